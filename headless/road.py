@@ -31,7 +31,10 @@ from synthroads_addon.base.text.table import text_table
 from synthroads_addon.scenario.scenario import load_scenario, scenario_names
 
 PARAMETERS, CENTRELINE, REPORT = "parameters.json", "centerline.geojson", "road.json"
+PICTURE = "deviation.png"
 _FIELDS = {"seed": "seed"}
+_LARGEST = 5.0
+"""Largest distance from a kink that a rounding may be asked for, m."""
 _SURFACE = ("lanes", "lateral profile")
 
 
@@ -41,6 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--list", action="store_true", help="list the file's roads or alignments, and write nothing")
     parser.add_argument("--output", type=Path, metavar="DIR", help="folder for the files (needed without --list)")
     add_axis_name_argument(parser)
+    text = "round kinks between elements by two clothoids at most M metres off (0.05); else they are refused"
+    parser.add_argument("--round-kinks", type=_distance, nargs="?", const=0.05, metavar="M", help=text)
     parser.add_argument("--only-axis", action="store_true", help="take the axis and its heights alone: no exit code 3")
     text = "print in which fields the road of an OpenDRIVE file differs from this parameter set"
     parser.add_argument("--against", type=Path, metavar="PARAMETERS", help=text)
@@ -64,7 +69,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     if arguments.output is None:
         raise InputError("--output", None, "is needed: a folder for the files (or --list)")
     scenario = load_scenario(arguments.scenario, all_changes(arguments, _FIELDS))
-    with output_folder(arguments.output, [PARAMETERS, CENTRELINE, REPORT], arguments.overwrite) as folder:
+    with output_folder(arguments.output, [PARAMETERS, CENTRELINE, REPORT, PICTURE], arguments.overwrite) as folder:
         from synthroads_addon.jobs.axis_source import axis_summary
         from synthroads_addon.jobs.generate import RoadSource
         from synthroads_addon.jobs.whole_road import has_whole_road
@@ -73,10 +78,15 @@ def run(arguments: argparse.Namespace) -> Outcome:
         from synthroads_addon.road.tessellation import sample_stations
 
         whole = has_whole_road(arguments.file) and not arguments.only_axis
-        road_file, axis_file = (arguments.file, None) if whole else (None, arguments.file)
-        place = axis_place(arguments)
         source = RoadSource(
-            scenario, None, axis_file, arguments.axis_name, place, pictures=arguments.output, road=road_file
+            scenario,
+            axis=None if whole else arguments.file,
+            axis_name=arguments.axis_name,
+            axis_place=axis_place(arguments),
+            pictures=arguments.output,
+            road=arguments.file if whole else None,
+            round_kinks=arguments.round_kinks,
+            deviations=folder / PICTURE,
         )
         parameters, told = source.read()
         report = told["axis"]
@@ -97,7 +107,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
 def _compare(arguments: argparse.Namespace) -> Outcome:
     """Return the fields in which a file's road differs from a parameter set; nothing is written."""
     if arguments.output is not None:
-        raise InputError("--output", str(arguments.output), "can't be given together with --against, which writes nothing")
+        raise InputError(
+            "--output", str(arguments.output), "can't be given together with --against, which writes nothing"
+        )
     from synthroads_addon.jobs.whole_road import differences_from
 
     scenario = load_scenario(arguments.scenario, all_changes(arguments, _FIELDS))
@@ -111,6 +123,17 @@ def _compare(arguments: argparse.Namespace) -> Outcome:
     if not cells:
         return 0, report, "no field differs"
     return 0, report, "\n".join(text_table(("field", "old", "new", ""), cells, ()))
+
+
+def _distance(text: str) -> float:
+    """Return a distance that kinks may be rounded by, m; raise argparse's error for any other."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 < value <= _LARGEST:
+        raise argparse.ArgumentTypeError(f"{text!r}: a distance above 0 and up to {_LARGEST:g} m is needed")
+    return value
 
 
 def _table(rows: list[dict[str, Any]]) -> str:

@@ -6,13 +6,13 @@ another alignment, give its elements back. Long axes are fitted in overlapping w
 curvature at which the one before was left, so time and memory stay proportional to the length.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from pydantic import ValidationError
 
 from ..base.arrays import Float, Int
@@ -20,6 +20,7 @@ from ..base.errors import InputError
 from ..base.machine import linear_algebra_on_one_thread
 from ..base.maps.crs import MapSystem
 from ..base.maps.places import Placement
+from ..base.remarks import warn
 from ..base.schema import round_value
 from ..road.alignment import Alignment, finite_array
 from ..road.axes.centerline import read_declared_axis
@@ -27,6 +28,7 @@ from ..road.parameters import AlignmentObject, HorizontalElement, VerticalPoint
 from ..road.profile import IntersectionPoint, Profile
 from ..scenario.road import RoadScenario
 from .chain import EQUAL, FREE, NEAR, ZERO, AxisData, Chain, ChainFit, Heights, Plan, Start, elevations, refine
+from .follow import followed, heights_followed
 from .search import Goal, descent, improve_fit, independent_count
 
 _WINDOW = 1200.0  # m
@@ -147,7 +149,9 @@ class AxisRefusedError(InputError):
         return type(self)(self.name, self.fit, picture)
 
 
-def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
+def fitted_axis(
+    path: Path, scenario: RoadScenario, seen: Callable[[AxisFit], None] | None = None
+) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the alignment fitted to the points of a file (CSV, GeoJSON), the scenario for it, and a report.
 
     Returns:
@@ -161,11 +165,15 @@ def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, Ro
     """
     place = Placement.of(MapSystem.of(scenario.epsg, scenario.height_epsg))
     points, declared = read_declared_axis(path, place)
-    return axis_of_points(path.name, points, declared, scenario)
+    return axis_of_points(path.name, points, declared, scenario, seen)
 
 
 def axis_of_points(
-    name: str, points: Float, declared: MapSystem | None, scenario: RoadScenario
+    name: str,
+    points: Float,
+    declared: MapSystem | None,
+    scenario: RoadScenario,
+    seen: Callable[[AxisFit], None] | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the alignment fitted to points (N, 3) of the scenario's coordinate system, m, as `fitted_axis` does.
 
@@ -174,14 +182,18 @@ def axis_of_points(
         points: in their order along the road.
         declared: system that the file names, whose heights count where the scenario's has none.
         scenario: limits of the road.
+        seen: gets the fit, to draw it.
     """
     system = MapSystem.of(scenario.epsg, scenario.height_epsg)
     heights = scenario.height_epsg
     if declared is not None and system.height_unit is None:
         heights = declared.height_epsg if declared.unit is None else declared.metric().height_epsg
     origin = np.round(points.mean(axis=0))
-    fit = fit_axis(points - origin)
+    fit = fit_axis(points - origin, follow=True)
     fit.check(name)
+    _tell_misfit(name, fit)
+    if seen:
+        seen(fit)
     alignment = alignment_object(fit)
     road = scenario.model_copy(
         update={"length": alignment.length, "map_origin": tuple(origin.tolist()), "height_epsg": heights}
@@ -194,6 +206,16 @@ def axis_of_points(
         "height": fit.height.to_dict(),
     }
     return alignment, road, report
+
+
+def _tell_misfit(name: str, fit: AxisFit) -> None:
+    """Warn where the road fitted to an axis is farther off its points than the fit aimed at (root mean square)."""
+    rows = (("across", fit.horizontal, fit.tolerance), ("in height", fit.height, _HEIGHT_SHARE * fit.tolerance))
+    for way, found, aim in rows:
+        if found.rms > aim:
+            text = "%s: the fitted road is off its points by %.1f cm %s (rms), which is to be %g cm at most: worst"
+            sizes = (100.0 * found.rms, way, 100.0 * aim, 100.0 * found.worst, found.worst_station)
+            warn(f"{text} %.1f cm at station %.0f m", name, *sizes)
 
 
 def alignment_object(fit: AxisFit) -> AlignmentObject:
@@ -242,7 +264,7 @@ def _written_radius(radius: float) -> float:
 
 
 @linear_algebra_on_one_thread()
-def fit_axis(points: ArrayLike, tolerance: float = 0.05, design_ends: bool = False) -> AxisFit:
+def fit_axis(points: ArrayLike, tolerance: float = 0.05, design_ends: bool = False, follow: bool = False) -> AxisFit:
     """Return the alignment and profile fitted to the points of an axis, with the points' deviations.
 
     Args:
@@ -252,6 +274,8 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05, design_ends: bool = Fal
             elements of a few metres follows (corners, jumps) are refused by `AxisFit.check` only.
         design_ends: let the alignment begin and end on a line or an arc, as roads are designed, wherever the points
             allow one as well as the clothoid that they end in. Too short a one is seen in no points.
+        follow: keep to points without noise (a design's) as near as their elements allow, with as many as that takes
+            (`fitting.follow`), instead of aiming at the tolerance's rms; points with noise are fitted as without it.
 
     Raises:
         InputError: wrong shape, a value that isn't finite, fewer than two distinct points, a tolerance not above 0.
@@ -261,20 +285,66 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05, design_ends: bool = Fal
         raise InputError("tolerance", tolerance, "a finite length above 0 m is needed")
     origin = np.append(np.round(given[:, :2].mean(axis=0)), 0.0)
     local, weights = _bridge_gaps(given - origin)
-    alignment, near = _fit_plan(local[:, :2], weights, _MARGIN * tolerance, design_ends)
+    real = weights == 1.0
+    found = _follow_plan(local, real, tolerance) if follow else None
+    alignment, near = found or _fit_plan(local[:, :2], weights, _MARGIN * tolerance, design_ends)
     reach = max(NEAR, 5.0 * float(np.median(np.diff(near))))
     station, offset = alignment.project_near(local[:, :2], near, reach)
     across = np.hypot(*(local[:, :2] - alignment.position(station)).T)
     # The road ends at its last point's foot: points before its begin or behind its end, out of their order, are off it.
     across = np.hypot(across, np.maximum(np.maximum(-station, station - alignment.length), 0.0))
-    profile = _fit_heights(station, local[:, 2], weights, alignment.length, _HEIGHT_SHARE * tolerance)
+    level = station, local[:, 2], weights, alignment.length, _HEIGHT_SHARE * tolerance
+    profile = _follow_heights(*level) if follow else _fit_heights(*level)
     heading = alignment.start_heading
     placed = Alignment(alignment.elements, alignment.x + origin[0], alignment.y + origin[1], heading)
-    real = weights == 1.0
     station, above = station[real], local[real, 2] - profile.elevation(station[real])
     aside, up = Deviations.of(station, across[real]), Deviations.of(station, above)
     signed = np.copysign(across, offset)[real]
     return AxisFit(placed, profile, aside, up, len(given), station, signed, above, tolerance)
+
+
+def _follow_plan(local: Float, real: NDArray[Any], tolerance: float) -> tuple[Alignment, Float] | None:
+    """Return what `_fit_plan` does, of points of a design (`follow.followed`); None where they aren't one's.
+
+    Args:
+        local: (N, 3) points and the light ones between them, m.
+        real: (N,) which are points.
+        tolerance: m.
+    """
+    points = local[real, :2]
+    try:
+        found = followed(points, tolerance)
+    except (InputError, np.linalg.LinAlgError):  # lines that turn on the spot
+        return None
+    if found is None:
+        return None
+    run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(local[:, :2], axis=0).T))])
+    if found.rank(points, tolerance)[0]:
+        usual, near = _fit_plan(points, np.ones(len(points)), _MARGIN * tolerance, False)
+        # Fewer elements are likelier than many where sparse points tell neither.
+        if np.abs(usual.project_near(points, near, NEAR)[1]).max() <= 0.5 * tolerance:
+            return usual, np.interp(run, run[real], near)
+    return found.alignment, np.interp(run, run[real], found.stations)
+
+
+def _follow_heights(station: Float, heights: Float, weights: Float, length: float, tolerance: float) -> Profile:
+    """Return the profile that heights of a design lie on, or that of `_fit_heights` where it is nearer to them."""
+    real = weights == 1.0
+    at, level = station[real], heights[real]
+
+    def worst(profile: Profile) -> float:
+        return float(np.abs(profile.elevation(at) - level).max())
+
+    found: Profile | None = None
+    if (np.diff(at) > 0.0).all():
+        try:
+            found = heights_followed(at, level, length)
+        except (InputError, np.linalg.LinAlgError):  # grades that no road has
+            found = None
+    if found is not None and worst(found) <= tolerance:
+        return found
+    usual = _fit_heights(station, heights, weights, length, tolerance)
+    return usual if found is None or worst(usual) <= worst(found) else found
 
 
 def _check_points(points: ArrayLike) -> Float:

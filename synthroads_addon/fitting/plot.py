@@ -1,8 +1,9 @@
 """A fitted axis as a picture: how far the points are from the road along it, across and in height."""
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,8 @@ from .fit import REFUSED_BEYOND, AxisFit, AxisRefusedError, Deviations
 FILE = "axis-fit.png"
 """Name of the picture beside a job's files."""
 _WIDTH, _PANEL, _ROW, _MARGIN, _LEFT = 1200, 200, 290, 16, 90
+_FINE = 1e-4
+"""Least reach of a picture of a file's line, m."""
 _RED: Color = (200, 30, 40)
 
 
@@ -56,36 +59,71 @@ def axis_picture(fit: AxisFit, name: str) -> Image.Image:
         fit: what was fitted.
         name: of the file with the points.
     """
-    rows = (("across, m (left of the line is up)", fit.across, fit.horizontal), ("height, m", fit.above, fit.height))
+    title = f"{name}: distance of {fit.points:,} points from the fitted road"
+    first, last = float(min(fit.stations.min(), 0.0)), float(max(fit.stations.max(), fit.alignment.length))
+    bounds = f"; refused beyond {REFUSED_BEYOND:g} times the tolerance of {fit.tolerance:g} m: {fit.limit:g} m"
+    rows = [
+        _Row(fit.stations, fit.across, fit.horizontal, 2.0 * fit.tolerance, fit.limit, bounds),
+        _Row(fit.stations, fit.above, fit.height, 2.0 * fit.tolerance, fit.limit, bounds),
+    ]
+    return _picture(title, rows, first, last)
+
+
+def deviation_picture(name: str, length: float, station: Float, across: Float, above: Float | None) -> Image.Image:
+    """Return the picture of how far a file's line is from the axis taken from it, in plan and in height.
+
+    Args:
+        name: of the file.
+        length: of the axis, m.
+        station, across: (N,) of places of the file's line, and their distance to the left of the axis, m.
+        above: (N,) their heights above the axis', m; None without heights.
+    """
+    title = f"{name}: distance of the file's line from the axis taken from it"
+    values = [across] if above is None else [across, above]
+    rows = [_Row(station, each, Deviations.of(station, each), _FINE, np.inf, "") for each in values]
+    return _picture(title, rows, 0.0, length)
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One diagram: values over stations, m; what it reaches at least, the limit, and what is said of it."""
+
+    station: Float
+    values: Float
+    deviations: Deviations
+    reach: float
+    limit: float
+    bounds: str
+
+
+def _picture(title: str, rows: Sequence[_Row], first: float, last: float) -> Image.Image:
+    names = ("across, m (left of the line is up)", "height, m")
 
     def paint(draw: ImageDraw.ImageDraw) -> None:
-        draw_text(draw, (_MARGIN, _MARGIN), f"{name}: distance of {fit.points:,} points from the fitted road", 19)
-        for number, (title, values, deviations) in enumerate(rows):
-            _draw_row(draw, 2 * _MARGIN + 50 + number * _ROW, fit, title, values, deviations)
+        draw_text(draw, (_MARGIN, _MARGIN), title, 19)
+        for number, row in enumerate(rows):
+            _draw_row(draw, 2 * _MARGIN + 50 + number * _ROW, names[number], row, first, last)
 
-    return draw_picture((_WIDTH, 2 * _ROW + 3 * _MARGIN + 20), paint)
+    return draw_picture((_WIDTH, len(rows) * _ROW + 3 * _MARGIN + 20), paint)
 
 
-def _draw_row(
-    draw: ImageDraw.ImageDraw, top: float, fit: AxisFit, title: str, values: Float, deviations: Deviations
-) -> None:
+def _draw_row(draw: ImageDraw.ImageDraw, top: float, title: str, row: _Row, first: float, last: float) -> None:
     """Draw one diagram of deviations over the station, with their limits where the points come near them."""
-    reach = 1.15 * max(deviations.worst, 2.0 * fit.tolerance)
+    deviations = row.deviations
+    reach = 1.15 * max(deviations.worst, row.reach)
     box = (_LEFT * SCALE, top * SCALE, (_WIDTH - _MARGIN) * SCALE, (top + _PANEL) * SCALE)
-    first, last = float(min(fit.stations.min(), 0.0)), float(max(fit.stations.max(), fit.alignment.length))
     frame = PlotFrame(draw, box, (first, -reach), (last, reach))
     draw_grid(frame, "station, m")
     draw_levels(frame, nice_step(reach / 2.0))
-    order = np.argsort(fit.stations, kind="stable")
-    draw.line(frame.at(fit.stations[order], values[order]), fill=LINES[0], width=SCALE, joint="curve")
+    order = np.argsort(row.station, kind="stable")
+    draw.line(frame.at(row.station[order], row.values[order]), fill=LINES[0], width=SCALE, joint="curve")
     ends = np.array([first, last])
-    for limit in (-fit.limit, fit.limit) if fit.limit < reach else ():
+    for limit in (-row.limit, row.limit) if row.limit < reach else ():
         draw.line(frame.at(ends, np.full(2, limit)), fill=_RED, width=SCALE)
-    worst = int(np.abs(values).argmax())
-    ((x, y),) = frame.at(fit.stations[worst : worst + 1], values[worst : worst + 1])
+    worst = int(np.abs(row.values).argmax())
+    ((x, y),) = frame.at(row.station[worst : worst + 1], row.values[worst : worst + 1])
     size = 5.0 * SCALE
     draw.ellipse([x - size, y - size, x + size, y + size], outline=_RED, width=2 * SCALE)
     draw_text(draw, (_LEFT, top - 26), title, 15, INK)
-    told = f"worst {deviations.worst:.3g} m at station {deviations.worst_station:,.1f} m, rms {deviations.rms:.3g} m; "
-    told += f"refused beyond {REFUSED_BEYOND:g} times the tolerance of {fit.tolerance:g} m: {fit.limit:g} m"
-    draw_text(draw, (_WIDTH - _MARGIN, top - 24), told, 13, SOFT, anchor="ra")
+    told = f"worst {deviations.worst:.3g} m at station {deviations.worst_station:,.1f} m, rms {deviations.rms:.3g} m"
+    draw_text(draw, (_WIDTH - _MARGIN, top - 24), told + row.bounds, 13, SOFT, anchor="ra")

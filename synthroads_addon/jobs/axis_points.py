@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from ..base.errors import InputError
 from ..base.maps.crs import LONGITUDE_LATITUDE, MapSystem, moved
 from ..base.maps.places import Placement, bring
 from ..base.remarks import assume, warn
-from ..fitting.fit import axis_of_points
+from ..fitting.fit import AxisFit, axis_of_points
 from ..road.axes.centerline import read_declared_axis
 from ..road.guidelines import StandardCrossSection
 from ..road.parameters import AlignmentObject
@@ -74,7 +74,12 @@ NOWHERE_ELSE = PathPlace()
 
 
 def axis_of_line(
-    path: Path, kind: str | None, scenario: RoadScenario, name: str | None, place: PathPlace
+    path: Path,
+    kind: str | None,
+    scenario: RoadScenario,
+    name: str | None,
+    place: PathPlace,
+    seen: Callable[[AxisFit], None] | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis fitted to a line of points of a file, the scenario for it, and a report.
 
@@ -84,6 +89,7 @@ def axis_of_line(
         scenario: limits of the road.
         name: of the line; None takes the longest that is a road by itself.
         place: where the axis lies beside the line.
+        seen: gets the fit, to draw it.
 
     Returns:
         as `jobs.axis_source.axis_from_file`; the report's ``heights`` is None where the file has none.
@@ -92,7 +98,7 @@ def axis_of_line(
         AxisRefusedError, MissingFileError, InputError: see there.
     """
     if kind is None:
-        return _axis_of_text(path, scenario, name, place)
+        return _axis_of_text(path, scenario, name, place, seen)
     line = chosen_line(path.name, read_points(path, kind), name)
     declared = None if line.system is None else MapSystem.read(line.system)
     scenario = _in_a_system(path.name, line, declared, scenario)
@@ -104,7 +110,7 @@ def axis_of_line(
     scenario, lost = with_mapped_section(f"{path.name}: {line.name}", line.section, scenario)
     points = _prepared(path.name, points, line.driven, scenario, place)
     sagitta = tell_spacing(path.name, outlines or [points])
-    axis, limits, report = axis_of_points(path.name, points, declared, scenario)
+    axis, limits, report = axis_of_points(path.name, points, declared, scenario, seen)
     left_out = [*line.left_out, *lost]
     if left_out:
         heads = ", ".join(text.partition(":")[0] for text in left_out)
@@ -117,14 +123,18 @@ def axis_of_line(
 
 
 def _axis_of_text(
-    path: Path, scenario: RoadScenario, name: str | None, place: PathPlace
+    path: Path,
+    scenario: RoadScenario,
+    name: str | None,
+    place: PathPlace,
+    seen: Callable[[AxisFit], None] | None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     if name is not None:
         raise InputError("--axis-name", name, "is for files of several roads or lines: this one has one of points")
     points, declared = read_declared_axis(path, Placement.of(MapSystem.of(scenario.epsg, scenario.height_epsg)))
     points = _prepared(path.name, points, has_times(path), scenario, place)
     sagitta = tell_spacing(path.name, [points])
-    axis, limits, report = axis_of_points(path.name, points, declared, scenario)
+    axis, limits, report = axis_of_points(path.name, points, declared, scenario, seen)
     return axis, limits, report | {"sagitta": round(sagitta, 4)}
 
 

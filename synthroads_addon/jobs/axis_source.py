@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +11,14 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.maps.crs import LONGITUDE_LATITUDE, MapSystem
 from ..base.random_streams import stream
-from ..base.remarks import assume, warn
-from ..fitting.fit import fit_heights
+from ..base.remarks import assume, collected_remarks, warn
+from ..fitting.fit import AxisFit, fit_heights
+from ..fitting.plot import axis_picture, deviation_picture
 from ..road.alignment import clip_offset, left_vectors
 from ..road.geometry import alignment_of
 from ..road.parameters import AlignmentObject
 from ..road.terrain import road_elevation_model
-from ..road_files.axis import road_axis
+from ..road_files.axis import line_deviation, road_axis
 from ..road_files.read import OF_POINTS, READERS, format_of, read_lines, read_points
 from ..sampling.alignment import sample_profile
 from ..scenario.road import RoadScenario
@@ -34,7 +36,13 @@ cuts and fills."""
 
 
 def axis_from_file(
-    path: Path, scenario: RoadScenario, seed: int, name: str | None = None, place: PathPlace = NOWHERE_ELSE
+    path: Path,
+    scenario: RoadScenario,
+    seed: int,
+    name: str | None = None,
+    place: PathPlace = NOWHERE_ELSE,
+    round_kinks: float | None = None,
+    picture: Path | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis of a file in local coordinates, the scenario that follows from it, and a report.
 
@@ -48,6 +56,8 @@ def axis_from_file(
         seed: of what is drawn.
         name: of the road or alignment in the file; None takes the longest.
         place: where the axis lies beside a line of points.
+        round_kinks: distance (m) from kinks of a file's elements that roundings may keep; None refuses kinks.
+        picture: file for a picture of how far the file's line or points are from the axis; none is drawn if None.
 
     Raises:
         AxisRefusedError: no road follows the points.
@@ -56,11 +66,17 @@ def axis_from_file(
     """
     kind = format_of(path)
     if kind not in READERS:
-        axis, limits, report = axis_of_line(path, kind, scenario, name, place)
+        fits: list[AxisFit] = []
+        axis, limits, report = axis_of_line(path, kind, scenario, name, place, fits.append)
+        if picture:
+            axis_picture(fits[0], path.name).save(picture, "PNG")
     elif place.given:
         raise InputError(place.given, path.name, f"is for lines of points and paths: {kind} says where its axis lies")
     else:
-        axis, limits, report = road_axis(path, scenario, name)
+        axis, limits, report = road_axis(path, scenario, name, round_kinks)
+        if picture:
+            with collected_remarks():  # they were made a line above
+                deviation_picture(path.name, *line_deviation(path, name, round_kinks)).save(picture, "PNG")
     _tell_overlap(path, axis, limits.half_width)
     if report.get("heights", ()) is None:
         vertical, source = _heights(axis, limits, seed)

@@ -71,6 +71,8 @@ class RoadSource:
     Attributes:
         pictures: folder for the picture of an axis that no road follows; none is drawn if None.
         road: OpenDRIVE file whose whole road is taken.
+        round_kinks: distance (m) from an axis' kinks that roundings may keep; None refuses kinks.
+        deviations: file for the picture of how far an axis' file is from it; none is drawn if None.
     """
 
     scenario: Scenario
@@ -80,6 +82,8 @@ class RoadSource:
     axis_place: PathPlace = NOWHERE_ELSE
     pictures: Path | None = None
     road: Path | None = None
+    round_kinks: float | None = None
+    deviations: Path | None = None
 
     def read(self) -> tuple[RoadParameters, dict[str, Any]]:
         """Return the road's parameters, and a report of the fit to a measured axis (empty without an axis)."""
@@ -87,11 +91,14 @@ class RoadSource:
         if self.parameters:
             return read_parameters(self.parameters), {}
         if self.road:
-            parameters, report = road_from_file(self.road, scenario, self.axis_name)
+            parameters, report = road_from_file(
+                self.road, scenario, self.axis_name, self.round_kinks, self.deviations
+            )
             return parameters, {"axis": report}
         if self.axis:
             with draw_refused_fit(self.pictures):
-                given = (self.axis, scenario.road, scenario.seed, self.axis_name, self.axis_place)
+                place = (self.axis_name, self.axis_place, self.round_kinks, self.deviations)
+                given = (self.axis, scenario.road, scenario.seed, *place)
                 axis, limits, report = axis_from_file(*given)
             return sample_road(limits, scenario.seed, scenario.title, axis), {"axis": report}
         return sample_road(scenario.road, scenario.seed, scenario.title), {}

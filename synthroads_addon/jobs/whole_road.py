@@ -22,6 +22,7 @@ from ..road_files.read import choose_line, format_of
 from ..sampling.road import sample_road
 from ..scenario.road import RoadScenario
 from ..scenario.scenario import Scenario
+from .axis_points import NOWHERE_ELSE
 from .axis_source import axis_from_file
 
 _BESIDE = 10.0
@@ -41,19 +42,22 @@ def road_from_file(path: Path, scenario: Scenario, name: str | None = None) -> t
         path: the file.
         scenario: what it doesn't say.
         name: of the road; None takes the longest that belongs to no junction.
+        round_kinks: distance (m) from kinks of its line that roundings may keep; None refuses kinks.
+        picture: file for a picture of how far the file's line is from the axis; none is drawn if None.
 
     Raises:
         MissingFileError, InputError: it can't be read, isn't OpenDRIVE, or a parameter set can't hold it.
     """
     if not has_whole_road(path):
         raise InputError(path.name, format_of(path), "OpenDRIVE is needed for a whole road: --axis takes other files")
+    line = (path, scenario.road, scenario.seed, name, NOWHERE_ELSE, round_kinks, picture)
     if choose_line(read_opendrive(path), name, path.name).lanes is None:
-        axis, limits, report = axis_from_file(path, scenario.road, scenario.seed, name)
+        axis, limits, report = axis_from_file(*line)
         return sample_road(limits, scenario.seed, scenario.title, axis), report
-    found = whole_road(path, scenario.road, name)
-    axis, limits, report = axis_from_file(path, scenario.road, scenario.seed, name)
+    found = whole_road(path, scenario.road, name, round_kinks)
+    axis, limits, report = axis_from_file(*line)
     if found.heights is not None:
-        axis, report["heights"] = _with_profile(path, axis, limits, found, name)
+        axis, report["heights"] = _with_profile(path, axis, limits, found, name, round_kinks)
     limits = _wide_enough(path, limits, found)
     parameters = sample_road(limits, scenario.seed, scenario.title, axis, found.given)
     report["surface"] = deviations(found.pavements, _lifted(parameters), found.stations, found.loss)
@@ -85,11 +89,16 @@ def _is_taken(text: str) -> bool:
 
 
 def _with_profile(
-    path: Path, axis: AlignmentObject, limits: RoadScenario, found: WholeRoad, name: str | None
+    path: Path,
+    axis: AlignmentObject,
+    limits: RoadScenario,
+    found: WholeRoad,
+    name: str | None,
+    round_kinks: float | None,
 ) -> tuple[AlignmentObject, dict[str, Any]]:
     """Return an axis with the heights that the road's planes give it, and what the report says of them."""
     assert found.heights is not None
-    heights = with_heights(choose_line(read_opendrive(path), name, path.name), found.heights)
+    heights = with_heights(choose_line(read_opendrive(path), name, path.name), found.heights, round_kinks)
     up = limits.map_origin[2]
     points = tuple(
         VerticalPoint(station=p.station, elevation=p.elevation - up, radius=p.radius) for p in heights.points

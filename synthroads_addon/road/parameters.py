@@ -8,6 +8,7 @@ positive to the left), slopes in percent, angles in degrees in JSON (`_deg`). Co
 from __future__ import annotations
 
 import builtins
+import itertools
 import math
 import re
 from pathlib import Path
@@ -117,6 +118,13 @@ class VerticalPoint(Model):
     radius: float = quantity(0.0, ge=0, unit="m", description="Radius of the crest or sag; 0 leaves a kink.")
 
 
+class StationEquation(Model):
+    """A place from which on the road's kilometres are counted anew."""
+
+    station: float = quantity(ge=0, unit="m", description="Where it is, from the begin of the centreline.")
+    ahead: float = quantity(ge=-1e8, le=1e8, unit="m", description="Count from there on.")
+
+
 class AlignmentObject(RoadObject):
     """The centreline: horizontal elements and vertical profile."""
 
@@ -128,6 +136,36 @@ class AlignmentObject(RoadObject):
     )
     horizontal: tuple[HorizontalElement, ...] = Field(min_length=1, description="Elements in order.")
     vertical: tuple[VerticalPoint, ...] = Field(min_length=1, description="Intersection points in order.")
+    first_station: float | None = quantity(
+        None, ge=-1e8, le=1e8, unit="m", description="Count of the road's kilometres at its begin; null: not known."
+    )
+    equations: tuple[StationEquation, ...] = Field((), description="Station equations, in order.")
+
+    @model_validator(mode="after")
+    def _equations_in_order(self) -> AlignmentObject:
+        if any(a.station >= b.station for a, b in itertools.pairwise(self.equations)):
+            raise ValueError("equations must be in the order of their stations")
+        return self
+
+    def counted(self, station: float) -> float:
+        """Return the count of the road's kilometres (m) at a station (m): what boards and plans say of the place."""
+        begin, count = 0.0, self.first_station or 0.0
+        for equation in self.equations:
+            if equation.station <= station:
+                begin, count = equation.station, equation.ahead
+        return count + station - begin
+
+    def counts(self, spacing: float) -> list[tuple[float, int]]:
+        """Return the stations (m) at which the count is a multiple of a spacing (m), and which multiple."""
+        borders = [0.0, *(equation.station for equation in self.equations), self.length]
+        found = []
+        for first, last in itertools.pairwise(borders):
+            at = self.counted(first)
+            for multiple in range(math.ceil(at / spacing - 1e-9), math.floor((at + last - first) / spacing + 1e-9) + 1):
+                place = first + multiple * spacing - at
+                if place < last or last == self.length:
+                    found.append((min(max(place, 0.0), self.length), multiple))
+        return found
 
     @model_validator(mode="after")
     def _no_longer_than_any_road(self) -> AlignmentObject:

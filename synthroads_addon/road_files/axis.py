@@ -17,8 +17,9 @@ from ..base.maps.places import check_heights
 from ..base.remarks import assume, warn
 from ..road.alignment import Alignment
 from ..road.parameters import AlignmentObject
+from ..road.profile import Profile
 from ..scenario.road import RoadScenario
-from .line import ExactAxis, RoadLine, alignment_object, exact_axis
+from .line import ExactAxis, RoadLine, alignment_object, exact_axis, heights_at, sampled
 from .read import choose_line, read_lines
 
 _ARM = 50.0
@@ -28,7 +29,7 @@ _NORTHERN, _SOUTHERN = 32600, 32700
 
 
 def road_axis(
-    path: Path, scenario: RoadScenario, name: str | None = None
+    path: Path, scenario: RoadScenario, name: str | None = None, round_kinks: float | None = None
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis of a road or alignment of a file, the scenario for it, and a report.
 
@@ -36,6 +37,7 @@ def road_axis(
         path: OpenDRIVE, LandXML or IFC, told by its content.
         scenario: whose coordinate system the road is to have, if it names one; else the file's is taken.
         name: of the line; None: the longest that belongs to no junction.
+        round_kinks: distance (m) from kinks that roundings may keep; None refuses them (`exact_axis`).
 
     Returns:
         the alignment in local coordinates; if the file has no heights its only vertical point is at 0 m, and the
@@ -50,13 +52,16 @@ def road_axis(
     line = choose_line(lines, name, path.name)
     if name is None and len(lines) > 1:
         assume("%s has %d roads: the longest, %r, is taken", path.name, len(lines), line.name)
-    axis = exact_axis(line)
+    axis = exact_axis(line, round_kinks)
+    for kink in axis.roundings:
+        text = "%s: the kink of %.4f rad at station %.3f m is rounded over %.2f m, %.1f mm off it"
+        warn(text, path.name, kink.angle, kink.station, kink.length, 1000.0 * kink.deviation)
     system, axis, placing = _placed(path, line, axis, scenario)
     middle = axis.alignment.position(0.5 * axis.alignment.length)
     height = axis.heights.points[0].elevation if axis.heights else 0.0
     origin = np.round([*middle, height])
     check_heights(path.name, np.array([[*middle, height]]))
-    alignment = _checked_object(path, axis, origin)
+    alignment = _checked_object(path, axis, origin, line)
     update: dict[str, Any] = {"length": alignment.length, "map_origin": tuple(origin.tolist())}
     if system is not None and system.epsg:
         update |= {"epsg": system.epsg, "height_epsg": scenario.height_epsg or system.height_epsg}
@@ -64,10 +69,30 @@ def road_axis(
     return alignment, road, report_of(path, line, axis) | {"placed": placing}
 
 
-def _checked_object(path: Path, axis: ExactAxis, origin: Float) -> AlignmentObject:
+def line_deviation(
+    path: Path, name: str | None = None, round_kinks: float | None = None
+) -> tuple[float, Float, Float, Float | None]:
+    """Return how far a file's line is from the axis that `road_axis` takes from it.
+
+    Returns:
+        the axis' length, and of places of the line at most a metre apart the stations, the distances to the left of
+        the axis and the heights above it (N,), m; None for the heights where the file has none.
+    """
+    line = choose_line(read_lines(path), name, path.name)
+    axis = exact_axis(line, round_kinks)
+    places, given = sampled(line)
+    station, across = axis.alignment.project(places)
+    station = np.clip(station, 0.0, axis.alignment.length)
+    if axis.heights is None:
+        return axis.alignment.length, station, across, None
+    profile = Profile(axis.heights.points)
+    return axis.alignment.length, station, across, heights_at(line, given) - profile.elevation(station)
+
+
+def _checked_object(path: Path, axis: ExactAxis, origin: Float, line: RoadLine) -> AlignmentObject:
     """Return an axis as the alignment of a parameter set; raise `InputError` for one beyond the limits of roads."""
     try:
-        return alignment_object(axis, origin)
+        return alignment_object(axis, origin, line)
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
         field = ".".join(str(part) for part in fault["loc"]) or "axis"
@@ -102,6 +127,16 @@ def report_of(path: Path, line: RoadLine, axis: ExactAxis) -> dict[str, Any]:
         "approximated": [
             {"kind": kind, "station": round(station, 3), "elements": count, "deviation": round(worst, 6)}
             for kind, station, count, worst in axis.approximated
+        ],
+        "rounded": [
+            {
+                "station": round(kink.station, 3),
+                "angle": round(kink.angle, 6),
+                "length": round(kink.length, 3),
+                "radius": round(1.0 / abs(kink.curvature), 3),
+                "deviation": round(kink.deviation, 6),
+            }
+            for kink in axis.roundings
         ],
         "left_out": list(line.left_out),
     }

@@ -19,7 +19,8 @@ from ..base.maps.crs import MapSystem
 from ..base.remarks import warn
 from .curves import Curve, transition
 from .heights import HeightPiece, circle
-from .line import SHORTEST, LineNames, PlanPiece, RoadLine
+from .line import SHORTEST, Equation, LineNames, PlanPiece, RoadLine
+from .xml_text import finite
 
 _SCHEMA = re.compile(rb"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'\s*\)\s*\)", re.IGNORECASE)
 _READ_AS = "IFC4X3_ADD2"
@@ -29,6 +30,10 @@ _KINDS = {
 }  # fmt: skip
 """Kinds of transition curves by IFC's names for them."""
 _LARGEST = 512 << 20
+_LONGEST = 200
+"""Letters of the library's own words in an error."""
+_DAMAGES = (ArithmeticError, AttributeError, LookupError, RecursionError, RuntimeError, TypeError, ValueError)
+"""Errors of the library, and of attributes that are missing or of another kind, in damaged files."""
 
 
 def read_ifc(path: Path) -> list[RoadLine]:
@@ -38,6 +43,20 @@ def read_ifc(path: Path) -> list[RoadLine]:
         MissingFileError, InputError: it can't be read, `ifcopenshell` isn't installed, or a segment isn't understood.
     """
     model = _open(path)
+    try:
+        return _lines(path, model)
+    except _DAMAGES as error:
+        raise InputError(path.name, None, f"a whole IFC file is needed ({_first_line(error)})") from None
+
+
+def _first_line(error: Exception) -> str:
+    """Return the first line of an error, shortened, its letters printable."""
+    said = next(iter(str(error).splitlines()), type(error).__name__)[:_LONGEST]
+    return "".join(letter if letter.isprintable() else "?" for letter in said)
+
+
+def _lines(path: Path, model: Any) -> list[RoadLine]:
+    """Return the alignments of a model, those that can't be used with their fault."""
     unit, angle = _units(model)
     system, place = _map(path, model, unit)
     names, lines = LineNames(), list[RoadLine]()
@@ -77,7 +96,7 @@ def _open(path: Path) -> Any:
             copy.write_bytes(data)
             return ifcopenshell.open(str(copy))
     except (RuntimeError, OSError, ValueError, ifcopenshell.Error) as error:
-        raise InputError(path.name, None, f"a readable IFC file is needed ({str(error).splitlines()[0]})") from None
+        raise InputError(path.name, None, f"a readable IFC file is needed ({_first_line(error)})") from None
 
 
 def _units(model: Any) -> tuple[float, float]:
@@ -180,14 +199,49 @@ def _alignment(alignment: Any, name: str, unit: float, angle: float) -> RoadLine
     left_out = [f"{len(profiles) - 1} more profiles"] if len(profiles) > 1 else []
     left_out += ["the cant of a railway"] if cants else []
     start = getattr(plans[0], "StartDistAlong", None)
+    first, equations = _stationing(layouts, unit)
+    if first is None:
+        first = 0.0 if start is None else float(start) * unit
     return RoadLine(
         name=name,
         source="IFC alignment",
         pieces=tuple(pieces),
         heights=tuple(heights),
-        first_station=0.0 if start is None else float(start) * unit,
+        first_station=first,
+        equations=equations,
         left_out=tuple(left_out),
     )
+
+
+def _stationing(nested: list[Any], unit: float) -> tuple[float | None, tuple[Equation, ...]]:
+    """Return the count at the begin (m; None without referents) and the station equations that referents give."""
+    rows = []
+    for referent in nested:
+        if not referent.is_a("IfcReferent"):
+            continue
+        count, back = (_stated(referent, name) for name in ("Station", "IncomingStation"))
+        location = getattr(getattr(referent.ObjectPlacement, "RelativePlacement", None), "Location", None)
+        along = getattr(getattr(location, "DistanceAlong", None), "wrappedValue", None)
+        if count is not None and along is not None:
+            rows.append((float(along) * unit, count * unit, None if back is None else back * unit))
+    if not rows:
+        return None, ()
+    rows.sort(key=lambda row: row[0])
+    station, count, back = rows[0]
+    equations = tuple(Equation(at, before, there) for at, there, before in rows if before is not None)
+    return (count if back is None else back) - station, equations
+
+
+def _stated(referent: Any, name: str) -> float | None:
+    """Return a number of a referent's Pset_Stationing; None without it."""
+    for relation in getattr(referent, "IsDefinedBy", ()) or ():
+        definition = getattr(relation, "RelatingPropertyDefinition", None)
+        if getattr(definition, "Name", None) != "Pset_Stationing":
+            continue
+        for each in getattr(definition, "HasProperties", ()) or ():
+            if each.Name == name and each.is_a("IfcPropertySingleValue") and each.NominalValue is not None:
+                return finite(f"Pset_Stationing {name}", each.NominalValue.wrappedValue)
+    return None
 
 
 def _plan_piece(row: Any, run: float, unit: float, angle: float) -> PlanPiece | None:

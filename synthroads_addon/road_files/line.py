@@ -14,10 +14,11 @@ from ..base.arrays import Float
 from ..base.errors import InputError
 from ..base.maps.crs import MapSystem
 from ..road.alignment import Alignment, Element
-from ..road.parameters import LONGEST_ROAD, AlignmentObject, HorizontalElement, VerticalPoint
+from ..road.parameters import LONGEST_ROAD, AlignmentObject, HorizontalElement, StationEquation, VerticalPoint
 from ..road.profile import IntersectionPoint
 from .curves import Curve, as_elements
 from .heights import HeightPiece, Heights, as_parabolas
+from .kinks import Rounding, rounded
 
 GAP, KINK = 1e-3, 1e-4
 """Gaps (m) and changes of direction (rad) between elements up to which they are joined without a word."""
@@ -127,6 +128,7 @@ class ExactAxis:
         kink, kink_station: largest change of direction there (rad), and where.
         drift, drift_station: largest distance (m) of the chained elements from the starts that the file gives them.
         starts: stations along the alignment at which the file's pieces begin, m.
+        roundings: kinks that two clothoids stand for.
     """
 
     alignment: Alignment
@@ -139,6 +141,7 @@ class ExactAxis:
     drift: float
     drift_station: float
     starts: tuple[float, ...] = ()
+    roundings: tuple[Rounding, ...] = ()
 
 
 @dataclass
@@ -148,12 +151,19 @@ class _Chain:
     approximated: list[tuple[str, float, int, float]] = field(default_factory=list)
 
 
-def exact_axis(line: RoadLine) -> ExactAxis:
+def exact_axis(line: RoadLine, round_kinks: float | None = None) -> ExactAxis:
     """Return a line's alignment, chained from its first element's start, and its heights.
+
+    Args:
+        line: of a file.
+        round_kinks: largest distance (m) from a kink that two clothoids may keep in its place; None refuses kinks.
 
     Raises:
         InputError: elements don't join (`GAP`, `KINK`), or there are none.
     """
+    roundings: list[Rounding] = []
+    if round_kinks is not None and line.pieces:
+        line, roundings = rounded(line, _joints(line.pieces)[1], KINK, round_kinks, SHARPEST)
     chain = _Chain()
     run = 0.0
     for piece in line.pieces:
@@ -180,6 +190,7 @@ def exact_axis(line: RoadLine) -> ExactAxis:
         tuple(chain.approximated),
         *(gaps[worst_gap], at[worst_gap], kinks[worst_kink], at[worst_kink], drift[worst_drift], at[worst_drift]),
         starts=tuple(chain.starts),
+        roundings=tuple(roundings),
     )
     _refuse_broken(line, axis)
     return axis
@@ -221,6 +232,34 @@ def end_pose(piece: PlanPiece) -> tuple[float, float, float]:
     return float(position[0]), float(position[1]), float(heading)
 
 
+def sampled(line: RoadLine) -> tuple[Float, Float]:
+    """Return places (N, 2) along a line's pieces as the file has them, a metre or less apart, and stations (N,), m."""
+    places, stations = [], []
+    for piece in line.pieces:
+        long = piece.shape.length if isinstance(piece.shape, Curve) else piece.length
+        along = np.linspace(0.0, long, max(2, min(_SAMPLES, math.ceil(long) + 1)))
+        if isinstance(piece.shape, Curve):
+            inner = piece.shape.positions(along) @ np.array([1.0, 1j]) * np.exp(1j * piece.heading)
+            places.append(np.column_stack([inner.real, inner.imag]) + [piece.x, piece.y])
+        else:
+            alone = Alignment([Element(piece.length, *piece.shape)], piece.x, piece.y, piece.heading)
+            places.append(alone.position(along))
+        stations.append(piece.station + along * (piece.length / long))
+    return np.vstack(places), np.concatenate(stations)
+
+
+def heights_at(line: RoadLine, station: Float) -> Float:
+    """Return the file's heights (N,), m, at stations (N,) of a line with heights; end grades go on beyond its ends."""
+    starts = np.array([piece.start for piece in line.heights])
+    owner = np.clip(np.searchsorted(starts, station, "right") - 1, 0, len(starts) - 1)
+    rows = np.array([(h.start, h.end, h.elevation, h.grade, h.square, h.cube) for h in line.heights])[owner]
+    first, last, level, grade, square, cube = rows.T
+    u = np.clip(station, first, last) - first
+    beyond = station - first - u
+    there = level + u * (grade + u * (square + u * cube))
+    return np.asarray(there + beyond * (grade + u * (2.0 * square + 3.0 * u * cube)))
+
+
 def _drift(alignment: Alignment, pieces: Sequence[PlanPiece], starts: Sequence[float]) -> list[float]:
     """Return how far (m) the chained elements are from the start of each piece."""
     given = np.array([(piece.x, piece.y) for piece in pieces])
@@ -255,11 +294,19 @@ def _refuse_broken(line: RoadLine, axis: ExactAxis) -> None:
         raise InputError(f"{name}: gap, m", round(axis.gap, 6), allowed)
     if axis.kink > KINK:
         allowed = f"elements must join within {KINK:g} rad, those at station {axis.kink_station:.3f} m are a kink"
+        allowed += ": --round-kinks rounds those that two clothoids can follow"
         raise InputError(f"{name}: change of direction, rad", round(axis.kink, 6), allowed)
 
 
-def alignment_object(axis: ExactAxis, origin: Float) -> AlignmentObject:
-    """Return an axis as the alignment of a parameter set about an origin (3,), m, with the instance number 1."""
+def alignment_object(axis: ExactAxis, origin: Float, line: RoadLine | None = None) -> AlignmentObject:
+    """Return an axis as the alignment of a parameter set about an origin (3,), m, with the instance number 1.
+
+    Args:
+        axis: what the line became.
+        origin: m.
+        line: whose count of stations it has; None: none.
+    """
+    equations = [] if line is None else [e for e in line.equations if 0.0 <= e.station <= axis.alignment.length]
     alignment = axis.alignment
     elements = tuple(
         HorizontalElement.between(element.length, element.curvature_start, element.curvature_end)
@@ -279,4 +326,6 @@ def alignment_object(axis: ExactAxis, origin: Float) -> AlignmentObject:
             VerticalPoint(station=point.station, elevation=point.elevation - float(origin[2]), radius=point.radius)
             for point in points
         ),
+        first_station=None if line is None else line.first_station,
+        equations=tuple(StationEquation(station=e.station, ahead=e.ahead) for e in equations),
     )

@@ -18,10 +18,13 @@ from synthroads_addon.scenario.road import RoadScenario
 from tests.helpers.files.mutations import TOKENS, accepted, damaged, for_all, fuzz
 from tests.helpers.roads.written_lines import opendrive, xodr_road
 from tests.helpers.roads.written_maps import Map, bend, beside, sbet, vector_file, well_known_binary
+from tests.road_files.test_ifc import MAP
+from tests.road_files.test_ifc import written as ifc_written
 from tests.road_files.test_landxml import KINDS, written
 from tests.road_files.test_opendrive import main_road
 
 _NUMBER = re.compile(rb"(?<=[\"'> ])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?(?=[\"'< ])")
+_IFC_NUMBER = re.compile(rb"(?<=[(,])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?(?=[,)])")
 _ODD = (
     *(b"0", b"-1", b"1e-12", b"1e-300", b"1e300", b"1e12", b"-1e12", b"1e6", b"nan", b"inf", b"", b"x", b"0.1", b"400"),
     *(b"1e5", b"-1e5", b"3.14159", b"1e-4", b"1e-6", b"9" * 400),
@@ -52,7 +55,7 @@ def with_odd_numbers(files: list[bytes]) -> st.SearchStrategy[bytes]:
 
     def changed(data: bytes, changes: list[tuple[int, bytes]]) -> bytes:
         for at, value in changes:
-            found = list(_NUMBER.finditer(data))
+            found = list((_IFC_NUMBER if data.startswith(b"ISO-10303-21") else _NUMBER).finditer(data))
             place = found[at % len(found)]
             data = data[: place.start()] + value + data[place.end() :]
         return data
@@ -66,6 +69,10 @@ def files_of(kind: str, folder: Path) -> list[bytes]:
         for name in KINDS:
             written(folder / f"{name}.xml", name, profile=PROFILE)
         return [(folder / f"{name}.xml").read_bytes() for name in KINDS]
+    if kind == "ifc":
+        for n, (schema, rest) in enumerate((("IFC4X3_ADD2", ""), ("IFC4X3_RC3", MAP.format(1.0, 0.2)))):
+            ifc_written(folder / f"{n}.ifc", schema, 1.0 - 0.5 * n, rest)
+        return [(folder / f"{n}.ifc").read_bytes() for n in range(2)]
     cubic = '<paramPoly3 pRange="normalized" aU="0" bU="90" cU="1" dU="2" aV="0" bV="0" cV="9" dV="-3"/>'
     curves = (
         [(0.0, 92.0, (0.0, 0.0, 0.2), cubic)],
@@ -76,7 +83,7 @@ def files_of(kind: str, folder: Path) -> list[bytes]:
 
 
 @fuzz(40, 2500)
-@pytest.mark.parametrize("kind", ["xodr", "xml"])
+@pytest.mark.parametrize("kind", ["xodr", "xml", "ifc"])
 def test_roads_with_odd_numbers(tmp_path: Path, kind: str, count: int) -> None:
     path = tmp_path / f"road.{kind}"
 
@@ -88,7 +95,7 @@ def test_roads_with_odd_numbers(tmp_path: Path, kind: str, count: int) -> None:
 
 
 @fuzz(25, 2500)
-@pytest.mark.parametrize("kind", ["xodr", "xml"])
+@pytest.mark.parametrize("kind", ["xodr", "xml", "ifc"])
 def test_damaged_roads(tmp_path: Path, kind: str, count: int) -> None:
     path = tmp_path / f"road.{kind}"
 

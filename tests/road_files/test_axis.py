@@ -145,7 +145,7 @@ def test_the_command_writes_a_road_that_comes_back_exactly(tmp_path: Path, capsy
     assert main(["road", str(path), "--output", str(tmp_path / "out"), "--seed", "4"]) == 0
     assert ["1 line", "2 spiral", "1 arc"][1] in capsys.readouterr().out
     assert sorted(file.name for file in (tmp_path / "out").iterdir()) == [
-        "centerline.geojson", "parameters.json", "road.json",
+        "centerline.geojson", "deviation.png", "parameters.json", "road.json",
     ]  # fmt: skip
     parameters = read_parameters(tmp_path / "out/parameters.json")
     found = RoadGeometry(parameters)

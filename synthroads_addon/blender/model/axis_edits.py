@@ -64,7 +64,9 @@ def edited_axis(geometry: RoadGeometry, backbone: bpy.types.Object, place: Float
     if len(points) < 2:
         raise InputError("Backbone", len(points), "needs two points at least: undo the edit, or build the road again")
     fit = fit_axis(points)
-    alignment = alignment_object(fit).model_copy(update={"instance": before.instance})
+    alignment = alignment_object(fit).model_copy(
+        update={"instance": before.instance, "first_station": before.first_station, "equations": before.equations}
+    )
     if np.abs(points[:, :2] - there[:, :2]).max() < _STILL:
         # Only heights were changed: curves stay, exactly.
         kept = {name: getattr(before, name) for name in ("start_x", "start_y", "start_heading_deg", "horizontal")}

@@ -56,13 +56,16 @@ class WholeRoad:
         return np.interp(station, *self.exact)
 
 
-def whole_road(path: Path, scenario: RoadScenario, name: str | None = None) -> WholeRoad:
+def whole_road(
+    path: Path, scenario: RoadScenario, name: str | None = None, round_kinks: float | None = None
+) -> WholeRoad:
     """Return all that an OpenDRIVE file says of a road, or of the two roads that are its carriageways.
 
     Args:
         path: the file.
         scenario: what it doesn't say.
         name: of the road; None: the longest that belongs to no junction.
+        round_kinks: distance (m) from kinks of its line that roundings may keep; None refuses kinks.
 
     Raises:
         MissingFileError, InputError: it can't be read, or a parameter set can't hold it.
@@ -81,7 +84,7 @@ def whole_road(path: Path, scenario: RoadScenario, name: str | None = None) -> W
     roads = [road, *_partner(lines, line, elements, road, up)]
     if len(roads) > 1:
         assume("%s: road %r runs along the same line: both are one road", path.name, roads[1].name)
-    axis = exact_axis(line)
+    axis = exact_axis(line, round_kinks)
     exact = np.array(
         [
             [*(piece.station for piece in line.pieces), line.pieces[-1].station + line.pieces[-1].length],
@@ -157,6 +160,6 @@ def _verge(scenario: RoadScenario) -> Verge:
     return Verge(STANDARD_CROSS_SECTIONS[section].verge if isinstance(section, str) else section.verge)
 
 
-def with_heights(line: RoadLine, heights: tuple[HeightPiece, ...]) -> Any:
+def with_heights(line: RoadLine, heights: tuple[HeightPiece, ...], round_kinks: float | None = None) -> Any:
     """Return a line's heights from cubics in its file's stations, as intersections along its axis."""
-    return exact_axis(replace(line, heights=heights)).heights
+    return exact_axis(replace(line, heights=heights), round_kinks).heights

@@ -37,7 +37,8 @@ _CABINET_HALF = 1.0  # m
 def plan_periodic(layout: Layout, rng: np.random.Generator) -> None:
     """Place kilometre boards every half kilometre and emergency phones every 2 km, in pairs on both sides.
 
-    The kilometres rise or fall with the stations. Phones keep away from boards: their spacing is a multiple of theirs.
+    The kilometres rise or fall with the stations, or are those that the road has; boards then stand at its half ones.
+    Phones keep away from boards: their spacing is a multiple of theirs.
     """
     furniture = layout.site.scenario.furniture
     board = KILOMETRE_BOARD_SPACING * rng.random()
@@ -47,9 +48,13 @@ def plan_periodic(layout: Layout, rng: np.random.Generator) -> None:
     between = BESIDE_BOARD + (KILOMETRE_BOARD_SPACING - 2.0 * BESIDE_BOARD) * rng.random()
     phone = (board + between + pick(rng, range(4)) * KILOMETRE_BOARD_SPACING) % EMERGENCY_PHONE_SPACING
     if furniture.kilometre_boards:
-        for number, station in enumerate((board + KILOMETRE_BOARD_SPACING * np.arange(count)).tolist()):
+        stations = (board + KILOMETRE_BOARD_SPACING * np.arange(count)).tolist()
+        boards = [(station, begin + step * number) for number, station in enumerate(stations)]
+        if layout.site.alignment.first_station is not None:
+            boards = [row for row in layout.site.alignment.counts(KILOMETRE_BOARD_SPACING) if row[1] >= 0]
+        for station, halves in boards:
             for roadside in layout.sides.values() if station <= layout.length else ():
-                put_kilometre_board(roadside, station, begin + step * number)
+                put_kilometre_board(roadside, station, halves)
     if furniture.emergency_phones:
         count = int(layout.length / EMERGENCY_PHONE_SPACING) + 1
         for station in (phone + EMERGENCY_PHONE_SPACING * np.arange(count)).tolist():

@@ -294,8 +294,14 @@ class _Referent:
 
 def _write_referents(ifc: IfcFile, geometry: RoadGeometry, axis: Axis) -> None:
     """Nest IfcReferents in the alignment by station: its start, crossfall points and width changes."""
-    zero = {"Station": ifc.add("IfcLengthMeasure", 0.0)}
-    referents = [_Referent(0.0, "station-0", "STATION", "Pset_Stationing", zero)]
+    count = geometry.parameters.alignment
+    begin = {"Station": ifc.add("IfcLengthMeasure", rounded(count.counted(0.0)))}
+    referents = [_Referent(0.0, "station-0", "STATION", "Pset_Stationing", begin)]
+    for number, equation in enumerate(count.equations):
+        back = count.counted(float(np.nextafter(equation.station, -np.inf)))
+        values = {"IncomingStation": back, "Station": equation.ahead}
+        measures = {key: ifc.add("IfcLengthMeasure", rounded(value)) for key, value in values.items()}
+        referents.append(_Referent(equation.station, f"equation-{number}", "STATION", "Pset_Stationing", measures))
     for name, carriageway in geometry.parameters.of_type(Carriageway).items():
         referents += _superelevation(ifc, name, carriageway)
         referents += _widths(ifc, geometry, name, carriageway)
@@ -306,7 +312,7 @@ def _write_referents(ifc: IfcFile, geometry: RoadGeometry, axis: Axis) -> None:
         referent = ifc.add_root("IfcReferent", item.name, **named, PredefinedType=item.kind)
         ifc.add_properties(referent, item.properties, item.values)
         if item.kind != "STATION":
-            ifc.add_properties(referent, "Pset_Stationing", {"Station": ifc.value(item.station, "m")})
+            ifc.add_properties(referent, "Pset_Stationing", {"Station": ifc.value(count.counted(item.station), "m")})
         ifc.note_relation("IfcRelNests", axis.alignment, [referent], "referents")
 
 

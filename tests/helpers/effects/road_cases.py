@@ -121,6 +121,7 @@ NODES = {"colour.source": "nodes"}
 CHECKERED = {"materials.textures": [CHECKS]}
 OTHER_ROAD = Case(value="left")
 OTHER_TURNOUT = Case(value="entry")
+COUNTED = {"objects.axis.equations": [{"station": 40.0, "ahead": 5000.0}]}
 BAY = TURNOUTS["bay"]
 CUTTING = {
     "objects.terrain.embankment_height": -3.0,
@@ -149,6 +150,10 @@ CASES: dict[str, Case] = {
     "metadata.referenceSystem": Case(value="https://www.opengis.net/def/crs/EPSG/0/25833"),
     "metadata.heightReferenceSystem": Case(value="https://www.opengis.net/def/crs/EPSG/0/7837"),
     "Alignment.vertical[].radius": Case(at="Alignment.vertical[1].radius"),
+    "Alignment.first_station": Case(value=12_000.0),
+    "Alignment.equations": Case(value=[{"station": 40.0, "ahead": 5000.0}]),
+    "Alignment.equations[].station": Case(given=COUNTED, value=50.0),
+    "Alignment.equations[].ahead": Case(given=COUNTED, value=7000.0),
     "Carriageway.side": Case(owner="right", value="left", also={"objects.left.side": "right"}),
     **{f"Carriageway.{name}": Case(owner="right") for name in (*WIDTHS, "lanes[].width")},
     "Carriageway.lanes[].kind": Case(scan={"scan.platform": {"kind": "vehicle", "speed": 10.0}}),
