@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from synthroads_addon.base.noise import noise_field  # noqa: E402
+from synthroads_addon.base.arithmetic.noise import noise_field  # noqa: E402
 from synthroads_addon.base.random_streams import stream  # noqa: E402
 from synthroads_addon.cloud.points import PointBlock  # noqa: E402
 from synthroads_addon.scanning.relief.micro_relief import OCTAVES, RELIEF, BeamEnds, MicroRelief, shift_by_relief  # noqa: E402

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.arithmetic.noise import noise_field
 from ..base.arrays import Float, Index
 from ..base.errors import InputError
-from ..base.noise import noise_field
 from ..materials.reflectance import LUMINANCE, facet_terms
 from ..materials.surfaces import OCTAVES
 from ..materials.table import Material

@@ -90,16 +90,13 @@ class RoadSource:
         scenario = self.scenario
         if self.parameters:
             return read_parameters(self.parameters), {}
+        wanted = (self.axis_name, self.axis_place, self.round_kinks, self.deviations)
         if self.road:
-            parameters, report = road_from_file(
-                self.road, scenario, self.axis_name, self.round_kinks, self.deviations
-            )
+            parameters, report = road_from_file(self.road, scenario, *wanted)
             return parameters, {"axis": report}
         if self.axis:
             with draw_refused_fit(self.pictures):
-                place = (self.axis_name, self.axis_place, self.round_kinks, self.deviations)
-                given = (self.axis, scenario.road, scenario.seed, *place)
-                axis, limits, report = axis_from_file(*given)
+                axis, limits, report = axis_from_file(self.axis, scenario.road, scenario.seed, *wanted)
             return sample_road(limits, scenario.seed, scenario.title, axis), {"axis": report}
         return sample_road(scenario.road, scenario.seed, scenario.title), {}
 

@@ -22,7 +22,7 @@ from ..road_files.read import choose_line, format_of
 from ..sampling.road import sample_road
 from ..scenario.road import RoadScenario
 from ..scenario.scenario import Scenario
-from .axis_points import NOWHERE_ELSE
+from .axis_points import NOWHERE_ELSE, PathPlace
 from .axis_source import axis_from_file
 
 _BESIDE = 10.0
@@ -35,13 +35,21 @@ def has_whole_road(path: Path) -> bool:
     return format_of(path) == "OpenDRIVE"
 
 
-def road_from_file(path: Path, scenario: Scenario, name: str | None = None) -> tuple[RoadParameters, dict[str, Any]]:
+def road_from_file(
+    path: Path,
+    scenario: Scenario,
+    name: str | None = None,
+    place: PathPlace = NOWHERE_ELSE,
+    round_kinks: float | None = None,
+    picture: Path | None = None,
+) -> tuple[RoadParameters, dict[str, Any]]:
     """Return the road of an OpenDRIVE file as a parameter set, and a report of its axis and of what became of the rest.
 
     Args:
         path: the file.
         scenario: what it doesn't say.
         name: of the road; None takes the longest that belongs to no junction.
+        place: where the axis lies beside a line of points: refused, as the file says where it is.
         round_kinks: distance (m) from kinks of its line that roundings may keep; None refuses kinks.
         picture: file for a picture of how far the file's line is from the axis; none is drawn if None.
 
@@ -50,7 +58,7 @@ def road_from_file(path: Path, scenario: Scenario, name: str | None = None) -> t
     """
     if not has_whole_road(path):
         raise InputError(path.name, format_of(path), "OpenDRIVE is needed for a whole road: --axis takes other files")
-    line = (path, scenario.road, scenario.seed, name, NOWHERE_ELSE, round_kinks, picture)
+    line = (path, scenario.road, scenario.seed, name, place, round_kinks, picture)
     if choose_line(read_opendrive(path), name, path.name).lanes is None:
         axis, limits, report = axis_from_file(*line)
         return sample_road(limits, scenario.seed, scenario.title, axis), report

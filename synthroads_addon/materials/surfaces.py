@@ -7,7 +7,7 @@ negative and ``spread_above`` elsewhere. M makes the mean of the factor 1, so th
 mean over its surface. Two spreads are what it takes to hold the quartiles and the 90th percentile of real asphalt and
 real markings; see `docs/calibration.md`.
 
-The field is `base.noise.noise_field`, of position alone: a place has the same factor in every strip, for every scanner
+The field is `base.arithmetic.noise.noise_field`, of position alone: a place has the same factor in every strip, for every scanner
 and every order of the blocks. It is evaluated once per return, where the ray met the surface that gave most of it: the
 factor is that of the footprint as a whole, and grain much finer than the footprint is not described by it.
 """
@@ -20,8 +20,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arithmetic.noise import noise_field
 from ..base.arrays import Float
-from ..base.noise import noise_field
 from .reflectance import facet_terms, reflectivity, returned_share
 from .table import Material
 

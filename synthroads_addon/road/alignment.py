@@ -21,9 +21,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..base.arithmetic.loops import point_loops
 from ..base.arrays import Float, Int
 from ..base.errors import InputError
-from ..base.loops import point_loops
 
 Kind = Literal["line", "arc", "clothoid"]
 

@@ -8,9 +8,9 @@ from itertools import islice
 from threading import current_thread, main_thread
 from typing import Any, Protocol, TypeAlias, TypeVar
 
-from ..base.loops import loops_by
+from ..base.arithmetic.loops import loops_by
+from ..base.arithmetic.noise import noise_by
 from ..base.machine import available_cores, freed_memory_kept, linear_algebra_on_one_thread
-from ..base.noise import noise_by
 from ..base.progress import StageTimer
 from .blocks import Block
 from .colour.colour import LayerSource

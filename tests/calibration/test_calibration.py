@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from headless.cli import main
+from synthroads_addon.base.arithmetic.noise import noise_field
 from synthroads_addon.base.arrays import otsu_threshold
 from synthroads_addon.base.errors import InputError, OutputError
-from synthroads_addon.base.noise import noise_field
 from synthroads_addon.calibration.expected import (
     Expectation,
     ReceiverModel,

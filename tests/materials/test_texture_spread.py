@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from synthroads_addon.base.noise import noise_field
+from synthroads_addon.base.arithmetic.noise import noise_field
 from synthroads_addon.materials import surfaces as module
 from synthroads_addon.materials.surfaces import OCTAVES, mean_over_median, spread_factors, surfaces_of
 from synthroads_addon.materials.table import Material, materials

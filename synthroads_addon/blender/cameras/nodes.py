@@ -10,8 +10,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ...base.arithmetic.loops import point_loops
 from ...base.arrays import AnyArray, Bool, Float32, Index, UInt16, take_rows
-from ...base.loops import point_loops
 from ...base.turns.main_thread import MainThreadCalls
 from ...scanning.colour.colour import (
     FROM_NODES,

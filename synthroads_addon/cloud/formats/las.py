@@ -21,10 +21,10 @@ import numpy as np
 from laspy.vlrs.known import WktCoordinateSystemVlr
 from numpy.typing import NDArray
 
+from ...base.arithmetic.loops import PackedPoints, point_loops
 from ...base.arrays import AnyArray, Float
 from ...base.classes import ClassScheme, asprs_scheme, class_scheme, numbered_scheme, stored_scheme
 from ...base.errors import InputError, OutputError
-from ...base.loops import PackedPoints, point_loops
 from ...base.schema import canonical_json
 from ..colours import SIXTEEN_BITS, sixteen_bits
 from ..flags import FLAGS

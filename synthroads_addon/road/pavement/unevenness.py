@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
+from ...base.arithmetic.noise import DECAY, noise_field
 from ...base.arrays import Float
-from ...base.noise import DECAY, noise_field
 
 LONGEST, OCTAVES = 16.0, 6
 """Longest wavelength of the field (m) and its octaves, down to half a metre: longer waves are the profile's, shorter

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.arithmetic.loops import PointLoops, point_loops
 from ...base.arrays import Float, Float32, dot_rows
-from ...base.loops import PointLoops, point_loops
 
 _COSINES, _ROUGHNESSES, _LEVELS = 24, 16, 12
 """Grid of the tables: cosine of the view, roughness, and root of the reflectance at a right angle."""

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.arithmetic.loops import point_loops
 from ...base.arrays import Float, Float32, Index, take_rows
-from ...base.loops import point_loops
 from ..scene.mesh import SceneMesh
 from ..scene.motion import MovingMesh
 from ..scene.surface_values import SurfaceInput, corner_shares

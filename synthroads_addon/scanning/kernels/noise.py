@@ -1,4 +1,4 @@
-"""The random field of relief, waves and brightness in a compiled loop, beside `noise.c`: the bytes of `base.noise`."""
+"""The random field of relief, waves and brightness in a compiled loop, beside `noise.c`: the bytes of `base.arithmetic.noise`."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from functools import cache
 
 import numpy as np
 
+from ...base.arithmetic.noise import SPREAD, Hash
 from ...base.arrays import Float, Float32
-from ...base.noise import SPREAD, Hash
 from .library import NoKernelError, load_kernel
 
 _POINTER, _INT64 = ctypes.c_void_p, ctypes.c_int64
 
 
 class CompiledNoise:
-    """The sums of octaves of `base.noise.noise_field`, compiled; any threads may use it side by side.
+    """The sums of octaves of `base.arithmetic.noise.noise_field`, compiled; any threads may use it side by side.
 
     Raises:
         NoKernelError: this machine has none.

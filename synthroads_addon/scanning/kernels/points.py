@@ -1,4 +1,4 @@
-"""Loops over points that are compiled, beside `points.c`: byte for byte what NumPy makes, see `base.loops`."""
+"""Loops over points that are compiled, beside `points.c`: byte for byte what NumPy makes, see `base.arithmetic.loops`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ...base.arithmetic.loops import PackedPoints
 from ...base.arrays import AnyArray, Bool, Float, Float32, Index, Int, UInt16
-from ...base.loops import PackedPoints
 from .library import NoKernelError, load_kernel
 
 _POINTER, _INT64, _INT32 = ctypes.c_void_p, ctypes.c_int64, ctypes.c_int32
@@ -94,7 +94,7 @@ def _as(kind: Any, shape: tuple[int, ...], **arrays: AnyArray) -> list[AnyArray]
 
 
 class CompiledPoints:
-    """The loops of `base.loops.PointLoops`, compiled; any threads may use it side by side.
+    """The loops of `base.arithmetic.loops.PointLoops`, compiled; any threads may use it side by side.
 
     Args:
         suffix: of the functions: ``_narrow`` for those that any processor has.

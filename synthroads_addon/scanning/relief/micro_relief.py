@@ -1,6 +1,6 @@
 """Roughness adjustment: points are shifted along their beams to where these meet the material's micro-relief.
 
-The scene's surfaces are smooth; real ones have texture. Its heights are a random field in space (`base.noise`), one for
+The scene's surfaces are smooth; real ones have texture. Its heights are a random field in space (`base.arithmetic.noise`), one for
 each wavelength: the same place has the same height in every strip, and pulses near each other have similar ones. A
 scanner sees the mean over its beam's footprint, which is all the flatter the larger and the more slanting that is.
 Strength 1 is the relief that pavements and soils have been measured to have (`RELIEF`), 0 none, more an exaggeration.
@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...base.arithmetic.loops import point_loops
+from ...base.arithmetic.noise import noise_field
 from ...base.arrays import AnyArray, Float, Index
 from ...base.errors import InputError
-from ...base.loops import point_loops
-from ...base.noise import noise_field
 from ...cloud.points import PointBlock
 from ...materials.table import UNKNOWN, Material, entry_of, materials
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...base.arithmetic.noise import hash_cells
 from ...base.arrays import Float, Index
-from ...base.noise import hash_cells
 from ...base.random_streams import stream
 from ...materials.surfaces import Surfaces
 from ..beam import beam_radii

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...base.arithmetic.loops import point_loops
 from ...base.arrays import AnyArray, Bool, Float, Float32, Index, take_rows
-from ...base.loops import point_loops
 
 
 class SurfaceInput(NamedTuple):

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from synthroads_addon.base.loops import loops_by
+from synthroads_addon.base.arithmetic.loops import loops_by
 from synthroads_addon.blender.cameras import MaterialSnapshot, layer_source
 from synthroads_addon.blender.cameras import programs as module
 from synthroads_addon.blender.cameras.nodes import NodeLayers

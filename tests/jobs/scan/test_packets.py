@@ -133,7 +133,9 @@ def test_compiled_loops_make_the_points_that_numpy_makes(
 )
 def test_whatever_is_scanned_numpy_makes_the_same_points(name: str, left: str, monkeypatch: pytest.MonkeyPatch) -> None:
     plan = plans(name)["auto"]
-    assert plan.summary()["kernels"].endswith(f"; pulses compiled{left}; noise compiled; poses compiled; points compiled")
+    assert plan.summary()["kernels"].endswith(
+        f"; pulses compiled{left}; noise compiled; poses compiled; points compiled"
+    )
     assert bool(plan.target.moving) == (name != "spared")
     expected = by_numpy(plan, monkeypatch)
     for threads in (1, 2):

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from synthroads_addon.base.noise import CHUNK, MAX_OCTAVES, noise_by, noise_field
+from synthroads_addon.base.arithmetic.noise import CHUNK, MAX_OCTAVES, noise_by, noise_field
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.scanning.kernels.library import load_kernel
 from synthroads_addon.scanning.kernels.noise import CompiledNoise, usable_noise

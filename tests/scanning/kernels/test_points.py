@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from synthroads_addon.base.arithmetic.loops import loops_by, point_loops
 from synthroads_addon.base.errors import OutputError
-from synthroads_addon.base.loops import loops_by, point_loops
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.cloud.formats.las import LasWriter
 from synthroads_addon.cloud.points import PointBlock

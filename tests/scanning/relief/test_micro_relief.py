@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from synthroads_addon.base.arithmetic.noise import mean_deviation, noise_field
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.noise import mean_deviation, noise_field
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.materials.table import Material, materials
 from synthroads_addon.scanning.relief.micro_relief import (

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synthroads_addon.base import noise as noise_module
-from synthroads_addon.base.noise import MAX_OCTAVES, hash_cells, mean_deviation, noise_field
+from synthroads_addon.base.arithmetic.noise import MAX_OCTAVES, hash_cells, mean_deviation, noise_field
 from synthroads_addon.base.random_streams import stream
 
 TURN = np.array([[15, 6, -10], [6, 10, 15], [10, -15, 6]]) / 19.0

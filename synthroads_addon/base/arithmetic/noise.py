@@ -18,8 +18,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Float, Float32
-from .random_streams import stream
+from ..arrays import Float, Float32
+from ..random_streams import stream
 
 Hash = NDArray[np.uint32]
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple, Protocol
 
-from .arrays import AnyArray, Bool, Float, Float32, Index, Int, UInt8, UInt16
+from ..arrays import AnyArray, Bool, Float, Float32, Index, Int, UInt8, UInt16
 
 
 class PackedPoints(NamedTuple):
