@@ -7,7 +7,7 @@ negative and ``spread_above`` elsewhere. M makes the mean of the factor 1, so th
 mean over its surface. Two spreads are what it takes to hold the quartiles and the 90th percentile of real asphalt and
 real markings; see `docs/calibration.md`.
 
-The field is `base.arithmetic.noise.noise_field`, of position alone: a place has the same factor in every strip, for every scanner
+The field is `noise_field`, of position alone: a place has the same factor in every strip, for every scanner
 and every order of the blocks. It is evaluated once per return, where the ray met the surface that gave most of it: the
 factor is that of the footprint as a whole, and grain much finer than the footprint is not described by it.
 """

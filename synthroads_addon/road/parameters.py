@@ -14,6 +14,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from ..base.errors import InputError
@@ -243,7 +244,7 @@ class RoadParameters(Model):
         """Return the least distance of the two carriageways' inner edges along the road, m."""
         inner = [item.inner_offset for item in self.of_type(Carriageway).values()]
         station = [0.0, *(s for width in inner for s in width_kinks(width))]
-        return float(min(sum(width_at(width, station) for width in inner)))
+        return float(sum((width_at(width, station) for width in inner), np.zeros(len(station))).min())
 
     def _missing_reference(self, item: RoadObject) -> str:
         """Return a message if an object names a carriageway, lane or turnout that isn't there, else an empty string."""

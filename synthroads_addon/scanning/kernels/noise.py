@@ -1,4 +1,4 @@
-"""The random field of relief, waves and brightness in a compiled loop, beside `noise.c`: the bytes of `base.arithmetic.noise`."""
+"""The random field of relief, waves and brightness in a compiled loop, beside `noise.c`: the bytes of NumPy."""
 
 from __future__ import annotations
 

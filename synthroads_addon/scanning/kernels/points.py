@@ -1,4 +1,4 @@
-"""Loops over points that are compiled, beside `points.c`: byte for byte what NumPy makes, see `base.arithmetic.loops`."""
+"""Loops over points that are compiled, beside `points.c`: byte for byte what NumPy makes."""
 
 from __future__ import annotations
 
@@ -222,7 +222,7 @@ class CompiledPoints:
         The rows, the uses and the triangles must be there: only the types are looked at.
         """
         kinds = (np.int64, np.int64, np.int64, np.int32, np.bool_, np.float64, np.float32, np.float32)
-        arrays = (rows, use, triangle, elements, mirrored, shares, values, result)
+        arrays: tuple[AnyArray, ...] = (rows, use, triangle, elements, mirrored, shares, values, result)
         if any(one.dtype != kind or not one.flags.c_contiguous for one, kind in zip(arrays, kinds, strict=True)):
             return False
         self._functions["interpolate"](len(rows), *(array.ctypes.data for array in arrays))

@@ -1,7 +1,7 @@
 """Roughness adjustment: points are shifted along their beams to where these meet the material's micro-relief.
 
-The scene's surfaces are smooth; real ones have texture. Its heights are a random field in space (`base.arithmetic.noise`), one for
-each wavelength: the same place has the same height in every strip, and pulses near each other have similar ones. A
+The scene's surfaces are smooth; real ones have texture. Its heights are a random field in space (`noise_field`), one
+for each wavelength: the same place has the same height in every strip, and pulses near each other have similar ones. A
 scanner sees the mean over its beam's footprint, which is all the flatter the larger and the more slanting that is.
 Strength 1 is the relief that pavements and soils have been measured to have (`RELIEF`), 0 none, more an exaggeration.
 """

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synthroads_addon.base import noise as noise_module
+from synthroads_addon.base.arithmetic import noise as noise_module
 from synthroads_addon.base.arithmetic.noise import MAX_OCTAVES, hash_cells, mean_deviation, noise_field
 from synthroads_addon.base.random_streams import stream
 
