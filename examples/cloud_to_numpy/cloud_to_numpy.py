@@ -47,7 +47,7 @@ def main(output: Path, cloud: Path | None = None) -> None:
     for number, count in zip(*np.unique(arrays["class_id"], return_counts=True), strict=True):
         chosen = arrays["class_id"] == number
         height = arrays["xyz"][chosen, 2].mean()
-        print(f"{names.get(int(number), "unlabelled"):14} {count:9,} points, mean height {height:7.2f} m")
+        print(f"{names.get(int(number), 'unlabelled'):14} {count:9,} points, mean height {height:7.2f} m")
     np.savez_compressed(output / "arrays.npz", **arrays)
     if open3d is None:
         print("Open3D isn't installed: no open3d.ply is written")

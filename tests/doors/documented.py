@@ -1,4 +1,4 @@
-"""The command lines, Python snippets and files that README, docs/tasks.md, docs/start.md, tutorials and guides show to users.
+"""The command lines, Python snippets and files that README, docs/tasks.md, start, tutorials and guides show to users.
 
 It needs nothing but Python itself: environments as users make them hold none of the tests' packages.
 """

@@ -28,7 +28,8 @@ def bench_group(tree: Tree) -> None:
     low, side = bench.height - SEAT, (bench.width - LEG) * 0.5
     with tree.frame("Seat and legs"):
         size = op.vector(tree, bench.width, bench.depth, SEAT)
-        parts = [paint_faces(box(tree, size, op.vector(tree, 0.0, 0.0, bench.height - SEAT / 2.0)), bench.seat_material)]
+        seat = box(tree, size, op.vector(tree, 0.0, 0.0, bench.height - SEAT / 2.0))
+        parts = [paint_faces(seat, bench.seat_material)]
         for x in (side * -1.0, side):
             leg = box(tree, op.vector(tree, LEG, bench.depth, low), op.vector(tree, x, 0.0, low * 0.5))
             parts.append(paint_faces(leg, bench.leg_material))
