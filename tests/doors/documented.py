@@ -1,4 +1,4 @@
-"""The command lines, snippets and files that README, docs/tasks.md, docs/start.md and the tutorials show to users.
+"""The command lines, Python snippets and files that README, docs/tasks.md, start, tutorials and guides show to users.
 
 It needs nothing but Python itself: environments as users make them hold none of the tests' packages.
 """
@@ -13,6 +13,10 @@ from pathlib import Path
 from typing import Literal
 
 ROOT = Path(__file__).resolve().parents[2]
+GUIDES = (
+    *("first-cloud", "own-scanner", "own-scene", "data-set", "train"),
+    *("label", "scan-to-twin", "compare", "blender", "cluster"),
+)
 PAGES = (
     ROOT / "README.md",
     ROOT / "docs" / "tasks.md",
@@ -20,6 +24,7 @@ PAGES = (
     ROOT / "docs" / "tutorials" / "data-engineer.md",
     ROOT / "docs" / "tutorials" / "modeller.md",
     ROOT / "docs" / "tutorials" / "researcher.md",
+    *(ROOT / "docs" / "guide" / f"{name}.md" for name in GUIDES),
 )
 """In the order in which a user reads them: later ones use what was made in earlier ones."""
 

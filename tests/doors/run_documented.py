@@ -131,8 +131,9 @@ def _outcome(line: Documented, row: Small, python: Path, folder: Path, extras: C
         )
     seconds = _processor_seconds() - before
     fault = refusal_fault(answer.returncode, answer.stderr, lacking) if lacking else _fault(answer, row)
-    if lacking and line.kind == "python" and "ModuleNotFoundError: No module named" in answer.stderr:
-        fault = ""  # a program of the reader's own, which Python itself refuses
+    program = line.kind == "python" or line.text.startswith("python examples/")
+    if lacking and program and "ModuleNotFoundError: No module named" in answer.stderr:
+        fault = ""  # a program of the reader's own, or an example of one, which Python itself refuses
     if not fault and seconds > row.seconds:
         fault = f"it took {seconds:.1f} s of processor time instead of {row.seconds:g} s at most"
     return Outcome(line, command, answer.returncode, answer.stdout, answer.stderr, seconds, fault)

@@ -10,11 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from tests.doors.documented import ROOT
+
 EXTRAS = ("ml", "twin", "e57", "maps", "cluster", "onnx")
 """Extras of pyproject.toml that users add to what `make demo` installs."""
 
 _MAKE = "the doors are behind it: it makes the environment that everything here is run in"
 _PIP = "it makes an environment; those of the extras are made by the session that runs this"
+_SLURM = "it needs Slurm: tests/cluster runs the script on one"
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,7 @@ _GANTRIES = "--set road.furniture.gantry_spacing=30"
 _TRAINING = "--set schedule.epochs=1 --set crops_per_tile=1 --set crop_points=1000 --set voxel=0.5 --set batch=2"
 _NETWORK = '--set \'network={"preset": "S", "width": 8, "radius": 1.0, "neighbours": 8}\' --set threads=1'
 _TINY = f"{_TRAINING} {_NETWORK}"
+_EXAMPLES = {"python examples/": f"python {ROOT / 'examples'}/"}
 _ML, _TWIN, _E57, _CLUSTER = (frozenset({name}) for name in ("ml", "twin", "e57", "cluster"))
 
 ROWS = (
@@ -196,4 +200,11 @@ ROWS = (
     Small("synthroads evaluate out/segmentation out/small-roads --split test --output out/scores", needs=_ML),
     Small("synthroads predict out/segmentation out/first/cloud.laz --output out/labelled.laz", needs=_ML),
     Small("from torch.utils.data import DataLoader", needs=_ML),
+    # docs/guide
+    Small("python examples/own_device/own_device.py out/own-device", "", _EXAMPLES),
+    Small("python examples/own_scene/own_scene.py out/own-scene", "", _EXAMPLES),
+    Small("python examples/torch_dataset/torch_dataset.py out/torch", "1", _EXAMPLES, needs=_ML),
+    Small("python examples/scan_to_twin/scan_to_twin.py out/scan-to-twin", "scan.laz", _EXAMPLES, ("scan.laz",)),
+    Small("python docs/slurm_cluster.py reference /shared/reference --jobs 20 --queue batch", reason=_SLURM),
+    Small("python docs/slurm_cluster.py reference /shared/reference --print-script", reason=_SLURM),
 )

@@ -1,0 +1,40 @@
+"""Turn a scan into the parameters of its road, and these into CityJSON and OpenDRIVE; say how near it comes.
+
+python examples/scan_to_twin/scan_to_twin.py out/scan-to-twin [CLOUD]
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from synthroads_addon import Job, generate, load_scenario, read_parameters
+from synthroads_addon.reconstruction.comparison import compare
+from synthroads_addon.reconstruction.report import ReconstructionJob, run_reconstruction
+from synthroads_addon.twin.formats import write_twin
+
+SMALL = ["seed=3", "fidelity=draft", "road.length=180", "road.half_width=20", "scan.platform.speed=20"]
+FORMATS = ("cityjson", "opendrive")
+
+
+def main(output: Path, cloud: Path | None = None) -> None:
+    """Reconstruct a scan, of a small road that is made if none is given, and write its twin."""
+    truth = None
+    if cloud is None:
+        generate(Job(load_scenario("rq31-600m", SMALL), output / "scan"))
+        cloud, truth = output / "scan" / "cloud.laz", output / "scan" / "parameters.json"
+    road = run_reconstruction(ReconstructionJob(cloud))
+    parameters = road.found.parameters
+    (output / "twin").mkdir(parents=True, exist_ok=True)
+    (output / "parameters.json").write_text(parameters.to_json(), encoding="utf-8")
+    write_twin(parameters, output / "twin", FORMATS)
+    city = json.loads((output / "twin" / "twin.city.json").read_text(encoding="utf-8"))
+    print(f"{parameters.alignment.length:.1f} m of road, {len(city['CityObjects'])} objects in CityJSON")
+    print(f"doubtful: {road.report['judgement']['doubtful'] or 'nothing'}")
+    if truth is not None:
+        print(f"metres from the true centreline: {compare(parameters, read_parameters(truth))['centreline']}")
+
+
+if __name__ == "__main__":
+    main(*map(Path, sys.argv[1:]))

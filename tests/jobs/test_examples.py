@@ -1,0 +1,135 @@
+"""The programs in `examples`, run as a reader runs them: what they write and print is what they say."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from synthroads_addon.base.classes import class_id
+from synthroads_addon.cloud.formats.registry import open_cloud
+from synthroads_addon.cloud.points import PointBlock, concatenate
+from synthroads_addon.road.parameters import read_parameters
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+NAMES = ("cloud_to_numpy", "own_device", "own_scene", "own_thing", "scan_to_twin", "torch_dataset")
+RUN = """
+import os, runpy, sys
+sys.argv = sys.argv[1:]
+runpy.run_path(sys.argv[0], run_name="__main__")
+sys.stdout.flush()
+os._exit(0) # Blender's own teardown can hang
+"""
+
+pytestmark = pytest.mark.any_blender
+
+
+def run(name: str, output: Path, *more: str | Path) -> str:
+    """Run an example into a folder; return what it prints."""
+    words = [sys.executable, "-c", RUN, EXAMPLES / name / f"{name}.py", output, *more]
+    environment = os.environ | {"PYTHONPATH": str(EXAMPLES.parent)}
+    done = subprocess.run(
+        [*map(str, words)],
+        cwd=output,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        stdin=subprocess.DEVNULL,
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    return done.stdout
+
+
+def points_of(file: Path) -> PointBlock:
+    with open_cloud(file) as cloud:
+        return concatenate(list(cloud.blocks()))
+
+
+@pytest.mark.slow
+def test_a_cloud_becomes_numpy_arrays(tmp_path: Path) -> None:
+    told = run("cloud_to_numpy", tmp_path)
+    points, arrays = points_of(tmp_path / "road" / "cloud.laz"), np.load(tmp_path / "arrays.npz")
+    np.testing.assert_array_equal(arrays["xyz"], points.xyz)
+    np.testing.assert_array_equal(arrays["class_id"], points.class_id)
+    counts = {name: int(count.replace(",", "")) for name, count in re.findall(r"(?m)^(\w+) +([\d,]+) points", told)}
+    assert counts["road"] == int((points.class_id == class_id("road")).sum()) > 1000
+    assert sum(counts.values()) == len(points)
+
+
+def test_a_scene_of_ones_own_is_scanned_with_its_classes(tmp_path: Path) -> None:
+    told = run("own_scene", tmp_path)
+    points = points_of(tmp_path / "cloud.laz")
+    assert told.strip().endswith(f"{len(points):,} points of 6 objects")
+    assert set(points.class_id) == {class_id(name) for name in ("road", "noise_barrier", "pole", "vehicle")}
+    wall = points.xyz[points.class_id == class_id("noise_barrier")]
+    assert wall[:, 1].mean() == pytest.approx(13.85, abs=0.05)  # its side towards the scanner
+
+
+@pytest.mark.slow
+def test_a_scanner_of_ones_own_does_what_its_file_says(tmp_path: Path) -> None:
+    run("own_device", tmp_path)
+    device = json.loads((EXAMPLES / "own_device" / "robot.json").read_text(encoding="utf-8"))
+    points = points_of(tmp_path / "cloud.laz")
+    assert points.number_of_returns.max() == device["maximum_returns"]
+    assert points.range.min() >= device["minimum_range"]
+    assert len(points) > 10_000
+
+
+@pytest.mark.slow
+@pytest.mark.first_python
+def test_a_data_set_is_learned_from(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    told = run("torch_dataset", tmp_path)
+    right = float(re.search(r"([\d.]+)% of the unseen", told)[1])
+    labels = np.concatenate([np.load(file) for file in (tmp_path / "roads").rglob("test/*/segment.npy")])
+    assert 100.0 >= right > 100.0 * np.bincount(labels[labels >= 0]).max() / (labels >= 0).sum(), "a guess is as good"
+
+
+@pytest.mark.slow
+def test_a_scan_becomes_a_twin(tmp_path: Path) -> None:
+    told = run("scan_to_twin", tmp_path)
+    off = json.loads(re.search(r"true centreline: (.*)", told)[1].replace("'", '"'))
+    assert off["largest"] < 0.1
+    found = read_parameters(tmp_path / "parameters.json")
+    city = json.loads((tmp_path / "twin" / "twin.city.json").read_text(encoding="utf-8"))
+    assert set(found.objects) & set(city["CityObjects"])
+    assert (tmp_path / "twin" / "twin.xodr").stat().st_size > 1000
+
+
+@pytest.mark.slow
+def test_a_thing_of_ones_own_is_in_cloud_and_twin(tmp_path: Path) -> None:
+    told = run("own_thing", tmp_path)
+    benches = re.findall(r"(?m)^(bench-\S+): instance (\d+), ([\d,]+) points, (in|not in) CityJSON", told)
+    points = points_of(tmp_path / "cloud.laz")
+    assert len(benches) >= 2
+    for _, instance, count, there in benches:
+        chosen = points.instance_id == int(instance)
+        assert int(chosen.sum()) == int(count.replace(",", "")) > 20
+        assert set(points.class_id[chosen]) == {class_id("utility")}
+        assert there == "in"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_folder_is_complete_and_small(name: str) -> None:
+    """A script of at most 60 lines, a README that says how to run it, and a picture."""
+    folder = EXAMPLES / name
+    script = (folder / f"{name}.py").read_text(encoding="utf-8")
+    assert len(script.splitlines()) <= 60
+    readme = (folder / "README.md").read_text(encoding="utf-8")
+    assert f"python examples/{name}/{name}.py out/" in readme
+    picture = folder / re.search(r"!\[[^\]]+\]\((\S+)\)", readme)[1]
+    assert picture.stat().st_size < 150_000
+    with Image.open(picture) as image:
+        assert min(image.size) > 100
+
+
+def test_every_folder_is_tried() -> None:
+    assert {folder.name for folder in EXAMPLES.iterdir() if folder.is_dir()} == set(NAMES)
