@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from .cloud.formats.registry import open_cloud as open_cloud
     from .jobs.generate import Job as Job
     from .jobs.generate import generate as generate
+    from .jobs.scan.arrays import ScanArrays as ScanArrays
+    from .jobs.scan_arrays import scan_to_arrays as scan_to_arrays
     from .jobs.scan_scene import SceneScan as SceneScan
     from .jobs.scan_scene import scan_scene as scan_scene
     from .road.parameters import read_parameters as read_parameters
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 
 _PLACES = {
     "Job": ".jobs.generate",
+    "ScanArrays": ".jobs.scan.arrays",
     "SceneScan": ".jobs.scan_scene",
     "generate": ".jobs.generate",
     "load_scenario": ".scenario.scenario",
@@ -33,6 +36,7 @@ _PLACES = {
     "read_parameters": ".road.parameters",
     "sample_road": ".sampling.road",
     "scan_scene": ".jobs.scan_scene",
+    "scan_to_arrays": ".jobs.scan_arrays",
 }
 """Name -> module that has it."""
 

@@ -36,7 +36,7 @@ from ..measure.errors import (
     shift_points,
     truest_settings,
 )
-from ..scan.files import record_to_files
+from ..scan.sink import record_cloud
 from ..scan.plan import Site
 
 LINES, PULSES = 64, 1024
@@ -181,7 +181,7 @@ class Trial:
         with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
             files = self.site.files(Path(folder), plan.target.origin)
             begin = self.clock()
-            record_to_files([plan], files, StageTimer(), announce=None)
+            record_cloud([plan], files, StageTimer(), announce=None)
             seconds = self.clock() - begin
         # Pulses come in whole lines, so that stretches hold fewer of them than their duration says.
         return sum(map(plan.pulse_count, plan.path.strips)), seconds, files.counts.points
