@@ -123,9 +123,7 @@ def make_job_road(job: Job, timer: StageTimer) -> tuple[RoadGeometry, dict[str, 
     return road, report
 
 
-def open_job_scene(
-    job: Job, road: RoadGeometry, begun: float, timer: StageTimer, report: dict[str, Any]
-) -> RoadScene:
+def open_job_scene(job: Job, road: RoadGeometry, begun: float, timer: StageTimer, report: dict[str, Any]) -> RoadScene:
     """Return the scene of a job's road, with the settings that its scenario leaves open chosen; adds to `report`.
 
     Args:

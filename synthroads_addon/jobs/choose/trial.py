@@ -36,8 +36,8 @@ from ..measure.errors import (
     shift_points,
     truest_settings,
 )
-from ..scan.sink import record_cloud
 from ..scan.plan import Site
+from ..scan.sink import record_cloud
 
 LINES, PULSES = 64, 1024
 """Stretches that errors are taken of, and the pulses of each."""

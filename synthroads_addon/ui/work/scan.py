@@ -28,8 +28,8 @@ from ...blender.scene.evaluated import scanned_scene_steps
 from ...jobs.generate import Job as PipelineJob
 from ...jobs.generate import check
 from ...jobs.job_files import JobFiles, empty_scan_warnings
-from ...jobs.scan.sink import record_cloud
 from ...jobs.scan.plan import Site, check_scan
+from ...jobs.scan.sink import record_cloud
 from ...road.geometry import RoadGeometry
 from ...scenario.scenario import OF_POINTS, Scenario
 from ..fields.preferences import with_preferences
