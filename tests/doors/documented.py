@@ -1,4 +1,4 @@
-"""The command lines, Python snippets and files that README, docs/tasks.md, docs/start.md and the tutorials show to users.
+"""The command lines, Python snippets and files that README, tasks, start, tutorials and the page on Python show.
 
 It needs nothing but Python itself: environments as users make them hold none of the tests' packages.
 """
@@ -20,6 +20,7 @@ PAGES = (
     ROOT / "docs" / "tutorials" / "data-engineer.md",
     ROOT / "docs" / "tutorials" / "modeller.md",
     ROOT / "docs" / "tutorials" / "researcher.md",
+    ROOT / "docs" / "reference" / "python.md",
 )
 """In the order in which a user reads them: later ones use what was made in earlier ones."""
 

@@ -39,7 +39,7 @@ def leave(action: Callable[[], int], report_interrupt: Callable[[], int] = say_i
         if was_stopped():
             code = report_interrupt()
         else:
-            import traceback
+            import traceback  # hardly ever needed
 
             traceback.print_exc()
             code = 1

@@ -1,7 +1,7 @@
 """The files by which a scene's process and who began it understand each other."""
 
 TASK = "task.json"
-"""What is to be made."""
+"""The task: scene, scenario and recipe."""
 FILES = "files"
 """Subfolder of a task's folder that is laid out as the data set."""
 DONE = "done.json"
