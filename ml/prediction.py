@@ -60,8 +60,11 @@ def predict(
     Raises:
         InputError: there is no such cloud or model, or the cloud isn't what the model needs.
     """
-    choice = choose_model(cloud, "segmentation") if run is None else None
-    trained = open_run(Path(run if choice is None else choice.card.name))
+    choice = None
+    if run is None:
+        choice = choose_model(cloud, "segmentation")
+        run = choice.card.name
+    trained = open_run(Path(run))
     name = trained.configuration.task
     written = output or usual_output(cloud, name)
     asked = Prediction(cloud, written, path, overwrite, classification, "--output" if output else "")
