@@ -6,7 +6,6 @@ Exit codes: 0 done; 1 a defect of ours; 2 bad input; 3 violations found, scenes 
 
 import argparse
 import errno
-import io
 import json
 import os
 import re
@@ -16,13 +15,13 @@ from contextlib import contextmanager, suppress
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from headless import INTERRUPTED, MAPPING_FAILED, ignore_end_signals, was_stopped
 from headless.messages import messages
 from synthroads_addon.base.errors import InputError, nearest_name
+from synthroads_addon.base.process.end_signals import EXIT_CODE, INTERRUPTED, MAPPING_FAILED, was_stopped
+from synthroads_addon.base.process.leave import leave as leave_process
 from synthroads_addon.base.remarks import collected_remarks
-from synthroads_addon.base.scratch.folders import remove_scratch_folders, temporary_files_in_scratch
 
 if TYPE_CHECKING:
     from synthroads_addon.jobs.axis_points import PathPlace
@@ -443,10 +442,10 @@ def note_at_interrupt(note: Callable[[], str]) -> None:
 
 
 def report_interrupt() -> int:
-    """Print that the command was interrupted, what it says of that itself, and return exit code 130."""
+    """Print that the command was interrupted, what it says of that itself, and return the exit code of that."""
     with suppress(OSError):  # the terminal is gone
         print(INTERRUPTED, *(note() for note in _interrupt_notes), sep="\n", file=sys.stderr, flush=True)
-    return 130
+    return EXIT_CODE
 
 
 def entry(name: str) -> None:
@@ -460,42 +459,16 @@ def entry(name: str) -> None:
     leave(lambda: command(name, argv))
 
 
-def leave(action: Callable[[], int], supervised: bool = True) -> None:
-    """Run an action and end the process at once with its exit code, without Blender's teardown.
+def leave(action: Callable[[], int]) -> NoReturn:
+    """Run an action, which returns an exit code, and end the process at once with it, without Blender's teardown.
 
-    Args:
-        action: returns the exit code.
-        supervised: whether it is done in a process of its own, where the system has them, so that an end by a signal
-            is one line too; not for what another process of ours waits for.
+    It is done in a process of its own, where the system has them, so that an end by a signal is one line too.
     """
-    if supervised and sys.platform == "linux":
+    if sys.platform == "linux":
         from headless.supervision import supervise  # only Unix has what it needs
 
         supervise()
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # names of files may hold what the terminal's encoding doesn't
-            stream.reconfigure(errors="backslashreplace")
-    try:
-        with temporary_files_in_scratch():
-            code = action()
-    except KeyboardInterrupt:  # before the command's own work began, or at its very end
-        code = report_interrupt()
-    except SystemExit as error:
-        code = error.code if isinstance(error.code, int) else 0 if error.code is None else 1
-    except BaseException:
-        if was_stopped():
-            code = report_interrupt()
-        else:
-            import traceback
-
-            traceback.print_exc()
-            code = 1
-    ignore_end_signals()
-    remove_scratch_folders()
-    for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError):  # the terminal is gone
-            stream.flush()
-    os._exit(code)
+    leave_process(action, report_interrupt)
 
 
 @contextmanager

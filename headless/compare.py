@@ -17,7 +17,6 @@ from headless.commands import Outcome, entry
 from headless.messages import logger, progress_bar
 from headless.pictures import can_draw
 from synthroads_addon.base.files import output_folder
-from synthroads_addon.base.progress import exhaust
 from synthroads_addon.base.remarks import remarks_so_far
 from synthroads_addon.base.schema import canonical_json
 
@@ -45,15 +44,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads compare`; return exit code, result as JSON data and printed text."""
     from synthroads_addon.comparison.classifier import has_classifier
-    from synthroads_addon.comparison.job import compare_steps
+    from synthroads_addon.comparison.job import compare
 
     drawn = can_draw(PICTURE)
     if not has_classifier():
         logger.info(_NO_CLASSIFIER)
     with output_folder(arguments.output, [REPORT, PICTURE], arguments.overwrite) as folder:
-        progress = progress_bar(arguments)
-        steps = compare_steps(arguments.synthetic, arguments.real, arguments.seed)
-        result = exhaust(steps, lambda share: progress("compare", share))
+        result = compare(arguments.synthetic, arguments.real, arguments.seed, progress_bar(arguments))
         data = result.to_dict() | {"remarks": remarks_so_far()}
         (folder / REPORT).write_text(canonical_json(data), encoding="utf-8")
         if drawn:

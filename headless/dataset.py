@@ -10,9 +10,10 @@ if __name__ == "__main__":
 from headless.commands import Outcome, add_changes_argument, entry
 from headless.messages import detail, progress_bar
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.dataset.changes import change_recipe
 from synthroads_addon.dataset.manifest import Manifest, faults, read_manifest
-from synthroads_addon.dataset.recipe import Recipe, load_recipe, path_within, recipe_names
-from synthroads_addon.scenario.scenario import scenario_changes
+from synthroads_addon.dataset.recipe import load_recipe, recipe_names
+from synthroads_addon.jobs.dataset.cluster import TIMEOUT, Cluster
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,40 +45,32 @@ def run(arguments: argparse.Namespace) -> Outcome:
             raise InputError("--overwrite", None, f"can't be given with {name}, which keeps what is there")
     if arguments.verify:
         return _verify(arguments.output)
-    if arguments.jobs is not None and not 1 <= arguments.jobs <= 1024:
-        raise InputError("--jobs", arguments.jobs, "must be 1 to 1024")
-    if arguments.worker_timeout is not None and not (arguments.scheduler and 1.0 <= arguments.worker_timeout < 1e9):
-        raise InputError("--worker-timeout", arguments.worker_timeout, "must be 1 s or more, and goes with --scheduler")
+    workers = _workers(arguments)
     recipe = change_recipe(load_recipe(arguments.recipe), arguments.changes)
     detail("recipe", recipe.to_dict())
-    from headless.dataset_run import DatasetRun, dask_workers, local_processes
+    from synthroads_addon.jobs.dataset.make import make_dataset
 
-    splits = frozenset(arguments.splits) if arguments.splits else None
-    folder, progress = arguments.output.absolute(), progress_bar(arguments)
-    work = DatasetRun(recipe, folder, arguments.resume, progress, splits, arguments.overwrite)
-    if arguments.scheduler:
-        submit = dask_workers(arguments.scheduler, arguments.worker_timeout or 1800.0)
-    else:
-        submit = local_processes(arguments.jobs or 1)
-    manifest = work.run(submit)
+    manifest = make_dataset(
+        recipe,
+        arguments.output,
+        jobs=workers,
+        resume=arguments.resume,
+        overwrite=arguments.overwrite,
+        splits=arguments.splits,
+        progress=progress_bar(arguments),
+    )
     failed = [scene for scene in manifest.scenes if scene.status == "failed"]
     return 3 if failed else 0, manifest.to_dict(), summary(manifest, arguments.output)
 
 
-def change_recipe(recipe: Recipe, changes: list[str]) -> Recipe:
-    """Return a copy of a recipe with further changes (``path=value``) to the scenarios of all its groups."""
-    if not changes:
-        return recipe
-    values = dict(scenario_changes(changes))
-    groups = []
-    for group in recipe.groups:
-        draw = {
-            path: drawn for path, drawn in group.draw.items() if not any(path_within(path, set_) for set_ in values)
-        }
-        variants = tuple(each | values for each in group.variants)
-        update = {"set": group.set | values, "draw": draw, "variants": variants}
-        groups.append(group.model_copy(update=update))
-    return Recipe.from_dict(recipe.model_copy(update={"groups": tuple(groups)}).to_dict(), "recipe")
+def _workers(arguments: argparse.Namespace) -> int | Cluster:
+    """Return how many scenes are made at once on this machine, or the cluster that makes them."""
+    if arguments.scheduler:
+        timeout = arguments.worker_timeout
+        return Cluster(arguments.scheduler) if timeout is None else Cluster(arguments.scheduler, timeout)
+    if arguments.worker_timeout is not None:
+        raise InputError("--worker-timeout", arguments.worker_timeout, TIMEOUT)
+    return 1 if arguments.jobs is None else int(arguments.jobs)
 
 
 def _verify(folder: Path) -> Outcome:

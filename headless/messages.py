@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from headless import ENDS
+from synthroads_addon.base.process.end_signals import ENDS
 from synthroads_addon.base.progress import Progress, duration, silent
 from synthroads_addon.base.remarks import ASSUMPTION
 from synthroads_addon.base.version import generator

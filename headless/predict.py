@@ -13,11 +13,7 @@ from headless.commands import Outcome, entry
 from headless.messages import progress_bar
 from synthroads_addon.base.classes import UNLABELLED
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.files import path_beside
 from synthroads_addon.base.text.table import text_table
-
-_ADDED = "-predicted"
-"""Ending of the output's name after the cloud's, where none is given."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,34 +39,24 @@ def run(arguments: argparse.Namespace) -> Outcome:
         raise InputError("CLOUD", " ".join(arguments.files), "one cloud is needed, perhaps with a RUN before it")
     *given, cloud = map(Path, arguments.files)
     from headless.train import summary
-    from ml.choice import choose_model
-    from ml.shipped import open_run
-    from ml.tasks import Prediction, task
+    from ml.prediction import predict
 
-    choice = None if given else choose_model(cloud, "segmentation")
-    trained = open_run(given[0] if choice is None else Path(choice.card.name))
-    name = trained.configuration.task
-    output = arguments.output or usual_output(cloud, name)
-    files, option = (cloud, output, arguments.path), "--output" if arguments.output else ""
-    asked = Prediction(*files, arguments.overwrite, arguments.classification, option)
-    metrics = task(name).predict(trained, asked, progress_bar(arguments))
+    predicted = predict(
+        cloud,
+        arguments.output,
+        given[0] if given else None,
+        path=arguments.path,
+        classification=arguments.classification,
+        overwrite=arguments.overwrite,
+        progress=progress_bar(arguments),
+    )
+    metrics, output, name, choice = predicted.metrics, predicted.output, predicted.task, predicted.choice
     metrics |= {"output": str(output), "next": next_step(cloud, output, name)}
     text = f"written {output}: {summary(metrics)}" if name == "centerline" else labelled(metrics)
     text += f"\nnext: {metrics['next']}"
     if choice is None:
         return 0, metrics, text
     return 3 if choice.doubtful else 0, metrics | {"choice": choice.to_dict()}, f"{choice.why()}\n{text}"
-
-
-def usual_output(cloud: Path, task: str) -> Path:
-    """Return the file beside a cloud that is written where none is named; another one for each cloud.
-
-    Raises:
-        InputError: the cloud's is no name of a file.
-    """
-    if task == "segmentation":
-        return path_beside(cloud, f"{cloud.stem}{_ADDED}{cloud.suffix}", "CLOUD")
-    return path_beside(cloud, f"{cloud.name}{_ADDED}.geojson", "CLOUD")
 
 
 def next_step(cloud: Path, output: Path, task: str) -> str:

@@ -7,8 +7,8 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from headless import ENDS, ignore_end_signals
 from headless.commands import report_interrupt
+from synthroads_addon.base.process.end_signals import ENDS, ignore_end_signals
 from synthroads_addon.base.scratch.folders import remove_scratch_folders
 
 GRACE = 1.0

@@ -18,8 +18,8 @@ from contextlib import suppress
 from functools import partial
 from typing import NoReturn
 
-from headless import ENDS
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.process.end_signals import ENDS
 from synthroads_addon.base.scratch.folders import record_folders_in, remove_recorded_folders
 from synthroads_addon.base.scratch.opened_file import note_opened_file_in, noted_file
 

@@ -16,23 +16,35 @@ from .base.version import version as version
 
 if TYPE_CHECKING:
     from .cloud.formats.registry import open_cloud as open_cloud
+    from .comparison.job import compare as compare
+    from .jobs.dataset.cluster import Cluster as Cluster
+    from .jobs.dataset.make import make_dataset as make_dataset
     from .jobs.generate import Job as Job
     from .jobs.generate import generate as generate
+    from .jobs.scan.arrays import ScanArrays as ScanArrays
+    from .jobs.scan_arrays import scan_to_arrays as scan_to_arrays
     from .jobs.scan_scene import SceneScan as SceneScan
     from .jobs.scan_scene import scan_scene as scan_scene
     from .road.parameters import read_parameters as read_parameters
     from .sampling.road import sample_road as sample_road
     from .scenario.scenario import load_scenario as load_scenario
+    from .twin.formats import write_twin as write_twin
 
 _PLACES = {
+    "Cluster": ".jobs.dataset.cluster",
     "Job": ".jobs.generate",
+    "ScanArrays": ".jobs.scan.arrays",
     "SceneScan": ".jobs.scan_scene",
+    "compare": ".comparison.job",
     "generate": ".jobs.generate",
     "load_scenario": ".scenario.scenario",
+    "make_dataset": ".jobs.dataset.make",
     "open_cloud": ".cloud.formats.registry",
     "read_parameters": ".road.parameters",
     "sample_road": ".sampling.road",
     "scan_scene": ".jobs.scan_scene",
+    "scan_to_arrays": ".jobs.scan_arrays",
+    "write_twin": ".twin.formats",
 }
 """Name -> module that has it."""
 

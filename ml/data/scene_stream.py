@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -19,6 +18,7 @@ from pydantic import Field, model_validator
 
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.named_paths import path_inside
+from synthroads_addon.base.process.modules import module_command, module_environment
 from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.schema import canonical_json, quantity
 from synthroads_addon.base.version import generator
@@ -47,7 +47,7 @@ from ..processes import process_number, wait_for_all
 SCENES = "scenes"
 """Folder of the scenes in that of a run, where no other is named."""
 LOG = "producer.log"
-PRODUCER: Sequence[str] = (sys.executable, str(Path(__file__).resolve().parents[2] / "headless" / "scene_stream.py"))
+PRODUCER: Sequence[str] = module_command("jobs.dataset.scene_producer")
 """Command that makes scenes, a program of its own: learning doesn't import what makes them."""
 _TICK = 0.05
 """Seconds between two looks for a scene."""
@@ -214,6 +214,7 @@ class SceneStream:
                 stdout=log,
                 stderr=log,
                 start_new_session=True,
+                env=module_environment(),
             )
 
     def _check_producers(self, missing: Sequence[int]) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..base.machine import linear_algebra_on_one_thread
+from ..base.progress import Progress, exhaust, silent
 from ..cloud.selection.classes import RealClass
 from ..cloud.selection.patches import FEATURES, Patches, join_patches, make_patches
 from .classifier import Distinction, distinguish
@@ -106,6 +107,11 @@ def _joined(clouds: tuple[DescribedCloud, ...], distinctions: tuple[Distinction,
 def _mean(rows: Sequence[Distinction], group: str) -> float:
     """Return the mean of 1 - AUC in a group, with an AUC below 0.5, worse than chance, counted as 0.5."""
     return float(np.mean([1.0 - max(one.auc[group], 0.5) for one in rows]))
+
+
+def compare(synthetic: Path, real: Path, seed: int = 1, progress: Progress = silent) -> CloudComparison:
+    """Compare synthetic clouds with real ones and return the result; arguments and errors as `compare_steps`."""
+    return exhaust(compare_steps(synthetic, real, seed), lambda share: progress("compare", share))
 
 
 def compare_steps(synthetic: Path, real: Path, seed: int = 1) -> Generator[float, None, CloudComparison]:

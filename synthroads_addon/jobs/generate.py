@@ -1,9 +1,11 @@
 """The main job: scenario -> parameters -> model -> scan -> cloud -> files. What no output needs is not made."""
 
+from __future__ import annotations
+
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,6 +28,9 @@ from .job_files import FILES, JobFiles, empty_scan_warnings
 from .scan.plan import check_scan
 from .whole_road import road_from_file
 
+if TYPE_CHECKING:
+    from .open_scene import RoadScene
+
 FROM_ROAD = frozenset(
     {"length", "radius", "grade_percent", "map_origin", "cross_section", "lanes", "lane_width", "median_width"}
     | {"turnouts", "lane_changes"}
@@ -41,7 +46,7 @@ class Job:
 
     Attributes:
         scenario: limits, scan, fidelity and outputs.
-        output: folder for the files.
+        output: folder for the files; `scan_to_arrays` needs none.
         parameters: take this road instead of sampling one.
         axis: sample a road along this centreline: any file that `synthroads road` reads.
         axis_name: of the road or alignment in that file; None takes the longest.
@@ -53,7 +58,7 @@ class Job:
     """
 
     scenario: Scenario
-    output: Path
+    output: Path | None = None
     parameters: Path | None = None
     axis: Path | None = None
     axis_name: str | None = None
@@ -111,31 +116,62 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     """
     begun, timer = job.begun or time.perf_counter(), StageTimer(progress)
     check(job)
-    source = RoadSource(job.scenario, job.parameters, job.axis, job.axis_name, job.axis_place, job.output, job.road)
+    if job.output is None:
+        raise InputError("output", None, "must be a folder for the files; scan_to_arrays needs none")
     files, scene = JobFiles(job.scenario), None
     with output_folder(job.output, files.names, job.overwrite) as folder:
-        road, report = make_road(source, timer)
-        job.scenario.check_sections(road.length)
-        check_asset_classes(job.scenario.cloud.scheme(), road.parameters)
+        road, report = make_job_road(job, timer)
         if set(job.scenario.outputs) & {"scene", *OF_POINTS}:
-            from ..blender.files import empty_file  # Blender takes a second to start: other outputs need none
-            from .open_scene import RoadScene
-
-            if job.new_file:
-                empty_file()
-            scene = RoadScene(job.scenario, road)
-        if scene and job.scenario.chooses:
-            from .choose.search import choose_settings  # loads Blender as well
-
-            scene, report["choice"] = choose_settings(scene, begun, timer)
+            scene = open_job_scene(job, road, begun, timer, report)
             files = JobFiles(scene.scenario)
         files.write_road(folder, road, timer)
         report["instances"] = road.numbers.to_dict()
         if scene:
             report["counts"] = scene.write_files(folder, timer)
-            if warnings := [*scene.warnings, *empty_scan_warnings(report["counts"])]:
-                report["warnings"] = warnings
+            add_warnings(report, scene)
         return files.write_report(folder, report, timer)
+
+
+def make_job_road(job: Job, timer: StageTimer) -> tuple[RoadGeometry, dict[str, Any]]:
+    """Return the road of a checked job and the beginning of its report: the fit to a measured axis, if it has one.
+
+    Raises:
+        InputError: there is no such road, or it can't be scanned as the scenario says.
+    """
+    source = RoadSource(job.scenario, job.parameters, job.axis, job.axis_name, job.axis_place, job.output, job.road)
+    road, report = make_road(source, timer)
+    job.scenario.check_sections(road.length)
+    check_asset_classes(job.scenario.cloud.scheme(), road.parameters)
+    return road, report
+
+
+def open_job_scene(job: Job, road: RoadGeometry, begun: float, timer: StageTimer, report: dict[str, Any]) -> RoadScene:
+    """Return the scene of a job's road, with the settings that its scenario leaves open chosen; adds to `report`.
+
+    Args:
+        job: the job.
+        road: its road.
+        begun: when the job began, by `time.perf_counter`.
+        timer: of its stages.
+        report: gets the choice.
+    """
+    from ..blender.files import empty_file  # Blender takes a second to start: other outputs need none
+    from .open_scene import RoadScene
+
+    if job.new_file:
+        empty_file()
+    scene = RoadScene(job.scenario, road)
+    if job.scenario.chooses:
+        from .choose.search import choose_settings  # loads Blender as well
+
+        scene, report["choice"] = choose_settings(scene, begun, timer)
+    return scene
+
+
+def add_warnings(report: dict[str, Any], scene: RoadScene) -> None:
+    """Add the warnings about a scene's scan, of which `report` has the counts, to it; none where there are none."""
+    if warnings := [*scene.warnings, *empty_scan_warnings(report["counts"])]:
+        report["warnings"] = warnings
 
 
 def check(job: Job) -> None:

@@ -69,17 +69,22 @@ class JobFiles:
                 write_twin(road.parameters, folder, self.scenario.twin, tolerance, self.scenario.ifc, progress=follow)
 
     def write_report(self, folder: Path, told: dict[str, Any], timer: StageTimer) -> dict[str, Any]:
-        """Write ``report.json`` and return its content; warnings and assumptions that are being collected are in it.
+        """Write ``report.json`` into a folder and return its content; the other arguments are those of `report`."""
+        report = self.report(told, timer)
+        (folder / "report.json").write_text(canonical_json(report), encoding="utf-8")
+        return report
+
+    def report(self, told: dict[str, Any], timer: StageTimer) -> dict[str, Any]:
+        """Return the content of ``report.json``; warnings and assumptions that are being collected are in it.
 
         Args:
-            folder: for it.
             told: what is to be said of this job besides what every report has: seed, settings, scenario, stages,
                 versions.
             timer: of the job's stages.
         """
         bpy = sys.modules.get("bpy")  # not there if nothing needed Blender
         scenario = self.scenario.to_dict()
-        report = (
+        return (
             {"type": "Report", "generator": generator()}
             | told
             | {
@@ -99,8 +104,6 @@ class JobFiles:
                 "cores": available_cores(),
             }
         )
-        (folder / "report.json").write_text(canonical_json(report), encoding="utf-8")
-        return report
 
 
 def empty_scan_warnings(counts: Mapping[str, Any]) -> list[str]:

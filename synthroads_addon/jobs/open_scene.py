@@ -19,6 +19,7 @@ from ..road.geometry import RoadGeometry
 from ..scanning.plan import ScanPlan
 from ..scanning.scene.motion import ScannedScene
 from ..scenario.scenario import OF_POINTS, Scenario
+from .scan.arrays import ArraySink
 from .scan.by_section import scan_by_section
 from .scan.plan import Site
 
@@ -45,9 +46,9 @@ class ForeignScene:
         """Return a copy with another scenario; `stands` has no effect, see `RoadScene.with_settings`."""
         return replace(self, site=replace(self.site, scenario=scenario))
 
-    def scan(self, folder: Path, timer: StageTimer) -> dict[str, Any]:
-        """Scan the scene and write cloud and previews; return the counts as JSON data."""
-        return self.site.scan(self.scene, BlenderServices(), folder, timer)
+    def scan(self, to: Path | ArraySink, timer: StageTimer) -> dict[str, Any]:
+        """Scan the scene into a folder's cloud and previews, or into memory; return the counts as JSON data."""
+        return self.site.scan(self.scene, BlenderServices(), to, timer)
 
 
 @dataclass
@@ -112,22 +113,29 @@ class RoadScene:
         """Return the plan of the scan with every default resolved; builds the ray casters."""
         return self.site.plan(self.read(), BlenderServices())
 
-    def scan(self, folder: Path, timer: StageTimer) -> dict[str, Any]:
-        """Scan the scene and write cloud and previews; return the counts as JSON data."""
+    def scan(self, to: Path | ArraySink, timer: StageTimer) -> dict[str, Any]:
+        """Scan the scene into a folder's cloud and previews, or into memory; return the counts as JSON data."""
         with timer.stage("scene mesh"):
             scene = self.read()
-        return self.site.scan(scene, BlenderServices(), folder, timer)
+        return self.site.scan(scene, BlenderServices(), to, timer)
 
-    def write_files(self, folder: Path, timer: StageTimer) -> dict[str, Any]:
-        """Build the model unless it is there, scan it and write the files made from it; return the counts."""
+    def build_and_scan(self, to: Path | ArraySink, timer: StageTimer) -> dict[str, Any]:
+        """Build the model unless it is there and scan it into files or memory, a long road section by section.
+
+        Return the counts as JSON data, empty if the scenario asks for nothing that is made from points.
+        """
         scenario = self.scenario
         if scenario.section_length(self.road.length) is not None:
-            counts, self.warnings = scan_by_section(self.site, self.road, folder, timer)
+            counts, self.warnings = scan_by_section(self.site, self.road, to, timer)
             return counts
         with timer.stage("model"):
             remember((self.model or self.build()).root, self.road.parameters, scenario, "")
-        counts = self.scan(folder, timer) if set(scenario.outputs) & set(OF_POINTS) else {}
-        if "scene" in scenario.outputs:
+        return self.scan(to, timer) if set(scenario.outputs) & set(OF_POINTS) else {}
+
+    def write_files(self, folder: Path, timer: StageTimer) -> dict[str, Any]:
+        """Build the model unless it is there, scan it and write the files made from it; return the counts."""
+        counts = self.build_and_scan(folder, timer)
+        if "scene" in self.scenario.outputs:
             with timer.stage("scene file"), packed_textures():
                 save_scene(folder / "scene.blend")
         return counts

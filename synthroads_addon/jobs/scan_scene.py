@@ -41,6 +41,7 @@ from .scan.plan import Site, check_scan
 if TYPE_CHECKING:
     from ..blender.scene.foreign import UpAxis
     from ..blender.scene.render_state import Visible
+    from .open_scene import ForeignScene
 
 
 CLASSES = "classes.json"
@@ -54,7 +55,7 @@ class SceneScan:
 
     Attributes:
         scenario: scan, fidelity and seed; its road is not looked at.
-        output: folder for the files.
+        output: folder for the files; `scan_to_arrays` needs none.
         scene: file to open, or the scene that is open if None.
         path: CSV or GeoJSON of a line that the platform follows, in map coordinates.
         tripods: positions (x, y) or (x, y, z) of a tripod in map coordinates; z is that of the scanner itself.
@@ -71,7 +72,7 @@ class SceneScan:
     """
 
     scenario: Scenario
-    output: Path
+    output: Path | None = None
     scene: Path | None = None
     path: Path | None = None
     tripods: tuple[tuple[float, ...], ...] = ()
@@ -93,22 +94,46 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
     Raises:
         InputError: an input is wrong or the output can't be written; nothing is left half-written.
     """
+    timer, files = StageTimer(progress), JobFiles(job.scenario, road=False)
+    job = replace(job, begun=job.begun or time.perf_counter())
+    mapping = check_scene_scan(job)
+    if job.output is None:
+        raise InputError("output", None, "must be a folder for the files; scan_to_arrays needs none")
+    with output_folder(job.output, files.names, job.overwrite) as folder:
+        scene, report = open_foreign_scene(job, mapping, timer)
+        counts = scene.scan(folder, timer)
+        add_counts(report, counts)
+        return JobFiles(scene.site.scenario, road=False).write_report(folder, report, timer)
+
+
+def open_foreign_scene(
+    job: SceneScan, mapping: ClassMapping | None, timer: StageTimer
+) -> tuple[ForeignScene, dict[str, Any]]:
+    """Open and read a job's scene; return it with all its settings, and the beginning of the job's report.
+
+    With an output folder a file of classes is written there to be filled in, where things have none.
+
+    Raises:
+        InputError: see `open_and_read` and `choose_settings`.
+    """
     # Blender takes a second to start: whoever imports the names of this module needs none.
     from .choose.search import choose_settings
     from .open_scene import ForeignScene
 
-    begun, timer = job.begun or time.perf_counter(), StageTimer(progress)
-    mapping, report = check_scene_scan(job), dict[str, Any](scene=job.scene.name if job.scene else None)
-    with output_folder(job.output, JobFiles(job.scenario, road=False).names, job.overwrite) as folder:
-        read, road, warnings = open_and_read(job, mapping, timer, report)
-        scene = ForeignScene(scene_site(job, read.static, road), read)
-        if hint := _say_unlabelled(job, mapping, read):
-            report["classes_to_fill_in"] = hint
-        if job.scenario.chooses:
-            scene, report["choice"] = choose_settings(scene, begun, timer)
-        counts = scene.scan(folder, timer)
-        report |= {"counts": counts, "warnings": warnings + warnings_of_counts(counts, hint)}
-        return JobFiles(scene.site.scenario, road=False).write_report(folder, report, timer)
+    report: dict[str, Any] = {"scene": job.scene.name if job.scene else None}
+    read, road, report["warnings"] = open_and_read(job, mapping, timer, report)
+    scene = ForeignScene(scene_site(job, read.static, road), read)
+    if hint := _say_unlabelled(job, mapping, read):
+        report["classes_to_fill_in"] = hint
+    if job.scenario.chooses:
+        scene, report["choice"] = choose_settings(scene, job.begun or time.perf_counter(), timer)
+    return scene, report
+
+
+def add_counts(report: dict[str, Any], counts: dict[str, Any]) -> None:
+    """Add the counts of a scene's scan, and warnings about them, to the job's report."""
+    report["counts"] = counts
+    report["warnings"] += warnings_of_counts(counts, report.get("classes_to_fill_in", ""))
 
 
 def check_scene_scan(job: SceneScan) -> ClassMapping | None:
@@ -250,7 +275,7 @@ def _view_over(scenario: Scenario, mesh: SceneMesh, road: RoadGeometry | None) -
 def _say_unlabelled(job: SceneScan, mapping: ClassMapping | None, scene: ScannedScene) -> str:
     """Log, before a scan, what in its scene has no class, and write a file of classes to fill in unless it is there.
 
-    Return the file's path; an empty string where everything has a class.
+    Return the file's path; an empty string where everything has a class, or no folder for files is given.
     """
     from ..blender.scene.unlabelled import unlabelled_things  # see `scan_scene`
 
@@ -259,6 +284,9 @@ def _say_unlabelled(job: SceneScan, mapping: ClassMapping | None, scene: Scanned
         return ""
     things = unlabelled_things(mapping, job.scenario.cloud.scheme().source_ids())
     if not things.count:
+        return ""
+    if job.output is None:
+        _logger.warning("warning: %s. Name a file with their classes in the field classes", things.text())
         return ""
     file = job.output / CLASSES
     if not file.exists():

@@ -13,12 +13,12 @@ import yaml
 from numpy.typing import NDArray
 from scipy import stats
 
-from headless.dataset import change_recipe
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.cloud.points import PointBlock
+from synthroads_addon.dataset.changes import change_recipe
 from synthroads_addon.dataset.data_card import data_card
 from synthroads_addon.dataset.layouts import layout_descriptions, write_layouts
 from synthroads_addon.dataset.manifest import (

@@ -1,4 +1,4 @@
-"""The command lines, Python snippets and files that README, docs/tasks.md, start, tutorials and guides show to users.
+"""The command lines, snippets and files that README, tasks, start, tutorials, guides and the page on Python show.
 
 It needs nothing but Python itself: environments as users make them hold none of the tests' packages.
 """
@@ -25,6 +25,7 @@ PAGES = (
     ROOT / "docs" / "tutorials" / "modeller.md",
     ROOT / "docs" / "tutorials" / "researcher.md",
     *(ROOT / "docs" / "guide" / f"{name}.md" for name in GUIDES),
+    ROOT / "docs" / "reference" / "python.md",
 )
 """In the order in which a user reads them: later ones use what was made in earlier ones."""
 

@@ -60,6 +60,7 @@ class Small:
 
 
 _ROAD = "--set road.length=60 --set road.half_width=20 --set scan.platform.speed=30"
+_SMALL_ROAD = {'"fidelity=draft"': '"fidelity=draft", "road.length=60", "road.half_width=20"'}
 _DRAFT = f"--fidelity draft {_ROAD}"
 _CLOUD = """--set 'outputs=["parameters", "cloud"]'"""
 _SCENES = f"--set fidelity=draft {_ROAD} --set road.half_width=25"
@@ -136,7 +137,7 @@ ROWS = (
     Small("pip install -e '.[twin]'", reason=_PIP),
     Small(
         "from pathlib import Path",
-        instead={'"fidelity=draft"': '"fidelity=draft", "road.length=60", "road.half_width=20"'},
+        instead=_SMALL_ROAD,
     ),
     # docs/start.md
     Small("pip install -e '.[e57]'", reason=_PIP),
@@ -207,4 +208,18 @@ ROWS = (
     Small("python examples/scan_to_twin/scan_to_twin.py out/scan-to-twin", "scan.laz", _EXAMPLES, ("scan.laz",)),
     Small("python docs/slurm_cluster.py reference /shared/reference --jobs 20 --queue batch", reason=_SLURM),
     Small("python docs/slurm_cluster.py reference /shared/reference --print-script", reason=_SLURM),
+    # docs/reference/python.md
+    Small("from synthroads_addon import Job, SceneScan, generate, scan_scene, scan_to_arrays"),
+    Small("# The points of a road that is sampled and scanned", instead=_SMALL_ROAD),
+    Small("# The points of a scene of one's own", inputs=("scene.glb",)),
+    Small(
+        "# A data set",
+        "",
+        {'"reference"': '"reference.yaml"', **_SMALL_ROAD},
+        ("reference.yaml",),
+        seconds=180.0,
+    ),
+    Small("# The geometric-semantic models of a road"),
+    Small("# How surely a cloud is told from real ones", inputs=("real.yaml",)),
+    Small("# The points of a cloud labelled by the shipped model that suits it", inputs=("scan.laz",), needs=_ML),
 )

@@ -17,10 +17,7 @@ from typing import Any
 
 import pytest
 
-from headless import dataset_run
 from headless.commands import command
-from headless.dataset_run import DatasetRun, Outcome
-from headless.dataset_scene import DONE, FILES, published_folders
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.scratch import locks
 from synthroads_addon.base.scratch.locks import this_process
@@ -36,6 +33,11 @@ from synthroads_addon.dataset.manifest import (
     write_manifest,
 )
 from synthroads_addon.dataset.recipe import Recipe
+from synthroads_addon.jobs.dataset import run as run_module
+from synthroads_addon.jobs.dataset.processes import Outcome
+from synthroads_addon.jobs.dataset.run import DatasetRun
+from synthroads_addon.jobs.dataset.scene import published_folders
+from synthroads_addon.jobs.dataset.scene_files import DONE, FILES
 
 OLD = {"title": "Old", "seed": 1, "layouts": ["pointcept"], "groups": [{"name": "a", "scenes": 3}]}
 NEW = {"title": "New", "seed": 2, "layouts": ["pointcept"], "groups": [{"name": "b", "scenes": 2}]}
@@ -214,7 +216,7 @@ CRASHES += [*(("write_manifest", after) for after in (0, 1, 2)), *(("append_reco
 def test_after_a_crash_no_scene_that_the_manifest_names_is_missing(
     old: Path, fresh: Path, place: str, after: int, goes_on: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    home = manifest_module if place == "remove" else dataset_run
+    home = manifest_module if place == "remove" else run_module
     before = content(old)
     with monkeypatch.context() as patched:
         patched.setattr(home, place, crashing(getattr(home, place), after))
@@ -237,7 +239,7 @@ def test_nothing_is_removed_where_the_scheduler_does_not_answer(
     old: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("headless.dataset_run._ANSWER", 1.0)
+    monkeypatch.setattr("synthroads_addon.jobs.dataset.cluster._ANSWER", 1.0)
     recipe = tmp_path / "new.json"
     recipe.write_text(json.dumps(NEW))
     before = content(old)
@@ -287,7 +289,7 @@ def test_a_run_that_is_stopped_leaves_whole_scenes_and_nothing_else(
             raise fault
 
     with monkeypatch.context() as patched:
-        patched.setattr(dataset_run, "append_record", stopped)
+        patched.setattr(run_module, "append_record", stopped)
         with pytest.raises((KeyboardInterrupt, OutputError)):
             make(folder, OLD)
     names = ["a-01", "a-02", "a-03"][:stand]
@@ -307,7 +309,7 @@ def test_a_run_that_is_killed_before_its_first_scene_can_be_resumed(
     """Killed before its recipe stands in the folder, and with a manifest that was being written."""
     folder = tmp_path / "set"
     with monkeypatch.context() as patched:
-        patched.setattr(dataset_run, "write_atomically", raising(dataset_run.write_atomically, 0, KeyboardInterrupt))
+        patched.setattr(run_module, "write_atomically", raising(run_module.write_atomically, 0, KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             make(folder, OLD)
     make(folder, OLD, resume=True)
@@ -327,7 +329,7 @@ def test_the_manifest_is_written_twice_however_many_scenes_there_are(
         written.append(len(manifest.scenes))
         write_manifest(folder, manifest)
 
-    monkeypatch.setattr(dataset_run, "write_manifest", counted)
+    monkeypatch.setattr(run_module, "write_manifest", counted)
     make(tmp_path / "set", {**OLD, "groups": [{"name": "a", "scenes": 5}]})
     assert written == [0, 5]
 
@@ -402,7 +404,7 @@ def test_what_contradicts_it_is_refused_by_name(old: Path, other: str, capsys: p
 def test_the_command_replaces_a_set(
     old: Path, fresh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(dataset_run, "local_processes", lambda jobs: small_scenes)
+    monkeypatch.setattr("synthroads_addon.jobs.dataset.make.local_processes", lambda jobs: small_scenes)
     recipe = tmp_path / "new.json"
     recipe.write_text(json.dumps(NEW))
     assert command("dataset", [str(recipe), "--output", str(old)]) == 2

@@ -11,10 +11,12 @@ from typing import Any
 
 import pytest
 
-from headless import dataset_run
-from headless.dataset_run import TASK, Outcome, WorkerAbsence, local_processes, run_task
 from headless.messages import logger
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.jobs.dataset import processes
+from synthroads_addon.jobs.dataset.cluster import WorkerAbsence
+from synthroads_addon.jobs.dataset.processes import Outcome, local_processes, run_task
+from synthroads_addon.jobs.dataset.scene_files import DONE, TASK
 
 
 class InterruptedPool:
@@ -44,15 +46,15 @@ def test_an_interrupt_while_a_thread_starts_leaves_no_process(monkeypatch: pytes
         ended.append(folder)
         return Outcome(Path(folder), "was stopped")
 
-    monkeypatch.setattr(dataset_run, "ThreadPoolExecutor", InterruptedPool)
-    monkeypatch.setattr(dataset_run, "run_task", slow_to_end)
+    monkeypatch.setattr(processes, "ThreadPoolExecutor", InterruptedPool)
+    monkeypatch.setattr(processes, "run_task", slow_to_end)
     with pytest.raises(KeyboardInterrupt):
         list(local_processes(1)(["scene"]))
     assert ended == ["scene"]
 
 
 def test_nothing_is_begun_that_would_be_stopped_at_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(dataset_run.subprocess, "Popen", None)
+    monkeypatch.setattr(processes.subprocess, "Popen", None)
     stopping = Event()
     stopping.set()
     (tmp_path / TASK).write_text("{}")
@@ -66,9 +68,9 @@ def test_each_attempt_has_a_folder_of_its_own(monkeypatch: pytest.MonkeyPatch, t
     def killed_twice(path: Path, threads: int, stopping: Event) -> int:
         assert (path / TASK).is_file()
         seen.append(path)
-        return -9 if len(seen) < 3 else (path / dataset_run.DONE).write_text("{}") and 0
+        return -9 if len(seen) < 3 else (path / DONE).write_text("{}") and 0
 
-    monkeypatch.setattr(dataset_run, "_run_process", killed_twice)
+    monkeypatch.setattr(processes, "_run_process", killed_twice)
     (tmp_path / TASK).write_text("{}")
     assert run_task(str(tmp_path), 1, Event()) == Outcome(seen[2])
     assert len({path for path in seen if path.parent == tmp_path}) == 3

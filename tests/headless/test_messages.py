@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from headless import dataset_run, messages
+from headless import messages
 from headless.commands import Outcome, command, run
 from headless.messages import INTERVAL, progress_bar
 from synthroads_addon.base.errors import InputError
@@ -97,7 +97,7 @@ def test_scenes_that_failed_are_told_on_standard_error(
         (folder / "failed.json").write_text(json.dumps({"error": "no road fits"}))
         return 2
 
-    monkeypatch.setattr(dataset_run, "_run_process", failing)
+    monkeypatch.setattr("synthroads_addon.jobs.dataset.processes._run_process", failing)
     recipe = tmp_path / "recipe.json"
     recipe.write_text(json.dumps({"title": "t", "groups": [{"name": "a", "scenes": 2}]}))
     assert command("dataset", [str(recipe), "--output", str(tmp_path / "set"), *flags]) == 3

@@ -13,7 +13,8 @@ from typing import Any
 
 import pytest
 
-from headless import cli, commands, dataset, generate, scan
+from headless import cli, commands, generate, scan
+from synthroads_addon.dataset.changes import change_recipe
 from synthroads_addon.dataset.recipe import load_recipe, scene_jobs
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
@@ -22,7 +23,7 @@ NEEDS_TORCH = pytest.mark.skipif(find_spec("torch") is None, reason="needs PyTor
 
 
 def test_changes_of_a_data_set_are_of_the_type_of_their_field() -> None:
-    changed = dataset.change_recipe(load_recipe("small-gantries"), ["cloud.classes=5", "title=7", "road.length=200"])
+    changed = change_recipe(load_recipe("small-gantries"), ["cloud.classes=5", "title=7", "road.length=200"])
     scenarios = [job.scenario for job in scene_jobs(changed)]
     assert {(one.cloud.classes, one.title, one.road.length) for one in scenarios} == {("5", "7", 200.0)}
 
@@ -30,7 +31,7 @@ def test_changes_of_a_data_set_are_of_the_type_of_their_field() -> None:
 def test_changes_of_a_data_set_hold_for_every_variant() -> None:
     recipe = load_recipe("small-roads")
     assert len({job.scenario.road.cross_section for job in scene_jobs(recipe)}) == 4
-    changed = dataset.change_recipe(recipe, ["road.design_class=EKA2", "road.cross_section=RQ28"])
+    changed = change_recipe(recipe, ["road.design_class=EKA2", "road.cross_section=RQ28"])
     assert {job.scenario.road.cross_section for job in scene_jobs(changed)} == {"RQ28"}
 
 

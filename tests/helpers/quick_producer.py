@@ -1,4 +1,4 @@
-"""Scenes for a training in no time, as `headless/scene_stream.py` makes them with Blender: ``FOLDER PRODUCERS``.
+"""Scenes for a training in no time, as `jobs.dataset.scene_producer` makes them with Blender: ``FOLDER PRODUCERS``.
 
 The environment says how: ``QUICK_LOG`` a file for the numbers of the scenes that are begun, and how many stand then;
 ``QUICK_DELAY`` seconds that a scene takes at most; ``QUICK_FAULT`` ``NUMBER:KIND``: a scene and its fault, "error"
@@ -17,11 +17,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from headless.commands import leave
-from headless.scene_stream import SceneFailedError, Stop, serve
+from synthroads_addon.base.process.leave import leave
 from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.dataset.manifest import SceneEntry, file_entries
 from synthroads_addon.dataset.scene_stream import WORK, Failure, StreamPlan, publish, scene_numbers
+from synthroads_addon.jobs.dataset.processes import Stop
+from synthroads_addon.jobs.dataset.scene_producer import SceneFailedError, serve
 from tests.helpers.clouds.road_tiles import road_tile
 
 
@@ -62,4 +63,4 @@ def make(folder: Path, plan: StreamPlan, number: int, stopping: Stop) -> None:
 
 
 if __name__ == "__main__":
-    leave(lambda: serve(Path(sys.argv[1]), int(sys.argv[2]), make, patience=1.0), supervised=False)
+    leave(lambda: serve(Path(sys.argv[1]), int(sys.argv[2]), make, patience=1.0))

@@ -162,7 +162,7 @@ def test_wrong_input_is_one_line(
     occupied = tmp_path / "occupied"
     occupied.mkdir()
     (occupied / "mine.txt").touch()
-    monkeypatch.setattr("headless.dataset_run._ANSWER", 1.0)
+    monkeypatch.setattr("synthroads_addon.jobs.dataset.cluster._ANSWER", 1.0)
     cases = {
         "begun with another recipe": run_here(capfd, other, folder, "--resume"),
         "holds other files": run_here(capfd, recipe, occupied),

@@ -23,7 +23,6 @@ import pytest
 import torch
 
 from headless import cli
-from headless.dataset_scene import DONE
 from ml.centerline.measuring import read_cases
 from ml.configuration import from_data
 from ml.data.scene_stream import SceneStream, StreamOptions
@@ -44,6 +43,7 @@ from synthroads_addon.calibration.expected import read_texture
 from synthroads_addon.dataset.manifest import append_record, read_manifest
 from synthroads_addon.dataset.recipe import load_recipe, scene_jobs
 from synthroads_addon.jobs.axis_source import axis_from_file
+from synthroads_addon.jobs.dataset.scene_files import DONE
 from synthroads_addon.materials.table import materials
 from synthroads_addon.materials.textures import texture_files
 from synthroads_addon.road.axes.centerline import read_axis

@@ -66,8 +66,7 @@ def test_names_at_the_top_are_those_of_their_modules() -> None:
     _run("""
 import sys
 import synthroads_addon as package
-names = ("Job", "SceneScan", "generate", "load_scenario", "open_cloud", "read_parameters", "sample_road", "scan_scene")
-for name in names:
+for name in package._PLACES:
     assert getattr(package, name).__name__ == name
 assert "bpy" not in sys.modules
 try:

@@ -13,8 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from headless.dataset_run import DatasetRun, Outcome, local_processes
 from synthroads_addon.dataset.recipe import Recipe
+from synthroads_addon.jobs.dataset.processes import Outcome, local_processes
+from synthroads_addon.jobs.dataset.run import DatasetRun
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.process_memory import memory_mb
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.jobs.scan import files
+from synthroads_addon.jobs.scan import sink
 from synthroads_addon.scenario import cloud
 from tests.helpers.page_modules import block_of_page
 from tests.helpers.scenes.scan_scenes import middle_pulses, plane, scan_of
@@ -28,9 +28,7 @@ def defined(code: str, module: Any) -> dict[str, Any]:
 def test_the_field_of_the_page_keeps_far_points_out_of_the_files() -> None:
     model = defined(f"class Cloud(ClosedModel):\n{block_of_page(PAGE, 'text')}", cloud)["Cloud"]
     effect = block_of_page(PAGE, "text", 1)
-    write = defined(f"class Files:\n    def write(self, result):\n{effect}        return result\n", files)[
-        "Files"
-    ].write
+    write = defined(f"class Files:\n    def write(self, result):\n{effect}        return result\n", sink)["Files"].write
     result = middle_pulses(scan_of(plane()), 900)
     farthest = float(np.median(result.points.range))
     near = write(SimpleNamespace(scenario=SimpleNamespace(cloud=model(farthest=farthest))), result)

@@ -36,8 +36,8 @@ from ..measure.errors import (
     shift_points,
     truest_settings,
 )
-from ..scan.files import record_to_files
 from ..scan.plan import Site
+from ..scan.sink import record_cloud
 
 LINES, PULSES = 64, 1024
 """Stretches that errors are taken of, and the pulses of each."""
@@ -181,7 +181,7 @@ class Trial:
         with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
             files = self.site.files(Path(folder), plan.target.origin)
             begin = self.clock()
-            record_to_files([plan], files, StageTimer(), announce=None)
+            record_cloud([plan], files, StageTimer(), announce=None)
             seconds = self.clock() - begin
         # Pulses come in whole lines, so that stretches hold fewer of them than their duration says.
         return sum(map(plan.pulse_count, plan.path.strips)), seconds, files.counts.points

@@ -28,7 +28,8 @@ from ...scanning.record import scan_blocks
 from ...scenario.scenario import Scenario
 from ..job_files import JobFiles
 from ..open_scene import RoadScene
-from ..scan.files import CloudFiles, record_to_files
+from ..scan.files import CloudFiles
+from ..scan.sink import record_cloud
 from .scenes import rays_of_blocks, spread_blocks
 
 _CAST_BLOCKS, _WRITTEN_BLOCKS = 48, 96
@@ -67,7 +68,7 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         with timer.stage("caster"):
             plan = shown.plan()
         files = shown.site.files(folder, plan.target.origin)
-        record_to_files([plan], files, timer)
+        record_cloud([plan], files, timer)
         seconds, memory = timer.seconds, peak_memory_mb()
         # The scene, its caster and the materials are the same for every number of rays.
         bare = replace(plan, records_seen_points=False, measured_layers=frozenset())

@@ -32,8 +32,8 @@ from ...scanning.scene.mesh import SceneMesh
 from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import Scenario
 from ..open_scene import RoadScene
-from ..scan.files import record_to_files
 from ..scan.plan import Site
+from ..scan.sink import record_cloud
 
 _BLOCKS, _BARE_BLOCKS = 48, 12
 """Blocks that are scanned, spread over the path, and those of which the rays are cast by Embree alone."""
@@ -158,7 +158,7 @@ def _scan(site: Site, plan: ScanPlan) -> tuple[dict[str, Any], float, float]:
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         files = site.files(Path(folder), plan.target.origin)
         clock, processor = time.perf_counter(), time.process_time()
-        counts = record_to_files([plan], files, StageTimer(), announce=None)
+        counts = record_cloud([plan], files, StageTimer(), announce=None)
         return counts, time.process_time() - processor, time.perf_counter() - clock
 
 

@@ -26,14 +26,15 @@ from ...scanning.plan import ScanPlan
 from ...scanning.platforms.stretches import PathStretches
 from ...scanning.scene.motion import ScannedScene, ShiftedMotion, lane_motions
 from ...scanning.sections import RoadSection, sections, shadow_length, strip_parts, vehicles_through
-from .files import record_to_files
+from .arrays import ArraySink
 from .plan import Site
+from .sink import record_cloud
 
 
 def scan_by_section(
-    site: Site, road: RoadGeometry, folder: Path, timer: StageTimer
+    site: Site, road: RoadGeometry, to: Path | ArraySink, timer: StageTimer
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Build and scan a road section by section, and write cloud and previews; only in the main thread.
+    """Build and scan a road section by section into a folder's files or into memory; only in the main thread.
 
     A road in the open scene is replaced; afterwards there is none.
 
@@ -44,9 +45,9 @@ def scan_by_section(
         InputError: see `plan_scan` and `check_colour`.
     """
     work = SectionScan(site, road)
-    files = site.files(folder, np.array(road.parameters.transform.translate))
+    sink = site.sink(to, np.array(road.parameters.transform.translate))
     with closing(work.plans(timer)) as plans:
-        counts = record_to_files(plans, files, timer)
+        counts = record_cloud(plans, sink, timer)
     return counts | {"sections": work.scanned}, tuple(work.warnings)
 
 

@@ -1,11 +1,12 @@
 """A scenario resolved into a `ScanPlan`: every default of fidelity, device, platform and weather is filled in here.
 
-`Site`: where a scenario's scan takes place, whoever made the scene; and its scan into files.
+`Site`: where a scenario's scan takes place, whoever made the scene; and its scan into files or arrays.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import gettempdir
 from typing import Any, Self
 
 from ...base.arrays import Float
@@ -46,7 +47,9 @@ from ...scanning.weather.registry import weather_of
 from ...scenario.choice import check_choice
 from ...scenario.scan import scanner_setting
 from ...scenario.scenario import OF_POINTS, Scenario
-from .files import CloudFiles, record_to_files
+from .arrays import ArraySink
+from .files import CloudFiles
+from .sink import CloudSink, record_cloud
 
 _CELLS_PER_PULSE, _FEWEST_CELLS = 4, 1 << 18
 """Cells in which it is looked for what is near a footprint: many are dearer than what a small scan saves by them."""
@@ -268,12 +271,22 @@ class Site:
         text = conditions.system.to_wkt() if conditions.system else None
         return CloudFiles(self.scenario, folder, origin, typical, conditions.epsg, self.view, system_text=text)
 
-    def scan(self, scene: ScannedScene, services: SceneServices, folder: Path, timer: StageTimer) -> dict[str, Any]:
-        """Scan a scene and write the cloud and the previews to a folder; return the counts as JSON data.
+    def arrays(self) -> ArraySink:
+        """Return a sink that keeps the cloud's arrays in memory."""
+        return ArraySink(self.scenario, Path(gettempdir()), self.path.typical_range)
+
+    def sink(self, to: Path | ArraySink, origin: Float) -> CloudSink:
+        """Return what takes the points: files in a folder, or the sink itself; origin (3,): see `files`."""
+        return self.files(to, origin) if isinstance(to, Path) else to
+
+    def scan(
+        self, scene: ScannedScene, services: SceneServices, to: Path | ArraySink, timer: StageTimer
+    ) -> dict[str, Any]:
+        """Scan a scene into a folder's files (cloud and previews) or into memory; return the counts as JSON data.
 
         Raises:
             InputError: see `plan` and `check_colour`.
         """
         with timer.stage("caster"):
             plan = self.plan(scene, services)
-        return record_to_files([plan], self.files(folder, plan.target.origin), timer)
+        return record_cloud([plan], self.sink(to, plan.target.origin), timer)

@@ -28,8 +28,8 @@ from ...blender.scene.evaluated import scanned_scene_steps
 from ...jobs.generate import Job as PipelineJob
 from ...jobs.generate import check
 from ...jobs.job_files import JobFiles, empty_scan_warnings
-from ...jobs.scan.files import record_to_files
 from ...jobs.scan.plan import Site, check_scan
+from ...jobs.scan.sink import record_cloud
 from ...road.geometry import RoadGeometry
 from ...scenario.scenario import OF_POINTS, Scenario
 from ..fields.preferences import with_preferences
@@ -141,7 +141,7 @@ def _read_open_scene(scan: RoadScan, work: Workplace) -> Generator[Step, None, M
         del scene
         follow_scan(timer, report)
         files = site.files(work.folder, plan.target.origin)
-        return record_to_files([plan], files, timer, work.note_forecast), warnings
+        return record_cloud([plan], files, timer, work.note_forecast), warnings
 
     return measure
 

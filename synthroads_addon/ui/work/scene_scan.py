@@ -16,7 +16,7 @@ from ...blender.scene.foreign import open_scene_warnings
 from ...blender.scene.render_state import Visible
 from ...blender.scene.units import scene_unit
 from ...jobs.job_files import JobFiles
-from ...jobs.scan.files import record_to_files
+from ...jobs.scan.sink import record_cloud
 from ...jobs.scan_scene import route_site, warnings_of_counts
 from ...scanning.platforms.over_scene import SceneRoute
 from ...scenario.scenario import OF_POINTS, Scenario
@@ -119,7 +119,7 @@ def _read(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Measure |
             plan = site.plan(scene, services)
         follow_scan(timer, report)
         files = site.files(work.folder, plan.target.origin)
-        return record_to_files([plan], files, timer, work.note_forecast), scene.warnings
+        return record_cloud([plan], files, timer, work.note_forecast), scene.warnings
 
     return measure
 

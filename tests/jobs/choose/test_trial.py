@@ -48,7 +48,7 @@ def test_a_scan_of_a_fixed_time_and_a_rate_is_predicted_exactly_though_others_di
     each: float, disturbed: int | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scans = MadeUpScans(each, disturbed=disturbed)
-    monkeypatch.setattr("synthroads_addon.jobs.choose.trial.record_to_files", scans.record)
+    monkeypatch.setattr("synthroads_addon.jobs.choose.trial.record_cloud", scans.record)
     plan = planned(StandIns(), seconds=75.0)
     trial = Trial(Site(Scenario.from_dict({"fidelity": "draft"}), plan.path), plan, clock=lambda: scans.now)
     seconds, points = trial.time_scan(())
@@ -59,7 +59,7 @@ def test_a_scan_of_a_fixed_time_and_a_rate_is_predicted_exactly_though_others_di
 
 def test_what_every_block_takes_counts_as_often_as_there_are_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     scans = MadeUpScans(0.0, block=1.0)
-    monkeypatch.setattr("synthroads_addon.jobs.choose.trial.record_to_files", scans.record)
+    monkeypatch.setattr("synthroads_addon.jobs.choose.trial.record_cloud", scans.record)
     plan = planned(StandIns(), seconds=1500.0)
     trial = Trial(Site(Scenario.from_dict({"fidelity": "draft"}), plan.path), plan, clock=lambda: scans.now)
     seconds, _ = trial.time_scan(())
@@ -71,7 +71,7 @@ def test_what_a_finer_relief_takes_is_measured_though_others_disturb_one(
     disturbed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scans = MadeUpScans(EACH, scans=1, disturbed=disturbed, octave=3e-7)
-    monkeypatch.setattr("synthroads_addon.jobs.choose.trial.record_to_files", scans.record)
+    monkeypatch.setattr("synthroads_addon.jobs.choose.trial.record_cloud", scans.record)
     plan = planned(StandIns(), seconds=75.0)
     trial = Trial(Site(Scenario.from_dict({"fidelity": "draft"}), plan.path), plan, clock=lambda: scans.now)
     seconds = trial.time_relief((), 6)

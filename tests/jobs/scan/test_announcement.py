@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from synthroads_addon.base.progress import StageTimer
-from synthroads_addon.jobs.scan import files as module
+from synthroads_addon.jobs.scan import sink as module
 from synthroads_addon.scanning import forecast
 from synthroads_addon.scanning.forecast import ScanForecast
 
@@ -37,7 +37,7 @@ def test_what_takes_more_than_half_a_minute_is_told_before_it_begins(
     monkeypatch.setattr(module, "record", record)
     monkeypatch.setattr(module, "_logger", SimpleNamespace(log=log))
     monkeypatch.setattr(forecast, "share_of_core", lambda: share)
-    module.record_to_files([plan], sink, StageTimer())
+    module.record_cloud([plan], sink, StageTimer())
     (line,) = said
     assert line.startswith(f"{level} scan: 80,000,000 pulses, so up to about as many points (1.0 GB as LAZ), in about ")
     assert "s (0.4 to 1.5 times that) and 3.0 GB of memory" in line or "min (0.4 to 1.5 times that)" in line

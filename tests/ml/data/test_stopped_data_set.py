@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from headless.dataset_run import DatasetRun, Outcome
-from headless.dataset_scene import DONE, FILES, published_folders
 from ml.data.batches import DataOptions, read_roads
 from ml.data.sources import Source
 from ml.runs import Run
@@ -24,6 +22,10 @@ from ml.segmentation.recipes import Data
 from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.dataset.manifest import file_entries, read_manifest
 from synthroads_addon.dataset.recipe import Recipe
+from synthroads_addon.jobs.dataset.processes import Outcome
+from synthroads_addon.jobs.dataset.run import DatasetRun
+from synthroads_addon.jobs.dataset.scene import published_folders
+from synthroads_addon.jobs.dataset.scene_files import DONE, FILES
 from tests.helpers.clouds.road_data_sets import write_cloud
 from tests.helpers.clouds.road_tiles import road_tile
 from tests.helpers.clouds.segmentation_data import toy

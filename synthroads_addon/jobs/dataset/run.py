@@ -1,4 +1,4 @@
-"""Making the scenes of a data set side by side, and publishing each as a whole: on this machine or on a Dask cluster.
+"""Publishing the scenes of a data set, each as a whole, so that a run can be stopped and taken up again.
 
 Whoever runs this is the only one that publishes. A scene is made in a folder of its own below ``.work``, by a process
 of its own; when that has ended well, its folders are moved to their places and it is recorded, in one line beside the
@@ -9,32 +9,25 @@ the same bytes.
 from __future__ import annotations
 
 import json
+import logging
 import shutil
-import subprocess
-import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator, Set
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Set
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from threading import Event
-from typing import Any, Protocol, cast
+from typing import Any
 
-from headless.dataset_scene import DONE, FAILED, FILES
-from headless.messages import logger
-from synthroads_addon.base.errors import InputError, OutputError
-from synthroads_addon.base.files import folder_at_work
-from synthroads_addon.base.machine import available_cores
-from synthroads_addon.base.named_paths import path_inside
-from synthroads_addon.base.progress import Progress, silent
-from synthroads_addon.base.schema import read_json
-from synthroads_addon.base.version import generator
-from synthroads_addon.dataset.data_card import data_card
-from synthroads_addon.dataset.layouts import layout_descriptions
-from synthroads_addon.dataset.manifest import (
+from ...base.errors import InputError, OutputError
+from ...base.files import folder_at_work
+from ...base.named_paths import path_inside
+from ...base.progress import Progress, silent
+from ...base.schema import read_json
+from ...base.version import generator
+from ...dataset.data_card import data_card
+from ...dataset.layouts import layout_descriptions
+from ...dataset.manifest import (
     MANIFEST,
     PUBLISHED,
     Manifest,
@@ -53,143 +46,13 @@ from synthroads_addon.dataset.manifest import (
     write_atomically,
     write_manifest,
 )
-from synthroads_addon.dataset.recipe import Recipe, SceneJob, scene_jobs
+from ...dataset.recipe import Recipe, SceneJob, scene_jobs
+from .processes import Outcome, Submit, scene_task
+from .scene_files import DONE, FILES, TASK
 
 WORK = ".work"
-TASK = "task.json"
 LOCK = ".lock"
-ATTEMPTS = 3
-"""A scene whose process is killed (too little memory, a lost node) is tried this often."""
-MOST_WORKERS = 8
-"""Workers of a cluster that may end before a scene does, as their time is over, until it is given up."""
-_ATTEMPT = "attempt-"
-INTERRUPTED = 130
-"""Exit code of a process that was told to end, as where a node is given back."""
-_ANSWER = 10.0
-"""Seconds that a scheduler has for its answer."""
-_TICK = 0.1
-"""Seconds between two looks at a process."""
-_LOOK = 2.0
-"""Seconds between two looks at who works on a cluster."""
-_SOON = 60.0
-"""Seconds without any worker after which it is said."""
-_MODULE = Path(__file__).with_name("dataset_scene.py")
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Result of one scene's process: the folder it worked in, and an error if it failed.
-
-    Attributes:
-        folder: where it worked.
-        error: what went wrong, in one line; None if nothing.
-    """
-
-    folder: Path
-    error: str | None = None
-
-
-class Stop(Protocol):
-    """Protocol of a stop flag, as of `threading.Event`."""
-
-    def is_set(self) -> bool:
-        """Return whether work has to stop."""
-        ...
-
-    def wait(self, timeout: float) -> bool:
-        """Wait for at most so many seconds until work has to stop; return whether it has to."""
-        ...
-
-
-class WorkerClosing:
-    """Stop flag that is set when this thread's Dask worker is about to close, as at the end of its wall time."""
-
-    def __init__(self) -> None:
-        from distributed import get_worker  # an optional package
-
-        self.worker = get_worker()
-
-    def is_set(self) -> bool:
-        """Return whether the worker is closing or closed."""
-        return self.worker.status.name not in ("running", "paused")
-
-    def wait(self, timeout: float) -> bool:
-        """Sleep for so many seconds; return whether the worker is closing."""
-        time.sleep(timeout)
-        return self.is_set()
-
-
-def scene_task(job: SceneJob, recipe: Recipe) -> dict[str, Any]:
-    """Return what a scene's process has to be told, as JSON data."""
-    return {
-        "name": job.name,
-        "number": job.number,
-        "split": job.split,
-        "scenario": job.scenario.to_dict(),
-        "recipe": recipe.to_dict(),
-    }
-
-
-def run_on_worker(folder: str) -> Outcome:
-    """Run the task in a folder on a Dask worker with its share of the cores; return how it ended.
-
-    Raises:
-        distributed.Reschedule: the worker closes; Dask has another one do it.
-    """
-    from distributed import Reschedule  # an optional package
-
-    closing = WorkerClosing()
-    outcome = run_task(folder, max(1, available_cores() // int(closing.worker.state.nthreads)), closing)
-    if not closing.is_set():
-        return outcome
-    if (begun := len(list(Path(folder).glob(f"{_ATTEMPT}*")))) < MOST_WORKERS:
-        raise Reschedule()
-    return Outcome(outcome.folder, f"its workers ended before it did, {begun} times: they need more time")
-
-
-def run_task(folder: str, threads: int, stopping: Stop) -> Outcome:
-    """Run the process of a task in a folder, again if it is killed; return how it ended; stops if ``stopping`` is set.
-
-    Each attempt has a folder of its own: one on a lost node may still be writing while the next is at work.
-    """
-    outcome = Outcome(Path(folder), "was not tried")
-    for _ in range(ATTEMPTS):
-        attempt = Path(tempfile.mkdtemp(prefix=_ATTEMPT, dir=folder))
-        shutil.copy(Path(folder) / TASK, attempt)
-        code = _run_process(attempt, threads, stopping)
-        if stopping.is_set():
-            return Outcome(attempt, "was stopped")
-        if code == 0 and (attempt / DONE).is_file():
-            return Outcome(attempt)
-        if (attempt / FAILED).is_file():
-            return Outcome(attempt, str(json.loads((attempt / FAILED).read_text(encoding="utf-8"))["error"]))
-        outcome = Outcome(attempt, _reason(code, attempt / "log.txt"))
-        if code > 0 and code != INTERRUPTED:  # a fault of its own: it would come again
-            return outcome
-    return outcome
-
-
-def _run_process(path: Path, threads: int, stopping: Stop) -> int:
-    """Run a scene's process in a folder until it ends or all is stopping; return its exit code, 0 if not begun."""
-    if stopping.is_set():
-        return 0
-    command = [sys.executable, str(_MODULE), str(path / TASK), str(threads)]
-    with (
-        (path / "log.txt").open("wb") as log,
-        subprocess.Popen(command, stdin=subprocess.PIPE, stdout=log, stderr=log) as process,
-    ):  # at the end of this block its standard input is closed, which ends it
-        while process.poll() is None and not stopping.wait(_TICK):
-            pass
-    return process.returncode
-
-
-def _reason(code: int, log: Path) -> str:
-    if code == INTERRUPTED:
-        return f"its process was told to end, {ATTEMPTS} times"
-    if code < 0:
-        return f"its process was killed by signal {-code}, {ATTEMPTS} times (too little memory?)"
-    lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-    return f"exit code {code}: {lines[-1] if lines else 'no message'}"
+_logger = logging.getLogger("synthroads")
 
 
 @dataclass
@@ -363,13 +226,13 @@ class DatasetRun:
             entry = SceneEntry.from_dict({**about, "status": "done", **done}, "scene")
             (outcome.folder / "report.json").replace(self._place(f"logs/{job.name}.json"))
             if not entry.points:
-                logger.warning("warning: %s: not one pulse came back", job.name)
-            logger.debug("%s is done: %s points", job.name, f"{entry.points:,}")
+                _logger.warning("warning: %s: not one pulse came back", job.name)
+            _logger.debug("%s is done: %s points", job.name, f"{entry.points:,}")
         else:
             entry = SceneEntry.from_dict({**about, "status": "failed", "error": outcome.error}, "scene")
             with suppress(FileNotFoundError):  # of a lost worker there is none
                 (outcome.folder / "log.txt").replace(self._place(f"logs/{job.name}.txt"))
-            logger.error("failed: %s: %s", job.name, outcome.error)
+            _logger.error("failed: %s: %s", job.name, outcome.error)
         self.entries[job.name] = entry  # first: where the run is stopped before the next line, `_abandon` keeps it
         try:
             append_record(self.folder, entry)
@@ -411,128 +274,3 @@ class DatasetRun:
     @cached_property
     def _layout_texts(self) -> dict[str, str]:
         return layout_descriptions(self.recipe, self.jobs)
-
-
-Submit = Callable[[list[str]], Iterator[Outcome]]
-"""Has the tasks in these folders done, and yields how each ended, in any order."""
-
-
-def local_processes(jobs: int) -> Submit:
-    """Return a function that runs tasks in so many processes at once on this machine."""
-
-    threads = max(1, available_cores() // jobs)
-
-    def submit(folders: list[str]) -> Iterator[Outcome]:
-        stopping = Event()
-        pool = ThreadPoolExecutor(jobs)
-        begun: list[str] = []
-        ended: list[str] = []
-
-        def task(folder: str) -> Outcome:
-            begun.append(folder)
-            try:
-                return run_task(folder, threads, stopping)
-            finally:
-                ended.append(folder)
-
-        try:
-            for future in as_completed([pool.submit(task, folder) for folder in folders]):
-                yield future.result()
-        finally:
-            stopping.set()
-            pool.shutdown(wait=True, cancel_futures=True)
-            # The pool doesn't know, and doesn't wait for, a thread that was just starting when the user interrupted.
-            while len(ended) < len(begun):
-                time.sleep(_TICK)
-
-    return submit
-
-
-def dask_workers(address: str, patience: float = 1800.0) -> Submit:
-    """Return a function that runs tasks on a Dask cluster, whose workers must see the folder under the same path.
-
-    The scheduler is called at once, before anything in the folder is touched.
-
-    Args:
-        address: the scheduler's.
-        patience: seconds without a single worker after which the work is given up; within them new ones may come.
-
-    Raises:
-        InputError: nobody answers at the address, the packages are missing, the scheduler is lost meanwhile, or no
-            worker is there for too long.
-    """
-    try:
-        import distributed
-    except ImportError:
-        raise InputError("--scheduler", address, "needs Dask: pip install 'synthroads[cluster]'") from None
-    try:
-        client = distributed.Client(address, timeout=_ANSWER, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
-        raise InputError("--scheduler", address, f"nobody answers there ({error})") from None
-
-    def submit(folders: list[str]) -> Iterator[Outcome]:
-        with client:
-            futures = client.map(run_on_worker, folders, key=folders, retries=ATTEMPTS, pure=False)
-            for future in _ended_futures(client, futures, WorkerAbsence(address, patience)):
-                yield _outcome(future, address)
-
-    return submit
-
-
-def _ended_futures(client: Any, futures: list[Any], absence: WorkerAbsence) -> Iterator[Any]:
-    """Yield Dask futures as they end; raises an InputError if the cluster has no worker for too long."""
-    from distributed import as_completed as completed  # an optional package
-
-    ending, looked = completed(futures, loop=client.loop, raise_errors=False), 0.0
-    while not ending.is_empty():
-        if ending.has_ready():
-            yield from ending.next_batch(block=False)
-            continue
-        time.sleep(_TICK)
-        if client.status == "running" and time.monotonic() - looked >= _LOOK:
-            looked = time.monotonic()
-            absence.update(len(client.scheduler_info(n_workers=-1)["workers"]), looked)
-
-
-def _outcome(future: Any, address: str) -> Outcome:
-    """Return how the task of an ended Dask future ended; raises an InputError if the scheduler was lost."""
-    if future.status == "finished":
-        return cast(Outcome, future.result())
-    if future.status == "error":
-        return Outcome(Path(future.key), f"its worker was lost ({future.exception()})")
-    raise InputError("--scheduler", address, "was lost; --resume continues with what is done")
-
-
-class WorkerAbsence:
-    """Timer of how long a cluster has had no worker: warns after a minute, raises after too long.
-
-    Args:
-        address: the scheduler's.
-        patience: seconds after which it is an error.
-    """
-
-    def __init__(self, address: str, patience: float) -> None:
-        self._address, self._patience = address, patience
-        self._since: float | None = None
-        self._said = False
-
-    def update(self, workers: int, now: float) -> None:
-        """Update the timer with the number of workers at a time, s.
-
-        Raises:
-            InputError: there has been none for too long.
-        """
-        if workers:
-            if self._said:
-                logger.warning("%s has workers again: %d", self._address, workers)
-            self._since, self._said = None, False
-            return
-        self._since = now if self._since is None else self._since
-        if now - self._since >= self._patience:
-            allowed = f"had no worker for {self._patience:g} s (--worker-timeout); --resume continues with what is done"
-            raise InputError("--scheduler", self._address, allowed)
-        if now - self._since >= min(_SOON, 0.5 * self._patience) and not self._said:
-            self._said = True
-            logger.warning(
-                "warning: %s has no worker; waiting for one, up to %g s in all", self._address, self._patience
-            )

@@ -1,4 +1,4 @@
-"""Make scenes for a training, as it wants them: ``python headless/scene_stream.py FOLDER PRODUCERS``.
+"""Scenes for a training, made as it wants them: ``python -m synthroads_addon.jobs.dataset.scene_producer FOLDER N``.
 
 A training begins it. It ends when that does: its standard input is then closed. What it makes is said in the folder:
 see `synthroads_addon.dataset.scene_stream`. Each scene has a process of its own, as those of a data set.
@@ -17,17 +17,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from headless.commands import leave
-from headless.dataset_run import TASK, Stop, run_task, scene_task
-from headless.dataset_scene import DONE, FAILED, FILES
-from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.machine import available_cores
-from synthroads_addon.base.scratch.locks import LockHeldError, exclusive
-from synthroads_addon.dataset.manifest import SceneEntry
-from synthroads_addon.dataset.scene_stream import (
+from ...base.errors import InputError
+from ...base.machine import available_cores
+from ...base.process.end_signals import handle_end_signals
+from ...base.process.leave import leave
+from ...base.scratch.locks import LockHeldError, exclusive
+from ...dataset.manifest import SceneEntry
+from ...dataset.scene_stream import (
     LOCK,
     WORK,
     Failure,
@@ -38,6 +34,8 @@ from synthroads_addon.dataset.scene_stream import (
     read_wanted,
     write_failure,
 )
+from .processes import Stop, run_task, scene_task
+from .scene_files import DONE, FAILED, FILES, TASK
 
 _TICK = 0.1
 """Seconds between two looks at what is wanted."""
@@ -175,4 +173,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    leave(main, supervised=False)
+    handle_end_signals()
+    leave(main)

@@ -1,0 +1,82 @@
+"""A trained model used on a cloud, in one call: which model, which file, and what was predicted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from synthroads_addon.base.files import path_beside
+from synthroads_addon.base.progress import Progress, silent
+
+from .choice import Choice, choose_model
+from .shipped import open_run
+from .tasks import Prediction, task
+
+_ADDED = "-predicted"
+"""Ending of the output's name after the cloud's, where none is given."""
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """A prediction that was written.
+
+    Attributes:
+        task: of the model: "segmentation" or "centerline".
+        output: file that was written.
+        metrics: what was found, and how long it took, as JSON data.
+        choice: why this shipped model was chosen, and how doubtful that is; None if a model was given.
+    """
+
+    task: str
+    output: Path
+    metrics: dict[str, Any]
+    choice: Choice | None = None
+
+
+def predict(
+    cloud: Path,
+    output: Path | None = None,
+    run: Path | str | None = None,
+    *,
+    path: Path | None = None,
+    classification: bool = False,
+    overwrite: bool = False,
+    progress: Progress = silent,
+) -> Predicted:
+    """Label a cloud's points, or find its road's centreline, by a trained model, and write the result to a file.
+
+    Args:
+        cloud: file to read (.laz, .las, .ply, ...).
+        output: labelled cloud (.laz, .las) of a segmentation, centreline (.geojson) of a centreline model; one beside
+            the cloud if None, see `usual_output`.
+        run: folder of a trained run, or a shipped model's name; the shipped segmentation that was trained on what is
+            most like the cloud if None.
+        path: line along the road that a centreline model begins with, CSV or GeoJSON; found in the cloud if None.
+        classification: write the classes' LAS codes to the field ``classification``, besides ``predicted_class``.
+        overwrite: replace a file that is there.
+        progress: told how far it is.
+
+    Raises:
+        InputError: there is no such cloud or model, or the cloud isn't what the model needs.
+    """
+    choice = None
+    if run is None:
+        choice = choose_model(cloud, "segmentation")
+        run = choice.card.name
+    trained = open_run(Path(run))
+    name = trained.configuration.task
+    written = output or usual_output(cloud, name)
+    asked = Prediction(cloud, written, path, overwrite, classification, "--output" if output else "")
+    return Predicted(name, written, task(name).predict(trained, asked, progress), choice)
+
+
+def usual_output(cloud: Path, task_name: str) -> Path:
+    """Return the file beside a cloud that is written where none is named; another one for each cloud.
+
+    Raises:
+        InputError: the cloud's is no name of a file.
+    """
+    if task_name == "segmentation":
+        return path_beside(cloud, f"{cloud.stem}{_ADDED}{cloud.suffix}", "CLOUD")
+    return path_beside(cloud, f"{cloud.name}{_ADDED}.geojson", "CLOUD")

@@ -1,0 +1,22 @@
+"""Changes to the scenarios of a recipe, after the recipe's own."""
+
+from collections.abc import Sequence
+
+from ..scenario.scenario import scenario_changes
+from .recipe import Recipe, path_within
+
+
+def change_recipe(recipe: Recipe, changes: Sequence[str]) -> Recipe:
+    """Return a copy of a recipe with further changes (``path=value``) to the scenarios of all its groups."""
+    if not changes:
+        return recipe
+    values = dict(scenario_changes(list(changes)))
+    groups = []
+    for group in recipe.groups:
+        draw = {
+            path: drawn for path, drawn in group.draw.items() if not any(path_within(path, set_) for set_ in values)
+        }
+        variants = tuple(each | values for each in group.variants)
+        update = {"set": group.set | values, "draw": draw, "variants": variants}
+        groups.append(group.model_copy(update=update))
+    return Recipe.from_dict(recipe.model_copy(update={"groups": tuple(groups)}).to_dict(), "recipe")

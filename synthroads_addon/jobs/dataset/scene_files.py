@@ -1,0 +1,10 @@
+"""The files by which a scene's process and who began it understand each other."""
+
+TASK = "task.json"
+"""The task: scene, scenario and recipe."""
+FILES = "files"
+"""Subfolder of a task's folder that is laid out as the data set."""
+DONE = "done.json"
+"""Description of what was made; it is written last."""
+FAILED = "failed.json"
+"""Why the scenario can't be met."""
