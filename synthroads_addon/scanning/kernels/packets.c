@@ -14,6 +14,9 @@
 #define INVALID 0xFFFFFFFFu
 #define EVERY_FEATURE 0xFFFFFFFFu
 #define WIDEST 16
+#define LEAST_COMPONENT 1e-18f
+/* Embree takes smaller components of directions for this number, a positive one. A packet that is followed together goes
+ * by the signs that the components had before, and loses faces where negative ones so small stand beside larger ones. */
 
 /* Rows of RTCRayHit4, 8 and 16, a number per ray in each; RTCRayHit is one of width 1, RTCRay ends before NORMAL. */
 enum {
@@ -55,7 +58,9 @@ static void fill(Number *packet, const CastRays *rays, int64_t first, int count,
         int64_t i = first + (j < count ? j : 0); /* lanes that are left over repeat the first ray, and aren't cast */
         for (int k = 0; k < 3; k++) {
             packet[(ORIGIN + k) * width + j].f = rays->origin[3 * i + k];
-            packet[(DIRECTION + k) * width + j].f = rays->direction[3 * i + k];
+            float component = rays->direction[3 * i + k];
+            int least = width > 1 && component < 0.0f && component > -LEAST_COMPONENT;
+            packet[(DIRECTION + k) * width + j].f = least ? 0.0f : component;
         }
         packet[NEAR * width + j].f = packet[TIME * width + j].f = 0.0f;
         packet[FAR * width + j].f = rays->limit[i * rays->limit_step];

@@ -133,6 +133,24 @@ def test_rays_that_run_together_differ_at_most_where_faces_share_an_edge(
     assert_ties(mesh, origins[other], directions[other], found[other], expected[other])
 
 
+@pytest.mark.parametrize("width", [4, 8, 16])
+@pytest.mark.parametrize("largest", [1e-3, 1e-17, 2e-18, 1e-19, 1e-40])
+def test_components_as_good_as_zero_lose_no_face(usable: Packets, width: int, largest: float) -> None:
+    """A flight along an axis without errors: of directions across, a component is the rounded sine of half a turn."""
+    if width > usable.width:
+        pytest.skip("narrower packets alone")
+    angle = np.deg2rad(0.18 * np.arange(-160, 160))
+    along = -largest * np.tile(np.linspace(0.0, 1.0, 16), 20)
+    directions = np.stack([along, np.sin(angle), -np.cos(angle)], axis=-1).astype(np.float32)
+    moved = np.array([-88.0, 0.0, 0.0], np.float32)
+    mesh = hills()[0] + moved, hills()[1]
+    origins = np.zeros_like(directions) + moved + np.array([0.0, 0.3, 30.0], np.float32)
+    found = PacketScene(usable, *mesh, packing=Packing(width=width)).cast(origins, directions, RANGE)
+    limits = np.full(len(origins), RANGE, np.float32)
+    expected = single_rays(mesh, origins, directions, limits, "INTERSECT")
+    assert (found >= 0).sum() == (expected >= 0).sum() > 250
+
+
 def test_rays_at_edges_choose_one_of_the_two_faces_and_none_slips_through(usable: Packets) -> None:
     mesh, random = hills(), stream(0, "edges")
     corners = mesh[0][mesh[1][np.arange(6000) % len(mesh[1])]].astype(np.float64)
