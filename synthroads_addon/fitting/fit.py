@@ -293,7 +293,10 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05, design_ends: bool = Fal
     across = np.hypot(*(local[:, :2] - alignment.position(station)).T)
     # The road ends at its last point's foot: points before its begin or behind its end, out of their order, are off it.
     across = np.hypot(across, np.maximum(np.maximum(-station, station - alignment.length), 0.0))
-    level = station, local[:, 2], weights, alignment.length, _HEIGHT_SHARE * tolerance
+    # Where points go back their feet may all be the begin: heights are then fitted along the points, to be refused.
+    run = station if station.max() > 0.0 else np.append(0.0, np.cumsum(np.hypot(*np.diff(local[:, :2], axis=0).T)))
+    along = np.argsort(run, kind="stable")
+    level = run[along], local[along, 2], weights[along], alignment.length, _HEIGHT_SHARE * tolerance
     profile = _follow_heights(*level) if follow else _fit_heights(*level)
     heading = alignment.start_heading
     placed = Alignment(alignment.elements, alignment.x + origin[0], alignment.y + origin[1], heading)

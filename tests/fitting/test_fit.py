@@ -651,3 +651,12 @@ def test_an_alignment_that_bends_on_to_its_ends_is_left_there() -> None:
     found = fit_axis(offset_points(tight, 0.004, 1), 0.03, design_ends=True).alignment.elements
     assert len(found) <= 3
     assert max(abs(e.curvature_end - e.curvature_start) for e in found) > 0.9 / 30.0
+
+
+@pytest.mark.parametrize("follow", [False, True])
+@pytest.mark.parametrize("way", [(0.0, 400.0, 0.0, 400.0), (97.5, 497.5, 297.5), (0.0, 400.0, 0.0)])
+def test_points_that_turn_back_are_refused_with_their_distance(way: tuple[float, ...], follow: bool) -> None:
+    points = np.zeros((len(way), 3))
+    points[:, 0] = way
+    with pytest.raises(AxisRefusedError, match="no road follows its points within 2 m"):
+        fit_axis(points, follow=follow).check("axis.csv")
