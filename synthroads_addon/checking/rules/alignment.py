@@ -17,6 +17,8 @@ RADIUS_RATIO = 1.5
 RADIUS_RATIO_BELOW = 1500.0
 #: The larger parameter of an S-curve's two clothoids over the smaller, at most (RAA).
 CLOTHOID_RATIO = 1.5
+#: Curvature (1/m) whose jumps are rounding in a file, and felt by nobody: 0.13 mm/s² at 130 km/h (chosen).
+_LEAST_JUMP = 1e-7
 #: Grades that differ by less than this (m/m) need no rounding: 0.1 mm on 100 m.
 SAME_GRADE = 1e-6
 
@@ -113,6 +115,8 @@ def _ratio(one: float, other: float) -> float:
 def _curvature_jump(road: Road) -> Iterator[Finding]:
     for i in np.flatnonzero(~same_curvature(road.k1[:-1], road.k0[1:])):
         jump = abs(road.k0[i + 1] - road.k1[i])
+        if jump < _LEAST_JUMP:
+            continue
         text = f"The curvature jumps by {jump:.2e} 1/m: a transition curve is missing (RAA)."
         yield Finding(road.axis, road.starts[i + 1], jump, 0.0, text)
 

@@ -147,3 +147,10 @@ def test_a_vertex_of_two_clothoids_and_a_hidden_jump_are_found() -> None:
     assert "clothoid-minimum" in {v.rule for v in checked(road(sliver))}
     halves = [*curve(1000, 500, arc=40)[:3], *curve(1000, 500, arc=40)[2:]]
     assert {v.rule for v in checked(road(halves))} == INSIDE
+
+
+@pytest.mark.parametrize(("jump", "found"), [(3e-8, False), (3e-7, True)])
+def test_a_jump_that_is_a_file_s_rounding_is_none(jump: float, found: bool) -> None:
+    (length, start, end), *others = CURVE[1:]
+    moved = [CURVE[0], (length, start, end - jump), *others]
+    assert ("curvature-jump" in {v.rule for v in checked(road(moved))}) == found
