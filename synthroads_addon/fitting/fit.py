@@ -19,11 +19,9 @@ from ..base.arrays import Float, Int
 from ..base.errors import InputError
 from ..base.machine import linear_algebra_on_one_thread
 from ..base.maps.crs import MapSystem
-from ..base.maps.places import Placement
 from ..base.remarks import warn
 from ..base.schema import round_value
 from ..road.alignment import Alignment, finite_array
-from ..road.axes.centerline import read_declared_axis
 from ..road.parameters import AlignmentObject, HorizontalElement, VerticalPoint
 from ..road.profile import IntersectionPoint, Profile
 from ..scenario.road import RoadScenario
@@ -149,25 +147,6 @@ class AxisRefusedError(InputError):
         return type(self)(self.name, self.fit, picture)
 
 
-def fitted_axis(
-    path: Path, scenario: RoadScenario, seen: Callable[[AxisFit], None] | None = None
-) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
-    """Return the alignment fitted to the points of a file (CSV, GeoJSON), the scenario for it, and a report.
-
-    Returns:
-        the alignment in local coordinates, the scenario with the length and map origin that follow from it, and with
-        the vertical coordinate system that the file names if it names none itself, and how
-        well it fits (m): root mean square, 95th percentile and worst distance, horizontally and in height.
-
-    Raises:
-        AxisRefusedError: no road follows the points (`AxisFit.check`).
-        InputError: the file is missing or not an axis, or doesn't lie where the road's coordinate system is used.
-    """
-    place = Placement.of(MapSystem.of(scenario.epsg, scenario.height_epsg))
-    points, declared = read_declared_axis(path, place)
-    return axis_of_points(path.name, points, declared, scenario, seen)
-
-
 def axis_of_points(
     name: str,
     points: Float,
@@ -175,7 +154,7 @@ def axis_of_points(
     scenario: RoadScenario,
     seen: Callable[[AxisFit], None] | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
-    """Return the alignment fitted to points (N, 3) of the scenario's coordinate system, m, as `fitted_axis` does.
+    """Return the alignment fitted to points (N, 3) of the scenario's system, m, the scenario for it, and a report.
 
     Args:
         name: of their file.
@@ -183,6 +162,14 @@ def axis_of_points(
         declared: system that the file names, whose heights count where the scenario's has none.
         scenario: limits of the road.
         seen: gets the fit, to draw it.
+
+    Returns:
+        the alignment in local coordinates, the scenario with the length and map origin that follow from it, and with
+        the vertical coordinate system that the file names if it names none itself, and how well it fits (m): root mean
+        square, 95th percentile and worst distance, horizontally and in height.
+
+    Raises:
+        AxisRefusedError: no road follows the points (`AxisFit.check`).
     """
     system = MapSystem.of(scenario.epsg, scenario.height_epsg)
     heights = scenario.height_epsg

@@ -19,9 +19,9 @@ from synthroads_addon.fitting.fit import (
     _is_exact,
     _trim_ends,
     fit_axis,
-    fitted_axis,
 )
 from synthroads_addon.fitting.plot import axis_picture
+from synthroads_addon.jobs.axis_source import axis_from_file
 from synthroads_addon.road.alignment import Alignment, Element
 from synthroads_addon.road.axes.centerline import read_axis
 from synthroads_addon.road.profile import IntersectionPoint, Profile
@@ -595,7 +595,7 @@ def test_a_fit_that_leaves_its_points_is_refused(tmp_path: Path) -> None:
     with pytest.raises(
         AxisRefusedError, match=r"axis axis\.csv: no road follows its points within 2 m, .* 40 times"
     ) as e:
-        fitted_axis(path, RoadScenario())
+        axis_from_file(path, RoadScenario(), 1)
     fit = e.value.fit
     assert max(fit.horizontal.worst, fit.height.worst) > fit.limit == 2.0
     assert f"at station {fit.horizontal.worst_station:.1f} m" in str(e.value)
@@ -616,7 +616,7 @@ def test_a_fit_that_leaves_its_points_is_refused(tmp_path: Path) -> None:
     ],
 )
 def test_real_axes_are_far_from_being_refused(path: Path) -> None:
-    _, _, report = fitted_axis(path, RoadScenario())
+    _, _, report = axis_from_file(path, RoadScenario(), 1)
     assert max(report["horizontal"]["worst"], report["height"]["worst"]) < 0.2 * REFUSED_BEYOND * 0.05
 
 

@@ -24,7 +24,7 @@ from synthroads_addon.checking.checker import check
 from synthroads_addon.cloud.tools.convert import read_centerline
 from synthroads_addon.dataset.manifest import faults, read_manifest
 from synthroads_addon.dataset.recipe import RECIPES, load_recipe, scene_jobs
-from synthroads_addon.fitting.fit import fitted_axis
+from synthroads_addon.jobs.axis_source import axis_from_file
 from synthroads_addon.materials.table import read_material_table
 from synthroads_addon.road.axes.centerline import read_axis
 from synthroads_addon.road.geometry import RoadGeometry
@@ -161,13 +161,13 @@ def test_recipes(put: Put, count: int) -> None:
 def test_axes_in_csv(put: Put, count: int) -> None:
     road = RoadScenario()
     files = [text.encode() for text in AXES]
-    for_all(damaged(files), count, put("axis.csv", lambda path: fitted_axis(path, road)))
+    for_all(damaged(files), count, put("axis.csv", lambda path: axis_from_file(path, road, 1)))
 
 
 @fuzz(20, 1500)
 def test_axes_in_geojson(put: Put, count: int) -> None:
     road = RoadScenario()
-    for_all(json_files(LINES), count, put("axis.geojson", lambda path: fitted_axis(path, road)))
+    for_all(json_files(LINES), count, put("axis.geojson", lambda path: axis_from_file(path, road, 1)))
 
 
 def use_trajectory(path: Path) -> None:
@@ -285,7 +285,7 @@ def test_points_that_no_road_runs_through(tmp_path: Path) -> None:
     points[:, 2] += np.linspace(0.0, 40_000.0, len(points))
     np.savetxt(tmp_path / "axis.csv", points, delimiter=",", header="x,y,z", comments="")
     refused(
-        lambda: fitted_axis(tmp_path / "axis.csv", RoadScenario()),
+        lambda: axis_from_file(tmp_path / "axis.csv", RoadScenario(), 1),
         r"z of point \d+ is 40\d\d\d.*: no land lies so high, 9,000 m is the most",
     )
 

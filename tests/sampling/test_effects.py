@@ -88,7 +88,7 @@ def _differ_beside_axis(path: str, seed: int) -> bool:
     """Return whether roads along one axis differ where a limit does; not where one of the two can't be had."""
     before, after = changed_limits(path)
     axis = sample_alignment(before, 5)
-    given = {"length": axis.length, "map_origin": (1.0, 2.0, 3.0)}  # as `fitted_axis` has them
+    given = {"length": axis.length, "map_origin": (1.0, 2.0, 3.0)}  # as `axis_of_points` has them
     try:
         roads = [sample_road(limits.model_copy(update=given), seed, "", axis) for limits in (before, after)]
     except InputError:

@@ -13,7 +13,7 @@ from synthroads_addon.base.maps.crs import MapSystem
 from synthroads_addon.base.maps.places import Placement
 from synthroads_addon.cloud.tools.convert import read_centerline
 from synthroads_addon.cloud.tools.divide import read_polygon
-from synthroads_addon.fitting.fit import fitted_axis
+from synthroads_addon.jobs.axis_source import axis_from_file
 from synthroads_addon.road.axes.centerline import read_axis
 from synthroads_addon.scenario.road import RoadScenario
 from tests.helpers.files.axis_files import ROAD, csv, geojson, in_system, lines, named, urn
@@ -162,8 +162,8 @@ def test_other_lines_in_geojson_are_moved_alike(crs: int, epsg: int, tmp_path: P
 
 def test_a_road_along_an_axis_keeps_the_axis_heights_system(tmp_path: Path) -> None:
     path = geojson(in_system(25833), named("EPSG:25833+7837"))(tmp_path)
-    alignment, road, _ = fitted_axis(path, RoadScenario())
+    alignment, road, _ = axis_from_file(path, RoadScenario(), 1)
     assert (road.epsg, road.height_epsg) == (25832, 7837)
     assert alignment.length == pytest.approx(400.0, abs=0.01)
     np.testing.assert_allclose(road.map_origin, ROAD.mean(axis=0), atol=1.0)
-    assert fitted_axis(geojson(ROAD, urn(25832))(tmp_path), RoadScenario())[1].height_epsg is None
+    assert axis_from_file(geojson(ROAD, urn(25832))(tmp_path), RoadScenario(), 1)[1].height_epsg is None
