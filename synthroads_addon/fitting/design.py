@@ -365,7 +365,9 @@ def simplified(found: Match, station: Float, values: Float, allowed: float) -> M
     element = 0
     while element < found.model.size:
         part = _Part.about(found.model, element, station, values)
-        for trial in sorted(_simpler(part.model, element - part.first), key=Model.freedom):
+        # A stretch without points, between two that lie far apart, tells nothing of what would do there.
+        simpler = sorted(_simpler(part.model, element - part.first), key=Model.freedom) if len(part.station) else ()
+        for trial in simpler:
             tried = part.match(trial, allowed)
             if tried.worst <= allowed and tried.model.freedom() < part.model.freedom():
                 whole = _placed(part.put_back(found.model, tried.model), station, values)

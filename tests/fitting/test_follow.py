@@ -105,3 +105,11 @@ def test_drawn_axes_come_back_from_points(step: float, right: int) -> None:
     print(f"every {step:g} m: elements of {same} of 20 axes come back, all within {1000.0 * worst:.1f} mm")
     assert worst < 0.05
     assert same >= right
+
+
+def test_a_stretch_without_points_is_no_fault() -> None:
+    """The first point ten kilometres before the others, which lie on a parabola."""
+    x = np.arange(20.0, 281.0, 20.0)
+    points = np.vstack([[-10_000.0, 0.0, 0.0], np.column_stack([x, np.round(x**2 / 1000.0, 3), 0.0 * x])])
+    fit = fit_axis(points - np.round(points.mean(axis=0)), follow=True)
+    assert fit.horizontal.worst < fit.limit
