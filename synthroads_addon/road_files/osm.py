@@ -50,10 +50,12 @@ def read_pbf(path: Path) -> list[PointLine]:
     try:
         check_size(path)
         source = osmium.io.File(str(path.resolve()), "pbf")  # no other format, whatever its name ends in
+        way: Any  # osmium's types don't know that one kind alone is read
         for way in osmium.FileProcessor(source, osmium.osm.WAY).with_filter(osmium.filter.KeyFilter("highway")):
             data.take(way.id, {tag.k: tag.v for tag in way.tags}, [node.ref for node in way.nodes])
         source = osmium.io.File(str(path.resolve()), "pbf")
         wanted = data.wanted
+        node: Any
         for node in osmium.FileProcessor(source, osmium.osm.NODE):
             if node.id in wanted and node.location.valid():
                 data.nodes[node.id] = (node.location.lon, node.location.lat)
