@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from ...base.errors import InputError
+from ...base.errors import InputError, MissingPackageError
 from ...base.machine import available_cores
 from .processes import ATTEMPT, ATTEMPTS, Outcome, Submit, run_task
 
@@ -96,7 +96,7 @@ def dask_workers(cluster: Cluster) -> Submit:
     try:
         import distributed
     except ImportError:
-        raise InputError("--scheduler", address, "needs Dask: pip install 'synthroads[cluster]'") from None
+        raise MissingPackageError("--scheduler", address, "distributed", "cluster") from None
     try:
         client = distributed.Client(address, timeout=_ANSWER, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:

@@ -281,7 +281,7 @@ def test_every_missing_package_has_its_words_in_blender() -> None:
     naming = {name for name, text in texts.items() if "pip install" in text}
     assert naming == {"base/errors.py", "ui/panels/export.py"}
     extras = {extra for text in texts.values() for extra in re.findall(r'MissingPackageError\([^)]*"(\w+)"\)', text)}
-    assert extras == {"twin", "e57"}
+    assert extras == {"twin", "e57", "maps", "cluster"}
     assert set(common.IN_BLENDER) == extras
 
 
@@ -290,7 +290,8 @@ def test_in_the_extension_no_message_names_pip(settings: Any, tmp_path: Path, mo
     settings.scan.own_lines_per_second, settings.scan.lines_per_second = True, 20.0
     bpy.ops.synthroads.build()
     laz, e57 = write(tmp_path / "a.laz", make_points(2_000)), write(tmp_path / "b.e57", make_points(2_000))
-    for package in ("pye57", "ifcopenshell"):
+    (tmp_path / "map.osm.pbf").write_bytes(b"\x00\x00\x00\x0e\x0a\x09OSMHeader\x18\x00")
+    for package in ("pye57", "ifcopenshell", "osmium"):
         monkeypatch.setitem(sys.modules, package, None)
     bpy.ops.synthroads.add_calibration_class()
     bpy.context.scene.synthroads_calibration.real = str(e57)
@@ -303,6 +304,7 @@ def test_in_the_extension_no_message_names_pip(settings: Any, tmp_path: Path, mo
         "fit_materials": ("e57", {}),
         "export_twin": ("twin", {"directory": str(tmp_path), "formats": {"ifc"}}),
         "scan": ("e57", {}),
+        "load_axis": ("maps", {"filepath": str(tmp_path / "map.osm.pbf")}),
     }
     for installed, words in ((False, "pip install 'synthroads"), (True, "")):
         monkeypatch.setattr(common, "RUNS_AS_EXTENSION", installed)
