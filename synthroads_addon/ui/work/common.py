@@ -19,7 +19,7 @@ RUNS_AS_EXTENSION = str(__package__).startswith("bl_ext.")
 IN_BLENDER = {
     "twin": "needs the extension SynthRoads IFC, which comes beside this one: Output > Export installs it",
     "e57": "is no format of the extension: the command synthroads cloud convert makes LAZ of it, and it of LAZ",
-    "maps": "is read outside of Blender: the command synthroads road makes a parameter set of it, which Load Set builds",
+    "maps": "is read outside of Blender: the command synthroads road makes a parameter set of it, for Load Set",
     "cluster": "is for the command synthroads dataset, outside of Blender",
 }
 """Sentences in Blender about a package that is missing, by the extra that brings it elsewhere."""
