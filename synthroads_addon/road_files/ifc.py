@@ -23,6 +23,8 @@ from .line import SHORTEST, Equation, LineNames, PlanPiece, RoadLine
 from .xml_text import finite
 
 _SCHEMA = re.compile(rb"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'\s*\)\s*\)", re.IGNORECASE)
+_END = b"END-ISO-10303-21"
+"""What a file of STEP ends with (ISO 10303-21): without it something was cut off, which the library reads over."""
 _READ_AS = "IFC4X3_ADD2"
 _KINDS = {
     "CLOTHOID": "clothoid", "BLOSSCURVE": "bloss", "COSINECURVE": "cosine", "SINECURVE": "sine",
@@ -88,6 +90,8 @@ def _open(path: Path) -> Any:
         raise InputError(
             path.name, schema or None, "IFC 4.3 (IFC4X3 and its candidates) is needed: others have no roads"
         )
+    if _END not in data[-4096:]:
+        raise InputError(path.name, None, "the file ends too early: END-ISO-10303-21 is needed at its end")
     try:
         if found and schema != _READ_AS:
             data = data[: found.start(1)] + _READ_AS.encode() + data[found.end(1) :]

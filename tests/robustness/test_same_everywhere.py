@@ -12,7 +12,7 @@ from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
 
-CHECKSUM = "b8ac17a7e29799cedfb1252078a3c3f31e785f851cca9dbab0c78850d8ccb1bb"
+CHECKSUM = "c32b7bc72bbfd855988d456ef5d2cc5d492530e43f772b92cdc3eb8bb3a818d8"
 EVERYTHING = ["exits=1", "entries=1", "emergency_bays=1"]
 
 

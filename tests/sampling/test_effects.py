@@ -67,7 +67,8 @@ def with_effect(parameters: RoadParameters) -> str:
         item.pop("instance")
         for path in (path for path in listed if path.partition(".")[0] == item["type"]):
             *way, name = path.split(".")[1:]
-            (item[way[0]] if way else item).pop(name, None)
+            if not way or not way[0].endswith("[]"):  # what a list holds goes with the list
+                (item[way[0]] if way else item).pop(name, None)
     return canonical_json(data)
 
 

@@ -14,7 +14,7 @@ from pydantic.fields import FieldInfo
 
 from synthroads_addon.base.schema import Model
 from synthroads_addon.road.objects import WidthPoint
-from synthroads_addon.road.parameters import AnyObject, Metadata, Transform
+from synthroads_addon.road.parameters import AnyObject, Metadata, StationEquation, Transform
 from synthroads_addon.road.surroundings import LONGEST, SPECIES, Environment, MaterialVariation
 
 OBJECTS = {kind.model_fields["type"].default: kind for kind in get_args(get_args(AnyObject)[0])}
@@ -84,8 +84,9 @@ def _values(kind: Any, metadata: list[Any]) -> st.SearchStrategy[Any]:
     if origin is tuple:
         least = _limit(metadata, annotated_types.MinLen, 0)
         most = min(_limit(metadata, annotated_types.MaxLen, 100), least + 2)
-        if arguments[0] is WidthPoint:
-            points = st.lists(model_data(WidthPoint), min_size=least, max_size=most, unique_by=lambda p: p["station"])
+        if isinstance(arguments[0], type) and issubclass(arguments[0], WidthPoint | StationEquation):
+            item = model_data(arguments[0])
+            points = st.lists(item, min_size=least, max_size=most, unique_by=lambda p: p["station"])
             return points.map(lambda points: sorted(points, key=lambda p: p["station"]))
         return st.lists(_values(arguments[0], []), min_size=least, max_size=most)
     if isinstance(kind, type) and issubclass(kind, Model):
