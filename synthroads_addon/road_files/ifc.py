@@ -24,7 +24,7 @@ from .xml_text import finite
 
 _SCHEMA = re.compile(rb"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'\s*\)\s*\)", re.IGNORECASE)
 _END = b"END-ISO-10303-21"
-"""What a file of STEP ends with (ISO 10303-21): without it something was cut off, which the library reads over."""
+"""The end of each file of STEP (ISO 10303-21): without it something was cut off, which the library reads over."""
 _READ_AS = "IFC4X3_ADD2"
 _KINDS = {
     "CLOTHOID": "clothoid", "BLOSSCURVE": "bloss", "COSINECURVE": "cosine", "SINECURVE": "sine",
