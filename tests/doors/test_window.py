@@ -1,7 +1,9 @@
 """By mouse in the window of a real Blender: from Preferences > Install from Disk to a scanned cloud that is shown.
 
-`../shared/real_blender` brings a Blender with a window (Debian's 5.2, Python 3.14) into a folder of its own, once:
-`build/real_blender`, or the one that SYNTHROADS_BLENDER_ROOT names. Each run has a new home folder in it.
+SYNTHROADS_BLENDER_ROOT names a folder that holds a whole Linux with a Blender 5.2 of its own, and
+SYNTHROADS_BLENDER_SCRIPTS one with two programs: ``enter.sh ROOT FOLDER COMMAND...`` runs a command within the first,
+where the folder is shown as /mnt/project; ``window.sh SCRIPT OUTPUT`` gives Blender a screen there and has it run a
+script. Each run has a new home folder.
 """
 
 from __future__ import annotations
@@ -23,14 +25,13 @@ import pytest
 from tests.doors.documented import ROOT
 
 HERE = Path(__file__).parent
-REAL_BLENDER = ROOT.parent / "shared" / "real_blender"
-CHOSEN = "SYNTHROADS_BLENDER_ROOT"
+BLENDER_ROOT, SCRIPTS = (os.environ.get(f"SYNTHROADS_BLENDER_{name}", "") for name in ("ROOT", "SCRIPTS"))
 INSIDE = "/mnt/project"
-"""Where enter.sh shows a folder of this machine inside."""
+"""Where enter.sh shows the folder."""
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(not (REAL_BLENDER / "setup.sh").exists(), reason="no ../shared/real_blender"),
+    pytest.mark.skipif(not (BLENDER_ROOT and SCRIPTS), reason="SYNTHROADS_BLENDER_ROOT and _SCRIPTS name no Blender"),
     pytest.mark.skipif(sys.platform != "linux" or os.geteuid() != 0, reason="a root of its own needs Linux and root"),
     pytest.mark.skipif(
         importlib.util.find_spec("bpy") is None, reason="Blender's own tool, which packs, comes with bpy"
@@ -39,20 +40,7 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def blender_root() -> Path:
-    """Return the folder with the real Blender, set up if it isn't there yet."""
-    root = Path(os.environ.get(CHOSEN) or ROOT / "build" / "real_blender")
-    if not (root / "usr" / "bin" / "blender").exists():
-        part = root.with_name(f"{root.name}.part")  # one that isn't complete is never taken for one that is
-        shutil.rmtree(part, ignore_errors=True)
-        part.parent.mkdir(parents=True, exist_ok=True)
-        _run(["bash", REAL_BLENDER / "setup.sh", "sid", part], 1800.0)
-        part.rename(root)
-    return root
-
-
-@pytest.fixture(scope="module")
-def worked(blender_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def worked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder in which `scan_by_mouse` was run: with ``home`` and ``out``."""
     folder = tmp_path_factory.mktemp("window")
     build = ["tools/build_extension.py", "--platform", "linux-x64", "--blender", "5.2-debian"]
@@ -60,7 +48,7 @@ def worked(blender_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     (folder / "home").mkdir()
     (archive,) = (folder / "dist").glob("synthroads-*.zip")
     archive.rename(folder / "home" / archive.name)
-    for file in (REAL_BLENDER / "window.sh", HERE / "by_mouse.py", HERE / "scan_by_mouse.py"):
+    for file in (Path(SCRIPTS, "window.sh"), HERE / "by_mouse.py", HERE / "scan_by_mouse.py"):
         shutil.copyfile(file, folder / file.name)
     inside = [
         "env",
@@ -70,7 +58,7 @@ def worked(blender_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
         f"{INSIDE}/scan_by_mouse.py",
         f"{INSIDE}/out",
     ]
-    said = _run(["bash", REAL_BLENDER / "enter.sh", blender_root, folder, *inside], 3600.0, may_fail=True)
+    said = _run(["bash", Path(SCRIPTS, "enter.sh"), BLENDER_ROOT, folder, *inside], 3600.0, may_fail=True)
     assert (folder / "out" / "answers.json").exists(), said
     return folder
 
