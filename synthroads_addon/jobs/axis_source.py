@@ -10,7 +10,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.maps.crs import LONGITUDE_LATITUDE, MapSystem
 from ..base.random_streams import stream
-from ..base.remarks import assume, collected_remarks, warn
+from ..base.remarks import assume, warn
 from ..fitting.fit import AxisFit, fit_heights
 from ..fitting.plot import axis_picture, deviation_picture
 from ..road.alignment import clip_offset, left_vectors
@@ -18,6 +18,7 @@ from ..road.geometry import alignment_of
 from ..road.parameters import AlignmentObject
 from ..road.terrain import road_elevation_model
 from ..road_files.axis import line_deviation, road_axis
+from ..road_files.line import ExactAxis, RoadLine
 from ..road_files.read import OF_POINTS, READERS, format_of, read_lines, read_points
 from ..sampling.alignment import sample_profile
 from ..scenario.road import RoadScenario
@@ -72,10 +73,10 @@ def axis_from_file(
     elif place.given:
         raise InputError(place.given, path.name, f"is for lines of points and paths: {kind} says where its axis lies")
     else:
-        axis, limits, report = road_axis(path, scenario, name, round_kinks)
+        read: list[tuple[RoadLine, ExactAxis]] = []
+        axis, limits, report = road_axis(path, scenario, name, round_kinks, lambda *both: read.append(both))
         if picture:
-            with collected_remarks():  # they were made a line above
-                deviation_picture(path.name, *line_deviation(path, name, round_kinks)).save(picture, "PNG")
+            deviation_picture(path.name, *line_deviation(*read[0])).save(picture, "PNG")
     _tell_overlap(path, axis, limits.half_width)
     if report.get("heights", ()) is None:
         vertical, source = _heights(axis, limits, seed)

@@ -65,7 +65,7 @@ def road_from_file(
     found = whole_road(path, scenario.road, name, round_kinks)
     axis, limits, report = axis_from_file(*line)
     if found.heights is not None:
-        axis, report["heights"] = _with_profile(path, axis, limits, found, name, round_kinks)
+        axis, report["heights"] = _with_profile(axis, limits, found, round_kinks)
     limits = _wide_enough(path, limits, found)
     parameters = sample_road(limits, scenario.seed, scenario.title, axis, found.given)
     report["surface"] = deviations(found.pavements, _lifted(parameters), found.stations, found.loss)
@@ -97,16 +97,11 @@ def _is_taken(text: str) -> bool:
 
 
 def _with_profile(
-    path: Path,
-    axis: AlignmentObject,
-    limits: RoadScenario,
-    found: WholeRoad,
-    name: str | None,
-    round_kinks: float | None,
+    axis: AlignmentObject, limits: RoadScenario, found: WholeRoad, round_kinks: float | None
 ) -> tuple[AlignmentObject, dict[str, Any]]:
     """Return an axis with the heights that the road's planes give it, and what the report says of them."""
     assert found.heights is not None
-    heights = with_heights(choose_line(read_opendrive(path), name, path.name), found.heights, round_kinks)
+    heights = with_heights(found.line, found.heights, round_kinks)
     up = limits.map_origin[2]
     points = tuple(
         VerticalPoint(station=p.station, elevation=p.elevation - up, radius=p.radius) for p in heights.points

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,11 @@ _NORTHERN, _SOUTHERN = 32600, 32700
 
 
 def road_axis(
-    path: Path, scenario: RoadScenario, name: str | None = None, round_kinks: float | None = None
+    path: Path,
+    scenario: RoadScenario,
+    name: str | None = None,
+    round_kinks: float | None = None,
+    seen: Callable[[RoadLine, ExactAxis], None] | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis of a road or alignment of a file, the scenario for it, and a report.
 
@@ -38,6 +43,7 @@ def road_axis(
         scenario: whose coordinate system the road is to have, if it names one; else the file's is taken.
         name: of the line; None: the longest that belongs to no junction.
         round_kinks: distance (m) from kinks that roundings may keep; None refuses them (`exact_axis`).
+        seen: gets the file's line and the axis taken from it, where the file has them, to draw both.
 
     Returns:
         the alignment in local coordinates; if the file has no heights its only vertical point is at 0 m, and the
@@ -53,6 +59,8 @@ def road_axis(
     if name is None and len(lines) > 1:
         assume("%s has %d roads: the longest, %r, is taken", path.name, len(lines), line.name)
     axis = exact_axis(line, round_kinks)
+    if seen:
+        seen(line, axis)
     for kink in axis.roundings:
         text = "%s: the kink of %.4f rad at station %.3f m is rounded over %.2f m, %.1f mm off it"
         warn(text, path.name, kink.angle, kink.station, kink.length, 1000.0 * kink.deviation)
@@ -69,17 +77,13 @@ def road_axis(
     return alignment, road, report_of(path, line, axis) | {"placed": placing}
 
 
-def line_deviation(
-    path: Path, name: str | None = None, round_kinks: float | None = None
-) -> tuple[float, Float, Float, Float | None]:
+def line_deviation(line: RoadLine, axis: ExactAxis) -> tuple[float, Float, Float, Float | None]:
     """Return how far a file's line is from the axis that `road_axis` takes from it.
 
     Returns:
         the axis' length, and of places of the line at most a metre apart the stations, the distances to the left of
         the axis and the heights above it (N,), m; None for the heights where the file has none.
     """
-    line = choose_line(read_lines(path), name, path.name)
-    axis = exact_axis(line, round_kinks)
     places, given = sampled(line)
     station, across = axis.alignment.project(places)
     station = np.clip(station, 0.0, axis.alignment.length)

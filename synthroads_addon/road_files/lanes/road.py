@@ -38,6 +38,7 @@ class WholeRoad:
     """A road of an OpenDRIVE file.
 
     Attributes:
+        line: its line in the file.
         given: its parts for a parameter set.
         heights: cubics of the profile, stations along the axis; None where the axis has those of the file.
         pavements: what its carriageways are made of.
@@ -45,6 +46,7 @@ class WholeRoad:
         exact: stations of the parameter set at the plan's (file, set), (2, K), m.
     """
 
+    line: RoadLine
     given: GivenRoad
     heights: tuple[HeightPiece, ...] | None
     pavements: Pavements
@@ -109,7 +111,7 @@ def whole_road(
     markings = line_markings(found, lambda s: np.interp(s, *exact), scenario, loss)
     places = [Places(FileSurface(one), axis.alignment, lambda s: np.interp(s, *exact)) for one in roads]
     given = GivenRoad(found.carriageways, found.turnouts, markings, things(places, loss))
-    return WholeRoad(given, heights, found, loss, exact)
+    return WholeRoad(line, given, heights, found, loss, exact)
 
 
 def _elements(root: Element) -> dict[str, Element]:
