@@ -10,6 +10,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.remarks import assume
 from ..road.geometry import RoadGeometry
+from ..road.given_road import GivenRoad
 from ..road.objects import nominal_width
 from ..road.parameters import AlignmentObject, RoadParameters, VerticalPoint, read_parameters
 from ..road.section import Carriageway
@@ -56,12 +57,25 @@ def road_from_file(
     Raises:
         MissingFileError, InputError: it can't be read, isn't OpenDRIVE, or a parameter set can't hold it.
     """
+    parameters, report, _ = _read_road(path, scenario, name, place, round_kinks, picture)
+    return parameters, report
+
+
+def _read_road(
+    path: Path,
+    scenario: Scenario,
+    name: str | None = None,
+    place: PathPlace = NOWHERE_ELSE,
+    round_kinks: float | None = None,
+    picture: Path | None = None,
+) -> tuple[RoadParameters, dict[str, Any], GivenRoad | None]:
+    """Return what `road_from_file` does, and what of the road the file gives; None where it has no lanes."""
     if not has_whole_road(path):
         raise InputError(path.name, format_of(path), "OpenDRIVE is needed for a whole road: --axis takes other files")
     line = (path, scenario.road, scenario.seed, name, place, round_kinks, picture)
     if choose_line(read_opendrive(path), name, path.name).lanes is None:
         axis, limits, report = axis_from_file(*line)
-        return sample_road(limits, scenario.seed, scenario.title, axis), report
+        return sample_road(limits, scenario.seed, scenario.title, axis), report, None
     found = whole_road(path, scenario.road, name, round_kinks)
     axis, limits, report = axis_from_file(*line)
     if found.heights is not None:
@@ -70,7 +84,7 @@ def road_from_file(
     parameters = sample_road(limits, scenario.seed, scenario.title, axis, found.given)
     report["surface"] = deviations(found.pavements, _lifted(parameters), found.stations, found.loss)
     report["left_out"] = [text for text in report["left_out"] if not _is_taken(text)]
-    return parameters, report | {"whole": found.loss.to_dict(), "summary": found.loss.lines()}
+    return parameters, report | {"whole": found.loss.to_dict(), "summary": found.loss.lines()}, found.given
 
 
 def differences_from(
@@ -84,11 +98,10 @@ def differences_from(
         MissingFileError, InputError: a file can't be read, or a parameter set can't hold the road.
     """
     old = read_parameters(against)
-    new, report = road_from_file(path, scenario, name)
-    types = {"Alignment", "Carriageway", "Turnout"}
-    given = whole_road(path, scenario.road, name).given
-    types |= {"LineMarking"} if given.markings is not None else set()
-    types |= {*THINGS, "Arrow", "Hatching"} if given.things is not None else set()
+    new, report, given = _read_road(path, scenario, name)
+    types = {"Alignment", "Carriageway", "Turnout"} if given else {"Alignment"}
+    types |= {"LineMarking"} if given and given.markings is not None else set()
+    types |= {*THINGS, "Arrow", "Hatching"} if given and given.things is not None else set()
     return differences(old, new, types), report
 
 
