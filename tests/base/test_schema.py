@@ -237,6 +237,10 @@ BROKEN = {
     "a gantry's left end lies left of its right end": _object(
         "", type="Gantry", kind="one_sided", left_offset=-5.0, right_offset=5.0, **PLACE
     ),
+    "an alignment's station equations are in the order of their stations": {
+        "alignment": SMALL_ROAD["objects"]["alignment"]
+        | {"equations": [{"station": 20.0, "ahead": 0.0}, {"station": 10.0, "ahead": 0.0}]}
+    },
     "forest and meadow are at most all of the land": _object(
         "", type="Landscape", seed=1, forest_share=0.6, meadow_share=0.5
     ),

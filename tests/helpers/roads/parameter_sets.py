@@ -288,6 +288,7 @@ LIBRARY_ONLY = {
     "a vegetation's band, heights and stretch end after they begin": "must not be less than band_start, height_min",
     "a gantry's left end lies left of its right end": "left_offset must be greater than right_offset",
     "a material has one set of textures at most": "textures has '.*' twice",
+    "an alignment's station equations are in the order of their stations": "must be in the order of their stations",
     "forest and meadow are at most all of the land": "forest_share and meadow_share must not be more than 1",
 }
 """Conditions that JSON Schema can't express -> what the library says. docs/parameters.md lists them."""
