@@ -75,7 +75,7 @@ def test_strips_are_as_bright_as_the_report_says() -> None:
         calm, points = (scan_block(one, strip, 0).points for one in (plan, brighter))
         np.testing.assert_allclose(points.intensity, calm.intensity * 10 ** (row["gain_db"] / 10), rtol=1e-6)
         np.testing.assert_array_equal(points.xyz, calm.xyz)
-    levels = [10 * np.log10(strip_gain(brighter.strip_errors, seed, 3)) + 0.75 for seed in range(400)]
+    levels = [10 * np.log10(strip_gain(brighter.reception.strip_errors, seed, 3)) + 0.75 for seed in range(400)]
     counts = np.bincount((stats.norm.cdf(levels) * 20).astype(int), minlength=20)
     assert stats.chisquare(counts).pvalue > 0.001
 

@@ -76,7 +76,11 @@ def planned(
     path.strips = (type(path.strips[0])(0, 0.0, seconds),)  # type: ignore[misc]
     scan = {"noise": {"range_sigma": 0.0}, "relief": 0.0, "caster": "embree"} | changes.pop("scan", {})
     scenario = Scenario.from_dict({"fidelity": "draft", "scan": scan} | changes)
-    return plan_scan(Survey(scenario, ScenarioInputs.read(scenario), services, conditions), ScannedScene(plane()), path)
+    return plan_scan(
+        Survey(scenario, ScenarioInputs.read(scenario), services, conditions or ScanConditions()),
+        ScannedScene(plane()),
+        path,
+    )
 
 
 def recorded(plan: ScanPlan) -> PointBlock:
