@@ -252,7 +252,7 @@ def _measure_mesh(name: str, scene: Path, quick: bool) -> dict[str, Any]:
     from synthroads_addon.base.changes import apply_change
     from synthroads_addon.base.progress import StageTimer, peak_memory_mb
     from synthroads_addon.jobs.measure.scenes import measure_scene  # in this process alone: it starts Blender
-    from synthroads_addon.jobs.scan_scene import SceneScan, open_and_read, scene_site
+    from synthroads_addon.jobs.scan_scene import SceneScan, check_scene_scan, open_and_read, scene_site
 
     data: Any = Scenario().to_dict()
     changes = _ROAD if name == "road" else (*_WAVES, _FAST if quick else _SLOW)
@@ -260,8 +260,9 @@ def _measure_mesh(name: str, scene: Path, quick: bool) -> dict[str, Any]:
         data = apply_change(data, change, Scenario)
     job = SceneScan(Scenario.from_dict(data), Path("out"), scene, up="z")
     before, timer = peak_memory_mb() or 0.0, StageTimer()
-    opened, road, _ = open_and_read(job, None, timer, {})
-    found = measure_scene(scene_site(job, opened.static, road), opened, scene, name, _RAYS[name], timer)
+    inputs = check_scene_scan(job)
+    opened, road, _ = open_and_read(job, inputs, timer, {})
+    found = measure_scene(scene_site(job, inputs, opened.static, road), opened, scene, name, _RAYS[name], timer)
     packed = {rays: rate.get("packets", rate["single rays"]) for rays, rate in found["rates"].items()}
     lines = {f"{name}_{rays}": 100.0 * rate["ours"] / packed[rays] for rays, rate in found["rates"].items()}
     scans = {

@@ -77,6 +77,7 @@ def demo_scene() -> tuple[SceneMesh, Flight]:
     from synthroads_addon.blender.files import empty_file
     from synthroads_addon.blender.model.build import build_road
     from synthroads_addon.blender.scene.evaluated import scene_mesh
+    from synthroads_addon.blender.things.model_builder import BuildRequest
     from synthroads_addon.road.geometry import RoadGeometry
     from synthroads_addon.sampling.road import sample_road
     from synthroads_addon.scenario.scenario import load_scenario
@@ -85,7 +86,7 @@ def demo_scene() -> tuple[SceneMesh, Flight]:
     scenario = load_scenario("rq31-600m")
     parameters = sample_road(scenario.road, scenario.seed)
     geometry = RoadGeometry(parameters)
-    build_road(parameters, scenario.settings().tolerance, scenario.settings().vegetation_detail)
+    build_road(BuildRequest(parameters, scenario.settings().tolerance, scenario.settings().vegetation_detail))
     station = np.arange(0.0, geometry.length, LINE_SPACING)
     axis = np.column_stack([geometry.alignment.frame(station)[0], geometry.profile.elevation(station)])
     return scene_mesh(), (axis, 60.0, float(np.deg2rad(52.0)))

@@ -40,6 +40,7 @@ from synthroads_addon.scanning.relief.normal_images import NormalImage
 from synthroads_addon.scanning.scene.caster import Caster
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import ScannedScene
+from synthroads_addon.scenario.inputs import ScenarioInputs
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 
 SETTINGS = ("colour.source=material", 'outputs=["cloud"]')
@@ -101,7 +102,7 @@ def save(path: Path, scenario: Scenario) -> None:
 
     empty_file()
     parameters = sample_road(scenario.road, scenario.seed)
-    shown = RoadScene(scenario, RoadGeometry(parameters))
+    shown = RoadScene.of(scenario, RoadGeometry(parameters))
     shown.build()
     scene = shown.read()
     kept = KeptScene(scenario.to_dict(), parameters.to_dict(), scene, constants(scene.static.materials))
@@ -119,7 +120,8 @@ def scan(path: Path) -> dict[str, Any]:
     geometry = RoadGeometry(RoadParameters.from_dict(kept.road))
     begin = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        counts = Site.of_road(scenario, geometry).scan(kept.scene, KeptServices(kept), Path(folder), timer)
+        site = Site.of_road(scenario, geometry, ScenarioInputs.read(scenario))
+        counts = site.scan(kept.scene, KeptServices(kept), Path(folder), timer)
         seconds = time.perf_counter() - begin
         cloud = hashlib.sha256((Path(folder) / "cloud.laz").read_bytes()).hexdigest()
     return {

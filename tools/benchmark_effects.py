@@ -75,7 +75,7 @@ def measure(rows: Sequence[ScanCost], repeats: int) -> None:
     """Scan a scene, built once, by all kinds in turn, and add points and seconds to these."""
     timer = StageTimer(silent)
     road, _ = make_road(RoadSource(rows[0].scenario), timer)
-    scene = RoadScene(rows[0].scenario, road)
+    scene = RoadScene.of(rows[0].scenario, road)
     scene.build()
     scene.read()
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:

@@ -21,6 +21,7 @@ sys.path.insert(0, str(ROOT))
 from synthroads_addon.base.arrays import Float  # noqa: E402
 from synthroads_addon.blender.files import empty_file  # noqa: E402
 from synthroads_addon.blender.model.build import build_road  # noqa: E402
+from synthroads_addon.blender.things.model_builder import BuildRequest  # noqa: E402
 from synthroads_addon.blender.views import pictures  # noqa: E402
 from synthroads_addon.road.geometry import RoadGeometry  # noqa: E402
 from synthroads_addon.road.surroundings import Environment  # noqa: E402
@@ -91,7 +92,7 @@ def render(textures: str, path: Path, width: int, samples: int) -> None:
     limits = load_scenario("rq31-600m", list(LIMITS)).road.model_copy(update={"textures": textures})
     light = Environment(sun_azimuth_deg=140.0, sun_elevation_deg=38.0)
     parameters = sample_road(limits, SEED, "").model_copy(update={"environment": light})
-    model, geometry = build_road(parameters, 0.01, 0.3), RoadGeometry(parameters)
+    model, geometry = build_road(BuildRequest(parameters, 0.01, 0.3)), RoadGeometry(parameters)
     eye, aim = geometry.point(np.array([20.0, 60.0]), np.array([-6.0, -8.0])) + parameters.transform.translate
     pictures.light(light)
     pictures.camera(eye - model.origin + [0.0, 0.0, 2.2], aim - model.origin + [0.0, 0.0, 0.3])

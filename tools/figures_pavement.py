@@ -43,7 +43,7 @@ def row(seed: int, rays: int) -> str:
     scenario = load_scenario("airborne-1000m", [*_SETTINGS, f"seed={seed}", f"scan.rays_per_pulse={rays}"])
     parameters = sample_road(scenario.road, seed)
     geometry = RoadGeometry(parameters)
-    scene, blocks = RoadScene(scenario, geometry), CollectedBlocks()
+    scene, blocks = RoadScene.of(scenario, geometry), CollectedBlocks()
     scene.build()
     record(scene.plan(), blocks)
     points = concatenate([block.points for block in blocks.results])

@@ -71,7 +71,7 @@ def measure_canopy(species: str, season: str, seed: int) -> CanopyFigures:
     scenario = load_scenario("airborne-1000m", settings)
     parameters = sample_road(scenario.road, seed)
     geometry = RoadGeometry(parameters)
-    scene, blocks = RoadScene(scenario, geometry), CollectedBlocks()
+    scene, blocks = RoadScene.of(scenario, geometry), CollectedBlocks()
     scene.build()
     record(scene.plan(), blocks)
     points = concatenate([block.points for block in blocks.results])

@@ -70,7 +70,7 @@ def measure_platform(platform: str) -> dict[str, Any]:
     name, changes = SCENES[platform]
     scenario = load_scenario(name, [*changes, "cloud.point_spacing=null"])
     empty_file()
-    shown = RoadScene(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
+    shown = RoadScene.of(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
     builds, few = [], None
     trial = None
     models = model_knobs(scenario, {})

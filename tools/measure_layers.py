@@ -59,13 +59,14 @@ def compare_sources(name: str, length: float, stretches: int, seconds: float, *c
     """
     empty_file()
     scenario = load_scenario(name, [f"road.length={length}", 'outputs=["cloud"]', *changes])
-    shown = RoadScene(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
+    shown = RoadScene.of(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
     shown.build()
     plan = shown.plan()
-    assert plan.request is not None
-    seen = join_results(record_as_measured(replace(plan, path=spread_stretches(plan.path, stretches, seconds)))).seen
+    assert plan.layers.request is not None
+    emission = replace(plan.emission, path=spread_stretches(plan.path, stretches, seconds))
+    seen = join_results(record_as_measured(replace(plan, emission=emission))).seen
     assert seen is not None
-    request = replace(plan.request, wanted=LAYERS)
+    request = replace(plan.layers.request, wanted=LAYERS)
     nodes, nodes_seconds = sampled(request, seen, "nodes")
     truth, truth_seconds = sampled(request, seen, "returns")
     rows = truth.source == FROM_RETURN

@@ -29,9 +29,9 @@ BLOCKS, RUNS, PULSES = 4, 5, 40_000
 def plan_of(scenario: str, changes: list[str]) -> ScanPlan:
     """Return the plan of a scenario's scan, for which its model is built."""
     job = load_scenario(scenario, ['outputs=["cloud"]', *changes])
-    shown = RoadScene(job, RoadGeometry(sample_road(job.road, job.seed)))
+    shown = RoadScene.of(job, RoadGeometry(sample_road(job.road, job.seed)))
     shown.build()
-    return RoadScene(job, shown.road, shown.model, shown.read()).plan()
+    return RoadScene(job, shown.road, shown.inputs, shown.model, shown.read()).plan()
 
 
 def times(plan: ScanPlan) -> tuple[float, float]:

@@ -117,7 +117,7 @@ def study(scenario: Scenario, real: Path | None, output: Path, repeats: int = 1)
     """
     timer = StageTimer(silent)
     road, _ = make_road(RoadSource(scenario), timer)
-    scene = RoadScene(scenario, road)
+    scene = RoadScene.of(scenario, road)
     scene.build()
     scene.read()
     known = [] if real is None else [read_compared(path, row) for path, row in find_clouds(real)]

@@ -30,8 +30,28 @@ def read_text(path: str | os.PathLike[str], kind: str, wanted: str = "", encodin
         InputError: it is no text.
     """
     name = os.fspath(path)
-    try:
+    with _told_faults(name, wanted, kind):
         return Path(name).read_text(encoding=encoding)
+
+
+def read_bytes(path: str | os.PathLike[str], wanted: str = "") -> bytes:
+    """Return the content of any file; MissingFileError and ``wanted`` as in `read_text`."""
+    with _told_faults(os.fspath(path), wanted):
+        return Path(path).read_bytes()
+
+
+def decoded(content: bytes, path: str | os.PathLike[str], kind: str, encoding: str = "utf-8") -> str:
+    """Return the text that a file's content is, with its own line ends; InputError and arguments as in `read_text`."""
+    with _told_faults(os.fspath(path), kind=kind):
+        return content.decode(encoding)
+
+
+@contextmanager
+def _told_faults(name: str, wanted: str = "", kind: str = "") -> Iterator[None]:
+    """Context in which a file is read: what goes wrong is told as `read_text` tells it."""
+    try:
+        yield
+        return
     except OSError as error:
         if isinstance(error, FileNotFoundError) and not wanted:
             raise MissingFileError(name, None, "no such file") from None

@@ -21,6 +21,13 @@ from ..materials.table import Material
 from ..scanning.colour.colour import MaterialLayers, surface_constants
 from ..scanning.devices.device import ScannerSetting
 from ..scanning.finish import Finish
+from ..scanning.parts.atmosphere import Atmosphere
+from ..scanning.parts.emission import Emission
+from ..scanning.parts.layers import Layers
+from ..scanning.parts.reception import Reception
+from ..scanning.parts.reflection import Reflection
+from ..scanning.parts.relief import Relief
+from ..scanning.parts.run import Run
 from ..scanning.plan import ScanPlan
 from ..scanning.platforms.polyline import PolylineGuide
 from ..scanning.relief.micro_relief import micro_relief
@@ -106,19 +113,14 @@ def simulate_pavement(
     half = pavement.length / 2.0 + _OVERRUN
     guide = PolylineGuide(np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]]))
     plan = ScanPlan(
-        target=Target(ScannedScene(mesh, ()), lambda _: pavement),
-        surfaces=surfaces_of([pavement.material], scan.reflection),
-        setting=setting,
-        path=with_motion(scan.platform.make_path(guide), scan.motion, seed),
-        rings=(),
-        seed=seed,
-        noise=scan.noise,
-        strip_errors=scan.strip_errors,
-        attenuation=scan.attenuation or 0.0,
-        measured_layers=frozenset({"normal", "material"}),
-        records_seen_points=True,
-        relief=micro_relief([name], [pavement.material]) if scan.relief else None,
-        relief_strength=scan.relief,
+        Target(ScannedScene(mesh, ()), lambda _: pavement),
+        Emission(setting, with_motion(scan.platform.make_path(guide), scan.motion, seed), rings=()),
+        Reflection(surfaces_of([pavement.material], scan.reflection)),
+        Run(seed),
+        Atmosphere(scan.attenuation or 0.0),
+        Reception(scan.noise, scan.strip_errors),
+        Relief(micro_relief([name], [pavement.material]) if scan.relief else None, scan.relief),
+        Layers(frozenset({"normal", "material"}), seen_points=True),
     )
     stages, finish = BlockScan(plan), Finish(plan, MaterialLayers(surface_constants([pavement.material])))
     blocks = [finish.finish_block(stages.scan_block(*block)).points for block in plan.blocks()]

@@ -193,7 +193,9 @@ def _tile_text(job: SceneJob, tile: Tile) -> str:
 def layout_descriptions(recipe: Recipe, jobs: Sequence[SceneJob]) -> dict[str, str]:
     """Return path -> text of the files that describe whole layouts: classes, and the scenes of each split."""
     texts: dict[str, str] = {}
-    schemes = {scheme.name: scheme for scheme in (job.scenario.cloud.scheme() for job in jobs)}
+    clouds = {job.scenario.cloud.classes: job.scenario.cloud for job in jobs}
+    read = {classes: cloud.scheme() for classes, cloud in clouds.items()}  # each file once, of however many scenes
+    schemes = {scheme.name: scheme for scheme in (read[job.scenario.cloud.classes] for job in jobs)}
     for layout, scheme in product(recipe.layouts, schemes.values()):
         root = layout_root(Path(), layout, scheme)
         if layout == "pointcept":
@@ -201,7 +203,7 @@ def layout_descriptions(recipe: Recipe, jobs: Sequence[SceneJob]) -> dict[str, s
             table = {"classes": names, "ids": ids, "ignore_index": -1}
             texts[f"{root.as_posix()}/classes.json"] = canonical_json(table)
         else:
-            with_scheme = [job for job in jobs if job.scenario.cloud.scheme().name == scheme.name]
+            with_scheme = [job for job in jobs if read[job.scenario.cloud.classes].name == scheme.name]
             texts[f"{root.as_posix()}/synthroads.yaml"] = _kitti_configuration(scheme, with_scheme)
     return texts
 

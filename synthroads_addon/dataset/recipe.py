@@ -196,7 +196,8 @@ def scene_jobs(recipe: Recipe) -> list[SceneJob]:
     Raises:
         InputError: a scenario or a change is wrong; the message names the group.
     """
-    return [_job(recipe, number, *place) for number, place in enumerate(scene_places(recipe))]
+    read: dict[str, Any] = {}
+    return [_job(recipe, read, number, *place) for number, place in enumerate(scene_places(recipe))]
 
 
 def scene_places(recipe: Recipe) -> list[tuple[SceneGroup, int, str]]:
@@ -206,19 +207,23 @@ def scene_places(recipe: Recipe) -> list[tuple[SceneGroup, int, str]]:
 
 def scene_job(recipe: Recipe, number: int) -> SceneJob:
     """Return the scene of a number from 0 in the recipe's order; see `scene_jobs`."""
-    return _job(recipe, number, *scene_places(recipe)[number])
+    return _job(recipe, {}, number, *scene_places(recipe)[number])
 
 
-def _job(recipe: Recipe, number: int, group: SceneGroup, place: int, split: str) -> SceneJob:
+def _job(recipe: Recipe, read: dict[str, Any], number: int, group: SceneGroup, place: int, split: str) -> SceneJob:
+    """Return a scene; the data of scenarios read so far are in `read`, by name, to which its own is added."""
     name = f"{group.name}-{place + 1:0{max(2, len(str(group.scenes)))}d}"
     try:
-        scenario = _scenario(recipe, group, name, place)
+        scenario = _scenario(recipe, read, group, name, place)
     except InputError as error:
         raise InputError(f"groups.{group.name}: {error.field}", error.value, error.allowed) from None
     return SceneJob(name, number, split, scenario)
 
 
-def _scenario(recipe: Recipe, group: SceneGroup, name: str, place: int) -> Scenario:
+def _scenario(recipe: Recipe, read: dict[str, Any], group: SceneGroup, name: str, place: int) -> Scenario:
+    base = group.scenario or recipe.scenario
+    if base not in read:
+        read[base] = load_scenario(base).to_dict()
     seed = int(stream(recipe.seed, "scene", name).integers(LARGEST_SEED))
     drawn = [_drawn_values(recipe.seed, name, part.draw) for part in (recipe, group)]
     changes = [{"seed": seed}, recipe.set, drawn[0], group.set, drawn[1]]
@@ -226,9 +231,8 @@ def _scenario(recipe: Recipe, group: SceneGroup, name: str, place: int) -> Scena
         turn, place_in_turn = divmod(place, len(group.variants))
         order = stream(recipe.seed, "variants", group.name, turn).permutation(len(group.variants))
         changes.append(group.variants[order[place_in_turn]])
-    data = load_scenario(group.scenario or recipe.scenario).to_dict()
     pairs = (pair for values in changes for pair in values.items())
-    scenario = Scenario.from_dict(with_changes(data, pairs))
+    scenario = Scenario.from_dict(with_changes(read[base], pairs))
     if _UNSTABLE in group_outputs(group, recipe):
         raise InputError("outputs", list(scenario.outputs), f"a data set can't hold {_UNSTABLE}: it differs each time")
     outputs = dict.fromkeys((*NEEDED_OUTPUTS, *(name for name in scenario.outputs if name != _UNSTABLE)))

@@ -19,6 +19,7 @@ from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters, read_parameters
 from ..sampling.road import sample_road
 from ..scanning.scene.classify import check_asset_classes
+from ..scenario.inputs import ScenarioInputs
 from ..scenario.road import RoadScenario
 from ..scenario.scenario import OF_POINTS, Scenario
 from ..twin.formats import check_formats
@@ -115,14 +116,14 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
         InputError: an input is wrong or the output can't be written; nothing is left half-written.
     """
     begun, timer = job.begun or time.perf_counter(), StageTimer(progress)
-    check(job)
+    inputs = check(job)
     if job.output is None:
         raise InputError("output", None, "must be a folder for the files; scan_to_arrays needs none")
     files, scene = JobFiles(job.scenario), None
     with output_folder(job.output, files.names, job.overwrite) as folder:
-        road, report = make_job_road(job, timer)
+        road, report = make_job_road(job, inputs, timer)
         if set(job.scenario.outputs) & {"scene", *OF_POINTS}:
-            scene = open_job_scene(job, road, begun, timer, report)
+            scene = open_job_scene(job, road, inputs, begun, timer, report)
             files = JobFiles(scene.scenario)
         files.write_road(folder, road, timer)
         report["instances"] = road.numbers.to_dict()
@@ -132,7 +133,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
         return files.write_report(folder, report, timer)
 
 
-def make_job_road(job: Job, timer: StageTimer) -> tuple[RoadGeometry, dict[str, Any]]:
+def make_job_road(job: Job, inputs: ScenarioInputs, timer: StageTimer) -> tuple[RoadGeometry, dict[str, Any]]:
     """Return the road of a checked job and the beginning of its report: the fit to a measured axis, if it has one.
 
     Raises:
@@ -141,16 +142,19 @@ def make_job_road(job: Job, timer: StageTimer) -> tuple[RoadGeometry, dict[str, 
     source = RoadSource(job.scenario, job.parameters, job.axis, job.axis_name, job.axis_place, job.output, job.road)
     road, report = make_road(source, timer)
     job.scenario.check_sections(road.length)
-    check_asset_classes(job.scenario.cloud.scheme(), road.parameters)
+    check_asset_classes(inputs.scheme, road.parameters)
     return road, report
 
 
-def open_job_scene(job: Job, road: RoadGeometry, begun: float, timer: StageTimer, report: dict[str, Any]) -> RoadScene:
+def open_job_scene(
+    job: Job, road: RoadGeometry, inputs: ScenarioInputs, begun: float, timer: StageTimer, report: dict[str, Any]
+) -> RoadScene:
     """Return the scene of a job's road, with the settings that its scenario leaves open chosen; adds to `report`.
 
     Args:
         job: the job.
         road: its road.
+        inputs: what the files that its scenario names hold.
         begun: when the job began, by `time.perf_counter`.
         timer: of its stages.
         report: gets the choice.
@@ -160,7 +164,7 @@ def open_job_scene(job: Job, road: RoadGeometry, begun: float, timer: StageTimer
 
     if job.new_file:
         empty_file()
-    scene = RoadScene(job.scenario, road)
+    scene = RoadScene(job.scenario, road, inputs)
     if job.scenario.chooses:
         from .choose.search import choose_settings  # loads Blender as well
 
@@ -174,10 +178,10 @@ def add_warnings(report: dict[str, Any], scene: RoadScene) -> None:
         report["warnings"] = warnings
 
 
-def check(job: Job) -> None:
-    """Raise an InputError for a job that can't be done, before any work starts."""
+def check(job: Job) -> ScenarioInputs:
+    """Raise an InputError for a job that can't be done, before any work starts; return what its files hold."""
     scenario = job.scenario
-    check_scan(scenario)
+    inputs = check_scan(scenario)
     system = metric_system(scenario.road.epsg, scenario.road.height_epsg, "road.epsg")
     if not (job.axis or job.parameters or job.road):
         _tell_odd_place(scenario.road, system)
@@ -188,6 +192,7 @@ def check(job: Job) -> None:
         raise InputError(given[1], str(sources[given[1]]), f"can't be given together with {given[0]}")
     if not scenario.outputs and not scenario.twin:
         raise InputError("outputs", [], f"must name at least one of {', '.join(FILES)}")
+    return inputs
 
 
 def _tell_odd_place(road: RoadScenario, system: MapSystem) -> None:

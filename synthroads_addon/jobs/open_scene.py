@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from ..base.progress import StageTimer
 from ..blender.files import save_scene
@@ -15,9 +15,11 @@ from ..blender.model.build import RoadModel, build_road
 from ..blender.model.store import remember
 from ..blender.scene.evaluated import scanned_scene
 from ..blender.services import BlenderServices
+from ..blender.things.model_builder import BuildRequest
 from ..road.geometry import RoadGeometry
 from ..scanning.plan import ScanPlan
 from ..scanning.scene.motion import ScannedScene
+from ..scenario.inputs import ScenarioInputs
 from ..scenario.scenario import OF_POINTS, Scenario
 from .scan.arrays import ArraySink
 from .scan.by_section import scan_by_section
@@ -58,6 +60,7 @@ class RoadScene:
     Attributes:
         scenario: the job.
         road: that the file shows, or is to show.
+        inputs: what the files that the scenario names hold.
         model: that was built for it; None before, and in a file that shows the road already.
         scene: of that model, as it was read; None before.
         road_id: of the road in the file; that of the one that is meant in it if empty.
@@ -66,15 +69,21 @@ class RoadScene:
 
     scenario: Scenario
     road: RoadGeometry
+    inputs: ScenarioInputs
     model: RoadModel | None = None
     scene: ScannedScene | None = None
     road_id: str = ""
     warnings: tuple[str, ...] = ()
 
+    @classmethod
+    def of(cls, scenario: Scenario, road: RoadGeometry) -> Self:
+        """Return a road's scene by a scenario whose files are read now."""
+        return cls(scenario, road, ScenarioInputs.read(scenario))
+
     @cached_property
     def site(self) -> Site:
         """Return the site of the road's scan: path, conditions and preview raster; cached."""
-        return Site.of_road(self.scenario, self.road)
+        return Site.of_road(self.scenario, self.road, self.inputs)
 
     @property
     def area(self) -> float:
@@ -85,15 +94,15 @@ class RoadScene:
     def build(self) -> RoadModel:
         """Build the road's model in the open file, in place of the one before, and return it."""
         settings, parameters = self.scenario.settings(), self.road.parameters
-        own = self.scenario.own_materials()
-        self.model = build_road(parameters, settings.tolerance, settings.vegetation_detail, own=own)
+        tolerance, detail, own = settings.tolerance, settings.vegetation_detail, self.inputs.materials
+        self.model = build_road(BuildRequest(parameters, tolerance, detail, own=own))
         self.scene = None
         return self.model
 
     def read(self) -> ScannedScene:
         """Return the open file's evaluated scene for scanning, cached until the model is rebuilt."""
         if self.scene is None:
-            factor, class_ids = self.scenario.scan.traffic_speed_factor, self.scenario.cloud.scheme().source_ids()
+            factor, class_ids = self.scenario.scan.traffic_speed_factor, self.inputs.scheme.source_ids()
             road = self.model.road_id if self.model else self.road_id
             self.scene = scanned_scene(geometry=self.road, speed_factor=factor, class_ids=class_ids, road=road)
         self.warnings = self.scene.warnings
@@ -101,13 +110,13 @@ class RoadScene:
 
     def rebuild(self, changes: Mapping[str, Any]) -> ScannedScene:
         """Build the model with fields of the scenario changed, and return its scene; the scenario stays as it is."""
-        changed = RoadScene(self.scenario.model_copy(update=changes), self.road)
+        changed = RoadScene(self.scenario.model_copy(update=changes), self.road, self.inputs)
         self.model, self.scene = changed.build(), changed.read()
         return self.scene
 
     def with_settings(self, scenario: Scenario, stands: bool) -> RoadScene:
         """Return the road under another scenario; model and scene are kept only if ``stands`` says they fit it."""
-        return RoadScene(scenario, self.road, *((self.model, self.scene) if stands else ()))
+        return RoadScene(scenario, self.road, self.inputs, *((self.model, self.scene) if stands else ()))
 
     def plan(self) -> ScanPlan:
         """Return the plan of the scan with every default resolved; builds the ray casters."""

@@ -47,9 +47,9 @@ def _without_files(job: J) -> J:
 
 def _scan_road(job: Job, progress: Progress) -> ScanArrays:
     timer = StageTimer(progress)
-    check(job)
-    road, report = make_job_road(job, timer)
-    scene = open_job_scene(job, road, job.begun or time.perf_counter(), timer, report)
+    inputs = check(job)
+    road, report = make_job_road(job, inputs, timer)
+    scene = open_job_scene(job, road, inputs, job.begun or time.perf_counter(), timer, report)
     report["instances"] = road.numbers.to_dict()
     sink = scene.site.arrays()
     report["counts"] = scene.build_and_scan(sink, timer)

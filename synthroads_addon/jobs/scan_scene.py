@@ -25,15 +25,16 @@ from ..base.progress import Progress, StageTimer, silent
 from ..base.remarks import assume, collected_remarks, warn
 from ..base.schema import read_json
 from ..cloud.tools.previews import TopView
-from ..road.axes.centerline import check_axis_file
+from ..road.axes.centerline import AxisContent
 from ..road.geometry import RoadGeometry
-from ..scanning.plan import ScanConditions
+from ..scanning.parts.conditions import ScanConditions
 from ..scanning.platforms.over_scene import SceneRoute, as_tripod, path_over
-from ..scanning.platforms.trajectory import RecordedTrajectory, check_trajectory_file
+from ..scanning.platforms.trajectory import RecordedTrajectory
 from ..scanning.scene.extent import body_bounds, strays_of
 from ..scanning.scene.map_coordinates import rounding_warnings, shift_of, step_at
 from ..scanning.scene.mesh import SceneMesh
 from ..scanning.scene.motion import ScannedScene
+from ..scenario.inputs import ScenarioInputs
 from ..scenario.scenario import OF_POINTS, Scenario
 from .job_files import JobFiles, empty_scan_warnings
 from .scan.plan import Site, check_scan
@@ -47,6 +48,21 @@ if TYPE_CHECKING:
 CLASSES = "classes.json"
 """File of classes by name that is written to be filled in, where things of a scene have none."""
 _logger = logging.getLogger("synthroads")
+
+
+@dataclass(frozen=True)
+class SceneInputs:
+    """Content of the files that the scan of a scene is given, each read once; the scene itself isn't among them.
+
+    Attributes:
+        named: what the files hold that the scenario names.
+        mapping: classes by name; None without a file of them.
+        line: that the platform follows; None without a file of it.
+    """
+
+    named: ScenarioInputs
+    mapping: ClassMapping | None = None
+    line: AxisContent | None = None
 
 
 @dataclass(frozen=True)
@@ -96,19 +112,17 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
     """
     timer, files = StageTimer(progress), JobFiles(job.scenario, road=False)
     job = replace(job, begun=job.begun or time.perf_counter())
-    mapping = check_scene_scan(job)
+    inputs = check_scene_scan(job)
     if job.output is None:
         raise InputError("output", None, "must be a folder for the files; scan_to_arrays needs none")
     with output_folder(job.output, files.names, job.overwrite) as folder:
-        scene, report = open_foreign_scene(job, mapping, timer)
+        scene, report = open_foreign_scene(job, inputs, timer)
         counts = scene.scan(folder, timer)
         add_counts(report, counts)
         return JobFiles(scene.site.scenario, road=False).write_report(folder, report, timer)
 
 
-def open_foreign_scene(
-    job: SceneScan, mapping: ClassMapping | None, timer: StageTimer
-) -> tuple[ForeignScene, dict[str, Any]]:
+def open_foreign_scene(job: SceneScan, inputs: SceneInputs, timer: StageTimer) -> tuple[ForeignScene, dict[str, Any]]:
     """Open and read a job's scene; return it with all its settings, and the beginning of the job's report.
 
     With an output folder a file of classes is written there to be filled in, where things have none.
@@ -121,9 +135,9 @@ def open_foreign_scene(
     from .open_scene import ForeignScene
 
     report: dict[str, Any] = {"scene": job.scene.name if job.scene else None}
-    read, road, report["warnings"] = open_and_read(job, mapping, timer, report)
-    scene = ForeignScene(scene_site(job, read.static, road), read)
-    if hint := _say_unlabelled(job, mapping, read):
+    read, road, report["warnings"] = open_and_read(job, inputs, timer, report)
+    scene = ForeignScene(scene_site(job, inputs, read.static, road), read)
+    if hint := _say_unlabelled(job, inputs, read):
         report["classes_to_fill_in"] = hint
     if job.scenario.chooses:
         scene, report["choice"] = choose_settings(scene, job.begun or time.perf_counter(), timer)
@@ -136,14 +150,14 @@ def add_counts(report: dict[str, Any], counts: dict[str, Any]) -> None:
     report["warnings"] += warnings_of_counts(counts, report.get("classes_to_fill_in", ""))
 
 
-def check_scene_scan(job: SceneScan) -> ClassMapping | None:
-    """Raise an InputError for a job that can't be done; return its mapping of names to classes, or None."""
+def check_scene_scan(job: SceneScan) -> SceneInputs:
+    """Raise an InputError for a job that can't be done; return what the files hold that it is given."""
     from ..blender.scene.foreign import check_scene_file  # see `scan_scene`
 
     platform = job.scenario.scan.platform
     if not set(job.scenario.outputs) & set(OF_POINTS):
         raise InputError("outputs", list(job.scenario.outputs), f"must name at least one of {', '.join(OF_POINTS)}")
-    check_scan(job.scenario, foreign=True)
+    named = check_scan(job.scenario, foreign=True)
     if job.scene is not None:
         check_scene_file(job.scene, job.up)
     if job.tripods:
@@ -152,21 +166,18 @@ def check_scene_scan(job: SceneScan) -> ClassMapping | None:
             raise InputError("--height", tripod.height, "can't be given with a tripod whose z is the scanner's own")
     if job.path and (job.tripods or isinstance(platform, RecordedTrajectory)):
         raise InputError("--path", str(job.path), "can't be given together with a trajectory or a tripod's positions")
-    if isinstance(platform, RecordedTrajectory) and platform.file:
-        check_trajectory_file(platform.file)
     if job.epsg is not None:
         metric_system(job.epsg, field="--epsg")
-    if job.path:
-        check_axis_file(job.path)
+    line = AxisContent.read(job.path) if job.path else None
     if job.classes is None:
-        return None
+        return SceneInputs(named, line=line)
     mapping = ClassMapping.from_dict(read_json(job.classes), source=str(job.classes))
-    mapping.check(job.scenario.cloud.scheme().source_ids(), str(job.classes))
-    return mapping
+    mapping.check(named.scheme.source_ids(), str(job.classes))
+    return SceneInputs(named, mapping, line)
 
 
 def open_and_read(
-    job: SceneScan, mapping: ClassMapping | None, timer: StageTimer, report: dict[str, Any]
+    job: SceneScan, inputs: SceneInputs, timer: StageTimer, report: dict[str, Any]
 ) -> tuple[ScannedScene, RoadGeometry | None, list[str]]:
     """Open a job's scene; return its scanned form, its road (or None) and warnings; adds the road to `report`.
 
@@ -193,14 +204,16 @@ def open_and_read(
                 settle(opened.road_id, edited)
         if opened and job.origin is not None:
             raise InputError("--origin", job.origin, "can't be given: the road in the scene has one of its own")
-        factor, class_ids = job.scenario.scan.traffic_speed_factor, job.scenario.cloud.scheme().source_ids()
+        factor, class_ids = job.scenario.scan.traffic_speed_factor, inputs.named.scheme.source_ids()
         further: dict[str, Any] = {"class_ids": class_ids, "road": opened.road_id if opened else ""}
         road = RoadGeometry(parameters) if parameters else None
         if opened and (unit := scene_unit()) != 1.0:
             warn("the scene's unit scale is %g: roads are built in metres, so that its units are taken for these", unit)
 
         def read() -> ScannedScene:
-            return scanned_scene(None, mapping, road, factor, number_objects=True, visible=job.visible, **further)
+            return scanned_scene(
+                None, inputs.mapping, road, factor, number_objects=True, visible=job.visible, **further
+            )
 
         scene = read()
         if not len(scene.static) and not scene.moving:
@@ -246,33 +259,35 @@ def _placed(
     return replace(scene, static=replace(scene.static, origin=shift)), warnings
 
 
-def scene_site(job: SceneScan, mesh: SceneMesh, road: RoadGeometry | None) -> Site:
+def scene_site(job: SceneScan, inputs: SceneInputs, mesh: SceneMesh, road: RoadGeometry | None) -> Site:
     """Return the site of a scene's scan: path, conditions, preview raster if wanted."""
     conditions = ScanConditions.of(road.parameters if road else None)
     if job.epsg is not None:
         conditions = replace(conditions, epsg=job.epsg, height_epsg=None)
     place = Placement.of(conditions.system)
-    path = path_over(job.scenario.scan.platform, mesh, road, job.path, job.tripods, place)
-    return Site(job.scenario, path, conditions, _view_over(job.scenario, mesh, road))
+    path = path_over(inputs.named.platform, mesh, road, inputs.line, job.tripods, place)
+    return Site(job.scenario, inputs.named, path, conditions, _view_over(job.scenario, inputs.named, mesh, road))
 
 
-def route_site(scenario: Scenario, route: SceneRoute, mesh: SceneMesh) -> Site:
+def route_site(scenario: Scenario, inputs: ScenarioInputs, route: SceneRoute, mesh: SceneMesh) -> Site:
     """Return the site of a scan along a route through a scene without a road."""
     for text in rounding_warnings(mesh, "the open scene", "move it near the scene's origin"):
         warn("%s", text)
-    path = route.path(scenario.scan.platform, mesh)
-    return Site(scenario, path, ScanConditions.of(None), _view_over(scenario, mesh, None))
+    path = route.path(inputs.platform, mesh)
+    return Site(scenario, inputs, path, ScanConditions.of(None), _view_over(scenario, inputs, mesh, None))
 
 
-def _view_over(scenario: Scenario, mesh: SceneMesh, road: RoadGeometry | None) -> TopView | None:
+def _view_over(
+    scenario: Scenario, inputs: ScenarioInputs, mesh: SceneMesh, road: RoadGeometry | None
+) -> TopView | None:
     """Return the raster of the previews, over the road or else the mesh's box; None if no previews are wanted."""
     if "previews" not in scenario.outputs:
         return None
-    scheme, (low, high) = scenario.cloud.scheme().sources(), body_bounds(mesh) + mesh.origin
+    scheme, (low, high) = inputs.scheme.sources(), body_bounds(mesh) + mesh.origin
     return TopView.over_road(road, scheme) if road else TopView.over_box(low, high, scheme)
 
 
-def _say_unlabelled(job: SceneScan, mapping: ClassMapping | None, scene: ScannedScene) -> str:
+def _say_unlabelled(job: SceneScan, inputs: SceneInputs, scene: ScannedScene) -> str:
     """Log, before a scan, what in its scene has no class, and write a file of classes to fill in unless it is there.
 
     Return the file's path; an empty string where everything has a class, or no folder for files is given.
@@ -282,7 +297,7 @@ def _say_unlabelled(job: SceneScan, mapping: ClassMapping | None, scene: Scanned
     meshes = [scene.static, *(body.mesh for body in scene.moving)]
     if not any(np.any(mesh.class_id == UNLABELLED) for mesh in meshes):
         return ""
-    things = unlabelled_things(mapping, job.scenario.cloud.scheme().source_ids())
+    things = unlabelled_things(inputs.mapping, inputs.named.scheme.source_ids())
     if not things.count:
         return ""
     if job.output is None:

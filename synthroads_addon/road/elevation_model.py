@@ -224,8 +224,7 @@ def read_elevation_model(path: str | os.PathLike[str], epsg: int, corridor: Corr
     """
     name = os.fspath(path)
     try:
-        with Path(name).open("rb"):
-            pass
+        driver = _driver_of(name)
     except (OSError, ValueError) as error:  # ValueError: a null byte is in the name
         reason = getattr(error, "strerror", None) or error
         raise MissingFileError(name, None, f"an elevation model is needed here ({reason})") from None
@@ -239,7 +238,7 @@ def read_elevation_model(path: str | os.PathLike[str], epsg: int, corridor: Corr
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what it warns of is refused below
-            with rasterio.open(name, driver=_driver_of(name)) as dataset:
+            with rasterio.open(name, driver=driver) as dataset:
                 _check_kind(name, dataset)
                 _check_system(name, dataset, epsg)
                 model = ElevationModel(name, _grid(name, dataset))

@@ -41,27 +41,27 @@ class Finish:
     def finish_block(self, result: BlockResult) -> BlockResult:
         """Return a block, or several joined, with colours, layers, micro-relief and final intensities, for the sink."""
         plan = self.plan
-        if result.seen is not None and (plan.colour_layers or plan.detects_after_layers):
+        if result.seen is not None and (plan.layers.coloured or plan.reception.after_layers):
             result = self._with_layers(result, result.seen)
         points = result.points
-        if result.seen is not None and plan.relief is not None:
-            points = self._with_relief(points, result.seen, plan.relief)
-        if result.seen is not None and plan.normal_images is not None:
+        if result.seen is not None and plan.relief.micro is not None:
+            points = self._with_relief(points, result.seen, plan.relief.micro)
+        if result.seen is not None and plan.relief.images is not None:
             points = tilt_normals(points, *self._tilts(points, result.seen), result.seen.towards_scanner)
-        changes: dict[str, AnyArray | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - plan.kept_layers)
-        if plan.range_corrected:
+        changes: dict[str, AnyArray | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - plan.layers.kept)
+        if plan.reception.range_corrected:
             changes["intensity"] = range_corrected(points.intensity, points.range, plan.setting)
         return replace(result, points=points.with_arrays(changes), seen=None)
 
     def _with_relief(self, points: PointBlock, seen: SeenPoints, relief: MicroRelief) -> PointBlock:
         """Return points shifted to where their beams meet the surface's relief, with its normals if they are wanted."""
-        plan, pavement, place = self.plan, self.plan.pavement, seen.position + self.plan.target.origin
+        plan, pavement, place = self.plan, self.plan.relief.pavement, seen.position + self.plan.target.origin
         # What moves is smooth: for all that has a relief the beam is the one that the scene at time 0 was seen by.
-        ends = BeamEnds(seen.position + plan.frame_origin, seen.towards_scanner, plan.setting.beam_angle)
-        how = relief, plan.relief_strength, plan.seed, plan.relief_octaves
+        ends = BeamEnds(seen.position + plan.reflection.frame_origin, seen.towards_scanner, plan.setting.beam_angle)
+        how = relief, plan.relief.strength, plan.run.seed, plan.relief.octaves
         raised = None if pavement is None else pavement.heights(points.instance_id, place)
         shifted = shift_by_relief(points, ends, *how, raised)
-        if not plan.relief_normals or shifted is points:
+        if not plan.relief.normals or shifted is points:
             return shifted
         field = ReliefField(points, ends, *how)
 
@@ -74,30 +74,30 @@ class Finish:
     def _tilts(self, points: PointBlock, seen: SeenPoints) -> tuple[Index, Float]:
         """Return the points that normal images tilt, and by what; see `NormalImages.tilts`."""
         plan = self.plan
-        assert plan.normal_images is not None
+        assert plan.relief.images is not None
         place, footprint = seen.position + plan.target.origin, points.range * plan.setting.beam_angle
-        local, normal = seen.position + plan.frame_origin, np.asarray(seen.normal, np.float64)
-        return plan.normal_images.tilts(seen.material, points.instance_id, place, local, normal, footprint)
+        local, normal = seen.position + plan.reflection.frame_origin, np.asarray(seen.normal, np.float64)
+        return plan.relief.images.tilts(seen.material, points.instance_id, place, local, normal, footprint)
 
     def _with_layers(self, result: BlockResult, seen: SeenPoints) -> BlockResult:
         """Return a block with its points' colours and layers, and with the intensities that follow from these."""
         plan = self.plan
         values = sample_points(
-            self.source, seen, plan.colour_layers | (OF_INTENSITY if plan.detects_after_layers else set())
+            self.source, seen, plan.layers.coloured | (OF_INTENSITY if plan.reception.after_layers else set())
         )
-        changes: dict[str, Any] = {name: values.arrays[name] for name in plan.colour_layers}
+        changes: dict[str, Any] = {name: values.arrays[name] for name in plan.layers.coloured}
         changes["color_source"] = values.source
-        if plan.detects_after_layers:
-            assert plan.material_means is not None
-            factors = layer_brightness(plan.material_means, seen, values)
-            if plan.normal_images is not None:
+        if plan.reception.after_layers:
+            assert plan.layers.means is not None
+            factors = layer_brightness(plan.layers.means, seen, values)
+            if plan.relief.images is not None:
                 rows, tilts = self._tilts(result.points, seen)
                 factors[rows] *= tilted_brightness(seen.normal[rows], tilts, seen.towards_scanner[rows])
             changes["intensity"] = result.points.intensity * factors
             if (power := result.points.array("power_db")) is not None:
                 changes["power_db"] = np.maximum(power + decibels(factors), DARKEST_DB)
         result = replace(result, points=result.points.with_arrays(changes))
-        if plan.detects_after_layers:
+        if plan.reception.after_layers:
             result = read_echoes(result, plan)
         assert result.points.color_source is not None
         return replace(result, sources=np.bincount(result.points.color_source, minlength=256))

@@ -64,7 +64,7 @@ def record(plan: ScanPlan, sink: Sink, timer: StageTimer | None = None) -> dict[
     Returns:
         what was rendered, as JSON data.
     """
-    timer, (begin, end) = timer or StageTimer(), plan.progress
+    timer, (begin, end) = timer or StageTimer(), plan.run.progress
     total, done = plan.block_count(), 0
     with ExitStack() as stack:
         source = _open_layers(plan, stack, timer)
@@ -80,21 +80,19 @@ def record(plan: ScanPlan, sink: Sink, timer: StageTimer | None = None) -> dict[
 def record_as_measured(plan: ScanPlan) -> list[BlockResult]:
     """Scan a plan without layers or relief; return its blocks, with normals, materials and seen points."""
     blocks = CollectedBlocks()
-    record(
-        replace(
-            plan, services=None, records_seen_points=True, measured_layers=plan.measured_layers | {"normal", "material"}
-        ),
-        blocks,
-    )
+    measured = plan.layers.measured | {"normal", "material"}
+    record(replace(plan, layers=replace(plan.layers, services=None, seen_points=True, measured=measured)), blocks)
     return blocks.results
 
 
 def _open_layers(plan: ScanPlan, stack: ExitStack, timer: StageTimer) -> LayerSource | None:
     """Return the source of the points' layers, which the stack closes; None where they stay as they are measured."""
-    if plan.services is None or plan.request is None:
+    if plan.layers.services is None or plan.layers.request is None:
         return None
     with timer.stage("images"):
-        return stack.enter_context(plan.services.layers(plan.request, lambda share: timer.progress("images", share)))
+        return stack.enter_context(
+            plan.layers.services.layers(plan.layers.request, lambda share: timer.progress("images", share))
+        )
 
 
 def scan_blocks(plan: ScanPlan, source: LayerSource | None = None) -> Generator[BlockResult, None, None]:
@@ -118,7 +116,7 @@ def scan_blocks(plan: ScanPlan, source: LayerSource | None = None) -> Generator[
 
 def _results(plan: ScanPlan, source: LayerSource | None) -> Iterator[BlockResult]:
     """Yield the results of a plan's blocks, see `scan_blocks`."""
-    workers, block_scan = plan.threads or available_cores(), BlockScan(plan)
+    workers, block_scan = plan.run.threads or available_cores(), BlockScan(plan)
 
     def scan(block: Block) -> BlockResult:
         return block_scan.scan_block(*block)

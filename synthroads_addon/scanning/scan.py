@@ -139,20 +139,26 @@ class BlockScan:
         if towards is not None:
             number = np.flatnonzero(towards)
             pulses = pulses.select(number)
-        if plan.outline is not None and plan.rays_per_pulse > 1 and not self._in_air:
-            near = np.flatnonzero(~self._missing(plan.outline, pulses, poses.motions))
+        if plan.emission.outline is not None and plan.rays_per_pulse > 1 and not self._in_air:
+            near = np.flatnonzero(~self._missing(plan.emission.outline, pulses, poses.motions))
             if len(near) < len(number):
                 number, pulses = number[near], pulses.select(near)
         traced, echoes, tally = self.traced_echoes(strip, pulses, poses.motions, key)
         if setting.receiver.echo_separation == "waveform":
             echoes = merge_peaks(echoes, setting.range_resolution)
-        if plan.surfaces.varying:
+        if plan.reflection.surfaces.varying:
             echoes = self.vary_brightness(traced, echoes, poses.motions)
-        if (gain := strip_gain(plan.strip_errors, plan.seed, strip.index)) != 1.0:
+        if (gain := strip_gain(plan.reception.strip_errors, plan.run.seed, strip.index)) != 1.0:
             echoes = replace(echoes, intensity=echoes.intensity * gain)
-        provisional = plan.detects_after_layers
+        provisional = plan.reception.after_layers
         echoes, readout, weak = detect_echoes(
-            echoes, errors, number, pulses.channel, setting, dropout=plan.noise.dropout, provisional=provisional
+            echoes,
+            errors,
+            number,
+            pulses.channel,
+            setting,
+            dropout=plan.reception.noise.dropout,
+            provisional=provisional,
         )
         keep, return_number, returns = number_returns(echoes.pulse, plan.most_returns)
         if not keep.all():
@@ -171,7 +177,7 @@ class BlockScan:
         missing = outline.passed_by(pulses.origin, pulses.direction, setting.maximum_range)
         rows = np.flatnonzero(missing) if target.moving else ()
         if len(rows):
-            radius = max(outer_radii(self.plan.rings, setting.divergence)) * setting.maximum_range
+            radius = max(outer_radii(self.plan.emission.rings, setting.divergence)) * setting.maximum_range
             origin, direction = (np.take(vectors, rows, axis=1) for vectors in (pulses.origin, pulses.direction))
             reach = np.full(len(rows), setting.maximum_range)
             missing[rows] = ~target.near_moving(origin, direction, reach, pulses.time[rows], motions, radius)
@@ -199,11 +205,13 @@ class BlockScan:
             signals = self.signals(traced)
         else:
             traced, signals = compiled.follow(pulses, motions)
-        if plan.multipath is not None:
-            traced, signals = self.add_ghosts(plan.multipath, traced, signals, motions)
-        for effect in plan.effects if self._in_air else ():
-            random = stream(plan.seed, f"effect {effect.name}", strip.index, key)
-            traced, signals = apply_effect(effect, random, setting, plan.attenuation, pulses, traced, signals)
+        if plan.reflection.multipath is not None:
+            traced, signals = self.add_ghosts(plan.reflection.multipath, traced, signals, motions)
+        for effect in plan.atmosphere.effects if self._in_air else ():
+            random = stream(plan.run.seed, f"effect {effect.name}", strip.index, key)
+            traced, signals = apply_effect(
+                effect, random, setting, plan.atmosphere.attenuation, pulses, traced, signals
+            )
         if compiled is None:
             return traced, group_returns(*signals, traced.pulse, setting.range_resolution), tally
         return traced, compiled.group(signals, traced.ray), tally
@@ -239,26 +247,26 @@ class BlockScan:
         plan, setting = self.plan, self.plan.setting
         limits = (setting.minimum_range, setting.maximum_range)
         rays = self.rays(pulses, motions, axis)
-        return trace(plan.target, plan.surfaces, rays, motions, *limits, axis, plan.openings)
+        return trace(plan.target, plan.reflection.surfaces, rays, motions, *limits, axis, plan.openings)
 
     @property
     def _in_air(self) -> bool:
         """Return whether effects may add echoes to pulses that meet no surface."""
-        return bool(self.plan.effects and self.plan.target.triangles)
+        return bool(self.plan.atmosphere.effects and self.plan.target.triangles)
 
     @property
     def _off_surfaces(self) -> bool:
         """Return whether there may be echoes that come from no surface: of the air, or ghosts."""
-        return self._in_air or self.plan.multipath is not None
+        return self._in_air or self.plan.reflection.multipath is not None
 
     def draw_errors(self, strip: Strip, count: int, key: int) -> Errors:
         """Draw the random errors of a block of ``count`` pulses; ``key`` keys their random streams."""
         plan = self.plan
 
         def source(purpose: str) -> np.random.Generator:
-            return stream(plan.seed, purpose, strip.index, key)
+            return stream(plan.run.seed, purpose, strip.index, key)
 
-        receiver, noise, ranges = plan.setting.receiver, plan.noise, plan.setting.range_sigma
+        receiver, noise, ranges = plan.setting.receiver, plan.reception.noise, plan.setting.range_sigma
 
         def values(purpose: str, wanted: object, draw: Callable[[np.random.Generator, int], Float32]) -> Any:
             return draw_values(partial(draw, source(purpose)), count) if wanted else None
@@ -286,8 +294,8 @@ class BlockScan:
 
     def poses_between(self, strip: Strip, begin: float, end: float) -> Poses:
         """Return the tracks of the scanner and of the target's moving parts between two times, s."""
-        path, noise, spacing = self.plan.path, self.plan.noise, self.plan.path.knot_spacing
-        strip_errors, seed = self.plan.strip_errors, self.plan.seed
+        path, noise, spacing = self.plan.path, self.plan.reception.noise, self.plan.path.knot_spacing
+        strip_errors, seed = self.plan.reception.strip_errors, self.plan.run.seed
         every = path.knots_per_node if isinstance(path, SwayingPath) else 1
         noisy = bool(noise.position_sigma or noise.attitude_sigma_deg or noise.heading_sigma_deg)
         known: dict[tuple[float, float], tuple[Float, Float]] = {}
@@ -317,7 +325,9 @@ class BlockScan:
         return Poses(
             track,
             Track.between(measured, begin, end, closest, every) if noisy or strip_errors.moves_points else track,
-            self.plan.target.motions(begin, end, min(spacing, _MOTION_KNOTS), track if self.plan.on_vehicle else None),
+            self.plan.target.motions(
+                begin, end, min(spacing, _MOTION_KNOTS), track if self.plan.emission.on_vehicle else None
+            ),
         )
 
     def emit(self, strip: Strip, poses: Poses, angle: Float32 | None, first: int, count: int) -> Pulses:
@@ -356,14 +366,14 @@ class BlockScan:
             motions: tracks of the target's moving parts.
             axis: (P,) what the pulses' axes meet, if these were cast already.
         """
-        pattern, setting = self.plan.pattern, self.plan.setting
+        pattern, setting = self.plan.emission.pattern, self.plan.setting
         origin, share = pulses.origin[:, None, :], pattern.weights[:, None]
         if len(pattern) == 1:
             return Rays(origin, pulses.direction[:, None, :], share, pulses.time)
         assert pulses.in_plane is not None
         assert pulses.across is not None
         across = (pulses.in_plane, pulses.across, pattern, setting.divergence)
-        if self.plan.beam == "conical":
+        if self.plan.emission.beam == "conical":
             return Rays(origin, conical_directions(pulses.direction, *across), share, pulses.time)
         met = axis or self.plan.target.cast(
             pulses.origin, pulses.direction, setting.maximum_range, pulses.time, motions
@@ -378,12 +388,14 @@ class BlockScan:
 
     def _signals(self, hits: Hits) -> HitSignals:
         """Return the signals that hits send back: ranges, their weights in mean ranges, and received intensities."""
-        surfaces, material = self.plan.surfaces, hits.material.ravel()
+        surfaces, material = self.plan.reflection.surfaces, hits.material.ravel()
         brightness = brightness_of(surfaces, material, np.abs(hits.along.ravel())).reshape(hits.face.shape)
         brightness *= hits.share
         weight = np.maximum(np.take(surfaces.reflectivity, material), LEAST_REFLECTANCE).reshape(hits.face.shape)
         weight *= hits.share
-        return HitSignals(hits.distance, weight, received_intensity(brightness, hits.distance, self.plan.attenuation))
+        return HitSignals(
+            hits.distance, weight, received_intensity(brightness, hits.distance, self.plan.atmosphere.attenuation)
+        )
 
     def add_ghosts(
         self, multipath: Multipath, traced: TracedRays, signals: BothSignals, motions: list[Track]
@@ -391,14 +403,14 @@ class BlockScan:
         """Return traced rays and signals with the echoes of what surfaces mirror among those that lie behind."""
         plan, (first, behind) = self.plan, signals
         hits, ray, ghosts = multipath.ghosts(
-            plan.target, plan.surfaces, plan.setting, plan.attenuation, traced, motions
+            plan.target, plan.reflection.surfaces, plan.setting, plan.atmosphere.attenuation, traced, motions
         )
         traced = replace(traced, behind=Hits.join([traced.behind, hits]), ray=np.concatenate([traced.ray, ray]))
         return traced, (first, HitSignals.join([behind, ghosts]))
 
     def vary_brightness(self, traced: Traced, echoes: Echoes, motions: list[Track]) -> Echoes:
         """Return the echoes with intensities scaled by how their materials' reflectance varies in space."""
-        surfaces, target = self.plan.surfaces, self.plan.target
+        surfaces, target = self.plan.reflection.surfaces, self.plan.target
         material = traced.pick("material", echoes.hit)
         uneven = np.flatnonzero(np.take(surfaces.uneven, material, mode="clip"))
         if self._off_surfaces:
@@ -410,8 +422,8 @@ class BlockScan:
         if target.moving:
             (position,) = target.at_time_zero(traced.pick("face", hit), position, traced.times(hit), motions)
         intensity = echoes.intensity.copy()
-        place = position.T + self.plan.frame_origin
-        intensity[uneven] *= spread_factors(surfaces, material[uneven], place, self.plan.seed)
+        place = position.T + self.plan.reflection.frame_origin
+        intensity[uneven] *= spread_factors(surfaces, material[uneven], place, self.plan.run.seed)
         return replace(echoes, intensity=intensity)
 
     def _points(
@@ -434,23 +446,23 @@ class BlockScan:
         number, returns, speckle = recorded
         pulse, hit = echoes.pulse, echoes.hit
         face, along = traced.pick("face", hit), traced.pick("along", hit)
-        distance = echoes.range + plan.noise.range_bias
+        distance = echoes.range + plan.reception.noise.range_bias
         if errors.range is not None:
             delayed = setting.receiver.range_delay or 0.0
             range_errors = errors.range_errors(number_in_block[pulse], number, delayed)
             distance = distance + range_sigma(setting, echoes.range, along, echoes.intensity) * range_errors
             if setting.receiver.range_walk:
-                gain = strip_gain(plan.strip_errors, plan.seed, strip.index)
-                distance = distance + range_walk(setting, speckle, plan.noise, gain)
+                gain = strip_gain(plan.reception.strip_errors, plan.run.seed, strip.index)
+                distance = distance + range_walk(setting, speckle, plan.reception.noise, gain)
         normal = None
-        if plan.records_seen_points or "normal" in plan.measured_layers:
+        if plan.layers.seen_points or "normal" in plan.layers.measured:
             normal = target.normals(face, along, pulses.time[pulse], motions)
             if self._off_surfaces:
                 air = np.flatnonzero(face < 0)
                 normal[:, air] = -traced.directions(hit[air])
         class_id = target.face_values("class_id", face)
         if self._off_surfaces:
-            class_id = np.where(face < 0, np.uint8(plan.air_class), class_id)
+            class_id = np.where(face < 0, np.uint8(plan.atmosphere.air_class), class_id)
         measured = MeasuredPoints(setting, target, pulses, pulse, echoes.range, echoes.intensity, face, normal)
         points = make_block(
             xyz=place_points(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
@@ -460,15 +472,15 @@ class BlockScan:
             instance_id=target.instances(face, pulses.time[pulse]),
             return_number=number,
             number_of_returns=returns,
-            gps_time=pulses.time[pulse] + plan.epoch,
+            gps_time=pulses.time[pulse] + plan.reception.epoch,
             scan_angle_deg=np.rad2deg(pulses.scan_angle[pulse]).astype(np.float32),
             strip=np.full(len(pulse), strip.index, dtype=np.uint16),
             range=distance,
             incidence_deg=np.rad2deg(np.arccos(np.minimum(np.abs(along), 1.0))).astype(np.float32),
-            **fill_layers(measured, plan.measured_layers),
+            **fill_layers(measured, plan.layers.measured),
         )
         seen = None
-        if plan.records_seen_points and normal is not None:
+        if plan.layers.seen_points and normal is not None:
             seen = self._seen_targets(traced, hit, face, normal, motions)
         return points, seen
 

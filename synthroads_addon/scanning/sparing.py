@@ -68,16 +68,18 @@ class Sparing:
     def _rays(self) -> list[tuple[float, float, float, float]]:
         """Return share of energy, stretch of the unit vector and deflections (rad) of each ray of a pulse."""
         radii, result = beam_radii(self.plan.setting.divergence), []
-        for (x, y), share in zip(self.plan.pattern.across.tolist(), self.plan.pattern.weights.tolist(), strict=True):
+        for (x, y), share in zip(
+            self.plan.emission.pattern.across.tolist(), self.plan.emission.pattern.weights.tolist(), strict=True
+        ):
             a, b = x * radii[0], y * radii[1]
-            conical = self.plan.beam == "conical"
+            conical = self.plan.emission.beam == "conical"
             result.append((share, 1.0 / np.sqrt(1.0 + a * a + b * b) if conical else 1.0, a, b))
         return result
 
     @cached_property
     def _reach(self) -> Float:
         """Return the deflections (2,) that no ray of a pulse exceeds, rad, as half axes of an ellipse."""
-        return np.array(outer_radii(self.plan.rings, self.plan.setting.divergence))
+        return np.array(outer_radii(self.plan.emission.rings, self.plan.setting.divergence))
 
     def find(self, pulses: Pulses, met: FirstHits, motions: list[Track]) -> SparedPulses:
         """Return the pulses whose whole footprint meets one plane, by what their axes meet.
@@ -87,7 +89,7 @@ class Sparing:
             met: (P,) what their axes meet.
             motions: tracks of the target's moving parts.
         """
-        plan, ground = self.plan, self.plan.ground
+        plan, ground = self.plan, self.plan.emission.ground
         assert ground is not None
         assert pulses.in_plane is not None
         assert pulses.across is not None
@@ -117,7 +119,7 @@ class Sparing:
 
     def find_missing(self, pulses: Pulses, met: FirstHits, motions: list[Track]) -> Index:
         """Return the pulses whose whole beam passes by everything, of those whose axis meets nothing."""
-        plan, ground = self.plan, self.plan.ground
+        plan, ground = self.plan, self.plan.emission.ground
         assert ground is not None
         rows = np.flatnonzero(met.face < 0)
         origin, direction = (np.take(vectors, rows, axis=1) for vectors in (pulses.origin, pulses.direction))
@@ -164,12 +166,13 @@ class Sparing:
     def _outer_rays(self, pulses: Pulses, some: SparedPulses) -> tuple[Float, Float]:
         """Return origins (3, 1 or K - 1, S) and directions (3, K - 1, S) of the rays around the axes of pulses."""
         plan = self.plan
-        pattern = replace(plan.pattern, across=plan.pattern.across[1:], weights=plan.pattern.weights[1:])
+        pattern = plan.emission.pattern
+        pattern = replace(pattern, across=pattern.across[1:], weights=pattern.weights[1:])
         assert pulses.in_plane is not None
         assert pulses.across is not None
         vectors = (pulses.origin, pulses.direction, pulses.in_plane, pulses.across)
         origin, direction, in_plane, across = (np.take(array, some.pulse, axis=1) for array in vectors)
-        if plan.beam == "conical":
+        if plan.emission.beam == "conical":
             beam = conical_directions(direction, in_plane, across, pattern, plan.setting.divergence)
             return origin[:, None, :], beam
         offsets = cylindrical_offsets(in_plane, across, pattern, plan.setting.divergence, some.distance)
@@ -177,7 +180,7 @@ class Sparing:
 
     def _ray_hits(self, spared: SparedPulses) -> Iterator[tuple[float, Float, Float]]:
         """Yield share of energy, range (S,), m, and n . d (S,) of each ray of spared pulses, the axis first."""
-        conical = self.plan.beam == "conical"
+        conical = self.plan.emission.beam == "conical"
         for share, length, x, y in self._rays:
             stretch = x * spared.steepness[:, 0]
             stretch += y * spared.steepness[:, 1]
@@ -195,12 +198,12 @@ class Sparing:
             spared: S pulses.
             first: number that the first of their axes' hits has among all hits of the block.
         """
-        surfaces, count = self.plan.surfaces, len(spared.pulse)
+        surfaces, count = self.plan.reflection.surfaces, len(spared.pulse)
         offset, energy = np.zeros(count), np.zeros(count)
         for share, distance, along in self._ray_hits(spared):
             bright = brightness_of(surfaces, spared.material, np.abs(along))
             bright *= share
-            energy += received_intensity(bright, distance, self.plan.attenuation)
+            energy += received_intensity(bright, distance, self.plan.atmosphere.attenuation)
             offset += share * (distance - spared.distance)
         weight = np.maximum(np.take(surfaces.reflectivity, spared.material), LEAST_REFLECTANCE)
         return Echoes(spared.pulse, first + np.arange(count), spared.distance + offset, energy, weight)

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from ..base.schema import notes, quantity
-from ..scanning.devices.device import DeviceChoice, ScannerSetting, load_device, setting_of
+from ..scanning.devices.device import Device, DeviceChoice, ScannerSetting, load_device, setting_of
 from ..scanning.noise import Noise
 from ..scanning.platforms.registry import PlatformModel, make_platform
 from ..scanning.strip_errors import StripErrors
@@ -126,10 +126,14 @@ class ScanScenario(DeviceChoice):
         return data
 
 
-def scanner_setting(scan: ScanScenario) -> ScannerSetting:
+def scanner_setting(scan: ScanScenario, device: Device | None = None) -> ScannerSetting:
     """Return the scenario's scanner with the rates and angles that the scenario sets (`setting_of`).
+
+    Args:
+        scan: the scenario's.
+        device: its device where that was read already; it is read now if None.
 
     Raises:
         InputError: there is no such device, it can't do it, or values contradict each other.
     """
-    return setting_of(load_device(scan.device), scan, scan.noise.range_sigma)
+    return setting_of(device or load_device(scan.device), scan, scan.noise.range_sigma)

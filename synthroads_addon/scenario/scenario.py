@@ -18,6 +18,7 @@ from ..materials.table import Material, read_material_table
 from ..road.guidelines import SECTIONS_OF_CLASS
 from ..scanning.beam import RINGS
 from ..scanning.colour.colour import takes_nodes
+from ..scanning.devices.device import load_device
 from ..twin.formats import FORMATS, IfcSettings, TwinFormat
 from .cloud import CloudScenario
 from .colour import ColourScenario
@@ -313,12 +314,12 @@ def _misfits_of_device(scan: dict[str, Any], named: AbstractSet[str]) -> list[st
     """Return the names of a scan's settings that its device can't do and that no change names."""
     misfits: list[str] = []
     try:
-        ScanScenario.from_dict(scan)
+        device = load_device(ScanScenario.from_dict(scan).device)
     except InputError:
         return misfits
     while True:
         try:
-            scanner_setting(ScanScenario.from_dict(_without(scan, *misfits)))
+            scanner_setting(ScanScenario.from_dict(_without(scan, *misfits)), device)
         except InputError as error:
             name = error.field.removeprefix("scan.")
             if name in _DEVICE_SETTINGS and name not in misfits and error.field not in named and name in scan:

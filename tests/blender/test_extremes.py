@@ -16,10 +16,12 @@ from synthroads_addon.blender.nodes.builder import Tree, node_group
 from synthroads_addon.blender.scene.evaluated import scanned_scene, scene_mesh
 from synthroads_addon.blender.scene.reading import MeshPart, Places, SceneTables, join_parts
 from synthroads_addon.blender.services import BlenderServices
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.tessellation import MAXIMUM_SPACING
 from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.inputs import ScenarioInputs
 from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.scenes.scan_scenes import scan_block
@@ -34,12 +36,12 @@ def test_a_road_of_a_metre_is_built_and_scanned() -> None:
     )
     parameters = sample_road(scenario.road, 1)
     geometry = RoadGeometry(parameters)
-    build_road(parameters, 0.02, 0.1)
+    build_road(BuildRequest(parameters, 0.02, 0.1))
     scene = scanned_scene(geometry=geometry)
     surface = np.isin(scene.static.class_id, [class_id("road"), class_id("road_marking")])
     width = -np.diff(geometry.offsets(0.5)[0, [0, -1]])[0]
     assert 0.5 * width < scene.static.areas()[surface].sum() < 1.2 * width
-    scan = Site.of_road(scenario, geometry).plan(scene, BlenderServices())
+    scan = Site.of_road(scenario, geometry, ScenarioInputs.read(scenario)).plan(scene, BlenderServices())
     points = scan_block(scan, scan.path.strips[0], 0).points
     station, _ = geometry.alignment.project(points.xyz[:, :2] - np.array(parameters.transform.translate)[:2])
     assert np.count_nonzero((station >= 0.0) & (station <= 1.0)) > 50
@@ -51,7 +53,7 @@ def test_the_end_of_a_hundred_kilometres_is_as_exact_as_the_start() -> None:
     parameters = sample_road(RoadScenario(length=100_000.0), 4)
     geometry = RoadGeometry(parameters)
     for start, end in ((0.0, 300.0), (99_700.0, 100_000.0)):
-        model = build_road(parameters, 0.005, 0.0, ("road",), (start, end))
+        model = build_road(BuildRequest(parameters, 0.005, 0.0, ("road",), (start, end)))
         mesh = scene_mesh()
         used = np.unique(mesh.triangles[mesh.class_id == class_id("road")])
         local = mesh.vertices[used].astype(np.float64) + model.origin - np.array(parameters.transform.translate)

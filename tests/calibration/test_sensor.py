@@ -24,6 +24,10 @@ from synthroads_addon.dataset.recipe import load_recipe, scene_jobs
 from synthroads_addon.materials.surfaces import surfaces_of
 from synthroads_addon.materials.table import materials, read_material_table
 from synthroads_addon.scanning.devices.device import load_device
+from synthroads_addon.scanning.parts.emission import Emission
+from synthroads_addon.scanning.parts.reception import Reception
+from synthroads_addon.scanning.parts.reflection import Reflection
+from synthroads_addon.scanning.parts.run import Run
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.platforms.polyline import PolylineGuide
 from synthroads_addon.scanning.receiving.response import read_power
@@ -61,13 +65,10 @@ def measured(scenario: str, changes: list[str], reflection: str = "lambert") -> 
     rows = [materials()[name] for name in mesh.materials]
     plan = ScanPlan(
         target=Target(ScannedScene(mesh, ()), BruteForce),
-        surfaces=surfaces_of(rows, reflection),  # type: ignore[arg-type]
-        setting=scanner_setting(scan),
-        path=with_motion(scan.platform.make_path(guide), scan.motion, 5),
-        rings=(),
-        seed=5,
-        noise=scan.noise,
-        strip_errors=scan.strip_errors,
+        emission=Emission(scanner_setting(scan), with_motion(scan.platform.make_path(guide), scan.motion, 5), rings=()),
+        reflection=Reflection(surfaces_of(rows, reflection)),  # type: ignore[arg-type]
+        run=Run(seed=5),
+        reception=Reception(scan.noise, scan.strip_errors),
     )
     stages = BlockScan(plan)
     return concatenate([stages.scan_block(*block).points for block in plan.blocks()]), plan
@@ -113,7 +114,7 @@ def test_an_airborne_sensor_is_found_again(
     found = calibrated(capsys, cloud, tmp_path, *words)["estimate"]
     assert found["range_sigma"] == pytest.approx(0.02, rel=0.12)
     power = materials()["asphalt"].reflectivity / 800.0**2 / plan.setting.threshold
-    gains = [10.0 * np.log10(strip_gain(plan.strip_errors, plan.seed, strip)) for strip in (0, 1)]
+    gains = [10.0 * np.log10(strip_gain(plan.reception.strip_errors, plan.run.seed, strip)) for strip in (0, 1)]
     # Brighter strips are ranged better: the mean of both strips' variances.
     brighter = np.sqrt(np.mean(10.0 ** (-2.0 * np.array(gains) / 10.0)))
     # How the noise is divided between its two parts scatters, by 0.67 to 1.06 over eight seeds; the sum hardly does.
@@ -135,7 +136,7 @@ def test_without_times_pairs_of_points_tell_strips_and_what_parts_them() -> None
     power, none = asphalt.intensity * 800.0**2, np.zeros(len(asphalt))
     road = RealClass("", asphalt.xyz, power, 0, none, none, none.astype(np.uint8))
     found = estimate_sensor(road, power, np.array([800.0]), np.array([0.0]))
-    gains = [10.0 * np.log10(strip_gain(plan.strip_errors, plan.seed, strip)) for strip in (0, 1)]
+    gains = [10.0 * np.log10(strip_gain(plan.reception.strip_errors, plan.run.seed, strip)) for strip in (0, 1)]
     assert found.strips == 2
     assert found.gain_step_db == pytest.approx(abs(gains[0] - gains[1]), abs=0.2)
     noise = 1.0 / (6.0 * materials()["asphalt"].reflectivity / 800.0**2 / plan.setting.threshold)

@@ -24,6 +24,7 @@ from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.instances import InstanceNumbers
 from synthroads_addon.road.parameters import read_parameters
+from synthroads_addon.scenario.inputs import ScenarioInputs
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.label_truth import misplaced_points
 from tests.helpers.logged import logged
@@ -155,17 +156,18 @@ def demo():
     """A third of the demo scene at standard fidelity: scenario, geometry and what is scanned."""
     from synthroads_addon.blender.model.build import build_road
     from synthroads_addon.blender.scene.evaluated import scanned_scene
+    from synthroads_addon.blender.things.model_builder import BuildRequest
     from synthroads_addon.sampling.road import sample_road
 
     scenario = load_scenario("rq31-600m", ["road.length=200", "scan.noise.range_sigma=0", "scan.rays_per_pulse=1"])
     parameters = sample_road(scenario.road, scenario.seed)
-    build_road(parameters, scenario.settings().tolerance, 0.3)
+    build_road(BuildRequest(parameters, scenario.settings().tolerance, 0.3))
     geometry = RoadGeometry(parameters)
     return scenario, geometry, scanned_scene(geometry=geometry)
 
 
 def scan_of(scenario, geometry, scene):
-    return Site.of_road(scenario, geometry).plan(scene, BlenderServices())
+    return Site.of_road(scenario, geometry, ScenarioInputs.read(scenario)).plan(scene, BlenderServices())
 
 
 @pytest.mark.keep_scene

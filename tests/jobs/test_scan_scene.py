@@ -22,6 +22,7 @@ from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.model.store import remember
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.scene.foreign import open_scene
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.jobs.open_scene import ForeignScene
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
@@ -383,7 +384,7 @@ def road_scene(tmp_path: Path) -> tuple[Path, RoadGeometry]:
     """Return a .blend that holds a road of ours with the set that it was built from, and its geometry."""
     scenario = load_scenario("rq31-600m", ["road.length=60", "road.half_width=25", "fidelity=draft"])
     parameters = sample_road(scenario.road, scenario.seed)
-    model = build_road(parameters, 0.02, 0.0)
+    model = build_road(BuildRequest(parameters, 0.02, 0.0))
     remember(model.root, parameters, scenario, "")
     return write_scene(tmp_path / "road.blend"), RoadGeometry(parameters)
 

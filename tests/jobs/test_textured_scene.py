@@ -15,6 +15,7 @@ import pytest
 from synthroads_addon.blender.cameras.nodes import NodeLayers
 from synthroads_addon.blender.files import empty_file
 from synthroads_addon.blender.model.build import build_road
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.jobs.scan.files import CloudFiles
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 from synthroads_addon.materials.reflectance import reflectivity
@@ -124,7 +125,7 @@ def test_casters_give_the_same_layers(tmp_path: Path, road: bool) -> None:
     if road:
         empty_file()
         scenario = load_scenario("rq31-600m", ["road.length=40", "road.half_width=20", "vegetation_detail=0.2"])
-        build_road(sample_road(scenario.road, scenario.seed), 0.02, 0.2)
+        build_road(BuildRequest(sample_road(scenario.road, scenario.seed), 0.02, 0.2))
         bpy.context.view_layer.update()
     else:
         shaded_scene(tmp_path)

@@ -1,7 +1,5 @@
 """The spread of a material's brightness: its distribution, and what the scan makes of it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,14 +9,14 @@ from synthroads_addon.base.arithmetic.noise import noise_field
 from synthroads_addon.materials import surfaces as module
 from synthroads_addon.materials.surfaces import OCTAVES, mean_over_median, spread_factors, surfaces_of
 from synthroads_addon.materials.table import Material, materials
-from tests.helpers.scenes.scan_scenes import Standing, middle_pulses, plane, scan_of
+from tests.helpers.scenes.scan_scenes import Standing, altered, middle_pulses, plane, scan_of
 
 UNEVEN = materials()["asphalt"].model_copy(update={"spread_below": 0.4, "spread_above": 0.2, "spread_wavelength": 2.0})
 
 
 def uneven_scan(material: Material = UNEVEN, rays: int = 1, path: Standing | None = None, **changes):
     scan = scan_of(plane(), rays, path, **changes)
-    return replace(scan, surfaces=surfaces_of([material]))
+    return altered(scan, surfaces=surfaces_of([material]))
 
 
 @given(st.floats(0.0, 1.5), st.floats(0.0, 1.5))
@@ -87,5 +85,5 @@ def test_without_spread_nothing_is_computed(monkeypatch: pytest.MonkeyPatch) -> 
     assert len(middle_pulses(scan_of(plane())).points)
     with pytest.raises(AssertionError, match="computed"):
         middle_pulses(uneven_scan())
-    off = replace(scan_of(plane()), surfaces=surfaces_of([UNEVEN], spread=False))
+    off = altered(scan_of(plane()), surfaces=surfaces_of([UNEVEN], spread=False))
     assert len(middle_pulses(off).points)

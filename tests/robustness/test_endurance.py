@@ -89,6 +89,7 @@ def scans_in_one_blender(folder: Path) -> tuple[list[float], list[int]]:
     Each tenth time images give the colours. The scene is the same afterwards.
     """
     from synthroads_addon.blender.model.build import build_road
+    from synthroads_addon.blender.things.model_builder import BuildRequest
     from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
     from synthroads_addon.sampling.road import sample_road
     from synthroads_addon.scenario.road import RoadScenario
@@ -97,7 +98,7 @@ def scans_in_one_blender(folder: Path) -> tuple[list[float], list[int]]:
     thin = {"lines_per_second": 20.0, "platform": {"height": 30.0, "speed": 30.0}}
     plain = {"fidelity": "draft", "scan": thin, "outputs": ["cloud", "previews"]}
     scenarios = [Scenario.from_dict({**plain, "colour": {"source": kind}}) for kind in ("images", *["material"] * 9)]
-    build_road(sample_road(RoadScenario(length=40.0, half_width=20.0), 4), 0.05, 0.1)
+    build_road(BuildRequest(sample_road(RoadScenario(length=40.0, half_width=20.0), 4), 0.05, 0.1))
     before = digest()
     memory, files = [], []
     for number in range(SCANS):

@@ -31,7 +31,7 @@ from synthroads_addon.scenario.assets import LIBRARIES, AssetLibrary
 from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scenario import SCENARIOS, Scenario
 from tests.helpers.roads.checker_full_road import full
-from tests.helpers.scenes.scan_scenes import ORIGIN, mesh_of, middle_pulses, plane, scan_of
+from tests.helpers.scenes.scan_scenes import ORIGIN, altered, mesh_of, middle_pulses, plane, scan_of
 
 ROOT = Path(__file__).parents[2]
 PRESETS = ROOT / "synthroads_addon" / "presets"
@@ -126,9 +126,9 @@ def test_a_surface_on_edge_gives_no_point_and_one_nearly_so_a_finite_one(distanc
 
 def test_denormal_intensities_are_zero_and_no_point() -> None:
     """exp(-0.2 d) is a denormal number from 3.5 km on and nothing from 3.8 km: neither traps nor slows down."""
-    scan = replace(scan_of(plane(20_000.0)), attenuation=12.0)
+    scan = altered(scan_of(plane(20_000.0)), attenuation=12.0)
     with np.errstate(all="raise", under="ignore"):
-        points = middle_pulses(replace(scan, setting=replace(scan.setting, threshold=1e-300)), 50).points
+        points = middle_pulses(altered(scan, setting=replace(scan.setting, threshold=1e-300)), 50).points
     assert len(points) == 0
 
 

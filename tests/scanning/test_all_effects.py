@@ -20,7 +20,7 @@ from synthroads_addon.scanning.scan import BlockScan
 from synthroads_addon.scanning.strip_errors import StripErrors
 from synthroads_addon.scanning.sway import Motion, with_motion
 from synthroads_addon.scanning.weather.conditions import Rain
-from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, mesh_of, plane, scan_of
+from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, altered, mesh_of, plane, scan_of
 
 HEIGHT = 12.0
 STRIP = Standing.strips[0]
@@ -78,8 +78,8 @@ def corner() -> ScanPlan:
         free_mirror=True,
         receiver=RECEIVER,
     )
-    path = with_motion(plan.path, MOTION, plan.seed)
-    return replace(
+    path = with_motion(plan.path, MOTION, plan.run.seed)
+    return altered(
         plan,
         setting=setting,
         path=path,
@@ -103,7 +103,7 @@ def bytes_of(points: PointBlock) -> dict[str, bytes]:
 
 
 def with_setting(**changes) -> Callable[[ScanPlan], ScanPlan]:
-    return lambda plan: replace(plan, setting=replace(plan.setting, **changes))
+    return lambda plan: altered(plan, setting=replace(plan.setting, **changes))
 
 
 def with_receiver(**changes) -> Callable[[ScanPlan], ScanPlan]:
@@ -111,11 +111,11 @@ def with_receiver(**changes) -> Callable[[ScanPlan], ScanPlan]:
 
 
 def with_noise(name: str) -> Callable[[ScanPlan], ScanPlan]:
-    return lambda plan: replace(plan, noise=NOISE.model_copy(update={name: 0.0}))
+    return lambda plan: altered(plan, noise=NOISE.model_copy(update={name: 0.0}))
 
 
 def with_strip_errors(name: str) -> Callable[[ScanPlan], ScanPlan]:
-    return lambda plan: replace(plan, strip_errors=STRIP_ERRORS.model_copy(update={name: 0.0}))
+    return lambda plan: altered(plan, strip_errors=STRIP_ERRORS.model_copy(update={name: 0.0}))
 
 
 LESS: dict[str, Callable[[ScanPlan], ScanPlan]] = {
@@ -125,14 +125,14 @@ LESS: dict[str, Callable[[ScanPlan], ScanPlan]] = {
     **{f"strips.{name}": with_strip_errors(name) for name in StripErrors.model_fields},
     **{f"receiver.{name}": with_receiver(**{name: None}) for name in RECEIVER.model_fields_set - {"response"}},
     "receiver.response": with_receiver(response="linear"),
-    "multipath": lambda plan: replace(plan, multipath=None),
-    "weather": lambda plan: replace(plan, effects=(), attenuation=0.0),
-    "motion": lambda plan: replace(plan, path=Standing(HEIGHT)),
+    "multipath": lambda plan: altered(plan, multipath=None),
+    "weather": lambda plan: altered(plan, effects=(), attenuation=0.0),
+    "motion": lambda plan: altered(plan, path=Standing(HEIGHT)),
 }
 
 
 def test_every_effect_acts() -> None:
-    plan = replace(corner(), chosen_blocks=((STRIP, 0),))
+    plan = altered(corner(), chosen_blocks=((STRIP, 0),))
     every = bytes_of(points_of(plan))
     assert not [name for name, change in LESS.items() if bytes_of(points_of(change(plan))) == every]
 
@@ -140,18 +140,18 @@ def test_every_effect_acts() -> None:
 @pytest.mark.parametrize("workers", [2, 3, 8])
 def test_workers_change_no_byte(workers: int) -> None:
     plan = corner()
-    alone = points_of(replace(plan, threads=1))
+    alone = points_of(altered(plan, threads=1))
     assert np.count_nonzero(alone.class_id == UNLABELLED) > 20
     assert (alone.return_number > 1).sum() > 20
-    assert bytes_of(points_of(replace(plan, threads=workers))) == bytes_of(alone)
+    assert bytes_of(points_of(altered(plan, threads=workers))) == bytes_of(alone)
 
 
 def test_the_order_of_blocks_changes_no_byte() -> None:
     plan = corner()
-    forward = [bytes_of(result.points) for result in scan_blocks(replace(plan, threads=1))]
+    forward = [bytes_of(result.points) for result in scan_blocks(altered(plan, threads=1))]
     scan = BlockScan(plan)
-    assert plan.chosen_blocks is not None
-    backward = [bytes_of(scan.scan_block(*block).points) for block in reversed(plan.chosen_blocks)]
+    assert plan.run.chosen_blocks is not None
+    backward = [bytes_of(scan.scan_block(*block).points) for block in reversed(plan.run.chosen_blocks)]
     assert backward[::-1] == forward
 
 
@@ -160,8 +160,8 @@ def test_ranges_without_noise_are_true_to_less_than_a_millimetre(slope: tuple[fl
     """All that moves, dims, mixes or loses echoes is on; points without errors lie on the plane."""
     plan = scan_of(plane(400.0, slope), 7, Standing(60.0), divergence=(1e-3, 1e-3), threshold=1e-6, saturation=1e-3)
     setting = replace(plan.setting, receiver=RECEIVER, free_mirror=True, field_of_view=1.2)
-    path = with_motion(plan.path, MOTION, plan.seed)
-    plan = replace(plan, setting=setting, path=path, noise=NOISE, strip_errors=STRIP_ERRORS)
+    path = with_motion(plan.path, MOTION, plan.run.seed)
+    plan = altered(plan, setting=setting, path=path, noise=NOISE, strip_errors=STRIP_ERRORS)
     points = BlockScan(plan).scan_block(path.strips[0], 0).points
     x, y, z = (points.true_xyz - ORIGIN).T
     off = (z - slope[0] * x - slope[1] * y) / np.sqrt(1.0 + slope[0] ** 2 + slope[1] ** 2)
@@ -178,7 +178,7 @@ def test_a_strip_shows_more_than_a_hundred_thousand_mirror_angles() -> None:
     strip = Strip(0, 0.0, 2.0)
 
     def angles(setting) -> int:
-        one = replace(plan, setting=setting)
+        one = altered(plan, setting=setting)
         count = one.pulse_count(strip)
         return len(np.unique(BlockScan(one).scan_pulses(strip, 0, count).points.scan_angle_deg))
 

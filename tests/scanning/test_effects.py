@@ -18,7 +18,7 @@ from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.relief.micro_relief import micro_relief
 from synthroads_addon.scanning.scan import BlockResult
 from synthroads_addon.scanning.scene.mesh import SceneMesh, empty_scene_mesh
-from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, mesh_of, plane, scan_block, scan_of, scan_pulses
+from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, altered, mesh_of, plane, scan_block, scan_of, scan_pulses
 
 HEIGHT = 60.0
 FULL_LINE = 1000  # pulses of the device's line, from left to right
@@ -62,8 +62,8 @@ def everything(points: PointBlock) -> bytes:
 def scan_with(*effects: object, mesh: SceneMesh | None = None, rays: int = 1, **changes: object) -> ScanPlan:
     """Return a scan of a plane with effects, its points told where they were seen."""
     scan = scan_of(plane(100.0) if mesh is None else mesh, rays)
-    layers = scan.measured_layers | {"material"}
-    return replace(scan, effects=effects, records_seen_points=True, measured_layers=layers, **changes)
+    layers = scan.layers.measured | {"material"}
+    return altered(scan, effects=effects, seen_points=True, measured=layers, **changes)
 
 
 def line(scan: ScanPlan, key: int = 0) -> BlockResult:
@@ -183,15 +183,15 @@ def test_points_in_the_air_go_through_colours_and_relief(by_layers: bool) -> Non
         mesh = mesh_of(plane(100.0).vertices, plane().triangles, name)
         rows = [materials()[name]]
         varying = surfaces_of(rows, spread=not by_layers)
-        scan = scan_with(HalfRange(), mesh=mesh, surfaces=varying, detects_after_layers=by_layers, seed=3)
-        scan = replace(
+        scan = scan_with(HalfRange(), mesh=mesh, surfaces=varying, after_layers=by_layers, seed=3)
+        scan = altered(
             scan,
-            colour_layers=frozenset({"rgb", "roughness"}),
-            kept_layers=frozenset({"material", "color_source", "true_range", "roughness"}),
-            material_means=surfaces_of(rows),
-            relief=micro_relief([name], rows),
-            relief_strength=1.0,
-            relief_octaves=2,
+            coloured=frozenset({"rgb", "roughness"}),
+            kept=frozenset({"material", "color_source", "true_range", "roughness"}),
+            means=surfaces_of(rows),
+            micro=micro_relief([name], rows),
+            strength=1.0,
+            octaves=2,
         )
         points = Finish(scan, MaterialLayers(surface_constants(rows))).finish_block(line(scan)).points
         air = points.material == NO_MATERIAL
@@ -221,7 +221,7 @@ def test_all_arrays_of_hits_fit_together() -> None:
     assert not first.brightness[~met].any()
     down = np.abs(first.direction[2])
     ray = np.flatnonzero(met.all(axis=0) & (down > 0.9))
-    reflectivity = scan.surfaces.reflectivity[0]
+    reflectivity = scan.reflection.surfaces.reflectivity[0]
     np.testing.assert_allclose(first.brightness[:, ray].sum(axis=0), reflectivity * down[ray], rtol=1e-3)
     assert len(first.behind_pulse) == 0
     assert 50 < len(second.behind_pulse) < 150

@@ -15,7 +15,7 @@ from synthroads_addon.scanning.colour.colour import MaterialLayers, surface_cons
 from synthroads_addon.scanning.finish import Finish
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.scan import BlockResult
-from tests.helpers.scenes.scan_scenes import mesh_of, middle_pulses, plane, scan_of
+from tests.helpers.scenes.scan_scenes import altered, mesh_of, middle_pulses, plane, scan_of
 
 KEPT = frozenset({"color_source", "true_xyz", "normal", "material", "scanner", "true_range"})
 
@@ -37,13 +37,13 @@ class Striped:
 
 
 def finish_of(scan: ScanPlan, source: Any, corrected: bool = False) -> Callable[[BlockResult], BlockResult]:
-    plan = replace(scan, material_means=scan.surfaces, range_corrected=corrected, kept_layers=KEPT)
+    plan = altered(scan, means=scan.reflection.surfaces, range_corrected=corrected, kept=KEPT)
     return Finish(plan, source).finish_block
 
 
 def detected_later(scan: ScanPlan) -> ScanPlan:
-    layers = scan.measured_layers | {"material"}
-    return replace(scan, records_seen_points=True, detects_after_layers=True, measured_layers=layers)
+    layers = scan.layers.measured | {"material"}
+    return altered(scan, seen_points=True, after_layers=True, measured=layers)
 
 
 def finished(scan: ScanPlan, dark: float, bright: float, material: str = "asphalt") -> BlockResult:
@@ -123,7 +123,7 @@ def test_what_passes_is_numbered_anew(most: int) -> None:
     ground = [(a, b, 0.0) for a in (-99.0, 99.0) for b in (-99.0, 99.0)]
     first = len(strip)
     mesh = mesh_of(strip + ground, [*faces, (first, first + 2, first + 3), (first, first + 3, first + 1)])
-    scan = replace(scan_of(mesh, rays=19), records_seen_points=True, detects_after_layers=True)
+    scan = altered(scan_of(mesh, rays=19), seen_points=True, after_layers=True)
     scan.path.pose = lambda strip, time: (  # type: ignore[method-assign]
         np.tile([-10.0, 0.0, 60.0], (len(time), 1)),
         np.broadcast_to(np.eye(3), (len(time), 3, 3)),
@@ -140,7 +140,7 @@ def test_what_passes_is_numbered_anew(most: int) -> None:
     assert (raw.points.number_of_returns == 2).sum() > 50
     device = scan.setting.device.model_copy(update={"maximum_returns": most})
     setting = replace(scan.setting, threshold=1e-3 * raw.points.intensity.min(), device=device)
-    scan = replace(scan, setting=setting)
+    scan = altered(scan, setting=setting)
     result = finish_of(scan, HighIsDark("asphalt", 1.0, 1.0))(middle_pulses(scan, 300))
     assert result.below_threshold == len(raw.points) - len(result.points) > 50
     assert (result.points.number_of_returns == 1).all()

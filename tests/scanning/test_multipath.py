@@ -23,7 +23,7 @@ from synthroads_addon.scanning.multipath import (
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.receiver import Receiver
 from synthroads_addon.scanning.scene.mesh import SceneMesh
-from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, mesh_of, scan_block, scan_of
+from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, altered, mesh_of, scan_block, scan_of
 
 WALL = 12.0
 """Left of the scanner, m: a wall, as high as this."""
@@ -44,8 +44,8 @@ def plan_of(ground: tuple[float, float], wall: tuple[float, float], **changes) -
     """Return a scan of the corner, whose two materials mirror by reflectance and slope."""
     mirrors = Mirrors(*(np.array(pair) for pair in zip(ground, wall, strict=True)))
     plan = scan_of(corner(), 1, Standing(3.0), field_of_view=2.0 * np.pi, **changes)
-    layers = plan.measured_layers | {"material"}
-    return replace(plan, multipath=Multipath(mirrors, 1.0), attenuation=0.002, measured_layers=layers)
+    layers = plan.layers.measured | {"material"}
+    return altered(plan, multipath=Multipath(mirrors, 1.0), attenuation=0.002, measured=layers)
 
 
 def scanned(plan: ScanPlan) -> tuple[PointBlock, PointBlock]:
@@ -92,12 +92,12 @@ def test_a_ghost_is_as_bright_as_mirror_image_range_and_blur_say() -> None:
 
 def test_strength_is_a_factor_and_nothing_else_changes() -> None:
     plan = plan_of((0.0, 0.3), (0.4, 0.003))
-    assert plan.multipath is not None
-    strong = replace(plan, multipath=replace(plan.multipath, strength=3.0))
+    assert plan.reflection.multipath is not None
+    strong = altered(plan, multipath=replace(plan.reflection.multipath, strength=3.0))
     one, three = scanned(plan)[0], scanned(strong)[0]
     np.testing.assert_allclose(three.intensity, 3.0 * one.intensity, rtol=1e-6)
     strip = plan.path.strips[0]
-    without = scan_block(replace(plan, multipath=None), strip, 0).points
+    without = scan_block(altered(plan, multipath=None), strip, 0).points
     points = scan_block(plan, strip, 0).points
     first = points.select(points.return_number == 1)
     # A ghost nearer to its mirror than the range resolution is one echo with it.
@@ -112,7 +112,7 @@ def test_ghosts_are_detected_by_the_receivers_chance() -> None:
     ghosts, _ = scanned(calm)
     threshold, ratio = float(np.median(ghosts.intensity)), 3.0
     setting = replace(calm.setting, threshold=threshold, receiver=Receiver(threshold_to_noise=ratio))
-    found, _ = scanned(replace(calm, setting=setting))
+    found, _ = scanned(altered(calm, setting=setting))
     chance = stats.norm.cdf(ratio * (ghosts.intensity / threshold - 1.0))
     seen = np.isin(ghosts.gps_time, found.gps_time)
     unsure = (chance > 0.02) & (chance < 0.98)

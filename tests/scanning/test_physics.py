@@ -19,6 +19,7 @@ from synthroads_addon.scanning.weather.conditions import Fog
 from tests.helpers.scenes.scan_scenes import (
     ORIGIN,
     Standing,
+    altered,
     beam_rays,
     echoes_and_pulses,
     mesh_of,
@@ -59,7 +60,7 @@ def test_mean_over_all_returns_is_that_of_the_footprint(rays: int, divergence: f
             scan = scan_of(
                 plane(slope=slope), rays, Standing(height), divergence=(divergence, divergence), minimum_range=0.0
             )
-            scan = replace(scan, setting=replace(scan.setting, maximum_range=5e4))
+            scan = altered(scan, setting=replace(scan.setting, maximum_range=5e4))
             echoes, pulses = echoes_and_pulses(scan, 499, 2)
             several += len(echoes.pulse) > 2
             for pulse in range(2):
@@ -101,7 +102,7 @@ def test_footprint_of_the_minivux_at_100_m() -> None:
     """1.6 x 0.5 mrad: 160 x 50 mm, the four-sigma widths of the Gaussian beam."""
     scan = scan_of(plane(), 19, Standing(100.0))
     assert footprint(scan) == pytest.approx((0.160, 0.050), rel=1e-3)
-    assert footprint(replace(scan, beam="cylindrical")) == pytest.approx((0.160, 0.050), rel=1e-3)
+    assert footprint(altered(scan, beam="cylindrical")) == pytest.approx((0.160, 0.050), rel=1e-3)
 
 
 def test_a_cone_widens_behind_a_step_and_a_cylinder_does_not() -> None:
@@ -111,7 +112,7 @@ def test_a_cone_widens_behind_a_step_and_a_cylinder_does_not() -> None:
     mesh = mesh_of(bar + ground, [(0, 1, 2), (0, 2, 3), (4, 5, 6), (4, 6, 7)])
     cone = scan_of(mesh, 19, Standing(100.0), divergence=(10e-3, 10e-3))
     assert footprint(cone)[0] == pytest.approx(1.0, rel=1e-2)
-    assert footprint(replace(cone, beam="cylindrical"))[0] == pytest.approx(0.5, rel=1e-2)
+    assert footprint(altered(cone, beam="cylindrical"))[0] == pytest.approx(0.5, rel=1e-2)
 
 
 # --- returns --------------------------------------------------------------------------------------------------------
@@ -139,7 +140,7 @@ def leaf_scan(transmission: float, layers: int = 1, rays: int = 7, **changes) ->
     scan = scan_of(mesh, rays, **changes)
     even = materials()["leaves"].model_copy(update={"transmission": transmission, "gap_size": 0.0})
     rows = [materials()["asphalt"], even]
-    return replace(scan, surfaces=surfaces_of(rows))
+    return altered(scan, surfaces=surfaces_of(rows))
 
 
 def test_a_leaf_layer_above_the_ground() -> None:
@@ -150,7 +151,7 @@ def test_a_leaf_layer_above_the_ground() -> None:
     leaf, ground = points.select(points.return_number == 1), points.select(points.return_number == 2)
     np.testing.assert_allclose(leaf.xyz[:, 2] - ORIGIN[2], 4.0, atol=2e-3)
     np.testing.assert_allclose(ground.xyz[:, 2] - ORIGIN[2], 0.0, atol=2e-3)
-    bright = scan.surfaces.reflectivity
+    bright = scan.reflection.surfaces.reflectivity
     cosine = np.cos(np.deg2rad(leaf.incidence_deg))
     np.testing.assert_allclose(leaf.intensity, 0.7 * bright[1] * cosine / leaf.range**2, rtol=1e-4)
     np.testing.assert_allclose(ground.intensity, 0.3 * bright[0] * cosine / ground.range**2, rtol=1e-4)
@@ -205,7 +206,7 @@ def test_weather_thins_far_and_dark_points_as_the_threshold_says() -> None:
     widths = {}
     for visibility in (23_000.0, 1_000.0, 300.0):
         extinction = Fog(visibility=visibility).attenuation(905.0)
-        scan = replace(scan_of(mesh, threshold=0.2 / 113.0**2), attenuation=extinction)
+        scan = altered(scan_of(mesh, threshold=0.2 / 113.0**2), attenuation=extinction)
         points = scan_pulses(scan, scan.path.strips[0], 0, 1000).points
         for side, name in ((-1.0, "asphalt"), (1.0, "concrete")):
             y = points.xyz[:, 1] - ORIGIN[1]
@@ -263,7 +264,7 @@ def test_nothing_drives_through_the_scanner_s_own_vehicle(driven: bool) -> None:
     moving = [
         MovingMesh(box(14, lane), LinearMotion((28.0, 0.0, 0.0), place=(-7.0, y, 0.0))) for lane, y in lanes.items()
     ]
-    scan = replace(scan_of(plane(), path=Standing(1.0, 20.0), moving=moving, minimum_range=0.1), on_vehicle=driven)
+    scan = altered(scan_of(plane(), path=Standing(1.0, 20.0), moving=moving, minimum_range=0.1), on_vehicle=driven)
     points = scan_pulses(scan, scan.path.strips[0], 0, 150_000).points
     seen = {lane: points.gps_time[points.instance_id == lane] for lane in lanes}
     if not driven:
@@ -305,23 +306,23 @@ def test_the_scanner_s_vehicle_takes_up_a_box_in_the_other_one_s_frame() -> None
 def test_dropouts_lose_their_share_and_returns_stay_numbered() -> None:
     scan = leaf_scan(0.5)
     all_points = middle_pulses(scan, 400).points
-    some = middle_pulses(replace(scan, noise=Noise(dropout=0.25)), 400).points
+    some = middle_pulses(altered(scan, noise=Noise(dropout=0.25)), 400).points
     assert len(some) / len(all_points) == pytest.approx(0.75, abs=0.06)
     kept = np.isin(some.gps_time, all_points.gps_time)
     assert kept.all()
     for time in np.unique(some.gps_time):
         mine = some.number_of_returns[some.gps_time == time]
         assert set(mine) == {len(mine)}
-    assert len(middle_pulses(replace(scan, noise=Noise(dropout=1.0)), 400).points) == 0
+    assert len(middle_pulses(altered(scan, noise=Noise(dropout=1.0)), 400).points) == 0
 
 
 def test_range_bias_and_pointing_errors_move_the_point_and_not_the_truth() -> None:
     scan = scan_of(plane())
     calm = middle_pulses(scan, 400).points
-    biased = middle_pulses(replace(scan, noise=Noise(range_bias=0.05)), 400).points
+    biased = middle_pulses(altered(scan, noise=Noise(range_bias=0.05)), 400).points
     np.testing.assert_allclose(biased.range - calm.range, 0.05, atol=1e-12)
     np.testing.assert_array_equal(biased.true_range, calm.range)
-    shaken = scan_block(replace(scan, noise=Noise(angle_sigma_mrad=1.0)), scan.path.strips[0], 0).points
+    shaken = scan_block(altered(scan, noise=Noise(angle_sigma_mrad=1.0)), scan.path.strips[0], 0).points
     quiet = scan_block(scan, scan.path.strips[0], 0).points
     np.testing.assert_array_equal(shaken.true_xyz, quiet.xyz)
     off = (shaken.xyz - quiet.xyz) / quiet.range[:, None]
@@ -333,7 +334,7 @@ def test_range_bias_and_pointing_errors_move_the_point_and_not_the_truth() -> No
 def test_platform_errors_have_their_size_and_the_truth_is_kept() -> None:
     scan = scan_of(plane(), path=Standing(60.0, speed=8.0))
     noise = Noise(position_sigma=0.03, correlation_time=0.002)
-    shaken = scan_pulses(replace(scan, noise=noise), scan.path.strips[0], 0, 200_000).points
+    shaken = scan_pulses(altered(scan, noise=noise), scan.path.strips[0], 0, 200_000).points
     calm = scan_pulses(scan, scan.path.strips[0], 0, 200_000).points
     np.testing.assert_array_equal(shaken.true_xyz, calm.xyz)
     # 2 s are 1000 correlation times: the spread is known to 1 / sqrt(1000).

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from synthroads_addon.cloud import layers
 from synthroads_addon.scanning import point_layers
 from tests.helpers.page_modules import block_of_page
-from tests.helpers.scenes.scan_scenes import middle_pulses, plane, scan_of
+from tests.helpers.scenes.scan_scenes import altered, middle_pulses, plane, scan_of
 
 PAGE = "extend/layer.md"
 
@@ -26,5 +24,5 @@ def test_the_function_of_the_page_fills_it(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(point_layers, "FILLERS", dict(point_layers.FILLERS))
     exec(block_of_page(PAGE, "python"), dict(vars(point_layers)))
     scan = scan_of(plane(), divergence=(1e-3, 2e-3))
-    points = middle_pulses(replace(scan, measured_layers=scan.measured_layers | {"footprint"})).points
+    points = middle_pulses(altered(scan, measured=scan.layers.measured | {"footprint"})).points
     np.testing.assert_allclose(points.more["footprint"], 2e-3 * points.true_range)

@@ -10,7 +10,7 @@ from synthroads_addon.scanning.noise import Noise
 from synthroads_addon.scanning.receiver import Receiver
 from synthroads_addon.scanning.receiving.range_noise import range_sigma
 from synthroads_addon.scanning.strip_errors import StripErrors, strip_gain
-from tests.helpers.scenes.scan_scenes import Standing, plane, scan_block, scan_of
+from tests.helpers.scenes.scan_scenes import Standing, altered, plane, scan_block, scan_of
 
 SIGMA = 0.01
 
@@ -19,11 +19,11 @@ def errors_and_sigma(**receiver):
     """Return the errors of ranges over a road from 2 m above, and their standard deviations by the formula."""
     plan = scan_of(plane(), 1, Standing(2.0), range_sigma=SIGMA)
     strip = plan.path.strips[0]
-    calm = scan_block(replace(plan, setting=replace(plan.setting, range_sigma=0.0)), strip, 0).points
+    calm = scan_block(altered(plan, setting=replace(plan.setting, range_sigma=0.0)), strip, 0).points
     threshold = float(calm.intensity[calm.range < 20.0].min())
     calm = calm.select(np.flatnonzero(calm.intensity >= threshold))
     setting = replace(plan.setting, threshold=threshold, receiver=Receiver(**receiver))
-    noisy = scan_block(replace(plan, setting=setting), strip, 0).points
+    noisy = scan_block(altered(plan, setting=setting), strip, 0).points
     assert len(noisy) == len(calm)
     cosine = 2.0 / calm.range
     depth = calm.range * np.sqrt(np.mean(np.square(setting.divergence))) / 4 * np.tan(np.arccos(cosine))
@@ -70,7 +70,7 @@ def test_errors_have_no_mean() -> None:
 def test_without_a_sigma_ranges_are_exact_whatever_the_receiver() -> None:
     plan = scan_of(plane(), 1)
     receiver = Receiver(faint_range_sigma=0.5, incidence_range_noise=1.0, range_tails=4.0)
-    points = scan_block(replace(plan, setting=replace(plan.setting, receiver=receiver)), plan.path.strips[0], 0).points
+    points = scan_block(altered(plan, setting=replace(plan.setting, receiver=receiver)), plan.path.strips[0], 0).points
     np.testing.assert_allclose(points.range, points.true_range, atol=1e-9)
 
 
@@ -83,10 +83,10 @@ def test_a_strong_echo_at_a_right_angle_has_the_device_s_sigma() -> None:
 
 def test_bright_speckle_is_ranged_nearer_without_a_bias() -> None:
     plan = scan_of(plane(), 1, range_sigma=1e-9)
-    plan = replace(plan, noise=Noise(speckle=0.3))
+    plan = altered(plan, noise=Noise(speckle=0.3))
     strip = plan.path.strips[0]
     walking = replace(plan.setting, receiver=Receiver(range_walk=0.004))
-    calm, points = (scan_block(p, strip, 0).points for p in (plan, replace(plan, setting=walking)))
+    calm, points = (scan_block(p, strip, 0).points for p in (plan, altered(plan, setting=walking)))
     level = 10 * np.log10(points.intensity / (points.intensity * points.range**3).mean() * points.range**3)
     shift = points.range - calm.range
     slope, _ = np.polyfit(level, shift, 1)
@@ -95,10 +95,13 @@ def test_bright_speckle_is_ranged_nearer_without_a_bias() -> None:
 
 
 def test_a_bright_strip_is_ranged_nearer_and_all_strips_together_are_not() -> None:
-    plan = replace(scan_of(plane(), 1, range_sigma=1e-9), strip_errors=StripErrors(gain_sigma_db=1.0))
+    plan = altered(scan_of(plane(), 1, range_sigma=1e-9), strip_errors=StripErrors(gain_sigma_db=1.0))
     strip = plan.path.strips[0]
     walking = replace(plan.setting, receiver=Receiver(range_walk=0.004))
-    calm, points = (scan_block(p, strip, 0).points for p in (plan, replace(plan, setting=walking)))
-    gains = [10 * np.log10(strip_gain(plan.strip_errors, seed, 0)) for seed in range(plan.seed, plan.seed + 900)]
+    calm, points = (scan_block(p, strip, 0).points for p in (plan, altered(plan, setting=walking)))
+    gains = [
+        10 * np.log10(strip_gain(plan.reception.strip_errors, seed, 0))
+        for seed in range(plan.run.seed, plan.run.seed + 900)
+    ]
     np.testing.assert_allclose(points.range - calm.range, -0.004 * gains[0], atol=1e-7)
     assert abs(0.004 * np.mean(gains)) < 1e-3

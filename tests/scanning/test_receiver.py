@@ -14,7 +14,7 @@ from synthroads_addon.scanning.receiver import Receiver, draw_values, number_ech
 from synthroads_addon.scanning.receiving.detector import detect_echoes
 from synthroads_addon.scanning.returns import Echoes
 from synthroads_addon.scanning.scan import BlockScan
-from tests.helpers.scenes.scan_scenes import Standing, plane, scan_block, scan_of
+from tests.helpers.scenes.scan_scenes import Standing, altered, plane, scan_block, scan_of
 from tests.helpers.scenes.scanners import device
 
 RATIO = 5.0
@@ -23,7 +23,7 @@ NOISY = Receiver(threshold_to_noise=RATIO)
 
 def received(plan: ScanPlan, blocks: int = 1, **changes) -> PointBlock:
     """Return the points of the first blocks of a scan with another setting."""
-    changed = replace(plan, setting=replace(plan.setting, **changes))
+    changed = altered(plan, setting=replace(plan.setting, **changes))
     return concatenate([scan_block(changed, changed.path.strips[0], block).points for block in range(blocks)])
 
 
@@ -98,7 +98,7 @@ def test_every_echo_of_a_pulse_follows_the_laws() -> None:
     pulses, echoes, dropout, sigma = 3000, 4, 0.1, 0.3
     plan = scan_of(plane(), 1)
     setting = replace(plan.setting, threshold=1.0, receiver=NOISY)
-    plan = replace(plan, setting=setting, noise=Noise(speckle=sigma, dropout=dropout))
+    plan = altered(plan, setting=setting, noise=Noise(speckle=sigma, dropout=dropout))
     errors = BlockScan(plan).draw_errors(plan.path.strips[0], pulses, 0)
     pulse = np.repeat(np.arange(pulses), echoes)
     power = np.full(len(pulse), 1.1)

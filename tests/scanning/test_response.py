@@ -8,7 +8,7 @@ from scipy import stats
 
 from synthroads_addon.scanning.receiver import Receiver
 from synthroads_addon.scanning.receiving.response import laser_gains, overlap_share, range_corrected, read_power
-from tests.helpers.scenes.scan_scenes import Standing, plane, scan_block, scan_of
+from tests.helpers.scenes.scan_scenes import Standing, altered, plane, scan_block, scan_of
 from tests.helpers.scenes.scanners import preset
 
 ONES = np.ones(256)
@@ -96,8 +96,8 @@ def test_gains_of_lasers_are_log_normal_and_drawn_from_the_seed() -> None:
 def test_the_scan_gives_each_laser_its_gain() -> None:
     plan = scan_of(plane(), 1, Standing(2.0))
     head = replace(preset("velodyne-hdl-64e"), range_sigma=0.0, threshold=0.0, saturation=np.inf)
-    layers = plan.measured_layers | {"channel", "power_db"}
-    plan = replace(plan, setting=replace(head, receiver=Receiver(gain_sigma_db=2.0)), measured_layers=layers)
+    layers = plan.layers.measured | {"channel", "power_db"}
+    plan = altered(plan, setting=replace(head, receiver=Receiver(gain_sigma_db=2.0)), measured=layers)
     points = scan_block(plan, plan.path.strips[0], 0).points
     channel, power = points.array("channel"), points.array("power_db")
     assert len(np.unique(channel)) > 50
@@ -107,7 +107,7 @@ def test_the_scan_gives_each_laser_its_gain() -> None:
 def test_near_echoes_are_fainter_where_laser_and_receiver_see_different_places() -> None:
     plan = scan_of(plane(), 1, Standing(2.0))
     setting = replace(plan.setting, receiver=Receiver(overlap_begin=1.0, overlap_full=4.0))
-    calm, near = (scan_block(p, plan.path.strips[0], 0).points for p in (plan, replace(plan, setting=setting)))
+    calm, near = (scan_block(p, plan.path.strips[0], 0).points for p in (plan, altered(plan, setting=setting)))
     share = np.clip((calm.range - 1.0) / 3.0, 0.0, 1.0)
     assert share.min() < 0.7
     np.testing.assert_allclose(near.intensity, calm.intensity * share, rtol=1e-9)

@@ -14,6 +14,7 @@ from synthroads_addon.scanning.scene.mesh import empty_scene_mesh
 from tests.helpers.scenes.scan_scenes import (
     ORIGIN,
     Standing,
+    altered,
     mesh_of,
     middle_pulses,
     plane,
@@ -57,7 +58,7 @@ def test_a_step_edge_is_two_returns_at_the_right_ranges() -> None:
 def test_noise_has_the_stated_sigma_and_its_own_stream() -> None:
     scan = scan_of(plane(), range_sigma=0.01)
     strip = scan.path.strips[0]
-    calm = scan_block(replace(scan, setting=replace(scan.setting, range_sigma=0.0)), strip, 0).points
+    calm = scan_block(altered(scan, setting=replace(scan.setting, range_sigma=0.0)), strip, 0).points
     first, second, other = (scan_block(scan, strip, block).points for block in (0, 0, 1))
     error = first.range - calm.range
     assert error.std() == pytest.approx(0.01, rel=0.02)
@@ -69,7 +70,7 @@ def test_noise_has_the_stated_sigma_and_its_own_stream() -> None:
 def test_speckle_is_gamma_distributed_with_its_own_stream() -> None:
     """A chi-square test of twenty equal shares; ranges and everything else are as without."""
     scan = scan_of(plane(), 7, range_sigma=0.01)
-    speckled = replace(scan, noise=Noise(speckle=0.25))
+    speckled = altered(scan, noise=Noise(speckle=0.25))
     strip = scan.path.strips[0]
     calm, points = (scan_block(plan, strip, 0).points for plan in (scan, speckled))
     np.testing.assert_array_equal(points.xyz, calm.xyz)
@@ -97,10 +98,10 @@ def test_a_part_of_the_intensitys_noise_is_normal(normal: float) -> None:
 
 
 def test_normal_noise_leaves_walking_ranges_without_a_bias() -> None:
-    plan = replace(scan_of(plane(), range_sigma=1e-9), noise=Noise(speckle=0.3, speckle_normal=1.0))
+    plan = altered(scan_of(plane(), range_sigma=1e-9), noise=Noise(speckle=0.3, speckle_normal=1.0))
     strip = plan.path.strips[0]
     walking = replace(plan.setting, receiver=Receiver(range_walk=0.02))
-    calm, points = (scan_block(p, strip, 0).points for p in (plan, replace(plan, setting=walking)))
+    calm, points = (scan_block(p, strip, 0).points for p in (plan, altered(plan, setting=walking)))
     shift = points.range - calm.range
     assert shift.std() > 0.02
     assert abs(shift.mean()) < 4.0 * shift.std() / np.sqrt(len(shift))
@@ -108,7 +109,7 @@ def test_normal_noise_leaves_walking_ranges_without_a_bias() -> None:
 
 def test_pointing_errors_are_normal_along_both_axes() -> None:
     """A chi-square test of twenty equal shares of where points lie beside their beams."""
-    scan = replace(scan_of(plane()), noise=Noise(angle_sigma_mrad=2.0))
+    scan = altered(scan_of(plane()), noise=Noise(angle_sigma_mrad=2.0))
     strip = scan.path.strips[0]
     errors = BlockScan(scan).draw_errors(strip, 8000, 0).angle
     assert errors is not None
@@ -116,7 +117,7 @@ def test_pointing_errors_are_normal_along_both_axes() -> None:
         counts = np.bincount((stats.norm.cdf(axis / 2e-3) * 20).astype(int), minlength=20)
         assert stats.chisquare(counts).pvalue > 0.001
     assert abs(np.corrcoef(errors)[0, 1]) < 0.05
-    points, calm = (scan_pulses(plan, strip, 450, 100).points for plan in (scan, replace(scan, noise=Noise())))
+    points, calm = (scan_pulses(plan, strip, 450, 100).points for plan in (scan, altered(scan, noise=Noise())))
     off = np.linalg.norm(points.xyz - calm.xyz, axis=1) / calm.range
     assert np.sqrt(np.mean(off**2)) == pytest.approx(2e-3 * np.sqrt(2.0), rel=0.2)
 
@@ -125,7 +126,7 @@ def test_dropouts_are_as_many_as_said_in_every_part_of_the_scan() -> None:
     """A chi-square test of the returns that are lost, over ten groups of the scan angle."""
     scan = scan_of(plane())
     strip, share = scan.path.strips[0], 0.2
-    calm, left = (scan_block(plan, strip, 0).points for plan in (scan, replace(scan, noise=Noise(dropout=share))))
+    calm, left = (scan_block(plan, strip, 0).points for plan in (scan, altered(scan, noise=Noise(dropout=share))))
     lost = ~np.isin(calm.gps_time, left.gps_time)
     group = (stats.rankdata(calm.scan_angle_deg, method="ordinal").astype(int) - 1) * 10 // len(calm)
     found, total = np.bincount(group, lost), np.bincount(group)
@@ -136,7 +137,7 @@ def test_speckle_decides_which_faint_echoes_are_detected() -> None:
     """Half of the pulses are lost at the threshold: a gamma variable exceeds 0.979 of its mean in half of all cases."""
     scan = scan_of(plane())
     usual = middle_pulses(scan, 4).points.intensity[0]
-    at_threshold = replace(scan, setting=replace(scan.setting, threshold=0.979 * usual), noise=Noise(speckle=0.25))
+    at_threshold = altered(scan, setting=replace(scan.setting, threshold=0.979 * usual), noise=Noise(speckle=0.25))
     found = [
         len(scan_pulses(at_threshold, scan.path.strips[0], 1000 * line + 495, 10, line).points) for line in range(200)
     ]
@@ -146,11 +147,11 @@ def test_speckle_decides_which_faint_echoes_are_detected() -> None:
 def test_intensity_follows_the_laser_equation_and_the_threshold() -> None:
     scan = scan_of(plane())
     points = middle_pulses(scan, 600).points
-    reflectivity = scan.surfaces.reflectivity[0]
+    reflectivity = scan.reflection.surfaces.reflectivity[0]
     expected = reflectivity * np.cos(np.deg2rad(points.incidence_deg)) / points.range**2
     np.testing.assert_allclose(points.intensity, expected, rtol=1e-5)
     limit = float(np.median(points.intensity))
-    result = middle_pulses(replace(scan, setting=replace(scan.setting, threshold=limit)), 600)
+    result = middle_pulses(altered(scan, setting=replace(scan.setting, threshold=limit)), 600)
     assert result.points.intensity.min() >= limit
     assert len(result.points) + result.below_threshold == 600
 
@@ -209,11 +210,11 @@ def test_incidence_up_to_90_degrees() -> None:
 
 
 def test_dense_fog_leaves_no_point_and_no_nan() -> None:
-    scan = replace(scan_of(plane(), 7), attenuation=0.2)
-    thick = middle_pulses(replace(scan, setting=replace(scan.setting, threshold=0.2 / 113.0**2)))
+    scan = altered(scan_of(plane(), 7), attenuation=0.2)
+    thick = middle_pulses(altered(scan, setting=replace(scan.setting, threshold=0.2 / 113.0**2)))
     assert len(thick.points) == 0
     assert thick.below_threshold == 100
-    clear = middle_pulses(replace(scan, attenuation=0.0)).points
+    clear = middle_pulses(altered(scan, attenuation=0.0)).points
     faint = middle_pulses(scan).points
     np.testing.assert_allclose(faint.intensity / clear.intensity, np.exp(-0.2 * clear.range), rtol=1e-4)
 

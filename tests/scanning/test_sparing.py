@@ -16,7 +16,7 @@ from synthroads_addon.scanning.scan import BlockResult
 from synthroads_addon.scanning.scene.bare_ground import BareGround
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.weather.registry import WEATHERS
-from tests.helpers.scenes.scan_scenes import Standing, mesh_of, plane, scan_of, scan_pulses
+from tests.helpers.scenes.scan_scenes import Standing, altered, mesh_of, plane, scan_of, scan_pulses
 
 PULSES = 400
 """Of a line, around the nadir: 72 degrees."""
@@ -63,9 +63,9 @@ def both(mesh: SceneMesh, rays: int = 7, **changes) -> tuple[BlockResult, BlockR
     """Return what a line gives with footprints in full and where needed, and the plan of the latter."""
     named = {name: changes.pop(name) for name in ("beam", "surfaces", "path") if name in changes}
     scan = scan_of(mesh, rays, named.pop("path", None), divergence=DIVERGENCE, **changes)
-    scan = replace(scan, **named)
-    ground = BareGround(mesh, scan.surfaces.pervious, 60.0 * max(outer_radii(RINGS[rays], DIVERGENCE)))
-    spared = replace(scan, ground=ground)
+    scan = altered(scan, **named)
+    ground = BareGround(mesh, scan.reflection.surfaces.pervious, 60.0 * max(outer_radii(RINGS[rays], DIVERGENCE)))
+    spared = altered(scan, ground=ground)
     strip, first = scan.path.strips[0], 500 - PULSES // 2
     return *(scan_pulses(one, strip, first, PULSES) for one in (scan, spared)), spared
 
@@ -120,7 +120,7 @@ def test_the_edge_of_a_marking_is_cast_in_full() -> None:
     assert checked == 0.0
     assert 0.9 < one < 1.0
     # What the edge does to a return is more than what is tolerated: had it been spared, it would show.
-    with_edges_lost = replace(plan, ground=without_edges(plan))
+    with_edges_lost = altered(plan, ground=without_edges(plan))
     lost = scan_pulses(with_edges_lost, plan.path.strips[0], 500 - PULSES // 2, PULSES)
     assert np.abs(lost.points.intensity / full.points.intensity - 1.0).max() > 0.05
 
@@ -128,7 +128,7 @@ def test_the_edge_of_a_marking_is_cast_in_full() -> None:
 def without_edges(plan: ScanPlan) -> BareGround:
     """Return a plan's ground as if its planes ended nowhere."""
     wrong = BareGround(scene(ROAD), np.zeros(1, bool), 0.1)
-    wrong.face = plan.ground.face
+    wrong.face = plan.emission.ground.face
     return wrong
 
 
@@ -159,7 +159,7 @@ def test_what_stands_in_a_beam_is_met(thing: str) -> None:
     assert one > 0.85
     assert one + checked < 1.0
     # Where nothing but the ground is known, the pulses at the thing lose it.
-    blind = replace(plan, ground=without_edges(plan))
+    blind = altered(plan, ground=without_edges(plan))
     lost = scan_pulses(blind, plan.path.strips[0], 500 - PULSES // 2, PULSES)
     assert len(lost.points) < len(full.points) or not np.allclose(lost.points.intensity, full.points.intensity)
 
@@ -199,7 +199,7 @@ def test_pulses_that_pass_by_everything_are_one_ray() -> None:
     met = int(spared.footprints[0].sum())
     assert met < PULSES / 1.5
     assert spared.rays < full.rays / 4
-    blind = replace(plan, ground=without_things(plan))
+    blind = altered(plan, ground=without_things(plan))
     lost = scan_pulses(blind, plan.path.strips[0], 500 - PULSES // 2, PULSES)
     assert len(lost.points) < len(full.points)
 
@@ -207,17 +207,19 @@ def test_pulses_that_pass_by_everything_are_one_ray() -> None:
 def without_things(plan: ScanPlan) -> BareGround:
     """Return a plan's ground as if nothing stood on it."""
     wrong = object.__new__(BareGround)
-    wrong.__dict__ |= plan.ground.__dict__ | {"_things": SimpleNamespace(passed_by=lambda corner, *_: corner[0] < 1e9)}
+    wrong.__dict__ |= plan.emission.ground.__dict__ | {
+        "_things": SimpleNamespace(passed_by=lambda corner, *_: corner[0] < 1e9)
+    }
     return wrong
 
 
 def test_nothing_is_spared_of_one_ray_nor_where_the_air_sends_echoes() -> None:
     mesh = plane(60.0)
     scan = scan_of(mesh, 7)
-    ground = BareGround(mesh, scan.surfaces.pervious, 0.1)
-    assert replace(scan, ground=ground).spares
-    assert not replace(scan, ground=ground, rings=()).spares
-    assert not replace(
+    ground = BareGround(mesh, scan.reflection.surfaces.pervious, 0.1)
+    assert altered(scan, ground=ground).spares
+    assert not altered(scan, ground=ground, rings=()).spares
+    assert not altered(
         scan, ground=ground, effects=WEATHERS["fog"](condition="fog", visibility=100.0, echoes=True).effects()
     ).spares
 

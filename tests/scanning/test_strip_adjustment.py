@@ -11,7 +11,7 @@ from synthroads_addon.scanning.devices.device import setting_of
 from synthroads_addon.scanning.platforms.path import Strip
 from synthroads_addon.scanning.strip_errors import StripErrors
 from synthroads_addon.scenario.scan import ScanScenario
-from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, mesh_of, scan_block, scan_of
+from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, altered, mesh_of, scan_block, scan_of
 from tests.helpers.scenes.scanners import device, mode
 
 ERRORS = StripErrors(boresight_sigma_deg=0.05, lever_arm_sigma=0.05, drift_sigma=0.1)
@@ -140,7 +140,7 @@ def plan():
     setting = setting_of(device(modes=[mode(5.0, 60.0, 500.0)]), ScanScenario.from_dict(scan))
     calm = scan_of(folded_ground(), 1, Crossing())
     setting = replace(setting, range_sigma=0.005, threshold=0.0, saturation=np.inf)
-    return replace(calm, setting=setting, strip_errors=ERRORS)
+    return altered(calm, setting=setting, strip_errors=ERRORS)
 
 
 def test_strip_adjustment_finds_the_errors_that_the_report_says(plan) -> None:
@@ -159,7 +159,7 @@ def test_strip_adjustment_finds_the_errors_that_the_report_says(plan) -> None:
 
 
 def test_strip_adjustment_finds_none_where_there_is_none(plan) -> None:
-    calm = replace(plan, strip_errors=StripErrors())
+    calm = altered(plan, strip_errors=StripErrors())
     angles, shifts = adjusted(plan.path, delivered(calm), control_points(folded_ground()))
     np.testing.assert_allclose(np.rad2deg(angles), 0.0, atol=ANGLES_WITHIN)
     np.testing.assert_allclose(shifts, 0.0, atol=SHIFTS_WITHIN)

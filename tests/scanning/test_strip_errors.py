@@ -1,7 +1,5 @@
 """Errors of strips: their distribution, what they do to points, and that the report says them."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy import stats
@@ -16,7 +14,7 @@ from synthroads_addon.scanning.strip_errors import (
     strip_error_report,
     strip_gain,
 )
-from tests.helpers.scenes.scan_scenes import Standing, plane, scan_block, scan_of
+from tests.helpers.scenes.scan_scenes import Standing, altered, plane, scan_block, scan_of
 
 ERRORS = StripErrors(boresight_sigma_deg=0.02, lever_arm_sigma=0.05, drift_sigma=0.1)
 
@@ -54,7 +52,7 @@ def test_errors_are_normal_and_each_strip_drifts_by_itself() -> None:
 def test_points_are_off_by_what_the_report_says_and_the_truth_is_kept(heading: float) -> None:
     path = TwoStrips(heading)
     plan = scan_of(plane(), 1, path)
-    wrong = replace(plan, strip_errors=ERRORS)
+    wrong = altered(plan, strip_errors=ERRORS)
     report = wrong.summary()["strip_errors"]
     roll, pitch, yaw = np.deg2rad(report["boresight_deg"])
     for strip, row in zip(plan.path.strips, report["strips"], strict=True):
@@ -72,18 +70,18 @@ def test_points_are_off_by_what_the_report_says_and_the_truth_is_kept(heading: f
 
 def test_strips_are_as_bright_as_the_report_says() -> None:
     plan = scan_of(plane(), 1, TwoStrips())
-    brighter = replace(plan, strip_errors=StripErrors(gain_sigma_db=1.0, gain_step_db=1.5))
+    brighter = altered(plan, strip_errors=StripErrors(gain_sigma_db=1.0, gain_step_db=1.5))
     for strip, row in zip(plan.path.strips, brighter.summary()["strip_errors"]["strips"], strict=True):
         calm, points = (scan_block(one, strip, 0).points for one in (plan, brighter))
         np.testing.assert_allclose(points.intensity, calm.intensity * 10 ** (row["gain_db"] / 10), rtol=1e-6)
         np.testing.assert_array_equal(points.xyz, calm.xyz)
-    levels = [10 * np.log10(strip_gain(brighter.strip_errors, seed, 3)) + 0.75 for seed in range(400)]
+    levels = [10 * np.log10(strip_gain(brighter.reception.strip_errors, seed, 3)) + 0.75 for seed in range(400)]
     counts = np.bincount((stats.norm.cdf(levels) * 20).astype(int), minlength=20)
     assert stats.chisquare(counts).pvalue > 0.001
 
 
 def test_strips_differ_by_their_step_by_turns_and_the_report_says_so() -> None:
-    plan = replace(scan_of(plane(), 1, TwoStrips()), strip_errors=StripErrors(gain_step_db=1.4))
+    plan = altered(scan_of(plane(), 1, TwoStrips()), strip_errors=StripErrors(gain_step_db=1.4))
     gains = [row["gain_db"] for row in plan.summary()["strip_errors"]["strips"]]
     np.testing.assert_allclose(gains, [0.7, -0.7], atol=1e-6)
 

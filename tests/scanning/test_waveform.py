@@ -8,7 +8,7 @@ from scipy import stats
 from synthroads_addon.scanning.receiver import Receiver
 from synthroads_addon.scanning.receiving.waveform import FULL_WIDTH, have_one_peak, merge_peaks
 from synthroads_addon.scanning.returns import Echoes
-from tests.helpers.scenes.scan_scenes import ORIGIN, mesh_of, middle_pulses, scan_of
+from tests.helpers.scenes.scan_scenes import ORIGIN, altered, mesh_of, middle_pulses, scan_of
 
 WIDTH = 0.75
 LENGTH = WIDTH / FULL_WIDTH
@@ -70,7 +70,7 @@ def test_points_trail_between_an_edge_and_what_is_behind_it() -> None:
     plan = scan_of(edge(0.78), 61, divergence=(10e-3, 10e-3), range_resolution=WIDTH)
     sharp = middle_pulses(plan, 12).points
     receiver = Receiver(echo_separation="waveform")
-    mixed = middle_pulses(replace(plan, setting=replace(plan.setting, receiver=receiver)), 12).points
+    mixed = middle_pulses(altered(plan, setting=replace(plan.setting, receiver=receiver)), 12).points
     off = [np.min(np.abs(points.xyz[:, 2, None] - ORIGIN[2] - [0.0, 0.78]), axis=1) for points in (sharp, mixed)]
     assert off[0].max() < 5e-3
     assert 1e-2 < off[1].max() < 0.3

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Collection, Generator, Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass
 
 import bpy
@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from ...base.errors import InputError
 from ...base.turns.stepper import Stepper
-from ...materials.table import Material
-from ...road.geometry import RoadGeometry
 from ...road.objects import LineObject, PointObject
 from ...road.parameters import RoadParameters
 from ...road.surroundings import Vehicle
@@ -22,7 +20,7 @@ from ..compat import modifier_input, object_inputs, set_modifier_input
 from ..labels import CLASS_PROPERTY
 from ..materials import remove_unused_materials, used_materials
 from ..nodes.builder import remove_unused_groups
-from ..things.model_builder import ROLE, ModelBuilder
+from ..things.model_builder import ROLE, BuildRequest, ModelBuilder
 from ..things.registry import model_parts, required_parts
 from .edits import POSTS, keep_built
 from .roads import (
@@ -109,35 +107,16 @@ class RoadModel:
         return str(self.root[ROAD])
 
 
-def build_road(
-    parameters: RoadParameters,
-    tolerance: float,
-    vegetation_detail: float = 1.0,
-    parts: Collection[str] | None = None,
-    stretch: tuple[float, float] | None = None,
-    geometry: RoadGeometry | None = None,
-    place: BuildTarget = MEANT,
-    own: Mapping[str, Material] | None = None,
-) -> RoadModel:
+def build_road(request: BuildRequest, place: BuildTarget = MEANT) -> RoadModel:
     """Build the road's objects in the current scene, replacing the road of `place`; return the model.
 
     If it can't be built, the file is as it was before.
-
-    Args:
-        parameters: the road.
-        tolerance: largest chord error of the road's surface, m.
-        vegetation_detail: share of the vegetation's triangles, 0 to 1; 0 builds none.
-        parts: which of `model_parts` are wanted; all if None. What they need from others is built hidden.
-        stretch: stations between which it is built, with an origin of its own (see `road.stretches`), from
-            and to the nearest rows of the whole road's surface; the whole road if None.
-        geometry: of the parameters, if there is one already.
-        own: materials in place of the shipped table's.
 
     Raises:
         ValueError: a part that there is none of.
         InputError: an asset of the set can't be read.
     """
-    work = _Build(parameters, tolerance, vegetation_detail, parts, stretch, geometry, place, own)
+    work = _Build(request, place)
     try:
         with work.log.record():
             work.build()
@@ -149,14 +128,7 @@ def build_road(
     return model
 
 
-def build_steps(
-    parameters: RoadParameters,
-    tolerance: float,
-    vegetation_detail: float = 1.0,
-    parts: Collection[str] | None = None,
-    stretch: tuple[float, float] | None = None,
-    place: BuildTarget = MEANT,
-) -> Generator[float | None, None, RoadModel]:
+def build_steps(request: BuildRequest, place: BuildTarget = MEANT) -> Generator[float | None, None, RoadModel]:
     """Generator that builds the road as `build_road` does, in short steps so that Blender's window stays responsive.
 
     The new road grows beside the one built before, and takes its place in the last step. Each object is evaluated in a
@@ -166,7 +138,7 @@ def build_steps(
     Yields:
         the share that is done, 0 to 1, or None while there is nothing to do in this thread.
     """
-    work = _Build(parameters, tolerance, vegetation_detail, parts, stretch, None, place)
+    work = _Build(request, place)
     stepper = Stepper(work.build, "SynthRoads build")
     try:
         more = True
@@ -193,19 +165,9 @@ class _Build:
         share: of it that is done, 0 to 1.
     """
 
-    def __init__(
-        self,
-        parameters: RoadParameters,
-        tolerance: float,
-        detail: float,
-        parts: Collection[str] | None,
-        stretch: tuple[float, float] | None,
-        geometry: RoadGeometry | None = None,
-        place: BuildTarget = MEANT,
-        own: Mapping[str, Material] | None = None,
-    ) -> None:
+    def __init__(self, request: BuildRequest, place: BuildTarget) -> None:
         known = model_parts()
-        self._wanted = set(known if parts is None else parts)
+        self._wanted = set(known if request.parts is None else request.parts)
         if self._wanted - set(known):
             raise ValueError(f"parts: {sorted(self._wanted - set(known))} are not among {tuple(known)}")
         scene = bpy.context.scene
@@ -221,7 +183,7 @@ class _Build:
                 root = new_root()
                 self._collection.objects.link(root)
         self._road = str(root[ROAD])
-        self._builder = ModelBuilder(parameters, self._collection, tolerance, detail, stretch, geometry, root, own)
+        self._builder = ModelBuilder(request, self._collection, root)
 
     def build(self) -> None:
         """Make the wanted parts' objects, updating `share`; runs within a `Stepper`."""

@@ -14,7 +14,7 @@ from ...road.geometry import RoadGeometry
 from ...road.objects import LineObject
 from ..compat import set_modifier_input
 from ..nodes.inputs import input_name
-from ..things.model_builder import ROLE
+from ..things.model_builder import ROLE, BuildRequest
 from .build import BuildTarget, RoadModel, build_steps
 from .edits import own_modifier, place_reason
 from .older_files import PARAMETERS
@@ -48,7 +48,7 @@ def settle_steps(road: str, edited: EditedRoad) -> Generator[float | None, None,
     kept = {edit.name: edit for edit in edited.by_hand if edit.name in names}
     copied = frozenset(item.name for item in copies) - set(kept)
     place = BuildTarget(road, keep_moves=False, keeps=frozenset(kept), drops=copied)
-    model = yield from build_steps(parameters, settings.tolerance, settings.vegetation_detail, place=place)
+    model = yield from build_steps(BuildRequest(parameters, settings.tolerance, settings.vegetation_detail), place)
     for name, edit in kept.items():
         _hand_over(bpy.data.objects[name], edit.part, edit.reason)
     remember(model.root, parameters, scenario, built_from, found)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -39,6 +40,30 @@ _KINDS: dict[str, tuple[type, ...]] = {
 """Kinds of sockets that fields of a thing fill, and the fields' types."""
 
 
+@dataclass(frozen=True)
+class BuildRequest:
+    """Request for the model of a road.
+
+    Attributes:
+        parameters: the road.
+        tolerance: largest chord error of the road's surface, m.
+        vegetation_detail: share of the vegetation's triangles, 0 to 1; 0 builds none.
+        parts: which of `model_parts` are wanted; all if None. What they need from others is built hidden.
+        stretch: stations between which it is built, with an origin of its own (see `road.stretches`), from and to the
+            nearest rows of the whole road's surface; the whole road if None.
+        geometry: of the parameters, if there is one already.
+        own: materials in place of the shipped table's.
+    """
+
+    parameters: RoadParameters
+    tolerance: float
+    vegetation_detail: float = 1.0
+    parts: Collection[str] | None = None
+    stretch: tuple[float, float] | None = None
+    geometry: RoadGeometry | None = None
+    own: Mapping[str, Material] | None = None
+
+
 class ModelBuilder:
     """Builder that adds a road model's objects one by one, and what they need to know of the road.
 
@@ -58,25 +83,17 @@ class ModelBuilder:
     """
 
     def __init__(
-        self,
-        parameters: RoadParameters,
-        collection: bpy.types.Collection,
-        tolerance: float,
-        detail: float,
-        stretch: tuple[float, float] | None = None,
-        geometry: RoadGeometry | None = None,
-        root: bpy.types.Object | None = None,
-        own: Mapping[str, Material] | None = None,
+        self, request: BuildRequest, collection: bpy.types.Collection, root: bpy.types.Object | None = None
     ) -> None:
-        self.geometry = geometry or RoadGeometry(parameters)
-        self._given = stretch or (0.0, self.geometry.length)
+        self.geometry = request.geometry or RoadGeometry(request.parameters)
+        self._given = request.stretch or (0.0, self.geometry.length)
         self.stations: NDArray[np.float64] = np.zeros(0)
         self.stretch = self._given
-        self._whole = stretch is None
-        self.parameters, self.materials = parameters, RoadMaterials.of(parameters, own)
+        self._whole = request.stretch is None
+        self.parameters, self.materials = request.parameters, RoadMaterials.of(request.parameters, request.own)
         self.origin, self.zero = np.zeros(3), 0
-        self.tolerance = tolerance
-        self.detail = detail
+        self.tolerance = request.tolerance
+        self.detail = request.vegetation_detail
         self.hidden = False
         self.objects: dict[str, bpy.types.Object] = {}
         self.at_once = 1

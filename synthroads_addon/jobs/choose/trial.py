@@ -89,8 +89,8 @@ class Trial:
     def scan_lines(self, rings: tuple[int, ...], lines: int = 0) -> list[BlockResult]:
         """Scan short stretches with a beam of so many rays per ring; return the result of each stretch."""
         path = scatter_stretches(self.plan.path, lines or self.lines, PULSES / self.plan.setting.shot_rate, self.phase)
-        ground = None if rings == RINGS[CONVERGED] else self.plan.ground
-        plan = replace(self.plan, path=path, rings=rings, ground=ground)
+        ground = None if rings == RINGS[CONVERGED] else self.plan.emission.ground
+        plan = replace(self.plan, emission=replace(self.plan.emission, path=path, rings=rings, ground=ground))
         results = iter(record_as_measured(plan))
         return [join_results([next(results) for _ in plan.cut.block_numbers(strip)]) for strip in path.strips]
 
@@ -129,9 +129,9 @@ class Trial:
         given = {path.removeprefix("colour."): value for path, value in changes.items()}
         scenario = self.site.scenario
         colour = type(scenario.colour).from_dict(scenario.colour.to_dict() | given)
-        assert self.plan.request is not None
+        assert self.plan.layers.request is not None
         settings = colour.settings(scenario.fidelity, self.plan.path.typical_range)
-        return replace(self.plan.request, settings=settings)
+        return replace(self.plan.layers.request, settings=settings)
 
     def count_images(self, changes: Mapping[str, Any]) -> tuple[int, float]:
         """Return the number of images that the whole path needs and their total megapixels; 0 without images."""
@@ -167,7 +167,7 @@ class Trial:
     @property
     def _few(self) -> int:
         """Return the number of the few stretches: no worker waits for another at the end."""
-        workers = self.plan.threads or available_cores()
+        workers = self.plan.run.threads or available_cores()
         return workers * -(-_FEW // workers)
 
     def _time_stretches(
@@ -175,9 +175,12 @@ class Trial:
     ) -> tuple[int, float, int]:
         """Scan so many stretches, at most a share of the path, into files; return pulses, seconds, points."""
         request = self.layer_request({"colour.source": "material"})
-        plan = replace(self.plan, rings=rings, relief_octaves=octaves, request=request)
+        emission = replace(self.plan.emission, rings=rings)
+        relief, layers = replace(self.plan.relief, octaves=octaves), replace(self.plan.layers, request=request)
+        plan = replace(self.plan, emission=emission, relief=relief, layers=layers)
         pulses = max(plan.cut.size, _TIMED_PULSES)
-        plan = replace(plan, path=scatter_stretches(plan.path, count, pulses / plan.setting.shot_rate, 0.5, share))
+        path = scatter_stretches(plan.path, count, pulses / plan.setting.shot_rate, 0.5, share)
+        plan = replace(plan, emission=replace(emission, path=path))
         with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
             files = self.site.files(Path(folder), plan.target.origin)
             begin = self.clock()

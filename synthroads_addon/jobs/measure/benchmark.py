@@ -30,7 +30,7 @@ from ..job_files import JobFiles
 from ..open_scene import RoadScene
 from ..scan.files import CloudFiles
 from ..scan.sink import record_cloud
-from .scenes import rays_of_blocks, spread_blocks
+from .scenes import rays_of_blocks, spread_blocks, with_rings
 
 _CAST_BLOCKS, _WRITTEN_BLOCKS = 48, 96
 """Blocks on which casting (spread over the scan) and writing are measured beside their floors: so many that what is
@@ -60,7 +60,7 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         with timer.stage("parameters"):
             road = RoadGeometry(sample_road(scenario.road, scenario.seed, scenario.title))
             JobFiles(scenario).write_road(folder, road, timer)
-        shown = RoadScene(scenario, road)
+        shown = RoadScene.of(scenario, road)
         with timer.stage("model"):
             model = shown.build()
         with timer.stage("scene mesh"):
@@ -71,17 +71,17 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         record_cloud([plan], files, timer)
         seconds, memory = timer.seconds, peak_memory_mb()
         # The scene, its caster and the materials are the same for every number of rays.
-        bare = replace(plan, records_seen_points=False, measured_layers=frozenset())
-        casting = {rays: _measure_casting(replace(bare, rings=RINGS[rays])) for rays in _RAYS}
+        bare = replace(plan, layers=replace(plan.layers, seen_points=False, measured=frozenset()))
+        casting = {rays: _measure_casting(with_rings(bare, RINGS[rays])) for rays in _RAYS}
         writing = _measure_writing(files)
         own = casting[plan.rays_per_pulse]
         scanning = timer.stages["scan"]["seconds"]
         assert scanning is not None
         whole = _scan_rate(files, scanning, own, writing)
         floors = [*casting.values(), writing, whole]
-        assert plan.request is not None
+        assert plan.layers.request is not None
         if scenario.colour.source != "material":
-            floors.append(measure_rendering(plan.request, _VIEWS))
+            floors.append(measure_rendering(plan.layers.request, _VIEWS))
     edit, edited = panel_edit(model, road.parameters)
     building = sum(timer.stages[name]["seconds"] or 0.0 for name in ("parameters", "model", "scene mesh"))
     least = files.counts.points / whole["floor"] / 1e6
@@ -123,7 +123,7 @@ def _measure_casting(plan: ScanPlan) -> Rate:
     threads, caster = available_cores(), plan.target._parts[0].caster
     blocks = spread_blocks(plan, _CAST_BLOCKS)
     origins, directions = rays_of_blocks(plan, blocks)
-    few = replace(plan, chosen_blocks=blocks, threads=threads)
+    few = replace(plan, run=replace(plan.run, chosen_blocks=blocks, threads=threads))
 
     def ours() -> float:
         return len(origins) / seconds_of(lambda: deque(scan_blocks(few), maxlen=0))

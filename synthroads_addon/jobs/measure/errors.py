@@ -73,8 +73,8 @@ def beam_errors(mine: Sequence[PointBlock], truth: Sequence[PointBlock]) -> Erro
 
 def shift_points(results: Sequence[BlockResult], plan: ScanPlan, octaves: int) -> list[Float]:
     """Return the points (N, 3) of each part, moved along their normals by the heights of a plan's micro-relief, m."""
-    assert plan.relief is not None
-    shift = partial(shift_by_relief, relief=plan.relief, strength=plan.relief_strength, seed=plan.seed)
+    assert plan.relief.micro is not None
+    shift = partial(shift_by_relief, relief=plan.relief.micro, strength=plan.relief.strength, seed=plan.run.seed)
     # As if seen at a right angle: how far a slanting beam carries a height is not the relief's error.
     seen = (
         (one.points.with_arrays({"incidence_deg": np.zeros(len(one.points), np.float32)}), one.seen)

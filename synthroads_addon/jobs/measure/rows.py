@@ -65,7 +65,7 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
         return {"knob": knob, "value": value, "left_out": "a pixel per return needs Blender 5.0 or newer"}
     road = RoadGeometry(sample_road(scenario.road, scenario.seed))
     start = time.process_time()
-    shown = RoadScene(scenario, road)
+    shown = RoadScene.of(scenario, road)
     shown.build()
     scene = shown.read()
     built = time.process_time()
@@ -126,12 +126,12 @@ def _measure_stretches(site: Site, knob: Knob, plan: ScanPlan) -> tuple[dict[str
         ``scan_seconds`` from there to the file, of the whole path, and ``rays_per_second`` of that;
         ``peak_memory_mb``; ``shares`` of the points by the source of their colour.
     """
-    request, coloured = plan.request, "colour" in knob.errors
+    request, coloured = plan.layers.request, "colour" in knob.errors
     assert request is not None
     if coloured:
         request = replace(request, wanted=LAYERS)
     path = spread_stretches(plan.path, _STRETCHES, _SECONDS)
-    part = replace(plan, path=path)
+    part = replace(plan, emission=replace(plan.emission, path=path))
     result = join_results(record_as_measured(part))
     start = time.process_time()
     with layer_source(request) as source, tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
@@ -173,12 +173,15 @@ def _true_plan(shown: RoadScene, part: ScanPlan, plants: float) -> ScanPlan | No
     if detail == plants and part.rays_per_pulse == CONVERGED and not part.spares:
         return None
     if detail == plants and part.target.caster.name == "embree":
-        return replace(part, rings=RINGS[CONVERGED], ground=None)
+        return replace(part, emission=replace(part.emission, rings=RINGS[CONVERGED], ground=None))
     scan = shown.scenario.scan.model_copy(update={"caster": "auto"})
-    true = RoadScene(shown.scenario.model_copy(update={"scan": scan, "vegetation_detail": plants}), shown.road)
+    scenario = shown.scenario.model_copy(update={"scan": scan, "vegetation_detail": plants})
+    true = RoadScene(scenario, shown.road, shown.inputs)
     if detail != plants:
         true.build()
-    return replace(true.plan(), path=part.path, rings=RINGS[CONVERGED], ground=None)
+    plan = true.plan()
+    emission = replace(plan.emission, path=part.path, rings=RINGS[CONVERGED], ground=None)
+    return replace(plan, emission=emission)
 
 
 def _beam_errors(sample: StretchPoints, plan: ScanPlan | None) -> dict[str, float]:
@@ -197,9 +200,10 @@ def _beam_errors(sample: StretchPoints, plan: ScanPlan | None) -> dict[str, floa
 def _relief_error(sample: StretchPoints) -> float:
     """Return the points' 95th percentile distance from the finest micro-relief at full strength, m."""
     plan, materials = sample.plan, sample.plan.target.materials
-    relief = plan.relief or micro_relief(materials, BlenderServices().materials(materials))
-    mine = shift_points([sample.result], replace(plan, relief=relief), plan.relief_octaves)
-    truth = shift_points([sample.result], replace(plan, relief=relief, relief_strength=1.0), FINEST)
+    micro = plan.relief.micro or micro_relief(materials, BlenderServices().materials(materials))
+    relief = replace(plan.relief, micro=micro)
+    mine = shift_points([sample.result], replace(plan, relief=relief), plan.relief.octaves)
+    truth = shift_points([sample.result], replace(plan, relief=replace(relief, strength=1.0)), FINEST)
     return relief_errors(mine, truth)["relief"][0]
 
 

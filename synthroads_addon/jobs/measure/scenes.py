@@ -49,7 +49,7 @@ Rays = tuple[Float32, Float32]
 def road_mesh(scenario: Scenario) -> SceneMesh:
     """Build a scenario's road in a new Blender file, and return what stands still in it as triangles."""
     empty_file()
-    shown = RoadScene(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
+    shown = RoadScene.of(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
     shown.build()
     return shown.read().static
 
@@ -58,6 +58,11 @@ def spread_blocks(plan: ScanPlan, count: int) -> tuple[Block, ...]:
     """Return so many of a plan's blocks, spread evenly over the scan; all of them where it has fewer."""
     every = list(plan.blocks())
     return tuple(every[i] for i in np.unique(np.linspace(0, len(every) - 1, count + 2).astype(int)[1:-1]))
+
+
+def with_rings(plan: ScanPlan, rings: tuple[int, ...]) -> ScanPlan:
+    """Return a plan with another number of rays on each ring around the beam's axis."""
+    return replace(plan, emission=replace(plan.emission, rings=rings))
 
 
 def rays_of_blocks(plan: ScanPlan, blocks: Sequence[Block]) -> Rays:
@@ -72,7 +77,7 @@ def rays_of_blocks(plan: ScanPlan, blocks: Sequence[Block]) -> Rays:
     keeping: Any = SimpleNamespace(name=caster.name, main_thread_only=False, kernels=caster.kernels, cast=cast_and_keep)
     target._parts, target.caster = [replace(part, caster=keeping), *target._parts[1:]], keeping
     for block in blocks:
-        BlockScan(replace(plan, target=target, ground=None)).scan_block(*block)
+        BlockScan(replace(plan, target=target, emission=replace(plan.emission, ground=None))).scan_block(*block)
     origins, directions = map(np.concatenate, zip(*kept, strict=True))
     return origins, directions
 
@@ -100,11 +105,12 @@ def measure_scene(
         seconds of processor time that a scan takes besides its pulses.
     """
     with timer.stage("caster"):
-        plan = replace(site.plan(scene, BlenderServices()), threads=available_cores())
+        plan = site.plan(scene, BlenderServices())
+        plan = replace(plan, run=replace(plan.run, threads=available_cores()))
     memory = peak_memory_mb() or 0.0
     bare = _bare_casters(plan, scene.static)
-    rates = {rays: _rates_in_turn(site, replace(plan, rings=RINGS[rays]), bare) for rays in rays_per_pulse}
-    fixed = _fixed_seconds(site, replace(plan, rings=RINGS[1]))
+    rates = {rays: _rates_in_turn(site, with_rings(plan, RINGS[rays]), bare) for rays in rays_per_pulse}
+    fixed = _fixed_seconds(site, with_rings(plan, RINGS[1]))
     floors = [
         {
             "name": f"{title}, {rays} rays per pulse; Embree's {kind}",
@@ -135,7 +141,7 @@ def _bare_casters(plan: ScanPlan, mesh: SceneMesh) -> dict[str, Caster]:
 
 def _rates_in_turn(site: Site, plan: ScanPlan, bare: dict[str, Caster]) -> dict[str, float]:
     """Return the best rates of a scan and of bare casters on the same rays, measured in turn."""
-    scanned = replace(plan, chosen_blocks=spread_blocks(plan, _BLOCKS))
+    scanned = replace(plan, run=replace(plan.run, chosen_blocks=spread_blocks(plan, _BLOCKS)))
     origins, directions = rays_of_blocks(plan, spread_blocks(plan, _BARE_BLOCKS))
     limit, best = plan.setting.maximum_range, dict[str, float]()
 
@@ -168,7 +174,8 @@ def _fixed_seconds(site: Site, plan: ScanPlan) -> float:
 
     def seconds(count: int) -> float:
         blocks = tuple(every[number % len(every)] for number in range(count))
-        return min(_scan(site, replace(plan, chosen_blocks=blocks))[1] for _ in range(2 * _TURNS))
+        some = replace(plan, run=replace(plan.run, chosen_blocks=blocks))
+        return min(_scan(site, some)[1] for _ in range(2 * _TURNS))
 
     of_few = seconds(few)
     return of_few - few * (seconds(many) - of_few) / (many - few)

@@ -15,6 +15,7 @@ from ...base.classes import ClassScheme
 from ...base.errors import InputError
 from ...cloud.layers import LAYERS, layer_arrays
 from ...cloud.points import POINT_TYPES, PointBlock
+from ...scenario.inputs import ScenarioInputs
 from ...scenario.scenario import Scenario
 from .sink import CloudSink, ScanCounts
 
@@ -81,13 +82,15 @@ class ArraySink(CloudSink):
     """Sink that keeps the arrays of the scenario's cloud in memory.
 
     Attributes:
-        scenario: says which attributes and classes the cloud has.
+        scenario: says which attributes the cloud has.
+        inputs: what the files that it names hold, its classes among them.
         folder: for files that thinning out takes meanwhile.
         typical_range: usual distance to what is scanned, m.
         counts: what was counted so far.
     """
 
     scenario: Scenario
+    inputs: ScenarioInputs
     folder: Path
     typical_range: float
     counts: ScanCounts = field(default_factory=ScanCounts)
@@ -102,7 +105,7 @@ class ArraySink(CloudSink):
     @property
     def scheme(self) -> ClassScheme:
         """Return the class scheme of the arrays."""
-        return self.scenario.cloud.scheme()
+        return self.inputs.scheme
 
     @contextmanager
     def _opened(self) -> Iterator[None]:

@@ -21,6 +21,7 @@ from ...blender.scene.evaluated import scene_mesh
 from ...blender.scene.left_out import material_warnings
 from ...blender.scene.vehicle_meshes import VehicleMeshes
 from ...blender.services import BlenderServices
+from ...blender.things.model_builder import BuildRequest
 from ...road.geometry import RoadGeometry
 from ...scanning.plan import ScanPlan
 from ...scanning.platforms.stretches import PathStretches
@@ -68,7 +69,7 @@ class SectionScan:
         self._site, self._scenario, self._road, self.cut = site, site.scenario, road, site.cut
         every = lane_motions(road, self._scenario.scan.traffic_speed_factor)
         self._motions = {name: motion for name, motion in every.items() if not motion.stands}
-        self._own = self._scenario.own_materials()
+        self._own = site.inputs.materials
         self._vehicles = VehicleMeshes(RoadMaterials.of(road.parameters, self._own))
         standing = {name: item for name, item in road.parameters.objects.items() if name not in self._motions}
         self.scanned = 0
@@ -90,7 +91,7 @@ class SectionScan:
             for section in self.sections():
                 shares = done / total, (done + len(section.blocks)) / total
                 try:
-                    yield replace(self.plan(section, timer), progress=shares)
+                    yield self.plan(section, timer, shares)
                 finally:
                     remove_road()
                     gc.collect()
@@ -100,25 +101,31 @@ class SectionScan:
         finally:
             gc.unfreeze()
 
-    def plan(self, section: RoadSection, timer: StageTimer) -> ScanPlan:
-        """Build a section in the open file and return the plan of its blocks of pulses."""
+    def plan(self, section: RoadSection, timer: StageTimer, progress: tuple[float, float] = (0.0, 1.0)) -> ScanPlan:
+        """Build a section in the open file and return the plan of its blocks of pulses; for progress see `Run`."""
         with timer.stage("model"):
             scene, frame = self._build(section)
         path = PathStretches(self.cut.path, self.cut.path.strips, frame)
         with timer.stage("caster"):
             plan = replace(self._site, path=path).plan(scene, BlenderServices())
-        assert plan.request is not None
+        assert plan.layers.request is not None
         seen_from = replace(path, strips=strip_parts(self.cut, section.blocks))
-        request = replace(plan.request, path=seen_from, frame=(frame[0], frame[1], frame[2]))
-        return replace(plan, frame_origin=frame, chosen_blocks=section.blocks, request=request)
+        request = replace(plan.layers.request, path=seen_from, frame=(frame[0], frame[1], frame[2]))
+        return replace(
+            plan,
+            reflection=replace(plan.reflection, frame_origin=frame),
+            layers=replace(plan.layers, request=request),
+            run=replace(plan.run, chosen_blocks=section.blocks, progress=progress),
+        )
 
     def _build(self, section: RoadSection) -> tuple[ScannedScene, Float]:
         """Build a section; return its scene with passing vehicles, and its frame's origin (3,) in the road's, m."""
         settings, whole, stretch = self._scenario.settings(), self._road.parameters, (section.low, section.high)
         tolerance, detail = settings.tolerance, settings.vegetation_detail
-        model = build_road(self._standing, tolerance, detail, stretch=stretch, geometry=self._road, own=self._own)
+        request = BuildRequest(self._standing, tolerance, detail, None, stretch, self._road, self._own)
+        model = build_road(request)
         frame = model.origin - np.array(whole.transform.translate)
-        class_ids = self._scenario.cloud.scheme().source_ids()
+        class_ids = self._site.inputs.scheme.source_ids()
         static = scene_mesh(objects=list(model.objects.values()), class_ids=class_ids)
         found = material_warnings(dict.fromkeys(static.materials, ()))
         self.warnings += [text for text in found if text not in self.warnings]

@@ -13,6 +13,7 @@ from ...cloud.formats.registry import open_writer
 from ...cloud.formats.writer import CloudWriter
 from ...cloud.points import PointBlock
 from ...cloud.tools.previews import TopView
+from ...scenario.inputs import ScenarioInputs
 from ...scenario.scenario import Scenario
 from .sink import CloudSink, ScanCounts
 
@@ -26,6 +27,7 @@ class CloudFiles(CloudSink):
 
     Attributes:
         scenario: says which files are wanted.
+        inputs: what the files that it names hold.
         folder: where the files go.
         origin: (3,) map coordinates near the points, m.
         typical_range: usual distance to what is scanned, m.
@@ -36,6 +38,7 @@ class CloudFiles(CloudSink):
     """
 
     scenario: Scenario
+    inputs: ScenarioInputs
     folder: Path
     origin: NDArray[np.float64]
     typical_range: float
@@ -69,7 +72,7 @@ class CloudFiles(CloudSink):
         cloud, path = self.scenario.cloud, self.folder / name
         epsg = self.epsg if self.system_text is None else None
         scale = self.intensity_scale
-        return open_writer(path, epsg, self.origin, scale, cloud.attributes, cloud.scheme(), self.system_text)
+        return open_writer(path, epsg, self.origin, scale, cloud.attributes, self.inputs.scheme, self.system_text)
 
     def _keep(self, points: PointBlock) -> None:
         for writer in self._writers:

@@ -21,7 +21,7 @@ from ...scanning.plan import ScanPlan
 from ...scanning.receiver import Response
 from ...scanning.record import record
 from ...scanning.scan import BlockResult
-from ...scenario.scan import scanner_setting
+from ...scenario.inputs import ScenarioInputs
 from ...scenario.scenario import Scenario
 
 _logger = logging.getLogger("synthroads")
@@ -58,12 +58,14 @@ class CloudSink(ABC):
 
     Attributes:
         scenario: the job.
+        inputs: what the files that it names hold.
         folder: for files that thinning out takes meanwhile.
         typical_range: usual distance to what is scanned, m.
         counts: what was counted so far.
     """
 
     scenario: Scenario
+    inputs: ScenarioInputs
     folder: Path
     typical_range: float
     counts: ScanCounts
@@ -87,7 +89,7 @@ class CloudSink(ABC):
     @cached_property
     def _response(self) -> Response | None:
         """Return what number the scanner makes of the received power."""
-        return scanner_setting(self.scenario.scan).receiver.response
+        return self.inputs.setting(self.scenario.scan).receiver.response
 
     @contextmanager
     def open(self) -> Iterator[None]:
@@ -117,7 +119,7 @@ class CloudSink(ABC):
 
     def summary(self) -> dict[str, Any]:
         """Return the counts so far as JSON data, by class name and colour source."""
-        names = self.scenario.cloud.scheme().sources().names()
+        names = self.inputs.scheme.sources().names()
         by_class: Counter[str] = Counter()  # a class of a scheme may have the name of one of the full table
         for number in np.flatnonzero(self.counts.by_class).tolist():
             by_class[names.get(number, str(number))] += int(self.counts.by_class[number])

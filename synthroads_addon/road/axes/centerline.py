@@ -9,8 +9,9 @@ import math
 import os
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -51,33 +52,61 @@ def read_axis(path: str | os.PathLike[str], place: Placement | None = None) -> F
         InputError: anything in it is not as above, there are fewer than two distinct points, a height is none, or the
             points lie outside of the system's area of use.
     """
-    return read_declared_axis(path, place)[0]
+    return AxisContent.read(path).placed(place or Placement())
 
 
 def check_axis_file(path: str | os.PathLike[str]) -> None:
     """Raise an error if a file is no axis, wherever its points lie; see `read_axis`."""
-    _read_points(os.fspath(path))
+    AxisContent.read(path)
 
 
 def read_declared_axis(path: str | os.PathLike[str], place: Placement | None = None) -> tuple[Float, MapSystem | None]:
     """Read the points (N, 3) of an axis, m, as `read_axis` does; return them, and the system that the file names."""
-    name = os.fspath(path)
-    points, system, geojson = _read_points(name)
-    points = bring(name, points, system, place or Placement(), geojson)
-    _check_spacing(name, points)
-    return points, system
+    content = AxisContent.read(path)
+    return content.placed(place or Placement()), content.system
 
 
-def _read_points(name: str) -> tuple[Float, MapSystem | None, bool]:
-    """Return the points (N, 3) of an axis as they stand in a file, the system that it names, and if it is GeoJSON."""
-    kind = "this is no text: CSV with columns x, y, z or GeoJSON is needed"
-    text = read_text(name, kind, "an axis file is needed here", encoding="utf-8-sig")
-    geojson = text.lstrip().startswith(("{", "["))
-    rows, system = _read_json(name, text) if geojson else (_read_csv(name, text), csv_system(name, text))
-    points = np.array(rows, dtype=np.float64).reshape(-1, 3)
-    if len(np.unique(points[:, :2], axis=0)) < 2:
-        raise InputError(name, None, f"{_TWO}, the file has {len(points)} points in all")
-    return points, system, geojson
+@dataclass(frozen=True)
+class AxisContent:
+    """Points of an axis as they stand in a file, wherever they lie.
+
+    Attributes:
+        name: of the file.
+        points: (N, 3), in the file's order.
+        system: that the file names; None without.
+        geojson: whether it is GeoJSON.
+    """
+
+    name: str
+    points: Float
+    system: MapSystem | None
+    geojson: bool
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Self:
+        """Read an axis from a CSV or GeoJSON file; see `read_axis`.
+
+        Raises:
+            MissingFileError, InputError: it is none, or has fewer than two distinct points.
+        """
+        name, kind = os.fspath(path), "this is no text: CSV with columns x, y, z or GeoJSON is needed"
+        text = read_text(name, kind, "an axis file is needed here", encoding="utf-8-sig")
+        geojson = text.lstrip().startswith(("{", "["))
+        rows, system = _read_json(name, text) if geojson else (_read_csv(name, text), csv_system(name, text))
+        points = np.array(rows, dtype=np.float64).reshape(-1, 3)
+        if len(np.unique(points[:, :2], axis=0)) < 2:
+            raise InputError(name, None, f"{_TWO}, the file has {len(points)} points in all")
+        return cls(name, points, system, geojson)
+
+    def placed(self, place: Placement) -> Float:
+        """Return the points (N, 3), m, moved into the map's coordinate system; see `read_axis`.
+
+        Raises:
+            InputError: they lie outside of the system's area of use, or one is implausibly far from the next.
+        """
+        points = bring(self.name, self.points, self.system, place, self.geojson)
+        _check_spacing(self.name, points)
+        return points
 
 
 def _check_spacing(name: str, points: Float) -> None:

@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
 from typing import Any, Literal
 
 import numpy as np
 
 from ...base.errors import InputError
 from ...base.maps.places import Placement
+from ...road.axes.centerline import AxisContent
 from ...road.geometry import RoadGeometry
 from ..scene.extent import elevation_at, middle_line
 from ..scene.mesh import SceneMesh
@@ -58,7 +58,7 @@ def path_over(
     platform: Platform,
     mesh: SceneMesh,
     road: RoadGeometry | None = None,
-    line: FilePath | None = None,
+    line: AxisContent | None = None,
     places: Sequence[Sequence[float]] = (),
     map_place: Placement | None = None,
 ) -> Path:
@@ -70,7 +70,7 @@ def path_over(
         platform: the scanner's.
         mesh: the scene.
         road: that the scene shows.
-        line: CSV or GeoJSON, in map coordinates.
+        line: of a file, in map coordinates.
         places: of a tripod, (x, y) or (x, y, z) in map coordinates; z is that of the scanner itself.
         map_place: the map's coordinate system, which the line is moved into; unknown if None.
 
@@ -84,7 +84,7 @@ def path_over(
         return TripodPath(tripod, [_scanner_place(tripod, place, mesh) for place in places])
     if road and not line:
         return platform.make_path(RoadGuide(road))
-    guide = PolylineGuide.read(line, origin, place=map_place) if line else PolylineGuide(middle_line(mesh), origin)
+    guide = PolylineGuide.along(line, origin, place=map_place) if line else PolylineGuide(middle_line(mesh), origin)
     guide.place = map_place or Placement()
     return platform.as_single_strip().make_path(guide, origin)
 

@@ -43,6 +43,14 @@ class Platform(ClosedModel):
         """
         raise NotImplementedError
 
+    def opened(self) -> Self:
+        """Return the platform with its file, if it has one, read and checked: all of its paths are made of that.
+
+        Raises:
+            InputError: the file can't be read, or isn't as it must be.
+        """
+        return self
+
     def value(self, field: str) -> Any:
         """Return a field's value, or its usual one while it isn't given."""
         given = getattr(self, field)

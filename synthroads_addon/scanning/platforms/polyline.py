@@ -1,6 +1,5 @@
 """Any polyline as what a path follows: its corners are rounded, so that heading and curvature are continuous."""
 
-import os
 from collections.abc import Sequence
 from typing import Self
 
@@ -12,7 +11,7 @@ from ...base.errors import InputError
 from ...base.maps.places import Placement
 from ...base.rotations import wrap_angle
 from ...road.alignment import CURVATURE_LIMIT, Alignment, Element, finite_array
-from ...road.axes.centerline import read_axis
+from ...road.axes.centerline import AxisContent
 from ...road.profile import IntersectionPoint, Profile
 from .guides import Guide
 
@@ -72,25 +71,25 @@ class PolylineGuide(Guide):
         self.deviation = float(np.abs(alignment.project(given[:, :2])[1]).max())
 
     @classmethod
-    def read(
+    def along(
         cls,
-        path: str | os.PathLike[str],
+        line: AxisContent,
         origin: Sequence[float] | None = None,
         tolerance: float = MEASURED,
         place: Placement | None = None,
     ) -> Self:
-        """Read a line in map coordinates from CSV or GeoJSON, by `read_axis`, and return its guide.
+        """Return the guide of a file's line.
 
         Args:
-            path: the file, in map coordinates.
+            line: of the file, in map coordinates.
             origin: map coordinates of the local origin, m; the points' mean to the metre if not given.
             tolerance: m, see the class.
             place: the map's coordinate system, see `read_axis`.
 
         Raises:
-            InputError: the file is missing or no line, or has a corner too sharp to be rounded.
+            InputError: the line is elsewhere than the map, or has a corner too sharp to be rounded.
         """
-        points = read_axis(path, place)
+        points = line.placed(place or Placement())
         base = np.round(points.mean(axis=0)) if origin is None else np.array(origin, dtype=np.float64)
         return cls(points - base, base.tolist(), tolerance)
 

@@ -7,14 +7,15 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from ...base.arrays import Float, Int
 from ...base.errors import InputError, nearest_name
-from ...base.files import read_text
+from ...base.files import decoded, read_bytes
+from ...base.maps.crs import MapSystem
 from ...base.maps.places import Placement, bring, check_heights
 from ...base.remarks import warn
 from ...base.rotations import angle_between, quaternion_matrices, quaternions, rotation_matrix, slerp, wrap_angle
@@ -27,6 +28,8 @@ from .sbet import is_sbet, poses_on_map, read_records
 
 COLUMNS = ("time", "x", "y", "z", "roll", "pitch", "heading")
 """Names in the header; in any order and case, beside any others."""
+_HEAD = 4096
+"""Bytes by which SBET is told from CSV."""
 _LARGEST = 1e10
 """Largest time (s: GPS time counts thousands of millions) and angle (deg)."""
 _NEAREST = 8.0  # m, of the typical range
@@ -53,6 +56,26 @@ class RecordedTrajectory(Platform):
         0.0, "m", "Added to the file's heights; minus the geoid's where they count from the ellipsoid.", (-1000, 1000)
     )
 
+    _content: TrajectoryContent | None = PrivateAttr(None)
+
+    def opened(self) -> Self:
+        """Return the platform with its file read, wherever its poses lie; itself where it has none."""
+        if self.file is None:
+            return self
+        result = self.model_copy()
+        result._content = TrajectoryContent.read(self.file)
+        return result
+
+    def rows(self, place: Placement) -> Trajectory:
+        """Return the poses of the file, moved into the map's coordinate system; see `read_trajectory`.
+
+        Raises:
+            InputError: there is no file, or it is wrong.
+        """
+        if self.file is None:
+            raise InputError("scan.platform.file", None, "a trajectory needs a CSV file")
+        return (self._content or TrajectoryContent.read(self.file)).placed(place)
+
     def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> TrajectoryPath:
         """Return the path through the poses of the platform's file, as one strip."""
         return TrajectoryPath(self, guide, origin)
@@ -78,10 +101,8 @@ class TrajectoryPath:
     """
 
     def __init__(self, platform: RecordedTrajectory, guide: Guide, origin: Sequence[float] | None = None) -> None:
-        if platform.file is None:
-            raise InputError("scan.platform.file", None, "a trajectory needs a CSV file")
-        rows = read_trajectory(platform.file, guide.place)
-        check_headings(Path(platform.file).name, rows)
+        rows, file = platform.rows(guide.place), str(platform.file)
+        check_headings(Path(file).name, rows)
         base = guide.origin if origin is None else np.array(origin, dtype=np.float64)
         self._time = rows.time - rows.time[0]
         self._position = rows.position + (0.0, 0.0, platform.height_shift) - base
@@ -89,7 +110,7 @@ class TrajectoryPath:
         # North is local y: a heading clockwise from it is 90 degrees less itself, counter-clockwise from x.
         angles = np.deg2rad([90.0 - rows.heading, rows.pitch, rows.roll])
         self._attitude = quaternions(rotation_matrix(*angles))
-        _refuse_wide_turns(platform.file, rows, self._attitude)
+        _refuse_wide_turns(file, rows, self._attitude)
         self._mounting = platform.mounting()
         self.strips = (Strip(0, 0.0, float(self._time[-1]), ends=True),)
         self.knot_spacing = self._knots()
@@ -210,45 +231,61 @@ def read_trajectory(path: str | os.PathLike[str], place: Placement | None = None
         InputError: a column is missing or there twice, a value is no finite number, the time doesn't increase, there
             are fewer than two rows, or there is no way to the map's system.
     """
-    name, place = os.fspath(path), place or Placement()
-    records = _sbet_records(name)
-    if records is not None:
-        points, heading = poses_on_map(name, records, place)
-        roll, pitch = np.rad2deg(records[:, 7]), np.rad2deg(records[:, 8])
-        return Trajectory(records[:, 0], points, roll, pitch, heading, np.arange(1, len(records) + 1))
-    rows, numbers = _read_csv(name)
-    declared, points = csv_system(name), rows[:, 1:4]
-    if declared is None and place.system is None:  # a scene of no map, which may be as small as degrees are
-        points = check_heights(name, points)
-    else:
-        points = bring(name, points, declared, place)
-    return Trajectory(rows[:, 0], points, rows[:, 4], rows[:, 5], rows[:, 6], numbers)
+    return TrajectoryContent.read(path).placed(place or Placement())
 
 
-def check_trajectory_file(path: str | os.PathLike[str]) -> None:
-    """Raise an error if a file is no trajectory, wherever its poses lie; see `read_trajectory`."""
-    name = os.fspath(path)
-    if _sbet_records(name) is None:
-        _read_csv(name)
+@dataclass(frozen=True)
+class TrajectoryContent:
+    """Poses as they stand in a trajectory file, wherever they lie.
+
+    Attributes:
+        name: of the file.
+        rows: of SBET (R, 17) records, of CSV (R, 7) values of `COLUMNS`.
+        lines: (R,) numbers of CSV's lines; None of SBET.
+        system: that CSV names; None without.
+    """
+
+    name: str
+    rows: Float
+    lines: Int | None = None
+    system: MapSystem | None = None
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> TrajectoryContent:
+        """Read a trajectory file, of one opening; see `read_trajectory`.
+
+        Raises:
+            MissingFileError, InputError: it is no trajectory, or names no known coordinate system.
+        """
+        name = os.fspath(path)
+        content = read_bytes(name, "a trajectory file is needed here")
+        if is_sbet(content[:_HEAD], len(content)):
+            return cls(name, read_records(name, content))
+        kind = f"this is no text: CSV with columns {', '.join(COLUMNS)} is needed"
+        text = decoded(content, name, kind, "utf-8-sig")
+        return cls(name, *_read_csv(name, text), csv_system(name, text))
+
+    def placed(self, place: Placement) -> Trajectory:
+        """Return the poses moved into the map's coordinate system; without one CSV stays as it is.
+
+        Raises:
+            InputError: there is no way to the map's system.
+        """
+        name, rows = self.name, self.rows
+        if self.lines is None:
+            points, heading = poses_on_map(name, rows, place)
+            roll, pitch = np.rad2deg(rows[:, 7]), np.rad2deg(rows[:, 8])
+            return Trajectory(rows[:, 0], points, roll, pitch, heading, np.arange(1, len(rows) + 1))
+        points = rows[:, 1:4]
+        if self.system is None and place.system is None:  # a scene of no map, which may be as small as degrees are
+            points = check_heights(name, points)
+        else:
+            points = bring(name, points, self.system, place)
+        return Trajectory(rows[:, 0], points, rows[:, 4], rows[:, 5], rows[:, 6], self.lines)
 
 
-def _sbet_records(name: str) -> Float | None:
-    """Return the records (R, 17) of a file if it is SBET, else None."""
-    try:
-        size = Path(name).stat().st_size
-        with Path(name).open("rb") as file:
-            if not is_sbet(file.read(4096), size):
-                return None
-            file.seek(0)
-            return read_records(name, file.read())
-    except (OSError, ValueError):  # told by whoever reads it as text
-        return None
-
-
-def _read_csv(name: str) -> tuple[Float, Int]:
-    """Return the values (R, 7) of `COLUMNS` in a CSV file, and the numbers (R,) of their lines."""
-    kind = f"this is no text: CSV with columns {', '.join(COLUMNS)} is needed"
-    text = read_text(name, kind, "a trajectory file is needed here", encoding="utf-8-sig")
+def _read_csv(name: str, text: str) -> tuple[Float, Int]:
+    """Return the values (R, 7) of `COLUMNS` in the text of a CSV file, and the numbers (R,) of their lines."""
     numbered = enumerate(text.splitlines(), 1)
     lines = [(number, line) for number, line in numbered if line.strip() and not line.lstrip().startswith("#")]
     if not lines:

@@ -28,6 +28,7 @@ from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...scanning.colour.colour import takes_nodes
 from ...scanning.platforms.over_scene import SceneRoute
+from ...scenario.inputs import ScenarioInputs
 from ...scenario.scenario import Scenario
 
 MARK = "synthroads-scan: "
@@ -66,19 +67,19 @@ def _scan(job: dict[str, Any]) -> dict[str, Any]:
 
 def _scan_road(job: dict[str, Any], scenario: Scenario, timer: StageTimer) -> tuple[dict[str, Any], Sequence[str]]:
     road = RoadGeometry(RoadParameters.from_dict(job["parameters"]))
-    scene = RoadScene(scenario, road, road_id=job["road"])
+    scene = RoadScene(scenario, road, ScenarioInputs.read(scenario), road_id=job["road"])
     return scene.scan(Path(job["folder"]), timer), scene.read().warnings
 
 
 def _scan_visible(job: dict[str, Any], scenario: Scenario, timer: StageTimer) -> tuple[dict[str, Any], Sequence[str]]:
     classes = ClassMapping.from_dict(job["classes"]) if job["classes"] else None
-    factor, class_ids = scenario.scan.traffic_speed_factor, scenario.cloud.scheme().source_ids()
+    factor, inputs = scenario.scan.traffic_speed_factor, ScenarioInputs.read(scenario)
     with timer.stage("scene mesh"):
-        further = {"number_objects": True, "class_ids": class_ids, "visible": job["visible"]}
+        further = {"number_objects": True, "class_ids": inputs.scheme.source_ids(), "visible": job["visible"]}
         scene = scanned_scene(classes=classes, speed_factor=factor, **further)
     if not len(scene.static) and not scene.moving:
         raise InputError("Scene", None, "nothing visible in it has faces that could be scanned")
-    site = route_site(scenario, SceneRoute(**job["route"]), scene.static)
+    site = route_site(scenario, inputs, SceneRoute(**job["route"]), scene.static)
     return ForeignScene(site, scene).scan(Path(job["folder"]), timer), scene.warnings
 
 

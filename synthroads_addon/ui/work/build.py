@@ -15,6 +15,7 @@ from ...blender.model.roads import ROAD, choose_road
 from ...blender.model.settle import settle_steps
 from ...blender.model.store import find_road, recall, remember, roads
 from ...blender.model.truth import EditedRoad, read_road
+from ...blender.things.model_builder import BuildRequest
 from ...road.parameters import RoadParameters
 from ...sampling.road import sample_road
 from ...scenario.scenario import Scenario
@@ -146,7 +147,7 @@ def road_work(
     """Generator that builds a road from given parameters, as a job's work; see `build_work` and `remember`."""
     fidelity = scenario.settings()
     yield Step(0.02, "Building")
-    steps = build_steps(parameters, fidelity.tolerance, fidelity.vegetation_detail, place=place)
+    steps = build_steps(BuildRequest(parameters, fidelity.tolerance, fidelity.vegetation_detail), place)
     model = yield from part_of_work(build_unseen(steps), 0.02, 1.0)
     remember(model.root, parameters, scenario, built_from, found)
     if place.beside:

@@ -31,6 +31,7 @@ from ...jobs.job_files import JobFiles, empty_scan_warnings
 from ...jobs.scan.plan import Site, check_scan
 from ...jobs.scan.sink import record_cloud
 from ...road.geometry import RoadGeometry
+from ...scenario.inputs import ScenarioInputs
 from ...scenario.scenario import OF_POINTS, Scenario
 from ..fields.preferences import with_preferences
 from .common import is_free
@@ -82,13 +83,13 @@ def scan_work(scan: RoadScan) -> Work[Written]:
         InputError: a setting is wrong or the folder can't be written; in its first step.
     """
     scenario = scan.scenario
-    check(PipelineJob(scenario, scan.target, overwrite=scan.overwrite))
+    inputs = check(PipelineJob(scenario, scan.target, overwrite=scan.overwrite))
     with Workplace.opened(scan.target, JobFiles(scenario).names, scan.overwrite) as work:
         if scan.edited.stale and not scan.edited.lost:
             yield Step(0.0, "Building")
             yield from _no_share(settle_steps(scan.road_id, scan.edited))
         yield Step(0.0, "Reading")
-        measure = None if renders_scene(scenario) else (yield from _read_open_scene(scan, work))
+        measure = None if renders_scene(scenario) else (yield from _read_open_scene(scan, inputs, work))
         state = "Scanning" if measure else "Rendering"
         if measure is None:
             measure = yield from _save_copy(scan, work)
@@ -118,10 +119,10 @@ def _save_copy(scan: RoadScan, work: Workplace) -> Generator[Step, None, Measure
     return measure
 
 
-def _read_open_scene(scan: RoadScan, work: Workplace) -> Generator[Step, None, Measure | None]:
+def _read_open_scene(scan: RoadScan, inputs: ScenarioInputs, work: Workplace) -> Generator[Step, None, Measure | None]:
     """Copy the open scene; return the function that scans it, or None if some materials must be rendered."""
     timer = work.timer
-    speed_factor, class_ids = scan.scenario.scan.traffic_speed_factor, scan.scenario.cloud.scheme().source_ids()
+    speed_factor, class_ids = scan.scenario.scan.traffic_speed_factor, inputs.scheme.source_ids()
     with timer.stage("scene mesh"):
         geometry, road = scan.road, scan.road_id
         steps = scanned_scene_steps(geometry=geometry, speed_factor=speed_factor, class_ids=class_ids, road=road)
@@ -131,7 +132,7 @@ def _read_open_scene(scan: RoadScan, work: Workplace) -> Generator[Step, None, M
         return None
 
     def measure(report: Report) -> tuple[dict[str, Any], Sequence[str]]:
-        site = Site.of_road(scan.scenario, scan.road)
+        site = Site.of_road(scan.scenario, scan.road, inputs)
         with timer.stage("scene mesh"):
             scene = copied.put_together()
         report(0.02)
@@ -224,13 +225,13 @@ def requested_visible_scan(context: bpy.types.Context) -> VisibleScan:
     """Return the request to scan a scene without a road; `InputError` if a setting is wrong."""
     settings, choices = context.scene.synthroads, context.scene.synthroads_scene_scan
     scenario = with_preferences(settings.scenario())
-    check_scan(scenario, foreign=True)
+    inputs = check_scan(scenario, foreign=True)
     platform = scenario.scan.platform
     follows_file = platform.kind == "trajectory"
     guide = None if follows_file else choices.guide
     route = route_of(guide, context.scene, platform.kind == "tripod")
-    classes = class_mapping(choices.classes, scenario)
-    return VisibleScan(scenario, route, classes, settings.folder(), settings.overwrite, choices.visible)
+    classes = class_mapping(choices.classes, inputs.scheme)
+    return VisibleScan(scenario, inputs, route, classes, settings.folder(), settings.overwrite, choices.visible)
 
 
 _last: Written | None = None

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ...base.class_mapping import ClassMapping
+from ...base.classes import ClassScheme
 from ...base.errors import InputError
 from ...base.schema import read_json
 from ...blender.scene.evaluated import scanned_scene_steps
@@ -19,6 +20,7 @@ from ...jobs.job_files import JobFiles
 from ...jobs.scan.sink import record_cloud
 from ...jobs.scan_scene import route_site, warnings_of_counts
 from ...scanning.platforms.over_scene import SceneRoute
+from ...scenario.inputs import ScenarioInputs
 from ...scenario.scenario import OF_POINTS, Scenario
 from .job import Aside, Report, Step, Work
 from .rendered_scan import save_open_scene
@@ -43,6 +45,7 @@ class VisibleScan:
 
     Attributes:
         scenario: scan, colours, files; its road isn't looked at.
+        inputs: what the files that it names hold.
         route: the scanner's way.
         visible: whether a render's or the viewport's state of the scene is scanned.
         classes: classes by name; none if None.
@@ -51,6 +54,7 @@ class VisibleScan:
     """
 
     scenario: Scenario
+    inputs: ScenarioInputs
     route: SceneRoute
     classes: ClassMapping | None
     target: Path
@@ -98,7 +102,7 @@ def _check_unit() -> None:
 
 def _read(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Measure | None]:
     """Copy the open scene; return the function that scans it, or None if some materials must be rendered."""
-    settings, class_ids = scan.scenario.scan, scan.scenario.cloud.scheme().source_ids()
+    settings, class_ids = scan.scenario.scan, scan.inputs.scheme.source_ids()
     timer = work.timer
     with timer.stage("scene mesh"):
         factor = settings.traffic_speed_factor
@@ -114,7 +118,7 @@ def _read(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Measure |
             scene = copied.put_together()
         if not len(scene.static) and not scene.moving:
             raise InputError("Scene", None, "nothing visible in it has faces that could be scanned")
-        site = route_site(scan.scenario, scan.route, scene.static)
+        site = route_site(scan.scenario, scan.inputs, scan.route, scene.static)
         with timer.stage("caster"):
             plan = site.plan(scene, services)
         follow_scan(timer, report)
@@ -195,7 +199,7 @@ def _camera_places(camera: bpy.types.Object, scene: bpy.types.Scene) -> Any:
     return np.array(poses)
 
 
-def class_mapping(path: str, scenario: Scenario) -> ClassMapping | None:
+def class_mapping(path: str, scheme: ClassScheme) -> ClassMapping | None:
     """Return the mapping of names to classes read from a JSON file; None for an empty path.
 
     Raises:
@@ -205,5 +209,5 @@ def class_mapping(path: str, scenario: Scenario) -> ClassMapping | None:
         return None
     place = str(Path(bpy.path.abspath(path)).expanduser())
     mapping = ClassMapping.from_dict(read_json(Path(place)), source=place)
-    mapping.check(scenario.cloud.scheme().source_ids(), place)
+    mapping.check(scheme.source_ids(), place)
     return mapping

@@ -20,6 +20,7 @@ from synthroads_addon.scanning.platforms.stretches import spread_stretches
 from synthroads_addon.scanning.record import record_as_measured
 from synthroads_addon.scanning.scan import join_results
 from synthroads_addon.scenario.scenario import load_scenario
+from tests.helpers.scenes.scan_scenes import altered
 from tools.measure_layers import compare_sources
 
 WORST_LAYER, WORST_COLOUR = 0.002, 1.0
@@ -48,14 +49,14 @@ def test_every_blender_gives_the_same() -> None:
     """The record is of one Blender, and all are compared with it."""
     empty_file()
     scenario = load_scenario("rq31-600m", [*ROAD, 'outputs=["cloud"]'])
-    shown = RoadScene(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
+    shown = RoadScene.of(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
     shown.build()
     plan = shown.plan()
-    seen = join_results(record_as_measured(replace(plan, path=spread_stretches(plan.path, 4, 0.02)))).seen
+    seen = join_results(record_as_measured(altered(plan, path=spread_stretches(plan.path, 4, 0.02)))).seen
     assert seen is not None
-    assert plan.request is not None
+    assert plan.layers.request is not None
     seen = seen.select(np.linspace(0, len(seen) - 1, COUNT).astype(np.intp))
-    request = replace(plan.request, wanted=frozenset(LAYERS))
+    request = replace(plan.layers.request, wanted=frozenset(LAYERS))
     with layer_source(request) as layers:
         values = sample_points(layers, seen, request.wanted)
     found = {"position": seen.position} | {name: np.asarray(values.arrays[name], np.float64) for name in LAYERS}

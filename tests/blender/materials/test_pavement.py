@@ -14,6 +14,7 @@ from synthroads_addon.blender.materials import RoadMaterials, material
 from synthroads_addon.blender.materials.pavement import AGE, ATTRIBUTE, SHAPE, look_group
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.road.damage import DAMAGES
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
@@ -111,7 +112,7 @@ def test_the_mesh_says_where_on_the_pavement_its_points_are() -> None:
     """Widths change along this road, so that a lane's middle moves."""
     parameters = RoadParameters.from_dict(base_road({}))
     geometry = RoadGeometry(parameters)
-    road = build_road(parameters, 0.005, 1.0, {"road"}).objects["Road"]
+    road = build_road(BuildRequest(parameters, 0.005, 1.0, {"road"})).objects["Road"]
     mesh = road.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     offset, place, shape, age = (np.empty((len(mesh.vertices), parts), np.float32) for parts in (1, 3, 3, 1))
     for name, values in (("offset", offset), (AGE, age)):
@@ -148,7 +149,7 @@ def test_lines_that_lane_changes_cross_are_more_worn_than_those_beside_the_lanes
     edge = {"type": "LineMarking", "carriageway": "right", "kind": "outer_edge", "width": 0.15, "dash_length": 0.0}
     objects["edge"] = edge | {"gap_length": 0.0, "start_station": 0.0, "end_station": 60.0}
     parameters = RoadParameters.from_dict(base_road(objects))
-    model = build_road(parameters, 0.005, 1.0, {"road", "painted_areas"})
+    model = build_road(BuildRequest(parameters, 0.005, 1.0, {"road", "painted_areas"}))
     brightness = {}
     for name in ("Road", "Painted Areas"):
         mesh = model.objects[name].evaluated_get(bpy.context.evaluated_depsgraph_get()).data
@@ -176,7 +177,7 @@ def test_patches_and_cracks_lie_where_the_parameters_say() -> None:
     """Faces cover the polygons, within 2 cm, less than a millimetre above the pavement; their points know the kind."""
     parameters = RoadParameters.from_dict(base_road({}))
     geometry = RoadGeometry(parameters)
-    model = build_road(parameters, 0.005, 1.0, {"road", "damaged_areas"})
+    model = build_road(BuildRequest(parameters, 0.005, 1.0, {"road", "damaged_areas"}))
     mesh = scene_mesh(objects=list(model.objects.values()))
     corners = mesh.vertices[mesh.triangles].astype(np.float64) + (
         model.origin - np.array(parameters.transform.translate)
@@ -204,7 +205,9 @@ def test_cracks_go_through_lines_and_are_as_deep_there_as_beside_them() -> None:
     data["objects"]["right"]["pavement"] = {"cracks": [crack], "unevenness": 0.0, "wheel_track_depth": 0.0}
     parameters = RoadParameters.from_dict(data)
     geometry = RoadGeometry(parameters)
-    mesh = scene_mesh(objects=list(build_road(parameters, 0.005, 1.0, {"road", "damaged_areas"}).objects.values()))
+    mesh = scene_mesh(
+        objects=list(build_road(BuildRequest(parameters, 0.005, 1.0, {"road", "damaged_areas"})).objects.values())
+    )
     station, offset = np.repeat([11.0, 11.5], 7), np.tile(np.linspace(-6.8, -6.2, 7), 2)
     place = geometry.point(station, offset) + parameters.transform.translate
     above = place - mesh.origin + [0.0, 0.0, 5.0]

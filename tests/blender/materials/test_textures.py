@@ -18,6 +18,7 @@ from synthroads_addon.blender.materials.calculable import material_needs
 from synthroads_addon.blender.materials.inputs import POSITION, TRUE_NORMAL
 from synthroads_addon.blender.materials.textures import SOURCE, packed_textures
 from synthroads_addon.blender.model.build import build_road
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.materials.table import materials
 from synthroads_addon.materials.textures import texture_sets
 from synthroads_addon.materials.variation import vary_material
@@ -151,7 +152,7 @@ def test_a_normal_image_turns_the_surface_along_its_sides(tmp_path: Path, name: 
     data = road.to_dict()
     data["objects"]["right"]["pavement"] = {"joint_depth": 0.0, "wheel_track_depth": 0.0}
     road = type(road).from_dict(data)
-    model = build_road(road, 0.005, 0.0, ("road",) if name == "asphalt" else ("road", "terrain"))
+    model = build_road(BuildRequest(road, 0.005, 0.0, ("road",) if name == "asphalt" else ("road", "terrain")))
     item = bpy.data.materials[f"SR {material}"]
     shown = next(node for node in item.node_tree.nodes if node.type == "BSDF_PRINCIPLED").inputs["Normal"]
     output = next(node for node in item.node_tree.nodes if node.type == "OUTPUT_AOV" and node.aov_name == "base_color")

@@ -18,6 +18,7 @@ from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.compat import modifier_input, set_modifier_input
 from synthroads_addon.blender.model.build import COLLECTION, RoadModel, build_road, remove_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.blender.things.road.layout import names_in_words, side_of
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import AlignmentObject, RoadParameters
@@ -75,7 +76,9 @@ def demo_parameters(**changes: Any) -> RoadParameters:
 
 
 def built(parameters: RoadParameters, tolerance: float = TOLERANCE, parts: set[str] | None = None) -> Built:
-    return Built(parameters, RoadGeometry(parameters), build_road(parameters, tolerance, 0.3, parts or BUILT))
+    return Built(
+        parameters, RoadGeometry(parameters), build_road(BuildRequest(parameters, tolerance, 0.3, parts or BUILT))
+    )
 
 
 def with_object(parameters: RoadParameters, name: str, **changes: Any) -> RoadParameters:
@@ -330,7 +333,7 @@ class TestFurniture:
 class TestLabels:
     def test_every_face_is_labelled_and_every_object_has_faces(self) -> None:
         parameters = demo_parameters(length=300.0)
-        model = build_road(parameters, TOLERANCE, 0.2)
+        model = build_road(BuildRequest(parameters, TOLERANCE, 0.2))
         mesh = scene_mesh()
         road = Built(parameters, RoadGeometry(parameters), model)
         assert not (mesh.class_id == 255).any()
@@ -475,7 +478,7 @@ class TestBuilding:
         assert set(road.model.objects) == {"Backbone", "Road", "Delineators"}
         assert np.unique(scene_mesh().class_id).tolist() == [class_id("warning_post")]
         with pytest.raises(ValueError, match="bridges"):
-            build_road(parameters, TOLERANCE, parts=["bridges"])
+            build_road(BuildRequest(parameters, TOLERANCE, parts=["bridges"]))
 
     def test_the_origin_is_the_map_origin(self) -> None:
         parameters = demo_parameters(length=100.0)
@@ -487,7 +490,7 @@ class TestBuilding:
         parameters = demo_parameters(length=100.0)
         meshes = []
         for _ in range(2):
-            build_road(parameters, TOLERANCE, 0.3)
+            build_road(BuildRequest(parameters, TOLERANCE, 0.3))
             meshes.append(scene_mesh())
         assert np.array_equal(meshes[0].vertices, meshes[1].vertices)
         assert np.array_equal(meshes[0].triangles, meshes[1].triangles)

@@ -8,6 +8,7 @@ import pytest
 from synthroads_addon.base.classes import classes
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.checking.checker import check
 from synthroads_addon.materials.table import UNKNOWN
 from synthroads_addon.road.instances import InstanceNumbers
@@ -28,7 +29,7 @@ def parameters() -> RoadParameters:
 
 @pytest.fixture(scope="module")
 def mesh(parameters: RoadParameters) -> SceneMesh:
-    build_road(parameters, 0.1, 0.1)
+    build_road(BuildRequest(parameters, 0.1, 0.1))
     return scene_mesh()
 
 

@@ -13,6 +13,7 @@ from synthroads_addon.blender.model.older_files import rename_inputs
 from synthroads_addon.blender.model.read_back import edited_parameters
 from synthroads_addon.blender.model.store import find_road, objects_of, recall
 from synthroads_addon.blender.model.truth import open_road
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
@@ -45,7 +46,7 @@ def name_as_before(model: RoadModel) -> None:
 
 def test_inputs_named_by_ids_are_read_edited_and_named_in_words() -> None:
     parameters = short_road()
-    model = build_road(parameters, 0.02, 0.0, ("road",))
+    model = build_road(BuildRequest(parameters, 0.02, 0.0, ("road",)))
     modifier = model.objects["Road"].modifiers[0]
     name_as_before(model)
     set_modifier_input(modifier, "carriageway-right-line-1 Dash", 4.5)
@@ -64,7 +65,7 @@ def test_inputs_named_by_ids_are_read_edited_and_named_in_words() -> None:
 
 def test_a_road_of_this_version_stays_as_it_is() -> None:
     parameters = short_road()
-    model = build_road(parameters, 0.02, 0.0, ("road",))
+    model = build_road(BuildRequest(parameters, 0.02, 0.0, ("road",)))
     interface = model.objects["Road"].modifiers[0].node_group.interface
     before = [entry.name for entry in interface.items_tree]
     rename_inputs(parameters, model.objects)
@@ -96,7 +97,7 @@ def test_a_file_without_roots_opens_with_its_road_edited_built_and_read_back() -
     set_modifier_input(objects["rail-left"].modifiers[0], "Offset", 12.5)
     edited = edited_parameters(parameters, objects)
     assert edited.objects["rail-left"].offset == 12.5  # type: ignore[union-attr]
-    model = build_road(edited, scenario.settings().tolerance, 0.0, ("road", "guardrails"))
+    model = build_road(BuildRequest(edited, scenario.settings().tolerance, 0.0, ("road", "guardrails")))
     assert model.root == root
     assert "Renamed by the User" in bpy.data.collections
     assert edited_parameters(edited, objects_of(root)) == edited

@@ -16,6 +16,7 @@ from synthroads_addon.blender.compat import modifier_input, set_modifier_input
 from synthroads_addon.blender.model.build import RoadModel, build_road
 from synthroads_addon.blender.model.read_back import edited_parameters
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.blender.things.road.layout import names_in_words, side_of
 from synthroads_addon.road.damage import deepest_damage
 from synthroads_addon.road.geometry import RoadGeometry
@@ -85,7 +86,7 @@ def everything(design_class: str = "EKA1A", cross_section: str = "RQ31", length:
 
 
 def built(parameters: RoadParameters, tolerance: float = 0.005, parts: tuple[str, ...] = ("road",)) -> Built:
-    return Built(parameters, RoadGeometry(parameters), build_road(parameters, tolerance, 0.3, parts))
+    return Built(parameters, RoadGeometry(parameters), build_road(BuildRequest(parameters, tolerance, 0.3, parts)))
 
 
 def cases() -> Iterator[Any]:
@@ -264,7 +265,7 @@ class TestStretches:
         whole = built(parameters, parts=parts).mesh()
         area: dict[int, float] = {}
         for stretch in stretches(450.0, 150.0):
-            build_road(parameters, 0.005, 0.3, parts, stretch)
+            build_road(BuildRequest(parameters, 0.005, 0.3, parts, stretch))
             mesh = scene_mesh()
             assert np.abs(mesh.vertices).max() < FRAME
             for number in np.unique(mesh.instance_id):
@@ -277,7 +278,7 @@ class TestStretches:
     def test_local_origins_stay_exact_on_the_map(self) -> None:
         parameters = sample_road(RoadScenario(length=10_000.0), 4)
         geometry = RoadGeometry(parameters)
-        model = build_road(parameters, 0.005, 0.0, ("road",), (9_000.0, 9_200.0))
+        model = build_road(BuildRequest(parameters, 0.005, 0.0, ("road",), (9_000.0, 9_200.0)))
         mesh = scene_mesh()
         vertices = mesh.vertices[np.unique(mesh.triangles[mesh.class_id == class_id("road")])].astype(np.float64)
         on_map = vertices + model.origin

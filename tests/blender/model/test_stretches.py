@@ -9,6 +9,7 @@ import pytest
 
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.road.stretches import stretches
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
@@ -21,7 +22,7 @@ def test_memory_stays_flat_over_20_km() -> None:
     parameters = sample_road(RoadScenario(length=20_000.0), 4)
     peaks = []
     for stretch in stretches(20_000.0):
-        build_road(parameters, 0.02, 0.3, stretch=stretch)
+        build_road(BuildRequest(parameters, 0.02, 0.3, stretch=stretch))
         triangles = len(scene_mesh().triangles)
         gc.collect()
         peaks.append(memory_mb())

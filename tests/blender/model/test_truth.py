@@ -19,6 +19,7 @@ from synthroads_addon.blender.model.build import BuildTarget, RoadModel, build_r
 from synthroads_addon.blender.model.settle import move_line, settle
 from synthroads_addon.blender.model.truth import EditedRoad, open_road, read_road
 from synthroads_addon.blender.scene.evaluated import scanned_scene
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.road.geometry import RoadGeometry, alignment_of
 from synthroads_addon.road.parameters import RoadParameters
 from tests.helpers.scenes.small_road import PARTS, TOLERANCE, build_small, open_small, small_parameters
@@ -72,7 +73,7 @@ def assert_shows(edited: EditedRoad, names: tuple[str, ...] = ()) -> None:
     """Check that the scene is that of the parameters that were read, built anew elsewhere."""
     here = shown()
     bpy.context.window.scene = bpy.data.scenes.new("Check")
-    build_road(edited.known(), TOLERANCE, 0.0, PARTS)
+    build_road(BuildRequest(edited.known(), TOLERANCE, 0.0, PARTS))
     there = shown()
     for name in names or edited.parameters.objects:
         number = edited.parameters.objects[name].instance

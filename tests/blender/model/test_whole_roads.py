@@ -11,6 +11,7 @@ from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.model.read_back import edited_parameters
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from tests.helpers.roads.lane_files import cubic, lane, lanes, road_file, section, taken, width
 
 ROUNDING = 2e-4
@@ -33,7 +34,7 @@ ROADS = {
 @pytest.mark.parametrize("name", list(ROADS))
 def test_a_road_of_a_file_is_built_and_read_back(tmp_path: Path, name: str) -> None:
     parameters, geometry, _ = taken(road_file(tmp_path, ROADS[name], length=120.0))
-    model = build_road(parameters, 0.005, parts={"road", "terrain"})
+    model = build_road(BuildRequest(parameters, 0.005, parts={"road", "terrain"}))
     mesh = scene_mesh(objects=[model.objects["Road"]])
     road = mesh.class_id == class_id("road")
     vertices = mesh.vertices[np.unique(mesh.triangles[road])].astype(np.float64)

@@ -17,6 +17,7 @@ from synthroads_addon.blender.model.build import RoadModel, build_road
 from synthroads_addon.blender.model.library import user_groups
 from synthroads_addon.blender.nodes.strip import strip_group
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.blender.things.sign.sign import sign_group
 from synthroads_addon.road.parameters import RoadParameters
 from tests.blender.nodes.test_axis import arc, corners, empty, give, meshes_of
@@ -98,7 +99,7 @@ def small_road() -> RoadModel:
     data = base_road({"exit": {"type": "Turnout", **TURNOUTS["exit"]}} | objects)
     for number, item in enumerate(data["objects"].values(), 1):
         item["instance"] = number
-    return build_road(RoadParameters.from_dict(data), 0.02)
+    return build_road(BuildRequest(RoadParameters.from_dict(data), 0.02))
 
 
 def names_in(groups: Iterable[bpy.types.NodeTree]) -> set[str]:

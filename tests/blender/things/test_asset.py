@@ -14,6 +14,7 @@ from synthroads_addon.base.classes import class_id
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.things.asset import Asset
@@ -64,7 +65,7 @@ def library(folder: Path, file: str, **more: object) -> Path:
 def test_an_asset_stands_on_the_ground_with_its_class_and_instance(tmp_path: Path, suffix: str) -> None:
     save_cube(tmp_path / f"box{suffix}")
     parameters = road_with(library(tmp_path, f"box{suffix}"))
-    model = build_road(parameters, 0.02, 0.0, ("terrain", "assets"))
+    model = build_road(BuildRequest(parameters, 0.02, 0.0, ("terrain", "assets")))
     mesh = scene_mesh()
     chosen = mesh.instance_id == 900
     assert set(mesh.class_id[chosen]) == {class_id("utility")}
@@ -88,21 +89,23 @@ def test_copies_share_one_collection_and_go_with_the_road(tmp_path: Path) -> Non
         objects[f"box-{number + 2}"] = objects["box-1"].model_copy(
             update={"instance": 901 + number, "station": 10.0 + 10.0 * number}
         )
-    build_road(parameters.model_copy(update={"objects": objects}), 0.02, 0.0, ("road", "assets"))
+    build_road(BuildRequest(parameters.model_copy(update={"objects": objects}), 0.02, 0.0, ("road", "assets")))
     assert len([item for item in bpy.data.meshes if item.name.startswith(("Box", "Cube"))]) == 1
-    build_road(parameters, 0.02, 0.0, ("road",))
+    build_road(BuildRequest(parameters, 0.02, 0.0, ("road",)))
     assert not [item for item in bpy.data.objects if item.name.startswith("box-")]
 
 
 def test_faults_are_named(tmp_path: Path) -> None:
     (tmp_path / "box.glb").write_bytes(b"no glTF at all")
     with pytest.raises(InputError, match=r"box\.glb"):
-        build_road(road_with(library(tmp_path, "box.glb")), 0.02, 0.0, ("road", "assets"))
+        build_road(BuildRequest(road_with(library(tmp_path, "box.glb")), 0.02, 0.0, ("road", "assets")))
     save_cube(tmp_path / "box.blend")
     with pytest.raises(InputError, match="holds no such object"):
-        build_road(road_with(library(tmp_path, "box.blend", object="Ball")), 0.02, 0.0, ("road", "assets"))
+        build_road(
+            BuildRequest(road_with(library(tmp_path, "box.blend", object="Ball")), 0.02, 0.0, ("road", "assets"))
+        )
     with pytest.raises(InputError, match="has no such asset"):
-        build_road(road_with(library(tmp_path, "box.blend"), name="ball"), 0.02, 0.0, ("road", "assets"))
+        build_road(BuildRequest(road_with(library(tmp_path, "box.blend"), name="ball"), 0.02, 0.0, ("road", "assets")))
 
 
 # What of a file stands beside the road
@@ -193,7 +196,7 @@ def _saved(path: Path, build: Any) -> None:
 
 def _size_of_asset(library_path: Path) -> np.ndarray:
     parameters = road_with(library_path, scale=1.0, rotation_deg=0.0)
-    build_road(parameters, 0.02, 0.0, ("terrain", "assets"))
+    build_road(BuildRequest(parameters, 0.02, 0.0, ("terrain", "assets")))
     mesh = scene_mesh()
     corners = mesh.vertices[mesh.triangles[mesh.instance_id == 900]].reshape(-1, 3).astype(np.float64)
     heading = RoadGeometry(parameters).alignment.heading(np.array([60.0]))[0] - np.pi / 2.0

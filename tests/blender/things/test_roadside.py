@@ -5,6 +5,7 @@ import pytest
 
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.materials.table import materials
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.surroundings import Terrain, Vegetation
@@ -100,7 +101,9 @@ def test_bare_plants_have_twigs_of_bark_where_leaves_were() -> None:
         parameters = RoadParameters.from_dict(
             road_data(straight_road(trees), 300.0) | {"environment": {"season": season}}
         )
-        model = build_road(parameters, 0.02, 0.3, {"road", "terrain", "vegetation", "hedges"}, (0.0, 60.0))
+        model = build_road(
+            BuildRequest(parameters, 0.02, 0.3, {"road", "terrain", "vegetation", "hedges"}, (0.0, 60.0))
+        )
         for name in trees:
             mesh = scene_mesh(objects=[model.objects[name]])
             names = [mesh.materials[number] for number in np.unique(mesh.material)]

@@ -9,6 +9,7 @@ from mathutils import Matrix
 
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.blender.views.landscape import LANDSCAPE, add_landscape, remove_landscape
 from synthroads_addon.road.parameters import RoadParameters
 from tests.helpers.roads.furnished_data import road_data
@@ -34,7 +35,7 @@ def landscape_objects() -> list[bpy.types.Object]:
 
 
 def test_scans_neither_build_nor_meet_it(parameters: RoadParameters) -> None:
-    build_road(parameters, 0.02, 0.0)
+    build_road(BuildRequest(parameters, 0.02, 0.0))
     assert not landscape_objects()
     before = scene_mesh()
     made = add_landscape(bpy.context.scene, parameters, Matrix.Identity(4))

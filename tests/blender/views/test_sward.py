@@ -11,6 +11,7 @@ from mathutils import Matrix
 
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.blender.views.sward import SWARD, Lawn, add_sward, mown, remove_sward
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
@@ -47,7 +48,7 @@ class Meadow(NamedTuple):
 def meadow() -> Meadow:
     """A built road with one stand of grass, and a place above its verge."""
     parameters = RoadParameters.from_dict(road_data({"grass": GRASS}))
-    build_road(parameters, 0.02, 0.0)
+    build_road(BuildRequest(parameters, 0.02, 0.0))
     geometry = RoadGeometry(parameters)
     edge = float(geometry.offsets(40.0)[0, -1])
     place = geometry.point(40.0, edge)[0] + (0.0, 0.0, 1.2)
@@ -160,6 +161,6 @@ def test_light_goes_through_blades_in_pictures_alone(meadow: Meadow) -> None:
 
 def test_a_road_without_grass_has_none() -> None:
     parameters = RoadParameters.from_dict(road_data({}))
-    build_road(parameters, 0.02, 0.0)
+    build_road(BuildRequest(parameters, 0.02, 0.0))
     lawn = Lawn.of(bpy.context.scene, Matrix.Identity(4))
     assert add_sward(bpy.context.scene, parameters, lawn, (0.0, 0.0, 0.0), Matrix.Identity(4)) is None

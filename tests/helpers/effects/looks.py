@@ -29,7 +29,7 @@ LABEL = "instance_id"
 
 def look_at(scenario: Scenario, parameters: RoadParameters) -> Look:
     """Build a road as a scenario asks for it, scan it, and return what is seen; for the main thread."""
-    scene = RoadScene(scenario, RoadGeometry(parameters))
+    scene = RoadScene.of(scenario, RoadGeometry(parameters))
     scene.build()
     seen = look_at_model(scene.read()) | {f"points.{name}": value for name, value in look_at_scan(scene).items()}
     return seen | look_at_landscape(parameters)

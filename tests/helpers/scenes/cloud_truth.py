@@ -15,6 +15,7 @@ from mathutils.bvhtree import BVHTree
 from synthroads_addon.blender.files import empty_file
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters, read_parameters
@@ -95,7 +96,7 @@ class Written:
         """
         assert self.parameters is not None
         empty_file()
-        build_road(self.parameters, TOLERANCE, 0.0, PARTS)
+        build_road(BuildRequest(self.parameters, TOLERANCE, 0.0, PARTS))
         mesh, numbers = scene_mesh(), RoadGeometry(self.parameters).numbers
         known = {number for number in self.by_instance if numbers.owner(number) is not None}
         assert len(known) > 5

@@ -16,6 +16,7 @@ from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.scanning.scene.mesh import SceneMesh
@@ -45,7 +46,7 @@ class FurnishedRoad:
     ) -> None:
         self.parameters = RoadParameters.from_dict(road_data(objects, **road))
         self.geometry = RoadGeometry(self.parameters)
-        self.model = build_road(self.parameters, 0.005, detail, {"road", "terrain", *parts}, stretch)
+        self.model = build_road(BuildRequest(self.parameters, 0.005, detail, {"road", "terrain", *parts}, stretch))
         self.origin = self.model.origin - np.array(self.parameters.transform.translate)
         self._surface: tuple[BVHTree, BVHTree] | None = None
         self._meshes: dict[tuple[str, ...], SceneMesh] = {}

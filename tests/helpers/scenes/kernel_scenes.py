@@ -23,7 +23,7 @@ from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import MovingMesh, ScannedScene
 from synthroads_addon.scanning.scene.target import Target
 from synthroads_addon.scanning.sparing import Traced
-from tests.helpers.scenes.scan_scenes import Standing, mesh_of, scan_of
+from tests.helpers.scenes.scan_scenes import Standing, altered, mesh_of, scan_of
 
 STRIP = Standing.strips[0]
 
@@ -60,7 +60,7 @@ def planned(
     setting = replace(plan.setting, **{name: changes.pop(name) for name in of_setting})
     target = Target(ScannedScene(mesh, tuple(moving)), lambda one: Cast(one, **(packing or {})))
     surfaces = surfaces_of((materials()[name] for name in mesh.materials), "oren_nayar")
-    return replace(plan, target=target, surfaces=surfaces, setting=setting, **changes)
+    return altered(plan, target=target, surfaces=surfaces, setting=setting, **changes)
 
 
 def by_numpy(plan: ScanPlan) -> ScanPlan:
@@ -121,7 +121,7 @@ def assert_same(plan: ScanPlan, pulses: Pulses) -> Echoes:
         BlockScan(one).traced_echoes(STRIP, pulses, one.target.motions(0.0, end, 0.01), 0)
         for one in (plan, by_numpy(plan))
     )
-    whole = not (plan.effects or plan.multipath or plan.spares)
+    whole = not (plan.atmosphere.effects or plan.reflection.multipath or plan.spares)
     assert isinstance(found[0], TracedPulses) == (whole and len(pulses.time) > 1)
     assert isinstance(expected[0], TracedPulses) is False
     assert found[2].rays == expected[2].rays

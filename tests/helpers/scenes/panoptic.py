@@ -141,5 +141,5 @@ def panoptic_set(scenario: Scenario, folder: Path) -> PanopticSet:
     with open_cloud(folder / "cloud.npz") as cloud:
         numbers = np.unique(np.concatenate([part.instance_id for part in cloud.blocks()]))
     reports = {name: read_report(folder, name) for name in scenario.twin}
-    shown, traffic = RoadScene(scenario, road), scenario.scan.traffic_speed_factor > 0.0
+    shown, traffic = RoadScene.of(scenario, road), scenario.scan.traffic_speed_factor > 0.0
     return PanopticSet(road, set(numbers.tolist()), reports, shown.plan(), shown.read().static, traffic, folder)

@@ -1,12 +1,18 @@
 """Small scenes, a hovering scanner and a caster by brute force, for tests of the scanner's loop."""
 
+import dataclasses
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from synthroads_addon.materials.surfaces import surfaces_of
 from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.beam import RINGS
+from synthroads_addon.scanning.parts.emission import Emission
+from synthroads_addon.scanning.parts.layers import Layers
+from synthroads_addon.scanning.parts.reflection import Reflection
+from synthroads_addon.scanning.parts.run import Run
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.platforms.path import Strip
 from synthroads_addon.scanning.pulses import Pulses
@@ -97,8 +103,20 @@ def scan_of(mesh: SceneMesh, rays: int = 1, path: Standing | None = None, moving
     setting = replace(setting, **{"range_sigma": 0.0, "threshold": 0.0, "saturation": np.inf, **changes})
     surfaces = surfaces_of(materials()[name] for name in mesh.materials)
     target = Target(ScannedScene(mesh, tuple(moving)), BruteForce)
-    layers = frozenset({"rgb", "normal", "true_range", "true_xyz", "scanner"})
-    return ScanPlan(target, surfaces, setting, path or Standing(), RINGS[rays], seed=3, measured_layers=layers)
+    layers = Layers(frozenset({"rgb", "normal", "true_range", "true_xyz", "scanner"}))
+    emission = Emission(setting, path or Standing(), RINGS[rays])
+    return ScanPlan(target, emission, Reflection(surfaces), Run(seed=3), layers=layers)
+
+
+def altered(plan: ScanPlan, **fields: Any) -> ScanPlan:
+    """Return a plan with fields of its parts changed, by the fields' names: no two parts have one of the same."""
+    parts = {}
+    for part in dataclasses.fields(plan):
+        value = getattr(plan, part.name)
+        known = {one.name for one in dataclasses.fields(value)} if dataclasses.is_dataclass(value) else set()
+        if mine := {name: fields.pop(name) for name in known & fields.keys()}:
+            parts[part.name] = replace(value, **mine)
+    return replace(plan, **parts, **fields)
 
 
 def scan_block(scan: ScanPlan, strip: Strip, block: int) -> BlockResult:
@@ -131,6 +149,6 @@ def echoes_and_pulses(scan: ScanPlan, first: int, count: int) -> tuple[Echoes, P
     """Return the echoes of some pulses of the first strip, before any threshold, and the pulses."""
     strip = scan.path.strips[0]
     pulses = emit_pulses(scan, strip, 0.0, 80.0, first, count)
-    traced = trace(scan.target, scan.surfaces, beam_rays(scan, pulses), [], 0.0, scan.setting.maximum_range)
+    traced = trace(scan.target, scan.reflection.surfaces, beam_rays(scan, pulses), [], 0.0, scan.setting.maximum_range)
     signals = BlockScan(scan).signals(traced)
     return group_returns(*signals, traced.pulse, scan.setting.range_resolution), pulses

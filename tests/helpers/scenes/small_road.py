@@ -10,9 +10,10 @@ from typing import Any
 import bpy
 import numpy as np
 
-from synthroads_addon.blender.model.build import RoadModel, build_road
+from synthroads_addon.blender.model.build import MEANT, RoadModel, build_road
 from synthroads_addon.blender.model.roads import origin_of
 from synthroads_addon.blender.model.store import find_road, objects_of, remember
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.roads.furnished_data import road_data
@@ -39,7 +40,8 @@ def small_parameters(length: float = 60.0, **more: dict[str, Any]) -> RoadParame
 def build_small(parameters: RoadParameters | None = None, **further: Any) -> RoadModel:
     """Build a short road in the current scene, and keep what it was built from."""
     parameters = parameters or small_parameters()
-    model = build_road(parameters, TOLERANCE, 0.0, further.pop("parts", PARTS), **further)
+    parts, place = further.pop("parts", PARTS), further.pop("place", MEANT)
+    model = build_road(BuildRequest(parameters, TOLERANCE, 0.0, parts, **further), place)
     remember(getattr(model, "root", model.collection), parameters, SCENARIO, "")
     return model
 

@@ -16,6 +16,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.files import empty_file
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scanned_scene
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.jobs.choose.knobs import ModelKnobs
 from synthroads_addon.jobs.choose.table import shipped_table
@@ -220,7 +221,7 @@ def errors_afterwards(scenario: Scenario) -> dict[str, float]:
     """
     parameters, settings = sample_road(scenario.road, scenario.seed), scenario.settings()
     empty_file()
-    shown = RoadScene(scenario, RoadGeometry(parameters))
+    shown = RoadScene.of(scenario, RoadGeometry(parameters))
 
     def points(detail: float, rays: int) -> list[PointBlock]:
         trial = Trial.of(shown.site, shown.rebuild(ModelKnobs(settings.tolerance, detail).changes))
@@ -229,7 +230,7 @@ def errors_afterwards(scenario: Scenario) -> dict[str, float]:
 
     mine = points(settings.vegetation_detail, settings.rays_per_pulse)
     errors = {name: pair[0] for name, pair in beam_errors(mine, points(1.0, 61)).items()}
-    build_road(parameters, settings.tolerance, 0.0)
+    build_road(BuildRequest(parameters, settings.tolerance, 0.0))
     geometry = RoadGeometry(parameters)
     return errors | {"height": float(abs(mesh_height_errors(scanned_scene(geometry=geometry).static, geometry)).max())}
 

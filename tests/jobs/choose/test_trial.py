@@ -14,6 +14,7 @@ from synthroads_addon.jobs.choose.trial import Trial
 from synthroads_addon.jobs.scan.files import CloudFiles
 from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.scanning.plan import ScanPlan
+from synthroads_addon.scenario.inputs import ScenarioInputs
 from synthroads_addon.scenario.scenario import Scenario
 from tests.jobs.scan.test_plan import StandIns, planned
 
@@ -37,10 +38,16 @@ class MadeUpScans:
             pulses = sum(map(plan.pulse_count, plan.path.strips))
             self.now += self.each + RATE * pulses + (0.0 if self.scans else FIRST) + self.block * plan.cut.count()
             self.now += OTHERS if self.scans == self.disturbed else 0.0
-            self.now += self.octave * (plan.relief_octaves - 2) * pulses
+            self.now += self.octave * (plan.relief.octaves - 2) * pulses
             self.scans += 1
             files.counts.points += pulses // 2
         return {}
+
+
+def site_of(plan: ScanPlan) -> Site:
+    """Return the site of a scan of draft fidelity along a plan's path."""
+    scenario = Scenario.from_dict({"fidelity": "draft"})
+    return Site(scenario, ScenarioInputs.read(scenario), plan.path)
 
 
 @pytest.mark.parametrize(("each", "disturbed"), [(0.0, None), (EACH, None), (EACH, 0), (EACH, 1), (0.0, 2), (EACH, 3)])
@@ -50,7 +57,7 @@ def test_a_scan_of_a_fixed_time_and_a_rate_is_predicted_exactly_though_others_di
     scans = MadeUpScans(each, disturbed=disturbed)
     monkeypatch.setattr("synthroads_addon.jobs.choose.trial.record_cloud", scans.record)
     plan = planned(StandIns(), seconds=75.0)
-    trial = Trial(Site(Scenario.from_dict({"fidelity": "draft"}), plan.path), plan, clock=lambda: scans.now)
+    trial = Trial(site_of(plan), plan, clock=lambda: scans.now)
     seconds, points = trial.time_scan(())
     assert trial.pulses > 1e6
     assert seconds == pytest.approx(each + RATE * trial.pulses, rel=1e-9)
@@ -61,7 +68,7 @@ def test_what_every_block_takes_counts_as_often_as_there_are_blocks(monkeypatch:
     scans = MadeUpScans(0.0, block=1.0)
     monkeypatch.setattr("synthroads_addon.jobs.choose.trial.record_cloud", scans.record)
     plan = planned(StandIns(), seconds=1500.0)
-    trial = Trial(Site(Scenario.from_dict({"fidelity": "draft"}), plan.path), plan, clock=lambda: scans.now)
+    trial = Trial(site_of(plan), plan, clock=lambda: scans.now)
     seconds, _ = trial.time_scan(())
     assert seconds == pytest.approx(RATE * trial.pulses + plan.cut.count(), rel=0.02)
 
@@ -73,7 +80,7 @@ def test_what_a_finer_relief_takes_is_measured_though_others_disturb_one(
     scans = MadeUpScans(EACH, scans=1, disturbed=disturbed, octave=3e-7)
     monkeypatch.setattr("synthroads_addon.jobs.choose.trial.record_cloud", scans.record)
     plan = planned(StandIns(), seconds=75.0)
-    trial = Trial(Site(Scenario.from_dict({"fidelity": "draft"}), plan.path), plan, clock=lambda: scans.now)
+    trial = Trial(site_of(plan), plan, clock=lambda: scans.now)
     seconds = trial.time_relief((), 6)
     assert seconds == pytest.approx(4 * 3e-7 * trial.pulses, rel=1e-6)
     times = JobTimes(shipped_table("uav"), area=1e4, pulses=10**6, points=10**6)

@@ -91,7 +91,7 @@ def seen(scenario: Scenario, path: str, folder: Path) -> Look:
     if path in OF_FILES:
         return look_at_cloud(scenario, road, folder)
     if scenario.chooses:
-        scene = RoadScene(scenario, RoadGeometry(road))
+        scene = RoadScene.of(scenario, RoadGeometry(road))
         scenario = choose_settings(scene, time.perf_counter(), StageTimer(silent))[0].scenario
     return look_at(scenario, road)
 

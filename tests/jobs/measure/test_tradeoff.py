@@ -15,6 +15,7 @@ from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scanned_scene
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.jobs.measure.rows import measure_row
 from synthroads_addon.jobs.measure.tradeoff import KNOBS, SCENES, knob_rows, row_scenario
 from synthroads_addon.road.damage import DAMAGES
@@ -196,7 +197,7 @@ def test_heights_are_within_the_tolerance_but_where_the_pavement_changes_at_once
         assert high - low == pytest.approx(0.05)
         before, behind = geometry.offsets(np.array([low - 1e-6, high + 1e-6]))
         assert np.abs(before - behind).max() > 0.4
-    build_road(parameters, 0.005, 0.0, ("road",))
+    build_road(BuildRequest(parameters, 0.005, 0.0, ("road",)))
     errors = np.abs(mesh_height_errors(scanned_scene(geometry=geometry).static, geometry))
     assert 0.001 < errors.max() < 0.005
 
@@ -208,7 +209,7 @@ def test_what_lies_on_the_pavement_is_no_error_of_its_height() -> None:
     scenario = load_scenario("every-class-1500m", ["road.length=200", "road.half_width=25", "road.pavement.concrete=0"])
     parameters = sample_road(scenario.road, scenario.seed)
     geometry = RoadGeometry(parameters)
-    build_road(parameters, 0.005, 0.0)
+    build_road(BuildRequest(parameters, 0.005, 0.0))
     mesh = scanned_scene(geometry=geometry).static
     laid_on = [number for number, kind in geometry.numbers.damages().items() if kind >= DAMAGES.index("patch")]
     corners = np.unique(mesh.triangles[np.isin(mesh.instance_id, laid_on)])

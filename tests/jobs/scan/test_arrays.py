@@ -17,6 +17,7 @@ from synthroads_addon.cloud.points import POINT_TYPES, PointBlock, concatenate
 from synthroads_addon.jobs.scan.arrays import ArraySink
 from synthroads_addon.road.instances import InstanceNumbers
 from synthroads_addon.road.parameters import read_parameters
+from synthroads_addon.scenario.inputs import ScenarioInputs
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 from tests.helpers.scenes.scan_scenes import middle_pulses, plane, scan_of
 
@@ -128,7 +129,7 @@ def test_jobs_that_write_files_ask_for_a_folder() -> None:
 
 
 def sink_of(asked: Scenario) -> ArraySink:
-    return ArraySink(asked, Path(), 60.0)
+    return ArraySink(asked, ScenarioInputs.read(asked), Path(), 60.0)
 
 
 def test_arrays_have_names_types_and_units() -> None:

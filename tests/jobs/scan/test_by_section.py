@@ -15,6 +15,7 @@ from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things import painted_area
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.jobs.generate import Job, generate
 from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.road.geometry import RoadGeometry
@@ -30,6 +31,7 @@ from synthroads_addon.scanning.blocks import Blocks
 from synthroads_addon.scanning.colour.colour import FROM_MATERIAL
 from synthroads_addon.scanning.colour.difference import cie_lab, ciede2000
 from synthroads_addon.scanning.sections import reached_stations, sections
+from synthroads_addon.scenario.inputs import ScenarioInputs
 from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scan import scanner_setting
 from synthroads_addon.scenario.scenario import Scenario
@@ -69,9 +71,9 @@ def triangles_within(parameters: RoadParameters, low: float, high: float) -> dic
 @pytest.mark.any_blender
 def test_a_stretch_has_the_whole_road_s_triangles() -> None:
     parameters, low, high = barriers(), 110.3, 160.9
-    build_road(parameters, 0.02, 0.1)
+    build_road(BuildRequest(parameters, 0.02, 0.1))
     whole = triangles_within(parameters, low, high)
-    build_road(parameters, 0.02, 0.1, stretch=(low - CUT, high + CUT))
+    build_road(BuildRequest(parameters, 0.02, 0.1, stretch=(low - CUT, high + CUT)))
     part = triangles_within(parameters, low, high)
     numbers = RoadGeometry(parameters).numbers
     there = {type(parameters.objects[str(numbers.owner(number))]) for number in whole}
@@ -186,7 +188,8 @@ def test_as_much_is_built_as_the_rays_reach(tmp_path: Path, kind: str, pitch: fl
     """All pulses of a section end between its stations, and not much more of the road is built."""
     scenario = job(tmp_path, 300.0, platform={"kind": kind, "pitch_deg": pitch, "speed": 40.0})
     geometry = RoadGeometry(sample_road(RoadScenario(length=1800.0), 4))
-    cut = Blocks(scanner_setting(scenario.scan), Site.of_road(scenario, geometry).path, len(RINGS[7]))
+    path = Site.of_road(scenario, geometry, ScenarioInputs.read(scenario)).path
+    cut = Blocks(scanner_setting(scenario.scan), path, len(RINGS[7]))
     parts = list(sections(cut, geometry, 300.0))
     assert [part.start for part in parts] == [300.0 * i for i in range(6)]
     assert sorted((s.index, b) for part in parts for s, b in part.blocks) == [(s.index, b) for s, b in cut.all()]
@@ -211,7 +214,7 @@ def test_only_damages_of_the_stretch_are_worked_out(monkeypatch: pytest.MonkeyPa
         return make(crack)
 
     monkeypatch.setattr(painted_area, "crack_outlines", crack_outlines)
-    build_road(parameters, 0.02, 0.0, parts=("damaged_areas",), stretch=(low, high))
+    build_road(BuildRequest(parameters, 0.02, 0.0, parts=("damaged_areas",), stretch=(low, high)))
     longest = 20.0
     assert stations
     assert min(stations) > low - longest

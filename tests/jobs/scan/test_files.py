@@ -11,6 +11,7 @@ import pytest
 
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.jobs.scan.files import CloudFiles
+from synthroads_addon.scenario.inputs import ScenarioInputs
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.scenes.scan_scenes import plane, scan_block, scan_of
 
@@ -24,7 +25,8 @@ def written_blocks(view: Any, folder: Path) -> list[PointBlock]:
     """Write blocks of a scan to a sink with this view of them; return them."""
     scan = scan_of(plane())
     results = [scan_block(scan, scan.path.strips[0], number) for number in range(BLOCKS)]
-    files = CloudFiles(Scenario.from_dict({"outputs": ["previews"]}), folder, np.zeros(3), 60.0, view=view)
+    scenario = Scenario.from_dict({"outputs": ["previews"]})
+    files = CloudFiles(scenario, ScenarioInputs.read(scenario), folder, np.zeros(3), 60.0, view=view)
     with files.open():
         for result in results:
             files.write(result)

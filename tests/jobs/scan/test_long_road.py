@@ -25,6 +25,7 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.road.tessellation import sample_stations
 from synthroads_addon.scanning.plan import ScanPlan
+from synthroads_addon.scenario.inputs import ScenarioInputs
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.scenes.scan_scenes import emit_pulses, scan_pulses
 from tests.helpers.scenes.sparse_scanner import sparse_scanner
@@ -134,7 +135,7 @@ def errors_of_a_section(work: SectionScan, road: RoadGeometry, section: Any, mon
     monkeypatch.setattr(Site, "plan", keep)
     with build_section(work, section) as scan:
         MESH[id(scan)] = meshes[-1]
-        triangles = exact_triangles(road, section.low, section.high, scan, scan.frame_origin)
+        triangles = exact_triangles(road, section.low, section.high, scan, scan.reflection.frame_origin)
         strip, block = section.blocks[len(section.blocks) // 2]
         first, _ = work.cut.pulse_span(strip, block)
         result = scan_pulses(scan, strip, first, PULSES, block).points
@@ -144,7 +145,7 @@ def errors_of_a_section(work: SectionScan, road: RoadGeometry, section: Any, mon
     paved = result.select(np.flatnonzero((result.class_id == class_id("road")) & ~is_laid_on(road, result.instance_id)))
     rows = np.searchsorted(pulses.time, paved.gps_time)
     assert np.array_equal(pulses.time[rows], paved.gps_time)
-    origin, direction = pulses.origin.T[rows] + scan.frame_origin, pulses.direction.T[rows]
+    origin, direction = pulses.origin.T[rows] + scan.reflection.frame_origin, pulses.direction.T[rows]
     exact = np.array(list(met(triangles, origin, direction)))
     place = origin + exact[:, None] * direction + np.array(road.parameters.transform.translate)
     return np.linalg.norm(paved.xyz - place, axis=1)
@@ -175,7 +176,8 @@ def test_a_long_road(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     print(f"farthest from the analytic surface: {worst * 1000:.2f} mm")
     assert worst < TOLERANCE + 0.001 + LAS_ROUNDING
 
-    work = SectionScan(Site.of_road(Scenario.from_dict(sparse(tmp_path, LONG)), geometry), geometry)
+    scenario = Scenario.from_dict(sparse(tmp_path, LONG))
+    work = SectionScan(Site.of_road(scenario, geometry, ScenarioInputs.read(scenario)), geometry)
     sections = list(work.sections())
     for number in np.linspace(0, len(sections) - 1, LOOKED_AT).astype(int):
         errors = errors_of_a_section(work, geometry, sections[number], monkeypatch)

@@ -21,7 +21,9 @@ from synthroads_addon.blender.model.store import remember
 from synthroads_addon.blender.model.truth import read_road
 from synthroads_addon.blender.scene.evaluated import scanned_scene, scene_mesh
 from synthroads_addon.blender.services import BlenderServices
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.cloud.points import PointBlock, concatenate
+from synthroads_addon.jobs.scan.parts import Survey
 from synthroads_addon.jobs.scan.plan import plan_scan
 from synthroads_addon.road import stretches as stretch
 from synthroads_addon.road.geometry import RoadGeometry
@@ -32,9 +34,11 @@ from synthroads_addon.scanning.platforms.path import Strip
 from synthroads_addon.scanning.record import scan_blocks
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import LaneMotion, MovingMesh, ScannedScene
+from synthroads_addon.scenario.inputs import ScenarioInputs
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.blender.things.test_vehicle import MODELS, VEHICLES, alone, vehicle
 from tests.helpers.scenes.furnished_road import Data, Float, road_data
+from tests.helpers.scenes.scan_scenes import altered
 
 pytestmark = pytest.mark.any_blender
 
@@ -46,7 +50,7 @@ HEIGHTS = 5e-5
 
 def build(objects: Data, tolerance: float = FINE, **road: Any) -> RoadGeometry:
     parameters = RoadParameters.from_dict(road_data(objects, **road))
-    build_road(parameters, tolerance, 0.0, {"road", "vehicles"})
+    build_road(BuildRequest(parameters, tolerance, 0.0, {"road", "vehicles"}))
     return RoadGeometry(parameters)
 
 
@@ -173,7 +177,7 @@ class TestWhatMoves:
     def test_on_a_stretch_with_an_origin_of_its_own(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(stretch, "FRAME", 50.0)
         parameters = RoadParameters.from_dict(road_data(VEHICLES))
-        build_road(parameters, 0.005, 0.0, {"road", "vehicles"}, stretch=(100.0, 200.0))
+        build_road(BuildRequest(parameters, 0.005, 0.0, {"road", "vehicles"}, stretch=(100.0, 200.0)))
         geometry = RoadGeometry(parameters)
         scene = scanned_scene(geometry=geometry)
         assert 0 < len(scene.moving) < len(VEHICLES)
@@ -226,7 +230,7 @@ class TestWhatMoves:
     def test_a_copy_of_a_vehicle_moves_as_well(self) -> None:
         """It is one more vehicle of the road as edited: on the lane that it was put on."""
         parameters = RoadParameters.from_dict(road_data({"a": vehicle("car", "right", 0, 100.0, (0.5, 0.5, 0.5))}))
-        root = build_road(parameters, 0.01, 0.0, {"road", "vehicles"}).root
+        root = build_road(BuildRequest(parameters, 0.01, 0.0, {"road", "vehicles"})).root
         remember(root, parameters, load_scenario("rq31-600m"), "")
         copy = bpy.data.objects["a"].copy()
         bpy.context.scene.collection.objects.link(copy)
@@ -348,9 +352,9 @@ def on_mesh(mesh: SceneMesh, points: Float) -> Float:
 def scanned(scene: ScannedScene, geometry: RoadGeometry, *changes: str) -> PointBlock:
     options = ["scan.noise.range_sigma=0", "scan.rays_per_pulse=1", 'cloud.attributes=["noise_free"]', "scan.threads=1"]
     scenario = load_scenario("rq31-600m", [*options, *changes])
-    scan = plan_scan(scenario, scene, _Drone(geometry), BlenderServices())
+    scan = plan_scan(Survey(scenario, ScenarioInputs.read(scenario), BlenderServices()), scene, _Drone(geometry))
     # What a pulse meets behind a window is a return of its own, and no return lies between two surfaces.
-    scan = replace(scan, setting=replace(scan.setting, range_resolution=0.0))
+    scan = altered(scan, setting=replace(scan.setting, range_resolution=0.0))
     return concatenate([result.points for result in scan_blocks(scan)])
 
 

@@ -17,6 +17,7 @@ from synthroads_addon.scanning.platforms.stretches import spread_stretches
 from synthroads_addon.scanning.record import record_as_measured
 from synthroads_addon.scanning.scan import BlockResult, join_results
 from synthroads_addon.scenario.scenario import load_scenario
+from tests.helpers.scenes.scan_scenes import altered
 
 pytestmark = [pytest.mark.any_blender, pytest.mark.slow]
 
@@ -55,13 +56,13 @@ def plans(name: str) -> dict[str, ScanPlan]:
     """Return the plans of one scene with packets and without."""
     scenario, changes, seconds = SCENES[name]
     job = load_scenario(scenario, [*COMMON, *changes])
-    shown = RoadScene(job, RoadGeometry(sample_road(job.road, job.seed)))
+    shown = RoadScene.of(job, RoadGeometry(sample_road(job.road, job.seed)))
     shown.build()
     scene, result = shown.read(), {}
     for kernels in ("auto", "off"):
         changed = job.model_copy(update={"scan": job.scan.model_copy(update={"kernels": kernels})})
-        plan = RoadScene(changed, shown.road, shown.model, scene).plan()
-        result[kernels] = replace(plan, path=spread_stretches(plan.path, 4, seconds))
+        plan = RoadScene(changed, shown.road, shown.inputs, shown.model, scene).plan()
+        result[kernels] = altered(plan, path=spread_stretches(plan.path, 4, seconds))
     return result
 
 
@@ -84,7 +85,7 @@ def test_points_are_those_of_single_rays_but_for_ties(name: str) -> None:
     apart = np.linalg.norm(packed.xyz[mine] - single.xyz[theirs], axis=1)
     footprint = made["off"].setting.beam_angle * single.range[theirs]
     assert (apart <= np.maximum(footprint, 1e-3)).all()
-    again = measured(replace(made["auto"], threads=3)).points
+    again = measured(altered(made["auto"], threads=3)).points
     for field in ("xyz", "intensity", "gps_time", "class_id"):
         np.testing.assert_array_equal(getattr(again, field), getattr(packed, field))
 
@@ -116,7 +117,7 @@ def test_compiled_loops_make_the_points_that_numpy_makes(
     noise: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan = plans("leaves")["auto"]
-    plan = replace(plan, noise=plan.noise.model_copy(update=noise))
+    plan = altered(plan, noise=plan.reception.noise.model_copy(update=noise))
     assert plan.summary()["kernels"].endswith("; pulses compiled; noise compiled; poses compiled; points compiled")
     assert None not in (plan.pose_kernel, plan.noise_kernel, plan.point_loops)
     assert_same(measured(plan), by_numpy(plan, monkeypatch))
@@ -139,4 +140,4 @@ def test_whatever_is_scanned_numpy_makes_the_same_points(name: str, left: str, m
     assert bool(plan.target.moving) == (name != "spared")
     expected = by_numpy(plan, monkeypatch)
     for threads in (1, 2):
-        assert_same(measured(replace(plan, threads=threads)), expected)
+        assert_same(measured(altered(plan, threads=threads)), expected)

@@ -48,7 +48,7 @@ def scan(parameters: RoadParameters, relief: float) -> PointBlock:
     changes = {"relief": relief, "noise": {"range_sigma": 0.0}, "platform": platform}
     cloud = {"attributes": ["damage", "noise_free", "normal"], "intensity": "range_corrected"}
     scenario = Scenario.from_dict(SCAN | {"scan": SCAN["scan"] | changes, "colour": colour, "cloud": cloud})
-    scene = RoadScene(scenario, RoadGeometry(parameters))
+    scene = RoadScene.of(scenario, RoadGeometry(parameters))
     scene.build()
     blocks = CollectedBlocks()
     record(scene.plan(), blocks)

@@ -13,19 +13,22 @@ import numpy as np
 import pytest
 
 from synthroads_addon.cloud.points import PointBlock
+from synthroads_addon.jobs.scan.parts import Survey
 from synthroads_addon.jobs.scan.plan import plan_scan
 from synthroads_addon.materials.table import Material, materials
 from synthroads_addon.road.surroundings import Environment
 from synthroads_addon.scanning.colour.colour import LayerSource, MaterialLayers, surface_constants
 from synthroads_addon.scanning.colour.request import LayerRequest
 from synthroads_addon.scanning.colour.transparency import Transparency
-from synthroads_addon.scanning.plan import ScanConditions, ScanPlan
+from synthroads_addon.scanning.parts.conditions import ScanConditions
+from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.record import CollectedBlocks, record
 from synthroads_addon.scanning.relief.normal_images import NormalImage
 from synthroads_addon.scanning.scene.caster import Caster
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import ScannedScene
 from synthroads_addon.scanning.weather.registry import WEATHERS
+from synthroads_addon.scenario.inputs import ScenarioInputs
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.scenes.scan_scenes import BruteForce, Standing, plane
 
@@ -73,7 +76,11 @@ def planned(
     path.strips = (type(path.strips[0])(0, 0.0, seconds),)  # type: ignore[misc]
     scan = {"noise": {"range_sigma": 0.0}, "relief": 0.0, "caster": "embree"} | changes.pop("scan", {})
     scenario = Scenario.from_dict({"fidelity": "draft", "scan": scan} | changes)
-    return plan_scan(scenario, ScannedScene(plane()), path, services, conditions)
+    return plan_scan(
+        Survey(scenario, ScenarioInputs.read(scenario), services, conditions or ScanConditions()),
+        ScannedScene(plane()),
+        path,
+    )
 
 
 def recorded(plan: ScanPlan) -> PointBlock:
@@ -89,15 +96,15 @@ def test_every_default_is_filled_in_once() -> None:
     foggy = ScanConditions(Environment(weather="fog", visibility=500.0))
     plan = planned(services, foggy)
     device = plan.setting.device
-    assert (plan.rings, plan.relief_octaves) == ((), 2), "the draft fidelity's"
+    assert (plan.emission.rings, plan.relief.octaves) == ((), 2), "the draft fidelity's"
     assert plan.setting.pulse_rate == device.modes[0].pulse_rate_khz * 1e3
     fog = WEATHERS["fog"].from_dict({"condition": "fog", "visibility": 500.0})
-    assert plan.attenuation == fog.attenuation(device.wavelength_nm)
-    assert planned(services, foggy, scan={"attenuation": 0.01}).attenuation == 0.01
-    assert not plan.on_vehicle
-    assert planned(services, scan={"platform": {"kind": "vehicle"}}).on_vehicle
+    assert plan.atmosphere.attenuation == fog.attenuation(device.wavelength_nm)
+    assert planned(services, foggy, scan={"attenuation": 0.01}).atmosphere.attenuation == 0.01
+    assert not plan.emission.on_vehicle
+    assert planned(services, scan={"platform": {"kind": "vehicle"}}).emission.on_vehicle
     with pytest.raises(AttributeError):
-        plan.seed = 2  # type: ignore[misc]
+        plan.run.seed = 2  # type: ignore[misc]
 
 
 def test_the_effects_of_the_weather_are_in_the_plan_unless_an_attenuation_is_given(
@@ -106,10 +113,10 @@ def test_the_effects_of_the_weather_are_in_the_plan_unless_an_attenuation_is_giv
     effect = object()
     monkeypatch.setattr(WEATHERS["rain"], "effects", lambda weather: (effect, weather))
     rain = {"condition": "rain", "visibility": 900.0}
-    assert planned(StandIns(), scan={"weather": rain}).effects == (effect, WEATHERS["rain"].from_dict(rain))
+    assert planned(StandIns(), scan={"weather": rain}).atmosphere.effects == (effect, WEATHERS["rain"].from_dict(rain))
     wet = ScanConditions(Environment(weather="rain", visibility=900.0))
-    assert planned(StandIns(), wet).effects == (effect, WEATHERS["rain"].from_dict(rain)), "that of the road"
-    assert planned(StandIns(), wet, scan={"attenuation": 0.01}).effects == ()
+    assert planned(StandIns(), wet).atmosphere.effects == (effect, WEATHERS["rain"].from_dict(rain)), "that of the road"
+    assert planned(StandIns(), wet, scan={"attenuation": 0.01}).atmosphere.effects == ()
 
 
 def test_it_asks_the_services_for_what_the_scenario_wants() -> None:

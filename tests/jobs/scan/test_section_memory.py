@@ -17,6 +17,7 @@ from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.record import CollectedBlocks, record
+from synthroads_addon.scenario.inputs import ScenarioInputs
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.process_memory import STATUS, memory_mb
 
@@ -58,7 +59,8 @@ def test_sections_leave_nothing_behind(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(by_section, "release_memory", release_and_look)
     scenario = dense()
     road = RoadGeometry(sample_road(scenario.road, scenario.seed, scenario.title))
-    work, counts = by_section.SectionScan(Site.of_road(scenario, road), road), []
+    site = Site.of_road(scenario, road, ScenarioInputs.read(scenario))
+    work, counts = by_section.SectionScan(site, road), []
     for plan in work.plans(StageTimer()):
         sink = CollectedBlocks()
         record(plan, sink)

@@ -1,7 +1,7 @@
 """Scenes scanned with footprints where needed give the returns of full ones, class by class, and lose no object."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -19,6 +19,7 @@ from synthroads_addon.scanning.scan import BlockResult, BlockScan, join_results
 from synthroads_addon.scanning.scene.bare_ground import CLASSES, BareGround
 from synthroads_addon.scanning.sparing import Sparing
 from synthroads_addon.scenario.scenario import load_scenario
+from tests.helpers.scenes.scan_scenes import altered
 
 pytestmark = [pytest.mark.any_blender, pytest.mark.slow]
 
@@ -68,11 +69,11 @@ def compared(name: str, caster: str = "auto") -> Compared:
     """Scan the stretches of a scene both ways."""
     scenario, changes, seconds = SCENES[name]
     job = load_scenario(scenario, [*COMMON, *changes, f"scan.caster={caster}"])
-    shown = RoadScene(job, RoadGeometry(sample_road(job.road, job.seed)))
+    shown = RoadScene.of(job, RoadGeometry(sample_road(job.road, job.seed)))
     shown.build()
     plan = shown.plan()
-    plan = replace(plan, path=spread_stretches(plan.path, STRETCHES, seconds))
-    return Compared(plan, measured(replace(plan, ground=None)), measured(plan))
+    plan = altered(plan, path=spread_stretches(plan.path, STRETCHES, seconds))
+    return Compared(plan, measured(altered(plan, ground=None)), measured(plan))
 
 
 def measured(plan: ScanPlan) -> BlockResult:
@@ -144,9 +145,9 @@ def test_other_casters_spare_the_same() -> None:
 @pytest.mark.parametrize("blind", ["edges", "things"])
 def test_without_what_it_looks_for_returns_are_lost(blind: str) -> None:
     scene = compared("uav")
-    assert scene.plan.ground is not None
-    wrong = without(scene.plan.ground, blind)
-    shares = share_by_class(scene.full.points, measured(replace(scene.plan, ground=wrong)).points)
+    assert scene.plan.emission.ground is not None
+    wrong = without(scene.plan.emission.ground, blind)
+    shares = share_by_class(scene.full.points, measured(altered(scene.plan, ground=wrong)).points)
     assert min(shares.values()) < 0.99, shares
 
 

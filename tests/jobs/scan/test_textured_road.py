@@ -65,7 +65,7 @@ def scan(parameters: RoadParameters, *, normals: bool = False) -> PointBlock:
     }
     colour = {"source": "nodes", "mode": "unlit"}
     settings = {"geometric_tolerance": 0.001, "scan": SCAN["scan"] | changes, "cloud": cloud, "colour": colour}
-    scene = RoadScene(Scenario.from_dict(SCAN | settings), RoadGeometry(parameters))
+    scene = RoadScene.of(Scenario.from_dict(SCAN | settings), RoadGeometry(parameters))
     scene.build()
     blocks = CollectedBlocks()
     record(scene.plan(), blocks)

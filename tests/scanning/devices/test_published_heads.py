@@ -1,6 +1,5 @@
 """Heads beside what is published of them: points, reach, precision and numbers, each measured in scans of a wall."""
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -11,7 +10,7 @@ from synthroads_addon.materials.table import Material
 from synthroads_addon.scanning.devices.shots import shot_count
 from synthroads_addon.scanning.platforms.path import Strip
 from synthroads_addon.scanning.scan import BlockScan
-from tests.helpers.scenes.scan_scenes import Standing, mesh_of, scan_of
+from tests.helpers.scenes.scan_scenes import Standing, altered, mesh_of, scan_of
 from tests.helpers.scenes.scanners import preset
 
 OUSTER, PUCK = "ouster-os1-64", "velodyne-vlp-32c"
@@ -49,11 +48,11 @@ def scanned(name: str, distance: float, reflectance: float, retroreflection: flo
     Of the points, those of the wall in front within `WIDE` of its middle, to the sides and in height.
     """
     setting = preset(name, lines_per_second=10.0)
-    plan = replace(
+    plan = altered(
         scan_of(walls(distance), 1, Turning(TURNS / 10.0)),
         setting=setting,
         surfaces=surfaces_of([target_of(reflectance, retroreflection)]),
-        measured_layers=frozenset({"scanner", "channel"}),
+        measured=frozenset({"scanner", "channel"}),
     )
     strip = plan.path.strips[0]
     scan, counts = BlockScan(plan), shot_count(setting, strip.duration)

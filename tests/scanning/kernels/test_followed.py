@@ -27,7 +27,7 @@ from synthroads_addon.scanning.scene.motion import LinearMotion, MovingMesh
 from synthroads_addon.scanning.scene.surface_values import ALONG, POSITION, SurfaceInput
 from synthroads_addon.scanning.trace import CLEAR_LAYERS, Hits
 from tests.helpers.scenes.kernel_scenes import NAMES, assert_bytes, assert_same, downwards, planned, soup, stack
-from tests.helpers.scenes.scan_scenes import mesh_of
+from tests.helpers.scenes.scan_scenes import altered, mesh_of
 
 pytestmark = pytest.mark.any_blender
 
@@ -47,7 +47,7 @@ def with_panes(plan: ScanPlan, mesh: SceneMesh, clear: tuple[int, ...]) -> ScanP
         SceneSurfaces(mesh), dict.fromkeys(clear, Transparency(frozenset({POSITION, ALONG}), here_and_there))
     )
     surfaces = surfaces_of((materials()[name] for name in mesh.materials), "oren_nayar", clear=clear)
-    return replace(plan, surfaces=surfaces, transparency=see)
+    return altered(plan, surfaces=surfaces, transparency=see)
 
 
 class Drops:
@@ -99,8 +99,8 @@ def test_more_panes_than_a_ray_passes(name: str) -> None:
     mesh.vertices[4:8, 2] = mesh.vertices[0:4, 2] - 2e-4
     plan = with_panes(planned(mesh, 7), mesh, (1,))
     whole = Transparency(frozenset({POSITION}), lambda _: np.ones(1))
-    assert plan.transparency is not None
-    assert_same(replace(plan, transparency=replace(plan.transparency, materials={1: whole})), downwards(200))
+    assert plan.reflection.transparency is not None
+    assert_same(altered(plan, transparency=replace(plan.reflection.transparency, materials={1: whole})), downwards(200))
     assert_same(plan, downwards(500))
 
 
@@ -125,13 +125,13 @@ def with_vertices(mesh: SceneMesh, vertices: np.ndarray) -> SceneMesh:
 @pytest.mark.parametrize("changes", [{}, {"attenuation": 0.02}, {"range_resolution": 3.0}])
 def test_parallel_rays(rays: int, changes: dict[str, Any]) -> None:
     plan = planned(soup(2500), rays, divergence=WIDE, **changes)
-    parallel = replace(plan, beam="cylindrical")
+    parallel = altered(plan, beam="cylindrical")
     first, other = assert_same(parallel, downwards(2001)), assert_same(plan, downwards(2001))
     assert (len(first.pulse) == len(other.pulse)) == (rays == 1)
 
 
 def test_parallel_rays_over_things_that_move() -> None:
-    plan = replace(planned(soup(1000), 19, moving=driving(), divergence=(0.2, 0.1)), beam="cylindrical")
+    plan = altered(planned(soup(1000), 19, moving=driving(), divergence=(0.2, 0.1)), beam="cylindrical")
     assert_same(plan, downwards(3001))
 
 
@@ -153,8 +153,8 @@ def street() -> SceneMesh:
 def test_spared_footprints(rays: int, beam: Any, moving: bool) -> None:
     mesh, divergence = street(), (4e-3, 2e-3)
     plan = planned(mesh, rays, moving=driving() if moving else (), divergence=divergence, attenuation=0.01)
-    ground = BareGround(mesh, plan.surfaces.pervious, 30.0 * max(outer_radii(RINGS[rays], divergence)))
-    plan = replace(plan, ground=ground, beam=beam)
+    ground = BareGround(mesh, plan.reflection.surfaces.pervious, 30.0 * max(outer_radii(RINGS[rays], divergence)))
+    plan = altered(plan, ground=ground, beam=beam)
     assert plan.spares
     echoes = assert_same(plan, downwards(2001))
     assert np.count_nonzero(echoes.intensity) > 1000
@@ -164,7 +164,7 @@ def test_spared_footprints(rays: int, beam: Any, moving: bool) -> None:
 def test_few_pulses_whose_footprints_are_cast(count: int) -> None:
     mesh = street()
     plan = planned(mesh, 7, divergence=(4e-3, 2e-3))
-    plan = replace(plan, ground=BareGround(mesh, plan.surfaces.pervious, 0.1))
+    plan = altered(plan, ground=BareGround(mesh, plan.reflection.surfaces.pervious, 0.1))
     for seed in range(6):
         assert_same(plan, downwards(count, seed))
 
@@ -174,7 +174,7 @@ def test_few_pulses_whose_footprints_are_cast(count: int) -> None:
 @pytest.mark.parametrize("attenuation", [0.0, 0.02])
 def test_drops_and_mirrors(rays: int, what: str, attenuation: float) -> None:
     plan = planned(soup(2500), rays, divergence=WIDE, attenuation=attenuation, threshold=1e-9)
-    changed = replace(
+    changed = altered(
         plan,
         effects=(Drops(), Drops()) if what != "mirrors" else (),
         multipath=mirrors() if what != "drops" else None,
@@ -213,7 +213,7 @@ def test_all_at_once(seed: int) -> None:
     random, mesh = stream(seed, "all"), soup(900, seed)
     rays = int(random.choice(list(RINGS)))
     plan = planned(mesh, rays, moving=driving(), divergence=tuple(random.uniform(0.0, 0.1, 2)), threshold=1e-9)
-    plan = replace(plan, beam=random.choice(["conical", "cylindrical"]), attenuation=float(random.choice([0.0, 0.03])))
+    plan = altered(plan, beam=random.choice(["conical", "cylindrical"]), attenuation=float(random.choice([0.0, 0.03])))
     if random.random() < 0.5:
         plan = with_panes(plan, mesh, (2, 4))
-    assert_same(replace(plan, effects=(Drops(),), multipath=mirrors()), downwards(int(random.integers(2, 1500)), seed))
+    assert_same(altered(plan, effects=(Drops(),), multipath=mirrors()), downwards(int(random.integers(2, 1500)), seed))

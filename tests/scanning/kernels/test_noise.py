@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from synthroads_addon.base.random_streams import stream
 from synthroads_addon.scanning.kernels.library import load_kernel
 from synthroads_addon.scanning.kernels.noise import CompiledNoise, usable_noise
 from synthroads_addon.scanning.record import scan_blocks
-from tests.helpers.scenes.scan_scenes import Standing, plane, scan_of
+from tests.helpers.scenes.scan_scenes import Standing, altered, plane, scan_of
 
 pytestmark = pytest.mark.any_blender
 
@@ -94,7 +93,7 @@ def test_a_scan_works_fields_out_by_the_kernel_while_it_runs() -> None:
             return super().fill(*arguments)  # type: ignore[arg-type]
 
     counted, plan = Counted(), scan_of(plane(), path=Standing())
-    plan = replace(plan, chosen_blocks=((plan.path.strips[0], 0),))
+    plan = altered(plan, chosen_blocks=((plan.path.strips[0], 0),))
     assert plan.noise_kernel is None  # its caster is no packets'
     vars(plan).update(noise_kernel=counted)
     for result in scan_blocks(plan):

@@ -33,7 +33,7 @@ from tests.helpers.scenes.kernel_scenes import (
     soup,
     stack,
 )
-from tests.helpers.scenes.scan_scenes import BruteForce, mesh_of, plane, scan_of
+from tests.helpers.scenes.scan_scenes import BruteForce, altered, mesh_of, plane, scan_of
 
 pytestmark = pytest.mark.any_blender
 
@@ -70,9 +70,9 @@ _CALLED = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 2, ctypes.c_int64, *[ctype
 @pytest.mark.parametrize("attenuation", [0.0, 0.02])
 def test_leaves_panes_and_reflectors_send_back_the_same_bytes(rays: int, attenuation: float) -> None:
     plan = planned(soup(), rays, attenuation=attenuation)
-    assert plan.surfaces.permeable
-    assert plan.surfaces.retroreflective
-    assert plan.surfaces.rough
+    assert plan.reflection.surfaces.permeable
+    assert plan.reflection.surfaces.retroreflective
+    assert plan.reflection.surfaces.rough
     assert plan.gaps is not None
     echoes = assert_same(plan, downwards(3001))
     assert len(np.unique(echoes.pulse)) < len(echoes.pulse)
@@ -164,7 +164,7 @@ def test_faces_without_area_and_edge_on(rays: int) -> None:
     direction[0, ::2] = 0.0
     level = pulses_of(pulses.origin, direction / np.linalg.norm(direction, axis=0))
     plan = planned(replace(mesh, vertices=vertices), rays)
-    forced = replace(plan, target=Target(ScannedScene(replace(mesh, vertices=vertices), ()), Forced))
+    forced = altered(plan, target=Target(ScannedScene(replace(mesh, vertices=vertices), ()), Forced))
     faces = forced.target.caster.cast(*(array.T.astype(np.float32) for array in (level.origin, level.direction)), 500.0)
     ranges, along = FacePlanes(replace(mesh, vertices=vertices)).intersect(faces, level.origin, level.direction)
     assert (along[faces >= 0] == 0.0).any()
@@ -196,9 +196,9 @@ def test_why_numpy_does_all_is_said() -> None:
     mixed = Target(ScannedScene(soup(9), (driving,)), lambda one: (Cast if len(one.triangles) > 9 else BruteForce)(one))
     half = Target(ScannedScene(soup(10), (driving,)), lambda one: (Cast if len(one.triangles) > 9 else BruteForce)(one))
     cases: dict[str, ScanPlan] = {
-        "no rays are cast in packets": replace(plan, target=mixed),
-        "no rays are cast in packets at what moves": replace(plan, target=half),
-        "faces are of materials that aren't there": replace(plan, surfaces=surfaces_of([materials()["asphalt"]])),
+        "no rays are cast in packets": altered(plan, target=mixed),
+        "no rays are cast in packets at what moves": altered(plan, target=half),
+        "faces are of materials that aren't there": altered(plan, surfaces=surfaces_of([materials()["asphalt"]])),
     }
     assert str(scan_of(plane(), 7).pulse_kernel) == "no rays are cast in packets"
     for reason, one in cases.items():

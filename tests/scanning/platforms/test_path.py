@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.dataset.recipe import load_recipe, scene_jobs
 from synthroads_addon.road.alignment import Alignment, Element
+from synthroads_addon.road.axes.centerline import AxisContent
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, RoadParameters, VerticalPoint
 from synthroads_addon.sampling.road import sample_road
@@ -768,12 +769,12 @@ def test_a_jittering_line_is_thinned_within_its_tolerance() -> None:
 def test_a_polyline_is_read_from_a_file_in_map_coordinates(tmp_path) -> None:
     file = tmp_path / "axis.csv"
     file.write_text("x,y,z\n500000,5600000,100\n500300,5600000,103\n500600,5600100,100\n", encoding="utf-8")
-    guide = PolylineGuide.read(file, origin=(500_000.0, 5_600_000.0, 90.0))
+    guide = PolylineGuide.along(AxisContent.read(file), origin=(500_000.0, 5_600_000.0, 90.0))
     start = np.zeros(1)
     np.testing.assert_allclose(guide.frame(start)[0], [[0.0, 0.0]], atol=1e-9)
     np.testing.assert_allclose(guide.elevation(start), 10.0, atol=1e-9)
     np.testing.assert_array_equal(guide.origin, (500_000.0, 5_600_000.0, 90.0))
-    centred = PolylineGuide.read(file)
+    centred = PolylineGuide.along(AxisContent.read(file))
     place = np.append(centred.frame(start)[0], centred.elevation(start))
     np.testing.assert_allclose(place + centred.origin, [500_000.0, 5_600_000.0, 100.0])
     path = make_platform(kind="vehicle").make_path(guide)

@@ -13,7 +13,7 @@ from synthroads_addon.scanning.platforms.path import epoch_of
 from synthroads_addon.scanning.platforms.polyline import PolylineGuide
 from synthroads_addon.scanning.platforms.registry import make_platform
 from synthroads_addon.scanning.platforms.stretches import PathStretches
-from synthroads_addon.scanning.platforms.trajectory import check_headings, check_trajectory_file, read_trajectory
+from synthroads_addon.scanning.platforms.trajectory import TrajectoryContent, check_headings, read_trajectory
 from synthroads_addon.scanning.sway import Motion, with_motion
 from tests.helpers.files.axis_files import in_system
 from tests.helpers.files.sbet_files import Flight
@@ -78,7 +78,7 @@ def test_sbet_comes_on_the_map(wander: float, sign: float, tmp_path: Path) -> No
 
 def test_sbet_needs_a_map(tmp_path: Path) -> None:
     path = Flight().sbet(tmp_path / "flight.sbet")
-    check_trajectory_file(path)
+    TrajectoryContent.read(path)
     with pytest.raises(InputError, match=r"flight\.sbet: the map's coordinate system must be named"):
         read_trajectory(path)
     with pytest.raises(InputError, match="outside of the system's area of use"):
@@ -103,7 +103,7 @@ def damaged(column: int, row: int, value: float) -> bytes:
 )
 def test_what_is_no_sbet_is_refused_by_record(data: bytes, said: str, tmp_path: Path) -> None:
     (tmp_path / "flight.out").write_bytes(data)
-    for read in (check_trajectory_file, lambda path: read_trajectory(path, HOME)):
+    for read in (TrajectoryContent.read, lambda path: read_trajectory(path, HOME)):
         with pytest.raises(InputError, match=re.escape(said)):
             read(tmp_path / "flight.out")
 

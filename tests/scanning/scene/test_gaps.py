@@ -9,7 +9,7 @@ from synthroads_addon.materials.surfaces import Surfaces, surfaces_of
 from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.scene.gaps import LeafGaps
-from tests.helpers.scenes.scan_scenes import Standing, mesh_of, scan_of, scan_pulses
+from tests.helpers.scenes.scan_scenes import Standing, altered, mesh_of, scan_of, scan_pulses
 
 OPEN, SIZE = 0.4, 0.1
 
@@ -27,7 +27,7 @@ def canopy(rays: int = 1, heights: tuple[float, ...] = (10.03,), **changes) -> S
     material = np.array([0, 0] + [1, 1] * len(heights), np.uint16)
     mesh = replace(mesh, material=material, materials=("asphalt", "leaves"))
     scan = scan_of(mesh, rays, Standing(60.0, 20.0), **changes)
-    return replace(scan, surfaces=leaf_surfaces())
+    return altered(scan, surfaces=leaf_surfaces())
 
 
 def scanned(scan: ScanPlan, first: int = 0, count: int = 3000):
@@ -93,15 +93,15 @@ def test_what_is_met_is_of_place_and_seed_alone() -> None:
 def test_leaves_are_where_they_were_when_a_place_is_scanned_again() -> None:
     scan = canopy(divergence=(1e-9, 1e-9))
     np.testing.assert_array_equal(scanned(scan).xyz, scanned(scan).xyz)
-    other = scanned(replace(scan, seed=scan.seed + 1))
+    other = scanned(altered(scan, seed=scan.run.seed + 1))
     assert not np.array_equal(other.xyz[:, 2] > 185.0, scanned(scan).xyz[:, 2] > 185.0)
 
 
 def test_nothing_is_looked_up_where_no_material_has_gaps() -> None:
     scan = canopy()
     assert scan.gaps is not None
-    assert replace(scan, surfaces=leaf_surfaces(0.0)).gaps is None
-    assert replace(scan, surfaces=leaf_surfaces(transmission=0.0)).gaps is None
+    assert altered(scan, surfaces=leaf_surfaces(0.0)).gaps is None
+    assert altered(scan, surfaces=leaf_surfaces(transmission=0.0)).gaps is None
 
 
 def test_light_is_neither_lost_nor_made() -> None:

@@ -8,6 +8,7 @@ from synthroads_addon.jobs.scan_scene import route_site
 from synthroads_addon.scanning.platforms.over_scene import SceneRoute
 from synthroads_addon.scanning.scene.map_coordinates import rounding_warnings, shift_of, step_at, to_scene_axes
 from synthroads_addon.scanning.scene.mesh import SceneMesh
+from synthroads_addon.scenario.inputs import ScenarioInputs
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.files.map_meshes import FACES, GROUND
 
@@ -43,7 +44,9 @@ def test_steps_are_told(place: tuple[float, float, float], told: list[str]) -> N
 
 def test_the_panel_refuses_map_coordinates_before_it_scans() -> None:
     with pytest.raises(InputError, match=r"the open scene: coordinates .* steps of 0\.5 m there: move it near the"):
-        route_site(Scenario(), SceneRoute("extent"), ground((294_000.0, 5_628_000.0, 0.0)))
+        route_site(
+            Scenario(), ScenarioInputs.read(Scenario()), SceneRoute("extent"), ground((294_000.0, 5_628_000.0, 0.0))
+        )
 
 
 def test_whole_metres_are_subtracted_where_the_scene_is_far() -> None:

@@ -1,14 +1,12 @@
 """Beams that an outline lets go meet nothing, not even with their rims; and it lets many of those go that don't."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from synthroads_addon.scanning.scan import BlockResult
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.outline import Outline
-from tests.helpers.scenes.scan_scenes import BruteForce, mesh_of, plane, scan_of, scan_pulses
+from tests.helpers.scenes.scan_scenes import BruteForce, altered, mesh_of, plane, scan_of, scan_pulses
 
 RADIUS, REACH = 2.0, 300.0
 
@@ -93,11 +91,11 @@ def test_where_nearly_all_beams_meet_something_few_are_asked() -> None:
 def test_a_scan_is_the_same_with_fewer_rays(beam: str) -> None:
     """Of a line over a narrow road, with wide beams that reach it with their rims alone."""
     mesh = plane(20.0, (0.0, 0.1))
-    full = replace(scan_of(mesh, 7, divergence=(2e-2, 1e-2)), beam=beam)
+    full = altered(scan_of(mesh, 7, divergence=(2e-2, 1e-2)), beam=beam)
     margin = 300.0 * 2e-2
 
     def line(outline: Outline | None) -> BlockResult:
-        return scan_pulses(replace(full, outline=outline), full.path.strips[0], 0, 1000)
+        return scan_pulses(altered(full, outline=outline), full.path.strips[0], 0, 1000)
 
     whole, some = line(None), line(Outline(mesh, BruteForce, margin))
     for name in ("xyz", "intensity", "gps_time", "return_number", "incidence_deg"):

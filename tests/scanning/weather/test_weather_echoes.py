@@ -13,7 +13,7 @@ from synthroads_addon.scanning.receiver import Receiver
 from synthroads_addon.scanning.weather.base import Weather
 from synthroads_addon.scanning.weather.conditions import Fog, Rain, Snow
 from synthroads_addon.scanning.weather.soft_target import soft_peak
-from tests.helpers.scenes.scan_scenes import Standing, middle_pulses, plane, scan_block, scan_of
+from tests.helpers.scenes.scan_scenes import Standing, altered, middle_pulses, plane, scan_block, scan_of
 
 RINGS = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0])
 DIVERGENCE = 4e-3
@@ -25,7 +25,7 @@ def in_weather(weather: Weather, threshold: float = THRESHOLD, path: Standing | 
     plan = scan_of(
         plane(), path=path, threshold=threshold, divergence=(DIVERGENCE, DIVERGENCE), minimum_range=1.0, **changes
     )
-    return replace(plan, effects=weather.effects())
+    return altered(plan, effects=weather.effects())
 
 
 def published(weather: Rain | Snow, low: float, high: float) -> float:
@@ -49,7 +49,7 @@ def published(weather: Rain | Snow, low: float, high: float) -> float:
 
 @pytest.mark.parametrize("weather", [Rain(rate_mm_h=20.0, echoes=True), Snow(rate_mm_h=3.0, echoes=True)])
 def test_drops_and_flakes_are_met_as_often_as_published_in_every_ring(weather: Rain | Snow) -> None:
-    plan = replace(in_weather(weather), setting=replace(in_weather(weather).setting, range_resolution=0.0))
+    plan = altered(in_weather(weather), setting=replace(in_weather(weather).setting, range_resolution=0.0))
     result = scan_block(plan, plan.path.strips[0], 0)
     air = result.points.class_id == UNLABELLED
     found = np.histogram(result.points.range[air], RINGS)[0]
@@ -80,7 +80,7 @@ def test_fog_s_echo_is_the_peak_of_the_published_integral() -> None:
     fog = Fog(visibility=80.0, echoes=True)
     plan = in_weather(fog, receiver=Receiver(overlap_begin=1.0, overlap_full=3.0))
     extinction, width = fog.extinction(905.0), plan.setting.range_resolution
-    plan = replace(plan, attenuation=2 * extinction)
+    plan = altered(plan, attenuation=2 * extinction)
 
     def power(reach: float) -> float:
         def back(behind: float) -> float:
@@ -97,7 +97,7 @@ def test_fog_s_echo_is_the_peak_of_the_published_integral() -> None:
     distance, peak = soft_peak(plan.setting, extinction)
     assert distance == pytest.approx(reach[expected.argmax()], abs=0.02)
     assert peak == pytest.approx(expected.max(), rel=0.01)
-    points = middle_pulses(replace(plan, setting=replace(plan.setting, threshold=0.5 * peak)), 100).points
+    points = middle_pulses(altered(plan, setting=replace(plan.setting, threshold=0.5 * peak)), 100).points
     fogged = points.class_id == UNLABELLED
     assert fogged.sum() == 100
     np.testing.assert_allclose(points.range[fogged], distance, atol=1e-6)
@@ -106,10 +106,10 @@ def test_fog_s_echo_is_the_peak_of_the_published_integral() -> None:
 
 def test_faint_fog_is_detected_by_chance() -> None:
     fog = Fog(visibility=80.0, echoes=True)
-    plan = replace(in_weather(fog), attenuation=2 * fog.extinction(905.0))
+    plan = altered(in_weather(fog), attenuation=2 * fog.extinction(905.0))
     _, peak = soft_peak(plan.setting, fog.extinction(905.0))
     receiver = Receiver(threshold_to_noise=5.0)
-    plan = replace(plan, setting=replace(plan.setting, threshold=peak / 0.9, receiver=receiver))
+    plan = altered(plan, setting=replace(plan.setting, threshold=peak / 0.9, receiver=receiver))
     result = scan_block(plan, plan.path.strips[0], 0)
     found = np.count_nonzero(result.points.class_id == UNLABELLED)
     chance = stats.norm.cdf(5.0 * (0.9 - 1.0))
@@ -118,7 +118,7 @@ def test_faint_fog_is_detected_by_chance() -> None:
 
 def test_no_echo_unless_wanted_and_the_scheme_s_class_for_noise() -> None:
     assert Rain().effects() == Snow().effects() == Fog().effects() == ()
-    plan = replace(in_weather(Rain(rate_mm_h=50.0, echoes=True)), air_class=42)
+    plan = altered(in_weather(Rain(rate_mm_h=50.0, echoes=True)), air_class=42)
     assert set(scan_block(plan, plan.path.strips[0], 0).points.class_id) == {1, 42}
 
 

@@ -15,6 +15,7 @@ import synthroads_addon
 from synthroads_addon.base.schema import note_of
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.model.store import find_road, remember
+from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.devices.device import DEVICES, device_names
@@ -86,7 +87,7 @@ def test_layout(name: str, library: Path) -> None:
 def test_the_road_panel_says_what_the_road_was_built_from(panel: Any) -> None:
     scenario = load_scenario("rq31-600m", ["road.length=20"])
     parameters = sample_road(scenario.road, 1)
-    road = build_road(parameters, 0.02, 0.0).root
+    road = build_road(BuildRequest(parameters, 0.02, 0.0)).root
     for built_from, said in (
         ("", ["label 'Built by a command, not from these settings' <FILE>"]),
         ('["file", "mine.json"]', ["label 'Built from mine.json' <FILE>"]),
@@ -136,7 +137,7 @@ def says_changed() -> bool:
 def test_every_setting_that_is_shown_says_that_the_road_has_changed(panel: Any) -> None:
     scenario = load_scenario("rq31-600m", ["road.length=20"])
     parameters = sample_road(scenario.road, 1)
-    road = build_road(parameters, 0.02, 0.0).root
+    road = build_road(BuildRequest(parameters, 0.02, 0.0)).root
     panel.road.cross_section = BY_HAND
     for group, name, _ in road_properties(panel):
         if name.startswith("own_"):

@@ -17,7 +17,7 @@ from synthroads_addon.blender.model.roads import root_above
 from synthroads_addon.blender.model.stage import DataBlockLog, remove_staged
 from synthroads_addon.blender.model.store import find_road, recall, roads
 from synthroads_addon.blender.scene.evaluated import scene_mesh
-from synthroads_addon.blender.things.model_builder import ROLE
+from synthroads_addon.blender.things.model_builder import ROLE, BuildRequest
 from synthroads_addon.blender.things.registry import model_parts
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.sampling.road import sample_road
@@ -64,7 +64,7 @@ def test_the_button_builds_what_the_library_builds(cheap: Any) -> None:  # noqa:
     same = load_scenario("rq31-600m", SAME)
     road = sample_road(same.road, same.seed, same.title)
     assert kept == road
-    build_road(road, same.settings().tolerance, same.settings().vegetation_detail)
+    build_road(BuildRequest(road, same.settings().tolerance, same.settings().vegetation_detail))
     library = scene_mesh()
     for name in ("vertices", "triangles", "class_id", "instance_id", "material"):
         assert (getattr(panel, name) == getattr(library, name)).all(), name
@@ -73,10 +73,10 @@ def test_the_button_builds_what_the_library_builds(cheap: Any) -> None:  # noqa:
 def test_steps_build_what_is_built_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(model_module, "_TURN", 0.0)  # as many turns as there can be
     road = parameters()
-    first = finish(build_steps(road, 0.02, 0.1))
+    first = finish(build_steps(BuildRequest(road, 0.02, 0.1)))
     names = sorted(item.name for item in first.collection.objects if item != first.root)
     stepped = scene_mesh()
-    second = build_road(road, 0.02, 0.1)
+    second = build_road(BuildRequest(road, 0.02, 0.1))
     at_once = scene_mesh()
     assert sorted(item.name for item in second.collection.objects if item != second.root) == names
     assert names == sorted(second.objects)
@@ -106,7 +106,7 @@ def test_cancelling_at_any_step_leaves_the_file_as_it_was(
     kept_groups: KeptGroups,
 ) -> None:
     if before != "nothing":
-        model = build_road(parameters(length=40), 0.02, 0.1)
+        model = build_road(BuildRequest(parameters(length=40), 0.02, 0.1))
         model.collection.objects.link(users_own)
         model.collection.color_tag = "COLOR_03"
         kept_groups.on = False  # steps end in the midst of making groups too
@@ -114,7 +114,7 @@ def test_cancelling_at_any_step_leaves_the_file_as_it_was(
     expected, counts = digest(), block_counts()
     road = parameters()
     number, seen = 1, 0
-    while steps_until_cancelled(number, lambda: build_steps(road, 0.02, 0.1)):
+    while steps_until_cancelled(number, lambda: build_steps(BuildRequest(road, 0.02, 0.1))):
         assert block_counts() == counts, number
         assert digest() == expected, number
         seen += 1
@@ -123,7 +123,7 @@ def test_cancelling_at_any_step_leaves_the_file_as_it_was(
 
 
 def test_cancelling_leaves_what_the_user_made_meanwhile() -> None:
-    steps = build_steps(parameters(), 0.02, 0.1)
+    steps = build_steps(BuildRequest(parameters(), 0.02, 0.1))
     for _ in range(4):
         next(steps)
     bpy.data.materials.new("Mine")
@@ -136,9 +136,9 @@ def test_cancelling_leaves_what_the_user_made_meanwhile() -> None:
 
 
 def test_the_road_before_stays_until_the_new_one_is_complete() -> None:
-    old = build_road(parameters(length=40), 0.02, 0.1)
+    old = build_road(BuildRequest(parameters(length=40), 0.02, 0.1))
     names = sorted([*old.objects, old.root.name])
-    steps = build_steps(parameters(), 0.02, 0.1)
+    steps = build_steps(BuildRequest(parameters(), 0.02, 0.1))
     next(steps)
     for _ in steps:
         found = bpy.data.collections["SynthRoads"]
@@ -149,7 +149,7 @@ def test_the_road_before_stays_until_the_new_one_is_complete() -> None:
 
 
 def test_a_part_that_fails_leaves_the_road_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    build_road(parameters(length=40), 0.02, 0.1)
+    build_road(BuildRequest(parameters(length=40), 0.02, 0.1))
     expected, counts = digest(), block_counts()
 
     def fail(builder: Any) -> None:
@@ -157,7 +157,10 @@ def test_a_part_that_fails_leaves_the_road_before(monkeypatch: pytest.MonkeyPatc
 
     parts = model_parts()
     monkeypatch.setitem(parts, "delineators", parts["delineators"]._replace(build=fail))
-    for run in (lambda: build_road(parameters(), 0.02, 0.1), lambda: finish(build_steps(parameters(), 0.02, 0.1))):
+    for run in (
+        lambda: build_road(BuildRequest(parameters(), 0.02, 0.1)),
+        lambda: finish(build_steps(BuildRequest(parameters(), 0.02, 0.1))),
+    ):
         with pytest.raises(InputError, match="cannot be read"):
             run()
         assert block_counts() == counts
@@ -165,12 +168,12 @@ def test_a_part_that_fails_leaves_the_road_before(monkeypatch: pytest.MonkeyPatc
 
 
 def test_groups_of_an_older_version_get_their_names_back(kept_groups: KeptGroups) -> None:
-    build_road(parameters(length=40), 0.02, 0.1)
+    build_road(BuildRequest(parameters(length=40), 0.02, 0.1))
     kept_groups.on = False
     for group in bpy.data.node_groups:
         group["synthroads_key"] = "older"
     expected = digest()
-    steps = build_steps(parameters(), 0.02, 0.1)
+    steps = build_steps(BuildRequest(parameters(), 0.02, 0.1))
     while len(bpy.data.collections["SynthRoads (building)"].objects if len(bpy.data.collections) > 1 else ()) < 3:
         next(steps)
     assert any("(older)" in group.name for group in bpy.data.node_groups)
@@ -179,9 +182,9 @@ def test_groups_of_an_older_version_get_their_names_back(kept_groups: KeptGroups
 
 
 def test_what_a_build_could_not_clean_up_goes_with_the_next_look() -> None:
-    build_road(parameters(length=40), 0.02, 0.1)
+    build_road(BuildRequest(parameters(length=40), 0.02, 0.1))
     expected = [line for line in lines() if not line.startswith("materials")]
-    steps = build_steps(parameters(), 0.02, 0.1)
+    steps = build_steps(BuildRequest(parameters(), 0.02, 0.1))
     # How often it pauses depends on the machine's speed.
     for _ in steps:
         found = bpy.data.collections.get("SynthRoads (building)")
@@ -299,7 +302,7 @@ def test_a_growing_road_is_evaluated_but_not_drawn() -> None:
     """Drawing each step takes longer than building; what is complete is shown."""
     bpy.ops.mesh.primitive_cube_add()
     seen = 0
-    steps = build_unseen(build_steps(parameters(), 0.02, 0.1))
+    steps = build_unseen(build_steps(BuildRequest(parameters(), 0.02, 0.1)))
     while True:
         try:
             next(steps)

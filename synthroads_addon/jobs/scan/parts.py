@@ -1,0 +1,225 @@
+"""Builders of the parts of a scan's plan (`scanning.parts`), with every default of fidelity and weather filled in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ...base.classes import UNLABELLED
+from ...cloud.layers import optional_arrays
+from ...materials.surfaces import Surfaces, surfaces_of
+from ...materials.table import Material, entry_of
+from ...materials.variation import vary_material, water_film
+from ...road.instances import InstanceNumbers
+from ...scanning.beam import RINGS, outer_radii
+from ...scanning.blocks import Blocks
+from ...scanning.colour.colour import takes_nodes
+from ...scanning.colour.request import LayerRequest
+from ...scanning.colour.surfaces import SceneSurfaces
+from ...scanning.colour.transparency import SeeThrough, Transparency
+from ...scanning.finish import OF_INTENSITY
+from ...scanning.multipath import Multipath, mirrors_of
+from ...scanning.parts.atmosphere import Atmosphere
+from ...scanning.parts.conditions import ScanConditions
+from ...scanning.parts.emission import Emission
+from ...scanning.parts.layers import Layers, SceneServices
+from ...scanning.parts.reflection import Reflection
+from ...scanning.parts.relief import Relief
+from ...scanning.relief.micro_relief import micro_relief
+from ...scanning.relief.normal_images import NormalImage, NormalImages
+from ...scanning.scene.bare_ground import MOST_CELLS, BareGround
+from ...scanning.scene.caster import Caster
+from ...scanning.scene.mesh import SceneMesh
+from ...scanning.scene.motion import ScannedScene
+from ...scanning.scene.outline import Outline
+from ...scanning.weather.registry import weather_of
+from ...scenario.inputs import ScenarioInputs
+from ...scenario.scenario import Scenario
+
+AIR_CLASS = "noise"
+"""Class of what rain, snow and fog send back, in schemes that have it; without one it is unlabelled."""
+_CELLS_PER_PULSE, _FEWEST_CELLS = 4, 1 << 18
+"""Cells in which it is looked for what is near a footprint: many are dearer than what a small scan saves by them."""
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Basis of a scan's plan, whatever the scene.
+
+    Attributes:
+        scenario: the job.
+        inputs: what the files that it names hold.
+        services: of the program that shows the scene.
+        conditions: the road's; those of no road by default.
+    """
+
+    scenario: Scenario
+    inputs: ScenarioInputs
+    services: SceneServices
+    conditions: ScanConditions = field(default_factory=ScanConditions)
+
+    def caster(self, mesh: SceneMesh) -> Caster:
+        """Return a ray caster over a mesh, of the kind that the scenario asks for."""
+        return self.services.caster(self.scenario.scan.caster, mesh, self.scenario.scan.kernels)
+
+    def damage_kinds(self) -> dict[int, int]:
+        """Return the kinds of the road's damages by instance number, if the cloud's files hold them; else none."""
+        road, kept = self.conditions.road, self.scenario.kept_layers
+        return InstanceNumbers(road).damages() if road is not None and "damage" in kept else {}
+
+
+@dataclass(frozen=True)
+class SceneMaterials:
+    """Materials of a scene, asked once of the program that shows it; lists are in the order of the names.
+
+    Attributes:
+        names: as the scene has them.
+        means: as the scene has them.
+        scanned: as the scan meets them, with the road's age and wetness.
+        transparencies: light that they let through at each place, by index.
+        normal_images: by index; none unless normals follow them.
+        give_intensities: whether intensities are computed from each point's own material layers.
+    """
+
+    names: tuple[str, ...]
+    means: list[Material]
+    scanned: list[Material]
+    transparencies: Mapping[int, Transparency]
+    normal_images: dict[int, NormalImage]
+    give_intensities: bool
+
+    @classmethod
+    def of(cls, survey: Survey, names: tuple[str, ...]) -> SceneMaterials:
+        """Return a scene's materials of these names."""
+        services, table = survey.services, survey.inputs.materials
+        images = services.normal_images(names) if survey.scenario.scan.relief_normals else {}
+        means = services.materials(names)
+        variation, environment = survey.conditions.variation, survey.conditions.environment
+        scanned = [
+            # A textured one has the images' means, and was made with the table.
+            vary_material(name, variation, environment, table)
+            if name in table and variation.texture(name) is None
+            else mean
+            for name, mean in zip(map(entry_of, names), means, strict=True)
+        ]
+        by_layers = _intensity_from_layers(survey, scanned, names)
+        return cls(names, means, scanned, services.transparencies(names), images, by_layers)
+
+
+def _intensity_from_layers(survey: Survey, scanned: list[Material], names: tuple[str, ...]) -> bool:
+    """Return whether intensities are computed from each point's own material layers.
+
+    Where nothing is said they do if nodes give these layers, and no table says how the brightness varies: who fitted
+    such a table to a real cloud wants that.
+    """
+    colour, fidelity = survey.scenario.colour, survey.scenario.fidelity
+    if colour.intensity_from_layers != "auto":
+        return colour.intensity_from_layers == "always"
+    spread = any(row.spread_below or row.spread_above for row in scanned)
+    return takes_nodes(colour.settings(fidelity)) and not spread and survey.services.reflectance_varies(names)
+
+
+def make_atmosphere(survey: Survey, wavelength: float) -> Atmosphere:
+    """Return the air for light of a wavelength (nm), by the scenario's weather, else the road's.
+
+    An attenuation that the scenario gives stands for a weather without echoes.
+    """
+    scan = survey.scenario.scan
+    loss, weather = scan.attenuation, scan.weather or weather_of(survey.conditions.environment)
+    return Atmosphere(
+        attenuation=weather.attenuation(wavelength) if loss is None else loss,
+        effects=weather.effects() if loss is None else (),
+        air_class=survey.inputs.scheme.source_ids().get(AIR_CLASS, UNLABELLED),
+    )
+
+
+def make_reflection(survey: Survey, scene: ScannedScene, materials: SceneMaterials) -> Reflection:
+    """Return what a scene's materials make of the beam; the layers of each point have their own variation already."""
+    scan, clear, spread = survey.scenario.scan, materials.transparencies, not materials.give_intensities
+    return Reflection(
+        surfaces=surfaces_of(materials.scanned, scan.reflection, spread=spread, clear=clear),
+        transparency=_see_through(scene, clear) if clear else None,
+        multipath=_multipath(survey, materials) if scan.multipath else None,
+    )
+
+
+def _see_through(scene: ScannedScene, materials: Mapping[int, Transparency]) -> SeeThrough:
+    """Return the transparent materials of a scene by their index."""
+    return SeeThrough(SceneSurfaces(scene.static, scene.moving), materials, unit=scene.static.unit)
+
+
+def _multipath(survey: Survey, materials: SceneMaterials) -> Multipath:
+    """Return the ghost echoes over a scene's materials as scanned."""
+    films = [water_film(entry_of(name), survey.conditions.environment) for name in materials.names]
+    return Multipath(mirrors_of(materials.scanned, films), survey.scenario.scan.multipath)
+
+
+def make_emission(survey: Survey, cut: Blocks, mesh: SceneMesh, air: Atmosphere, reflection: Reflection) -> Emission:
+    """Return how pulses leave the scanner, with what needn't be cast of them where echoes come from surfaces alone.
+
+    Args:
+        survey: basis of the plan.
+        cut: the scan's blocks.
+        mesh: what stands still, with classes of the full table.
+        air: adds echoes or doesn't.
+        reflection: of the scene.
+    """
+    scenario, setting, scan, ground, outline = survey.scenario, cut.setting, survey.scenario.scan, None, None
+    rings, divergence = scenario.beam_rings, setting.divergence
+    spares = scenario.settings().footprints == "where_needed" and (rings or scenario.chooses)
+    if spares and not air.effects and reflection.multipath is None:
+        ground = _bare_ground(mesh, reflection.surfaces, cut, outer_radii(rings, divergence))
+    if rings and not air.effects and len(mesh.triangles):
+        widest = max(max(outer_radii(pattern, divergence)) for pattern in RINGS.values())
+        margin = widest * setting.maximum_range  # measurements take the plan with other rays per pulse
+        outline = Outline(mesh, survey.caster, margin)
+    return Emission(setting, cut.path, rings, scan.beam, scan.platform.driven, ground, outline)
+
+
+def _bare_ground(mesh: SceneMesh, surfaces: Surfaces, cut: Blocks, radii: tuple[float, float]) -> BareGround:
+    """Return where footprints of half axes ``radii`` (m per metre of range) meet nothing but ground, for all pulses."""
+    pulses = sum(map(cut.pulse_count, cut.path.strips))
+    cells = min(max(_CELLS_PER_PULSE * pulses, _FEWEST_CELLS), MOST_CELLS)
+    return BareGround(mesh, surfaces.pervious, max(radii) * cut.path.typical_range, cells)
+
+
+def make_relief(survey: Survey, materials: SceneMaterials) -> Relief:
+    """Return the relief of a scene's surfaces beyond the model's faces, as far as the scenario wants it."""
+    scan, conditions, images = survey.scenario.scan, survey.conditions, materials.normal_images
+    shifts = scan.relief > 0.0
+    return Relief(
+        micro=micro_relief(materials.names, materials.means) if shifts else None,
+        strength=scan.relief,
+        octaves=survey.scenario.settings().relief_octaves,
+        normals=scan.relief_normals,
+        images=NormalImages(images, conditions.pavement) if images else None,
+        pavement=conditions.pavement if shifts else None,
+    )
+
+
+def make_layers(
+    survey: Survey, scene: ScannedScene, materials: SceneMaterials, relief: Relief, emission: Emission
+) -> Layers:
+    """Return which layers the points get, and where from; what relief and intensities need is among the measured."""
+    scenario, path, by_layers = survey.scenario, emission.path, materials.give_intensities
+    kept, coloured = scenario.kept_layers, scenario.coloured_layers
+    moved = relief.micro is not None or relief.images is not None
+    return Layers(
+        measured=(kept & optional_arrays("scan")) | ({"normal", "material"} if moved else set()),
+        coloured=coloured,
+        kept=kept,
+        seen_points=bool(coloured) or by_layers or moved,
+        means=surfaces_of(materials.means),
+        request=LayerRequest(
+            settings=scenario.colour.settings(scenario.fidelity, path.typical_range),
+            wanted=coloured | (OF_INTENSITY if by_layers else set()),
+            mesh=scene.static,
+            environment=survey.conditions.environment,
+            path=path,
+            field_of_view=emission.setting.field_of_view,
+            seed=scenario.seed,
+            moving=scene.moving,
+            kernels=scenario.scan.kernels,
+        ),
+        services=survey.services,
+    )
