@@ -40,6 +40,40 @@ class PackedPoints(NamedTuple):
     per_degree: float
 
 
+class ColumnGrid(NamedTuple):
+    """Grid across a direction, in whose cells lie what is seen side by side from there.
+
+    Attributes:
+        axes: (2, 3) vectors across the direction, over the width of the cells.
+        low: (2,) where the grid begins along these, in cells.
+        count: of the cells along each.
+        margin: by which faces are wider than they are, in cells.
+        direction: (3,) unit vector.
+        above: how far from a face's plane a place must be to be surely on one of its sides, m.
+    """
+
+    axes: Float
+    low: Float
+    count: tuple[int, int]
+    margin: float
+    direction: Float
+    above: float
+
+
+class Faces(NamedTuple):
+    """Faces of a mesh.
+
+    Attributes:
+        vertices: (V, 3) m.
+        triangles: (T, 3) rows of these.
+        planes: (T, 4) unit normals n, and c of n . x = c.
+    """
+
+    vertices: Float32
+    triangles: AnyArray
+    planes: Float
+
+
 class PointLoops(Protocol):
     """Interface of the loops; each gives the bytes of the NumPy code that asks for it: `scanning.kernels.points`."""
 
@@ -143,6 +177,32 @@ class PointLoops(Protocol):
 
     def evaluate_pieces(self, station: Float, pieces: Sequence[Float]) -> Float:
         """Return x, y, heading and curvature (4, N) at stations (N,) on the pieces of an alignment."""
+        ...
+
+    def face_columns(
+        self, faces: Faces, grid: ColumnGrid, most: int
+    ) -> tuple[AnyArray, AnyArray]:
+        """Return the faces of each cell of a grid that they may touch: where they begin (C + 1,), and their numbers.
+
+        Args:
+            faces: T of them.
+            grid: across a direction.
+            most: faces of a cell: where there are more none is listed.
+        """
+        ...
+
+    def clear_places(
+        self, places: Float, faces: Faces, grid: ColumnGrid, listed: tuple[AnyArray, AnyArray]
+    ) -> Bool:
+        """Return a mask (N,) of places (3, N), m, that no face listed in their cell hides from the grid's direction.
+
+        What lies in a cell without faces isn't among them.
+
+        Args:
+            places: (3, N).
+            faces, grid: as they were for `face_columns`.
+            listed: what that returned.
+        """
         ...
 
     def find_feet(

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base.arithmetic.loops import PackedPoints
+from ...base.arithmetic.loops import ColumnGrid, Faces, PackedPoints
 from ...base.arrays import AnyArray, Bool, Float, Float32, Index, Int, UInt16
 from .library import NoKernelError, load_kernel
 
@@ -31,6 +31,8 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "measure": (None, (_INT64, _POINTER)),
     "step": (_INT64, (_INT64, _POINTER, _POINTER)),
     "evaluate": (None, (_INT64, *[_POINTER] * 3)),
+    "sort_faces": (None, (_POINTER, _INT64, *[_POINTER] * 6)),
+    "clear": (None, (_POINTER, _INT64, *[_POINTER] * 7)),
 }
 """Results and arguments of the functions of points.c, by name."""
 _RECORD = 36
@@ -85,12 +87,42 @@ class _Pieces(ctypes.Structure):
     )
 
 
+class _Columns(ctypes.Structure):
+    """Columns side by side; as `Columns` in points.c."""
+
+    _fields_ = (
+        ("axes", ctypes.c_double * 6),
+        ("low", ctypes.c_double * 2),
+        ("columns", _INT64 * 2),
+        ("margin", ctypes.c_double),
+        ("direction", ctypes.c_double * 3),
+        ("above", ctypes.c_double),
+    )
+
+    @classmethod
+    def of(cls, grid: ColumnGrid) -> _Columns:
+        """Return a grid for C."""
+        axes, low, direction = (np.ravel(one).tolist() for one in (grid.axes, grid.low, grid.direction))
+        types = [kind for _, kind in cls._fields_]
+        return cls(
+            types[0](*axes), types[1](*low), types[2](*grid.count), grid.margin, types[4](*direction), grid.above
+        )
+
+
 def _as(kind: Any, shape: tuple[int, ...], **arrays: AnyArray) -> list[AnyArray]:
     """Return arrays of this shape, C-contiguous and of this type; raise ValueError for another shape."""
     for name, array in arrays.items():
         if array.shape != shape:
             raise ValueError(f"{name} {array.shape}: must be {shape}")
     return [np.ascontiguousarray(array, kind) for array in arrays.values()]
+
+
+def _faces(faces: Faces) -> tuple[AnyArray, ...]:
+    """Return vertices, triangles and planes for C."""
+    (vertices,) = _as(np.float32, (len(faces.vertices), 3), vertices=faces.vertices)
+    (triangles,) = _as(np.int32, (len(faces.triangles), 3), triangles=faces.triangles)
+    (planes,) = _as(np.float64, (len(triangles), 4), planes=faces.planes)
+    return vertices, triangles, planes
 
 
 class CompiledPoints:
@@ -361,6 +393,49 @@ class CompiledPoints:
             if not left:
                 break
         return station, along, offset
+
+    def face_columns(
+        self, faces: Faces, grid: ColumnGrid, most: int
+    ) -> tuple[AnyArray, AnyArray]:
+        """Return the faces of each cell of a grid that they may touch: where they begin (C + 1,), and their numbers.
+
+        Args:
+            faces: T of them.
+            grid: across a direction.
+            most: faces of a cell, 255 at most: where there are more none is listed.
+        """
+        vertices, triangles, _ = _faces(faces)
+        if most > np.iinfo(np.uint8).max:
+            raise ValueError(f"most {most}: must be 255 or less")
+        told, cells = _Columns.of(grid), grid.count[0] * grid.count[1]
+        head = (ctypes.byref(told), len(triangles), vertices.ctypes.data, triangles.ctypes.data)
+        starts = np.zeros(cells + 1, np.uint32)
+        counts = starts[1:]
+        self._functions["sort_faces"](*head, counts.ctypes.data, None, None, None)
+        counts[counts > most] = 0
+        np.cumsum(counts, out=counts)
+        numbers, filled = np.empty(int(starts[-1]), np.int32), np.zeros(cells, np.uint8)
+        self._functions["sort_faces"](*head, None, *(one.ctypes.data for one in (starts, filled, numbers)))
+        return starts, numbers
+
+    def clear_places(
+        self, places: Float, faces: Faces, grid: ColumnGrid, listed: tuple[AnyArray, AnyArray]
+    ) -> Bool:
+        """Return a mask (N,) of places (3, N), m, that no face listed in their cell hides from the grid's direction.
+
+        Args:
+            places: (3, N).
+            faces, grid: as they were for `face_columns`.
+            listed: what that returned.
+        """
+        count = places.shape[1]
+        (places,) = _as(np.float64, (3, count), places=places)
+        (starts,) = _as(np.uint32, (grid.count[0] * grid.count[1] + 1,), starts=listed[0])
+        (numbers,) = _as(np.int32, (int(starts[-1]),), numbers=listed[1])
+        told, result = _Columns.of(grid), np.empty(count, np.bool_)
+        arrays = (places, *_faces(faces), starts, numbers, result)
+        self._functions["clear"](ctypes.byref(told), count, *(one.ctypes.data for one in arrays))
+        return result
 
     def pack(self, record: AnyArray, points: PackedPoints) -> tuple[Float, Int] | None:
         """Fill in LAS records (N,) of point format 7, without extra bytes; None where a value or a type doesn't fit.
