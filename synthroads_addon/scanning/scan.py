@@ -1,6 +1,8 @@
 """One block of pulses, from the path to the points. Pure arrays: the casters are all that knows the scene."""
 
-from collections.abc import Callable
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -13,7 +15,7 @@ from ..cloud.points import PointBlock, concatenate, make_block
 from ..materials.surfaces import brightness_of, spread_factors
 from .beam import conical_directions, cylindrical_offsets, outer_radii
 from .colour.colour import SeenPoints
-from .devices.shots import shots
+from .devices.shots import Columns, ShotRun, shot_run
 from .effects import apply_effect
 from .kernels.hits import TracedPulses
 from .kernels.pulses import PulseKernel
@@ -86,6 +88,28 @@ class _Tally:
     footprints: Int | None = None
 
 
+@dataclass(frozen=True)
+class _Beams:
+    """Beams of a block's P pulses, before it is known which of them may meet anything.
+
+    Attributes:
+        shot: of the device, of all pulses of the block.
+        time: (P,) s since the first strip's start.
+        origin: (3, P) where each leaves the scanner, local, m.
+        direction: (3, P) unit vectors of their axes.
+    """
+
+    shot: ShotRun
+    time: Float
+    origin: Float
+    direction: Float
+
+    def select(self, rows: Index) -> _Beams:
+        """Return the beams of these indices."""
+        origin, direction = (np.take(vectors, rows, axis=1) for vectors in (self.origin, self.direction))
+        return _Beams(self.shot, np.take(self.time, rows), origin, direction)
+
+
 def join_results(results: list[BlockResult]) -> BlockResult:
     """Return the results of several blocks, none of them finished yet, joined into one in their order."""
     seen = [result.seen for result in results if result.seen is not None]
@@ -128,21 +152,15 @@ class BlockScan:
         A block isn't cut any smaller, though its arrays leave the processor's cache: blocks are scanned side by side in
         threads that take turns in Python, so that few long calls beat many short ones.
         """
-        plan, setting, target = self.plan, self.plan.setting, self.plan.target
+        plan, setting = self.plan, self.plan.setting
         errors = self.draw_errors(strip, count, key)
         begin, end = (plan.cut.time(strip, number) for number in (first, first + count - 1))
         poses = self.poses_between(strip, begin, end)
-        pulses = self.emit(strip, poses, errors.angle, first, count)
-        number = np.arange(count)  # of each pulse within the block
+        beams = self._aim(strip, poses, errors.angle, first, count)
         # In the air, echoes come from pulses into the sky as well.
-        towards = None if self._in_air else may_hit_scene(setting, target, pulses, poses.motions)
-        if towards is not None:
-            number = np.flatnonzero(towards)
-            pulses = pulses.select(number)
-        if plan.outline is not None and plan.rays_per_pulse > 1 and not self._in_air:
-            near = np.flatnonzero(~self._missing(plan.outline, pulses, poses.motions))
-            if len(near) < len(number):
-                number, pulses = number[near], pulses.select(near)
+        towards = None if self._in_air else self._towards_scene(beams, poses.motions)
+        number = np.arange(count) if towards is None else towards  # of each pulse within the block
+        pulses = self._fire(beams, poses, errors.angle, towards)
         traced, echoes, tally = self.traced_echoes(strip, pulses, poses.motions, key)
         if setting.receiver.echo_separation == "waveform":
             echoes = merge_peaks(echoes, setting.range_resolution)
@@ -165,16 +183,27 @@ class BlockScan:
         points = replace(points, intensity=intensity)
         return BlockResult(points, seen, count, tally.rays, weak, clipped, footprints=tally.footprints)
 
-    def _missing(self, outline: Outline, pulses: Pulses, motions: list[Track]) -> Bool:
+    def _towards_scene(self, beams: _Beams, motions: list[Track]) -> Index | None:
+        """Return the pulses (K,) that may meet anything, by boxes around the scene and its outline; None if all may."""
+        plan = self.plan
+        towards = may_hit_scene(plan.setting, plan.target, beams.origin, beams.direction, motions)
+        rows = None if towards is None else np.flatnonzero(towards)
+        if plan.outline is None or plan.rays_per_pulse == 1:
+            return rows
+        near = np.flatnonzero(~self._missing(plan.outline, beams if rows is None else beams.select(rows), motions))
+        if len(near) == (len(beams.time) if rows is None else len(rows)):
+            return rows
+        return near if rows is None else rows[near]
+
+    def _missing(self, outline: Outline, beams: _Beams, motions: list[Track]) -> Bool:
         """Return a mask (P,) of pulses that surely meet nothing, by the outline of the static scene and what moves."""
         setting, target = self.plan.setting, self.plan.target
-        missing = outline.passed_by(pulses.origin, pulses.direction, setting.maximum_range)
+        missing = outline.passed_by(beams.origin, beams.direction, setting.maximum_range)
         rows = np.flatnonzero(missing) if target.moving else ()
         if len(rows):
             radius = max(outer_radii(self.plan.rings, setting.divergence)) * setting.maximum_range
-            origin, direction = (np.take(vectors, rows, axis=1) for vectors in (pulses.origin, pulses.direction))
-            reach = np.full(len(rows), setting.maximum_range)
-            missing[rows] = ~target.near_moving(origin, direction, reach, pulses.time[rows], motions, radius)
+            few, reach = beams.select(rows), np.full(len(rows), setting.maximum_range)
+            missing[rows] = ~target.near_moving(few.origin, few.direction, reach, few.time, motions, radius)
         return missing
 
     def traced_echoes(
@@ -326,26 +355,44 @@ class BlockScan:
         Args:
             angle: (2, P) pointing errors in the scan plane and across it, rad; None without.
         """
-        several = self.plan.rays_per_pulse > 1
-        shot = shots(self.plan.setting, first, count, several or angle is not None)
-        time = shot.time + strip.start_time
-        kernel, frame = self.plan.pose_kernel, (shot.in_plane, shot.across)
+        return self._fire(self._aim(strip, poses, angle, first, count), poses, angle, None)
+
+    def _turned(
+        self, track: Track, times: Float, vectors: Sequence[Float], columns: Columns | None = None
+    ) -> tuple[Float, list[Float]]:
+        """Return positions and turned vectors by a track, see `turned_vectors`."""
+        kernel = self.plan.pose_kernel
         turned = turned_vectors if kernel is None else kernel.turned_vectors
-        beam = [shot.direction, *(axis for axis in frame if several and axis is not None)]
-        origin, (direction, *axes) = turned(poses.true, time, beam)
-        in_plane, across = axes if several else (None, None)
+        return turned(track, times, vectors, columns)
+
+    def _aim(self, strip: Strip, poses: Poses, angle: Float32 | None, first: int, count: int) -> _Beams:
+        """Return where ``count`` pulses of a strip from ``first`` on are fired from and to, see `emit`."""
+        shot = shot_run(self.plan.setting, first, count, self.plan.rays_per_pulse > 1 or angle is not None)
+        time = shot.time + strip.start_time
+        origin, (direction,) = self._turned(poses.true, time, [shot.table.direction], Columns(shot.first))
+        return _Beams(shot, time, origin, direction)
+
+    def _fire(self, beams: _Beams, poses: Poses, angle: Float32 | None, rows: Index | None) -> Pulses:
+        """Return the pulses of beams, or the rows (K,) of them, ascending, see `emit`."""
+        shot, several = beams.shot, self.plan.rays_per_pulse > 1
+        if rows is not None:
+            beams = beams.select(rows)
+            angle = None if angle is None else np.take(angle, rows, axis=1)
+        time, origin, direction = beams.time, beams.origin, beams.direction
+        in_plane = across = None
+        if several:
+            frame = [axis for axis in (shot.table.in_plane, shot.table.across) if axis is not None]
+            _, (in_plane, across) = self._turned(poses.true, time, frame, Columns(shot.first, rows))
         measured_origin, measured_direction = origin, direction
         if poses.measured is not poses.true or angle is not None:
-            believed = shot.direction
+            believed, *axes = (shot.column(name, rows) for name in ("direction", "in_plane", "across"))
             if angle is not None:
-                assert frame[0] is not None
-                assert frame[1] is not None
-                believed = tilt_vectors(believed, frame[0], frame[1], angle)
-            measured_origin, (measured_direction,) = turned(poses.measured, time, [believed])
-        assert shot.beam is not None
-        channel = shot.beam.astype(np.uint8)
+                believed = tilt_vectors(believed, *axes, angle)
+            measured_origin, (measured_direction,) = self._turned(poses.measured, time, [believed])
+        scan_angle, channel = (shot.column(name, rows) for name in ("scan_angle", "beam"))
+        channel = np.asarray(channel, np.uint8)
         return Pulses(
-            time, shot.scan_angle, channel, origin, direction, in_plane, across, measured_origin, measured_direction
+            time, scan_angle, channel, origin, direction, in_plane, across, measured_origin, measured_direction
         )
 
     def rays(self, pulses: Pulses, motions: list[Track], axis: FirstHits | None = None) -> Rays:
