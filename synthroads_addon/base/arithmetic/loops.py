@@ -205,6 +205,16 @@ class PointLoops(Protocol):
         """
         ...
 
+    def candidate_nodes(self, places: Sequence[Float], nodes: Sequence[Float], spacing: float) -> tuple[Int, Int]:
+        """Return (point, node) index pairs, sorted by point, of nodes that may be next to feet, see `road.alignment`.
+
+        Args:
+            places: x and y (N,).
+            nodes: x and y (M,), M > 0.
+            spacing: between two nodes at most, m.
+        """
+        ...
+
     def find_feet(
         self,
         evaluate: Callable[[Float], tuple[Float, ...]],

@@ -31,6 +31,7 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "measure": (None, (_INT64, _POINTER)),
     "step": (_INT64, (_INT64, _POINTER, _POINTER)),
     "evaluate": (None, (_INT64, *[_POINTER] * 3)),
+    "candidates": (_INT64, (_INT64, _POINTER, _POINTER, _INT64, *[_POINTER] * 3, ctypes.c_double, *[_POINTER] * 3)),
     "sort_faces": (None, (_POINTER, _INT64, *[_POINTER] * 6)),
     "clear": (None, (_POINTER, _INT64, *[_POINTER] * 7)),
 }
@@ -361,6 +362,24 @@ class CompiledPoints:
         result, at = np.empty((len(rows), 4), np.float32), None if shift is None else shift.ctypes.data
         self._functions["inputs"](len(rows), rows.ctypes.data, source.ctypes.data, at, unit, result.ctypes.data)
         return result
+
+    def candidate_nodes(self, places: Sequence[Float], nodes: Sequence[Float], spacing: float) -> tuple[Int, Int]:
+        """Return (point, node) index pairs, sorted by point, see `road.alignment`.
+
+        Args:
+            places: x and y (N,).
+            nodes: x and y (M,), M > 0.
+            spacing: between two nodes at most, m.
+        """
+        x, y = _as(np.float64, (len(places[0]),), x=places[0], y=places[1])
+        node_x, node_y = _as(np.float64, (len(nodes[0]),), node_x=nodes[0], node_y=nodes[1])
+        middle, square = np.array([node_x.mean(), node_y.mean()]), np.empty(len(node_x))
+        owner, column = np.empty((2, len(x) * ((len(node_x) + 1) // 2)), np.int64)
+        addresses = [one.ctypes.data for one in (x, y, node_x, node_y, middle, square, owner, column)]
+        found = self._functions["candidates"](
+            *(len(x), *addresses[:2], len(node_x), *addresses[2:5], spacing, *addresses[5:])
+        )
+        return owner[:found], column[:found]
 
     def find_feet(
         self,
