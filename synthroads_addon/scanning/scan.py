@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Bool, Float, Float32, Index, Int, UInt8
+from ..base.arithmetic.loops import EchoPlaces, PointLoops
+from ..base.arrays import AnyArray, Bool, Float, Float32, Index, Int, UInt8
 from ..base.random_streams import stream
 from ..cloud.points import PointBlock, concatenate, make_block
 from ..materials.surfaces import brightness_of, spread_factors
@@ -489,7 +490,39 @@ class BlockScan:
             if setting.receiver.range_walk:
                 gain = strip_gain(plan.strip_errors, plan.seed, strip.index)
                 distance = distance + range_walk(setting, speckle, plan.noise, gain)
-        normal = None
+        kernel = plan.point_loops
+        if kernel is not None and isinstance(traced, TracedPulses) and not target.moving:
+            arrays, seen = self._placed_by_loops(kernel, pulses, traced, echoes, distance)
+        else:
+            arrays, seen = self._placed(pulses, traced, echoes, distance, motions)
+        points = make_block(
+            intensity=echoes.intensity,
+            rgb=np.zeros((len(pulse), 3), dtype=np.uint16),
+            return_number=number,
+            number_of_returns=returns,
+            strip=np.full(len(pulse), strip.index, dtype=np.uint16),
+            range=distance,
+            incidence_deg=np.rad2deg(np.arccos(np.minimum(np.abs(along), 1.0))).astype(np.float32),
+            **arrays,
+        )
+        return points, seen
+
+    def _placed(
+        self, pulses: Pulses, traced: Traced, echoes: Echoes, distance: Float, motions: list[Track]
+    ) -> tuple[dict[str, AnyArray], SeenPoints | None]:
+        """Return the arrays of echoes' points that follow from where these are, and where they were seen.
+
+        Args:
+            pulses: of the block.
+            traced: hits.
+            echoes: N of them.
+            distance: (N,) measured ranges, m.
+            motions: tracks of the target's moving parts.
+        """
+        plan, setting, target = self.plan, self.plan.setting, self.plan.target
+        pulse, hit = echoes.pulse, echoes.hit
+        face, along = traced.pick("face", hit), traced.pick("along", hit)
+        normal, seen = None, None
         if plan.records_seen_points or "normal" in plan.measured_layers:
             normal = target.normals(face, along, pulses.time[pulse], motions)
             if self._off_surfaces:
@@ -499,25 +532,51 @@ class BlockScan:
         if self._off_surfaces:
             class_id = np.where(face < 0, np.uint8(plan.air_class), class_id)
         measured = MeasuredPoints(setting, target, pulses, pulse, echoes.range, echoes.intensity, face, normal)
-        points = make_block(
-            xyz=place_points(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
-            intensity=echoes.intensity,
-            rgb=np.zeros((len(pulse), 3), dtype=np.uint16),
-            class_id=class_id,
-            instance_id=target.instances(face, pulses.time[pulse]),
-            return_number=number,
-            number_of_returns=returns,
-            gps_time=pulses.time[pulse] + plan.epoch,
-            scan_angle_deg=np.rad2deg(pulses.scan_angle[pulse]).astype(np.float32),
-            strip=np.full(len(pulse), strip.index, dtype=np.uint16),
-            range=distance,
-            incidence_deg=np.rad2deg(np.arccos(np.minimum(np.abs(along), 1.0))).astype(np.float32),
-            **fill_layers(measured, plan.measured_layers),
-        )
-        seen = None
+        arrays: dict[str, AnyArray] = {
+            "xyz": place_points(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
+            "class_id": class_id,
+            "instance_id": target.instances(face, pulses.time[pulse]),
+            "gps_time": pulses.time[pulse] + plan.epoch,
+            "scan_angle_deg": np.rad2deg(pulses.scan_angle[pulse]).astype(np.float32),
+        }
         if plan.records_seen_points and normal is not None:
             seen = self._seen_targets(traced, hit, face, normal, motions)
-        return points, seen
+        return arrays | fill_layers(measured, plan.measured_layers), seen
+
+    def _placed_by_loops(
+        self, loops: PointLoops, pulses: Pulses, traced: TracedPulses, echoes: Echoes, distance: Float
+    ) -> tuple[dict[str, AnyArray], SeenPoints | None]:
+        """Return what `_placed` does where nothing moves and all echoes are of surfaces, by compiled loops."""
+        plan, target = self.plan, self.plan.target
+        of_pulses = (pulses.time, pulses.scan_angle, pulses.origin, pulses.measured_origin, pulses.measured_direction)
+        of_faces = (target.static_planes, target.class_id, target.instance_id, target.material)
+        hits = (traced.face, traced.along, traced.distance, traced.direction, traced.begin)
+        asked = plan.records_seen_points or "normal" in plan.measured_layers
+        placed = loops.placed(
+            EchoPlaces(echoes.pulse, echoes.hit, distance, *hits, *of_pulses, *of_faces, target.origin, plan.epoch),
+            asked,
+        )
+        face, known = traced.pick("face", echoes.hit), {"normal": placed.narrow_normal, "material": placed.material}
+        measured = MeasuredPoints(
+            plan.setting, target, pulses, echoes.pulse, echoes.range, echoes.intensity, face, None
+        )
+        arrays: dict[str, AnyArray] = {
+            "xyz": placed.xyz,
+            "class_id": placed.class_id,
+            "instance_id": placed.instance_id,
+            "gps_time": placed.gps_time,
+            "scan_angle_deg": placed.scan_angle_deg,
+            **{name: array for name, array in known.items() if name in plan.measured_layers},
+            **fill_layers(measured, plan.measured_layers - known.keys()),
+        }
+        if not plan.records_seen_points:
+            return arrays, None
+        sunlit = None
+        if plan.sun is not None:
+            facing, begin = loops.facing(placed.normal, placed.position, plan.sun, _OFF_SURFACE)
+            sunlit = self._unshaded(facing, begin, placed.time, [])
+        seen = SeenPoints(placed.position, placed.scanner, placed.normal, placed.material, placed.time, face, sunlit)
+        return arrays, seen
 
     def _seen_targets(self, traced: Traced, hit: Index, face: Index, normal: Float, motions: list[Track]) -> SeenPoints:
         """Return the surface points that gave the returns, in the scene at time 0, as it is rendered.
@@ -544,11 +603,16 @@ class BlockScan:
         """Return a mask (N,) of the points that the sun reaches, on the side that their normals (3, N) point to."""
         sun = self.plan.sun
         assert sun is not None
-        result = sun @ normal > 0.0
-        towards = np.flatnonzero(result & (face >= 0))
-        # Columns are chosen several times as fast by `take` as by indexing.
-        begin = np.take(normal, towards, axis=1)
-        begin *= _OFF_SURFACE
-        begin += np.take(position, towards, axis=1)
-        result[towards] = self.plan.target.unobstructed(begin, sun, time[towards], motions)
+        facing = (sun[0] * normal[0] + sun[1] * normal[1] + sun[2] * normal[2] > 0.0) & (face >= 0)
+        return self._unshaded(facing, normal * _OFF_SURFACE + position, time, motions)
+
+    def _unshaded(self, facing: Bool, begin: Float, time: Float, motions: list[Track]) -> Bool:
+        """Return a mask (N,) of the places (3, N), m, that face the sun and that nothing shades at times (N,), s."""
+        sun, towards = self.plan.sun, np.flatnonzero(facing)
+        assert sun is not None
+        if len(towards) < len(facing):
+            # Columns are chosen several times as fast by `take` as by indexing.
+            begin, time = np.take(begin, towards, axis=1), np.take(time, towards)
+        result = np.zeros(len(facing), bool)
+        result[towards] = self.plan.target.unobstructed(begin, sun, time, motions)
         return result

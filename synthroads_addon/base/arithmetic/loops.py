@@ -40,6 +40,69 @@ class PackedPoints(NamedTuple):
     per_degree: float
 
 
+class EchoPlaces(NamedTuple):
+    """N echoes of M hits of P pulses at F faces of which none moves.
+
+    Attributes:
+        pulse, hit: (N,) of each echo.
+        range: (N,) measured, m.
+        face, along, distance: (M,) of the hits: faces, n . d of their normals and the rays, and true ranges, m.
+        direction, begin: (3, M) of the hits' rays; no begin: where the pulses do, m.
+        time, scan_angle: (P,) s, rad.
+        origin, measured_origin, measured_direction: (3, P) m.
+        planes: (F, 4) of the faces, see `Faces`.
+        class_id, instance_id, material: (F,).
+        map_origin, epoch: what is added to measured places, (3,) m, and times, s.
+    """
+
+    pulse: Index
+    hit: Index
+    range: Float
+    face: Index
+    along: Float
+    distance: Float
+    direction: Float
+    begin: Float | None
+    time: Float
+    scan_angle: Float
+    origin: Float
+    measured_origin: Float
+    measured_direction: Float
+    planes: Float
+    class_id: AnyArray
+    instance_id: AnyArray
+    material: AnyArray
+    map_origin: Float
+    epoch: float
+
+
+class PlacedPoints(NamedTuple):
+    """N points of echoes.
+
+    Attributes:
+        xyz: (N, 3) as measured, map coordinates, m.
+        gps_time: (N,) s.
+        scan_angle_deg: (N,).
+        class_id, instance_id, material: (N,).
+        position, scanner, normal: (N, 3) where each was seen and from where, local, m, and unit normals there, towards
+            the scanner.
+        narrow_normal: (N, 3) likewise.
+        time: (N,) of the pulses, s.
+    """
+
+    xyz: Float
+    gps_time: Float
+    scan_angle_deg: Float32
+    class_id: UInt8
+    instance_id: AnyArray
+    material: UInt16
+    position: Float
+    scanner: Float
+    normal: Float
+    narrow_normal: Float32
+    time: Float
+
+
 class ColumnGrid(NamedTuple):
     """Grid across a direction, in whose cells lie what is seen side by side from there.
 
@@ -203,6 +266,14 @@ class PointLoops(Protocol):
             faces, grid: as they were for `face_columns`.
             listed: what that returned.
         """
+        ...
+
+    def placed(self, echoes: EchoPlaces, seen: bool) -> PlacedPoints:
+        """Return the points of echoes; what is known of the places where they were seen only if asked, else empty."""
+        ...
+
+    def facing(self, normal: Float, position: Float, direction: Float, off: float) -> tuple[Bool, Float]:
+        """Return which normals (N, 3) face a direction (3,), and the places (3, N) so far (m) off positions (N, 3)."""
         ...
 
     def candidate_nodes(self, places: Sequence[Float], nodes: Sequence[Float], spacing: float) -> tuple[Int, Int]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base.arithmetic.loops import ColumnGrid, Faces, PackedPoints
+from ...base.arithmetic.loops import ColumnGrid, EchoPlaces, Faces, PackedPoints, PlacedPoints
 from ...base.arrays import AnyArray, Bool, Float, Float32, Index, Int, UInt16
 from .library import NoKernelError, load_kernel
 
@@ -32,6 +32,8 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "step": (_INT64, (_INT64, _POINTER, _POINTER)),
     "evaluate": (None, (_INT64, *[_POINTER] * 3)),
     "candidates": (_INT64, (_INT64, _POINTER, _POINTER, _INT64, *[_POINTER] * 3, ctypes.c_double, *[_POINTER] * 3)),
+    "place": (None, (_INT64, _POINTER, _POINTER)),
+    "face_sun": (None, (_INT64, *[_POINTER] * 3, ctypes.c_double, *[_POINTER] * 2)),
     "sort_faces": (None, (_POINTER, _INT64, *[_POINTER] * 6)),
     "clear": (None, (_POINTER, _INT64, *[_POINTER] * 7)),
 }
@@ -86,6 +88,26 @@ class _Pieces(ctypes.Structure):
         ("pieces", _INT64),
         ("terms", _INT64),
     )
+
+
+class _Echoes(ctypes.Structure):
+    """Echoes and their pulses; as `Echoes` in points.c."""
+
+    _fields_ = (
+        *((name, _POINTER) for name in ("pulse", "hit", "range", "face", "along", "distance", "direction", "begin")),
+        ("hits", _INT64),
+        *((name, _POINTER) for name in ("time", "scan_angle", "origin", "measured_origin", "measured_direction")),
+        ("pulses", _INT64),
+        *((name, _POINTER) for name in ("planes", "class_id", "instance_id", "material")),
+        ("map_origin", ctypes.c_double * 3),
+        ("epoch", ctypes.c_double),
+    )
+
+
+class _Placed(ctypes.Structure):
+    """Points; as `Placed` in points.c."""
+
+    _fields_ = tuple((name, _POINTER) for name in PlacedPoints._fields)
 
 
 class _Columns(ctypes.Structure):
@@ -362,6 +384,69 @@ class CompiledPoints:
         result, at = np.empty((len(rows), 4), np.float32), None if shift is None else shift.ctypes.data
         self._functions["inputs"](len(rows), rows.ctypes.data, source.ctypes.data, at, unit, result.ctypes.data)
         return result
+
+    def placed(self, echoes: EchoPlaces, seen: bool) -> PlacedPoints:
+        """Return the points of echoes; what is known of the places where they were seen only if asked, else empty.
+
+        Raises:
+            IndexError: a pulse, a hit or a face isn't there.
+        """
+        e, count = echoes, len(echoes.pulse)
+        hits, pulses, faces = len(e.face), len(e.time), len(e.planes)
+        for name, numbers, most in (("pulse", e.pulse, pulses), ("hit", e.hit, hits), ("face", e.face, faces)):
+            if len(numbers) and not (numbers.min() >= 0 and numbers.max() < most):
+                raise IndexError(f"{name} {numbers.min()} to {numbers.max()} of {most}")
+        begin = e.begin if e.begin is None else _as(np.float64, (3, hits), begin=e.begin)[0]
+        of_hits: list[AnyArray | None] = [
+            *_as(np.int64, (count,), pulse=e.pulse, hit=e.hit),
+            *_as(np.float64, (count,), range=e.range),
+            *_as(np.int64, (hits,), face=e.face),
+            *_as(np.float64, (hits,), along=e.along, distance=e.distance),
+            *_as(np.float64, (3, hits), direction=e.direction),
+            begin,
+        ]
+        vectors = {name: getattr(e, name) for name in ("origin", "measured_origin", "measured_direction")}
+        of_pulses = [
+            *_as(np.float64, (pulses,), time=e.time, scan_angle=e.scan_angle),
+            *_as(np.float64, (3, pulses), **vectors),
+        ]
+        of_faces = [
+            *_as(np.float64, (faces, 4), planes=e.planes),
+            *_as(np.uint8, e.class_id.shape, class_id=e.class_id),
+            *_as(np.uint32, e.class_id.shape, instance_id=e.instance_id),
+            *_as(np.uint16, e.class_id.shape, material=e.material),
+        ]
+        if len(e.class_id) < faces:
+            raise ValueError(f"class_id {e.class_id.shape}: must be of {faces} faces")
+        told = _Echoes(
+            *(None if one is None else one.ctypes.data for one in of_hits),
+            *(hits, *(one.ctypes.data for one in of_pulses)),
+            *(pulses, *(one.ctypes.data for one in of_faces)),
+            (ctypes.c_double * 3)(*e.map_origin),
+            e.epoch,
+        )
+        known = count if seen else 0
+        placed = PlacedPoints(
+            *(np.empty((count, 3)), np.empty(count), np.empty(count, np.float32)),
+            *(np.empty(count, np.uint8), np.empty(count, np.uint32), np.empty(count, np.uint16)),
+            *(np.empty((known, 3)), np.empty((known, 3)), np.empty((known, 3))),
+            *(np.empty((known, 3), np.float32), np.empty(known)),
+        )
+        addresses = [one.ctypes.data if len(one) else None for one in placed]
+        self._functions["place"](count, ctypes.byref(told), ctypes.byref(_Placed(*addresses)))
+        return placed
+
+    def facing(self, normal: Float, position: Float, direction: Float, off: float) -> tuple[Bool, Float]:
+        """Return which normals (N, 3) face a direction (3,), and the places (3, N) so far (m) off positions (N, 3)."""
+        count = len(normal)
+        normal, position = _as(np.float64, (count, 3), normal=normal, position=position)
+        (direction,) = _as(np.float64, (3,), direction=direction)
+        facing, begin = np.empty(count, np.bool_), np.empty((3, count))
+        arrays = (normal, position, direction)
+        self._functions["face_sun"](
+            count, *(one.ctypes.data for one in arrays), off, facing.ctypes.data, begin.ctypes.data
+        )
+        return facing, begin
 
     def candidate_nodes(self, places: Sequence[Float], nodes: Sequence[Float], spacing: float) -> tuple[Int, Int]:
         """Return (point, node) index pairs, sorted by point, see `road.alignment`.
