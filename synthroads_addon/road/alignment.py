@@ -356,6 +356,8 @@ def _arc_to_foot(along: Float, offset: Float, bend: Float) -> Float:
 
 def _candidate_nodes(x: Float, y: Float, node_x: Float, node_y: Float) -> tuple[Int, Int]:
     """Return (point, node) index pairs, sorted by point, of nodes at a local minimum of distance near the least."""
+    if (loops := point_loops()) is not None:
+        return loops.candidate_nodes((x, y), (node_x, node_y), _NODE_SPACING)
     centre_x, centre_y = node_x.mean(), node_y.mean()  # cancellation then stays far below a node spacing
     p = np.column_stack((x - centre_x, y - centre_y))
     q = np.stack((node_x - centre_x, node_y - centre_y))

@@ -78,6 +78,11 @@ class CarriagewaySection:
         other.carriageway = self.carriageway.model_copy(update={"pavement": pavement})
         return other
 
+    @property
+    def constant_distances(self) -> Float | None:
+        """Return the (B,) `distances` that hold at every station; None where they differ."""
+        return None if self._constant is None else self._constant[0]
+
     def distances(self, station: ArrayLike) -> Float:
         """Return the (N, B) distances of the strips' boundaries from the centreline at N stations, inner first, m."""
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..base.arrays import Bool, Float, Float32, Index, UInt8
 from .devices.device import ScannerSetting
+from .devices.shots import Columns
 from .knots import Track
 from .receiver import EchoValues, values_of_echoes
 from .scene.target import Target
@@ -111,10 +112,20 @@ class Pulses:
         return Pulses(**chosen)
 
 
-def turned_vectors(track: Track, times: Float, vectors: Sequence[Float]) -> tuple[Float, list[Float]]:
-    """Return a track's positions (3, N), m, at times (N,), s, and sets of vectors (3, N) turned by its rotations."""
+def turned_vectors(
+    track: Track, times: Float, vectors: Sequence[Float], columns: Columns | None = None
+) -> tuple[Float, list[Float]]:
+    """Return a track's positions (3, N), m, at times (N,), s, and sets of vectors (3, N) turned by its rotations.
+
+    Args:
+        track: that spans the times.
+        times: s.
+        vectors: (3, N), or tables (3, M) of which columns are turned.
+        columns: N of such tables.
+    """
     rotation, position, _ = track.at(times)
-    return position, [turn_vectors(rotation, one) for one in vectors]
+    chosen = vectors if columns is None else [columns.of(one, len(times)) for one in vectors]
+    return position, [turn_vectors(rotation, one) for one in chosen]
 
 
 def turn_vectors(rotation: Float, vectors: Float) -> Float:
@@ -145,18 +156,27 @@ def tilt_vectors(vectors: Float, first: Float, second: Float, angle: Float32) ->
     return result
 
 
-def may_hit_scene(setting: ScannerSetting, target: Target, pulses: Pulses, motions: list[Track]) -> Bool | None:
-    """Return a mask (P,) of the pulses that may hit anything, by bounding boxes; None if all may."""
+def may_hit_scene(
+    setting: ScannerSetting, target: Target, origins: Float, directions: Float, motions: list[Track]
+) -> Bool | None:
+    """Return a mask (P,) of the pulses that may hit anything, by bounding boxes; None if all may.
+
+    Args:
+        setting: the scanner's.
+        target: what is scanned.
+        origins, directions: (3, P) where the pulses begin, local, m, and unit vectors of their axes.
+        motions: tracks of the target's moving parts.
+    """
     boxes = [] if target.bounds is None else [target.bounds]
     boxes += target.moving_bounds(motions)
     if not boxes:
-        return np.zeros(len(pulses.time), dtype=bool)
+        return np.zeros(origins.shape[1], dtype=bool)
     low, high = np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
     cone = max(setting.divergence) * 2.0
     width = cone * setting.maximum_range
     towards: Bool | None = None
     for axis in range(3):
-        place, direction = pulses.origin[axis], pulses.direction[axis]
+        place, direction = origins[axis], directions[axis]
         if place.min() > high[axis] + width:
             turned = direction < cone
         elif place.max() < low[axis] - width:

@@ -1,19 +1,22 @@
 """One block of pulses, from the path to the points. Pure arrays: the casters are all that knows the scene."""
 
-from collections.abc import Callable
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Bool, Float, Float32, Index, Int, UInt8
+from ..base.arithmetic.loops import EchoPlaces, PointLoops
+from ..base.arrays import AnyArray, Bool, Float, Float32, Index, Int, UInt8
 from ..base.random_streams import stream
 from ..cloud.points import PointBlock, concatenate, make_block
 from ..materials.surfaces import brightness_of, spread_factors
 from .beam import conical_directions, cylindrical_offsets, outer_radii
 from .colour.colour import SeenPoints
-from .devices.shots import shots
+from .devices.shots import Columns, ShotRun, shot_run
 from .effects import apply_effect
 from .kernels.hits import TracedPulses
 from .kernels.pulses import PulseKernel
@@ -86,6 +89,28 @@ class _Tally:
     footprints: Int | None = None
 
 
+@dataclass(frozen=True)
+class _Beams:
+    """Beams of a block's P pulses, before it is known which of them may meet anything.
+
+    Attributes:
+        shot: of the device, of all pulses of the block.
+        time: (P,) s since the first strip's start.
+        origin: (3, P) where each leaves the scanner, local, m.
+        direction: (3, P) unit vectors of their axes.
+    """
+
+    shot: ShotRun
+    time: Float
+    origin: Float
+    direction: Float
+
+    def select(self, rows: Index) -> _Beams:
+        """Return the beams of these indices."""
+        origin, direction = (np.take(vectors, rows, axis=1) for vectors in (self.origin, self.direction))
+        return _Beams(self.shot, np.take(self.time, rows), origin, direction)
+
+
 def join_results(results: list[BlockResult]) -> BlockResult:
     """Return the results of several blocks, none of them finished yet, joined into one in their order."""
     seen = [result.seen for result in results if result.seen is not None]
@@ -128,21 +153,15 @@ class BlockScan:
         A block isn't cut any smaller, though its arrays leave the processor's cache: blocks are scanned side by side in
         threads that take turns in Python, so that few long calls beat many short ones.
         """
-        plan, setting, target = self.plan, self.plan.setting, self.plan.target
+        plan, setting = self.plan, self.plan.setting
         errors = self.draw_errors(strip, count, key)
         begin, end = (plan.cut.time(strip, number) for number in (first, first + count - 1))
         poses = self.poses_between(strip, begin, end)
-        pulses = self.emit(strip, poses, errors.angle, first, count)
-        number = np.arange(count)  # of each pulse within the block
+        beams = self._aim(strip, poses, errors.angle, first, count)
         # In the air, echoes come from pulses into the sky as well.
-        towards = None if self._in_air else may_hit_scene(setting, target, pulses, poses.motions)
-        if towards is not None:
-            number = np.flatnonzero(towards)
-            pulses = pulses.select(number)
-        if plan.emission.outline is not None and plan.rays_per_pulse > 1 and not self._in_air:
-            near = np.flatnonzero(~self._missing(plan.emission.outline, pulses, poses.motions))
-            if len(near) < len(number):
-                number, pulses = number[near], pulses.select(near)
+        towards = None if self._in_air else self._towards_scene(beams, poses.motions)
+        number = np.arange(count) if towards is None else towards  # of each pulse within the block
+        pulses = self._fire(beams, poses, errors.angle, towards)
         traced, echoes, tally = self.traced_echoes(strip, pulses, poses.motions, key)
         if setting.receiver.echo_separation == "waveform":
             echoes = merge_peaks(echoes, setting.range_resolution)
@@ -171,16 +190,27 @@ class BlockScan:
         points = replace(points, intensity=intensity)
         return BlockResult(points, seen, count, tally.rays, weak, clipped, footprints=tally.footprints)
 
-    def _missing(self, outline: Outline, pulses: Pulses, motions: list[Track]) -> Bool:
+    def _towards_scene(self, beams: _Beams, motions: list[Track]) -> Index | None:
+        """Return the pulses (K,) that may meet anything, by boxes around the scene and its outline; None if all may."""
+        plan = self.plan
+        towards = may_hit_scene(plan.setting, plan.target, beams.origin, beams.direction, motions)
+        rows = None if towards is None else np.flatnonzero(towards)
+        if plan.emission.outline is None or plan.rays_per_pulse == 1:
+            return rows
+        near = np.flatnonzero(~self._missing(plan.emission.outline, beams if rows is None else beams.select(rows), motions))
+        if len(near) == (len(beams.time) if rows is None else len(rows)):
+            return rows
+        return near if rows is None else rows[near]
+
+    def _missing(self, outline: Outline, beams: _Beams, motions: list[Track]) -> Bool:
         """Return a mask (P,) of pulses that surely meet nothing, by the outline of the static scene and what moves."""
         setting, target = self.plan.setting, self.plan.target
-        missing = outline.passed_by(pulses.origin, pulses.direction, setting.maximum_range)
+        missing = outline.passed_by(beams.origin, beams.direction, setting.maximum_range)
         rows = np.flatnonzero(missing) if target.moving else ()
         if len(rows):
             radius = max(outer_radii(self.plan.emission.rings, setting.divergence)) * setting.maximum_range
-            origin, direction = (np.take(vectors, rows, axis=1) for vectors in (pulses.origin, pulses.direction))
-            reach = np.full(len(rows), setting.maximum_range)
-            missing[rows] = ~target.near_moving(origin, direction, reach, pulses.time[rows], motions, radius)
+            few, reach = beams.select(rows), np.full(len(rows), setting.maximum_range)
+            missing[rows] = ~target.near_moving(few.origin, few.direction, reach, few.time, motions, radius)
         return missing
 
     def traced_echoes(
@@ -336,26 +366,44 @@ class BlockScan:
         Args:
             angle: (2, P) pointing errors in the scan plane and across it, rad; None without.
         """
-        several = self.plan.rays_per_pulse > 1
-        shot = shots(self.plan.setting, first, count, several or angle is not None)
-        time = shot.time + strip.start_time
-        kernel, frame = self.plan.pose_kernel, (shot.in_plane, shot.across)
+        return self._fire(self._aim(strip, poses, angle, first, count), poses, angle, None)
+
+    def _turned(
+        self, track: Track, times: Float, vectors: Sequence[Float], columns: Columns | None = None
+    ) -> tuple[Float, list[Float]]:
+        """Return positions and turned vectors by a track, see `turned_vectors`."""
+        kernel = self.plan.pose_kernel
         turned = turned_vectors if kernel is None else kernel.turned_vectors
-        beam = [shot.direction, *(axis for axis in frame if several and axis is not None)]
-        origin, (direction, *axes) = turned(poses.true, time, beam)
-        in_plane, across = axes if several else (None, None)
+        return turned(track, times, vectors, columns)
+
+    def _aim(self, strip: Strip, poses: Poses, angle: Float32 | None, first: int, count: int) -> _Beams:
+        """Return where ``count`` pulses of a strip from ``first`` on are fired from and to, see `emit`."""
+        shot = shot_run(self.plan.setting, first, count, self.plan.rays_per_pulse > 1 or angle is not None)
+        time = shot.time + strip.start_time
+        origin, (direction,) = self._turned(poses.true, time, [shot.table.direction], Columns(shot.first))
+        return _Beams(shot, time, origin, direction)
+
+    def _fire(self, beams: _Beams, poses: Poses, angle: Float32 | None, rows: Index | None) -> Pulses:
+        """Return the pulses of beams, or the rows (K,) of them, ascending, see `emit`."""
+        shot, several = beams.shot, self.plan.rays_per_pulse > 1
+        if rows is not None:
+            beams = beams.select(rows)
+            angle = None if angle is None else np.take(angle, rows, axis=1)
+        time, origin, direction = beams.time, beams.origin, beams.direction
+        in_plane = across = None
+        if several:
+            frame = [axis for axis in (shot.table.in_plane, shot.table.across) if axis is not None]
+            _, (in_plane, across) = self._turned(poses.true, time, frame, Columns(shot.first, rows))
         measured_origin, measured_direction = origin, direction
         if poses.measured is not poses.true or angle is not None:
-            believed = shot.direction
+            believed, *axes = (shot.column(name, rows) for name in ("direction", "in_plane", "across"))
             if angle is not None:
-                assert frame[0] is not None
-                assert frame[1] is not None
-                believed = tilt_vectors(believed, frame[0], frame[1], angle)
-            measured_origin, (measured_direction,) = turned(poses.measured, time, [believed])
-        assert shot.beam is not None
-        channel = shot.beam.astype(np.uint8)
+                believed = tilt_vectors(believed, *axes, angle)
+            measured_origin, (measured_direction,) = self._turned(poses.measured, time, [believed])
+        scan_angle, channel = (shot.column(name, rows) for name in ("scan_angle", "beam"))
+        channel = np.asarray(channel, np.uint8)
         return Pulses(
-            time, shot.scan_angle, channel, origin, direction, in_plane, across, measured_origin, measured_direction
+            time, scan_angle, channel, origin, direction, in_plane, across, measured_origin, measured_direction
         )
 
     def rays(self, pulses: Pulses, motions: list[Track], axis: FirstHits | None = None) -> Rays:
@@ -454,7 +502,39 @@ class BlockScan:
             if setting.receiver.range_walk:
                 gain = strip_gain(plan.reception.strip_errors, plan.run.seed, strip.index)
                 distance = distance + range_walk(setting, speckle, plan.reception.noise, gain)
-        normal = None
+        kernel = plan.point_loops
+        if kernel is not None and isinstance(traced, TracedPulses) and not target.moving:
+            arrays, seen = self._placed_by_loops(kernel, pulses, traced, echoes, distance)
+        else:
+            arrays, seen = self._placed(pulses, traced, echoes, distance, motions)
+        points = make_block(
+            intensity=echoes.intensity,
+            rgb=np.zeros((len(pulse), 3), dtype=np.uint16),
+            return_number=number,
+            number_of_returns=returns,
+            strip=np.full(len(pulse), strip.index, dtype=np.uint16),
+            range=distance,
+            incidence_deg=np.rad2deg(np.arccos(np.minimum(np.abs(along), 1.0))).astype(np.float32),
+            **arrays,
+        )
+        return points, seen
+
+    def _placed(
+        self, pulses: Pulses, traced: Traced, echoes: Echoes, distance: Float, motions: list[Track]
+    ) -> tuple[dict[str, AnyArray], SeenPoints | None]:
+        """Return the arrays of echoes' points that follow from where these are, and where they were seen.
+
+        Args:
+            pulses: of the block.
+            traced: hits.
+            echoes: N of them.
+            distance: (N,) measured ranges, m.
+            motions: tracks of the target's moving parts.
+        """
+        plan, setting, target = self.plan, self.plan.setting, self.plan.target
+        pulse, hit = echoes.pulse, echoes.hit
+        face, along = traced.pick("face", hit), traced.pick("along", hit)
+        normal, seen = None, None
         if plan.layers.seen_points or "normal" in plan.layers.measured:
             normal = target.normals(face, along, pulses.time[pulse], motions)
             if self._off_surfaces:
@@ -464,25 +544,51 @@ class BlockScan:
         if self._off_surfaces:
             class_id = np.where(face < 0, np.uint8(plan.atmosphere.air_class), class_id)
         measured = MeasuredPoints(setting, target, pulses, pulse, echoes.range, echoes.intensity, face, normal)
-        points = make_block(
-            xyz=place_points(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
-            intensity=echoes.intensity,
-            rgb=np.zeros((len(pulse), 3), dtype=np.uint16),
-            class_id=class_id,
-            instance_id=target.instances(face, pulses.time[pulse]),
-            return_number=number,
-            number_of_returns=returns,
-            gps_time=pulses.time[pulse] + plan.reception.epoch,
-            scan_angle_deg=np.rad2deg(pulses.scan_angle[pulse]).astype(np.float32),
-            strip=np.full(len(pulse), strip.index, dtype=np.uint16),
-            range=distance,
-            incidence_deg=np.rad2deg(np.arccos(np.minimum(np.abs(along), 1.0))).astype(np.float32),
-            **fill_layers(measured, plan.layers.measured),
-        )
-        seen = None
+        arrays: dict[str, AnyArray] = {
+            "xyz": place_points(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
+            "class_id": class_id,
+            "instance_id": target.instances(face, pulses.time[pulse]),
+            "gps_time": pulses.time[pulse] + plan.reception.epoch,
+            "scan_angle_deg": np.rad2deg(pulses.scan_angle[pulse]).astype(np.float32),
+        }
         if plan.layers.seen_points and normal is not None:
             seen = self._seen_targets(traced, hit, face, normal, motions)
-        return points, seen
+        return arrays | fill_layers(measured, plan.layers.measured), seen
+
+    def _placed_by_loops(
+        self, loops: PointLoops, pulses: Pulses, traced: TracedPulses, echoes: Echoes, distance: Float
+    ) -> tuple[dict[str, AnyArray], SeenPoints | None]:
+        """Return what `_placed` does where nothing moves and all echoes are of surfaces, by compiled loops."""
+        plan, target = self.plan, self.plan.target
+        of_pulses = (pulses.time, pulses.scan_angle, pulses.origin, pulses.measured_origin, pulses.measured_direction)
+        of_faces = (target.static_planes, target.class_id, target.instance_id, target.material)
+        hits = (traced.face, traced.along, traced.distance, traced.direction, traced.begin)
+        asked = plan.layers.seen_points or "normal" in plan.layers.measured
+        placed = loops.placed(
+            EchoPlaces(echoes.pulse, echoes.hit, distance, *hits, *of_pulses, *of_faces, target.origin, plan.reception.epoch),
+            asked,
+        )
+        face, known = traced.pick("face", echoes.hit), {"normal": placed.narrow_normal, "material": placed.material}
+        measured = MeasuredPoints(
+            plan.setting, target, pulses, echoes.pulse, echoes.range, echoes.intensity, face, None
+        )
+        arrays: dict[str, AnyArray] = {
+            "xyz": placed.xyz,
+            "class_id": placed.class_id,
+            "instance_id": placed.instance_id,
+            "gps_time": placed.gps_time,
+            "scan_angle_deg": placed.scan_angle_deg,
+            **{name: array for name, array in known.items() if name in plan.layers.measured},
+            **fill_layers(measured, plan.layers.measured - known.keys()),
+        }
+        if not plan.layers.seen_points:
+            return arrays, None
+        sunlit = None
+        if plan.sun is not None:
+            facing, begin = loops.facing(placed.normal, placed.position, plan.sun, _OFF_SURFACE)
+            sunlit = self._unshaded(facing, begin, placed.time, [])
+        seen = SeenPoints(placed.position, placed.scanner, placed.normal, placed.material, placed.time, face, sunlit)
+        return arrays, seen
 
     def _seen_targets(self, traced: Traced, hit: Index, face: Index, normal: Float, motions: list[Track]) -> SeenPoints:
         """Return the surface points that gave the returns, in the scene at time 0, as it is rendered.
@@ -509,11 +615,16 @@ class BlockScan:
         """Return a mask (N,) of the points that the sun reaches, on the side that their normals (3, N) point to."""
         sun = self.plan.sun
         assert sun is not None
-        result = sun @ normal > 0.0
-        towards = np.flatnonzero(result & (face >= 0))
-        # Columns are chosen several times as fast by `take` as by indexing.
-        begin = np.take(normal, towards, axis=1)
-        begin *= _OFF_SURFACE
-        begin += np.take(position, towards, axis=1)
-        result[towards] = self.plan.target.unobstructed(begin, sun, time[towards], motions)
+        facing = (sun[0] * normal[0] + sun[1] * normal[1] + sun[2] * normal[2] > 0.0) & (face >= 0)
+        return self._unshaded(facing, normal * _OFF_SURFACE + position, time, motions)
+
+    def _unshaded(self, facing: Bool, begin: Float, time: Float, motions: list[Track]) -> Bool:
+        """Return a mask (N,) of the places (3, N), m, that face the sun and that nothing shades at times (N,), s."""
+        sun, towards = self.plan.sun, np.flatnonzero(facing)
+        assert sun is not None
+        if len(towards) < len(facing):
+            # Columns are chosen several times as fast by `take` as by indexing.
+            begin, time = np.take(begin, towards, axis=1), np.take(time, towards)
+        result = np.zeros(len(facing), bool)
+        result[towards] = self.plan.target.unobstructed(begin, sun, time, motions)
         return result

@@ -40,6 +40,103 @@ class PackedPoints(NamedTuple):
     per_degree: float
 
 
+class EchoPlaces(NamedTuple):
+    """N echoes of M hits of P pulses at F faces of which none moves.
+
+    Attributes:
+        pulse, hit: (N,) of each echo.
+        range: (N,) measured, m.
+        face, along, distance: (M,) of the hits: faces, n . d of their normals and the rays, and true ranges, m.
+        direction, begin: (3, M) of the hits' rays; no begin: where the pulses do, m.
+        time, scan_angle: (P,) s, rad.
+        origin, measured_origin, measured_direction: (3, P) m.
+        planes: (F, 4) of the faces, see `Faces`.
+        class_id, instance_id, material: (F,).
+        map_origin, epoch: what is added to measured places, (3,) m, and times, s.
+    """
+
+    pulse: Index
+    hit: Index
+    range: Float
+    face: Index
+    along: Float
+    distance: Float
+    direction: Float
+    begin: Float | None
+    time: Float
+    scan_angle: Float
+    origin: Float
+    measured_origin: Float
+    measured_direction: Float
+    planes: Float
+    class_id: AnyArray
+    instance_id: AnyArray
+    material: AnyArray
+    map_origin: Float
+    epoch: float
+
+
+class PlacedPoints(NamedTuple):
+    """N points of echoes.
+
+    Attributes:
+        xyz: (N, 3) as measured, map coordinates, m.
+        gps_time: (N,) s.
+        scan_angle_deg: (N,).
+        class_id, instance_id, material: (N,).
+        position, scanner, normal: (N, 3) where each was seen and from where, local, m, and unit normals there, towards
+            the scanner.
+        narrow_normal: (N, 3) likewise.
+        time: (N,) of the pulses, s.
+    """
+
+    xyz: Float
+    gps_time: Float
+    scan_angle_deg: Float32
+    class_id: UInt8
+    instance_id: AnyArray
+    material: UInt16
+    position: Float
+    scanner: Float
+    normal: Float
+    narrow_normal: Float32
+    time: Float
+
+
+class ColumnGrid(NamedTuple):
+    """Grid across a direction, in whose cells lie what is seen side by side from there.
+
+    Attributes:
+        axes: (2, 3) vectors across the direction, over the width of the cells.
+        low: (2,) where the grid begins along these, in cells.
+        count: of the cells along each.
+        margin: by which faces are wider than they are, in cells.
+        direction: (3,) unit vector.
+        above: how far from a face's plane a place must be to be surely on one of its sides, m.
+    """
+
+    axes: Float
+    low: Float
+    count: tuple[int, int]
+    margin: float
+    direction: Float
+    above: float
+
+
+class Faces(NamedTuple):
+    """Faces of a mesh.
+
+    Attributes:
+        vertices: (V, 3) m.
+        triangles: (T, 3) rows of these.
+        planes: (T, 4) unit normals n, and c of n . x = c.
+    """
+
+    vertices: Float32
+    triangles: AnyArray
+    planes: Float
+
+
 class PointLoops(Protocol):
     """Interface of the loops; each gives the bytes of the NumPy code that asks for it: `scanning.kernels.points`."""
 
@@ -143,6 +240,50 @@ class PointLoops(Protocol):
 
     def evaluate_pieces(self, station: Float, pieces: Sequence[Float]) -> Float:
         """Return x, y, heading and curvature (4, N) at stations (N,) on the pieces of an alignment."""
+        ...
+
+    def face_columns(
+        self, faces: Faces, grid: ColumnGrid, most: int
+    ) -> tuple[AnyArray, AnyArray]:
+        """Return the faces of each cell of a grid that they may touch: where they begin (C + 1,), and their numbers.
+
+        Args:
+            faces: T of them.
+            grid: across a direction.
+            most: faces of a cell: where there are more none is listed.
+        """
+        ...
+
+    def clear_places(
+        self, places: Float, faces: Faces, grid: ColumnGrid, listed: tuple[AnyArray, AnyArray]
+    ) -> Bool:
+        """Return a mask (N,) of places (3, N), m, that no face listed in their cell hides from the grid's direction.
+
+        What lies in a cell without faces isn't among them.
+
+        Args:
+            places: (3, N).
+            faces, grid: as they were for `face_columns`.
+            listed: what that returned.
+        """
+        ...
+
+    def placed(self, echoes: EchoPlaces, seen: bool) -> PlacedPoints:
+        """Return the points of echoes; what is known of the places where they were seen only if asked, else empty."""
+        ...
+
+    def facing(self, normal: Float, position: Float, direction: Float, off: float) -> tuple[Bool, Float]:
+        """Return which normals (N, 3) face a direction (3,), and the places (3, N) so far (m) off positions (N, 3)."""
+        ...
+
+    def candidate_nodes(self, places: Sequence[Float], nodes: Sequence[Float], spacing: float) -> tuple[Int, Int]:
+        """Return (point, node) index pairs, sorted by point, of nodes that may be next to feet, see `road.alignment`.
+
+        Args:
+            places: x and y (N,).
+            nodes: x and y (M,), M > 0.
+            spacing: between two nodes at most, m.
+        """
         ...
 
     def find_feet(

@@ -198,23 +198,28 @@ class NodeLayers:
         for number in spans:
             for what in calculator.inputs_of(number):
                 asked.setdefault(what, []).append(number)
-        values, loops = {what: np.zeros((len(rows), 4), np.float32) for what in asked}, point_loops()
+        values, loops = dict[SurfaceInput, Float32](), point_loops()
         together: dict[tuple[int, ...], list[SurfaceInput]] = {}
         for what, numbers in asked.items():
             if loops is not None and what in (POSITION, TRUE_NORMAL) and points.normal.dtype == np.float64:
                 source, shift = (points.position, self._frame) if what == POSITION else (points.normal, None)
                 values[what] = loops.inputs(rows, source, shift, self._unit)
-            elif what == POSITION:
-                values[what][:, :3] = (take_rows(points.position, rows) + self._frame) / self._unit
-            elif what in _OF_POINT:
-                values[what][:, :3] = _OF_POINT[what](points, rows)
+            elif what == POSITION or what in _OF_POINT:
+                values[what] = np.zeros((len(rows), 4), np.float32)
+                if what == POSITION:
+                    values[what][:, :3] = (take_rows(points.position, rows) + self._frame) / self._unit
+                else:
+                    values[what][:, :3] = _OF_POINT[what](points, rows)
             else:
                 together.setdefault(tuple(numbers), []).append(what)
         for several, inputs in together.items():
             places = [spans[number] for number in several]
-            mine = rows if len(places) == len(spans) else np.concatenate([rows[start:end] for start, end in places])
+            if len(places) == len(spans):
+                values |= self._surfaces.read(inputs, points, rows)
+                continue
+            mine = np.concatenate([rows[start:end] for start, end in places])
             for what, array in self._surfaces.read(inputs, points, mine).items():
-                first = 0
+                first, values[what] = 0, np.zeros((len(rows), 4), np.float32)
                 for start, end in places:
                     values[what][start:end] = array[first : first + end - start]
                     first += end - start

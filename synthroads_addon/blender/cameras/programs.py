@@ -6,6 +6,7 @@ import ctypes
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Literal
 
 import bpy
@@ -13,7 +14,7 @@ import numpy as np
 
 from ...base.arrays import Float32, Index
 from ...scanning.kernels.library import NoKernelError
-from ...scanning.kernels.materials import run_program, usable_materials
+from ...scanning.kernels.materials import ReadyProgram, usable_materials
 from ...scanning.kernels.program import MaterialProgram, ProgramBuilder
 from ...scanning.scene.surface_values import SurfaceInput
 from ..materials.programs import UnknownNodeError, compile_material
@@ -39,12 +40,13 @@ class ProgramCalculator:
     main_thread = False
 
     def __init__(self, kernel: ctypes.CDLL, programs: Mapping[int, MaterialProgram], layers: Sequence[str]) -> None:
-        self._kernel, self._programs = kernel, dict(programs)
+        self._kernel = kernel
+        self._programs = {index: ReadyProgram(program) for index, program in programs.items()}
         self.materials, self.layers = frozenset(programs), tuple(layers)
 
     def inputs_of(self, material: int) -> frozenset[SurfaceInput]:
         """Return the inputs that the program of the material with this index reads."""
-        return frozenset(self._programs[material].inputs)
+        return frozenset(self._programs[material].program.inputs)
 
     def calculate(self, material: Index, values: dict[SurfaceInput, Float32]) -> dict[str, Float32]:
         """Return the layers at N places, by name, (N, C) float32; 0 where a material says nothing of one.
@@ -53,23 +55,15 @@ class ProgramCalculator:
             material: (N,) of each place, ascending.
             values: (N, 4) of each input.
         """
-        numbers, starts, counts = np.unique(material, return_index=True, return_counts=True)
-        counts = counts.tolist()
-        parts = []
-        for number, start, count in zip(numbers.tolist(), starts.tolist(), counts, strict=True):
-            program = self._programs[number]
-            here = {what: values[what][start : start + count] for what in program.inputs}
-            parts.append(run_program(self._kernel, program, here, count))
-        names = {name: one.shape[1] for part in parts for name, one in part.items()}
-        return {
-            name: np.concatenate(
-                [
-                    part.get(name, np.zeros((count, width), np.float32))
-                    for part, count in zip(parts, counts, strict=True)
-                ]
-            )
-            for name, width in names.items()
-        }
+        starts = np.flatnonzero(np.diff(material, prepend=-1)).tolist()
+        spans = list(pairwise([*starts, len(material)]))
+        ready = [self._programs[int(material[start])] for start in starts]
+        widths = {name: width for one in ready for name, width in one.program.outputs}
+        result = {name: np.zeros((len(material), width), np.float32) for name, width in widths.items()}
+        for one, (start, end) in zip(ready, spans, strict=True):
+            here = {what: values[what][start:end] for what in one.program.inputs}
+            one.run(self._kernel, here, {name: result[name][start:end] for name, _ in one.program.outputs})
+        return result
 
 
 @dataclass

@@ -42,12 +42,18 @@ def pavement_places(
         station, offset: m.
         contrasts: of its strips, see `age.strip_contrasts`; none where nothing but heights is asked.
     """
-    distances = section.distances(station)
-    distance = section.carriageway.sign * offset
-    strip = np.clip((distances[:, 1:] <= distance[:, None]).sum(axis=1), 0, len(section.kinds) - 1)
-    kind, source = np.array(strip_lanes(section.kinds, len(section.carriageway.lanes)))[strip].T
-    rows = np.arange(len(distance))
-    inner, outer = distances[rows, source], distances[rows, source + 1]
+    distance, constant = section.carriageway.sign * offset, section.constant_distances
+    lanes = np.array(strip_lanes(section.kinds, len(section.carriageway.lanes))).T
+    if constant is not None:
+        strip = np.minimum(np.searchsorted(constant[1:], distance, side="right"), len(section.kinds) - 1)
+        kind, source = (np.take(row, strip) for row in lanes)
+        inner, outer = np.take(constant, source), np.take(constant, source + 1)
+    else:
+        distances = section.distances(station)
+        strip = np.clip((distances[:, 1:] <= distance[:, None]).sum(axis=1), 0, len(section.kinds) - 1)
+        kind, source = (np.take(row, strip) for row in lanes)
+        rows = np.arange(len(distance))
+        inner, outer = distances[rows, source], distances[rows, source + 1]
     code = place_code(kind, int(section.carriageway.side == "left"), (outer - inner) / 2.0)
     age = np.array(contrasts)[strip] if len(contrasts) else np.zeros(len(distance))
     return PavementPlace(np.asarray(station, np.float64), distance - (inner + outer) / 2.0, code, age)

@@ -73,7 +73,9 @@ class PavementSurface:
     def is_paved(self, side: Side, station: Float, offset: Float) -> Bool:
         """Return which places (N,) lie on a carriageway's pavement."""
         section = self.geometry.sections[side]
-        distances, distance = section.distances(station), section.carriageway.sign * offset
+        distance, constant = section.carriageway.sign * offset, section.constant_distances
+        # One row stands for all where widths are the same everywhere.
+        distances = section.distances(station) if constant is None else constant[None]
         paved = (distance >= distances[:, 0]) & (distance <= distances[:, -2])
         if "island" in section.kinds:
             inner, outer = section.boundaries_of("island", station)

@@ -11,7 +11,7 @@ from ...base.arithmetic.loops import point_loops
 from ...base.arrays import Float, Float32, Index, take_rows
 from ..scene.mesh import SceneMesh
 from ..scene.motion import MovingMesh
-from ..scene.surface_values import SurfaceInput, corner_shares
+from ..scene.surface_values import NORMALS, SurfaceInput, corner_shares
 from .colour import SeenPoints
 
 
@@ -32,9 +32,9 @@ class SceneSurfaces:
         """Return each surface input's values (K, 4) at rows (K,) of points; 0 where the surface lacks it."""
         if points.face is None:
             return {what: np.zeros((len(rows), 4), np.float32) for what in sorted(inputs)}
-        return self.read_places(
-            inputs, *(take_rows(one, rows) for one in (points.face, points.position, points.normal))
-        )
+        asked = list(inputs)
+        normal = take_rows(points.normal, rows) if any(what.kind in NORMALS for what in asked) else None
+        return self.read_places(asked, take_rows(points.face, rows), take_rows(points.position, rows), normal)
 
     def read_places(
         self, inputs: Iterable[SurfaceInput], face: Index, place: Float, normal: NDArray[np.floating] | None = None
@@ -50,44 +50,49 @@ class SceneSurfaces:
         result = {what: np.zeros((len(face), 4), np.float32) for what in sorted(inputs)}
         if not result:
             return result
-        normal = np.zeros((len(face), 3)) if normal is None else normal
         for number, mesh in enumerate(self._meshes):
             low, high = self._firsts[number], self._firsts[number + 1]
             mine = np.flatnonzero((face >= low) & (face < high))
+            if len(mine) == len(face):
+                return self._read_mesh(number, mesh, (face, place, normal), list(result))
             if len(mine):
-                some = (face, place, normal)
-                if len(mine) < len(face):
-                    some = (take_rows(face, mine), take_rows(place, mine), take_rows(normal, mine))
-                self._read_mesh(number, mesh, some, mine, result)
+                towards = None if normal is None else take_rows(normal, mine)
+                places = (take_rows(face, mine), take_rows(place, mine), towards)
+                for what, values in self._read_mesh(number, mesh, places, list(result)).items():
+                    result[what][mine] = values
         return result
 
     def _read_mesh(
         self,
         number: int,
         mesh: SceneMesh,
-        places: tuple[Index, Float, NDArray[np.floating]],
-        rows: Index,
-        result: dict[SurfaceInput, Float32],
-    ) -> None:
-        """Fill in, in place, the surface inputs' values of places (face, place, normal) on one of the meshes."""
+        places: tuple[Index, Float, NDArray[np.floating] | None],
+        inputs: Sequence[SurfaceInput],
+    ) -> dict[SurfaceInput, Float32]:
+        """Return the surface inputs' values (N, 4) of places (face, place, normal) on one of the meshes."""
         faces, place, towards = places[0] - self._firsts[number], places[1], places[2]
         rotation, begin = self._poses[number]
-        normal = np.asarray(towards, np.float64)
+        normal = None if towards is None else np.asarray(towards, np.float64)
         if number:  # what stands is in the scene's own frame
-            place, normal = (place - begin) @ rotation, normal @ rotation
+            place = (place - begin) @ rotation
+            normal = None if normal is None else normal @ rotation
         if (loops := point_loops()) is not None:
             shares = loops.corner_shares(mesh.vertices, mesh.triangles, faces, place)
         else:
             corners = take_rows(mesh.vertices, take_rows(mesh.triangles, faces))
             shares = corner_shares(corners.astype(np.float64), place)
-        for what, values in result.items():
-            found = np.zeros(len(rows), bool)
-            if mesh.surface is not None:
-                values[rows], found = mesh.surface.read(what, faces, shares, place, normal)
-            if what.kind == "normal":
+        located = None if mesh.surface is None else mesh.surface.locate(faces)
+        result: dict[SurfaceInput, Float32] = {}
+        for what in inputs:
+            values, found = np.zeros((len(faces), 4), np.float32), np.zeros(len(faces), bool)
+            if mesh.surface is not None and located is not None:
+                values, found = mesh.surface.read(what, located, shares, place, normal)
+            if what.kind == "normal" and towards is not None:
                 # Where the shading isn't smooth it is the face's own.
-                values[rows[found], :3] = values[rows[found], :3] @ rotation.T
-                values[rows[~found], :3] = towards[~found]
+                values[found, :3] = values[found, :3] @ rotation.T
+                values[~found, :3] = towards[~found]
+            result[what] = values
+        return result
 
 
 def _initial_pose(part: MovingMesh) -> tuple[Float, Float]:

@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...base.arrays import AnyArray, Float
+from ...base.arrays import AnyArray, Float, Index
 from ...base.rotations import rotation_matrix
 from ..patterns.base import Numbers, PulseRays
 from .device import ScannerSetting
@@ -44,30 +46,73 @@ def shots(setting: ScannerSetting, first: int, count: int, with_frame: bool = Fa
     Args:
         with_frame: whether the axes across the beam are wanted.
     """
-    number = np.arange(first, first + count, dtype=np.int64)
+    return shot_run(setting, first, count, with_frame).shots()
+
+
+class Columns(NamedTuple):
+    """Columns of tables (..., M) that repeat.
+
+    Attributes:
+        first: the first of a run of them.
+        rows: (N,) which of the run, ascending; None for all.
+    """
+
+    first: int
+    rows: Index | None = None
+
+    def of(self, table: AnyArray, count: int) -> AnyArray:
+        """Return the ``count`` columns of a table."""
+        if self.rows is None:
+            return _repeated(table, self.first, count)
+        return np.take(table, (self.rows + self.first) % table.shape[-1], axis=-1)
+
+
+@dataclass(frozen=True)
+class ShotRun:
+    """Shots one after the other, as the columns of a table of shots that repeats.
+
+    Attributes:
+        table: of the shots; its times are those within a cycle.
+        first: column of the first one.
+        time: (P,) of each, s.
+    """
+
+    table: PulseRays
+    first: int
+    time: Float
+
+    def column(self, name: str, rows: Index | None = None) -> AnyArray | None:
+        """Return an array (..., N) of the shots, or of rows (N,) of these, ascending; None if the table has none."""
+        values: AnyArray | None = getattr(self.table, name)
+        count = len(self.time) if rows is None else len(rows)
+        return None if values is None else Columns(self.first, rows).of(values, count)
+
+    def shots(self) -> PulseRays:
+        """Return all of them."""
+        names = ("scan_angle", "direction", "in_plane", "across", "beam")
+        others: list[Any] = [self.column(name) for name in names]
+        return PulseRays(self.time, *others)
+
+
+def shot_run(setting: ScannerSetting, first: int, count: int, with_frame: bool = False) -> ShotRun:
+    """Return what `shots` does, most of it not worked out yet."""
     lines = setting.device.pattern.cycle_lines
-    if lines == 0 or setting.free_mirror:
-        return _shots(setting, number, with_frame)
     length = lines * setting.pulses_per_line * len(setting.device.heads)
-    cycle = number // length
-    number -= cycle * length
-    if length > _LARGEST_TABLE:
-        chosen = _shots(setting, number, with_frame)
+    if 0 < length <= _LARGEST_TABLE and not setting.free_mirror:
+        table = _cycle_table(setting, with_frame)
+        cycle, column = divmod(first, length)
+        cycles = np.arange(cycle, cycle + -(-(column + count) // length), dtype=np.int64)
+        time = table.time + (cycles * lines / setting.lines_per_second)[:, None]
+        return ShotRun(table, column, time.ravel()[column : column + count].copy())
+    number = np.arange(first, first + count, dtype=np.int64)
+    if lines == 0 or setting.free_mirror:
+        alone = _shots(setting, number, with_frame)
     else:
-        chosen = _look_up_shots(_cycle_table(setting, with_frame), int(number[0]) if count else 0, count)
-    chosen.time[:] += cycle * lines / setting.lines_per_second
-    return chosen
-
-
-def _look_up_shots(table: PulseRays, first: int, count: int) -> PulseRays:
-    """Return ``count`` shots from ``first`` on of a table of shots, which repeats."""
-    time, scan_angle, direction = (
-        _repeated(array, first, count) for array in (table.time, table.scan_angle, table.direction)
-    )
-    others = (table.in_plane, table.across, table.beam)
-    return PulseRays(
-        time, scan_angle, direction, *(None if one is None else _repeated(one, first, count) for one in others)
-    )
+        cycle_of = number // length
+        number -= cycle_of * length
+        alone = _shots(setting, number, with_frame)
+        alone.time[:] += cycle_of * lines / setting.lines_per_second
+    return ShotRun(alone, 0, alone.time)
 
 
 def _repeated(table: AnyArray, first: int, count: int) -> AnyArray:

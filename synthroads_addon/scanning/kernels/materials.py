@@ -68,6 +68,70 @@ def usable_materials() -> ctypes.CDLL | NoKernelError:
     return kernel
 
 
+class ReadyProgram:
+    """A material's program as the kernel takes it; any threads may run it side by side.
+
+    Args:
+        program: of the material.
+
+    Attributes:
+        program: as given.
+    """
+
+    def __init__(self, program: MaterialProgram) -> None:
+        self.program = program
+        self._registers = np.zeros((program.registers + SCRATCH, LANES), np.float32)
+        for number, value in program.constants:
+            self._registers[number] = value
+        self._pictures = (_Picture * max(1, len(program.pictures)))(*map(_told, program.pictures))
+        self._widths = np.array([parts for _, parts in program.outputs], np.int32)
+        self._native = _Program(
+            program.code.ctypes.data,
+            program.tables.ctypes.data,
+            ctypes.addressof(self._pictures),
+            program.uniform,
+            len(program.code),
+            program.registers,
+        )
+
+    def run(
+        self,
+        kernel: ctypes.CDLL,
+        values: Mapping[SurfaceInput, Float32],
+        outputs: Mapping[str, Float32],
+        narrow: bool = False,
+    ) -> None:
+        """Write the material's layers at N places into arrays (N, C) by name; lets go of Python's lock meanwhile.
+
+        Args:
+            kernel: what runs it.
+            values: (N, 4) float32 of each input that it reads.
+            outputs: C-contiguous float32.
+            narrow: keep to the instructions that every processor has: the same, more slowly.
+        """
+        program = self.program
+        results = [outputs[name] for name, _ in program.outputs]
+        count = len(results[0]) if results else 0
+        inputs = [np.ascontiguousarray(values[what], np.float32) for what in program.inputs]
+        if any(array.shape != (count, 4) for array in inputs):
+            raise ValueError(f"values of {[array.shape for array in inputs]}: must be ({count}, 4)")
+        for one, (name, parts) in zip(results, program.outputs, strict=True):
+            if one.shape != (count, parts) or one.dtype != np.float32 or not one.flags.c_contiguous:
+                raise ValueError(f"{name} {one.dtype} {one.shape}: must be float32 ({count}, {parts}), side by side")
+        if not count:
+            return
+        registers = self._registers.copy()
+        pointers = [
+            (_POINTER * max(1, len(arrays)))(*(one.ctypes.data for one in arrays)) for arrays in (inputs, results)
+        ]
+        places = _Places(
+            ctypes.addressof(pointers[0]), ctypes.addressof(pointers[1]), self._widths.ctypes.data, count
+        )
+        kernel.synthroads_materials(
+            ctypes.byref(self._native), registers.ctypes.data, ctypes.byref(places), int(narrow)
+        )
+
+
 def run_program(
     kernel: ctypes.CDLL,
     program: MaterialProgram,
@@ -75,39 +139,17 @@ def run_program(
     count: int,
     narrow: bool = False,
 ) -> dict[str, Float32]:
-    """Return a material's layers at N places, by name, (N, C) float32; lets go of Python's lock meanwhile.
+    """Return a material's layers at N places, by name, (N, C) float32, see `ReadyProgram.run`.
 
     Args:
         kernel: what runs it.
         program: of the material.
         values: (N, 4) float32 of each input that it reads.
         count: N.
-        narrow: keep to the instructions that every processor has: the same, more slowly.
+        narrow: keep to the instructions that every processor has.
     """
-    inputs = [np.ascontiguousarray(values[what], np.float32) for what in program.inputs]
-    if any(array.shape != (count, 4) for array in inputs):
-        raise ValueError(f"values of {[array.shape for array in inputs]}: must be ({count}, 4)")
     outputs = {name: np.empty((count, parts), np.float32) for name, parts in program.outputs}
-    if not count:
-        return outputs
-    registers = np.zeros((program.registers + SCRATCH, LANES), np.float32)
-    for number, value in program.constants:
-        registers[number] = value
-    pictures = (_Picture * max(1, len(program.pictures)))(*map(_told, program.pictures))
-    widths = np.array([parts for _, parts in program.outputs], np.int32)
-    told = _Program(
-        program.code.ctypes.data,
-        program.tables.ctypes.data,
-        ctypes.addressof(pictures),
-        program.uniform,
-        len(program.code),
-        program.registers,
-    )
-    pointers = [
-        (_POINTER * max(1, len(arrays)))(*(one.ctypes.data for one in arrays)) for arrays in (inputs, outputs.values())
-    ]
-    places = _Places(ctypes.addressof(pointers[0]), ctypes.addressof(pointers[1]), widths.ctypes.data, count)
-    kernel.synthroads_materials(ctypes.byref(told), registers.ctypes.data, ctypes.byref(places), int(narrow))
+    ReadyProgram(program).run(kernel, values, outputs, narrow)
     return outputs
 
 

@@ -12,8 +12,8 @@
 typedef struct {
     Cast cast;
     void *casts, *scene;
-    int64_t first, faces;   /* number of its first face among all */
-    const double *planes;   /* (4, faces), body frame */
+    int64_t first;          /* number of its first face among all */
+    const double *planes;   /* (faces, 4), body frame */
     int64_t knots;
     double begin, spacing;  /* of the knots, s */
     const double *rotation, *position, *way; /* (9, knots), (3, knots), and of the middle of the ball around it */
@@ -207,7 +207,7 @@ INLINE void cast_pending(const Part *part, const Rays *rays, const Work *work, i
         double along;
         if (work->found[j] < 0)
             continue;
-        const double distance = range_to(part->planes, part->faces, work->found[j], ray, ray + 3, &along);
+        const double distance = range_to(part->planes, work->found[j], ray, ray + 3, &along);
         const int64_t i = work->pending[j];
         if (finite(distance) && distance < rays->distance[i]) {
             rays->face[i] = (int32_t)part->first + work->found[j];

@@ -24,7 +24,7 @@ class _Part(ctypes.Structure):
 
     _fields_ = (
         *((name, POINTER) for name in ("cast", "casts", "scene")),
-        *((name, INT64) for name in ("first", "faces")),
+        ("first", INT64),
         ("planes", POINTER),
         ("knots", INT64),
         *((name, DOUBLE) for name in ("begin", "spacing")),
@@ -78,7 +78,7 @@ class MovingParts:
         track_numbers = (way.shape[1], track.begin, track.spacing, *(array.ctypes.data for array in arrays))
         numbers = (part.radius, part.radius**2, fastest)
         self._bodies.append(
-            _Part(cast, None, scene, part.first, part.count, planes.ctypes.data, *track_numbers, *numbers)
+            _Part(cast, None, scene, part.first, planes.ctypes.data, *track_numbers, *numbers)
         )
 
     def cast(

@@ -52,7 +52,18 @@ typedef struct {
     int32_t changes;    /* in those; from call to call, where rays are cast by several */
 } Casts;
 
-static void fill(Number *packet, const CastRays *rays, int64_t first, int count, const int width)
+/* Fills in what all rays have alike, and Embree leaves as it is. */
+INLINE void prepare(Number *packet, const int width)
+{
+    for (int j = 0; j < width; j++) {
+        packet[NEAR * width + j].f = packet[TIME * width + j].f = 0.0f;
+        packet[MASK * width + j].u = INVALID;
+        packet[ID * width + j].u = packet[FLAGS * width + j].u = 0;
+        packet[INSTANCE * width + j].u = packet[INSTANCE_PRIMITIVE * width + j].u = INVALID;
+    }
+}
+
+INLINE void fill(Number *packet, const CastRays *rays, int64_t first, int count, const int width)
 {
     for (int j = 0; j < width; j++) {
         int64_t i = first + (j < count ? j : 0); /* lanes that are left over repeat the first ray, and aren't cast */
@@ -62,16 +73,12 @@ static void fill(Number *packet, const CastRays *rays, int64_t first, int count,
             int least = width > 1 && component < 0.0f && component > -LEAST_COMPONENT;
             packet[(DIRECTION + k) * width + j].f = least ? 0.0f : component;
         }
-        packet[NEAR * width + j].f = packet[TIME * width + j].f = 0.0f;
         packet[FAR * width + j].f = rays->limit[i * rays->limit_step];
-        packet[MASK * width + j].u = INVALID;
-        packet[ID * width + j].u = packet[FLAGS * width + j].u = 0;
         packet[PRIMITIVE * width + j].u = packet[GEOMETRY * width + j].u = INVALID;
-        packet[INSTANCE * width + j].u = packet[INSTANCE_PRIMITIVE * width + j].u = INVALID;
     }
 }
 
-static int32_t answer(const Number *packet, int j, int occluded, const int width)
+INLINE int32_t answer(const Number *packet, int j, int occluded, const int width)
 {
     if (occluded)
         return packet[FAR * width + j].f < 0.0f; /* Embree sets it to minus infinity */
@@ -79,7 +86,7 @@ static int32_t answer(const Number *packet, int j, int occluded, const int width
 }
 
 /* Whether all rays run beside the first; no if anything isn't a number. */
-static int coherent(const Number *packet, const Casts *casts, const int width)
+INLINE int coherent(const Number *packet, const Casts *casts, const int width)
 {
     int32_t beside = 1;
     for (int j = 1; j < width; j++) {
@@ -95,14 +102,16 @@ static int coherent(const Number *packet, const Casts *casts, const int width)
     return beside;
 }
 
-static inline __attribute__((always_inline)) void cast_all(
+INLINE void cast_all(
     Casts *casts, void *scene, int64_t rays_in_all, const CastRays *rays, int32_t *found, const int width)
 {
-    Number packet[ROWS * WIDEST] __attribute__((aligned(64)));
+    Number packet[ROWS * WIDEST] __attribute__((aligned(64))), alone[ROWS] __attribute__((aligned(64)));
     int32_t valid[WIDEST] __attribute__((aligned(64)));
     Arguments single = {0, EVERY_FEATURE, NULL, NULL, NULL, 0.0f}, together = single;
     together.flags = casts->flags;
     int32_t changes = casts->changes;
+    prepare(packet, width);
+    prepare(alone, 1);
     for (int64_t first = 0; first < rays_in_all; first += width) {
         int count = rays_in_all - first < width ? (int)(rays_in_all - first) : width;
         fill(packet, rays, first, count, width);
@@ -114,9 +123,9 @@ static inline __attribute__((always_inline)) void cast_all(
                 found[first + j] = answer(packet, j, casts->occluded, width);
         } else {
             for (int j = 0; j < count; j++) {
-                fill(packet, rays, first + j, 1, 1);
-                casts->one(scene, packet, &single);
-                found[first + j] = answer(packet, 0, casts->occluded, 1);
+                fill(alone, rays, first + j, 1, 1);
+                casts->one(scene, alone, &single);
+                found[first + j] = answer(alone, 0, casts->occluded, 1);
             }
         }
         changes = 0;
@@ -127,7 +136,7 @@ static inline __attribute__((always_inline)) void cast_all(
 }
 
 /* Writes the number of the first face that each ray meets, -1 for none; or 1 where it meets anything, else 0. */
-EXPORT void synthroads_cast(Casts *casts, void *scene, int64_t count, const CastRays *rays, int32_t *found)
+INLINE void any_cast(Casts *casts, void *scene, int64_t count, const CastRays *rays, int32_t *found)
 {
     if (casts->width == 16)
         cast_all(casts, scene, count, rays, found, 16);
@@ -136,3 +145,6 @@ EXPORT void synthroads_cast(Casts *casts, void *scene, int64_t count, const Cast
     else
         cast_all(casts, scene, count, rays, found, 4);
 }
+
+EXPORT_WIDE(void, cast, (Casts *casts, void *scene, int64_t count, const CastRays *rays, int32_t *found),
+            (casts, scene, count, rays, found))

@@ -7,6 +7,8 @@
  */
 #include "kernel.h"
 #include "loops/axis.h"
+#include "loops/columns.h"
+#include "loops/placed.h"
 #include "loops/records.h"
 
 INLINE float larger(float a, float b)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base.arithmetic.loops import PackedPoints
+from ...base.arithmetic.loops import ColumnGrid, EchoPlaces, Faces, PackedPoints, PlacedPoints
 from ...base.arrays import AnyArray, Bool, Float, Float32, Index, Int, UInt16
 from .library import NoKernelError, load_kernel
 
@@ -31,6 +31,11 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "measure": (None, (_INT64, _POINTER)),
     "step": (_INT64, (_INT64, _POINTER, _POINTER)),
     "evaluate": (None, (_INT64, *[_POINTER] * 3)),
+    "candidates": (_INT64, (_INT64, _POINTER, _POINTER, _INT64, *[_POINTER] * 3, ctypes.c_double, *[_POINTER] * 3)),
+    "place": (None, (_INT64, _POINTER, _POINTER)),
+    "face_sun": (None, (_INT64, *[_POINTER] * 3, ctypes.c_double, *[_POINTER] * 2)),
+    "sort_faces": (None, (_POINTER, _INT64, *[_POINTER] * 6)),
+    "clear": (None, (_POINTER, _INT64, *[_POINTER] * 7)),
 }
 """Results and arguments of the functions of points.c, by name."""
 _RECORD = 36
@@ -85,12 +90,62 @@ class _Pieces(ctypes.Structure):
     )
 
 
+class _Echoes(ctypes.Structure):
+    """Echoes and their pulses; as `Echoes` in points.c."""
+
+    _fields_ = (
+        *((name, _POINTER) for name in ("pulse", "hit", "range", "face", "along", "distance", "direction", "begin")),
+        ("hits", _INT64),
+        *((name, _POINTER) for name in ("time", "scan_angle", "origin", "measured_origin", "measured_direction")),
+        ("pulses", _INT64),
+        *((name, _POINTER) for name in ("planes", "class_id", "instance_id", "material")),
+        ("map_origin", ctypes.c_double * 3),
+        ("epoch", ctypes.c_double),
+    )
+
+
+class _Placed(ctypes.Structure):
+    """Points; as `Placed` in points.c."""
+
+    _fields_ = tuple((name, _POINTER) for name in PlacedPoints._fields)
+
+
+class _Columns(ctypes.Structure):
+    """Columns side by side; as `Columns` in points.c."""
+
+    _fields_ = (
+        ("axes", ctypes.c_double * 6),
+        ("low", ctypes.c_double * 2),
+        ("columns", _INT64 * 2),
+        ("margin", ctypes.c_double),
+        ("direction", ctypes.c_double * 3),
+        ("above", ctypes.c_double),
+    )
+
+    @classmethod
+    def of(cls, grid: ColumnGrid) -> _Columns:
+        """Return a grid for C."""
+        axes, low, direction = (np.ravel(one).tolist() for one in (grid.axes, grid.low, grid.direction))
+        types = [kind for _, kind in cls._fields_]
+        return cls(
+            types[0](*axes), types[1](*low), types[2](*grid.count), grid.margin, types[4](*direction), grid.above
+        )
+
+
 def _as(kind: Any, shape: tuple[int, ...], **arrays: AnyArray) -> list[AnyArray]:
     """Return arrays of this shape, C-contiguous and of this type; raise ValueError for another shape."""
     for name, array in arrays.items():
         if array.shape != shape:
             raise ValueError(f"{name} {array.shape}: must be {shape}")
     return [np.ascontiguousarray(array, kind) for array in arrays.values()]
+
+
+def _faces(faces: Faces) -> tuple[AnyArray, ...]:
+    """Return vertices, triangles and planes for C."""
+    (vertices,) = _as(np.float32, (len(faces.vertices), 3), vertices=faces.vertices)
+    (triangles,) = _as(np.int32, (len(faces.triangles), 3), triangles=faces.triangles)
+    (planes,) = _as(np.float64, (len(triangles), 4), planes=faces.planes)
+    return vertices, triangles, planes
 
 
 class CompiledPoints:
@@ -330,6 +385,87 @@ class CompiledPoints:
         self._functions["inputs"](len(rows), rows.ctypes.data, source.ctypes.data, at, unit, result.ctypes.data)
         return result
 
+    def placed(self, echoes: EchoPlaces, seen: bool) -> PlacedPoints:
+        """Return the points of echoes; what is known of the places where they were seen only if asked, else empty.
+
+        Raises:
+            IndexError: a pulse, a hit or a face isn't there.
+        """
+        e, count = echoes, len(echoes.pulse)
+        hits, pulses, faces = len(e.face), len(e.time), len(e.planes)
+        for name, numbers, most in (("pulse", e.pulse, pulses), ("hit", e.hit, hits), ("face", e.face, faces)):
+            if len(numbers) and not (numbers.min() >= 0 and numbers.max() < most):
+                raise IndexError(f"{name} {numbers.min()} to {numbers.max()} of {most}")
+        begin = e.begin if e.begin is None else _as(np.float64, (3, hits), begin=e.begin)[0]
+        of_hits: list[AnyArray | None] = [
+            *_as(np.int64, (count,), pulse=e.pulse, hit=e.hit),
+            *_as(np.float64, (count,), range=e.range),
+            *_as(np.int64, (hits,), face=e.face),
+            *_as(np.float64, (hits,), along=e.along, distance=e.distance),
+            *_as(np.float64, (3, hits), direction=e.direction),
+            begin,
+        ]
+        vectors = {name: getattr(e, name) for name in ("origin", "measured_origin", "measured_direction")}
+        of_pulses = [
+            *_as(np.float64, (pulses,), time=e.time, scan_angle=e.scan_angle),
+            *_as(np.float64, (3, pulses), **vectors),
+        ]
+        of_faces = [
+            *_as(np.float64, (faces, 4), planes=e.planes),
+            *_as(np.uint8, e.class_id.shape, class_id=e.class_id),
+            *_as(np.uint32, e.class_id.shape, instance_id=e.instance_id),
+            *_as(np.uint16, e.class_id.shape, material=e.material),
+        ]
+        if len(e.class_id) < faces:
+            raise ValueError(f"class_id {e.class_id.shape}: must be of {faces} faces")
+        told = _Echoes(
+            *(None if one is None else one.ctypes.data for one in of_hits),
+            *(hits, *(one.ctypes.data for one in of_pulses)),
+            *(pulses, *(one.ctypes.data for one in of_faces)),
+            (ctypes.c_double * 3)(*e.map_origin),
+            e.epoch,
+        )
+        known = count if seen else 0
+        placed = PlacedPoints(
+            *(np.empty((count, 3)), np.empty(count), np.empty(count, np.float32)),
+            *(np.empty(count, np.uint8), np.empty(count, np.uint32), np.empty(count, np.uint16)),
+            *(np.empty((known, 3)), np.empty((known, 3)), np.empty((known, 3))),
+            *(np.empty((known, 3), np.float32), np.empty(known)),
+        )
+        addresses = [one.ctypes.data if len(one) else None for one in placed]
+        self._functions["place"](count, ctypes.byref(told), ctypes.byref(_Placed(*addresses)))
+        return placed
+
+    def facing(self, normal: Float, position: Float, direction: Float, off: float) -> tuple[Bool, Float]:
+        """Return which normals (N, 3) face a direction (3,), and the places (3, N) so far (m) off positions (N, 3)."""
+        count = len(normal)
+        normal, position = _as(np.float64, (count, 3), normal=normal, position=position)
+        (direction,) = _as(np.float64, (3,), direction=direction)
+        facing, begin = np.empty(count, np.bool_), np.empty((3, count))
+        arrays = (normal, position, direction)
+        self._functions["face_sun"](
+            count, *(one.ctypes.data for one in arrays), off, facing.ctypes.data, begin.ctypes.data
+        )
+        return facing, begin
+
+    def candidate_nodes(self, places: Sequence[Float], nodes: Sequence[Float], spacing: float) -> tuple[Int, Int]:
+        """Return (point, node) index pairs, sorted by point, see `road.alignment`.
+
+        Args:
+            places: x and y (N,).
+            nodes: x and y (M,), M > 0.
+            spacing: between two nodes at most, m.
+        """
+        x, y = _as(np.float64, (len(places[0]),), x=places[0], y=places[1])
+        node_x, node_y = _as(np.float64, (len(nodes[0]),), node_x=nodes[0], node_y=nodes[1])
+        middle, square = np.array([node_x.mean(), node_y.mean()]), np.empty(len(node_x))
+        owner, column = np.empty((2, len(x) * ((len(node_x) + 1) // 2)), np.int64)
+        addresses = [one.ctypes.data for one in (x, y, node_x, node_y, middle, square, owner, column)]
+        found = self._functions["candidates"](
+            *(len(x), *addresses[:2], len(node_x), *addresses[2:5], spacing, *addresses[5:])
+        )
+        return owner[:found], column[:found]
+
     def find_feet(
         self,
         evaluate: Callable[[Float], tuple[Float, ...]],
@@ -361,6 +497,49 @@ class CompiledPoints:
             if not left:
                 break
         return station, along, offset
+
+    def face_columns(
+        self, faces: Faces, grid: ColumnGrid, most: int
+    ) -> tuple[AnyArray, AnyArray]:
+        """Return the faces of each cell of a grid that they may touch: where they begin (C + 1,), and their numbers.
+
+        Args:
+            faces: T of them.
+            grid: across a direction.
+            most: faces of a cell, 255 at most: where there are more none is listed.
+        """
+        vertices, triangles, _ = _faces(faces)
+        if most > np.iinfo(np.uint8).max:
+            raise ValueError(f"most {most}: must be 255 or less")
+        told, cells = _Columns.of(grid), grid.count[0] * grid.count[1]
+        head = (ctypes.byref(told), len(triangles), vertices.ctypes.data, triangles.ctypes.data)
+        starts = np.zeros(cells + 1, np.uint32)
+        counts = starts[1:]
+        self._functions["sort_faces"](*head, counts.ctypes.data, None, None, None)
+        counts[counts > most] = 0
+        np.cumsum(counts, out=counts)
+        numbers, filled = np.empty(int(starts[-1]), np.int32), np.zeros(cells, np.uint8)
+        self._functions["sort_faces"](*head, None, *(one.ctypes.data for one in (starts, filled, numbers)))
+        return starts, numbers
+
+    def clear_places(
+        self, places: Float, faces: Faces, grid: ColumnGrid, listed: tuple[AnyArray, AnyArray]
+    ) -> Bool:
+        """Return a mask (N,) of places (3, N), m, that no face listed in their cell hides from the grid's direction.
+
+        Args:
+            places: (3, N).
+            faces, grid: as they were for `face_columns`.
+            listed: what that returned.
+        """
+        count = places.shape[1]
+        (places,) = _as(np.float64, (3, count), places=places)
+        (starts,) = _as(np.uint32, (grid.count[0] * grid.count[1] + 1,), starts=listed[0])
+        (numbers,) = _as(np.int32, (int(starts[-1]),), numbers=listed[1])
+        told, result = _Columns.of(grid), np.empty(count, np.bool_)
+        arrays = (places, *_faces(faces), starts, numbers, result)
+        self._functions["clear"](ctypes.byref(told), count, *(one.ctypes.data for one in arrays))
+        return result
 
     def pack(self, record: AnyArray, points: PackedPoints) -> tuple[Float, Int] | None:
         """Fill in LAS records (N,) of point format 7, without extra bytes; None where a value or a type doesn't fit.

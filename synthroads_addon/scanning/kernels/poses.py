@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 
 from ...base.arrays import Float
+from ..devices.shots import Columns
 from ..knots import Track
 from .library import NoKernelError, load_kernel
 
@@ -29,28 +30,38 @@ class CompiledPoses:
         self._turn.restype = None
         self._turn.argtypes = [
             *(_INT64, _POINTER, _DOUBLE, _DOUBLE, _INT64, _POINTER, _POINTER),
+            *(_INT64, _INT64, _POINTER),
             *(_INT64, _POINTER, _POINTER, _POINTER),
         ]
 
-    def turned_vectors(self, track: Track, times: Float, vectors: Sequence[Float]) -> tuple[Float, list[Float]]:
+    def turned_vectors(
+        self, track: Track, times: Float, vectors: Sequence[Float], columns: Columns | None = None
+    ) -> tuple[Float, list[Float]]:
         """Return a track's positions (3, N), m, at times (N,), s, and sets of vectors (3, N) turned by its rotations.
 
         Args:
             track: two knots or more.
             times: within the track.
-            vectors: `MOST_SETS` at most.
+            vectors: `MOST_SETS` at most, (3, N), or tables (3, M) of which columns are turned.
+            columns: N of such tables; rows are ascending.
         """
         count, sets = len(times), [np.ascontiguousarray(one, np.float64) for one in vectors]
         times, rotation, position = (
             np.ascontiguousarray(array, np.float64) for array in (times, track.rotation, track.position)
         )
-        knots = position.shape[1]
-        if len(sets) > MOST_SETS or any(one.shape != (3, count) for one in sets) or rotation.shape != (9, knots):
-            raise ValueError(f"vectors {[one.shape for one in sets]}: {MOST_SETS} sets of (3, {count}) at most")
+        knots, first, rows, width = position.shape[1], 0, None, count
+        if columns is not None and sets:
+            first, width = columns.first, sets[0].shape[1]
+            rows = None if columns.rows is None else np.ascontiguousarray(columns.rows, np.int64)
+            if first < 0 or not width or (rows is not None and (rows.shape != (count,) or rows.min(initial=0) < 0)):
+                raise ValueError(f"columns from {first} of {width}, rows {rows}: {count} of them, none below 0")
+        if len(sets) > MOST_SETS or any(one.shape != (3, width) for one in sets) or rotation.shape != (9, knots):
+            raise ValueError(f"vectors {[one.shape for one in sets]}: {MOST_SETS} sets of (3, {width}) at most")
         place, turned = np.empty((3, count)), [np.empty((3, count)) for _ in sets]
         addresses = [(_POINTER * MOST_SETS)(*(one.ctypes.data for one in arrays)) for arrays in (sets, turned)]
         self._turn(
             *(count, times.ctypes.data, track.begin, track.spacing, knots, rotation.ctypes.data, position.ctypes.data),
+            *(first, width, None if rows is None else rows.ctypes.data),
             *(len(sets), *addresses, place.ctypes.data),
         )
         return place, turned

@@ -14,8 +14,7 @@ typedef struct {
     Cast cast;
     void *scene;
     const Shape *shape;
-    int64_t faces;                                     /* of what doesn't move */
-    const double *planes;                              /* (4, faces) */
+    const double *planes;                              /* (faces, 4) of what doesn't move */
     const uint16_t *material;                          /* of all faces */
     const double *reflectivity, *facet_a, *facet_b;    /* (M) of materials, as all that follow */
     const double *transmission, *open_below, *gap_size;
@@ -261,7 +260,7 @@ INLINE int64_t any_first(const Scene *scene, void *casts, const Beams *beams, co
                         ray.origin[i] = beams->origin[i * pulses + begin + p];
                         ray.direction[i] = turned[i * step + k * lot + p];
                     }
-                    distance = range_to(scene->planes, scene->faces, face, ray.origin, ray.direction, &along);
+                    distance = range_to(scene->planes, face, ray.origin, ray.direction, &along);
                 }
                 shine += settle_first(scene, met, passed, length, shining, shine, k, begin + p, pulses, &ray, face,
                                       distance, along, __builtin_nan(""));
@@ -301,7 +300,7 @@ INLINE void any_cast_first(const Scene *scene, void *casts, const Beams *beams, 
                             ray.direction[i] = turned[i * step + k * lot + p];
                         }
                     }
-                    distance = range_to(scene->planes, scene->faces, face, ray.origin, ray.direction, &along);
+                    distance = range_to(scene->planes, face, ray.origin, ray.direction, &along);
                 }
                 const int hit = face >= 0 && finite(distance);
                 met->face[at] = hit ? face : -1;
@@ -380,7 +379,7 @@ INLINE void any_cast_behind(const Scene *scene, void *casts, const Beams *beams,
             double place[3];
             for (int i = 0; i < 3; i++)
                 place[i] = ray.origin[i] + start * ray.direction[i];
-            const double distance = range_to(scene->planes, scene->faces, found[j], place, ray.direction,
+            const double distance = range_to(scene->planes, found[j], place, ray.direction,
                                              ahead->along + begin + j);
             if (finite(distance))
                 ahead->distance[begin + j] = distance;
@@ -684,6 +683,6 @@ EXPORT void synthroads_describe(const Scene *scene, const Beams *beams, const Me
         if (met->along)
             along[i] = met->along[row];
         else
-            range_to(scene->planes, scene->faces, met->face[row], ray.origin, ray.direction, along + i);
+            range_to(scene->planes, met->face[row], ray.origin, ray.direction, along + i);
     }
 }

@@ -45,7 +45,6 @@ class _Scene(ctypes.Structure):
 
     _fields_ = (
         *((name, POINTER) for name in ("cast", "scene", "shape")),
-        ("faces", INT64),
         *((name, POINTER) for name in ("planes", "material", "reflectivity", "facet_a", "facet_b")),
         *((name, POINTER) for name in ("transmission", "open_below", "gap_size")),
         *((name, POINTER) for name in ("pervious", "gappy", "shining", "clear")),
@@ -106,7 +105,7 @@ class PulseKernel:
         parallel: bool = False,
     ) -> None:
         self._kernel, caster = _load(), target.caster
-        if not isinstance(caster, PacketScene) or not len(target.static_planes[0]):
+        if not isinstance(caster, PacketScene) or not len(target.static_planes):
             raise NoKernelError("no rays are cast in packets")
         if int(target.material.max()) >= len(surfaces.reflectivity):
             raise NoKernelError("faces are of materials that aren't there")
@@ -127,7 +126,7 @@ class PulseKernel:
         limits = (setting.minimum_range, setting.maximum_range, attenuation)
         self._scene = _Scene(
             *(*caster.native, ctypes.addressof(self._shape.native)),
-            *(len(target.static_planes[0]), *address),
+            *address,
             (DOUBLE * 3)(*(np.zeros(3) if gaps is None else gaps.frame_origin)),
             0.0 if gaps is None else 0.75 / math.pi * gaps.solid_angle,
             0 if gaps is None else gaps.key,

@@ -52,16 +52,15 @@ INLINE Ray ray_of(const Shape *shape, const Beams *beams, int64_t k, int64_t p)
     return ray;
 }
 
-/* FacePlanes.intersect: the range to the plane of one of so many faces, and n . d. `planes`: (4, faces). */
-INLINE double range_to(const double *planes, int64_t faces, int32_t face, const double *origin,
-                       const double *direction, double *along)
+/* FacePlanes.intersect: the range to the plane of a face, and n . d. `planes`: (faces, 4). */
+INLINE double range_to(const double *planes, int32_t face, const double *origin, const double *direction,
+                       double *along)
 {
-    const double *plane = planes + face;
-    double height = plane[3 * faces] - plane[0] * origin[0], product = plane[0] * direction[0];
+    const double *plane = planes + 4 * (int64_t)face;
+    double height = plane[3] - plane[0] * origin[0], product = plane[0] * direction[0];
     for (int i = 1; i < 3; i++) {
-        double normal = plane[i * faces];
-        product += normal * direction[i];
-        height -= normal * origin[i];
+        product += plane[i] * direction[i];
+        height -= plane[i] * origin[i];
     }
     *along = product;
     return height / product;

@@ -41,11 +41,11 @@ class FacePlanes:
     """The planes of a mesh's faces in float64: n . x = c.
 
     Attributes:
-        planes: (4, T) unit normal and c, a row each; the normal of a face without area is 0.
+        planes: (T, 4) unit normals and c, a face's side by side; the normal of a face without area is 0.
     """
 
     def __init__(self, mesh: SceneMesh) -> None:
-        self.planes: Float = np.empty((4, len(mesh.triangles)))
+        self.planes: Float = np.empty((len(mesh.triangles), 4))
         for start in range(0, len(mesh.triangles), _BLOCK):
             self._fill(mesh, slice(start, start + _BLOCK))
 
@@ -53,12 +53,13 @@ class FacePlanes:
         a, b, c = (mesh.vertices[mesh.triangles[block, i]].T.astype(np.float64) for i in range(3))
         b -= a
         c -= a
-        normal = self.planes[:3, block]
+        normal = np.empty_like(a)
         for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
             normal[i] = b[j] * c[k] - b[k] * c[j]
         length = np.sqrt(np.einsum("ij,ij->j", normal, normal))
         normal /= np.where(length > 0.0, length, 1.0)
-        self.planes[3, block] = np.einsum("ij,ij->j", normal, a)
+        self.planes[block, :3] = normal.T
+        self.planes[block, 3] = np.einsum("ij,ij->j", normal, a)
 
     def intersect(self, faces: Index, origins: Float, directions: Float) -> tuple[Float, Float]:
         """Return rays' ranges (m) to the planes of ``faces``, and n . d, the signed cosine of incidence.
@@ -73,23 +74,20 @@ class FacePlanes:
             meets the side that the normal points to.
         """
         # Clipped, indices needn't be checked one by one before.
-        height, product = np.take(self.planes[3], faces, mode="clip"), np.empty(faces.shape)
-        normal = np.take(self.planes[0], faces, mode="clip")
-        along = normal * directions[0]
-        height -= np.multiply(normal, origins[0], out=product)
+        plane, product = np.take(self.planes, faces, axis=0, mode="clip"), np.empty(faces.shape)
+        height = plane[..., 3].copy()
+        along = plane[..., 0] * directions[0]
+        height -= np.multiply(plane[..., 0], origins[0], out=product)
         for i in (1, 2):
-            np.take(self.planes[i], faces, mode="clip", out=normal)
-            along += np.multiply(normal, directions[i], out=product)
-            height -= np.multiply(normal, origins[i], out=product)
+            along += np.multiply(plane[..., i], directions[i], out=product)
+            height -= np.multiply(plane[..., i], origins[i], out=product)
         with np.errstate(divide="ignore", invalid="ignore"):
             height /= along
         return height, along
 
     def normals(self, faces: Index, along: Float) -> Float:
         """Return (3, H) unit normals of faces, turned towards rays with n . d = ``along`` (H,); of -1 any."""
-        result = np.empty((3, len(faces)))
-        for plane, row in zip(self.planes, result, strict=False):
-            np.take(plane, faces, mode="clip", out=row)
+        result = np.ascontiguousarray(np.take(self.planes, faces, axis=0, mode="clip")[:, :3].T)
         result *= np.where(along > 0.0, -1.0, 1.0)
         return result
 

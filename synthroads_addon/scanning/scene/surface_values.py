@@ -68,8 +68,24 @@ class PartValues:
     values: Mapping[SurfaceInput, MeshValues]
 
 
-_NORMALS = ("normal", "object_normal")
+NORMALS = ("normal", "object_normal")
 """Kinds of inputs that are normals of the shading: in the scene mesh's frame, and in the part's own."""
+
+
+class PlacesOnPart(NamedTuple):
+    """Places on triangles of a part.
+
+    Attributes:
+        part: the part.
+        rows: (H,) of the places among others.
+        use: (H,) at which of the places that the part stands at each is.
+        triangle: (H,) of the part.
+    """
+
+    part: PartValues
+    rows: Index
+    use: Index
+    triangle: Index
 
 
 @dataclass(frozen=True)
@@ -89,27 +105,34 @@ class SurfaceValues:
         """Return the first triangle (P,) of each part; cached."""
         return np.array([part.first for part in self.parts], np.int64)
 
+    def locate(self, faces: Index) -> list[PlacesOnPart]:
+        """Return where triangles (N,) of the scene's mesh are, part by part; some may be on none."""
+        number = faces if self.kept is None else np.take(self.kept, faces).astype(np.intp)
+        # Meshes may be many: only those are looked at that the triangles are of.
+        owner, result = np.searchsorted(self._firsts, number, side="right") - 1, list[PlacesOnPart]()
+        for at in np.flatnonzero(np.bincount(owner + 1)[1:]).tolist():
+            part = self.parts[at]
+            mine = np.flatnonzero((owner == at) & (number < part.first + len(part.corners) * part.uses))
+            if len(mine):
+                place = np.take(number, mine) - part.first
+                use = place // len(part.corners)  # several times as fast as what gives the remainder as well
+                result.append(PlacesOnPart(part, mine, use, place - use * len(part.corners)))
+        return result
+
     def read(
-        self, what: SurfaceInput, faces: Index, shares: Float, place: Float, normal: Float
+        self, what: SurfaceInput, located: list[PlacesOnPart], shares: Float, place: Float, normal: Float | None
     ) -> tuple[Float32, Bool]:
         """Return an input's values (N, 4) on triangles, and a mask (N,) of those that have it; zeros elsewhere.
 
         Args:
             what: the input.
-            faces: (N,) triangles of the scene's mesh.
+            located: where the triangles are, see `locate`.
             shares: (N, 3) weights of their corners.
-            place, normal: (N, 3) in the mesh's frame, m; the places on the triangles, and unit normals there.
+            place: (N, 3) on the triangles, in the mesh's frame, m.
+            normal: (N, 3) unit normals there; None if the input is none.
         """
-        result, found = np.zeros((len(faces), 4), np.float32), np.zeros(len(faces), bool)
-        number = faces if self.kept is None else np.take(self.kept, faces).astype(np.intp)
-        # Meshes may be many: only those are looked at that the triangles are of.
-        owner = np.searchsorted(self._firsts, number, side="right") - 1
-        for at in np.unique(owner[owner >= 0]).tolist():
-            part = self.parts[at]
-            mine = np.flatnonzero((owner == at) & (number < part.first + len(part.corners) * part.uses))
-            if not len(mine):
-                continue
-            use, triangle = np.divmod(number[mine] - part.first, len(part.corners))
+        result, found = np.zeros((len(place), 4), np.float32), np.zeros(len(place), bool)
+        for part, mine, use, triangle in located:
             if what.kind == "object":
                 values = _in_frame(part, use, place[mine])
             else:
@@ -117,7 +140,8 @@ class SurfaceValues:
                     found[mine] = True
                     continue
                 values = _interpolate(part, what, use, triangle, take_rows(shares, mine))
-                if values is not None and what.kind in _NORMALS:
+                if values is not None and what.kind in NORMALS:
+                    assert normal is not None
                     values[:, :3] = _oriented_normals(part, use, values[:, :3], normal[mine], what.kind == "normal")
             if values is not None:
                 result[mine], found[mine] = values, True
@@ -165,7 +189,7 @@ def _interpolate_into(
         shares: (N, 3) weights of the corners.
     """
     loops, entry = point_loops(), part.values.get(what)
-    if loops is None or entry is None or entry.domain in ("object", "face") or what.kind in _NORMALS:
+    if loops is None or entry is None or entry.domain in ("object", "face") or what.kind in NORMALS:
         return False
     rows, use, triangle = places
     elements = part.corners if entry.domain == "corner" else part.points

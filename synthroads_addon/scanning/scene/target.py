@@ -16,6 +16,7 @@ from .bundles import Bundles
 from .caster import Caster, FacePlanes, as_rows
 from .mesh import SceneMesh
 from .motion import MovingMesh, ScannedScene
+from .sun_columns import SunColumns
 
 SUN_REACH = 2000.0
 """How far away something may stand that throws a shadow, m."""
@@ -105,6 +106,7 @@ class Target:
         ]
         self.caster = self._parts[0].caster
         self.bounds = static.vertex_bounds()
+        self._columns = SunColumns(static, self._parts[0].planes)
 
     def face_values(self, name: str, faces: Index) -> AnyArray:
         """Return ``class_id``, ``instance_id``, ``material`` or ``damage`` of faces (H,); that of no face for -1."""
@@ -185,7 +187,12 @@ class Target:
             reach: how far is looked, m.
         """
         towards = np.broadcast_to(direction[:, None], origins.shape)
-        free = ~self.caster.occluded(as_rows(origins), as_rows(towards), reach)
+        free = self._columns.clear(origins, direction)
+        if free is None:
+            free = ~self.caster.occluded(as_rows(origins), as_rows(towards), reach)
+        elif len(rows := np.flatnonzero(~free)):
+            begin = as_rows(np.take(origins, rows, axis=1))
+            free[rows] = ~self.caster.occluded(begin, as_rows(towards[:, : len(rows)]), reach)
         if not self.moving or not len(times):
             return free
         rays = Bundles.gather(origins, towards, times, np.full(len(times), reach))
@@ -263,12 +270,12 @@ class Target:
 
     @property
     def static_planes(self) -> Float:
-        """Return the planes (4, F) of the static mesh's faces, see `FacePlanes`."""
+        """Return the planes (F, 4) of the static mesh's faces, see `FacePlanes`."""
         return self._parts[0].planes.planes
 
     def static_normals(self, faces: Index) -> Float:
         """Return the local unit normals (3, H) of faces of the static mesh, on the side that these are seen from."""
-        return np.take(self._parts[0].planes.planes[:3], faces, axis=1)
+        return np.ascontiguousarray(np.take(self._parts[0].planes.planes, faces, axis=0)[:, :3].T)
 
     def normals(self, faces: Index, along: Float, times: Float, motions: list[Track]) -> Float:
         """Return the local unit normals (3, H) of faces at times (H,), turned towards the rays that met them.

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.random_streams import stream
+from synthroads_addon.scanning.devices.shots import Columns
 from synthroads_addon.scanning.kernels.library import load_kernel
 from synthroads_addon.scanning.kernels.poses import CompiledPoses, usable_poses
 from synthroads_addon.scanning.knots import Track
@@ -60,6 +61,22 @@ def test_poses_and_vectors(kernel: CompiledPoses, knots: int, sets: int, count: 
         assert mine.tobytes() == theirs.tobytes()
 
 
+@pytest.mark.parametrize("columns", [1, 7, 5000])
+@pytest.mark.parametrize("first", [0, 3, 4999])
+@pytest.mark.parametrize("every", [None, 1, 13])
+def test_columns_of_tables_that_repeat(kernel: CompiledPoses, columns: int, first: int, every: int | None) -> None:
+    random, path, count = stream(columns, "table"), track(9), 3000
+    tables, first = [random.normal(0, 1, (3, columns)) for _ in range(2)], first % columns
+    rows = None if every is None else np.sort(random.integers(0, every * count, count))
+    run = np.arange(count) if rows is None else rows
+    times = random.uniform(path.begin, path.begin + 8 * path.spacing, count)
+    alone = kernel.turned_vectors(path, times, [table[:, (first + run) % columns] for table in tables])
+    for way in (kernel.turned_vectors, turned_vectors):
+        place, turned = way(path, times, tables, Columns(first, rows))
+        assert place.tobytes() == alone[0].tobytes()
+        assert [one.tobytes() for one in turned] == [one.tobytes() for one in alone[1]]
+
+
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_vectors_and_poses_that_are_none(kernel: CompiledPoses) -> None:
     path, odd = track(9), np.array([np.nan, np.inf, -np.inf, 1e308, 1e-310, -0.0])
@@ -76,3 +93,8 @@ def test_arrays_that_do_not_match_are_refused(kernel: CompiledPoses) -> None:
         kernel.turned_vectors(track(4), times, [np.zeros((3, 5))])
     with pytest.raises(ValueError, match="at most"):
         kernel.turned_vectors(track(4), times, [np.zeros((3, 4))] * 4)
+    for columns in (Columns(-1), Columns(0, np.arange(3)), Columns(0, np.array([0, 1, -1, 2]))):
+        with pytest.raises(ValueError, match="4 of them, none below 0"):
+            kernel.turned_vectors(track(4), times, [np.zeros((3, 4))], columns)
+    with pytest.raises(ValueError, match="columns from 0 of 0"):
+        kernel.turned_vectors(track(4), times, [np.zeros((3, 0))], Columns(0))

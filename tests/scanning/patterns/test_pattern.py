@@ -14,7 +14,7 @@ from scipy import stats
 
 from synthroads_addon.base.rotations import rotation_matrix
 from synthroads_addon.scanning.devices.device import Device, PulseMode, ScannerSetting, device_names, load_device
-from synthroads_addon.scanning.devices.shots import _cycle_table, shot_count, shots
+from synthroads_addon.scanning.devices.shots import _cycle_table, shot_count, shot_run, shots
 from synthroads_addon.scanning.patterns.base import PulseRays
 from tests.helpers.scenes.scanners import custom, mode, preset, wedges
 
@@ -227,6 +227,12 @@ def test_slices_equal_the_whole(name: str, data: st.DataObject) -> None:
         joined = np.concatenate([getattr(part, field) for part in parts], axis=-1)
         np.testing.assert_array_equal(value, joined)
     assert (whole.in_plane is None) is (not framed)
+    run, rows = shot_run(s, begin, size, framed), np.arange(cut, size, 2)
+    for field in ("scan_angle", "direction", "in_plane", "across", "beam"):
+        value, some = getattr(whole, field), run.column(field, rows)
+        assert (value is None) is (some is None)
+        if some is not None:
+            np.testing.assert_array_equal(some, value[..., rows])
 
 
 @pytest.mark.parametrize("name", [name for name in EVERY if len(any_setting(name).device.heads) == 1])

@@ -91,3 +91,39 @@ INLINE int64_t any_step(int64_t count, const Feet *f, const double *restrict ang
 }
 
 EXPORT_WIDE(int64_t, step, (int64_t count, const Feet *feet, const double *angle), (count, feet, angle))
+
+/* Lists, for points one after the other, which nodes of an axis, all about a middle, may be next to their feet: those
+ * at a local minimum of distance that lies within `spacing` of the least. Returns their number. `square`: (nodes). */
+INLINE int64_t any_candidates(int64_t count, const double *restrict x, const double *restrict y, int64_t nodes,
+                              const double *restrict node_x, const double *restrict node_y, const double *middle,
+                              double spacing, double *restrict square, int64_t *restrict owner,
+                              int64_t *restrict column)
+{
+    int64_t found = 0;
+    for (int64_t i = 0; i < count; i++) {
+        const double px = x[i] - middle[0], py = y[i] - middle[1], length = px * px + py * py;
+        double least = __builtin_inf();
+        for (int64_t k = 0; k < nodes; k++) { /* less the point's own part, which is the same for all */
+            const double qx = node_x[k] - middle[0], qy = node_y[k] - middle[1];
+            square[k] = px * (-2.0 * qx) + py * (-2.0 * qy) + (qx * qx + qy * qy);
+            least = square[k] < least ? square[k] : least;
+        }
+        const double from = least + length > 0.0 ? least + length : 0.0, reach = __builtin_sqrt(from) + spacing;
+        const double bound = reach * reach - length;
+        for (int64_t k = 0; k < nodes; k++) {
+            const int falls = k == 0 || square[k] < square[k - 1];
+            const int rises = k == nodes - 1 || !(square[k + 1] < square[k]);
+            if (square[k] <= bound && falls && rises) {
+                owner[found] = i;
+                column[found++] = k;
+            }
+        }
+    }
+    return found;
+}
+
+EXPORT_WIDE(int64_t, candidates,
+            (int64_t count, const double *x, const double *y, int64_t nodes, const double *node_x,
+             const double *node_y, const double *middle, double spacing, double *square, int64_t *owner,
+             int64_t *column),
+            (count, x, y, nodes, node_x, node_y, middle, spacing, square, owner, column))
