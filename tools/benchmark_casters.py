@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.waves import wave_mesh
+from synthroads_addon.jobs.measure.waves import wave_mesh
 from synthroads_addon.base.progress import peak_memory_mb
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.blender.casters.bvhtree import BVHTreeCaster

@@ -22,7 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.waves import write_waves
+from synthroads_addon.jobs.measure.waves import write_waves
 from synthroads_addon.base.progress import peak_memory_mb
 from synthroads_addon.blender.casters.embree import EmbreeCaster
 from synthroads_addon.blender.scene.evaluated import scanned_scene
