@@ -55,6 +55,13 @@ class RoadGeometry:
         profile: the vertical profile in local elevation.
         sections: the carriageways' cross-sections by side.
         strips: the M strips from left to right.
+
+    Example:
+        >>> from synthroads_addon import sample_road
+        >>> from synthroads_addon.scenario.road import RoadScenario
+        >>> geometry = RoadGeometry(sample_road(RoadScenario(length=200.0), seed=1))
+        >>> geometry.length, geometry.point([0.0, 100.0], [-5.0, -5.0]).shape
+        (200.0, (2, 3))
     """
 
     def __init__(self, parameters: RoadParameters) -> None:
