@@ -221,10 +221,10 @@ def moved(points: Float, source: MapSystem, target: MapSystem) -> tuple[Float, f
 
     Example:
         >>> import numpy as np
-        >>> cologne = np.array([[6.96, 50.94, 55.0]])  # degrees east and north, m
-        >>> plan, _ = moved(cologne, MapSystem.read("EPSG:4258"), MapSystem.of(25832))
-        >>> plan.round().tolist()
-        [[356676.0, 5645134.0, 55.0]]
+        >>> cities = np.array([[6.96, 50.94, 55.0], [8.68, 50.11, 112.0]])  # degrees east and north, m
+        >>> points, _ = moved(cities, MapSystem.read("EPSG:4258"), MapSystem.of(25832))
+        >>> points.round().tolist()
+        [[356676.0, 5645134.0, 55.0], [477119.0, 5550910.0, 112.0]]
     """
     from pyproj.exceptions import ProjError  # takes a fifth of a second, and few commands need it
 
