@@ -67,7 +67,7 @@ $(RUNNER)/made: Makefile
 
 clean: ## remove what was built, the demo's output and the caches
 	rm -rf build dist docs/reference/api $(OUT)/demo .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info __pycache__
-	find synthroads_addon headless ml tests tools -name __pycache__ -type d -prune -exec rm -rf {} +
+	find synthroads_addon headless ml tests tools studies -name __pycache__ -type d -prune -exec rm -rf {} +
 
 distclean: clean ## and the environments too
 	rm -rf .venv .nox

@@ -204,9 +204,9 @@ def doors(session: nox.Session) -> None:
     places: dict[str, str | dict[str, str]] = {"demo": str(Path(session.bin, "python").absolute())}
     (bpy,) = re.findall(r"^bpy==[\w.]+", Path(lock_of("demo", version)).read_text(encoding="utf-8"), re.MULTILINE)
     places["bare"] = _door(session, "bare", bpy)
-    places["extras"] = {
-        extra: _door(session, extra, "--editable", f".[{extra}]", upon="") for extra in DOOR_EXTRAS[version]
-    }
+    # The package is built apart from what is installed once, for the wheel: each time that brings a compiler anew.
+    added = ("--no-build-isolation", "--editable")
+    places["extras"] = {extra: _door(session, extra, *added, f".[{extra}]", upon="") for extra in DOOR_EXTRAS[version]}
     shutil.rmtree("build/wheel", ignore_errors=True)
     session.run("python", "-m", "pip", "wheel", "-q", "--no-deps", "--wheel-dir", "build/wheel", ".")
     (wheel,) = Path("build/wheel").glob("*.whl")  # its name tells the version

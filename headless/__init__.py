@@ -1,4 +1,4 @@
-"""Thin command lines over `synthroads_addon`; each module is one sub-command."""
+"""Thin command lines over `synthroads_addon`; each module that `headless.cli` lists is one sub-command."""
 
 import sys
 from pathlib import Path

@@ -17,15 +17,17 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.benchmark_table import DEMO, QUICK, TABLE, add_scaling, beside_lines, join_runs, judge_lines, markdown
-from headless.commands import Outcome, add_changes_argument, entry
+from headless.commands import Outcome, entry
 from headless.marked_documents import put_tables
-from headless.messages import progress_bar
-from headless.waves import CELLS, write_obj, write_waves
+from headless.options import add_changes_argument
+from headless.progress import progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import output_folder
 from synthroads_addon.base.machine import available_cores, cores_of_children, machine
 from synthroads_addon.base.progress import Progress
 from synthroads_addon.base.schema import canonical_json, read_json
+from synthroads_addon.jobs.measure.mesh_scans import measure_mesh_scans, scans_beside, write_road
+from synthroads_addon.jobs.measure.waves import CELLS, write_waves
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 
 PARTS = ("demo", "waves", "road", "start")
@@ -33,18 +35,7 @@ PARTS = ("demo", "waves", "road", "start")
 _FILES = ["benchmark.json", "benchmark.md"]
 _PART = "--part"
 _BESIDE = "--beside"
-_MESH = ("scan.relief=0", "colour.source=material", 'cloud.formats=["las"]', 'outputs=["cloud"]')
-_WAVES = (*_MESH, "scan.device=generic-polygon", "scan.platform.height=80")
-_ROAD = (
-    *_MESH, "scan.device=riegl-minivux-3uav", "scan.pulse_rate_khz=200", "scan.field_of_view_deg=180",
-    "scan.lines_per_second=100", "scan.platform.height=60", "scan.platform.speed=8",
-)  # fmt: skip
-_ROAD_LENGTH = "road.length=100"
-_QUICK_ROAD = ("road.length=20", "road.half_width=20", "fidelity=draft")
 _QUICK_CELLS = 60
-_SLOW, _MIDDLE, _FAST = (f"scan.platform.speed={speed}" for speed in (2, 10, 100))
-"""Of the waves 5 million pulses, 1 million, and a tenth of that."""
-_RAYS = {"waves": (1, 19), "road": (1, 7, 19)}
 _PAIRS = 3
 """Times that both versions scan in turn."""
 
@@ -199,7 +190,7 @@ def _measure_beside(
     root, script = Path(__file__).resolve().parents[1], str(Path(__file__).with_name("benchmark_beside.py"))
     versions = {"ours": root, "other": arguments.beside.resolve()}
     rows = []
-    for name, scene, changes in _scans_beside(arguments):
+    for name, scene, changes in scans_beside(arguments.parts, arguments.quick):
         several: dict[str, list[dict[str, Any]]] = {side: [] for side in versions}
         for turn in range(1 if arguments.quick else _PAIRS):
             for side in list(versions)[:: -1 if turn % 2 else 1]:
@@ -208,20 +199,6 @@ def _measure_beside(
                 several[side].append(_json_of(command, f"{name} by {versions[side]}", cores, versions[side]))
         rows.append({"name": name, "scene": scene} | {side: _medians(found) for side, found in several.items()})
     return rows
-
-
-def _scans_beside(arguments: argparse.Namespace) -> list[tuple[str, str, tuple[str, ...]]]:
-    """Return the scans that are measured with both versions: name of the line, scene, changes of the scenario."""
-    scans = []
-    for scene, changes in (("waves", _WAVES), ("road", _ROAD)):
-        for rays in _RAYS[scene] if scene in arguments.parts else ():
-            further: tuple[str, ...] = (f"scan.rays_per_pulse={rays}",)
-            if scene == "waves":
-                further += (_FAST if arguments.quick else _SLOW if rays == 1 else _MIDDLE,)
-            scans.append((f"{scene}_{rays}", scene, (*changes, *further)))
-    if "start" in arguments.parts:
-        scans.append(("start", "start", (*_WAVES, _FAST)))
-    return scans
 
 
 def _medians(several: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -233,50 +210,15 @@ def _measure_part(part: dict[str, Any]) -> dict[str, Any]:
     """Measure one part in this process, and return its figures; ``road file`` writes the road as a mesh."""
     name, quick = part["part"], part["quick"]
     if name == "demo":
-        from synthroads_addon.jobs.measure.benchmark import measure_demo  # likewise
+        from synthroads_addon.jobs.measure.benchmark import measure_demo  # in this process alone: it starts Blender
 
         result = measure_demo(_scenario(part["scenario"], part["changes"], quick))
     elif name == "road file":
-        from synthroads_addon.jobs.measure.scenes import road_mesh  # likewise
-
-        mesh = road_mesh(load_scenario("rq31-600m", [_ROAD_LENGTH, *(_QUICK_ROAD if quick else ())]))
-        write_obj(Path(part["scene"]), mesh.vertices, mesh.triangles)
+        write_road(Path(part["scene"]), quick)
         result = {}
     else:
-        result = _measure_mesh(name, Path(part["scene"]), quick)
+        result = measure_mesh_scans(name, Path(part["scene"]), quick)
     return result
-
-
-def _measure_mesh(name: str, scene: Path, quick: bool) -> dict[str, Any]:
-    """Scan a mesh; return its lines and rates, see `headless.benchmark_table.LIMITS`."""
-    from synthroads_addon.base.changes import apply_change
-    from synthroads_addon.base.progress import StageTimer, peak_memory_mb
-    from synthroads_addon.jobs.measure.scenes import measure_scene  # in this process alone: it starts Blender
-    from synthroads_addon.jobs.scan_scene import SceneScan, check_scene_scan, open_and_read, scene_site
-
-    data: Any = Scenario().to_dict()
-    changes = _ROAD if name == "road" else (*_WAVES, _FAST if quick else _SLOW)
-    for change in changes:
-        data = apply_change(data, change, Scenario)
-    job = SceneScan(Scenario.from_dict(data), Path("out"), scene, up="z")
-    before, timer = peak_memory_mb() or 0.0, StageTimer()
-    inputs = check_scene_scan(job)
-    opened, road, _ = open_and_read(job, inputs, timer, {})
-    found = measure_scene(scene_site(job, inputs, opened.static, road), opened, scene, name, _RAYS[name], timer)
-    packed = {rays: rate.get("packets", rate["single rays"]) for rays, rate in found["rates"].items()}
-    lines = {f"{name}_{rays}": 100.0 * rate["ours"] / packed[rays] for rays, rate in found["rates"].items()}
-    scans = {
-        f"{name}_{rays}": {
-            "pulses_per_second": rate["pulses_per_second"],
-            "processor_rate": rate["ours"],
-            "busy": rate["busy"],
-        }
-        for rays, rate in found["rates"].items()
-    }
-    if name == "waves":
-        memory = 1e6 * (found["memory_mb"] - before) / len(opened.static)
-        lines |= {"waves_memory": memory, "waves_opening": found["opening"], "waves_fixed": found["fixed"]}
-    return {"lines": lines, "floors": found["floors"], "scans": scans}
 
 
 def _scenario(name: str, changes: list[str], quick: bool) -> Scenario:

@@ -14,8 +14,9 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, entry, numbers
-from headless.messages import progress_bar
+from headless.commands import Outcome, entry
+from headless.options import numbers
+from headless.progress import progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import check_file_target
 from synthroads_addon.base.progress import exhaust

@@ -5,7 +5,9 @@ import sys
 from collections.abc import Collection, Sequence
 from typing import Any
 
-from headless.commands import Parser, add_arguments, add_shared_options, leave, missing_package, module_of, run
+from headless.commands import add_arguments, leave, module_of, run
+from headless.error_lines import missing_package
+from headless.parser import Parser, add_shared_options
 from synthroads_addon.base.version import generator
 
 COMMANDS = {

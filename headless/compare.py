@@ -14,8 +14,9 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.commands import Outcome, entry
-from headless.messages import logger, progress_bar
+from headless.messages import logger
 from headless.pictures import can_draw
+from headless.progress import progress_bar
 from synthroads_addon.base.files import output_folder
 from synthroads_addon.base.remarks import remarks_so_far
 from synthroads_addon.base.schema import canonical_json

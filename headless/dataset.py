@@ -7,8 +7,10 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_changes_argument, entry
-from headless.messages import detail, progress_bar
+from headless.commands import Outcome, entry
+from headless.messages import detail
+from headless.options import add_changes_argument
+from headless.progress import progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.dataset.changes import change_recipe
 from synthroads_addon.dataset.manifest import Manifest, faults, read_manifest

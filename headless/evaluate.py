@@ -8,7 +8,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.commands import Outcome, entry
-from headless.messages import progress_bar
+from headless.progress import progress_bar
 from synthroads_addon.base.files import check_folder_target
 
 

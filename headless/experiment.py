@@ -10,8 +10,9 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_changes_argument, entry, note_at_interrupt
-from headless.messages import progress_bar
+from headless.commands import Outcome, entry, note_at_interrupt
+from headless.options import add_changes_argument
+from headless.progress import progress_bar
 from ml.configuration import EXPERIMENTS, names_in
 from synthroads_addon.base.errors import InputError
 

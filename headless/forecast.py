@@ -11,7 +11,8 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_changes_argument, entry
+from headless.commands import Outcome, entry
+from headless.options import add_changes_argument
 from ml.configuration import load_configuration
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import check_file_target, write_file

@@ -8,7 +8,8 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.commands import Outcome, entry
-from headless.messages import logger, progress_bar
+from headless.messages import logger
+from headless.progress import progress_bar
 from headless.prompt_end import ended_promptly
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import check_folder_target

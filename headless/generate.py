@@ -9,9 +9,10 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import (
+from headless.commands import Outcome, entry
+from headless.messages import detail
+from headless.options import (
     AXIS_FILES,
-    Outcome,
     add_allow_large_argument,
     add_axis_name_argument,
     add_changes_argument,
@@ -22,10 +23,9 @@ from headless.commands import (
     axis_place,
     choice_changes,
     choice_summary,
-    entry,
     whole_number,
 )
-from headless.messages import detail, progress_bar
+from headless.progress import progress_bar
 from synthroads_addon.base.changes import parse_change
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.scenario.scenario import Scenario, load_scenario, scenario_names

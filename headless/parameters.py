@@ -8,7 +8,8 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_changes_argument, all_changes, entry
+from headless.commands import Outcome, entry
+from headless.options import add_changes_argument, all_changes
 from synthroads_addon.base.changes import apply_change
 from synthroads_addon.road.guidelines import STANDARD_CROSS_SECTIONS, USUAL_SECTION
 from synthroads_addon.road.parameters import DESIGN_CLASSES, RoadParameters

@@ -10,7 +10,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.commands import Outcome, entry
-from headless.messages import progress_bar
+from headless.progress import progress_bar
 from synthroads_addon.base.classes import UNLABELLED
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.text.table import text_table

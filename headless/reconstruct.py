@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_renamed_argument, add_twin_argument, entry
-from headless.messages import progress_bar
+from headless.commands import Outcome, entry
+from headless.options import add_renamed_argument, add_twin_argument
 from headless.pictures import can_draw
+from headless.progress import progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import output_folder
 from synthroads_addon.base.machine import linear_algebra_on_one_thread

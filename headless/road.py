@@ -14,15 +14,8 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import (
-    AXIS_FILES,
-    Outcome,
-    add_axis_name_argument,
-    add_changes_argument,
-    all_changes,
-    axis_place,
-    entry,
-)
+from headless.commands import Outcome, entry
+from headless.options import AXIS_FILES, add_axis_name_argument, add_changes_argument, all_changes, axis_place
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import output_folder
 from synthroads_addon.base.remarks import remarks_so_far

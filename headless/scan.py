@@ -11,18 +11,18 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless import generate
-from headless.commands import (
-    Outcome,
+from headless.commands import Outcome, entry
+from headless.messages import detail
+from headless.options import (
     add_allow_large_argument,
     add_changes_argument,
     add_choice_arguments,
     add_device_argument,
     all_changes,
     choice_changes,
-    entry,
     numbers,
 )
-from headless.messages import detail, progress_bar
+from headless.progress import progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.scenario.scenario import Scenario, load_scenario, scenario_changes, scenario_names, with_changes
 from synthroads_addon.scenario.without import scenario_without

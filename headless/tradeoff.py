@@ -14,8 +14,8 @@ if __name__ == "__main__":
 
 from headless.commands import Outcome, entry
 from headless.marked_documents import put_tables
-from headless.messages import progress_bar
 from headless.pictures import can_draw, check_drawable
+from headless.progress import progress_bar
 from headless.tradeoff_table import TABLES, row_fault, table_texts
 from synthroads_addon.base.errors import InputError, OutputError, nearest_name
 from synthroads_addon.base.files import check_folder_target, write_file

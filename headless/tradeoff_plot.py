@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from headless.tradeoff_table import ROW_TITLES, measured_rows
+from synthroads_addon.base.figure import new_figure, save_figure
 from synthroads_addon.base.text.literal import literal_texts, shown_text
 from synthroads_addon.jobs.measure.tradeoff import KNOBS
 
@@ -17,17 +18,12 @@ _DECADES = 30.0
 @literal_texts()
 def plot(results: Sequence[Row], path: Path) -> None:
     """Draw rows as errors against seconds into an image file, one panel per kind of error; presets are stars."""
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    from matplotlib import pyplot
-
     measured = measured_rows(results)
     panels = [name for name in ROW_TITLES if any(_varies(measured, knob, name) for knob in _knobs(measured))]
     columns = min(3, max(1, len(panels)))
     lines = -(-max(1, len(panels)) // columns)
-    size = (5.2 * columns, 3.9 * lines + 0.6)
-    figure, axes = pyplot.subplots(lines, columns, figsize=size, squeeze=False, layout="constrained")
+    figure = new_figure(5.2 * columns, 3.9 * lines + 0.6)
+    axes = figure.subplots(lines, columns, squeeze=False)
     for axis in axes.flat[len(panels) :]:
         axis.set_visible(False)
     shown: dict[str, Any] = {}
@@ -40,8 +36,7 @@ def plot(results: Sequence[Row], path: Path) -> None:
         axis.grid(alpha=0.3)
     if shown:
         figure.legend(shown.values(), shown.keys(), loc="outside lower center", ncols=5, fontsize=9, frameon=False)
-    figure.savefig(path, dpi=90, metadata={"Software": None})
-    pyplot.close(figure)
+    save_figure(figure, path, dpi=90)
 
 
 def _set_scales(axis: Any, errors: Sequence[float]) -> None:

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_changes_argument, entry, note_at_interrupt
-from headless.messages import detail, progress_bar
+from headless.commands import Outcome, entry, note_at_interrupt
+from headless.messages import detail
+from headless.options import add_changes_argument
+from headless.progress import progress_bar
 from ml.configuration import SHIPPED, load_configuration, names_in
 
 if TYPE_CHECKING:

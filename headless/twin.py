@@ -10,8 +10,10 @@ from typing import get_args
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_renamed_argument, add_twin_argument, entry
-from headless.messages import logger, progress_bar
+from headless.commands import Outcome, entry
+from headless.messages import logger
+from headless.options import add_renamed_argument, add_twin_argument
+from headless.progress import progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import output_folder
 from synthroads_addon.base.progress import duration

@@ -15,6 +15,7 @@ import torch
 from torch import nn
 
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
+from synthroads_addon.base.figure import new_figure, save_figure
 from synthroads_addon.base.files import folder_at_work, write_file
 from synthroads_addon.base.named_paths import path_inside
 from synthroads_addon.base.random_streams import stream
@@ -301,15 +302,13 @@ def to_json_data(value: Any) -> Any:
 @literal_texts()
 def _curves(history: list[dict[str, float]]) -> bytes:
     """Return a PNG with one small plot per figure of the history, over the epochs."""
-    from matplotlib.figure import Figure  # takes half a second, which only pictures need
-
     names = [name for name in history[-1] if name not in ("epoch", "seconds")]
-    figure = Figure(figsize=(4 * min(len(names), 3), 3 * -(-len(names) // 3)), layout="constrained")
+    figure = new_figure(4 * min(len(names), 3), 3 * -(-len(names) // 3))
     for place, name in enumerate(names):
         axes = figure.add_subplot(-(-len(names) // 3), min(len(names), 3), place + 1)
         axes.plot([epoch["epoch"] for epoch in history], [epoch.get(name, float("nan")) for epoch in history])
         axes.set(title=shown_text(name.replace("_", " ")), xlabel="epoch")
         axes.grid(alpha=0.3)
     content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=110)
+    save_figure(figure, content, dpi=110)
     return content.getvalue()

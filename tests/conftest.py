@@ -155,9 +155,9 @@ def _empty_scene_for_module(request: pytest.FixtureRequest) -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def _no_lines_of_slow_work(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands tell every ten seconds that they are at work: on a busy machine beside any message that is tested."""
-    messages = sys.modules.get("headless.messages")
-    if messages is not None and request.path.name != "test_messages.py":
-        monkeypatch.setattr(messages, "INTERVAL", 1000.0)
+    progress = sys.modules.get("headless.progress")
+    if progress is not None and request.path.name != "test_messages.py":
+        monkeypatch.setattr(progress, "INTERVAL", 1000.0)
 
 
 @pytest.fixture(autouse=True)

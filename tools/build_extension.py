@@ -31,7 +31,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # the root, from where tools see each other
 
-from tools.build_kernels import KERNELS, KernelError, build_kernels
+from tools.build_kernels import KEPT, KERNELS, KernelError, build_kernels
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "synthroads_addon"
@@ -290,7 +290,7 @@ def stage(extension: Extension, target: str, release: Release, wheels: list[Path
 def compile_kernels(target: str, folder: Path) -> None:
     """Compile the scan's kernels for a platform into a folder; raise `BuildError` if that fails."""
     try:
-        build_kernels(target, folder)
+        build_kernels(target, folder, KEPT)
     except KernelError as error:
         raise BuildError(str(error)) from error
 

@@ -17,6 +17,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,8 @@ except ImportError:  # by hand, outside of a build
 
 ROOT = Path(__file__).resolve().parent.parent
 KERNELS = ROOT / "synthroads_addon" / "scanning" / "kernels"
+KEPT = ROOT / "build" / "kernels"
+"""Folder that keeps what was compiled: a checkout is installed into many environments, from the same source."""
 TARGETS = {
     # glibc's version is that of the wheels of embreex; the kernels call nothing of it.
     "linux-x64": ("x86_64-linux-gnu.2.17", "so"),
@@ -56,8 +59,14 @@ def this_platform() -> str:
     return f"{system}-{ {'x86_64': 'x64', 'amd64': 'x64', 'aarch64': 'arm64'}.get(machine, machine) }"
 
 
-def build_kernels(target: str, folder: Path = KERNELS) -> list[Path]:
+def build_kernels(target: str, folder: Path = KERNELS, kept: Path | None = None) -> list[Path]:
     """Compile all kernels for a platform into a folder; return the paths of their libraries.
+
+    Args:
+        target: name of the platform, as in `TARGETS`.
+        folder: for the libraries.
+        kept: folder of libraries that were compiled before, of which those of the same source, options and compiler are
+            taken, and where new ones are added; None compiles all.
 
     Raises:
         KernelError: the compiler isn't installed, or fails.
@@ -66,16 +75,36 @@ def build_kernels(target: str, folder: Path = KERNELS) -> list[Path]:
         raise KernelError("the compiler isn't installed: pip install 'ziglang>=0.17,<0.18'")
     triple, suffix = TARGETS[target]
     sources = sorted(KERNELS.glob("*.c"))
-    return [_compile(source, triple, folder / f"{source.stem}-{target}.{suffix}") for source in sources]
+    return [_library(source, triple, folder / f"{source.stem}-{target}.{suffix}", kept) for source in sources]
 
 
-def _compile(source: Path, triple: str, library: Path) -> Path:
+def _library(source: Path, triple: str, library: Path, kept: Path | None) -> Path:
+    """Write a source's library, compiled now or before, and return its path."""
+    if kept is None:
+        return _write(library, _compile(source, triple, library.name))
+    made_from = (source_digest(source), source.name, triple, *_OPTIONS, library.name, version("ziglang"))
+    known = kept / f"{hashlib.sha256(repr(made_from).encode()).hexdigest()}-{library.name}"
+    if not known.is_file():
+        _write(known, _compile(source, triple, library.name))
+    return _write(library, known.read_bytes())
+
+
+def _write(path: Path, content: bytes) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f"{path.name}.part-{os.getpid()}")
+    part.write_bytes(content)
+    part.replace(path)  # where the old one is loaded, it stays as it is
+    return path
+
+
+def _compile(source: Path, triple: str, name: str) -> bytes:
+    """Return the library of a source for one of Zig's platforms, under a name, as bytes."""
     digest = source_digest(source)
     with tempfile.TemporaryDirectory(prefix="synthroads-") as cache:
-        made = Path(cache) / library.name
+        made = Path(cache) / name
         command = [sys.executable, "-m", "ziglang", "cc", "-target", triple, *_OPTIONS, f'-DSOURCE="{digest}"']
-        if library.suffix == ".dylib":  # its name is written into it, else with the folder where it was made
-            command.append(f"-Wl,-install_name,@rpath/{library.name}")
+        if name.endswith(".dylib"):  # its name is written into it, else with the folder where it was made
+            command.append(f"-Wl,-install_name,@rpath/{name}")
         environment = {**os.environ, "ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache}
         # By a relative path, so that no path of this machine gets in.
         answer = subprocess.run(
@@ -88,11 +117,7 @@ def _compile(source: Path, triple: str, library: Path) -> Path:
         )
         if answer.returncode != 0:
             raise KernelError(f"{source.name} wasn't compiled for {triple}:\n{answer.stdout}{answer.stderr}")
-        library.parent.mkdir(parents=True, exist_ok=True)
-        part = library.with_name(f"{library.name}.part-{os.getpid()}")
-        part.write_bytes(made.read_bytes())
-        part.replace(library)  # where the old one is loaded, it stays as it is
-    return library
+        return made.read_bytes()
 
 
 def source_digest(source: Path) -> str:
@@ -122,7 +147,7 @@ class KernelHook(BuildHookInterface):
             if target not in TARGETS:
                 continue
             try:
-                build_kernels(target)
+                build_kernels(target, kept=KEPT)
             except KernelError as error:
                 self.app.display_warning(f"SynthRoads works without its kernels, and slower: {error}")
 
@@ -136,7 +161,7 @@ def main() -> int:
     options = parser.parse_args()
     try:
         for target in TARGETS if options.platform == "all" else [options.platform]:
-            for path in build_kernels(target, options.output_dir):
+            for path in build_kernels(target, options.output_dir, KEPT):
                 print(path)
     except KernelError as error:
         print(f"error: {error}", file=sys.stderr)

@@ -19,7 +19,7 @@ def print_what_docstrings() -> bool:
     print("-- docstrings", flush=True)
     found = [
         f"{path.relative_to(ROOT)}:{number}: a docstring begins with What: say in one sentence what is done or returned"
-        for folder in ("synthroads_addon", "headless", "ml", "tests", "tools")
+        for folder in ("synthroads_addon", "headless", "ml", "tests", "tools", "studies")
         for path in sorted((ROOT / folder).rglob("*.py"))
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
         if line.lstrip().startswith('"""What ')
@@ -80,7 +80,7 @@ def commands() -> dict[str, list[str]]:
         "import-linter": [str(scripts / "lint-imports"), "--no-logo"],
         "bandit": [
             *(sys.executable, "-m", "bandit", "--quiet", "--configfile", "pyproject.toml", "--recursive"),
-            *("synthroads_addon", "headless", "ml", "tools", "noxfile.py"),
+            *("synthroads_addon", "headless", "ml", "tools", "studies", "noxfile.py"),
         ],
         # Whether a version is known to be unsafe can't be asked without a network: `--dry-run` reads the locks alone.
         **{f"pip-audit {lock.stem}": [*audit, str(lock)] for lock in sorted((ROOT / "tools" / "locks").glob("*.txt"))},

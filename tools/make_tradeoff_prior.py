@@ -50,7 +50,7 @@ OCTAVES = (2, 4, 6)
 WANTED = frozenset({"rgb", "roughness", "metallic", "specular"})
 SAMPLE = {"images": 0.7, "nodes": 2.4, "returns": 3.8}
 """Microseconds per point that takes its colour from images, from its material's nodes, and that is rendered by itself
-(from images: `synthroads tradeoff`; the other two: the mean of `python tools/measure_layers.py`)."""
+(from images: `synthroads tradeoff`; the other two: the mean of `python studies/costs/layers.py`)."""
 TIMED = 3
 """Images that are timed in full size; all but the first in a quarter of it as well."""
 PREVIEWS = 0.1

@@ -14,6 +14,7 @@ from scipy.stats import rankdata
 
 from synthroads_addon.base.arrays import Float, Float32
 from synthroads_addon.base.classes import ClassScheme, class_scheme
+from synthroads_addon.base.figure import new_figure, save_figure
 from synthroads_addon.base.text.literal import literal_texts, shown_text
 
 from ..data.classes import IGNORED
@@ -46,7 +47,7 @@ def small_png(figure: Any, dpi: float | None = None) -> bytes:
         dpi: pixels per inch; the figure's own if not given.
     """
     drawn, content = io.BytesIO(), io.BytesIO()
-    figure.savefig(drawn, format="png", dpi=dpi or figure.dpi)
+    save_figure(figure, drawn, dpi=dpi or figure.dpi)
     image = Image.open(drawn, formats=("PNG",)).convert("RGB").quantize(_PALETTE, dither=Image.Dither.NONE)
     image.save(content, format="png", optimize=True)
     return content.getvalue()
@@ -119,9 +120,7 @@ def corridor_picture(shown: Case, prediction: Float, view: PictureView, title: s
 
 
 def _panels(title: str, heights: Sequence[float], view: PictureView, height: float) -> tuple[Any, Sequence[Any]]:
-    from matplotlib.figure import Figure  # takes half a second, which only pictures need
-
-    figure = Figure(figsize=(13.0, 1.6 + 2.0 * sum(heights)), layout="constrained")
+    figure = new_figure(13.0, 1.6 + 2.0 * sum(heights))
     panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
     figure.suptitle(shown_text(title), fontsize=11)
     panels[0].set(xlim=(view.first, view.last), ylim=(-height, height), ylabel="offset from the true axis, m")
@@ -263,8 +262,7 @@ def comparison(
         names: of the classes.
         scheme: that they are of, for their colours; a built-in one if None.
     """
-    from matplotlib.figure import Figure  # takes half a second, which only pictures need
-    from matplotlib.patches import Patch
+    from matplotlib.patches import Patch  # takes half a second, which only pictures need
 
     colors = class_colors(names, scheme)
     wrong = np.where(tile.segment == IGNORED, IGNORED, (predicted != tile.segment).astype(np.int16))
@@ -272,7 +270,7 @@ def comparison(
     known = tile.coord[tile.segment != IGNORED, :2] if (tile.segment != IGNORED).any() else tile.coord[:, :2]
     extent = np.percentile(known, _OUTSIDE, axis=0)
     views = [top_view(tile.coord, labels, table, extent) for labels, table, _ in shown]
-    figure = Figure(figsize=(15, 0.8 + 4.9 * views[0].shape[0] / _PIXELS), dpi=100, layout="constrained")
+    figure = new_figure(15, 0.8 + 4.9 * views[0].shape[0] / _PIXELS)
     for axes, view, (_, _, title) in zip(figure.subplots(1, 3), views, shown, strict=True):
         axes.imshow(view, origin="lower", interpolation="nearest")
         axes.set(title=title, xticks=[], yticks=[])

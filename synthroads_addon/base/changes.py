@@ -14,7 +14,13 @@ _DEEPEST = 20
 
 
 def apply_change(data: Any, change: str, model: type[Model]) -> Any:
-    """Return JSON data with one ``path=value`` applied, the value being of the type of the model's field."""
+    """Return JSON data with one ``path=value`` applied, the value being of the type of the model's field.
+
+    Example:
+        >>> from synthroads_addon.scenario.scenario import Scenario
+        >>> apply_change({}, "road.length=800", Scenario)
+        {'road': {'length': 800}}
+    """
     path, value = parse_change(change, model)
     return _with_value(data, path, value)
 

@@ -54,7 +54,12 @@ class ClassMapping(Model):
 
 
 def fits_pattern(name: str, pattern: str) -> bool:
-    """Return whether a name fits a shell pattern; ``Lamp.*`` fits ``Lamp`` too. Case matters."""
+    """Return whether a name fits a shell pattern; ``Lamp.*`` fits ``Lamp`` too. Case matters.
+
+    Example:
+        >>> fits_pattern("Lamp.003", "Lamp.*"), fits_pattern("Lamp", "Lamp.*"), fits_pattern("lamp", "Lamp*")
+        (True, True, False)
+    """
     return fnmatchcase(name, pattern) or (pattern.endswith(".*") and fnmatchcase(name, pattern[:-2]))
 
 

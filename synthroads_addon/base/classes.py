@@ -190,7 +190,12 @@ def classes() -> tuple[PointClass, ...]:
 
 @cache
 def class_id(name: str) -> int:
-    """Return the id of the class ``name`` in the full table; KeyError if there is none."""
+    """Return the id of the class ``name`` in the full table; KeyError if there is none.
+
+    Example:
+        >>> class_id("guardrail")
+        4
+    """
     return {row.name: row.id for row in classes()}[name]
 
 
@@ -213,6 +218,10 @@ def class_scheme(name_or_file: str) -> ClassScheme:
 
     Raises:
         InputError: there is no such scheme, or its file names unknown classes, one class twice or a code beyond LAS.
+
+    Example:
+        >>> [row.name for row in class_scheme("5").rows]
+        ['ground', 'road', 'road_marking', 'vegetation', 'road_furniture']
     """
     if name_or_file == "17":
         return ClassScheme("17", classes(), np.arange(256, dtype=np.uint8))

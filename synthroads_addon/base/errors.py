@@ -19,6 +19,10 @@ class InputError(SynthRoadsError):
         field: where the value stands, as a dotted path or a file name, e.g. ``scan.platform.height``.
         value: the offending value; None if there is none to show (a missing key, say).
         allowed: what would be right, in words with its unit.
+
+    Example:
+        >>> print(InputError("scan.platform.height", -3, "a height above 0 m is needed"))
+        scan.platform.height is -3: a height above 0 m is needed
     """
 
     def __init__(self, field: str, value: object, allowed: str) -> None:

@@ -11,7 +11,13 @@ from .arrays import Float
 
 
 def rotation_matrix(heading: ArrayLike, pitch: ArrayLike = 0.0, roll: ArrayLike = 0.0) -> Float:
-    """Return the rotation matrices (..., 3, 3) of attitudes (...), rad; the three are broadcast."""
+    """Return the rotation matrices (..., 3, 3) of attitudes (...), rad; the three are broadcast.
+
+    Example:
+        >>> import numpy as np
+        >>> (rotation_matrix(np.pi / 2) @ np.array([1.0, 0.0, 0.0])).round(6).tolist()
+        [0.0, 1.0, 0.0]
+    """
     h, p, r = np.broadcast_arrays(*(np.asarray(angle, dtype=np.float64) for angle in (heading, pitch, roll)))
     (ch, cp, cr), (sh, sp, sr) = (np.cos(h), np.cos(p), np.cos(r)), (np.sin(h), np.sin(p), np.sin(r))
     matrix = np.empty((*h.shape, 3, 3))

@@ -15,7 +15,13 @@ RULES: dict[str, Rule] = {rule.id: rule for module in MODULES for rule in module
 
 
 def check(parameters: RoadParameters) -> list[Violation]:
-    """Return all violations in the order of `RULES`, then along the road; an empty list if it keeps all rules."""
+    """Return all violations in the order of `RULES`, then along the road; an empty list if it keeps all rules.
+
+    Example:
+        >>> from synthroads_addon import load_scenario, sample_road
+        >>> check(sample_road(load_scenario("rq31-600m").road, seed=7))
+        []
+    """
     violations: list[Violation] = []
     with np.errstate(all="ignore"):
         road = Road(parameters)

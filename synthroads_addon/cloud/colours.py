@@ -19,6 +19,10 @@ def full_brightness(largest: float, *, whole: bool = True) -> float:
 
     Returns:
         255 or 65535; of floating-point fields 1 as well; a larger largest value itself.
+
+    Example:
+        >>> full_brightness(212), full_brightness(40_000), full_brightness(0.8, whole=False)
+        (255.0, 65535.0, 1.0)
     """
     return next((full for full in _BRIGHTNESSES[whole:] if largest <= full), float(largest))
 
@@ -29,6 +33,12 @@ def brightness_text(full: float) -> str:
 
 
 def sixteen_bits(values: AnyArray, full: float) -> UInt16:
-    """Return colours of any shape as 16 bits, from stored values whose full brightness is given; NaN is dark."""
+    """Return colours of any shape as 16 bits, from stored values whose full brightness is given; NaN is dark.
+
+    Example:
+        >>> import numpy as np
+        >>> sixteen_bits(np.array([0, 128, 255]), full=255).tolist()
+        [0, 32896, 65535]
+    """
     share = np.clip(np.nan_to_num(np.asarray(values, dtype=np.float64)) / full, 0.0, 1.0)
     return np.rint(share * SIXTEEN_BITS).astype(np.uint16)

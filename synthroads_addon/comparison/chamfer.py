@@ -26,6 +26,13 @@ def density_aware_chamfer(one: Float, other: Float, scale: float) -> float:
     Args:
         one, other: the points, m.
         scale: 1 / a, m.
+
+    Example:
+        >>> import numpy as np
+        >>> plane = np.random.default_rng(1).uniform(0.0, 1.0, (200, 3)) * [1.0, 1.0, 0.0]
+        >>> raised = plane + [0.0, 0.0, 0.05]
+        >>> [round(float(density_aware_chamfer(plane, other, scale=0.05)), 2) for other in (plane, raised)]
+        [0.0, 0.63]
     """
     return 0.5 * (_one_way(one, other, scale) + _one_way(other, one, scale))
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Float
+from ..base.figure import new_figure, save_figure
 from ..base.files import write_file
 from ..base.text.literal import literal_texts
 from ..cloud.selection.patches import FEATURES
@@ -27,9 +28,7 @@ def save_picture(result: CloudComparison, path: Path, overwrite: bool = False) -
     Raises:
         InputError: the file is there already or can't be written.
     """
-    from matplotlib.figure import Figure  # takes half a second to load: nothing else of the comparison needs it
-
-    figure = Figure(figsize=_INCHES, layout="constrained")
+    figure = new_figure(*_INCHES)
     rows = -(-(len(FEATURES) + 1) // _COLUMNS)
     axes = figure.subplots(rows, _COLUMNS).ravel()
     _draw_groups(axes[0], result)
@@ -39,7 +38,7 @@ def save_picture(result: CloudComparison, path: Path, overwrite: bool = False) -
     for empty in axes[len(FEATURES) + 1 :]:
         empty.set_axis_off()
     data = io.BytesIO()
-    figure.savefig(data, format="png", dpi=100)
+    save_figure(figure, data, dpi=100)
     write_file(path, data.getvalue(), overwrite=overwrite)
 
 

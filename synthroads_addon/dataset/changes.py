@@ -7,7 +7,14 @@ from .recipe import Recipe, path_within
 
 
 def change_recipe(recipe: Recipe, changes: Sequence[str]) -> Recipe:
-    """Return a copy of a recipe with further changes (``path=value``) to the scenarios of all its groups."""
+    """Return a copy of a recipe with further changes (``path=value``) to the scenarios of all its groups.
+
+    Example:
+        >>> from synthroads_addon.dataset.recipe import load_recipe, scene_jobs
+        >>> shorter = change_recipe(load_recipe("small-roads"), ["road.length=50"])
+        >>> {job.scenario.road.length for job in scene_jobs(shorter)}
+        {50.0}
+    """
     if not changes:
         return recipe
     values = dict(scenario_changes(list(changes)))

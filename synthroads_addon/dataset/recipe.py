@@ -54,7 +54,14 @@ class DrawnValue(ClosedModel):
         return self
 
     def draw(self, random: np.random.Generator) -> Any:
-        """Return a value, a number of a range to `_DIGITS` digits."""
+        """Return a value, a number of a range to `_DIGITS` digits.
+
+        Example:
+            >>> import numpy as np
+            >>> visibility = DrawnValue(minimum=500.0, maximum=23_000.0, scale="logarithmic")
+            >>> 500.0 <= visibility.draw(np.random.default_rng(1)) <= 23_000.0
+            True
+        """
         if self.one_of:
             return self.one_of[int(random.integers(len(self.one_of)))]
         assert self.minimum is not None
@@ -67,7 +74,12 @@ class DrawnValue(ClosedModel):
         return min(max(float(f"{value:.{_DIGITS}g}"), self.minimum), self.maximum)
 
     def text(self) -> str:
-        """Return the range or the values in words, for people."""
+        """Return the range or the values in words, for people.
+
+        Example:
+            >>> DrawnValue(minimum=500.0, maximum=23_000.0, scale="logarithmic").text()
+            '500 to 23000, by ratio'
+        """
         if self.one_of:
             return "one of " + ", ".join(json.dumps(value) for value in self.one_of)
         return f"{self.minimum:g} to {self.maximum:g}" + (", by ratio" if self.scale == "logarithmic" else "")
@@ -182,6 +194,11 @@ def load_recipe(name_or_file: str) -> Recipe:
     Raises:
         MissingFileError: there is no such file.
         InputError: it isn't YAML, or a field is unknown or out of its limits.
+
+    Example:
+        >>> recipe = load_recipe("small-roads")
+        >>> [group.name for group in recipe.groups], recipe.seed
+        (['roads'], 11)
     """
     path = preset_path(RECIPES, name_or_file, "recipe", (".yaml", ".yml", ".json"))
     return Recipe.from_dict(read_yaml(path), source=str(name_or_file))
@@ -195,6 +212,11 @@ def scene_jobs(recipe: Recipe) -> list[SceneJob]:
 
     Raises:
         InputError: a scenario or a change is wrong; the message names the group.
+
+    Example:
+        >>> jobs = scene_jobs(load_recipe("small-roads"))
+        >>> len(jobs), jobs[0].name, jobs[0].split
+        (8, 'roads-01', 'train')
     """
     read: dict[str, Any] = {}
     return [_job(recipe, read, number, *place) for number, place in enumerate(scene_places(recipe))]

@@ -235,6 +235,14 @@ def fit_heights(station: Float, heights: Float, length: float, tolerance: float)
         station, heights: (N,), m.
         length: of the road, m.
         tolerance: root mean square of the heights that the fit aims at, m.
+
+    Example:
+        >>> import numpy as np
+        >>> station = np.linspace(0.0, 600.0, 121)
+        >>> heights = np.where(station < 300.0, 100.0 - 0.02 * station, 94.0 + 0.03 * (station - 300.0))
+        >>> points = fit_heights(station, heights, length=600.0, tolerance=0.05)
+        >>> [round(point.station) for point in points]
+        [0, 300, 600]
     """
     profile = _fit_heights(station, heights, np.ones(len(station)), length, tolerance)
     return _vertical_points(profile)
@@ -266,6 +274,14 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05, design_ends: bool = Fal
 
     Raises:
         InputError: wrong shape, a value that isn't finite, fewer than two distinct points, a tolerance not above 0.
+
+    Example:
+        >>> import numpy as np
+        >>> angle = np.linspace(0.0, 0.5, 60)
+        >>> points = np.column_stack([500.0 * np.sin(angle), 500.0 * (1.0 - np.cos(angle))])
+        >>> (arc,) = fit_axis(points, tolerance=0.02).alignment.elements
+        >>> arc.kind, round(1.0 / arc.mean_curvature)
+        ('arc', 500)
     """
     given = _check_points(points)
     if not (np.isfinite(tolerance) and tolerance > 0):

@@ -56,6 +56,12 @@ def unrolled(points: Float) -> tuple[Float, Float]:
     """Return the arc length (N,) along points (N, 2) and the integral of the heading over it (N,), both in m.
 
     Between two points the line is taken for the arc that turns by the mean of the angles at both.
+
+    Example:
+        >>> import numpy as np
+        >>> length, _ = unrolled(np.array([[0.0, 0.0], [3.0, 4.0], [6.0, 8.0]]))
+        >>> length.tolist()
+        [0.0, 5.0, 10.0]
     """
     move = np.diff(points, axis=0)
     chord = np.hypot(*move.T)
@@ -78,6 +84,13 @@ def noise_of(station: Float, values: Float, degree: int) -> float:
 
     It is told by the least quarter of the divided differences of the next degree: those over a border of two pieces
     are larger. 0 with too few points.
+
+    Example:
+        >>> import numpy as np
+        >>> station = np.arange(0.0, 400.0, 2.0)
+        >>> noise = np.random.default_rng(1).normal(0.0, 0.02, len(station))
+        >>> round(noise_of(station, 1e-4 * station**2 + noise, degree=2), 2)
+        0.02
     """
     order = degree + 1
     if len(values) < 2 * order:

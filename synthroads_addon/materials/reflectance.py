@@ -23,6 +23,10 @@ def reflectivity(base_color: ArrayLike, metallic: ArrayLike, specular: ArrayLike
         base_color: (..., 3) linear RGB, 0 to 1.
         metallic: (...,) 0 to 1.
         specular: (...,) 0 to 1. R can exceed 1 where it is over 0.5.
+
+    Example:
+        >>> float(reflectivity([0.5, 0.5, 0.5], metallic=0.0, specular=0.05).round(3))
+        0.3
     """
     luminance = np.asarray(base_color, dtype=np.float64) @ LUMINANCE
     metal = np.asarray(metallic, dtype=np.float64)
@@ -43,6 +47,10 @@ def facet_terms(slope: ArrayLike) -> tuple[Float, Float]:
 
     Args:
         slope: (...,) standard deviation of the facets' slope angle sqrt(v), rad; for 0 they are exactly 1 and 0.
+
+    Example:
+        >>> facet_terms(0.0), tuple(round(float(term), 3) for term in facet_terms(0.3))
+        ((1.0, 0.0), (0.893, 0.225))
     """
     # Beyond 1e6 nothing changes any more, and the square stays finite.
     variance = np.square(np.minimum(np.abs(np.asarray(slope, dtype=np.float64)), 1e6))
@@ -76,6 +84,14 @@ def returned_share(
 
     Returns:
         (N,) float64, all finite and not negative.
+
+    Example:
+        >>> import numpy as np
+        >>> incidence = np.radians([0.0, 60.0])
+        >>> returned_share(np.cos(incidence), 0.2).round(3).tolist()  # Lambert
+        [0.2, 0.1]
+        >>> returned_share(np.cos(incidence), 0.2, *facet_terms(0.3)).round(3).tolist()  # rough: Oren and Nayar
+        [0.179, 0.123]
     """
     lit: Float = np.atleast_1d(np.asarray(cosine, dtype=np.float64))
     result: Float = lit * facet_a

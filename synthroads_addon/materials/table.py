@@ -88,7 +88,12 @@ class MaterialTable(Model):
 
 @cache
 def materials() -> dict[str, Material]:
-    """Return the shipped materials by name, read once."""
+    """Return the shipped materials by name, read once.
+
+    Example:
+        >>> round(float(materials()["asphalt"].reflectivity), 3)
+        0.219
+    """
     path = PRESETS / "materials.json"
     return MaterialTable.from_dict(read_json(path), source=str(path)).materials
 

@@ -7,6 +7,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..base.arrays import Float
+from ..base.figure import new_figure, save_figure
 from ..base.text.literal import literal_texts, shown_text
 from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject
@@ -26,12 +27,7 @@ _BEYOND = 6.0  # m outside of the pavement
 @literal_texts()
 def draw(found: Reconstruction, cloud: RoadCloud, path: FilePath) -> None:
     """Draw a reconstruction (plan, detail, cross-section, heights) and write the picture as PNG."""
-    import matplotlib  # takes half a second, and few ask for the picture
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure = plt.figure(figsize=_SIZE, dpi=_DPI, layout="constrained")
+    figure = new_figure(*_SIZE)
     grid = figure.add_gridspec(3, 2, height_ratios=(1.3, 1.3, 1.0))
     geometry = RoadGeometry(found.parameters)
     plan(figure.add_subplot(grid[0, :]), found, geometry, (0.0, geometry.length))
@@ -40,8 +36,7 @@ def draw(found: Reconstruction, cloud: RoadCloud, path: FilePath) -> None:
     across(figure.add_subplot(grid[2, 0]), found, geometry)
     heights(figure.add_subplot(grid[2, 1]), found, geometry)
     figure.suptitle(f"{shown_text(found.parameters.metadata.title)}: {cloud.read:,} points", fontsize=10)
-    figure.savefig(path, metadata={"Software": None})
-    plt.close(figure)
+    save_figure(figure, path, dpi=_DPI)
 
 
 def plan(axes: Any, found: Reconstruction, geometry: RoadGeometry, span: tuple[float, float]) -> None:

@@ -56,6 +56,12 @@ class Element:
 
     Raises:
         InputError: a value is not a finite number or out of range.
+
+    Example:
+        >>> Element(length=90.0, curvature_start=0.0, curvature_end=1 / 300).kind
+        'clothoid'
+        >>> round(Element(90.0, 0.0, 1 / 300).turn, 3)
+        0.15
     """
 
     length: float
@@ -105,6 +111,16 @@ class Alignment:
         length: m.
         x, y: map position of the start, m.
         start_heading: rad, counter-clockwise from +x (east).
+
+    Example:
+        >>> import numpy as np
+        >>> straight, half_circle = Element(100.0, 0.0, 0.0), Element(100.0 * np.pi, 0.01, 0.01)
+        >>> axis = Alignment([straight, half_circle])  # from (0, 0) to the east
+        >>> axis.position(axis.length).round(3).tolist()
+        [100.0, 200.0]
+        >>> station, offset = axis.project([[50.0, 3.5]])
+        >>> station.round(3).tolist(), offset.round(3).tolist()
+        ([50.0], [3.5])
     """
 
     def __init__(self, elements: Sequence[Element], x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
@@ -387,6 +403,10 @@ def clip_offset(offset: ArrayLike, curvature: ArrayLike) -> Float:
 
     Raises:
         InputError: a value that isn't finite.
+
+    Example:
+        >>> clip_offset([5.0, 20.0], curvature=1 / 10).round(2).tolist()
+        [5.0, 9.8]
     """
     offsets, bend = np.broadcast_arrays(finite_array("offset", offset), finite_array("curvature", curvature))
     folds = offsets * bend > _REACH

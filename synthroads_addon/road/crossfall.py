@@ -14,7 +14,12 @@ NARROW, NARROW_RUN_OFF = 4.0, 0.225
 
 
 def run_off_length(design_class: str, half_width: float, start: float, end: float) -> float:
-    """Return the least length (m) in which both carriageways' crossfall can change between two curvatures (1/m)."""
+    """Return the least length (m) in which both carriageways' crossfall can change between two curvatures (1/m).
+
+    Example:
+        >>> round(run_off_length("EKA1A", half_width=12.0, start=0.0, end=1 / 1000), 1)
+        96.7
+    """
     lengths = []
     slowest = steepest_percent(design_class, half_width)
     for side in ("left", "right"):
@@ -47,6 +52,10 @@ def wanted_percent(design_class: str, side: str, curvature: float) -> float:
     """Return the crossfall (%, positive where it falls to the right) that a carriageway needs at a curvature (1/m).
 
     Outwards on straights and in curves wide enough for it, else to the inside of the curve.
+
+    Example:
+        >>> wanted_percent("EKA1A", "right", curvature=0.0), wanted_percent("EKA1A", "right", curvature=1 / 1000)
+        (2.5, -6.0)
     """
     if abs(curvature) * LIMITS[design_class].radius_outwards < 1.0:
         return LEAST_CROSSFALL_PERCENT if side == "right" else -LEAST_CROSSFALL_PERCENT

@@ -55,6 +55,14 @@ class RoadGeometry:
         profile: the vertical profile in local elevation.
         sections: the carriageways' cross-sections by side.
         strips: the M strips from left to right.
+
+    Example:
+        >>> from synthroads_addon import sample_road
+        >>> from synthroads_addon.scenario.road import RoadScenario
+        >>> geometry = RoadGeometry(sample_road(RoadScenario(length=200.0), seed=2))
+        >>> inner, outer = geometry.elevation([100.0, 100.0], [-5.0, -9.0])  # of the right carriageway
+        >>> round(100.0 * float(inner - outer) / 4.0, 1)  # crossfall, percent
+        2.5
     """
 
     def __init__(self, parameters: RoadParameters) -> None:

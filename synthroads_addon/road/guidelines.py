@@ -85,7 +85,12 @@ USUAL_SECTION = {"EKA1A": "RQ31", "EKA1B": "RQ31", "EKA2": "RQ28", "EKA3": "RQ25
 
 
 def design_class_of(cross_section: str, preferred: str) -> str:
-    """Return the preferred design class if it may have a cross-section, else the first one that may."""
+    """Return the preferred design class if it may have a cross-section, else the first one that may.
+
+    Example:
+        >>> design_class_of("RQ31", preferred="EKA1A"), design_class_of("RQ25", preferred="EKA1A")
+        ('EKA1A', 'EKA3')
+    """
     if cross_section in SECTIONS_OF_CLASS[preferred]:
         return preferred
     return next(name for name, sections in SECTIONS_OF_CLASS.items() if cross_section in sections)
@@ -95,6 +100,10 @@ def curve_crossfall_percent(design_class: str, curvature: float) -> float:
     """Return the crossfall (%) towards the inside of a curve: 6 at the smallest radius, 2.5 from the largest.
 
     In between linear in log radius against log crossfall, rounded up to half a percent.
+
+    Example:
+        >>> [float(curve_crossfall_percent("EKA1A", 1 / radius)) for radius in (900.0, 2000.0, 5000.0)]
+        [6.0, 3.5, 2.5]
     """
     limits = LIMITS[design_class]
     radius = 1.0 / max(abs(curvature), 1e-9)

@@ -125,7 +125,13 @@ StripWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=2), Tag("num
 
 
 def width_at(width: AnyWidth, station: ArrayLike) -> Float:
-    """Return a width (m) at stations of any shape, same shape, interpolated between its points."""
+    """Return a width (m) at stations of any shape, same shape, interpolated between its points.
+
+    Example:
+        >>> taper = (WidthPoint(station=0.0, width=0.0), WidthPoint(station=60.0, width=3.5))
+        >>> width_at(taper, [0.0, 30.0, 60.0]).tolist()
+        [0.0, 1.75, 3.5]
+    """
     station = np.asarray(station, dtype=np.float64)
     if isinstance(width, tuple):
         return np.interp(station, [p.station for p in width], [p.width for p in width])

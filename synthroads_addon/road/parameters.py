@@ -105,7 +105,12 @@ class HorizontalElement(Model):
 
     @classmethod
     def between(cls, length: float, curvature_start: float, curvature_end: float) -> HorizontalElement:
-        """Return the line, arc or clothoid of a length (m) with the curvatures at its ends (1/m)."""
+        """Return the line, arc or clothoid of a length (m) with the curvatures at its ends (1/m).
+
+        Example:
+            >>> HorizontalElement.between(120.0, 0.0, 1 / 800).kind
+            'clothoid'
+        """
         same = curvature_start == curvature_end
         kind: Literal["line", "arc", "clothoid"] = "clothoid" if not same else "arc" if curvature_start else "line"
         return cls(kind=kind, length=length, curvature_start=curvature_start, curvature_end=curvature_end)
@@ -287,7 +292,17 @@ class RoadParameters(Model):
 
 
 def read_parameters(path: Path | str) -> RoadParameters:
-    """Read a parameter set from a JSON file; InputError names file, field, value and what is allowed."""
+    """Read a parameter set from a JSON file; InputError names file, field, value and what is allowed.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from synthroads_addon import sample_road
+        >>> from synthroads_addon.scenario.road import RoadScenario
+        >>> road = sample_road(RoadScenario(length=100.0), seed=1)
+        >>> _ = Path("road.json").write_text(road.to_json(), encoding="utf-8")
+        >>> read_parameters("road.json") == road
+        True
+    """
     data = read_json(path)
     if isinstance(data, dict) and data.get("type") not in (None, "RoadParameters"):
         raise InputError(f"{path}: type", data["type"], "must be 'RoadParameters'")

@@ -57,6 +57,14 @@ class Profile:
         tangent_lengths: (P,) T of every rounding, m; 0 where there is none.
         breakpoints: sorted stations where the curvature jumps (both ends of a rounding) or the grade does (an
             intersection without rounding), m.
+
+    Example:
+        >>> lowest = IntersectionPoint(500.0, 90.0, radius=10_000.0)
+        >>> sag = Profile([IntersectionPoint(0.0, 100.0), lowest, IntersectionPoint(1000.0, 100.0)])
+        >>> float(sag.elevation(500.0)), sag.tangent_lengths.round(1).tolist()
+        (92.0, [0.0, 200.0, 0.0])
+        >>> sag.grade([0.0, 500.0, 1000.0]).round(3).tolist()
+        [-0.02, 0.0, 0.02]
     """
 
     def __init__(self, points: Sequence[IntersectionPoint]) -> None:

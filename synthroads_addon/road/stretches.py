@@ -34,7 +34,12 @@ _BARRIER_PERIOD = 4.0
 
 
 def stretches(length: float, longest: float = LONGEST) -> list[tuple[float, float]]:
-    """Return the (start, end) stations, m, of a road's stretches: the fewest, equally long, none above ``longest``."""
+    """Return the (start, end) stations, m, of a road's stretches: the fewest, equally long, none above ``longest``.
+
+    Example:
+        >>> stretches(1000.0, longest=600.0)
+        [(0.0, 500.0), (500.0, 1000.0)]
+    """
     count = max(1, math.ceil(length / longest - 1e-9))
     borders = [length * i / count for i in range(count + 1)]
     return list(pairwise(borders))

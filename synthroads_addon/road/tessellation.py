@@ -28,6 +28,15 @@ def sample_stations(geometry: RoadGeometry, tolerance: float, start: float = 0.0
         geometry: the analytic road.
         tolerance: largest distance (m) between the mesh and the analytic surface, > 0.
         start, end: stations (m) of the stretch that is wanted.
+
+    Example:
+        >>> from synthroads_addon import sample_road
+        >>> from synthroads_addon.scenario.road import RoadScenario
+        >>> from synthroads_addon.road.geometry import RoadGeometry
+        >>> geometry = RoadGeometry(sample_road(RoadScenario(length=200.0), seed=1))
+        >>> coarse, fine = (sample_stations(geometry, tolerance) for tolerance in (0.05, 0.005))
+        >>> len(coarse) < len(fine)
+        True
     """
     end = min(end, geometry.length)
     kinks = _enclosing_kinks(_kinks(geometry, tolerance), start, end)

@@ -73,6 +73,15 @@ def read_lines(path: Path) -> list[RoadLine]:
     Raises:
         MissingFileError: it can't be read.
         InputError: it is of another format, isn't understood, or has none.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from synthroads_addon import sample_road, write_twin
+        >>> from synthroads_addon.scenario.road import RoadScenario
+        >>> write_twin(sample_road(RoadScenario(length=120.0), seed=7), Path(), ["opendrive"])
+        >>> line = read_lines(Path("twin.xodr"))[0]
+        >>> line.source, round(line.length, 3)
+        ('OpenDRIVE road', 120.0)
     """
     name = format_of(path)
     if name not in READERS:

@@ -51,6 +51,14 @@ def sample_road(
 
     Raises:
         InputError: limits contradict each other; the message names them all.
+
+    Example:
+        >>> from synthroads_addon.scenario.road import RoadScenario
+        >>> road = sample_road(RoadScenario(length=200.0, cross_section="RQ31"), seed=7)
+        >>> [len(road.carriageway(side).lanes) for side in ("left", "right")]
+        [2, 2]
+        >>> road == sample_road(RoadScenario(length=200.0, cross_section="RQ31"), seed=7)
+        True
     """
     if axis:
         scenario = scenario.model_copy(update={"length": round_value(axis.length)})
@@ -106,7 +114,14 @@ def _free_id(name: str, taken: Mapping[str, Any]) -> str:
 
 
 def sample_alignment(scenario: RoadScenario, seed: int) -> AlignmentObject:
-    """Return a drawn alignment within the limits of its design class, its middle at the local origin."""
+    """Return a drawn alignment within the limits of its design class, its middle at the local origin.
+
+    Example:
+        >>> from synthroads_addon.scenario.road import RoadScenario
+        >>> axis = sample_alignment(RoadScenario(length=500.0), seed=1)
+        >>> round(sum(element.length for element in axis.horizontal), 3)
+        500.0
+    """
     rng = stream(seed, "alignment")
     heading = round_value(rng.uniform(-180.0, 180.0), 6)
     axis = AlignmentObject(

@@ -53,6 +53,11 @@ def beam_pattern(rings: tuple[int, ...]) -> BeamPattern:
 
     Raises:
         InputError: a ring has fewer than 3 rays: its mean would lie beside the axis.
+
+    Example:
+        >>> pattern = beam_pattern((6,))  # one ray in the middle and six around it
+        >>> len(pattern), round(float(pattern.weights.sum()), 6)
+        (7, 1.0)
     """
     for count in rings:
         if count < 3:
@@ -105,7 +110,12 @@ def _phases(rings: tuple[int, ...], radii: Float, weights: Float) -> Float:
 
 
 def beam_radii(divergence: Sequence[float]) -> tuple[float, float]:
-    """Return a beam's two radii at 1/e^2, m per metre of distance, from its two full divergence angles (rad)."""
+    """Return a beam's two radii at 1/e^2, m per metre of distance, from its two full divergence angles (rad).
+
+    Example:
+        >>> [round(100.0 * radius, 3) for radius in beam_radii((0.0005, 0.0011))]  # m, at a distance of 100 m
+        [0.025, 0.055]
+    """
     return math.tan(divergence[0] / 2.0), math.tan(divergence[1] / 2.0)
 
 

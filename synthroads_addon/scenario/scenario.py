@@ -226,6 +226,11 @@ def load_scenario(name_or_file: str, changes: list[str] | None = None) -> Scenar
 
     Raises:
         InputError: there is no such scenario, or a field is unknown or out of its limits.
+
+    Example:
+        >>> scenario = load_scenario("rq31-600m", ["seed=7", "road.length=200"])
+        >>> scenario.road.length, scenario.road.cross_section
+        (200.0, 'RQ31')
     """
     path = preset_path(SCENARIOS, name_or_file, "--scenario")
     scenario = Scenario.from_dict(read_json(path), source=str(name_or_file))

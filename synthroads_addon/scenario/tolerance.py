@@ -111,6 +111,10 @@ def parse_tolerance(text: str, field: str = "--tolerance") -> dict[str, float]:
 
     Raises:
         InputError: a kind that there isn't, or one named twice; a number or a unit is wrong, or a limit is exceeded.
+
+    Example:
+        >>> parse_tolerance("height=5mm,intensity=5%")
+        {'height': 0.005, 'intensity': 0.05}
     """
     data: dict[str, float] = {}
     for part in text.split(","):

@@ -56,6 +56,11 @@ def scenario_without(scenario: Scenario, effects: Iterable[str]) -> Scenario:
 
     Raises:
         InputError: there is no such effect.
+
+    Example:
+        >>> from synthroads_addon import load_scenario
+        >>> scenario_without(load_scenario("rq31-600m", ["scan.noise.speckle=0.2"]), ["speckle"]).scan.noise.speckle
+        0.0
     """
     changes: list[str] = []
     effects = list(effects)

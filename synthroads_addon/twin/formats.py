@@ -185,6 +185,14 @@ def write_twin(
 
     Raises:
         InputError: a format is unknown or its package isn't installed, or a road can't be said in it.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from synthroads_addon import sample_road
+        >>> from synthroads_addon.scenario.road import RoadScenario
+        >>> write_twin(sample_road(RoadScenario(length=50.0), seed=7), Path(), ["opendrive", "geojson"])
+        >>> sorted(path.name for path in Path().iterdir())
+        ['twin-geojson-report.json', 'twin-opendrive-report.json', 'twin.geojson', 'twin.xodr']
     """
     check_formats(formats)
     total, done = sum(FORMATS[name].seconds for name in formats), 0.0

@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
+from studies.costs.casters import bare_mesh
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.casters import make_caster
@@ -25,7 +26,6 @@ from synthroads_addon.scenario.inputs import ScenarioInputs
 from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.scenes.scan_scenes import scan_block
-from tools.benchmark_casters import bare_mesh
 
 ROUNDING = 2e-4  # m, of float32 coordinates a few hundred metres from the origin
 

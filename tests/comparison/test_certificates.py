@@ -9,11 +9,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from studies.realism.certificates import WITHOUT, certificate, pages, sweep_certificate, table
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.comparison.job import CloudComparison
 from synthroads_addon.dataset.recipe import recipe_names
 from tests.comparison.test_sweeps import made_up
-from tools.certify_recipes import WITHOUT, certificate, pages, sweep_certificate, table
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from studies.costs.effects import ALL, NONE, ScanCost, kinds, table, with_sensor_of
 from synthroads_addon.dataset.recipe import load_recipe, scene_jobs
 from synthroads_addon.scenario.scenario import load_scenario
-from tools.benchmark_effects import ALL, NONE, ScanCost, kinds, table, with_sensor_of
 
 
 def test_a_scenario_gets_the_sensor_of_a_recipe_and_nothing_else() -> None:

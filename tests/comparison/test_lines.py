@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from studies.realism.lines import LineFigures, line_figures, main
 from synthroads_addon.base.errors import InputError
 from tests.helpers.clouds.calibration_cloud import write_las
-from tools.figures_lines import LineFigures, line_figures, main
 
 STEP, APART = 0.36, 0.3
 
@@ -57,7 +57,7 @@ def test_the_table_has_a_row_for_each_cloud(
     cloud = write_las(tmp_path / "made-up.las", place, np.full(len(place), 100.0), np.ones(len(place), np.uint16))
     listed = tmp_path / "list.yaml"
     listed.write_text(f'type: CloudList\nclouds:\n  - {{cloud: {cloud.name}, class_field: label, road: "1"}}\n')
-    monkeypatch.setattr("sys.argv", ["figures_lines.py", str(listed)])
+    monkeypatch.setattr("sys.argv", ["lines.py", str(listed)])
     assert main() == 0
     head, _, row = capsys.readouterr().out.strip().splitlines()
     assert row.startswith("| made-up |")

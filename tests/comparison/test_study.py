@@ -5,11 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synthroads_addon.base.errors import InputError
-from synthroads_addon.cloud.selection.classes import RealClass
-from synthroads_addon.comparison.clouds import ComparedCloud
-from synthroads_addon.scenario.scenario import load_scenario
-from tools.study_effects import (
+from studies.realism.effects import (
     EVERYTHING,
     MARKING,
     NOTHING,
@@ -20,6 +16,10 @@ from tools.study_effects import (
     table,
     variants,
 )
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.cloud.selection.classes import RealClass
+from synthroads_addon.comparison.clouds import ComparedCloud
+from synthroads_addon.scenario.scenario import load_scenario
 
 
 def cloud(contrast_db: float, seed: int) -> ComparedCloud:

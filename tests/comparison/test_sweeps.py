@@ -8,10 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from synthroads_addon.base.errors import InputError
-from synthroads_addon.comparison.clouds import ListedCloud
-from tests.helpers.clouds.calibration_cloud import write_las
-from tools.figures_sweeps import (
+from studies.realism.sweeps import (
     RINGS,
     SweepFigures,
     best_accuracy,
@@ -22,6 +19,9 @@ from tools.figures_sweeps import (
     table,
     thickness,
 )
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.comparison.clouds import ListedCloud
+from tests.helpers.clouds.calibration_cloud import write_las
 
 HEIGHT = 1.7
 PLACE = np.array([300.0, 200.0, 50.0 + HEIGHT])

@@ -129,6 +129,11 @@ INPUTS: dict[str, Callable[[Path, Path], None]] = {
     "small-roads.yaml": _recipe("small-roads", {"roads": "{train: 1, validation: 1, test: 1}"}),
 }
 """Name of a file -> what writes it, given the environment's interpreter and the folder."""
+MADE_FROM = {
+    **dict.fromkeys(("axis.csv", "road.json"), ("out/mine",)),
+    "real.yaml": ("out/wide", "out/real"),
+}
+"""Name of a file -> what lines write that it is made from, or that it names."""
 
 
 def _run(python: Path, folder: Path, *words: str) -> None:

@@ -2,8 +2,9 @@
 
     python -m tests.doors.run_documented ENVIRONMENT/bin/python FOLDER [EXTRA ...]
 
-Lines are run in the order of the pages, as a reader does: each finds what the ones before it have written. A line that
-needs an extra which isn't there must be refused, with exit code 2 and one line that says how to install it.
+Each line finds what those before it have written, as a reader's does: it waits for those that write what it names, and
+lines that have nothing to do with each other run side by side. A line that needs an extra which isn't there must be
+refused, with exit code 2 and one line that says how to install it.
 """
 
 from __future__ import annotations
@@ -14,19 +15,29 @@ import resource
 import shlex
 import subprocess
 import sys
-from collections.abc import Collection, Iterable, Iterator, Sequence
+import tempfile
+import threading
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from tests.doors.cluster import cluster
 from tests.doors.documented import Documented, documented_lines
-from tests.doors.inputs import INPUTS
+from tests.doors.inputs import INPUTS, MADE_FROM
 from tests.doors.small_sizes import EXTRAS, ROWS, Small
 
 _LEAVE = "\nimport os, sys\nsys.stdout.flush(), sys.stderr.flush(), os._exit(0)"
 """End of a snippet: without Blender's teardown, in which a process can hang."""
 _LIMIT = 600.0
 """Seconds after which a line is given up."""
+_AT_ONCE = 2
+"""Lines that run side by side."""
+_PATH = re.compile(r"(?<![\w/.-])(?:out/[\w./-]*\w|[\w-]+\.(?:csv|glb|json|laz|osm|xodr|yaml))(?![\w/])")
+"""File or folder of the reader's own in a line."""
+_WRITTEN = re.compile(r"--(?:output|save)[= ](\S+)")
+"""What a command writes."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +78,7 @@ def run_documented(
         python: the environment's interpreter; its other commands lie beside it.
         folder: working folder of the lines: empty, or one in which all lines were run already.
         extras: extras of pyproject.toml that the environment holds.
-        only_needing: run only lines that need an extra, in a folder where those that need none were run before.
+        only_needing: run only lines that need one of these extras, in a folder where all were run before.
 
     Raises:
         ValueError: an extra is unknown, or a line has no row in the table or a row no line.
@@ -75,13 +86,102 @@ def run_documented(
     if unknown := set(extras) - set(EXTRAS):
         raise ValueError(f"no such extras: {', '.join(sorted(unknown))}")
     folder.mkdir(parents=True, exist_ok=True)
-    for line, row in rows_of(documented_lines()):
-        if line.kind == "file":
-            (folder / line.name).write_text(line.text + "\n", encoding="utf-8")
-        if row is None or row.reason or (only_needing and not row.needs):
+    chosen = [
+        (line, row)
+        for line, row in rows_of(documented_lines())
+        if line.kind == "file" or (row and not row.reason and (not only_needing or row.needs & set(extras)))
+    ]
+    steps = list(_steps(chosen, python, folder, extras))
+    before = [{n for n in range(number) if step.waits_for(steps[n])} for number, step in enumerate(steps)]
+    done: set[int] = set()
+    waiting, running = list(range(len(steps))), dict[Future[Outcome | None], int]()
+    with ThreadPoolExecutor(_AT_ONCE) as pool:
+        while waiting or running:
+            for number in [n for n in waiting if before[n] <= done][: _AT_ONCE - len(running)]:
+                running[pool.submit(steps[number].run)] = number
+                waiting.remove(number)
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                done.add(running.pop(future))
+                if outcome := future.result():
+                    yield outcome
+
+
+@dataclass(frozen=True)
+class Step:
+    """Something that is done on the way through the pages: a file is saved or made, or a line is run.
+
+    Attributes:
+        run: does it; returns the outcome of a line, and of a file that can't be made.
+        reads: files and folders that must be there before.
+        writes: those that it makes or changes.
+        alone: whether nothing may run beside it.
+    """
+
+    run: Callable[[], Outcome | None]
+    reads: frozenset[str] = frozenset()
+    writes: frozenset[str] = frozenset()
+    alone: bool = False
+
+    def waits_for(self, earlier: Step) -> bool:
+        """Return whether it comes after an earlier one: that writes what this one reads, or they write the same."""
+        shared = _meet(earlier.writes, self.reads | self.writes) or _meet(earlier.reads, self.writes)
+        return shared or self.alone or earlier.alone
+
+
+def _meet(some: Iterable[str], others: Iterable[str]) -> bool:
+    """Return whether a path is one of others, lies in one of them, or holds one."""
+    return any(f"{a}/".startswith(f"{b}/") or f"{b}/".startswith(f"{a}/") for a in some for b in others)
+
+
+def _steps(
+    lines: Iterable[tuple[Documented, Small | None]], python: Path, folder: Path, extras: Collection[str]
+) -> Iterator[Step]:
+    """Yield the steps of lines with their rows, in order: a file that a line takes for granted is made before it."""
+    made: set[str] = set()
+    for line, row in lines:
+        if row is None:
+            text = line.text + "\n"
+            yield Step(partial(_save, folder / line.name, text), writes=frozenset({line.name}))
             continue
-        fault = _input_fault(row.inputs, python, folder)
-        yield Outcome(line, "", None, "", "", 0.0, fault) if fault else _outcome(line, row, python, folder, extras)
+        for name in row.inputs:
+            if name not in made:
+                made.add(name)
+                reads = frozenset(MADE_FROM.get(name, ()))
+                yield Step(partial(_make_input, line, name, python, folder), reads, frozenset({name}))
+        reads, writes = paths_of(line, row)
+        runs = partial(_outcome, line, row, python, folder, extras)
+        yield Step(runs, reads | set(row.inputs), writes, alone=_wants_cluster(row, extras))
+
+
+def paths_of(line: Documented, row: Small) -> tuple[frozenset[str], frozenset[str]]:
+    """Return the files and folders that a line names: those that it reads, and those that it writes.
+
+    What a program of the reader's own does with a path can't be seen: it is taken to write all that it names.
+    """
+    command = row.command(line.text)
+    named = frozenset(_PATH.findall(command))
+    if line.kind == "python" or command.startswith("python "):
+        return frozenset(), named
+    writes = frozenset(_WRITTEN.findall(command))
+    return named - writes, writes
+
+
+def _save(file: Path, text: str) -> None:
+    file.write_text(text, encoding="utf-8")
+
+
+def _make_input(line: Documented, name: str, python: Path, folder: Path) -> Outcome | None:
+    """Make a file that a line takes for granted; return an outcome with the reason where it can't be made."""
+    if not (folder / name).exists():
+        try:
+            INPUTS[name](python, folder)
+        except (OSError, RuntimeError) as error:
+            return Outcome(line, "", None, "", "", 0.0, f"{name} can't be made: {error}")
+    return None
+
+
+def _wants_cluster(row: Small, extras: Collection[str]) -> bool:
+    return "cluster" in row.needs and row.needs <= set(extras)
 
 
 def rows_of(lines: Sequence[Documented], rows: Iterable[Small] = ROWS) -> list[tuple[Documented, Small | None]]:
@@ -102,34 +202,16 @@ def rows_of(lines: Sequence[Documented], rows: Iterable[Small] = ROWS) -> list[t
     return [(line, table.get(line.key)) for line in lines if line.kind == "file" or typed[line.key] is line]
 
 
-def _input_fault(names: Iterable[str], python: Path, folder: Path) -> str:
-    """Make the files that a line takes for granted; return why one can't be made, empty if all are there."""
-    for name in names:
-        if not (folder / name).exists():
-            try:
-                INPUTS[name](python, folder)
-            except (OSError, RuntimeError) as error:
-                return f"{name} can't be made: {error}"
-    return ""
-
-
 def _outcome(line: Documented, row: Small, python: Path, folder: Path, extras: Collection[str]) -> Outcome:
     """Run a line and return its outcome."""
     command = row.command(line.text)
     lacking = sorted(row.needs - set(extras))
-    before = _processor_seconds()
-    with cluster(python, folder, command, wanted=row.needs >= {"cluster"} and not lacking) as command:
-        answer = subprocess.run(
-            [str(python), "-c", command + _LEAVE] if line.kind == "python" else _words(command, python),
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=_LIMIT,
-            stdin=subprocess.DEVNULL,
-            env=_environment(python),
-        )
-    seconds = _processor_seconds() - before
+    begun = _processor_seconds()
+    with cluster(python, folder, command, wanted=_wants_cluster(row, extras)) as command:
+        words = [str(python), "-c", command + _LEAVE] if line.kind == "python" else _words(command, python)
+        answer, seconds = _answer(words, folder, _environment(python))
+    if _wants_cluster(row, extras):  # the cluster's own counts as well
+        seconds = _processor_seconds() - begun
     fault = refusal_fault(answer.returncode, answer.stderr, lacking) if lacking else _fault(answer, row)
     program = line.kind == "python" or line.text.startswith("python examples/")
     if lacking and program and "ModuleNotFoundError: No module named" in answer.stderr:
@@ -137,6 +219,26 @@ def _outcome(line: Documented, row: Small, python: Path, folder: Path, extras: C
     if not fault and seconds > row.seconds:
         fault = f"it took {seconds:.1f} s of processor time instead of {row.seconds:g} s at most"
     return Outcome(line, command, answer.returncode, answer.stdout, answer.stderr, seconds, fault)
+
+
+def _answer(
+    words: list[str], folder: Path, environment: dict[str, str]
+) -> tuple[subprocess.CompletedProcess[str], float]:
+    """Run a command; return how it ended, and its processor time, that of its own processes included."""
+    with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as errors:
+        process = subprocess.Popen(
+            words, cwd=folder, stdin=subprocess.DEVNULL, stdout=output, stderr=errors, env=environment
+        )
+        limit = threading.Timer(_LIMIT, process.kill)
+        limit.start()
+        _, status, used = os.wait4(process.pid, 0)
+        limit.cancel()
+        process.returncode = os.waitstatus_to_exitcode(status)
+        said = []
+        for file in (output, errors):
+            file.seek(0)
+            said.append(file.read().decode("utf-8", "replace"))
+    return subprocess.CompletedProcess(words, process.returncode, *said), used.ru_utime + used.ru_stime
 
 
 def _words(command: str, python: Path) -> list[str]:

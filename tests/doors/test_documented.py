@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from tests.doors.documented import PAGES, ROOT, Documented, blocks, documented_lines
-from tests.doors.inputs import INPUTS
-from tests.doors.run_documented import refusal_fault, rows_of
+from tests.doors.inputs import INPUTS, MADE_FROM
+from tests.doors.run_documented import Step, paths_of, refusal_fault, rows_of
 from tests.doors.small_sizes import EXTRAS, ROWS, Small
 
 LINES = documented_lines()
@@ -45,6 +45,41 @@ def test_what_is_run_is_the_line_with_small_numbers() -> None:
             assert not (row.reason and (row.more or row.instead or row.needs or row.inputs)), line
             assert set(row.inputs) <= set(INPUTS)
             assert row.needs <= set(EXTRAS)
+
+
+def test_a_line_waits_for_those_that_write_what_it_names() -> None:
+    rows = {line.key: paths_of(line, row) for line, row in rows_of(LINES) if row and not row.reason}
+    steps = [Step(lambda: None, *paths) for paths in rows.values()]
+    names = list(rows)
+
+    def waits(line: str, earlier: str) -> bool:
+        later, first = (next(n for n, name in enumerate(names) if name.startswith(text)) for text in (line, earlier))
+        return steps[later].waits_for(steps[first])
+
+    assert rows["synthroads cloud info out/mine/cloud.laz"] == ({"out/mine/cloud.laz"}, set())
+    assert waits("synthroads cloud info out/mine", "synthroads generate --scenario rq31-600m --output out/mine")
+    assert waits("synthroads experiment gantries", "synthroads dataset standin")
+    assert waits("synthroads experiment gantries", "synthroads dataset reference")
+    assert waits("synthroads dataset two-scanners.yaml --output out/two-scanners --verify", "synthroads dataset two-sc")
+    assert not waits("synthroads generate --output out/wide", "synthroads generate --scenario rq31-600m --output out/m")
+    assert not waits("synthroads check out/mine", "synthroads cloud info out/mine")
+    alone = Step(lambda: None, alone=True)
+    assert alone.waits_for(steps[0])
+    assert steps[0].waits_for(alone)
+
+
+def test_what_a_line_reads_is_written_by_one_before_it() -> None:
+    """Else it would be run before what it waits for, or beside it."""
+    written = set(INPUTS)
+    for line, row in rows_of(LINES):
+        if line.kind == "file":
+            written.add(line.name)
+        elif row and not row.reason:
+            reads, writes = paths_of(line, row)
+            reads |= {path for name in row.inputs for path in MADE_FROM.get(name, ())}
+            tops = {"/".join(path.split("/")[:2]) for path in reads}
+            assert tops <= written, line
+            written |= writes
 
 
 def test_words_that_are_replaced_must_be_there() -> None:

@@ -362,7 +362,7 @@ def test_the_last_quarter_of_a_thousand_scenes_costs_no_more_than_the_first(tmp_
 
 def test_the_cost_of_thousands_of_scenes_is_worked_out_from_a_finished_set(old: Path) -> None:
     """Three scenes within half an hour on two cores; each has two files of some bytes."""
-    from tools.figures_dataset import costs
+    from studies.costs.dataset import costs
 
     os.utime(old / "recipe.json", (0.0, 1000.0))
     os.utime(old / "manifest.json", (0.0, 2800.0))

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from headless.cli import COMMANDS
-from headless.commands import EXTRAS, missing_package
+from headless.error_lines import EXTRAS, missing_package
 
 ROOT = Path(__file__).resolve().parents[2]
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))

@@ -9,6 +9,7 @@ import re
 import struct
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from headless import messages
 from headless.commands import Outcome, command, run
-from headless.messages import INTERVAL, progress_bar
+from headless.progress import INTERVAL, _Rate, progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import Stage
 from synthroads_addon.cloud.formats.registry import open_writer
@@ -129,8 +129,8 @@ class Clock:
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     """Time that passes only where a test says so; lines are shown at once."""
     made = Clock()
-    monkeypatch.setattr(messages, "PATIENCE", 0.0)
-    monkeypatch.setattr(messages.time, "perf_counter", made)
+    monkeypatch.setattr("headless.progress.PATIENCE", 0.0)
+    monkeypatch.setattr("headless.progress.time.perf_counter", made)
     return made
 
 
@@ -186,14 +186,14 @@ def test_what_is_soon_over_shows_no_progress(capsys: pytest.CaptureFixture[str])
 def test_what_was_held_back_is_shown_once_it_takes_longer(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(messages, "PATIENCE", 0.2)
+    monkeypatch.setattr("headless.progress.PATIENCE", 0.2)
 
     def action(arguments: argparse.Namespace) -> Outcome:
         progress = progress_bar(arguments)
         progress("scenes", 0.0)
-        deadline = messages.time.perf_counter() + 20.0
-        while not (said := capsys.readouterr().err) and messages.time.perf_counter() < deadline:
-            messages.time.sleep(0.05)
+        deadline = time.perf_counter() + 20.0
+        while not (said := capsys.readouterr().err) and time.perf_counter() < deadline:
+            time.sleep(0.05)
         return 0, {}, said
 
     assert run(action, flags()) == 0
@@ -208,7 +208,7 @@ def silent_work(seconds: float, *told: tuple[str, float]) -> Callable[[argparse.
         for stage, share in told:
             assert progress is not None
             progress(stage, share)
-        messages.time.sleep(seconds)
+        time.sleep(seconds)
         return 0, {}, "done"
 
     return action
@@ -218,8 +218,8 @@ def silent_work(seconds: float, *told: tuple[str, float]) -> Callable[[argparse.
 def test_work_that_tells_nothing_for_long_still_has_its_lines(
     told: tuple[tuple[str, float], ...], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(messages, "PATIENCE", 0.0)
-    monkeypatch.setattr(messages, "INTERVAL", 0.2)
+    monkeypatch.setattr("headless.progress.PATIENCE", 0.0)
+    monkeypatch.setattr("headless.progress.INTERVAL", 0.2)
     assert run(silent_work(1.1, *told), flags(command="gallery")) == 0
     lines = capsys.readouterr().err.splitlines()
     assert 3 <= len(lines) <= 6 + len(told)
@@ -230,12 +230,12 @@ def test_work_that_tells_nothing_for_long_still_has_its_lines(
 def test_the_heartbeat_ends_with_the_command_and_keeps_quiet_if_asked(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(messages, "PATIENCE", 0.0)
-    monkeypatch.setattr(messages, "INTERVAL", 0.1)
+    monkeypatch.setattr("headless.progress.PATIENCE", 0.0)
+    monkeypatch.setattr("headless.progress.INTERVAL", 0.1)
     assert run(silent_work(0.3), flags(quiet=True, output="x", command="gallery")) == 0
     assert capsys.readouterr() == ("", "")
     assert run(silent_work(0.0), flags(command="gallery")) == 0
-    messages.time.sleep(0.4)
+    time.sleep(0.4)
     assert capsys.readouterr().err == ""
 
 
@@ -255,7 +255,7 @@ def test_the_time_that_is_left_follows_from_what_was_done(clock: Clock, capsys: 
 
 
 def test_what_was_spent_in_silence_is_no_longer_left() -> None:
-    rate = messages._Rate()
+    rate = _Rate()
     rate.add(0.0, "scan", 0.0)
     rate.add(100.0, "scan", 0.5)
     assert [rate.left(now) for now in (100.0, 160.0, 300.0)] == [100.0, 40.0, 0.0]
@@ -279,7 +279,8 @@ def test_in_a_terminal_progress_is_a_bar_and_messages_stand_above_it() -> None:
     code = """
 import argparse, time
 from headless.commands import run
-from headless.messages import logger, progress_bar
+from headless.messages import logger
+from headless.progress import progress_bar
 
 def action(arguments):
     progress = progress_bar(arguments)

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from headless import cli, commands, generate, scan
+from headless import cli, generate, options, scan
 from synthroads_addon.dataset.changes import change_recipe
 from synthroads_addon.dataset.recipe import load_recipe, scene_jobs
 from synthroads_addon.sampling.road import sample_road
@@ -107,9 +107,9 @@ def test_tolerance_means_one_thing(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_device_is_short_for_its_field() -> None:
     words = ["generate", "--output", "out", "--device", "riegl-vux-1uav22"]
-    assert commands.all_changes(parsed(*words), generate._FIELDS) == ['scan.device="riegl-vux-1uav22"']
+    assert options.all_changes(parsed(*words), generate._FIELDS) == ['scan.device="riegl-vux-1uav22"']
     same = [*words, "--set", "scan.device=riegl-vux-1uav22", "--seed", "7", "--twin", "ifc"]
-    assert commands.all_changes(parsed(*same), generate._FIELDS)[1:] == [
+    assert options.all_changes(parsed(*same), generate._FIELDS)[1:] == [
         'scan.device="riegl-vux-1uav22"',
         "seed=7",
         'twin=["ifc"]',

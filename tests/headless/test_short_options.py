@@ -9,7 +9,8 @@ from collections.abc import Iterator
 import pytest
 
 from headless.cli import COMMANDS, build_parser
-from headless.commands import SHORT_OPTIONS, add_shared_options, command, module_of
+from headless.commands import command, module_of
+from headless.parser import SHORT_OPTIONS, add_shared_options
 
 
 def parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tools.figures_plants import measure_canopy
+from studies.surfaces.plants import measure_canopy
 
 SHARE = 0.2
 """By how much figures may differ from the published ones, as a share of these."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from headless import cli, messages
+from headless import cli
 from ml import training_loop
 from ml.runs import Run
 from synthroads_addon.base.schema import canonical_json, read_json
@@ -75,8 +75,8 @@ def test_a_note_of_one_command_is_not_said_by_the_next(capsys: pytest.CaptureFix
 def test_a_trainings_lines_have_epoch_and_loss(
     configuration: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(messages, "PATIENCE", 0.0)
-    monkeypatch.setattr(messages, "INTERVAL", 0.0)
+    monkeypatch.setattr("headless.progress.PATIENCE", 0.0)
+    monkeypatch.setattr("headless.progress.INTERVAL", 0.0)
     assert cli.main(["train", str(configuration), "--output", str(configuration.parent / "run")]) == 0
     said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("training: ")]
     form = re.compile(r"training: \d+ % after \d+ s(?:, about \d+ s left)? \(epoch (\d) of 3, loss (\d\.?\d*)\)")

@@ -17,7 +17,8 @@ _FENCE = re.compile(r"^(```+)(\S*)[^\n]*\n(.*?)^\1$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"!?\[(?:[^\]\[]|\[[^\]]*\])*\]\(([^)\s]+)\)")
 _IMPORT = re.compile(r"(?:^ *|`)((?:from|import) (?:synthroads_addon|headless|ml)\b[^`#\n]*)", re.MULTILINE)
 _MODULE = re.compile(r"(?<![\w./])(?:synthroads_addon|headless|ml)(?:\.[a-z]\w*)+(?:\.\w+)?")
-_FILE = re.compile(r"(?<![\w./-])(?:synthroads_addon|headless|ml|tests|tools|docs|presets)/[\w./-]*\w(?:::\w+)*")
+_FOLDERS = "synthroads_addon|headless|ml|tests|tools|studies|docs|presets"
+_FILE = re.compile(rf"(?<![\w./-])(?:{_FOLDERS})/[\w./-]*\w(?:::\w+)*")
 _OLD = re.compile(r"(?m)^\| `[^|]*\| (?=[^|]*\|$)")
 _SHELL = {"|", ">", ">>", "<", "&&", ";"}
 

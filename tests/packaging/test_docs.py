@@ -246,7 +246,8 @@ def test_the_layout_has_every_folder() -> None:
     named = paths(LAYOUT)
     folders = [path.parent.relative_to(ADDON).as_posix() for path in ADDON.glob("*/*/__init__.py")]
     learning = [path.parent.relative_to(ROOT).as_posix() for path in (ROOT / "ml").rglob("*/__init__.py")]
-    assert sorted({*folders, *learning} - named - {"presets"}) == []
+    studies = [path.parent.relative_to(ROOT).as_posix() for path in (ROOT / "studies").glob("*/*.py")]
+    assert sorted({*folders, *learning, *studies} - named - {"presets"}) == []
 
 
 def test_what_the_layout_names_is_there() -> None:

@@ -116,7 +116,7 @@ def test_holds_every_module_and_data_file_once(archive: Path) -> None:
 
 def test_holds_no_tests_caches_or_tools(archive: Path) -> None:
     for name in _names(archive):
-        assert name.split("/")[0] not in {"tests", "tools", "headless", "ml", "docs"}, name
+        assert name.split("/")[0] not in {"tests", "tools", "studies", "headless", "ml", "docs"}, name
         assert "__pycache__" not in name.split("/"), name
         assert not name.endswith((".pyc", ".blend1", ".zip")), name
 

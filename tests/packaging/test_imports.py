@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 ADDON = ROOT / "synthroads_addon"
 BLENDERS = ("bpy", "bpy_extras", "bmesh", "mathutils", "gpu")
 NEED_BLENDER = {"blender", "jobs", "ui"}
-ABSOLUTE = re.compile(r"^\s*(?:from|import) (?:synthroads_addon|headless|ml|tests|tools)\b", re.MULTILINE)
+ABSOLUTE = re.compile(r"^\s*(?:from|import) (?:synthroads_addon|headless|ml|tests|tools|studies)\b", re.MULTILINE)
 
 
 def _free_modules() -> list[str]:
@@ -31,6 +31,13 @@ def test_the_add_on_imports_itself_relatively() -> None:
     """As an extension the package is bl_ext.user_default.synthroads, and headless and ml are not there."""
     for path in sorted(ADDON.rglob("*.py")):
         assert not ABSOLUTE.findall(path.read_text(encoding="utf-8")), path
+
+
+def test_commands_and_learning_import_nothing_that_is_not_installed() -> None:
+    """The wheel has neither tests nor tools nor studies."""
+    left_out = re.compile(r"^\s*(?:from|import) (?:tests|tools|studies)\b", re.MULTILINE)
+    paths = [path for part in ("headless", "ml") for path in sorted((ROOT / part).rglob("*.py"))]
+    assert [path.name for path in paths if left_out.search(path.read_text(encoding="utf-8"))] == []
 
 
 def test_the_library_is_imported_without_blender() -> None:

@@ -69,6 +69,41 @@ def test_a_kernel_that_is_wrong_is_refused_and_where_it_is_installed_left_out(
     assert [path.name for path in tmp_path.iterdir()] == ["wrong.c"]
 
 
+def test_what_was_compiled_is_taken_until_source_options_or_compiler_change(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiled: list[str] = []
+
+    def compile_(source: Path, triple: str, name: str) -> bytes:
+        compiled.append(name)
+        return source.read_bytes()
+
+    monkeypatch.setattr(builder, "KERNELS", tmp_path)
+    monkeypatch.setattr(builder, "_compile", compile_)
+    source, kept = tmp_path / "half.c", tmp_path / "kept"
+
+    def built(target: str = "linux-x64") -> int:
+        """Build into a new folder; return how many sources were compiled for it."""
+        compiled.clear()
+        (library,) = build_kernels(target, tmp_path / "libraries", kept)
+        assert library.read_bytes() == source.read_bytes()
+        library.unlink()
+        return len(compiled)
+
+    source.write_text('#include "half.h"\n', encoding="utf-8")
+    (tmp_path / "half.h").write_text("int half(int);\n", encoding="utf-8")
+    assert [built(), built(), built("windows-x64"), built()] == [1, 0, 1, 0]
+    (tmp_path / "half.h").write_text("long half(long);\n", encoding="utf-8")
+    assert [built(), built()] == [1, 0]
+    source.write_text('#include "half.h"\nint more;\n', encoding="utf-8")
+    assert [built(), built()] == [1, 0]
+    monkeypatch.setattr(builder, "_OPTIONS", ("-O3",))
+    assert [built(), built()] == [1, 0]
+    monkeypatch.setattr(builder, "version", lambda name: "0.99")
+    assert [built(), built()] == [1, 0]
+    assert len(build_kernels("linux-x64", tmp_path / "libraries")) == len(compiled) == 1, "without a folder all is"
+
+
 def test_without_the_compiler_it_is_installed_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(builder, "find_spec", lambda name: None)
     hook = _Hook()
@@ -82,7 +117,7 @@ def test_wheels_have_all_platforms_and_what_is_edited_its_own(
     version: str, targets: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     built: list[str] = []
-    monkeypatch.setattr(builder, "build_kernels", built.append)
+    monkeypatch.setattr(builder, "build_kernels", lambda target, **_: built.append(target))
     _Hook().initialize(version, {})
     assert built == targets
     monkeypatch.setattr(builder, "this_platform", lambda: "linux-arm64")

@@ -11,6 +11,8 @@ MOST_FILES = 21
 MAY_HAVE_MORE = {"headless", "synthroads_addon/blender/things", "synthroads_addon/road/things"}
 MOST_OF_A_WORD = 3
 """Most files in a folder that share the word before the first underscore."""
+MOST_LINES_OF_A_COMMAND = 250
+"""Most lines of a file of the command line: what is longer works something out, and that belongs below."""
 
 
 def _folders(*tops: str) -> dict[str, list[str]]:
@@ -22,14 +24,19 @@ def _folders(*tops: str) -> dict[str, list[str]]:
 
 
 def test_no_folder_has_too_many_files() -> None:
-    sizes = {folder: len(names) for folder, names in _folders("synthroads_addon", "headless", "ml").items()}
+    sizes = {folder: len(names) for folder, names in _folders("synthroads_addon", "headless", "ml", "studies").items()}
     assert {folder for folder, size in sizes.items() if size > MOST_FILES} <= MAY_HAVE_MORE
 
 
 def test_files_that_share_a_word_have_a_folder_of_that_word() -> None:
-    for folder, names in _folders("synthroads_addon", "headless", "ml", "tests").items():
+    for folder, names in _folders("synthroads_addon", "headless", "ml", "studies", "tests").items():
         words = [name.partition("_")[0] for name in names if "_" in name.strip("_") and not name.startswith("test_")]
         assert not [word for word, number in Counter(words).items() if number > MOST_OF_A_WORD], folder
+
+
+def test_files_of_the_command_line_are_short() -> None:
+    lines = {path.name: len(path.read_bytes().splitlines()) for path in (ROOT / "headless").rglob("*.py")}
+    assert {name: number for name, number in lines.items() if number > MOST_LINES_OF_A_COMMAND} == {}
 
 
 def test_nothing_lies_loose_in_the_add_on() -> None:

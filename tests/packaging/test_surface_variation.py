@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tools import surface_variation as module
-from tools.surface_variation import plane_residuals, surface_variation
+from studies.surfaces import surface_variation as module
+from studies.surfaces.surface_variation import plane_residuals, surface_variation
 
 
 def rough_plane(count: int, sigma: float, size: float = 10.0, slope: float = 0.0) -> np.ndarray:

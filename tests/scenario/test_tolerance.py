@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from headless.commands import choice_changes
+from headless.options import choice_changes
 from headless.tradeoff_table import ROW_TITLES
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.scenario.scenario import load_scenario

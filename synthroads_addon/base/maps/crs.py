@@ -51,6 +51,11 @@ class MapSystem:
         height_unit: m per unit of z; None where no vertical part says it.
         ellipsoidal: whether heights are counted from the ellipsoid.
         local: whether x and y are a site's own, of no map.
+
+    Example:
+        >>> system = MapSystem.read("EPSG:25832")
+        >>> system.name, system.unit
+        ('ETRS89 / UTM zone 32N', 1.0)
     """
 
     text: str
@@ -164,6 +169,10 @@ def metric_system(epsg: int, height_epsg: int | None = None, field: str = "epsg"
 
     Raises:
         InputError: see `MapSystem.of`; or its coordinates are degrees, or aren't metres.
+
+    Example:
+        >>> metric_system(25832).name
+        'ETRS89 / UTM zone 32N'
     """
     try:
         system = MapSystem.of(epsg, height_epsg)
@@ -189,7 +198,12 @@ def compound_code(epsg: int, height_epsg: int | None) -> int | None:
 
 
 def system_urn(epsg: int, height_epsg: int | None = None) -> str:
-    """Return the OGC's URN of a system (07-092r1): of the one code of a pair, or of both codes."""
+    """Return the OGC's URN of a system (07-092r1): of the one code of a pair, or of both codes.
+
+    Example:
+        >>> system_urn(25832), system_urn(25832, 7837)
+        ('urn:ogc:def:crs:EPSG::25832', 'urn:ogc:def:crs,crs:EPSG::25832,crs:EPSG::7837')
+    """
     code = compound_code(epsg, height_epsg)
     if code is not None:
         return f"urn:ogc:def:crs:EPSG::{code}"
@@ -204,6 +218,13 @@ def moved(points: Float, source: MapSystem, target: MapSystem) -> tuple[Float, f
 
     Raises:
         InputError: there is no way between the systems for a point.
+
+    Example:
+        >>> import numpy as np
+        >>> cities = np.array([[6.96, 50.94, 55.0], [8.68, 50.11, 112.0]])  # degrees east and north, m
+        >>> points, _ = moved(cities, MapSystem.read("EPSG:4258"), MapSystem.of(25832))
+        >>> points.round().tolist()
+        [[356676.0, 5645134.0, 55.0], [477119.0, 5550910.0, 112.0]]
     """
     from pyproj.exceptions import ProjError  # takes a fifth of a second, and few commands need it
 

@@ -50,7 +50,21 @@ def open_writer(
     crs_text: str | None = None,
     standard_time: bool = False,
 ) -> CloudWriter:
-    """Return the writer that suits a file's ending, not yet entered as a context; arguments as `CloudWriter`."""
+    """Return the writer that suits a file's ending, not yet entered as a context; arguments as `CloudWriter`.
+
+    Example:
+        >>> from pathlib import Path
+        >>> import laspy
+        >>> las = laspy.create(point_format=6, file_version="1.4")
+        >>> las.x, las.y, las.z = [294000.5, 294001.0], [5628000.5, 5628000.0], [180.25, 181.5]
+        >>> las.write("scan.las")
+        >>> with open_cloud(Path("scan.las")) as cloud:
+        ...     with open_writer(Path("scan.ply"), 25832, [294e3, 5628e3, 0.0], 1.0, attributes=()) as writer:
+        ...         for block in cloud.blocks():
+        ...             writer.write(block)
+        >>> writer.count
+        2
+    """
     make: type[CloudWriter] = _format_class(check_ending(path), "Writer")
     return make(path, epsg, offset, intensity_scale, attributes, scheme, crs_text, standard_time)
 
@@ -67,6 +81,16 @@ def open_cloud(path: Path) -> CloudReader:
     Raises:
         MissingFileError: there is no such file, or it can't be read.
         InputError: it is no cloud, or truncated, or of a kind that isn't read here.
+
+    Example:
+        >>> from pathlib import Path
+        >>> import laspy
+        >>> las = laspy.create(point_format=6, file_version="1.4")
+        >>> las.x, las.y, las.z = [294000.5, 294001.0], [5628000.5, 5628000.0], [180.25, 181.5]
+        >>> las.write("scan.las")
+        >>> with open_cloud(Path("scan.las")) as cloud:
+        ...     print([block.xyz.tolist() for block in cloud.blocks()])
+        [[[294000.5, 5628000.5, 180.25], [294001.0, 5628000.0, 181.5]]]
     """
     ending = check_ending(path)
     if not path.is_file():

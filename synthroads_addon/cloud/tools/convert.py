@@ -47,6 +47,15 @@ def convert(
     Raises:
         InputError: a file can't be read, or the scheme is unknown or doesn't suit the cloud.
         OutputError: the output is there already or can't be written.
+
+    Example:
+        >>> from pathlib import Path
+        >>> import laspy
+        >>> las = laspy.create(point_format=6, file_version="1.4")
+        >>> las.x, las.y, las.z = [10.0, 60.0], [0.0, 0.0], [100.0, 101.0]
+        >>> las.write("scan.las")
+        >>> convert(Path("scan.las"), Path("scan.ply"))["points"]
+        2
     """
     check_output(source, output, overwrite)
     with open_cloud(source) as cloud:

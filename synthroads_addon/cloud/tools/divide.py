@@ -73,6 +73,15 @@ def crop(
     Raises:
         InputError: nothing to crop by is given, limits are in the wrong order, or nothing lies within.
         OutputError: the output is there already or can't be written.
+
+    Example:
+        >>> from pathlib import Path
+        >>> import laspy
+        >>> las = laspy.create(point_format=6, file_version="1.4")
+        >>> las.x, las.y, las.z = [10.0, 60.0], [0.0, 0.0], [100.0, 101.0]
+        >>> las.write("scan.las")
+        >>> crop(Path("scan.las"), Path("part.laz"), box=(0.0, -5.0, 50.0, 5.0))["points"]
+        1
     """
     check_output(source, output, overwrite)
     if box is None and heights is None and polygon is None:
@@ -195,7 +204,15 @@ def read_polygon(path: Path, place: Placement | None = None) -> list[Float]:
 
 
 def points_in_rings(points: Float, rings: list[Float]) -> Bool:
-    """Return which points (N, 2) lie in an odd number of rings: within polygons, but not within their holes."""
+    """Return which points (N, 2) lie in an odd number of rings: within polygons, but not within their holes.
+
+    Example:
+        >>> import numpy as np
+        >>> outer = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
+        >>> hole = np.array([[4.0, 4.0], [6.0, 4.0], [6.0, 6.0], [4.0, 6.0]])
+        >>> points_in_rings(np.array([[1.0, 1.0], [5.0, 5.0], [11.0, 5.0]]), [outer, hole]).tolist()
+        [True, False, False]
+    """
     inside = np.zeros(len(points), dtype=bool)
     x, y = points.T
     for ring in rings:

@@ -26,7 +26,13 @@ _PAIRS_AT_ONCE = 4_000_000
 
 
 def luminance(rgb: UInt16) -> Float:
-    """Return the luma 0.3 r + 0.59 g + 0.11 b (N,), 0 to 1, of 16-bit sRGB colours (N, 3)."""
+    """Return the luma 0.3 r + 0.59 g + 0.11 b (N,), 0 to 1, of 16-bit sRGB colours (N, 3).
+
+    Example:
+        >>> import numpy as np
+        >>> luminance(np.array([[65535, 65535, 65535], [65535, 0, 0]], dtype=np.uint16)).round(3).tolist()
+        [1.0, 0.3]
+    """
     return rgb @ LUMINANCE / 65535.0
 
 

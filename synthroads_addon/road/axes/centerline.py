@@ -51,6 +51,12 @@ def read_axis(path: str | os.PathLike[str], place: Placement | None = None) -> F
         MissingFileError: the file doesn't exist or cannot be read.
         InputError: anything in it is not as above, there are fewer than two distinct points, a height is none, or the
             points lie outside of the system's area of use.
+
+    Example:
+        >>> from pathlib import Path
+        >>> _ = Path("axis.csv").write_text("x;y;z\\n0;0;100\\n50;0;100.5\\n", encoding="utf-8")
+        >>> read_axis("axis.csv").tolist()
+        [[0.0, 0.0, 100.0], [50.0, 0.0, 100.5]]
     """
     return AxisContent.read(path).placed(place or Placement())
 

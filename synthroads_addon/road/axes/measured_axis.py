@@ -42,6 +42,13 @@ class MeasuredAxis:
         points: (N, 3) float64 vertices, m.
         joined: (N - 1,) bool, whether the line runs from a vertex to the next one; False: a gap.
         station: (N,) float64 running length in plan, m, strictly increasing from 0.
+
+    Example:
+        >>> import numpy as np
+        >>> corner = np.array([[0.0, 0.0, 10.0], [30.0, 0.0, 10.0], [30.0, 40.0, 12.0]])
+        >>> axis = MeasuredAxis(corner, np.ones(2, dtype=bool))
+        >>> axis.length, axis.elevation(50.0).round(3).tolist()
+        (70.0, 11.0)
     """
 
     def __init__(self, points: ArrayLike, joined: ArrayLike | None = None) -> None:

@@ -37,7 +37,12 @@ def species_shapes() -> dict[str, dict[str, dict[str, float]]]:
 
 
 def is_bare(species: str, season: str) -> bool:
-    """Return whether plants of a species have lost their leaves in a season."""
+    """Return whether plants of a species have lost their leaves in a season.
+
+    Example:
+        >>> is_bare("maple", "winter"), is_bare("spruce", "winter")
+        (True, False)
+    """
     return season == "winter" and species not in NEEDLES
 
 

@@ -235,7 +235,13 @@ def device_names() -> list[str]:
 
 
 def load_device(name_or_file: str) -> Device:
-    """Return the device of a preset's name or of a file; raise `InputError` if there is none or it is inconsistent."""
+    """Return the device of a preset's name or of a file; raise `InputError` if there is none or it is inconsistent.
+
+    Example:
+        >>> device = load_device("riegl-vux-1uav22")
+        >>> device.wavelength_nm, device.maximum_returns
+        (1550.0, 15)
+    """
     path = preset_path(DEVICES, name_or_file, "scan.device")
     return Device.from_dict(read_json(path), source=str(name_or_file))
 
@@ -252,6 +258,11 @@ def setting_of(device: Device, scan: DeviceChoice, range_sigma: float | None = N
 
     Raises:
         InputError: the device can't do it, or values contradict each other; names field, value and what is allowed.
+
+    Example:
+        >>> setting = setting_of(load_device("riegl-vux-1uav22"), DeviceChoice(pulse_rate_khz=600.0))
+        >>> round(setting.pulse_rate)  # 1/s
+        600000
     """
     mode = _mode(device, scan.pulse_rate_khz)
     view = _field_of_view(device, mode, scan.field_of_view_deg)

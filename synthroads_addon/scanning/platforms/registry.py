@@ -26,5 +26,10 @@ def make_platform(kind: str = next(iter(PLATFORMS)), **values: Any) -> Platform:
 
     Raises:
         InputError: there is no such kind, it has no such field, or a value is out of its limits.
+
+    Example:
+        >>> platform = make_platform("uav", height=60.0, speed=5.0)
+        >>> platform.height, platform.speed
+        (60.0, 5.0)
     """
     return _Carrier.from_dict({"platform": {"kind": kind, **values}}, source="scan").platform

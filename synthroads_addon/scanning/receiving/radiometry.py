@@ -23,6 +23,10 @@ def received_intensity(share: ArrayLike, distance: ArrayLike, attenuation: float
         share: brightness of the surface times the ray's share of the pulse's energy.
         distance: range d, m; below `NEAREST` it counts as this.
         attenuation: a, 1/m of range, not negative; the light goes there and back, so it is twice the extinction.
+
+    Example:
+        >>> received_intensity([0.2, 0.2], [10.0, 100.0]).tolist()
+        [0.002, 2e-05]
     """
     distance = np.asarray(distance, dtype=np.float64)
     far = bool(np.all(distance >= NEAREST))
@@ -37,7 +41,12 @@ def received_intensity(share: ArrayLike, distance: ArrayLike, attenuation: float
 
 
 def decibels(power: ArrayLike) -> Float32:
-    """Return powers in decibels, at least `DARKEST_DB`."""
+    """Return powers in decibels, at least `DARKEST_DB`.
+
+    Example:
+        >>> decibels([1.0, 0.01]).tolist()
+        [0.0, -20.0]
+    """
     return np.asarray(10.0 * np.log10(np.maximum(power, 10.0 ** (DARKEST_DB / 10.0))), dtype=np.float32)
 
 
@@ -47,6 +56,12 @@ def saturate(intensity: Float, limit: float) -> tuple[Float, int]:
     Args:
         intensity: (N,) that reach the detector.
         limit: largest that it tells apart; inf clips nothing.
+
+    Example:
+        >>> import numpy as np
+        >>> intensity, clipped = saturate(np.array([0.2, 0.9, 1.4]), limit=1.0)
+        >>> intensity.tolist(), clipped
+        ([0.2, 0.9, 1.0], 1)
     """
     clipped = int(np.count_nonzero(intensity > limit))
     return (np.minimum(intensity, limit), clipped) if clipped else (intensity, 0)

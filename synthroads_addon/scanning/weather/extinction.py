@@ -26,12 +26,22 @@ def visibility_extinction(visibility: float, wavelength_nm: float, exponent: flo
         visibility: V, m.
         wavelength_nm: of the laser.
         exponent: q, see `kim_exponent` and `kruse_exponent`; 0 for drops that are larger than the wavelength.
+
+    Example:
+        >>> fog = visibility_extinction(200.0, wavelength_nm=1550.0, exponent=kim_exponent(200.0))
+        >>> round(fog, 4)
+        0.0196
     """
     return -math.log(CONTRAST) / visibility * (wavelength_nm / _REFERENCE) ** -exponent
 
 
 def kim_exponent(visibility: float) -> float:
-    """Return Kim's exponent q at a visibility (m): 0 below 500 m, growing to 1.3 at 6 km; 1.6 above 50 km."""
+    """Return Kim's exponent q at a visibility (m): 0 below 500 m, growing to 1.3 at 6 km; 1.6 above 50 km.
+
+    Example:
+        >>> [round(kim_exponent(visibility), 2) for visibility in (200.0, 3_000.0, 23_000.0)]
+        [0.0, 0.82, 1.3]
+    """
     kilometres = visibility * _PER_KILOMETRE
     if kilometres < 0.5:
         return 0.0
@@ -53,7 +63,12 @@ def _clear_exponent(kilometres: float) -> float:
 
 
 def per_metre(decibels_per_kilometre: float) -> float:
-    """Return the extinction coefficient, 1/m, of an attenuation in dB/km."""
+    """Return the extinction coefficient, 1/m, of an attenuation in dB/km.
+
+    Example:
+        >>> round(per_metre(20.0), 5)
+        0.00461
+    """
     return decibels_per_kilometre * _PER_DECIBEL * _PER_KILOMETRE
 
 
@@ -62,6 +77,11 @@ def snow_extinction(rate_mm_h: float, wavelength_nm: float, *, wet: bool = True)
 
     Wet snow, near 0 degrees C as snow on German motorways mostly is, has a = 1.023e-4 L + 3.786 and b = 0.72, dry
     snow a = 5.42e-5 L + 5.496 and b = 1.38, with the wavelength L in nm.
+
+    Example:
+        >>> wet, dry = snow_extinction(2.0, wavelength_nm=1550.0), snow_extinction(2.0, wavelength_nm=1550.0, wet=False)
+        >>> round(wet, 5), round(dry, 5)
+        (0.0015, 0.00334)
     """
     if wet:
         return per_metre((1.023e-4 * wavelength_nm + 3.7855466) * rate_mm_h**0.72)

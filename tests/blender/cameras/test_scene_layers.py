@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from studies.costs.layers import compare_sources
 from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA, layer_source
 from synthroads_addon.blender.files import empty_file
 from synthroads_addon.jobs.open_scene import RoadScene
@@ -21,7 +22,6 @@ from synthroads_addon.scanning.record import record_as_measured
 from synthroads_addon.scanning.scan import join_results
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.scenes.scan_scenes import altered
-from tools.measure_layers import compare_sources
 
 WORST_LAYER, WORST_COLOUR = 0.002, 1.0
 """Largest RMSE of a layer, and largest 95th percentile of CIEDE2000 of lit colours."""

@@ -10,6 +10,8 @@ import bpy
 import numpy as np
 import pytest
 
+from studies.costs.casters import bare_mesh
+from studies.costs.raycast_nodes import RaycastNodesCaster
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.blender import casters
@@ -20,8 +22,6 @@ from synthroads_addon.blender.casters.measure import agreement, bare_rate
 from synthroads_addon.scanning.kernels.library import NoKernelError
 from synthroads_addon.scanning.kernels.packets import Packets, usable_packets
 from synthroads_addon.scanning.scene.mesh import SceneMesh
-from tools.benchmark_casters import bare_mesh
-from tools.raycast_nodes import RaycastNodesCaster
 
 RANGE = 60.0
 FAST = {"embree": EmbreeCaster, "raycast nodes": RaycastNodesCaster}

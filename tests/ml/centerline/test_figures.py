@@ -13,11 +13,10 @@ from ml.data.roads import LearningRoad
 from ml.networks.centerline.models import TARGETS
 from ml.scores.evaluation import evaluate, make_case, skeleton_predictor
 from ml.scores.metrics import Spread
+from studies.learning.centerline import grid_search, remembering, road_table
 from tests.helpers.clouds.centerline_batches import SETTINGS, small
 from tests.helpers.clouds.centerline_roads import strip_road
 from tests.helpers.roads.analytic_roads import roads
-from tools import figures_centerline
-from tools.figures_centerline import grid_search, road_table
 
 
 def test_the_grid_search_takes_the_best_that_finds_enough() -> None:
@@ -45,12 +44,12 @@ def test_what_was_found_is_remembered_by_points_and_frames(monkeypatch: pytest.M
     places = frames_along(known.known_truth.axis).select(slice(20, 43))
     plain = CenterlinePredictor(small("single").eval(), SETTINGS, UseOptions(step=10))
     wanted = plain.regress(known, places)
-    remembering = figures_centerline.remembering(plain)
+    kept = remembering(plain)
     for _ in range(2):
-        found = remembering.regress(known, places)
+        found = kept.regress(known, places)
         np.testing.assert_array_equal(found.value, wanted.value)
         np.testing.assert_array_equal(found.std, wanted.std)
-    again, _ = remembering.calibrate([(known, places)])
+    again, _ = kept.calibrate([(known, places)])
     factors = np.array([again.calibration[name].factor for name in TARGETS])
     np.testing.assert_allclose(again.regress(known, places).std, wanted.raw_std * factors)
     assert len(seen) == 2

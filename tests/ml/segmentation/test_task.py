@@ -18,6 +18,7 @@ from headless import cli, commands
 from headless import evaluate as evaluate_command
 from headless import predict as predict_command
 from headless import train as train_command
+from headless.parser import add_shared_options
 from ml.configuration import EXPERIMENTS, load_configuration
 from ml.data.classes import IGNORED
 from ml.data.crops import Seeds
@@ -278,7 +279,7 @@ def test_commands_train_evaluate_and_predict(data: Path, tmp_path: Path, capsys:
 
         parser = argparse.ArgumentParser()
         module.add_arguments(parser)
-        commands.add_shared_options(parser)
+        add_shared_options(parser)
         code = commands.run(module.run, parser.parse_args([*map(str, arguments), "--json"]))
         out = capsys.readouterr()
         assert code == 0, out.err

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from studies.surfaces.surface_variation import plane_residuals, surface_variation
 from synthroads_addon.base.arithmetic.noise import mean_deviation, noise_field
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.cloud.points import PointBlock, concatenate
@@ -24,7 +25,6 @@ from synthroads_addon.scanning.relief.micro_relief import (
 )
 from tests.helpers.clouds.random_points import make_points
 from tests.helpers.relative_speed import quiet_seconds
-from tools.surface_variation import plane_residuals, surface_variation
 
 REAL = sorted((Path(__file__).resolve().parents[3].parent / "shared" / "real").glob("als_*.laz"))
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])

@@ -1,0 +1,59 @@
+"""Statistics of a cloud as text, for `synthroads cloud info`."""
+
+from typing import Any
+
+from synthroads_addon.base.text.table import text_table
+
+_COLUMNS = (
+    ("points", "points", "{:,}"),
+    ("density", "1/m2", "{:.1f}"),
+    ("height_mean", "height m", "{:.2f}"),
+    ("height_std", "std", "{:.2f}"),
+    ("roughness", "roughness", "{:.4f}"),
+    ("intensity_mean", "intensity", "{:.3f}"),
+    ("intensity_std", "std", "{:.3f}"),
+    ("luminance_mean", "luminance", "{:.3f}"),
+    ("luminance_std", "std", "{:.3f}"),
+)
+
+
+def table(figures: dict[str, Any]) -> str:
+    """Return a cloud's statistics as text: extent, attributes, and a table of figures by class."""
+    lines = [f"{figures['file']}: {figures['kind']}, {figures['points']:,} points"]
+    named = figures["coordinate_system"]
+    lines.append(f"coordinate system {named or 'not named: coordinates are taken for metres'}")
+    if named and figures["height_epsg"] is None:
+        lines.append("what heights are counted from isn't named")
+    if figures["bounds"]:
+        low, high = figures["bounds"]["low"], figures["bounds"]["high"]
+        spans = " x ".join(f"{b - a:.1f}" for a, b in zip(low, high, strict=True))
+        lines.append(f"from {low} to {high}: {spans} m")
+    lines.append(f"attributes: {', '.join(figures['attributes']) or 'none beyond the usual ones'}")
+    if figures["left_out"]:
+        lines.append(f"not read: {', '.join(figures['left_out'])}")
+    rows = [("", *(title for _, title, _ in _COLUMNS))]
+    for name, values in {"all": figures["all"], **figures["classes"]}.items():
+        if values:
+            shown = (form.format(values[key]) if values[key] is not None else "-" for key, _, form in _COLUMNS)
+            rows.append((name, *shown))
+    lines += text_table(rows[0], rows[1:], range(1, len(rows[0])))
+    return "\n".join([*lines, *_predicted_lines(figures)])
+
+
+def _predicted_lines(figures: dict[str, Any]) -> list[str]:
+    """Return the lines on a cloud's predicted classes, and how they agree with its own; none where there are none."""
+    if "predicted_classes" not in figures:
+        return []
+    agreement = figures["agreement"]
+    ious = agreement["iou"] if agreement else {}
+    rows = [
+        (name, f"{row['points']:,}", f"{row['share']:.1%}", f"{ious[name]:.3f}" if name in ious else "-")
+        for name, row in figures["predicted_classes"].items()
+    ]
+    titles = ("predicted_class", "points", "share", f"IoU with {figures['class_field']}")
+    kept = len(titles) if agreement else len(titles) - 1
+    lines = ["", *text_table(titles[:kept], [row[:kept] for row in rows], range(1, kept))]
+    if agreement and agreement["share"] is not None:
+        own = f"{figures['class_field']}: the same class for {agreement['share']:.1%} of {agreement['points']:,} points"
+        lines.append(f"beside the cloud's own {own}")
+    return lines

@@ -1,0 +1,238 @@
+"""Progress of a command on standard error: a bar in a terminal, lines elsewhere."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from headless.messages import logger, set_up
+from synthroads_addon.base.process.end_signals import ENDS
+from synthroads_addon.base.progress import Progress, duration, silent
+
+INTERVAL = 10.0
+"""Seconds between two lines about the same stage, where standard error is no terminal."""
+PATIENCE = 2.0
+"""Seconds until the first of these lines."""
+_FIRST, _LEAST = 3.0, 0.01
+"""Seconds and share of work that must be done before the time that is left is told."""
+_working: list[_LineProgress] = []
+"""The progress in lines of the command that is run."""
+_endings: list[Callable[[], None]] = []
+"""Functions that end the progress which is shown: the bar, and the stage that is timed."""
+
+
+@contextmanager
+def progress_display(arguments: argparse.Namespace) -> Iterator[None]:
+    """Context of a command at work: says so in lines where there is no terminal, and ends what shows its progress."""
+    if not arguments.quiet and not _in_a_terminal():
+        _working.append(_lines(arguments))
+    try:
+        yield
+    finally:
+        _working.clear()
+        while _endings:
+            _endings.pop()()
+
+
+def progress_bar(arguments: argparse.Namespace) -> Progress:
+    """Return a progress callback: a bar in a terminal, log lines elsewhere, nothing with ``--quiet``."""
+    if arguments.quiet:
+        return silent
+    set_up(arguments)  # for those that aren't run by `headless.commands.run`
+    verbose = logger.isEnabledFor(logging.DEBUG)
+    shown = _bar() if _in_a_terminal() else _lines(arguments)
+    return _StageTimeProgress(shown) if verbose else shown
+
+
+def _in_a_terminal() -> bool:
+    """Return whether standard error is a terminal."""
+    return sys.stderr is not None and sys.stderr.isatty()
+
+
+def _lines(arguments: argparse.Namespace) -> _LineProgress:
+    """Return the progress in lines that the command has, or a new one of what isn't run as a command."""
+    patience = 0.0 if logger.isEnabledFor(logging.DEBUG) else PATIENCE
+    return _working[-1] if _working else _LineProgress(patience, getattr(arguments, "command", None) or "work")
+
+
+def _start_thread(target: Callable[[], None]) -> threading.Thread:
+    """Start a thread that ends with the process, and return it.
+
+    Signals that end the command aren't delivered to it: they would leave the main thread asleep.
+    """
+
+    def run() -> None:
+        if hasattr(signal, "pthread_sigmask"):
+            signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)
+        target()
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    return thread
+
+
+class _LineProgress:
+    """Progress callback that logs a line for each new stage, and one every `INTERVAL` seconds, whether called or not.
+
+    What is over within `PATIENCE` seconds shows none, so that wrong input stays a single line.
+
+    Args:
+        patience: seconds until the first line.
+        working: what is at work while no stage is told.
+    """
+
+    def __init__(self, patience: float, working: str) -> None:
+        self._seen: set[str] = set()
+        self._begun = self._last = time.perf_counter()
+        self._stage, self._share = working, 0.0
+        self._rate = _Rate()
+        self._lock = threading.RLock()
+        self._held: list[str] | None = []
+        self._over = threading.Event()
+        self._patience = patience
+        _start_thread(self._beat)
+        _endings.append(self._end)
+
+    def __call__(self, stage: str, share: float) -> None:
+        with self._lock:
+            now = time.perf_counter()
+            self._stage, self._share = stage, share
+            self._rate.add(now, stage, share)
+            if stage not in self._seen or now - self._last >= INTERVAL:
+                self._tell(now)
+
+    def _tell(self, now: float) -> None:
+        """Log a line on the stage that is at work."""
+        self._seen.add(self._stage)
+        self._last = now
+        after = f"after {now - self._begun:.0f} s"
+        told = f"{100.0 * self._share:.0f} % {after}" if self._rate.began else f"at work {after}"
+        left = self._rate.left(now)
+        told += "" if left is None else f", about {duration(left)} left"
+        detail = getattr(self._stage, "detail", "")
+        line = f"{self._stage}: {told}{f' ({detail})' if detail else ''}"
+        if self._held is None:
+            logger.info(line)
+        else:
+            self._held.append(line)
+
+    def _beat(self) -> None:
+        """Log a line whenever none was logged for `INTERVAL` seconds, until the end: work may tell nothing for long."""
+        if not self._over.wait(self._patience):
+            self._show_held()
+        while not self._over.wait(max(0.01, self._last + INTERVAL - time.perf_counter())):
+            with self._lock:
+                now = time.perf_counter()
+                if now - self._last >= INTERVAL and not self._over.is_set():
+                    self._tell(now)
+
+    def _show_held(self) -> None:
+        with self._lock:
+            for line in self._held or ():
+                logger.info(line)
+            self._held = None
+
+    def _end(self) -> None:
+        with self._lock:
+            self._over.set()
+
+
+class _Rate:
+    """How fast a share of work grows, for the time that is left of it.
+
+    Attributes:
+        began: time and share of the first report since a stage began at 0, or the share fell or was 1; None before any.
+    """
+
+    def __init__(self) -> None:
+        self.began: tuple[float, float] | None = None
+        self._stage = ""
+        self._share = 0.0
+        self._at = 0.0
+
+    def add(self, now: float, stage: str, share: float) -> None:
+        """Take a report into account. Shares may be of a stage, or of all stages one after the other."""
+        begins = share < self._share or self._share >= 1.0 or (share == 0.0 and stage != self._stage)
+        if self.began is None or begins:
+            self.began = now, share
+        self._at, self._stage, self._share = now, stage, share
+
+    def left(self, now: float) -> float | None:
+        """Return the seconds left, by what was done since the first report; None where that says too little.
+
+        What the last report said may have gone on since: the time since then counts as spent.
+        """
+        if self.began is None:
+            return None
+        spent, done = self._at - self.began[0], self._share - self.began[1]
+        if spent < _FIRST or done < _LEAST or self._share >= 1.0:
+            return None
+        return max(0.0, spent * (1.0 - self._share) / done - (now - self._at))
+
+
+class _StageTimeProgress:
+    """Progress callback that logs each stage's beginning and duration, and calls another one."""
+
+    def __init__(self, shown: Progress) -> None:
+        self._shown = shown
+        self._stage: str | None = None
+        self._since = 0.0
+        _endings.append(self._end)
+
+    def __call__(self, stage: str, share: float) -> None:
+        if stage != self._stage:
+            self._end()
+            logger.debug("stage %s: begins", stage)
+            self._stage, self._since = stage, time.perf_counter()
+        self._shown(stage, share)
+
+    def _end(self) -> None:
+        if self._stage is not None:
+            logger.debug("stage %s: took %.2f s", self._stage, time.perf_counter() - self._since)
+        self._stage = None
+
+
+def _bar() -> Progress:
+    from tqdm import tqdm
+
+    class AboveTheBar(logging.StreamHandler):
+        """Takes the bar away while a message is written."""
+
+        def emit(self, record: logging.LogRecord) -> None:
+            with tqdm.external_write_mode(file=sys.stderr):
+                super().emit(record)
+
+    logger.handlers[:] = [AboveTheBar(sys.stderr)]
+    form = "{desc:<12} {bar:40} {n:3.0f} %  {elapsed}{postfix}"
+    bar = tqdm(total=100, bar_format=form, file=sys.stderr, leave=False)
+    rate, over = _Rate(), threading.Event()
+
+    def refresh() -> None:
+        while not over.wait(1.0):
+            bar.refresh()
+
+    def end() -> None:
+        over.set()
+        thread.join(2.0)
+        bar.close()
+
+    def show(stage: str, share: float) -> None:
+        if bar.desc != f"{stage}: ":
+            bar.reset()
+            bar.set_description(stage)
+        now = time.perf_counter()
+        rate.add(now, stage, share)
+        left = rate.left(now)
+        notes = ["" if left is None else f"about {duration(left)} left", getattr(stage, "detail", "")]
+        bar.set_postfix_str(", ".join(filter(None, notes)), refresh=False)
+        bar.update(100 * share - bar.n)
+
+    thread = _start_thread(refresh)
+    _endings.append(end)
+    return show

@@ -1,0 +1,174 @@
+"""Measure a scan by the cores that it may use, on a machine that needs no Blender: a table of docs/benchmark.md.
+
+    python studies/costs/cores.py save out/scene.pickle [--scenario NAME] [--set FIELD=VALUE ...]
+    python studies/costs/cores.py scan out/scene.pickle --cores 1 2 4 8 16
+
+The first command, in Blender, makes the scene and keeps it in a file; the second reads it wherever Embree, NumPy and
+laspy are, and scans it in a process of its own for each number of cores, with colours and layers of the materials.
+The file is a pickle: read none but your own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gzip
+import hashlib
+import json
+import pickle  # nosec B403 # one's own file, as the docstring says
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import Any, NamedTuple
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from synthroads_addon.base.machine import available_cores, cores_of_children
+from synthroads_addon.base.progress import StageTimer, peak_memory_mb
+from synthroads_addon.blender.casters.embree import EmbreeCaster
+from synthroads_addon.jobs.scan.plan import Site
+from synthroads_addon.materials.table import Material
+from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.scanning.colour.colour import LayerSource, surface_constants
+from synthroads_addon.scanning.colour.request import LayerRequest, material_layers
+from synthroads_addon.scanning.colour.transparency import Transparency
+from synthroads_addon.scanning.relief.normal_images import NormalImage
+from synthroads_addon.scanning.scene.caster import Caster
+from synthroads_addon.scanning.scene.mesh import SceneMesh
+from synthroads_addon.scanning.scene.motion import ScannedScene
+from synthroads_addon.scenario.inputs import ScenarioInputs
+from synthroads_addon.scenario.scenario import Scenario, load_scenario
+
+SETTINGS = ("colour.source=material", 'outputs=["cloud"]')
+
+
+class KeptScene(NamedTuple):
+    """A scene in a file, with what a scan asks of Blender besides.
+
+    Attributes:
+        scenario, road: as JSON data.
+        scene: what is scanned.
+        materials: mean properties by the scene's materials.
+    """
+
+    scenario: dict[str, Any]
+    road: dict[str, Any]
+    scene: ScannedScene
+    materials: dict[str, Material]
+
+
+class KeptServices:
+    """Services of a scan without Blender: Embree, and the means of the materials."""
+
+    def __init__(self, kept: KeptScene) -> None:
+        self._rows = kept.materials
+
+    def caster(self, name: str, mesh: SceneMesh, kernels: str) -> Caster:
+        """Return Embree's caster over a mesh, whatever its name."""
+        return EmbreeCaster(mesh)
+
+    def materials(self, names: Sequence[str]) -> list[Material]:
+        """Return the mean optical properties of materials by name."""
+        return [self._rows[name] for name in names]
+
+    def reflectance_varies(self, names: Sequence[str]) -> bool:
+        """Return that no layer varies: the means are all there is."""
+        return False
+
+    def normal_images(self, names: Sequence[str]) -> dict[int, NormalImage]:
+        """Return that no material has a normal image."""
+        return {}
+
+    def transparencies(self, names: Sequence[str]) -> dict[int, Transparency]:
+        """Return that no material is clear in places."""
+        return {}
+
+    def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> AbstractContextManager[LayerSource]:
+        """Return the context of the means as the points' layers."""
+        rows = self.materials(request.mesh.materials)
+        return nullcontext(material_layers(request, surface_constants(rows)))
+
+
+def save(path: Path, scenario: Scenario) -> None:
+    """Build a scenario's road in Blender and write its scene to a file."""
+    from synthroads_addon.blender.files import empty_file
+    from synthroads_addon.blender.materials import constants
+    from synthroads_addon.jobs.open_scene import RoadScene
+    from synthroads_addon.sampling.road import sample_road
+
+    empty_file()
+    parameters = sample_road(scenario.road, scenario.seed)
+    shown = RoadScene.of(scenario, RoadGeometry(parameters))
+    shown.build()
+    scene = shown.read()
+    kept = KeptScene(scenario.to_dict(), parameters.to_dict(), scene, constants(scene.static.materials))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with gzip.open(path, "wb", compresslevel=3) as file:
+        pickle.dump(tuple(kept), file)
+    print(f"{path}: {len(scene.static):,} triangles, {path.stat().st_size / 1e6:.1f} MB")
+
+
+def scan(path: Path) -> dict[str, Any]:
+    """Scan a kept scene with all cores that this process may use; return seconds, points and digest of the cloud."""
+    with gzip.open(path, "rb") as file:
+        kept = KeptScene(*pickle.load(file))  # nosec B301 # as above
+    scenario, timer = Scenario.from_dict(kept.scenario), StageTimer()
+    geometry = RoadGeometry(RoadParameters.from_dict(kept.road))
+    begin = time.perf_counter()
+    with tempfile.TemporaryDirectory() as folder:
+        site = Site.of_road(scenario, geometry, ScenarioInputs.read(scenario))
+        counts = site.scan(kept.scene, KeptServices(kept), Path(folder), timer)
+        seconds = time.perf_counter() - begin
+        cloud = hashlib.sha256((Path(folder) / "cloud.laz").read_bytes()).hexdigest()
+    return {
+        "cores": available_cores(),
+        "seconds": seconds,
+        "points": counts["points"],
+        "memory_mb": peak_memory_mb(),
+        "stages": timer.stages,
+        "sha256": cloud,
+    }
+
+
+def in_process(path: Path, cores: int) -> dict[str, Any]:
+    """Scan a kept scene in a new process that may use so many cores; return what `scan` does."""
+    with cores_of_children(cores):
+        done = subprocess.run([sys.executable, __file__, "scan", str(path)], check=True, capture_output=True, text=True)
+    result: dict[str, Any] = json.loads(done.stdout)
+    return result
+
+
+def main() -> None:
+    """Save a scene, or scan one and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=("save", "scan"))
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--scenario", default="rq31-600m")
+    parser.add_argument("--set", dest="changes", action="append", default=[], metavar="FIELD=VALUE")
+    parser.add_argument("--cores", nargs="+", type=int, default=[])
+    arguments = parser.parse_args()
+    if arguments.what == "save":
+        save(arguments.file, load_scenario(arguments.scenario, [*SETTINGS, *arguments.changes]))
+        return
+    if not arguments.cores:
+        print(json.dumps(scan(arguments.file)))
+        return
+    print("| cores | scan, s | million points/s | against one core | memory, MB | the same bytes |")
+    print("|---|---|---|---|---|---|")
+    runs: list[dict[str, Any]] = []
+    for cores in arguments.cores:
+        run = in_process(arguments.file, cores)
+        runs.append(run)
+        rate, gain = run["points"] / run["seconds"] / 1e6, runs[0]["seconds"] / run["seconds"]
+        same = "yes" if run["sha256"] == runs[0]["sha256"] else "NO"
+        cells = [f"{cores}", f"{run['seconds']:.1f}", f"{rate:.2f}", f"{gain:.2f}", f"{run['memory_mb']:,.0f}", same]
+        print(f"| {' | '.join(cells)} |", flush=True)
+    print(json.dumps(runs), file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

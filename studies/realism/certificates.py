@@ -1,0 +1,234 @@
+"""Certify recipes: how real their clouds are, as `synthroads compare` says, in one table and a file for each.
+
+    synthroads dataset centerline-airborne --splits test --set road.length=200 --output out/centerline-airborne
+    python studies/realism/certificates.py --real real.yaml --output docs/certificates out/centerline-airborne
+
+Each folder is a data set that `synthroads dataset` has made, named as its recipe. Every cloud of it is compared with
+all of the real ones. `docs/certificates/RECIPE.json` holds AUC, realism and statistics, `docs/certificates.md` the
+tables over all files in the folder, those of earlier runs included: recipes for other kinds of scanner are certified by
+other real clouds.
+
+    synthroads dataset sweeps --splits test --set 'cloud.attributes=["range"]' --output out/sweeps
+    python studies/realism/certificates.py --sweeps --real halves.yaml --output docs/certificates out/sweeps
+
+Single sweeps have too few points for patches. They are certified by the figures of `sweeps.py`, beside two or
+more real sweeps or parts of one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from studies.realism.sweeps import SweepFigures, named_figures, sweep_figures  # noqa: E402
+from synthroads_addon.base.errors import InputError  # noqa: E402
+from synthroads_addon.base.progress import exhaust  # noqa: E402
+from synthroads_addon.base.schema import canonical_json  # noqa: E402
+from synthroads_addon.comparison.clouds import find_clouds  # noqa: E402
+from synthroads_addon.comparison.job import CloudComparison, compare_steps  # noqa: E402
+from synthroads_addon.dataset.recipe import load_recipe  # noqa: E402
+
+_SHOWN = 3
+_SIDES = ("synthetic", "real")
+_RANGE = 1.5
+"""Statistics of a cloud count as real within this many times the range of the real clouds' ones, about its middle."""
+_BY_PATCHES, _BY_FIGURES = "Certificate", "SweepCertificate"
+WITHOUT = {
+    "centerline-mobile": "no real cloud of a road by a vehicle's line scanners or from a tripod was at hand",
+    "centerline-uav": "no real cloud of a road by a UAV was at hand",
+    "package-models": "several sensors in one set: real clouds of one kind say nothing of the whole",
+    "reference": "no real cloud of a road by a UAV was at hand",
+    "small-gantries": "no real cloud of a road by a UAV was at hand",
+    "small-roads": "no real cloud of a road by a UAV was at hand",
+    "standin": "stands in for real clouds where there are none: no sensor in particular is meant",
+}
+"""Shipped recipes without a certificate, and why they have none."""
+
+
+def certificate(recipe: str, result: CloudComparison, real: str) -> dict[str, Any]:
+    """Return a recipe's certificate as JSON data.
+
+    Args:
+        recipe: its name.
+        result: of all its clouds.
+        real: what the real clouds are, in words.
+    """
+    data = result.to_dict()
+    auc = {group: _spread([row["auc"][group] for row in data["synthetic"]]) for group in data["realism"]}
+    yardstick = {group: _spread([row["auc"][group] for row in data["real"]]) for group in data["realism"]}
+    return {
+        "type": _BY_PATCHES,
+        "recipe": recipe,
+        "title": load_recipe(recipe).title,
+        "real": real,
+        "clouds": len(data["synthetic"]),
+        "patches": sum(row["patches"] for row in data["synthetic"]),
+        "auc": auc,
+        "yardstick": yardstick,
+        "realism": data["realism"],
+        "giveaways": dict(list(data["giveaways"].items())[:_SHOWN]),
+        "statistics": _statistics(data),
+    }
+
+
+def _spread(values: list[float]) -> list[float]:
+    """Return the least, the mean and the largest of some values."""
+    return [round(float(value), 3) for value in (min(values), np.mean(values), max(values))]
+
+
+def _statistics(data: dict[str, Any]) -> dict[str, Any]:
+    """Return each statistic's medians, real and synthetic, and how many clouds lie within the real ones' range."""
+    names = data["synthetic"][0]["medians"]
+    return {name: _beside(*([row["medians"][name] for row in data[side]] for side in _SIDES)) for name in names}
+
+
+def _beside(ours: list[float], theirs: list[float]) -> dict[str, Any]:
+    """Return the spread of synthetic and real clouds' values, and how many of the first are within the real range."""
+    middle, half = (max(theirs) + min(theirs)) / 2.0, _RANGE * (max(theirs) - min(theirs)) / 2.0
+    inside = sum(abs(value - middle) <= half for value in ours)
+    return {"synthetic": _spread(ours), "real": _spread(theirs), "within": inside}
+
+
+def sweep_certificate(
+    recipe: str, synthetic: list[SweepFigures], real: list[SweepFigures], words: str
+) -> dict[str, Any]:
+    """Return the certificate of a recipe of single sweeps as JSON data: figures that all of its and all real ones have.
+
+    Args:
+        recipe: its name.
+        synthetic: figures of its sweeps.
+        real: those of two or more real ones, or parts of one.
+        words: what these are.
+
+    Raises:
+        InputError: there is but one real one, which has no range.
+    """
+    if len(real) < 2:
+        raise InputError("--real", len(real), "must be two real sweeps or parts of one, or more: one has no range")
+    ours, theirs = ([named_figures(one) for one in side] for side in (synthetic, real))
+    names = [name for name in ours[0] if np.isfinite([row[name] for row in [*ours, *theirs]]).all()]
+    figures = {name: _beside([row[name] for row in ours], [row[name] for row in theirs]) for name in names}
+    return {
+        "type": _BY_FIGURES,
+        "recipe": recipe,
+        "title": load_recipe(recipe).title,
+        "real": words,
+        "clouds": len(ours),
+        "statistics": figures,
+    }
+
+
+def pages(rows: list[dict[str, Any]], folder: str) -> str:
+    """Return certificates of both kinds, and why other recipes have none, as a Markdown page beside their folder."""
+    by_patches, by_figures = ([row for row in rows if row["type"] == kind] for kind in (_BY_PATCHES, _BY_FIGURES))
+    text = table(by_patches, folder)
+    if by_figures:
+        text += sweep_table(by_figures, folder)
+    certified = {row["recipe"] for row in rows}
+    without = {name: reason for name, reason in WITHOUT.items() if name not in certified}
+    lines = ["", "## Without a certificate", "", *(f"- `{name}`: {reason}." for name, reason in without.items())]
+    return text + "\n".join([*lines, ""])
+
+
+def sweep_table(rows: list[dict[str, Any]], folder: str) -> str:
+    """Return certificates of single sweeps as a section in Markdown."""
+    lines = [
+        "",
+        "## Single sweeps",
+        "",
+        "A sweep has too few points for patches, and one real sweep alone gives no yardstick. So its front and its",
+        "back, parted by azimuths with gaps of 20 deg, stand for two. Figures are those of",
+        "[the table of sweeps](devices.md#a-heads-sweeps-beside-a-real-one) that all have; within range is what lies",
+        f"within {_RANGE:g} times the range of the two, about its middle. Where both halves have nearly the same",
+        "value, hardly any sweep is. Made by",
+        "",
+        "    python studies/realism/certificates.py --sweeps --real HALVES --output docs/certificates DATASET ...",
+        "",
+        "| recipe | sweeps | figures within range | never within range | against |",
+        "|---|--:|--:|---|---|",
+    ]
+    for row in rows:
+        total = row["clouds"] * len(row["statistics"])
+        within = sum(one["within"] for one in row["statistics"].values())
+        never = "; ".join(
+            f"{name}: {one['synthetic'][1]:g} (real {one['real'][0]:g} to {one['real'][2]:g})"
+            for name, one in row["statistics"].items()
+            if not one["within"]
+        )
+        name = f"[`{row['recipe']}`]({folder}/{row['recipe']}.json)"
+        lines.append(f"| {name} | {row['clouds']} | {within} of {total} | {never} | {row['real']} |")
+    return "\n".join([*lines, ""])
+
+
+def table(rows: list[dict[str, Any]], folder: str) -> str:
+    """Return certificates as a Markdown page beside the folder that their files are in."""
+    groups = list(rows[0]["realism"])
+    lines = [
+        "# How real are the recipes' clouds?",
+        "",
+        "AUC of telling each cloud from real ones (mean of all clouds), and in brackets realism: 1 - AUC over that of",
+        "the real clouds among each other ([how it is measured](compare.md)). Statistics are within range where a",
+        f"cloud's median lies within {_RANGE:g} times the range of the real clouds' medians. Clouds are the recipes'",
+        "test scenes on 200 m of road, of the even one that of [compare.md](compare.md#what-it-says-of-ours). Made by",
+        "",
+        "    python studies/realism/certificates.py --real LIST --output docs/certificates DATASET ...",
+        "",
+        f"| recipe | clouds | {' | '.join(groups)} | statistics within range | tells most | against |",
+        "|---|--:|" + "--:|" * len(groups) + "--:|---|---|",
+    ]
+    for row in rows:
+        cells = [f"{row['auc'][group][1]:.2f} ({row['realism'][group]:.2f})" for group in groups]
+        total = row["clouds"] * len(row["statistics"])
+        within = sum(one["within"] for one in row["statistics"].values())
+        told = ", ".join(f"{name} {told:.2f}" for name, (told, _) in row["giveaways"].items())
+        name = f"[`{row['recipe']}`]({folder}/{row['recipe']}.json)"
+        lines.append(
+            f"| {name} | {row['clouds']} | {' | '.join(cells)} | {within} of {total} | {told} | {row['real']} |"
+        )
+    return "\n".join([*lines, ""])
+
+
+def certify(folder: Path, real: Path, words: str, sweeps: bool = False) -> dict[str, Any]:
+    """Compare the clouds of a data set, or its single sweeps, with real ones; return its certificate.
+
+    Raises:
+        InputError: it holds no cloud, see also `compare_steps`.
+    """
+    clouds = folder / "scenes"
+    if not clouds.is_dir():
+        raise InputError(str(folder), None, "must be a data set that synthroads dataset has made")
+    if sweeps:
+        ours, theirs = ([sweep_figures(*found) for found in find_clouds(path)] for path in (clouds, real))
+        return sweep_certificate(folder.name, ours, theirs, words)
+    result = exhaust(compare_steps(clouds, real), lambda share: None)
+    return certificate(folder.name, result, words)
+
+
+def main() -> None:
+    """Certify the command line's data sets: write a file for each, and the table of all files in the folder."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("datasets", type=Path, nargs="+", metavar="DATASET")
+    parser.add_argument("--real", type=Path, required=True, metavar="LIST", help="real clouds, see docs/compare.md")
+    parser.add_argument("--words", default="real clouds", metavar="TEXT", help="what the real clouds are")
+    parser.add_argument("--sweeps", action="store_true", help="by the figures of single sweeps")
+    parser.add_argument("--output", type=Path, required=True, metavar="DIR", help="folder of certificates")
+    arguments = parser.parse_args()
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    for folder in arguments.datasets:
+        data = certify(folder, arguments.real, arguments.words, arguments.sweeps)
+        (arguments.output / f"{folder.name}.json").write_text(canonical_json(data), encoding="utf-8")
+        print(folder.name, json.dumps(data.get("realism", data["statistics"])), flush=True)
+    rows = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(arguments.output.glob("*.json"))]
+    arguments.output.with_suffix(".md").write_text(pages(rows, arguments.output.name), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,285 @@
+"""Figures of single sweeps of a rotating head, synthetic beside real: points, numbers, noise, what a threshold tells.
+
+    synthroads dataset sweeps --splits test --set 'cloud.attributes=["range"]' --output out/sweeps
+    python studies/realism/sweeps.py out/sweeps/scenes --real sweeps.yaml
+
+Both are a cloud, a folder or a list of clouds as `synthroads compare` takes them (docs/compare.md); ranges must be in
+the file, or the list says where all was seen from. For each cloud the Markdown table has
+
+- the road's points to the square metre of road in rings of range, and the median of their numbers in dB over the first
+  real cloud's;
+- the median number of markings, and of vegetation, over the road's;
+- the noise of the numbers: by how much the logarithms of neighbours closer than `CLOSE` differ on average;
+- the share of the road's numbers that are 0;
+- the thickness of the road: the root of the least eigenvalue of `NEAREST` neighbours' covariance, median, mm;
+- the best balanced accuracy with which one threshold on the number parts road from marking, and from vegetation.
+
+With ``--limits`` each figure is held against the real one's, and the exit code is 3 if one is beyond its limit.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from synthroads_addon.base.arrays import Float  # noqa: E402
+from synthroads_addon.base.errors import InputError  # noqa: E402
+from synthroads_addon.cloud.selection.classes import RealClass, class_by_label, read_real_cloud  # noqa: E402
+from synthroads_addon.comparison.clouds import (  # noqa: E402
+    CLASSES,
+    ROAD,
+    ListedCloud,
+    between_azimuths,
+    find_clouds,
+    name_of,
+)
+
+RINGS = (4.0, 6.0, 10.0, 15.0, 20.0, 30.0, 50.0)
+"""Edges of the rings of range, m."""
+NEAR = (6.0, 20.0)
+"""Ranges within which noise and thickness are measured, m; nearer ones the car hides in part."""
+CLOSE = 0.15
+"""Neighbours are closer than this, m."""
+NEAREST = 20
+"""Points whose covariance gives the thickness."""
+_SECTORS, _LENGTHENS = 180, 1.2
+"""Sectors of the azimuth, and factor of the range, within which a point stands for all of the road that is there."""
+_FEWEST = 30
+_LEVELS = 512
+
+LIMITS: dict[str, tuple[float, float]] = {
+    "marking over road": (1.2, 2.0),
+    "vegetation over road": (0.8, 1.6),
+    "noise": (0.15, 0.35),
+    "zeros": (0.03, 0.15),
+}
+"""Least and largest value that these figures of a synthetic sweep may have."""
+_DENSITY_FACTORS = {20.0: 1.5, 50.0: 2.0}
+"""Up to a range, m, densities differ from the real ones by this factor at most."""
+_DECIBELS, _ACCURACY = 3.0, 0.05
+"""How far median numbers (dB), and accuracies of a threshold, may lie from, and above, the real ones."""
+
+
+@dataclass(frozen=True)
+class SweepFigures:
+    """Figures of one sweep; NaN where it has too few points.
+
+    Attributes:
+        name: of the file.
+        density: (R,) road points to the square metre of road in each ring.
+        level: (R,) median of the road's numbers there, dB.
+        values: all other figures by name, in the order of the table.
+    """
+
+    name: str
+    density: Float
+    level: Float
+    values: dict[str, float]
+
+
+def sweep_figures(path: Path, row: ListedCloud) -> SweepFigures:
+    """Return the figures of a cloud.
+
+    Raises:
+        InputError: it can't be read, has too little road, or nobody says from where it was seen.
+    """
+    cloud = between_azimuths(read_real_cloud(path, row.class_field), row)
+    found: dict[str, RealClass] = {}
+    for name in CLASSES:
+        code = getattr(row, name)
+        try:
+            if code is not None:
+                found[name] = class_by_label(cloud, code, f"{path.name}: {name}")
+        except InputError:
+            if name == ROAD:
+                raise
+    ranges = {name: _ranges(points, row, path.name) for name, points in found.items()}
+    road, distance = found[ROAD], ranges[ROAD]
+    rings = [(distance >= low) & (distance < high) for low, high in pairwise(RINGS)]
+    enough = [int(ring.sum()) >= _FEWEST for ring in rings]
+    # Lost numbers are points all the same, alike many at all ranges.
+    share = len(road.intensity) / (len(road.intensity) + road.zeros)
+    azimuth = _azimuth(road, row)
+    density = [
+        _density(distance[ring], azimuth[ring], low, high) / share if some else np.nan
+        for ring, some, (low, high) in zip(rings, enough, pairwise(RINGS), strict=True)
+    ]
+    level = [
+        10.0 * np.log10(np.median(road.intensity[ring])) if some else np.nan
+        for ring, some in zip(rings, enough, strict=True)
+    ]
+    numbers = {name: points.intensity for name, points in found.items()}
+    values: dict[str, float] = {}
+    for name in CLASSES[1:]:
+        values[f"{name} over road"] = _ratio(numbers.get(name), numbers[ROAD])
+    near = (distance >= NEAR[0]) & (distance < NEAR[1])
+    place = road.place[near]
+    values["noise"] = number_noise(place, road.intensity[near])
+    values["zeros"] = 1.0 - share
+    values["thickness, mm"] = 1e3 * thickness(place)
+    for name in CLASSES[1:]:
+        values[f"threshold: road or {name}"] = best_accuracy(numbers[ROAD], numbers.get(name))
+    return SweepFigures(
+        path.parent.name if path.stem == "cloud" else name_of(path, row), np.array(density), np.array(level), values
+    )
+
+
+def _ranges(points: RealClass, row: ListedCloud, file: str) -> Float:
+    """Return the ranges (N,) of a class's points, m."""
+    if row.scanner is not None:
+        return np.asarray(np.linalg.norm(points.place - np.asarray(row.scanner), axis=1))
+    if not np.isfinite(points.distance).all():
+        raise InputError(file, None, 'has no ranges: give cloud.attributes=["range"] to the scan, or a list a scanner')
+    return points.distance
+
+
+def _azimuth(road: RealClass, row: ListedCloud) -> Float:
+    """Return the azimuth (N,) of points about the scanner, rad: about the one place that the ranges agree with."""
+    middle = np.asarray(row.scanner) if row.scanner is not None else scanner_place(road.place, road.distance)
+    away = road.place - middle
+    return np.asarray(np.arctan2(away[:, 1], away[:, 0]))
+
+
+def scanner_place(place: Float, distance: Float) -> Float:
+    """Return the place (3,) whose distances from points (N, 3) are nearest to (N,), above most of them (least squares).
+
+    Spheres about the points meet in a line of equations: |p|^2 - d^2 = 2 p . c - |c|^2. Of the two mirror images on
+    either side of a level road the upper one is taken.
+    """
+    origin = place.mean(axis=0)
+    local = place - origin
+    plane = np.linalg.svd(local[:: max(len(local) // 5000, 1)], full_matrices=False)[2]
+    plane[2] *= np.sign(plane[2, 2]) or 1.0
+    flat = local @ plane[:2].T
+    terms = np.column_stack([2.0 * flat, -np.ones(len(flat))])
+    found = np.linalg.lstsq(terms, (local**2).sum(axis=1) - distance**2, rcond=None)[0]
+    height = np.sqrt(max(found[2] - found[:2] @ found[:2], 0.0))
+    return np.asarray(origin + found[:2] @ plane[:2] + height * plane[2])
+
+
+def _density(distance: Float, azimuth: Float, low: float, high: float) -> float:
+    """Return points to the square metre of the cells, by range and azimuth, that hold any.
+
+    Cells are as long as lasers' rings on the road lie apart there: with the range by equal factors.
+    """
+    parts = int(np.ceil(np.log(high / low) / np.log(_LENGTHENS)))
+    edges = np.geomspace(low, high, parts + 1)
+    part = np.clip(np.searchsorted(edges, distance, side="right") - 1, 0, parts - 1)
+    sector = np.floor((azimuth / (2.0 * np.pi) + 0.5) * _SECTORS).astype(np.int64) % _SECTORS
+    cells = np.unique(part * _SECTORS + sector) // _SECTORS
+    area = np.pi / _SECTORS * (edges[cells + 1] ** 2 - edges[cells] ** 2)
+    return len(distance) / float(area.sum())
+
+
+def _ratio(of: Float | None, to: Float) -> float:
+    """Return the ratio of the medians of two classes' numbers; NaN of too few."""
+    few = of is None or len(of) < _FEWEST or len(to) < _FEWEST
+    return float("nan") if few or of is None else float(np.median(of) / np.median(to))
+
+
+def number_noise(place: Float, number: Float) -> float:
+    """Return by how much the logarithms of numbers (N,) of neighbours closer than `CLOSE` differ on average."""
+    distance, nearest = cKDTree(place).query(place, k=2)
+    close = distance[:, 1] < CLOSE
+    apart = np.abs(np.log(number[close] / number[nearest[close, 1]]))
+    return float(apart.mean()) if len(apart) >= _FEWEST else float("nan")
+
+
+def thickness(place: Float) -> float:
+    """Return the median root of the least eigenvalue of the covariance of `NEAREST` neighbours of points (N, 3), m."""
+    if len(place) < NEAREST:
+        return float("nan")
+    around = cKDTree(place).query(place, k=NEAREST)[1]
+    groups = place[around] - place[around].mean(axis=1, keepdims=True)
+    covariance = np.einsum("nki,nkj->nij", groups, groups) / NEAREST
+    return float(np.median(np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[:, 0], 0.0))))
+
+
+def best_accuracy(one: Float, other: Float | None) -> float:
+    """Return the best balanced accuracy with which a threshold parts numbers (N,) from (M,), whichever way."""
+    if other is None or len(other) < _FEWEST or len(one) < _FEWEST:
+        return float("nan")
+    levels = np.quantile(np.concatenate([one, other]), np.linspace(0.0, 1.0, _LEVELS))
+    below = [np.searchsorted(np.sort(values), levels, side="right") / len(values) for values in (one, other)]
+    return float(0.5 + 0.5 * np.abs(below[0] - below[1]).max())
+
+
+def named_figures(figures: SweepFigures) -> dict[str, float]:
+    """Return figures of a sweep by name; NaN where it has too few points.
+
+    Densities are those from `NEAR` on: nearer the car hides the road in part.
+    """
+    result = {}
+    for (low, high), density, level in zip(pairwise(RINGS), figures.density, figures.level, strict=True):
+        ring = f"{low:g} to {high:g} m"
+        if low >= NEAR[0]:
+            result[f"road points/m², {ring}"] = float(density)
+        result[f"median road number, {ring}, dB"] = float(level)
+    return result | figures.values
+
+
+def misses(figures: SweepFigures, real: SweepFigures) -> list[str]:
+    """Return what of a synthetic sweep's figures is beyond its limit, in words."""
+    found = []
+    for (low, high), ours, theirs in zip(pairwise(RINGS), figures.density, real.density, strict=True):
+        factor = next(value for reach, value in _DENSITY_FACTORS.items() if high <= reach)
+        if low >= NEAR[0] and np.isfinite(theirs) and not 1.0 / factor <= ours / theirs <= factor:
+            found.append(f"density at {low:g} to {high:g} m: {ours:.3g} against {theirs:.3g}")
+    for low, ours, theirs in zip(RINGS, figures.level, real.level, strict=False):
+        if np.isfinite(theirs) and not abs(ours - theirs) <= _DECIBELS:
+            found.append(f"median from {low:g} m on: {ours - theirs:+.1f} dB")
+    for name, (low, high) in LIMITS.items():
+        value = figures.values[name]
+        if np.isfinite(value) and not low <= value <= high:
+            found.append(f"{name}: {value:.3g}, {low:g} to {high:g} allowed")
+    for name, value in figures.values.items():
+        theirs = real.values[name]
+        if name.startswith("threshold") and value > theirs + _ACCURACY:
+            found.append(f"{name}: {value:.2f} against {theirs:.2f}")
+    return found
+
+
+def table(rows: list[SweepFigures], real: SweepFigures) -> str:
+    """Return a Markdown table of figures, a column for each cloud."""
+    lines = [f"| | {' | '.join(row.name for row in rows)} |", "|---|" + "--:|" * len(rows)]
+    for number, (low, high) in enumerate(pairwise(RINGS)):
+        cells = [_cell(row.density[number]) for row in rows]
+        lines.append(f"| road points/m², {low:g} to {high:g} m | {' | '.join(cells)} |")
+    for number, (low, high) in enumerate(pairwise(RINGS)):
+        cells = [_cell(row.level[number] - real.level[number], "+.1f") for row in rows]
+        lines.append(f"| median road number, {low:g} to {high:g} m, dB | {' | '.join(cells)} |")
+    lines += [f"| {name} | {' | '.join(_cell(row.values[name]) for row in rows)} |" for name in rows[0].values]
+    return "\n".join(lines)
+
+
+def _cell(value: float, form: str = ".3g") -> str:
+    return format(value, form) if np.isfinite(value) else "–"
+
+
+def main() -> int:
+    """Print the table of the command line's clouds, and what is beyond its limits; return the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("synthetic", type=Path, help="cloud, folder or list")
+    parser.add_argument("--real", type=Path, required=True, metavar="LIST", help="real sweeps, see docs/compare.md")
+    parser.add_argument("--limits", action="store_true", help="exit with 3 if a figure is beyond its limit")
+    arguments = parser.parse_args()
+    real, synthetic = (
+        [sweep_figures(*found) for found in find_clouds(path)] for path in (arguments.real, arguments.synthetic)
+    )
+    print(table([*real, *synthetic], real[0]))
+    beyond = [f"{row.name}: {miss}" for row in synthetic for miss in misses(row, real[0])]
+    print("\n".join(beyond) or "all within limits", file=sys.stderr)
+    return 3 if beyond and arguments.limits else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

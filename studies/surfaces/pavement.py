@@ -1,0 +1,95 @@
+"""Print the table of docs/pavement.md: how a pavement looks to an airborne scan, by offset.
+
+python studies/surfaces/pavement.py --seeds 5 6 7
+python studies/surfaces/pavement.py --seeds 5 6 --rays 7
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+
+from synthroads_addon import load_scenario
+from synthroads_addon.base.arrays import Float
+from synthroads_addon.base.classes import class_id
+from synthroads_addon.cloud.points import concatenate
+from synthroads_addon.jobs.open_scene import RoadScene
+from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scanning.record import CollectedBlocks, record
+
+_STEP = 0.25
+"""Width of a bin of offsets, m."""
+_SETTINGS = (
+    "road.length=200",
+    "road.half_width=20",
+    "road.pavement.concrete=0",
+    'road.pavement.asphalts=["asphalt"]',
+    "road.pavement.renewed=0",
+    "road.markings.removed=0",
+    'road.environment.wetness={"minimum": 0, "maximum": 0}',
+    "road.trees_per_hectare=0",
+    "road.shrubs_per_hectare=0",
+    "road.grass_density=0",
+    "scan.noise.range_sigma=0",
+    'cloud.attributes=["noise_free"]',
+    "cloud.intensity=range_corrected",
+)
+
+
+def row(seed: int, rays: int) -> str:
+    """Return a line of the table, of a road that is built in the open file and scanned."""
+    scenario = load_scenario("airborne-1000m", [*_SETTINGS, f"seed={seed}", f"scan.rays_per_pulse={rays}"])
+    parameters = sample_road(scenario.road, seed)
+    geometry = RoadGeometry(parameters)
+    scene, blocks = RoadScene.of(scenario, geometry), CollectedBlocks()
+    scene.build()
+    record(scene.plan(), blocks)
+    points = concatenate([block.points for block in blocks.results])
+    local = points.xyz - parameters.transform.translate
+    station, offset = geometry.alignment.project(local[:, :2])
+    height, level = local[:, 2] - geometry.elevation(station, offset), 10.0 * np.log10(points.intensity)
+    road, paint = (points.class_id == class_id(name) for name in ("road", "road_marking"))
+    spread, reach, waves = [], [], []
+    for side in ("left", "right"):
+        section = geometry.sections[side]
+        distance, edges = section.carriageway.sign * offset, section.distances(100.0)[0, [0, -2]]
+        on = road & (station > 2.0) & (station < 198.0)
+        profile = _medians(distance[on], level[on], *edges)
+        spread.append(f"{np.nanstd(profile):.2f}")
+        reach.append(f"{np.nanmax(profile) - np.nanmin(profile):.1f}")
+        lanes = section.lane_boundaries(100.0)[0]
+        profile = 1e3 * _medians(distance[on], height[on], lanes.min(), lanes.max())
+        there = np.flatnonzero(~np.isnan(profile))
+        line = np.polyval(np.polyfit(there, profile[there], 1), there)
+        waves.append(f"{(profile[there] - line).std():.2f}")
+    over = np.median(level[paint]) - np.median(level[road])
+    cells = [
+        str(seed),
+        *(" / ".join(both) for both in (spread, reach, waves)),
+        f"{over:.1f}",
+        f"{level[paint].std():.2f}",
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def _medians(distance: Float, values: Float, low: float, high: float) -> Float:
+    """Return the medians of values by bins of distances between two; NaN where there are none."""
+    number = np.floor((distance - low) / _STEP)
+    bins = [values[number == place] for place in range(int((high - low) / _STEP + 1e-9))]
+    return np.array([np.median(values) if len(values) else np.nan for values in bins])
+
+
+def main() -> None:
+    """Print a line for each seed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[5, 6, 7])
+    parser.add_argument("--rays", type=int, default=1, help="rays per pulse")
+    given = parser.parse_args()
+    for seed in given.seeds:
+        print(row(seed, given.rays), flush=True)
+
+
+if __name__ == "__main__":
+    main()
