@@ -1,4 +1,4 @@
-"""Measure each stage of the demo job, and scans of meshes, beside what others' code alone takes, in the same run."""
+"""Measure each stage of the demo job, and scans of meshes, and compare with third-party code alone in the same run."""
 
 import argparse
 import json
@@ -53,19 +53,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads benchmark` to its parser."""
     cores = sorted({1, min(2, available_cores())})
     parser.add_argument("--output", type=Path, metavar="DIR", help=f"folder for {' and '.join(_FILES)}")
-    parser.add_argument("--document", type=Path, metavar="FILE", help="fill the tables of this Markdown file as well")
-    text = "numbers of cores (1, and 2 where there are so many)"
+    parser.add_argument("--document", type=Path, metavar="FILE", help="also fill the tables of this Markdown file")
+    text = "numbers of cores to measure with (1, and 2 where available)"
     parser.add_argument("--cores", nargs="+", type=int, default=cores, metavar="N", help=text)
-    text = f"any of {', '.join(PARTS)} (all; start, the first scan of a new process, needs {_BESIDE})"
+    text = f"parts to measure: {', '.join(PARTS)} (all; start, a new process's first scan, needs {_BESIDE})"
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=text)
-    text = "folder of another version, a checkout or where it is installed, whose scans are measured in turn with these"
+    text = "folder of another version (checkout or installation), whose scans are measured alternately with this one's"
     parser.add_argument(_BESIDE, type=Path, metavar="FOLDER", help=text)
     text = "scene to measure on (%(default)s)"
     parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help=text)
     add_changes_argument(parser)
-    parser.add_argument("--quick", action="store_true", help="a small scene: to see that all works, in seconds")
+    parser.add_argument("--quick", action="store_true", help="use a small scene, to check that everything works")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
-    text = "keep what the folder holds already of other parts and numbers of cores, measured on this machine"
+    text = "keep results of other parts and numbers of cores that this machine has already written to the folder"
     parser.add_argument("--resume", action="store_true", help=text)
     parser.add_argument(_PART, metavar="JSON", help=argparse.SUPPRESS)
 

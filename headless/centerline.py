@@ -1,4 +1,4 @@
-"""Find a road's centreline in a cloud by several views of it, with its deviations and where it isn't to be trusted."""
+"""Find the centreline of a road in a cloud by several methods, its standard deviations, and where it is doubtful."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads centerline` to its parser."""
     parser.add_argument("cloud", type=Path, metavar="CLOUD", help="cloud to read (.laz, .las, .ply, .e57, .npz)")
-    text = "centreline (.geojson); a report (.json) is written beside it (beside the cloud: of cloud.laz "
+    text = "centreline (.geojson); a report (.json) is written beside it (beside the cloud: "
     text += "cloud.laz-centerline.geojson)"
     parser.add_argument("--output", type=Path, metavar="FILE", help=text)
     parser.set_defaults(writes=True)
-    text = "kind of road, where it is known (auto: found out)"
+    text = "kind of road, if known (auto: found in the cloud)"
     parser.add_argument("--road", choices=("auto", "dual", "single"), default="auto", help=text)
-    text = "course of the road, roughly: CSV or GeoJSON in the cloud's coordinates (found in the cloud)"
+    text = "approximate course of the road: CSV or GeoJSON in the cloud's coordinates (found in the cloud)"
     parser.add_argument("--path", type=Path, metavar="FILE", help=text)
-    text = "folder of a trained centreline model, or a shipped one's name (`synthroads list models`): one more view of "
-    text += "the axis; none: only those that learn nothing (the shipped model trained on what is most like the cloud)"
+    text = "folder or name (`synthroads list models`) of a trained centreline model that estimates the axis as well; "
+    text += "none: use no trained model (the shipped model whose training data are most like the cloud)"
     parser.add_argument("--run", metavar="DIR_OR_NAME", help=text)
-    text = "known axis (CSV, GeoJSON) to compare with afterwards; it changes nothing"
+    text = "true axis (CSV, GeoJSON) to compare the result with; it does not influence the result"
     parser.add_argument("--truth", type=Path, metavar="FILE", help=text)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
 

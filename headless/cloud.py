@@ -28,27 +28,27 @@ _COLUMNS = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads cloud` and its tools to the parser."""
     tools = parser.add_subparsers(dest="tool", required=True, metavar="TOOL")
-    _info_arguments(tools.add_parser("info", help="figures of all points and of each class"))
+    _info_arguments(tools.add_parser("info", help="print figures of all points and of each class"))
     thin = tools.add_parser("subsample", help="keep one point per cell of a grid")
     _file_arguments(thin)
     thin.add_argument("--grid", type=float, default=0.04, metavar="M", help="edge of a cell, m (0.04)")
-    mapping = tools.add_parser("map-intensity", help="map intensities on the distribution of another cloud")
+    mapping = tools.add_parser("map-intensity", help="map intensities to the distribution of another cloud")
     _file_arguments(mapping)
-    mapping.add_argument("--target", required=True, type=Path, metavar="FILE", help="cloud with the wanted intensities")
-    mapping.add_argument("--per-class", action="store_true", help="each class on the target's class of that name")
-    change = tools.add_parser("convert", help="write another format, or merged classes")
+    mapping.add_argument("--target", required=True, type=Path, metavar="FILE", help="cloud with the distribution")
+    mapping.add_argument("--per-class", action="store_true", help="map each class to the target's of the same name")
+    change = tools.add_parser("convert", help="write another format, or merge classes")
     _file_arguments(change)
-    _preview_arguments(tools.add_parser("preview", help="draw from above and a cross-section"))
+    _preview_arguments(tools.add_parser("preview", help="draw the cloud from above and in cross-section"))
     together = tools.add_parser("merge", help="put several clouds into one")
     together.add_argument("files", type=Path, nargs="+", metavar="FILE", help="clouds, in the order of their points")
     together.add_argument("--output", required=True, type=Path, metavar="FILE", help="file to write")
-    part = tools.add_parser("crop", help="keep what lies within a box, heights or a polygon")
+    part = tools.add_parser("crop", help="keep the points within a box, heights or a polygon")
     _file_arguments(part)
     _crop_arguments(part)
-    tiles = tools.add_parser("tile", help="cut into square tiles, thinned out if wanted")
+    tiles = tools.add_parser("tile", help="cut into square tiles, thinned out on request")
     _tile_arguments(tiles)
     for tool in (thin, change):
-        tool.add_argument("--classes", metavar="NAME_OR_FILE", help="5, or a .json file of classes (the cloud's own)")
+        tool.add_argument("--classes", metavar="NAME_OR_FILE", help="5, or a .json file of classes (as in the cloud)")
     for tool in (thin, mapping, change, together, part, tiles):
         tool.add_argument("--overwrite", action="store_true", help="replace a file that is already there")
 
@@ -104,14 +104,15 @@ def _predicted_lines(figures: dict[str, Any]) -> list[str]:
 
 def _file_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
-    parser.add_argument("--output", required=True, type=Path, metavar="FILE", help="file to write; its ending decides")
+    text = "file to write; its ending gives the format"
+    parser.add_argument("--output", required=True, type=Path, metavar="FILE", help=text)
 
 
 def _info_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
-    text = "of roughness's neighbourhood, m (0.5)"
+    text = "radius of the neighbourhood for the roughness, m (0.5)"
     parser.add_argument("--radius", type=_positive, default=0.5, metavar="M", help=text)
-    text = "points per class for the roughness (5000; 0: none)"
+    text = "points per class that the roughness is computed from (5000; 0: no roughness)"
     count = whole_number(10_000_000, "10 million")
     parser.add_argument("--samples", type=count, default=5000, metavar="N", help=text)
 
@@ -121,31 +122,31 @@ def _preview_arguments(parser: argparse.ArgumentParser) -> None:
     text = "folder for the pictures; with --picture a .png file"
     parser.add_argument("--output", required=True, type=Path, metavar="DIR_OR_FILE", help=text)
     kinds = ("class", "predicted", "intensity", "rgb", "section")
-    text = f"draw only this one: {', '.join(kinds)} (all that the cloud has)"
+    text = f"draw only this picture: {', '.join(kinds)} (all that the cloud has)"
     parser.add_argument("--picture", choices=kinds, metavar="KIND", help=text)
-    parser.add_argument("--station", type=float, metavar="M", help="where to cut, m along the line (the middle)")
-    parser.add_argument("--centerline", type=Path, metavar="FILE", help="GeoJSON line of the stations (the long axis)")
-    parser.add_argument("--line", type=float, nargs=4, metavar=("X1", "Y1", "X2", "Y2"), help="cut along this line")
-    parser.add_argument("--depth", type=_positive, default=1.0, metavar="M", help="thickness of the cut, m (1)")
+    parser.add_argument("--station", type=float, metavar="M", help="of the cross-section, m (the middle)")
+    parser.add_argument("--centerline", type=Path, metavar="FILE", help="GeoJSON line of stations (the long axis)")
+    parser.add_argument("--line", type=float, nargs=4, metavar=("X1", "Y1", "X2", "Y2"), help="line of the section")
+    parser.add_argument("--depth", type=_positive, default=1.0, metavar="M", help="depth of the cross-section, m (1)")
     parser.add_argument("--overwrite", action="store_true", help="replace pictures that are already there")
 
 
 def _crop_arguments(parser: argparse.ArgumentParser) -> None:
     names = ("X1", "Y1", "X2", "Y2")
-    parser.add_argument("--box", type=float, nargs=4, metavar=names, help="least x and y, then largest, map")
-    parser.add_argument("--heights", type=float, nargs=2, metavar=("LOW", "HIGH"), help="least and largest z")
-    parser.add_argument("--polygon", type=Path, metavar="FILE", help="GeoJSON polygons in the map's coordinates")
+    parser.add_argument("--box", type=float, nargs=4, metavar=names, help="smallest x and y, then largest, m")
+    parser.add_argument("--heights", type=float, nargs=2, metavar=("LOW", "HIGH"), help="smallest and largest z, m")
+    parser.add_argument("--polygon", type=Path, metavar="FILE", help="GeoJSON polygons in map coordinates")
 
 
 def _tile_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the tiles")
     parser.add_argument("--size", type=float, default=60.0, metavar="M", help="edge of a tile, m (60)")
-    text = "keep one point per cell of this edge, m, e.g. 0.04 (all points)"
+    text = "keep one point per cell with this edge, m, e.g. 0.04 (all points)"
     parser.add_argument("--grid", type=float, metavar="M", help=text)
     count = whole_number(10**9, "a thousand million")
     parser.add_argument("--fewest", type=count, default=1, metavar="N", help="leave out tiles with fewer points (1)")
-    text = "laz, las, ply, e57, npz (the cloud's own)"
+    text = "laz, las, ply, e57, npz (the cloud's format)"
     parser.add_argument("--format", choices=("laz", "las", "ply", "e57", "npz"), metavar="KIND", help=text)
 
 

@@ -214,7 +214,7 @@ def add_allow_large_argument(parser: argparse.ArgumentParser) -> None:
     """Add the flag ``--allow-large``, which lifts the scenario's limit ``scan.most_pulses``."""
     from synthroads_addon.scenario.scan import MOST_POSSIBLE
 
-    text = "do a scan of any size: without it one of more pulses than scan.most_pulses is refused"
+    text = "allow a scan of any size; without it, a scan of more pulses than scan.most_pulses is refused"
     parser.add_argument("--allow-large", action="store_const", const=MOST_POSSIBLE, help=text)
 
 
@@ -226,7 +226,7 @@ def add_choice_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tolerance",
         metavar="KIND=VALUE,...",
-        help=f"choose the cheapest settings whose errors keep this, e.g. height=5mm,intensity=5%%; kinds: {kinds} "
+        help=f"choose the fastest settings that keep these errors, e.g. height=5mm,intensity=5%%; kinds: {kinds} "
         "(the fidelity's settings)",
     )
     parser.add_argument(
@@ -304,14 +304,14 @@ def add_renamed_argument(parser: argparse.ArgumentParser, former: str, name: str
 
 def add_axis_name_argument(parser: argparse.ArgumentParser) -> None:
     """Declare ``--axis-name``, which chooses one of a file's roads, and where the axis lies beside a line of points."""
-    text = "road or alignment of the file, by its name (the longest); `synthroads road FILE --list` lists them"
+    text = "name of a road or alignment in the file (the longest); `synthroads road FILE --list` lists them"
     parser.add_argument("--axis-name", metavar="NAME", help=text)
-    text = "the axis lies so far beside the file's points, m; positive to the left in their direction (0)"
+    text = "distance from the file's points to the axis, m; positive: axis to their left, along their order (0)"
     parser.add_argument("--offset-from-path", type=float, metavar="METRES", help=text)
-    text = "the file's points run in the middle of this lane, 0 the outermost (instead of --offset-from-path)"
+    text = "lane in whose middle the file's points run, 0: the outermost (instead of --offset-from-path)"
     parser.add_argument("--path-lane", type=int, metavar="N", help=text)
     text = (
-        "the file's points are so high above the road, m; with the geoid's height where they count from the ellipsoid"
+        "height of the file's points above the road, m; add the geoid height if their heights are ellipsoidal"
     )
     parser.add_argument("--height-above-road", type=float, metavar="METRES", help=text)
 
@@ -331,7 +331,7 @@ def add_twin_argument(parser: argparse.ArgumentParser, default: Sequence[str] = 
     """Add the option ``--twin FORMATS``: names of formats separated by commas, as a list in ``twin``."""
     from synthroads_addon.twin.formats import TWIN_FORMATS
 
-    text = f"geometric-semantic models, with commas: {', '.join(TWIN_FORMATS)} ({','.join(default) or 'none'})"
+    text = f"geometric-semantic models, separated by commas: {', '.join(TWIN_FORMATS)} ({','.join(default) or 'none'})"
     parser.add_argument("--twin", type=_split_names, default=list(default), metavar="FORMATS", help=text)
 
 
@@ -345,7 +345,7 @@ def _add_common_arguments(parser: argparse.ArgumentParser) -> None:
     amount = parser.add_mutually_exclusive_group()
     text = "print errors only; if no output file is given, also print the result"
     amount.add_argument("--quiet", action="store_true", help=text)
-    amount.add_argument("--verbose", action="store_true", help="print settings, versions and times of stages as well")
+    amount.add_argument("--verbose", action="store_true", help="also print settings, versions and times of stages")
     parser.add_argument("--json", action="store_true", help="print the result as JSON on standard output")
 
 

@@ -22,14 +22,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recipe", metavar="RECIPE", help=f"{known}, or a .yaml or .json file")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the data set")
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--jobs", type=int, metavar="N", help="scenes made at once on this machine (1)")
+    where.add_argument("--jobs", type=int, metavar="N", help="scenes made at the same time on this machine (1)")
     where.add_argument(
-        "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers make them (none), tcp://HOST:PORT"
+        "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers make the scenes (none), tcp://HOST:PORT"
     )
     parser.add_argument(
-        "--worker-timeout", type=float, metavar="S", help="seconds that a scheduler may be without any worker (1800)"
+        "--worker-timeout", type=float, metavar="S", help="give up after this many seconds without a worker (1800)"
     )
-    parser.add_argument("--resume", action="store_true", help="continue what was begun in this folder")
+    parser.add_argument("--resume", action="store_true", help="continue the data set that was begun in this folder")
     parser.add_argument("--overwrite", action="store_true", help="replace the data set that is there")
     parser.add_argument(
         "--splits", nargs="+", metavar="SPLIT", help="make scenes of these splits only (all); --resume makes the others"

@@ -1,6 +1,6 @@
 """Run an experiment: several trainings that differ in their data, each with several seeds.
 
-One table has all scores. What is trained already isn't trained again: after an interruption the same command goes on.
+One table has all scores. Finished trainings are kept: after an interruption, run the same command again to go on.
 """
 
 import argparse
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads experiment` to its parser."""
     known = ", ".join(names_in(EXPERIMENTS))
     parser.add_argument("experiment", metavar="EXPERIMENT", help=f"YAML file, or one of {known}")
-    text = "folder that {NAME} in the experiment's paths stands for (can be repeated)"
+    text = "folder that replaces {NAME} in the experiment's paths (can be repeated)"
     parser.add_argument("--data", type=_folder, action="append", default=[], metavar="NAME=FOLDER", help=text)
     parser.add_argument("--output", type=Path, required=True, metavar="DIR", help="folder for runs, scores and table")
     text = "configuration that all trainings start from: a name or a YAML file (the experiment's)"

@@ -15,7 +15,7 @@ from synthroads_addon.base.files import check_file_target
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads export` to its parser."""
     parser.add_argument("run", type=Path, metavar="RUN", help="folder of a trained run, or name of a shipped model")
-    text = "ONNX file to write (RUN.onnx in the folder that the command runs in)"
+    text = "ONNX file to write (RUN.onnx in the current folder)"
     parser.add_argument("--output", type=Path, metavar="FILE", help=text)
     parser.set_defaults(writes=True)
     parser.add_argument("--overwrite", action="store_true", help="replace a file that is already there")

@@ -1,6 +1,6 @@
-"""Forecast how long a training of a segmentation takes on this machine, from a few of its steps.
+"""Forecast how long the training of a segmentation takes on this machine, from a few of its steps.
 
-Seconds per step, measured, are multiplied by the steps of the whole training. Scores after the epochs take more.
+The measured time per step is multiplied by the number of steps. Scoring after the epochs takes additional time.
 """
 
 import argparse
@@ -22,10 +22,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads forecast` to its parser."""
     text = "shipped configuration of a segmentation, or a YAML file"
     parser.add_argument("configuration", metavar="CONFIGURATION", help=text)
-    text = "steps that are measured (%(default)s)"
+    text = "number of steps to measure (%(default)s)"
     parser.add_argument("--steps", type=int, default=3, metavar="N", help=text)
     add_changes_argument(parser, "the configuration", "threads=1")
-    parser.add_argument("--output", type=Path, metavar="FILE", help="JSON file to write as well")
+    parser.add_argument("--output", type=Path, metavar="FILE", help="also write this JSON file")
 
 
 def run(arguments: argparse.Namespace) -> Outcome:

@@ -49,12 +49,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
     add_device_argument(parser)
     seed = whole_number(2**63 - 1, "2^63 - 1")
-    parser.add_argument("--seed", type=seed, metavar="N", help="seed of everything random (the scenario's own)")
-    text = "point on the trade-off (the scenario's own)"
+    parser.add_argument("--seed", type=seed, metavar="N", help="seed of all random choices (the scenario's own)")
+    text = "speed against accuracy, as a preset (the scenario's own)"
     parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help=text)
-    parser.add_argument("--parameters", type=Path, metavar="FILE", help="take this road instead of sampling one")
+    parser.add_argument("--parameters", type=Path, metavar="FILE", help="take this parameter set, and sample none")
     parser.add_argument("--axis", type=Path, metavar="FILE", help=AXIS_FILES)
-    text = "OpenDRIVE file whose whole road is taken: lanes, surface, marks, objects, signals"
+    text = "OpenDRIVE file whose road is taken whole: lanes, surface, markings, objects, signals"
     parser.add_argument("--road", type=Path, metavar="FILE", help=text)
     add_axis_name_argument(parser)
     add_choice_arguments(parser)
@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_without_argument(parser: argparse.ArgumentParser) -> None:
     """Declare ``--without``, which leaves an effect of the sensor out."""
-    text = f"leave an effect out, with the same rays and seed (can be repeated): {', '.join(EFFECTS)}"
+    text = f"leave out this effect; rays and seed stay the same (can be repeated): {', '.join(EFFECTS)}"
     parser.add_argument("--without", action="append", default=[], choices=list(EFFECTS), metavar="EFFECT", help=text)
 
 

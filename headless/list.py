@@ -1,4 +1,4 @@
-"""List what comes under a name: scenarios, scanners, recipes, classes, trainings; and the fields that --set takes."""
+"""List shipped names (scenarios, scanners, recipes, classes, trainings, ...) and the fields that --set takes."""
 
 import argparse
 import json
@@ -39,10 +39,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads list` to its parser."""
     text = f"{', '.join(KINDS)}, or {_FIELDS}: what --set takes (the kinds themselves)"
     parser.add_argument("kind", nargs="?", metavar="KIND", help=text)
-    text = "only names (of fields: paths) that begin so; or files of your own, or folders of them (all that is shipped)"
+    text = "only names, or paths of fields, that begin with this; or your files or folders of them (all shipped names)"
     parser.add_argument("names", nargs="*", metavar="NAME_OR_FILE", help=text)
     parser.words = "names"  # type: ignore[attr-defined]
-    text = "whose fields: the scenario's, or those of a training (%(default)s)"
+    text = "list the fields of a scenario or of a training (%(default)s)"
     parser.add_argument("--of", choices=_OWNERS, default="scenario", help=text)
 
 

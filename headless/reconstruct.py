@@ -1,4 +1,4 @@
-"""Turn a cloud into a road's parameters, with the deviations of the cloud from it, and its geometric-semantic model."""
+"""Turn a cloud into the parameters of its road, with deviations from the cloud, and a geometric-semantic model."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads reconstruct` to its parser."""
     parser.add_argument("cloud", type=Path, metavar="CLOUD", help="cloud to read (.laz, .las, .ply, .e57, .npz)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
-    text = "kind of road, where it is known (auto: found out)"
+    text = "kind of road, if known (auto: found in the cloud)"
     parser.add_argument("--road", choices=("auto", "dual", "single"), default="auto", help=text)
-    text = "course of the road, roughly: CSV or GeoJSON in the cloud's coordinates (found in the cloud)"
+    text = "approximate course of the road: CSV or GeoJSON in the cloud's coordinates (found in the cloud)"
     parser.add_argument("--path", type=Path, metavar="FILE", help=text)
-    text = "folder of a trained centreline model: one more view of the axis (those that learn nothing)"
+    text = "folder of a trained centreline model that estimates the axis as well (no trained model)"
     parser.add_argument("--run", type=Path, metavar="DIR", help=text)
-    text = "root mean square that the alignment may keep from the measured axis, m (0.03)"
+    text = "largest root mean square distance of the alignment from the measured axis, m (0.03)"
     parser.add_argument("--fit-tolerance", type=float, default=0.03, metavar="M", help=text)
     add_renamed_argument(parser, "--tolerance", "--fit-tolerance")
-    text = "take the widths of the standard cross-section that all measured ones are near to (the measured ones)"
+    text = "use the widths of the standard cross-section that matches all measured widths (the measured widths)"
     parser.add_argument("--snap", action="store_true", help=text)
-    text = "true parameters (.json) or axis (CSV, GeoJSON) to compare with afterwards; they change nothing"
+    text = "true parameters (.json) or axis (CSV, GeoJSON) to compare the result with; no influence on the result"
     parser.add_argument("--truth", type=Path, metavar="FILE", help=text)
     parser.add_argument("--no-picture", action="store_true", help=f"don't draw {PICTURE}")
     add_twin_argument(parser)

@@ -44,15 +44,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--list", action="store_true", help="list the file's roads or alignments, and write nothing")
     parser.add_argument("--output", type=Path, metavar="DIR", help="folder for the files (needed without --list)")
     add_axis_name_argument(parser)
-    text = "round kinks between elements by two clothoids at most M metres off (0.05); else they are refused"
+    text = "round kinks between elements by two clothoids, at most M metres away (0.05); by default kinks are refused"
     parser.add_argument("--round-kinks", type=_distance, nargs="?", const=0.05, metavar="M", help=text)
-    parser.add_argument("--only-axis", action="store_true", help="take the axis and its heights alone: no exit code 3")
-    text = "print in which fields the road of an OpenDRIVE file differs from this parameter set"
+    parser.add_argument("--only-axis", action="store_true", help="take only the axis and its heights; no exit code 3")
+    text = "print the fields in which the road of an OpenDRIVE file differs from this parameter set"
     parser.add_argument("--against", type=Path, metavar="PARAMETERS", help=text)
     names = ", ".join(scenario_names())
-    text = f"what the file doesn't say: {names}, or a .json file (%(default)s)"
+    text = f"scenario for what the file doesn't say: {names}, or a .json file (%(default)s)"
     parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help=text)
-    parser.add_argument("--seed", type=int, metavar="N", help="seed of what is drawn (the scenario's own)")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of all random choices (the scenario's own)")
     add_changes_argument(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
 

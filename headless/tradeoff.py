@@ -39,14 +39,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scenario", action="append", metavar="NAME_OR_FILE", help=f"scene to measure on; can be repeated ({scenes})"
     )
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for tables, JSON and plots")
-    text = f"any of {', '.join(KNOBS)} (all)"
+    text = f"settings to measure: {', '.join(KNOBS)} (all)"
     parser.add_argument("--knobs", nargs="+", default=list(KNOBS), metavar="KNOB", help=text)
     parser.add_argument(
-        "--resume", action="store_true", help="keep the rows that the folder holds already; measure the others"
+        "--resume", action="store_true", help="keep the rows that are in the folder; measure the others"
     )
-    parser.add_argument("--overwrite", action="store_true", help="measure again what the folder holds already")
-    parser.add_argument("--document", type=Path, metavar="FILE", help="fill the tables of this Markdown file as well")
-    parser.add_argument("--pictures", type=Path, metavar="DIR", help="put the plots here as well")
+    parser.add_argument("--overwrite", action="store_true", help="measure the rows in the folder again")
+    parser.add_argument("--document", type=Path, metavar="FILE", help="also fill the tables of this Markdown file")
+    parser.add_argument("--pictures", type=Path, metavar="DIR", help="also write the plots to this folder")
     parser.add_argument(_ROW, metavar="JSON", help=argparse.SUPPRESS)
 
 
