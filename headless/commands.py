@@ -310,9 +310,7 @@ def add_axis_name_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--offset-from-path", type=float, metavar="METRES", help=text)
     text = "lane in whose middle the file's points run, 0: the outermost (instead of --offset-from-path)"
     parser.add_argument("--path-lane", type=int, metavar="N", help=text)
-    text = (
-        "height of the file's points above the road, m; add the geoid height if their heights are ellipsoidal"
-    )
+    text = "height of the file's points above the road, m; add the geoid height if their heights are ellipsoidal"
     parser.add_argument("--height-above-road", type=float, metavar="METRES", help=text)
 
 

@@ -30,9 +30,7 @@ _NO_CLASSIFIER = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads compare` to its parser."""
-    parser.add_argument(
-        "synthetic", type=Path, metavar="SYNTHETIC", help="cloud, folder or list of clouds to judge"
-    )
+    parser.add_argument("synthetic", type=Path, metavar="SYNTHETIC", help="cloud, folder or list of clouds to judge")
     parser.add_argument(
         "real", type=Path, metavar="REAL", help="cloud, folder or list of real clouds; two or more give a reference"
     )

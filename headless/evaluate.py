@@ -20,9 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for tables and pictures")
     text = "for segmentation: mapping of the clouds' classes to the model's: semantickitti, ign or a JSON file (none)"
     parser.add_argument("--mapping", metavar="MAPPING", help=text)
-    text = (
-        "for segmentation: public data set in the folders (`synthroads list yardsticks`), or a JSON file (none)"
-    )
+    text = "for segmentation: public data set in the folders (`synthroads list yardsticks`), or a JSON file (none)"
     parser.add_argument("--yardstick", metavar="NAME", help=text)
 
 

@@ -195,7 +195,7 @@ class OptionalField(Field):
             if hook:
                 hook(group, context)
 
-        text = f"{self.tooltip}. Tick to give a value of your own"
+        text = f"{self.tooltip}. Tick to set your own value"
         about = {"name": f"Own {self.label}", "description": text, "default": self.default is not None}
         return {self.checkbox_name: bpy.props.BoolProperty(**about, update=begin)}
 

@@ -49,7 +49,7 @@ class SYNTHROADS_PG_roads(bpy.types.PropertyGroup):
         items=_road_items,
         get=_shown_road,
         set=_choose_road,
-        description="Road that the panels are about: the active object's; its root becomes active where one is chosen",
+        description="Road that the panels show: that of the active object. A chosen road's root becomes active",
     )
 
 

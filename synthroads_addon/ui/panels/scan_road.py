@@ -41,7 +41,7 @@ _BOX_SHARE = 0.92
 
 
 class SYNTHROADS_OT_road_from_scan(RoadLoader, bpy.types.Operator):
-    """Find the road that a cloud shows, and build it from its measured parameters. It takes the place of the road built before"""  # noqa: E501 (a tooltip is one line)
+    """Find the road in a cloud, and build it from its measured parameters. It replaces the road built before"""
 
     bl_idname = "synthroads.road_from_scan"
     bl_label = "Road from a Scan"
@@ -50,20 +50,20 @@ class SYNTHROADS_OT_road_from_scan(RoadLoader, bpy.types.Operator):
     road: bpy.props.EnumProperty(
         name="Carriageways",
         items=[
-            ("auto", "Found Out", "The cloud tells"),
+            ("auto", "Automatic", "Found in the cloud"),
             ("dual", "Dual", "Two carriageways with a median"),
             ("single", "Single", "One carriageway"),
         ],
-        description="Kind of road, where it is known",
+        description="Kind of road, if known",
     )
     course: bpy.props.StringProperty(
         name="Course",
         subtype="FILE_PATH",
-        description="Rough course of the road (CSV or GeoJSON, in the cloud's coordinates), where it isn't found",
+        description="Approximate course of the road (CSV or GeoJSON, in the cloud's coordinates), if it isn't found",
     )
     tolerance: bpy.props.FloatProperty(
         name="Tolerance",
-        description="Root mean square that the alignment may keep from the measured axis",
+        description="Largest root mean square distance of the alignment from the measured axis",
         default=FIT_TOLERANCE,
         min=TOLERANCES[0],
         max=TOLERANCES[1],
@@ -73,7 +73,7 @@ class SYNTHROADS_OT_road_from_scan(RoadLoader, bpy.types.Operator):
     )
     snap: bpy.props.BoolProperty(
         name="Standard Widths",
-        description="Take the widths of the standard cross-section that all measured ones are near to",
+        description="Use the widths of the standard cross-section that matches all measured widths",
     )
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -97,13 +97,13 @@ class SYNTHROADS_OT_road_from_scan(RoadLoader, bpy.types.Operator):
 
 
 class SYNTHROADS_OT_show_doubt(bpy.types.Operator):
-    """Look along the road at the begin of this stretch"""
+    """Look along the road at the beginning of this stretch"""
 
     bl_idname = "synthroads.show_doubt"
     bl_label = "Look at the Stretch"
     bl_options = {"INTERNAL"}  # noqa: RUF012 (Blender reads a plain set)
 
-    station: bpy.props.FloatProperty(name="Station", description="Along the road, m")
+    station: bpy.props.FloatProperty(name="Station", description="Distance along the road, m")
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -182,9 +182,9 @@ def verdict(judgement: dict[str, Any]) -> str:
     """Return a sentence that says how far a found road is to be trusted."""
     places = sum(1 for _ in doubt_lines(judgement))
     if not places:
-        return "Nothing of it is doubtful"
+        return "No part of it is doubtful"
     share = 1.0 - judgement["trusted"]
-    axis = f", its axis on {share:.0%} of the length" if share > 0.0 else ""
+    axis = f", the axis on {share:.0%} of the length" if share > 0.0 else ""
     return f"The result is doubtful at {places} {'place' if places == 1 else 'places'}{axis}"
 
 

@@ -27,7 +27,7 @@ from .view import look_along
 
 
 class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
-    """Make a road from these settings. It takes the place of the shown road; all else stays as it is"""
+    """Build a road from these settings. It replaces the shown road; everything else stays as it is"""
 
     bl_idname = "synthroads.build"
     bl_label = "Build Road"
@@ -35,8 +35,8 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
 
     beside: bpy.props.BoolProperty(
         name="One More",
-        description="Build one more road beside what is there, with another seed where a road has this one, "
-        "instead of building the shown one anew",
+        description="Add a road to the scene instead of rebuilding the shown one; if a road has the same seed, "
+        "the next road gets another",
         options={"SKIP_SAVE"},
     )
 

@@ -173,7 +173,7 @@ def _write_files(scan: RoadScan, work: Workplace, measure: Measure, report: Repo
 
 
 class SYNTHROADS_OT_scan(LongOperator, bpy.types.Operator):
-    """Scan everything that is visible, and write the labelled points with pictures; of a road, its parameters"""
+    """Scan everything that is visible; write the labelled points, pictures and, for a road, its parameters"""
 
     bl_idname = "synthroads.scan"
     bl_label = "Scan"

@@ -113,7 +113,7 @@ def _read(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Measure |
         with timer.stage("scene mesh"):
             scene = copied.put_together()
         if not len(scene.static) and not scene.moving:
-            raise InputError("Scene", None, "nothing visible in it has faces that could be scanned")
+            raise InputError("Scene", None, "nothing visible has faces that can be scanned")
         site = route_site(scan.scenario, scan.route, scene.static)
         with timer.stage("caster"):
             plan = site.plan(scene, services)
