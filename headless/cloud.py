@@ -64,7 +64,7 @@ def table(figures: dict[str, Any]) -> str:
     """Return a cloud's statistics as text: extent, attributes, and a table of figures by class."""
     lines = [f"{figures['file']}: {figures['kind']}, {figures['points']:,} points"]
     named = figures["coordinate_system"]
-    lines.append(f"coordinate system {named or 'not named: coordinates are taken for metres'}")
+    lines.append(f"coordinate system {named or 'not named: coordinates are read as metres'}")
     if named and figures["height_epsg"] is None:
         lines.append("what heights are counted from isn't named")
     if figures["bounds"]:

@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads dataset`; return exit code (3 if scenes failed), manifest as JSON data and printed text."""
     for name, keeps in (("--resume", arguments.resume), ("--verify", arguments.verify)):
         if keeps and arguments.overwrite:
-            raise InputError("--overwrite", None, f"can't be given with {name}, which keeps what is there")
+            raise InputError("--overwrite", None, f"can't be given with {name}, which keeps existing scenes")
     if arguments.verify:
         return _verify(arguments.output)
     workers = _workers(arguments)

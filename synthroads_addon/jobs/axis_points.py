@@ -130,7 +130,9 @@ def _axis_of_text(
     seen: Callable[[AxisFit], None] | None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     if name is not None:
-        raise InputError("--axis-name", name, "is for files of several roads or lines: this one has one of points")
+        raise InputError(
+            "--axis-name", name, "is for files with several roads or lines; this file has one line of points"
+        )
     points, declared = read_declared_axis(path, Placement.of(MapSystem.of(scenario.epsg, scenario.height_epsg)))
     points = _prepared(path.name, points, has_times(path), scenario, place)
     sagitta = tell_spacing(path.name, [points])
@@ -196,7 +198,7 @@ def _prepared(file: str, points: Float, driven: bool, scenario: RoadScenario, pl
     offset = place.aside(cross_section_of(scenario))
     if driven and offset is None:
         text = (
-            "%s is the path of a vehicle, and is taken for the axis itself: --offset-from-path METRES (positive to the "
+            "%s is the path of a vehicle, and is used as the axis itself: --offset-from-path METRES (positive to the "
         )
         warn(text + "left) or --path-lane N says where the axis lies beside it", file)
     if driven and place.height is None:

@@ -47,7 +47,7 @@ def with_mapped_section(
         return scenario, []
     lost = list[str]()
     if mapped.lanes is None:
-        text = "%s: the map has no number of lanes: the cross-section is the scenario's"
+        text = "%s: the map gives no number of lanes: the scenario's cross-section is used"
         assume(text, name)
     elif scenario.lanes is not None:
         if scenario.lanes != mapped.lanes:

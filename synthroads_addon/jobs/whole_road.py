@@ -71,7 +71,7 @@ def _read_road(
 ) -> tuple[RoadParameters, dict[str, Any], GivenRoad | None]:
     """Return what `road_from_file` does, and what of the road the file gives; None where it has no lanes."""
     if not has_whole_road(path):
-        raise InputError(path.name, format_of(path), "OpenDRIVE is needed for a whole road: --axis takes other files")
+        raise InputError(path.name, format_of(path), "must be OpenDRIVE; for other files use --axis")
     line = (path, scenario.road, scenario.seed, name, place, round_kinks, picture)
     if choose_line(read_opendrive(path), name, path.name).lanes is None:
         axis, limits, report = axis_from_file(*line)

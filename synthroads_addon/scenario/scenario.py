@@ -170,7 +170,7 @@ class Scenario(ClosedModel):
         if self.chooses:
             name = "time_budget" if self.tolerance is None else "tolerance"
             text = f"can't be kept on a road of {length:g} m, which is built by sections of {section:g} m: choose on a "
-            raise InputError(name, getattr(self, name), f"{text}shorter road, and set what was chosen")
+            raise InputError(name, getattr(self, name), f"{text}shorter road, and use its settings")
         if "scene" in self.outputs:
             text = f"can't have scene: a road of {length:g} m is built by sections of {section:g} m; leave scene out, "
             text += f"or set scan.section_length to {length / 2.0:g} or more"

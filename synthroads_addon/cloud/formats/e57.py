@@ -294,7 +294,7 @@ class E57Reader(CloudReader):
             if given and None not in given:
                 self.header = replace(self.header, intensity_scale=SIXTEEN_BITS)
             elif any(given):
-                text = "only some of its scans say what intensities count to: all are taken as they stand"
+                text = "only some of its scans name the limits of intensities: intensities are read unscaled"
                 assume(f"{path.name}: {text}")
                 self._intensities = [None] * len(self._scans)
 
@@ -390,7 +390,7 @@ class E57Reader(CloudReader):
         void = {name: part[flag] != 0 for flag, names in _FLAGGED.items() if flag in part for name in names}
         for flag, (name, *_) in _FLAGGED.items():
             if name in void and (count := int(np.count_nonzero(void[name]))):
-                self._remarks[f"points have an invalid {_PLAIN[flag]}: it is taken for 0"] += count
+                self._remarks[f"points have an invalid {_PLAIN[flag]}: it is read as 0"] += count
         spans = colors if intensities is None else {**colors, "intensity": intensities}
         for name in (*_CHANNELS, "intensity", "timeStamp"):
             if name not in part:
@@ -405,7 +405,7 @@ class E57Reader(CloudReader):
         """Return values (n,) as shares of what lies between their limits, to which those beyond are set."""
         share = (values - limits[0]) / (limits[1] - limits[0])
         if count := int(np.count_nonzero((share < 0.0) | (share > 1.0))):
-            self._remarks[f"points have {what} beyond the limits that the file names, to which it is set"] += count
+            self._remarks[f"points have {what} beyond the file's limits: they are clipped to these limits"] += count
         return np.clip(share, 0.0, 1.0)
 
     def _block(self, arrays: dict[str, AnyArray], count: int, pose: tuple[AnyArray, AnyArray], done: int) -> PointBlock:
@@ -444,7 +444,7 @@ def _declared_place(path: Path, text: str) -> Placement:
     """Return the placement that a file of others declares, whose coordinates are metres by the standard."""
     place = placed(path, *system_of_text(text))
     if place.declared is not None and place.scale is not None:
-        allowed = "isn't in metres, which E57's coordinates are by its standard: which of the two holds can't be told"
+        allowed = "isn't in metres, the unit of coordinates in the E57 standard: it is unclear which one is right"
         raise InputError(f"{path}: coordinate system", place.declared.label, allowed)
     return place
 

@@ -96,7 +96,7 @@ def placed(path: Path, declared: MapSystem | None, notes: Sequence[str] = ()) ->
     if units[0] == 1.0:
         told = f"its heights are in units of {units[2]:.9g} m: they are read in metres"
     elif declared.height_unit is None:
-        told += "; it names no unit of heights, which are taken to have the same"
+        told += "; it names no unit of heights: the same unit is assumed"
     elif units[2] != units[0]:
         told += f"; a unit of its heights is {units[2]:.9g} m"
     return Placement(system, declared, (*notes, told))
@@ -114,7 +114,7 @@ def system_of_text(text: str | None) -> tuple[MapSystem | None, list[str]]:
         return MapSystem.read(text), []
     except UnknownSystemError:
         shown = " ".join(text.split())[:60]
-        return None, [f"its coordinate system can't be read ({shown}): it is left aside, coordinates are metres"]
+        return None, [f"its coordinate system can't be read ({shown}): it is ignored, coordinates are metres"]
 
 
 def header_from_notes(
@@ -155,7 +155,7 @@ def header_from_notes(
     except (KeyError, TypeError, ValueError, OverflowError):
         offset = np.full(3, np.nan)
     if not np.isfinite(offset).all() or not isinstance(text, str | None):
-        raise InputError(str(path), None, "its notes on offset and coordinate system are damaged")
+        raise InputError(str(path), None, "its data on offset and coordinate system are damaged")
     place = placed(path, *system_of_text(text))
     return replace(
         header,

@@ -460,7 +460,7 @@ def _notes(path: Path, las: laspy.LasHeader, number: int) -> dict[str, Any]:
     record = next((v.record_data_bytes() for v in las.vlrs if v.user_id == OWN and v.record_id == number), None)
     notes = json.loads(record) if record else {}
     if not isinstance(notes, dict):
-        raise InputError(str(path), None, "its notes on intensity scale and classes are damaged")
+        raise InputError(str(path), None, "its data on intensity scale and classes are damaged")
     return notes
 
 
@@ -513,7 +513,7 @@ def _check_chunks(path: Path, start: int, record: bytes) -> None:
 
 
 def _damage_error(path: Path) -> InputError:
-    return InputError(str(path), None, "is damaged: the table of its chunks doesn't fit the file")
+    return InputError(str(path), None, "is damaged: its table of chunks doesn't match the file")
 
 
 def _chunk_sizes(path: Path, file: BinaryIO, start: int, record: bytes) -> list[int]:

@@ -185,10 +185,10 @@ class NpzReader(CloudReader):
         if "notes.npy" not in self._file.namelist():
             return None
         if self._file.getinfo("notes.npy").file_size > _LONGEST_NOTES:
-            raise ValueError("its notes are too long")
+            raise ValueError("its metadata are too long")
         with self._file.open("notes.npy") as member:
             if math.prod(_npy_header(member)[0]) != 1:
-                raise ValueError("its notes are no text")
+                raise ValueError("its metadata are not text")
         with self._file.open("notes.npy") as member:
             return json.loads(str(npy.read_array(member, allow_pickle=False)))
 

@@ -195,9 +195,9 @@ class PlyReader(CloudReader):
         """Yield the points as blocks of at most ``size``, from the file's first point on."""
         label = self._others.get("class")
         if self._assumed_scheme:
-            assume(f"{self.header.path.name}: its class_id is taken for numbers of the 17 classes")
+            assume(f"{self.header.path.name}: its class_id is read as numbers of the 17 classes")
         elif label and _plain(label) != _CLASSES[0]:
-            assume(f"{self.header.path.name}: its property {label} is taken for LAS codes of classes")
+            assume(f"{self.header.path.name}: its property {label} is read as LAS codes of classes")
         full = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
         self._file.seek(self._start)
         for done in range(0, self.header.count, size):

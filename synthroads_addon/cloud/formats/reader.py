@@ -125,7 +125,7 @@ class CloudReader(ABC):
         if name == "class_id" and values.dtype.kind != "u":
             none |= values == -1
         if none.any():
-            self._remarks[f"points have no {name} (NaN or -1): it is taken for 0"] += int(np.count_nonzero(none))
+            self._remarks[f"points have no {name} (NaN or -1): it is read as 0"] += int(np.count_nonzero(none))
             values = np.where(none, 0, values)
         if values.dtype.kind == "b":
             return values.astype(kind)
@@ -157,7 +157,7 @@ class CloudReader(ABC):
             self._brightness = full_brightness(largest, whole=whole) if largest else SIXTEEN_BITS
             if largest and not (whole and self._brightness == SIXTEEN_BITS):
                 taken = brightness_text(self._brightness)
-                assume(f"{self.header.path.name}: its colours, {largest:g} at most, are taken for {taken}")
+                assume(f"{self.header.path.name}: its colours, {largest:g} at most, are read as {taken}")
         return self._brightness
 
     def close(self) -> None:

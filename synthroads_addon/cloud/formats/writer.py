@@ -119,7 +119,7 @@ class CloudWriter(ABC):
             return
         for column in self.columns:
             if block.array(column.array) is None:
-                raise OutputError(str(self.path), column.array, "is to be written, but the points don't have it")
+                raise OutputError(str(self.path), column.array, "can't be written: the points don't have it")
         if not self.keeps_flags:
             block = self._without_flags(block)
             if not len(block):

@@ -71,7 +71,7 @@ def road_classes(cloud: RealCloud, road: RoadClasses, owner: str | None = None) 
     fields = ("--paved", "--line") if owner is None else (f"{owner}paved", f"{owner}lines")
     result = {}
     if road.paved:
-        selection = f"{spans} m beside the axis, more than {CLEAR:g} m from the lines" if road.lines else f"{spans} m"
+        selection = f"{spans} m from the axis, more than {CLEAR:g} m from the lines" if road.lines else f"{spans} m"
         result["paved"] = select_class(cloud, np.flatnonzero(on & free), selection, fields[0])
     if road.lines:
         chosen, threshold = _points_on_dashes(cloud.intensity, station, offset, road, fields[1])

@@ -201,7 +201,7 @@ def _draw(
         return drawn, fields
     cut = concatenate(slab)
     if len(cut) == 0:
-        raise InputError("--line" if line else "--station", line or station, "cuts no points of the cloud")
+        raise InputError("--line" if line else "--station", line or station, "meets no points of the cloud")
     heights = float(cut.xyz[:, 2].min()), float(cut.xyz[:, 2].max())
     if line is None:
         reach = 1.02 * float(np.abs((cut.xyz[:, :2] - middle) @ right).max()) + 0.5
@@ -335,7 +335,7 @@ def scheme_of(cloud: CloudReader, classes: str | None) -> ClassScheme:
     scheme = class_scheme(classes)
     if any(scheme.selectors()):
         finer = ", ".join(row.name for row in scheme.fine.values() if any(row.selectors()))
-        raise InputError("--classes", classes, f"has {finer}, which a cloud's classes don't tell apart: scan with it")
+        raise InputError("--classes", classes, f"has {finer}, not distinguished in the cloud: scan with it")
     if not header.labelled or header.scheme.name != "17":
         held = f"the classes {header.scheme.name}" if header.labelled else "LAS codes only"
         raise InputError(str(header.path), None, f"holds {held}: only the 17 classes can be merged into {classes}")

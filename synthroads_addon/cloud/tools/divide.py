@@ -34,7 +34,7 @@ def merge(sources: list[Path], output: Path, overwrite: bool = False, progress: 
         OutputError: the output is there already or can't be written.
     """
     if len(sources) < 2:
-        raise InputError("FILE", len(sources), "must be two clouds or more")
+        raise InputError("FILE", len(sources), "must be at least two clouds")
     for source in sources:
         check_output(source, output, overwrite)
     with ExitStack() as stack:
@@ -76,11 +76,11 @@ def crop(
     """
     check_output(source, output, overwrite)
     if box is None and heights is None and polygon is None:
-        raise InputError("--box", None, "one of --box, --heights, --polygon says what is kept")
+        raise InputError("--box", None, "give --box, --heights or --polygon, to say which points are kept")
     if box is not None and not (box[0] <= box[2] and box[1] <= box[3]):
-        raise InputError("--box", list(box), "must be the least x and y, then the largest")
+        raise InputError("--box", list(box), "must be the smallest x and y, then the largest")
     if heights is not None and not heights[0] <= heights[1]:
-        raise InputError("--heights", list(heights), "must be the least, then the largest")
+        raise InputError("--heights", list(heights), "must be the smallest, then the largest")
     if polygon is not None:
         read_polygon(polygon)  # before the cloud is opened
     with open_cloud(source) as cloud:
@@ -89,7 +89,7 @@ def crop(
             for points in pass_with_progress(cloud.blocks(), cloud.header.count, progress, "crop"):
                 writer.write(points.select(_inside(points.xyz, box, heights, rings)))
             if not writer.count:
-                raise InputError(str(source), None, "has no points within what is to be kept")
+                raise InputError(str(source), None, "has no points within the chosen box, heights or polygon")
         return summary_of(cloud, writer) | {"points_read": cloud.header.count}
 
 
@@ -166,7 +166,7 @@ def tile(
                     writers.append(writer)
             report_losses(source.name, writers)
             if not written:
-                raise InputError("--fewest", fewest, "is more than any tile's points")
+                raise InputError("--fewest", fewest, "is more than the points of any tile")
     return {"file": source.name, "output": str(folder), "size": size, "grid": grid, "tiles": written}
 
 
@@ -233,4 +233,4 @@ def _check_alike(first: CloudReader, other: CloudReader) -> None:
         ("epoch of GPS time", one.standard_time, two.standard_time),
     ):
         if mine != theirs:
-            raise InputError(str(two.path), None, f"has other {what} than {one.path.name}: convert one of them first")
+            raise InputError(str(two.path), None, f"has a different {what} from {one.path.name}: convert one first")

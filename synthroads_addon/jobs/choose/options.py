@@ -70,12 +70,12 @@ def _tolerance_error(options: Sequence[Option], limits: Mapping[str, float]) -> 
     for kind, limit in limits.items():
         best = min(option.upper(kind) for option in options)
         if best > limit:
-            text = f"can't be kept here: the best to be had is {error_text(kind, best)}"
+            text = f"can't be reached here: the smallest possible error is {error_text(kind, best)}"
             return InputError(f"tolerance.{kind}", limit, text)
     kinds = [kind for kind in limits if any(kind in option.found for option in options)]
     nearest = min(options, key=lambda option: max(option.upper(kind) / max(limits[kind], _LEAST) for kind in kinds))
     said = ", ".join(f"{kind}={error_text(kind, nearest.upper(kind))}" for kind in kinds)
-    return InputError("tolerance", None, f"{' and '.join(kinds)} can't be kept together: the nearest is {said}")
+    return InputError("tolerance", None, f"{' and '.join(kinds)} can't be reached together: the nearest is {said}")
 
 
 def cheapest(knobs: Knobs, limits: Mapping[str, float]) -> Option:

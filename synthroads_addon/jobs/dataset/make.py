@@ -48,7 +48,7 @@ def make_dataset(
         OutputError: the folder holds something else, or can't be written, or another run is at work in it.
     """
     if overwrite and resume:
-        raise InputError("--overwrite", None, "can't be given with --resume, which keeps what is there")
+        raise InputError("--overwrite", None, "can't be given with --resume, which keeps existing scenes")
     if not isinstance(jobs, Cluster) and not 1 <= jobs <= _MOST_JOBS:
         raise InputError("--jobs", jobs, f"must be 1 to {_MOST_JOBS}")
     known = recipe if isinstance(recipe, Recipe) else load_recipe(str(recipe))

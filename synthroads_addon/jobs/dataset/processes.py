@@ -103,7 +103,7 @@ def _run_process(path: Path, threads: int, stopping: Stop) -> int:
 
 def _reason(code: int, log: Path) -> str:
     if code == EXIT_CODE:
-        return f"its process was told to end, {ATTEMPTS} times"
+        return f"its process was terminated, {ATTEMPTS} times"
     if code < 0:
         return f"its process was killed by signal {-code}, {ATTEMPTS} times (too little memory?)"
     lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()

@@ -85,7 +85,7 @@ class DatasetRun:
         self.jobs = scene_jobs(self.recipe)
         known = sorted({job.split for job in self.jobs})
         for split in sorted((self.splits or frozenset()) - set(known)):
-            raise InputError("--splits", split, f"must be of the recipe's: {', '.join(known)}")
+            raise InputError("--splits", split, f"must be splits of the recipe: {', '.join(known)}")
         self._names = {job.name for job in self.jobs}
         self._sequences = {f"{job.number:02d}" for job in self.jobs}
         self._recipe_text = self.recipe.to_json()
@@ -154,7 +154,7 @@ class DatasetRun:
             paths = [*paths_of_set(self.folder, read_manifest(self.folder)), *self._published_folders()]
             for path in self._unrecorded_folders(set(paths)):
                 name = path.relative_to(self.folder).as_posix()
-                raise OutputError("--output", str(self.folder), f"holds {name}, which is no scene's; move it away")
+                raise OutputError("--output", str(self.folder), f"holds {name}, not a part of a scene; move it away")
             begin_removal(self.folder, paths)
             write_manifest(self.folder, self._manifest())
         elif self.resume:
@@ -177,7 +177,7 @@ class DatasetRun:
             try:
                 names += map(published_name, read_json(path)["folders"])
             except (KeyError, TypeError, ValueError) as error:
-                raise InputError(str(path), None, f"isn't as a run leaves it ({error}); remove {WORK}") from None
+                raise InputError(str(path), None, f"is damaged ({error}); remove {WORK}") from None
         return names
 
     def _unrecorded_folders(self, known: Set[str] = frozenset()) -> list[Path]:
@@ -226,7 +226,7 @@ class DatasetRun:
             entry = SceneEntry.from_dict({**about, "status": "done", **done}, "scene")
             (outcome.folder / "report.json").replace(self._place(f"logs/{job.name}.json"))
             if not entry.points:
-                _logger.warning("warning: %s: not one pulse came back", job.name)
+                _logger.warning("warning: %s: no pulse came back", job.name)
             _logger.debug("%s is done: %s points", job.name, f"{entry.points:,}")
         else:
             entry = SceneEntry.from_dict({**about, "status": "failed", "error": outcome.error}, "scene")

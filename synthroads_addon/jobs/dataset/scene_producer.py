@@ -132,7 +132,7 @@ def serve(folder: Path, producers: int, make: Make, patience: float = _PATIENCE)
             return 0
         except LockHeldError:
             if waited >= patience:
-                write_failure(folder, Failure(number=0, error="another training is at work in the folder"))
+                write_failure(folder, Failure(number=0, error="another training is running in this folder"))
                 return 2
             waited += _TICK
             stopping.wait(_TICK)

@@ -115,7 +115,7 @@ class ArraySink(CloudSink):
         for name, parts in self._parts.items():
             values = points.array(name)
             if values is None:
-                raise InputError("cloud.attributes", name, "is to be kept, but the points don't have it")
+                raise InputError("cloud.attributes", name, "is in cloud.attributes, but the points don't have it")
             parts.append(np.take(self._ids, values) if name == "class_id" else values)
         self._count += len(points)
 

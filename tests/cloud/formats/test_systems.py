@@ -117,12 +117,12 @@ UNDERSTOOD = {
     "two systems": (
         Declared(gdal(25832), keys=((1024, 1), (3072, 25833))),
         (25832, None),
-        ("two coordinate systems: EPSG:25832 is used, EPSG:25833 is left aside",),
+        ("two coordinate systems: EPSG:25832 is used, EPSG:25833 is ignored",),
     ),
     "two systems, keys count": (
         Declared(gdal(25832), bit=False, keys=((1024, 1), (3072, 25833))),
         (25833, None),
-        ("EPSG:25833 is used, EPSG:25832 is left aside",),
+        ("EPSG:25833 is used, EPSG:25832 is ignored",),
     ),
     "no system": (Declared("here be dragons"), (None, None), ("can't be read (here be dragons)",)),
     "text cut off": (Declared(gdal(25832)[:200]), (None, None), ("can't be read (PROJCS",)),

@@ -26,8 +26,8 @@ FLAT = np.column_stack([ROAD[:, :2], np.zeros(len(ROAD))])
 
 UNDERSTOOD: dict[str, tuple[Write, str]] = {
     "the road's own": (geojson(ROAD, urn(25832)), ""),
-    "none": (geojson(ROAD), "names no system: its coordinates are taken for EPSG:25832"),
-    "CSV, none": (csv(ROAD), "names no system: its coordinates are taken for EPSG:25832"),
+    "none": (geojson(ROAD), "names no system: its coordinates are read as EPSG:25832"),
+    "CSV, none": (csv(ROAD), "names no system: its coordinates are read as EPSG:25832"),
     "Web Mercator": (geojson(in_system(3857), urn(3857)), "moved from EPSG:3857 to EPSG:25832"),
     "next zone": (geojson(in_system(25833), urn(25833)), "moved from EPSG:25833 to EPSG:25832"),
     "Gauss-Krueger": (geojson(in_system(31466), urn(31466)), "to within"),
@@ -68,7 +68,7 @@ REFUSED: dict[str, tuple[Write, str]] = {
     "a column that counts, flat": (lines(COUNTED_FLAT), "the first column counts the lines"),
     "height of a northing": (csv(ROAD[:, [0, 0, 1]], ""), r"z of point 41 is 5628240\.0: no land lies so high"),
     "height in millimetres": (csv(ROAD * [1.0, 1.0, 1000.0]), "z of point .*: no land lies so high"),
-    "depth of the sea": (csv(ROAD - [0.0, 0.0, 20_000.0]), "no land lies so high, 9,000 m is the most"),
+    "depth of the sea": (csv(ROAD - [0.0, 0.0, 20_000.0]), "no land lies higher than 9,000 m"),
     "x and y swapped": (csv(SWAPPED), r"outside of the system's area of use: EPSG:25832 is for longitudes 6\.0 to"),
     "Swiss, undeclared": (csv(SWISS), "outside of the system's area of use"),
     "Gauss-Krueger, undeclared": (csv(in_system(31466)), "outside of the system's area of use"),
