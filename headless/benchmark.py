@@ -76,15 +76,15 @@ def run(arguments: argparse.Namespace) -> Outcome:
         result = _measure_part(json.loads(arguments.part))
         return 0, result, canonical_json(result)
     _check(arguments)
-    found: dict[str, Any] = {}
+    figures: dict[str, Any] = {}
     kept = _read_kept(arguments)
 
     def measure() -> dict[str, str]:
-        found.update(_measure_all(arguments))
+        figures.update(_measure_all(arguments))
         if kept:
-            found["runs"] = join_runs(kept["runs"], found["runs"])
-        add_scaling(found["runs"])
-        return {TABLE: markdown(found)}
+            figures["runs"] = join_runs(kept["runs"], figures["runs"])
+        add_scaling(figures["runs"])
+        return {TABLE: markdown(figures)}
 
     with ExitStack() as opened:
         folder = None
@@ -94,9 +94,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
             )
         table = put_tables(arguments.document, [TABLE], measure)[TABLE]
         if folder:
-            (folder / _FILES[0]).write_text(canonical_json(found), encoding="utf-8")
+            (folder / _FILES[0]).write_text(canonical_json(figures), encoding="utf-8")
             (folder / _FILES[1]).write_text(table, encoding="utf-8")
-    return 0, found, table + _verdict(found)
+    return 0, figures, table + _verdict(figures)
 
 
 def _check(arguments: argparse.Namespace) -> None:
@@ -128,15 +128,15 @@ def _measure_all(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def _runs(arguments: argparse.Namespace, about: dict[str, Any], folder: Path) -> dict[str, Any]:
     progress, runs = progress_bar(arguments), []
-    own = [part for part in arguments.parts if part != "start"]
+    measured_parts = [part for part in arguments.parts if part != "start"]
     for number, cores in enumerate(arguments.cores):
         run: dict[str, Any] = {"cores": cores, "lines": {}, "floors": [], "stages": {}, "scans": {}, "beside": []}
-        for step, part in enumerate(own):
+        for step, part in enumerate(measured_parts):
             progress(f"{part}, {cores}", (number + step / len(arguments.parts)) / len(arguments.cores))
-            found = _measure_in_process({**about, "part": part, "scene": str(folder / f"{part}.obj")}, cores)
-            run["floors"] += found["floors"]
+            figures = _measure_in_process({**about, "part": part, "scene": str(folder / f"{part}.obj")}, cores)
+            run["floors"] += figures["floors"]
             for name in ("lines", "stages", "scans"):
-                run[name] |= found.get(name, {})
+                run[name] |= figures.get(name, {})
         if arguments.beside:
             run["beside"] = _measure_beside(arguments, folder, cores, progress)
             run["lines"] |= beside_lines(run["beside"])
@@ -206,7 +206,9 @@ def _measure_beside(
                 progress(f"{name}, {side}, {cores}", 0.0)
                 command = [sys.executable, script, str(folder / f"{scene}.obj"), *changes]
                 several[side].append(_json_of(command, f"{name} by {versions[side]}", cores, versions[side]))
-        rows.append({"name": name, "scene": scene} | {side: _medians(found) for side, found in several.items()})
+        rows.append(
+            {"name": name, "scene": scene} | {side: _medians(side_scans) for side, side_scans in several.items()}
+        )
     return rows
 
 
@@ -261,21 +263,21 @@ def _measure_mesh(name: str, scene: Path, quick: bool) -> dict[str, Any]:
     job = SceneScan(Scenario.from_dict(data), Path("out"), scene, up="z")
     before, timer = peak_memory_mb() or 0.0, StageTimer()
     opened, road, _ = open_and_read(job, None, timer, {})
-    found = measure_scene(scene_site(job, opened.static, road), opened, scene, name, _RAYS[name], timer)
-    packed = {rays: rate.get("packets", rate["single rays"]) for rays, rate in found["rates"].items()}
-    lines = {f"{name}_{rays}": 100.0 * rate["ours"] / packed[rays] for rays, rate in found["rates"].items()}
+    figures = measure_scene(scene_site(job, opened.static, road), opened, scene, name, _RAYS[name], timer)
+    packed = {rays: rate.get("packets", rate["single rays"]) for rays, rate in figures["rates"].items()}
+    lines = {f"{name}_{rays}": 100.0 * rate["ours"] / packed[rays] for rays, rate in figures["rates"].items()}
     scans = {
         f"{name}_{rays}": {
             "pulses_per_second": rate["pulses_per_second"],
             "processor_rate": rate["ours"],
             "busy": rate["busy"],
         }
-        for rays, rate in found["rates"].items()
+        for rays, rate in figures["rates"].items()
     }
     if name == "waves":
-        memory = 1e6 * (found["memory_mb"] - before) / len(opened.static)
-        lines |= {"waves_memory": memory, "waves_opening": found["opening"], "waves_fixed": found["fixed"]}
-    return {"lines": lines, "floors": found["floors"], "scans": scans}
+        memory = 1e6 * (figures["memory_mb"] - before) / len(opened.static)
+        lines |= {"waves_memory": memory, "waves_opening": figures["opening"], "waves_fixed": figures["fixed"]}
+    return {"lines": lines, "floors": figures["floors"], "scans": scans}
 
 
 def _scenario(name: str, changes: list[str], quick: bool) -> Scenario:

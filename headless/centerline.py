@@ -59,15 +59,15 @@ def run(arguments: argparse.Namespace) -> Outcome:
     cloud = read_road_cloud(arguments.cloud)
     axis = read_axis(arguments.truth, cloud.place) if arguments.truth else None
     network, why = _network(arguments)
-    found = find_centreline(cloud, _options(arguments, cloud, network), progress_bar(arguments))
-    result = centreline_report(found, cloud) | {"network": why}
+    centreline = find_centreline(cloud, _options(arguments, cloud, network), progress_bar(arguments))
+    result = centreline_report(centreline, cloud) | {"network": why}
     if axis is not None:
-        result["comparison"] = compare_line(found.path, axis[:, :2] - cloud.origin[:2])
+        result["comparison"] = compare_line(centreline.path, axis[:, :2] - cloud.origin[:2])
     result["remarks"] = remarks_so_far()
-    text = canonical_json(centreline_geojson(found, cloud, arguments.cloud.stem))
+    text = canonical_json(centreline_geojson(centreline, cloud, arguments.cloud.stem))
     write_file(lines, text.encode(), overwrite=arguments.overwrite)
     write_file(table, canonical_json(result).encode(), overwrite=arguments.overwrite)
-    return 3 if found.judgement.doubts else 0, result, summary(result, lines)
+    return 3 if centreline.judgement.doubts else 0, result, summary(result, lines)
 
 
 def _network(arguments: argparse.Namespace) -> tuple[Predictor | None, dict[str, Any]]:
@@ -110,8 +110,8 @@ def summary(result: dict[str, Any], output: Path) -> str:
     lines = [f"{result['road']} carriageway, centreline of {result['length']:.0f} m (std {std['mean']:.2f} m)"]
     for view in result["views"]:
         beside = view["from_centreline"].get("rms")
-        apart = "" if beside is None else f", {beside:.2f} m rms from it"
-        lines.append(f"  {view['name']}: seen on {view['seen']:.0%}, agrees on {view['used']:.0%}{apart}")
+        distance_text = "" if beside is None else f", {beside:.2f} m rms from it"
+        lines.append(f"  {view['name']}: seen on {view['seen']:.0%}, agrees on {view['used']:.0%}{distance_text}")
     lines.append(f"  network: {result['network']['why']}")
     lines += [f"  {line}" for line in reservation_lines(result)]
     return "\n".join([*lines, f"written to {output}"])

@@ -97,8 +97,10 @@ def _predicted_lines(figures: dict[str, Any]) -> list[str]:
     kept = len(titles) if agreement else len(titles) - 1
     lines = ["", *text_table(titles[:kept], [row[:kept] for row in rows], range(1, kept))]
     if agreement and agreement["share"] is not None:
-        own = f"{figures['class_field']}: the same class for {agreement['share']:.1%} of {agreement['points']:,} points"
-        lines.append(f"beside the cloud's own {own}")
+        agreement_text = (
+            f"{figures['class_field']}: the same class for {agreement['share']:.1%} of {agreement['points']:,} points"
+        )
+        lines.append(f"beside the cloud's own {agreement_text}")
     return lines
 
 

@@ -45,9 +45,9 @@ def missing_package(error: ModuleNotFoundError) -> str:
     name = (error.name or "").partition(".")[0]
     if name in ("", "headless", "ml", "synthroads_addon"):
         raise error
-    wanted = f"synthroads[{EXTRAS[name]}]" if name in EXTRAS else "synthroads"
+    requirement = f"synthroads[{EXTRAS[name]}]" if name in EXTRAS else "synthroads"
     within = "install and enable the SynthRoads extension in Blender, or " if name not in EXTRAS else ""
-    return f"error: the package {name} is missing: {within}run pip install '{wanted}'"
+    return f"error: the package {name} is missing: {within}run pip install '{requirement}'"
 
 
 if lacking := [name for name in _NEEDED if find_spec(name) is None]:  # Blender itself has none but NumPy

@@ -43,12 +43,12 @@ def run(arguments: argparse.Namespace) -> Outcome:
     return 0, figures, summary(figures)
 
 
-def summary(found: dict[str, Any]) -> str:
+def summary(forecast: dict[str, Any]) -> str:
     """Return a forecast as a line of text: hours, steps, seconds per step, device, batch."""
     return (
-        f"{found['hours']:,.1f} hours for {found['steps']:,} steps of {found['seconds_per_step']:.2f} s, on "
-        f"{found['device']} with {found['threads']} threads ({found['tiles']:,} tiles, "
-        f"{found['batch_points']:,} points of a batch)"
+        f"{forecast['hours']:,.1f} hours for {forecast['steps']:,} steps of {forecast['seconds_per_step']:.2f} s, on "
+        f"{forecast['device']} with {forecast['threads']} threads ({forecast['tiles']:,} tiles, "
+        f"{forecast['batch_points']:,} points of a batch)"
     )
 
 

@@ -75,12 +75,12 @@ def _kinds() -> Outcome:
     return 0, {"kinds": data}, "\n".join(text_table(("kind", "number", "what it is", "use"), rows))
 
 
-def _fields(owner: str, wanted: Sequence[str]) -> Outcome:
+def _fields(owner: str, prefixes: Sequence[str]) -> Outcome:
     known = list(fields_of(_OWNERS[owner]()))
-    for text in wanted:
+    for text in prefixes:
         if not any(one.path.startswith(text) for one in known):
             raise InputError(_FIELDS, text, f"no field of the {owner} begins so; `synthroads list fields` has them all")
-    listed = [one for one in known if not wanted or one.path.startswith(tuple(wanted))]
+    listed = [one for one in known if not prefixes or one.path.startswith(tuple(prefixes))]
     intervals = tuple(f"{one.path}." for one in listed if one.interval)
     shown = [one for one in listed if not (intervals and one.path.startswith(intervals))]
     rows = [_row(one) for one in shown]

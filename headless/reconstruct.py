@@ -105,11 +105,11 @@ def _comparison(truth: Path | None, place: Placement) -> Callable[[RoadParameter
         from synthroads_addon.road.parameters import read_parameters
 
         parameters = read_parameters(truth)
-        return lambda found: compare(found, parameters)
+        return lambda road: compare(road, parameters)
     from synthroads_addon.road.axes.centerline import read_axis
 
     axis = read_axis(truth, place)
-    return lambda found: compare_axis(found, axis)
+    return lambda road: compare_axis(road, axis)
 
 
 def _job(arguments: argparse.Namespace) -> ReconstructionJob:
@@ -136,16 +136,16 @@ def _write(road: ReconstructedRoad, folder: Path, no_picture: bool) -> None:
     from synthroads_addon.road.geometry import RoadGeometry
     from synthroads_addon.road.tessellation import sample_stations
 
-    found = road.found
-    geometry = RoadGeometry(found.parameters)
-    (folder / PARAMETERS).write_text(found.parameters.to_json(), encoding="utf-8")
+    result = road.found
+    geometry = RoadGeometry(result.parameters)
+    (folder / PARAMETERS).write_text(result.parameters.to_json(), encoding="utf-8")
     line = centerline_geojson(geometry, sample_stations(geometry, 0.005))
-    line["features"][0]["properties"]["doubtful"] = found.judgement.to_dict()["doubtful"]
+    line["features"][0]["properties"]["doubtful"] = result.judgement.to_dict()["doubtful"]
     (folder / CENTRELINE).write_text(canonical_json(line), encoding="utf-8")
     if not no_picture:
         from synthroads_addon.reconstruction.picture import draw
 
-        draw(found, road.cloud, folder / PICTURE)
+        draw(result, road.cloud, folder / PICTURE)
 
 
 def summary(result: dict[str, Any], output: Path) -> str:

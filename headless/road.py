@@ -113,12 +113,12 @@ def _compare(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.jobs.whole_road import differences_from
 
     scenario = load_scenario(arguments.scenario, all_changes(arguments, _FIELDS))
-    found, _ = differences_from(arguments.file, arguments.against, scenario, arguments.axis_name)
-    rows = [one._asdict() for one in found]
+    differences, _ = differences_from(arguments.file, arguments.against, scenario, arguments.axis_name)
+    rows = [one._asdict() for one in differences]
     report = {"file": str(arguments.file), "against": str(arguments.against), "differences": rows}
     cells = [
         (one.field, str(one.old), str(one.new), "" if one.station is None else f"at station {one.station:.1f} m")
-        for one in found
+        for one in differences
     ]
     if not cells:
         return 0, report, "no field differs"

@@ -92,9 +92,10 @@ def better_row(row: Mapping[str, Any], others: Iterable[Mapping[str, Any]], nois
     """
 
     def as_accurate(other: Mapping[str, Any]) -> bool:
-        found = other["errors"]
+        other_errors = other["errors"]
         return all(
-            name in found and abs(found[name]) <= (1.0 + ALIKE) * abs(error) for name, error in row["errors"].items()
+            name in other_errors and abs(other_errors[name]) <= (1.0 + ALIKE) * abs(error)
+            for name, error in row["errors"].items()
         )
 
     faster = [other for other in others if other["seconds"] < row["seconds"] * (1.0 - noise) and as_accurate(other)]

@@ -122,9 +122,9 @@ def remove_remains(folder: Path) -> None:
             remove_scene(folder, number)
 
 
-def write_wanted(folder: Path, wanted: range) -> None:
+def write_wanted(folder: Path, scenes: range) -> None:
     """Say which scenes are wanted by now: in their order those of them are made that aren't there."""
-    write_atomically(folder / WANTED, json.dumps([wanted.start, wanted.stop]))
+    write_atomically(folder / WANTED, json.dumps([scenes.start, scenes.stop]))
 
 
 def read_wanted(folder: Path) -> range:

@@ -95,13 +95,13 @@ class RoadSource:
         scenario = self.scenario
         if self.parameters:
             return read_parameters(self.parameters), {}
-        wanted = (self.axis_name, self.axis_place, self.round_kinks, self.deviations)
+        options = (self.axis_name, self.axis_place, self.round_kinks, self.deviations)
         if self.road:
-            parameters, report = road_from_file(self.road, scenario, *wanted)
+            parameters, report = road_from_file(self.road, scenario, *options)
             return parameters, {"axis": report}
         if self.axis:
             with draw_refused_fit(self.pictures):
-                axis, limits, report = axis_from_file(self.axis, scenario.road, scenario.seed, *wanted)
+                axis, limits, report = axis_from_file(self.axis, scenario.road, scenario.seed, *options)
             return sample_road(limits, scenario.seed, scenario.title, axis), {"axis": report}
         return sample_road(scenario.road, scenario.seed, scenario.title), {}
 

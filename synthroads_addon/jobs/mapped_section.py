@@ -119,26 +119,31 @@ def _bases(
     lanes: int, width: float | None, scenario: RoadScenario
 ) -> Iterator[tuple[dict[str, Any], StandardCrossSection]]:
     """Yield changes that give a scenario a cross-section with a number of lanes, and that cross-section."""
-    own = cross_section_of(scenario)
-    if len(own.lanes) == lanes:
-        yield {}, own
+    usual_section = cross_section_of(scenario)
+    if len(usual_section.lanes) == lanes:
+        yield {}, usual_section
     allowed = SECTIONS_OF_CLASS[scenario.design_class]
     standard = [name for name in STANDARD_CROSS_SECTIONS if len(STANDARD_CROSS_SECTIONS[name].lanes) == lanes]
-    wanted = 3.75 if width is None else width
+    lane_width = 3.75 if width is None else width
     standard.sort(
         key=lambda name: (
             name not in allowed,
-            abs(math.fsum(STANDARD_CROSS_SECTIONS[name].lanes) / lanes - wanted),
+            abs(math.fsum(STANDARD_CROSS_SECTIONS[name].lanes) / lanes - lane_width),
         )
     )
     for name in standard:
         section = STANDARD_CROSS_SECTIONS[name]
         yield {"cross_section": name, "design_class": design_class_of(name, scenario.design_class)}, section
-    widths = (own.lanes + own.lanes[-1:] * lanes)[:lanes]
+    widths = (usual_section.lanes + usual_section.lanes[-1:] * lanes)[:lanes]
     section = StandardCrossSection(
-        widths, own.hard_shoulder, own.outer_edge_strip, own.inner_edge_strip, own.median, own.verge
+        widths,
+        usual_section.hard_shoulder,
+        usual_section.outer_edge_strip,
+        usual_section.inner_edge_strip,
+        usual_section.median,
+        usual_section.verge,
     )
-    yield {"cross_section": _by_hand(section, widths, own.median)}, section
+    yield {"cross_section": _by_hand(section, widths, usual_section.median)}, section
 
 
 def _by_hand(section: StandardCrossSection, lanes: tuple[float, ...], median: float) -> FreeCrossSection:

@@ -85,8 +85,8 @@ class RoadScene:
     def build(self) -> RoadModel:
         """Build the road's model in the open file, in place of the one before, and return it."""
         settings, parameters = self.scenario.settings(), self.road.parameters
-        own = self.scenario.own_materials()
-        self.model = build_road(parameters, settings.tolerance, settings.vegetation_detail, own=own)
+        materials = self.scenario.own_materials()
+        self.model = build_road(parameters, settings.tolerance, settings.vegetation_detail, own=materials)
         self.scene = None
         return self.model
 

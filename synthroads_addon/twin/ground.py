@@ -189,8 +189,8 @@ def _toe_distance(
         every = np.repeat(station, distance.shape[1])
         offset = (edge[:, None] + np.sign(reach)[:, None] * distance).ravel()
         ground = ground_elevation(geometry, terrain, every, offset).reshape(distance.shape)
-        apart = np.abs(ground - level[:, None]) - np.maximum(distance - begin, 0.0) / terrain.batter_slope
-        return np.where(np.isnan(apart), -1.0, apart)
+        excess = np.abs(ground - level[:, None]) - np.maximum(distance - begin, 0.0) / terrain.batter_slope
+        return np.where(np.isnan(excess), -1.0, excess)
 
     steps = np.linspace(0.0, 1.0, max(2, int(np.ceil(far.max() / _FIRST_LOOK)) + 1))
     met = excess_height(far[:, None] * steps) <= 0.0

@@ -99,10 +99,10 @@ class Trace:
         about = {"type": "TwinReport", "version": "1.0", "generator": generator(), "format": name, "file": file}
         about |= {"identifier": parameters.metadata.identifier, "level_of_detail": self.level}
         traced, lost = self._rows()
-        own = {key: item.instance for key, item in parameters.objects.items()}
-        reduced = [{"id": key, "instance": own[key], "reason": reason} for key, reason in self._reduced]
+        instances = {key: item.instance for key, item in parameters.objects.items()}
+        reduced = [{"id": key, "instance": instances[key], "reason": reason} for key, reason in self._reduced]
         passes = [
-            {"id": key, "instance": own[key], "first_pass_instance": one.first, "pass_step": one.step}
+            {"id": key, "instance": instances[key], "first_pass_instance": one.first, "pass_step": one.step}
             for key, one in numbers.passes.items()
         ]
         text = compact_json(about)[:-1]

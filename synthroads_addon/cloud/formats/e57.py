@@ -290,7 +290,7 @@ class E57Reader(CloudReader):
         if not self.header.labelled:  # ours are in the unit of the notes, whatever the limits
             self._intensities = [self._limits(scan, "intensity", fields) for scan, fields in self._scanned()]
             pairs = zip(self._intensities, self._fields, strict=True)
-            given = [found for found, fields in pairs if "intensity" in fields]
+            given = [limits for limits, fields in pairs if "intensity" in fields]
             if given and None not in given:
                 self.header = replace(self.header, intensity_scale=SIXTEEN_BITS)
             elif any(given):
@@ -340,26 +340,26 @@ class E57Reader(CloudReader):
         if name not in fields:
             return None
         group = "colorLimits" if name in _CHANNELS else f"{name}Limits"
-        found: Limits | None = None
+        limits: Limits | None = None
         try:
             if scan.isDefined(group) and all(scan[group].isDefined(f"{name}{end}") for end in _ENDS):
                 low, high = (_number_of(scan[group][f"{name}{end}"]) for end in _ENDS)
-                found = (low, high)
-            if not _tells(found):
-                found = _field_limits(self._e57.StructureNode(scan["points"].prototype())[name])
+                limits = (low, high)
+            if not _tells(limits):
+                limits = _field_limits(self._e57.StructureNode(scan["points"].prototype())[name])
         except Exception as problem:
             raise InputError(
                 str(self.header.path), None, f"is an E57 file that is damaged ({_error_text(problem)})"
             ) from None
-        return found if _tells(found) else None
+        return limits if _tells(limits) else None
 
     def _color_limits(self, scan: Any, fields: set[str]) -> dict[str, Limits]:
         """Return the limits of a scan's colour channels; where none are declared, by the largest value there is."""
         limits = {name: self._limits(scan, name, fields) for name in _CHANNELS if name in fields}
         if None in limits.values():
             full = self._assumed_brightness(self._colors(), whole=False)
-            return {name: found or (0.0, full) for name, found in limits.items()}
-        return {name: found for name, found in limits.items() if found}
+            return {name: bounds or (0.0, full) for name, bounds in limits.items()}
+        return {name: bounds for name, bounds in limits.items() if bounds}
 
     def _colors(self) -> Iterator[AnyArray]:
         """Yield the stored colours of all scans, in parts, invalid ones as NaN."""

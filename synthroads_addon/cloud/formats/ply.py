@@ -166,7 +166,7 @@ class PlyReader(CloudReader):
         except BaseException:
             self._file.close()
             raise
-        self._own = {name: found for name in _own_names() if (found := self._stored_name(name))}
+        self._own = {name: stored for name in _own_names() if (stored := self._stored_name(name))}
         self._others = {} if isinstance(notes, dict) else self._names_of_others()
         used = {*"xyz", *self._own.values(), *self._others.values()}
         colored = all(name in self._own or name in self._others for name in _CHANNELS)
@@ -185,11 +185,13 @@ class PlyReader(CloudReader):
     def _names_of_others(self) -> dict[str, str]:
         """Return the properties of a file of others by the quantity that they are, as far as ours aren't there."""
         plain = {_plain(name): name for name in sorted(self._names, reverse=True)}
-        found = {what: next((plain[name] for name in names if name in plain), None) for what, names in _OTHERS.items()}
-        if not all(found[name] for name in _CHANNELS):
-            found |= dict.fromkeys(_CHANNELS)
+        names_by_kind = {
+            what: next((plain[name] for name in names if name in plain), None) for what, names in _OTHERS.items()
+        }
+        if not all(names_by_kind[name] for name in _CHANNELS):
+            names_by_kind |= dict.fromkeys(_CHANNELS)
         mine = {**{array: name for array, (name, _) in _FIELDS.items()}, "source": f"{_SCALAR}strip"}
-        return {what: name for what, name in found.items() if name and mine.get(what, what) not in self._own}
+        return {what: name for what, name in names_by_kind.items() if name and mine.get(what, what) not in self._own}
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
         """Yield the points as blocks of at most ``size``, from the file's first point on."""
@@ -228,9 +230,15 @@ class PlyReader(CloudReader):
         return self._assumed_brightness(colors(), whole=all(kind.kind in "iu" for kind in kinds))
 
     def _block(self, record: AnyArray, full: float, done: int) -> PointBlock:
-        own, others = self._own, self._others
-        stored = {c.name: record[own[ply_name(c)]] for c in columns(self.header.attributes) if ply_name(c) in own}
-        stored |= {array: record[own[name]].copy() for array, (name, _) in _FIELDS.items() if name in own}
+        stored_names, others = self._own, self._others
+        stored = {
+            c.name: record[stored_names[ply_name(c)]]
+            for c in columns(self.header.attributes)
+            if ply_name(c) in stored_names
+        }
+        stored |= {
+            array: record[stored_names[name]].copy() for array, (name, _) in _FIELDS.items() if name in stored_names
+        }
         stored |= {name: record[field].copy() for name, field in others.items() if name in (*_FIELDS, *FLAGS)}
         if "source" in others:  # from 1, as in LAS; 0 is none, which strips count as 65535
             source = self._fit(record[others["source"]], "strip", done)

@@ -74,10 +74,10 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         bare = replace(plan, records_seen_points=False, measured_layers=frozenset())
         casting = {rays: _measure_casting(replace(bare, rings=RINGS[rays])) for rays in _RAYS}
         writing = _measure_writing(files)
-        own = casting[plan.rays_per_pulse]
+        rates = casting[plan.rays_per_pulse]
         scanning = timer.stages["scan"]["seconds"]
         assert scanning is not None
-        whole = _scan_rate(files, scanning, own, writing)
+        whole = _scan_rate(files, scanning, rates, writing)
         floors = [*casting.values(), writing, whole]
         assert plan.request is not None
         if scenario.colour.source != "material":
@@ -91,7 +91,7 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         "job": seconds / least,
         "model": building / bare_mesh_seconds(plan.target.triangles),
         "panel_edit": edit / bare_mesh_seconds(edited),
-        "casting": 100.0 * own["ours"] / own["floor"],
+        "casting": 100.0 * rates["ours"] / rates["floor"],
         "writing": 100.0 * writing["ours"] / writing["floor"],
     }
     if scenario.colour.source != "material":
@@ -139,7 +139,7 @@ def _measure_casting(plan: ScanPlan) -> Rate:
 def _best_rates(ours: Callable[[], float], floor: Callable[[], float]) -> dict[str, float]:
     """Return the best rates, in millions per second, of two functions called in turn; disturbances hit both."""
     rates = [(ours(), floor()) for _ in range(_TURNS)]
-    return {"ours": max(own for own, _ in rates) / 1e6, "floor": max(bare for _, bare in rates) / 1e6}
+    return {"ours": max(rate for rate, _ in rates) / 1e6, "floor": max(bare for _, bare in rates) / 1e6}
 
 
 def _measure_writing(files: CloudFiles) -> Rate:

@@ -94,8 +94,8 @@ class ArraySink(CloudSink):
     _count: int = 0
 
     def __post_init__(self) -> None:
-        wanted, layers = self.scenario.cloud.arrays(), layer_arrays()
-        self._types = POINT_TYPES | {name: layers[name] for name in layers if name in wanted}
+        array_names, layers = self.scenario.cloud.arrays(), layer_arrays()
+        self._types = POINT_TYPES | {name: layers[name] for name in layers if name in array_names}
         self._ids = self.scheme.ids
         self._parts: dict[str, list[AnyArray]] = {name: [] for name in self._types}
 

@@ -200,8 +200,8 @@ class Objects:
 
     def _object(self, name: str, item: RoadObject, attributes: dict[str, Value], place: tuple[float, ...]) -> Element:
         """Add and return an `object` element at a place given as station, offset and height, m."""
-        found = self.frame.road_coordinates(*(np.array([value]) for value in place))
-        return self._placed(name, item, attributes, np.array([found.s[0], found.t[0], found.h[0]]))
+        coordinates = self.frame.road_coordinates(*(np.array([value]) for value in place))
+        return self._placed(name, item, attributes, np.array([coordinates.s[0], coordinates.t[0], coordinates.h[0]]))
 
     def _placed(
         self, name: str, item: RoadObject, attributes: dict[str, Value], place: Float, number: int | None = None

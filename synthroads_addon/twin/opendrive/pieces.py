@@ -179,8 +179,8 @@ def merge_similar(rows: list[tuple[float, list[float]]], end: float) -> list[tup
     ends = [start for start, _ in rows[1:]] + [end]
     for (start, coefficients), until in zip(rows[1:], ends[1:], strict=True):
         before_start, before = kept[-1]
-        apart = _shift_cubic(np.array(before), -before_start) - _shift_cubic(np.array(coefficients), -start)
-        if np.abs(apart).max() >= _TAKEN_FOR_ONE:
+        difference = _shift_cubic(np.array(before), -before_start) - _shift_cubic(np.array(coefficients), -start)
+        if np.abs(difference).max() >= _TAKEN_FOR_ONE:
             kept.append((start, coefficients))
             continue
         at = before_start + (until - before_start) * _SHARES[:4]

@@ -143,12 +143,12 @@ class LanePlan:
         return np.asarray(other.carriageway.sign * other.distances(station)[:, 0])
 
     def _widths(self, station: Float) -> Float:
-        own = self.offsets(station)
+        offsets = self.offsets(station)
         sign = self.frame.section.carriageway.sign
-        widths = sign * (own[:, 1:] - own[:, :-1])
+        widths = sign * (offsets[:, 1:] - offsets[:, :-1])
         if self.frame.has_median:
             far = self.frame.t_coordinate(station, self._far_edge(station), self.median_fall(station))
-            widths = np.column_stack([widths, sign * (own[:, 0] - far)])
+            widths = np.column_stack([widths, sign * (offsets[:, 0] - far)])
         return np.asarray(widths, dtype=np.float64)
 
     def width_at_start(self, piece: int) -> Float:

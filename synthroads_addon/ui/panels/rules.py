@@ -134,7 +134,7 @@ class SYNTHROADS_PG_violation(bpy.types.PropertyGroup):
     offset: bpy.props.FloatProperty()
     value: bpy.props.StringProperty()
     limit: bpy.props.StringProperty()
-    found: bpy.props.StringProperty(description="Both, short")
+    comparison: bpy.props.StringProperty(description="Both, short")
     text: bpy.props.StringProperty()
 
 
@@ -225,7 +225,7 @@ class SYNTHROADS_UL_violations(bpy.types.UIList):
     ) -> None:
         """Draw one row of the list."""
         names = [row.name for row in data.violations]
-        _draw_columns(layout, (f"{item.station:,.0f} m", item.name, item.found), names)
+        _draw_columns(layout, (f"{item.station:,.0f} m", item.name, item.comparison), names)
 
     def filter_items(
         self, context: bpy.types.Context, data: SYNTHROADS_PG_rules, field: str
@@ -326,7 +326,7 @@ def _fill(rules: SYNTHROADS_PG_rules, parameters: RoadParameters, violations: li
         row.rule, row.object, row.text = violation.rule, violation.object, violation.text
         row.station, row.offset = violation.station, violation_offset(geometry, violation)
         row.value, row.limit = (_write_number(number, violation.unit) for number in (violation.value, violation.limit))
-        row.found = f"{_digits(violation.value)} / {_digits(violation.limit)} {violation.unit}".removesuffix(" 1")
+        row.comparison = f"{_digits(violation.value)} / {_digits(violation.limit)} {violation.unit}".removesuffix(" 1")
     rules["index"] = -1  # past its update: nothing was clicked yet
 
 

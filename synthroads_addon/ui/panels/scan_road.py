@@ -141,19 +141,19 @@ class SYNTHROADS_PT_scan_road(Sidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the doubts with their reasons, what was measured with its deviations, and the notes."""
-        layout, found = self.layout, found_road(find_road(context.scene))
-        assert found  # poll() has seen it
-        draw_text(layout, verdict(found["judgement"]), "ERROR" if is_doubtful(found) else "CHECKMARK")
-        for station, text in doubt_lines(found["judgement"]):
+        layout, result = self.layout, found_road(find_road(context.scene))
+        assert result  # poll() has seen it
+        draw_text(layout, verdict(result["judgement"]), "ERROR" if is_doubtful(result) else "CHECKMARK")
+        for station, text in doubt_lines(result["judgement"]):
             row = layout.box().row()
             draw_text(row.column(align=True), text, share=_BOX_SHARE, beside=1)
             row.operator(SYNTHROADS_OT_show_doubt.bl_idname, text="", icon="VIEWZOOM").station = station
         measures = layout.column(align=True)
-        for text in found["measures"]:
+        for text in result["measures"]:
             draw_text(measures, text)
-        for note in found["notes"]:
+        for note in result["notes"]:
             draw_text(layout, note, "INFO")
-        layout.operator(SYNTHROADS_OT_show_cloud.bl_idname, icon="POINTCLOUD_DATA").filepath = found["cloud"]
+        layout.operator(SYNTHROADS_OT_show_cloud.bl_idname, icon="POINTCLOUD_DATA").filepath = result["cloud"]
 
 
 def found_road(road: bpy.types.Object | None) -> dict[str, Any] | None:
@@ -167,15 +167,15 @@ def found_road(road: bpy.types.Object | None) -> dict[str, Any] | None:
 @lru_cache(maxsize=4)
 def _read(text: str) -> dict[str, Any] | None:
     try:
-        found: dict[str, Any] = json.loads(text)
-        return found if {"cloud", "judgement", "measures", "notes"} <= found.keys() else None
+        result: dict[str, Any] = json.loads(text)
+        return result if {"cloud", "judgement", "measures", "notes"} <= result.keys() else None
     except (TypeError, ValueError, AttributeError):  # edited by hand
         return None
 
 
-def is_doubtful(found: dict[str, Any]) -> bool:
+def is_doubtful(result: dict[str, Any]) -> bool:
     """Return whether any stretch of a found road isn't to be trusted."""
-    return any(True for _ in doubt_lines(found["judgement"]))
+    return any(True for _ in doubt_lines(result["judgement"]))
 
 
 def verdict(judgement: dict[str, Any]) -> str:

@@ -46,11 +46,11 @@ class SYNTHROADS_OT_look_through(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Make `camera` the scene's camera and show its view."""
-        found = dict(cameras_of(context.scene)).get(self.camera)
-        if found is None:
+        camera = dict(cameras_of(context.scene)).get(self.camera)
+        if camera is None:
             self.report({"ERROR"}, "Add the cameras first")
             return {"CANCELLED"}
-        context.scene.camera = found
+        context.scene.camera = camera
         space = view_of(context)
         if space:
             space.region_3d.view_perspective = "CAMERA"

@@ -141,14 +141,18 @@ def build_work(scenario: Scenario, built_from: str, place: BuildTarget = MEANT) 
 
 
 def road_work(
-    parameters: RoadParameters, scenario: Scenario, built_from: str, place: BuildTarget = MEANT, found: str = ""
+    parameters: RoadParameters,
+    scenario: Scenario,
+    built_from: str,
+    place: BuildTarget = MEANT,
+    reconstruction: str = "",
 ) -> Work[RoadModel]:
     """Generator that builds a road from given parameters, as a job's work; see `build_work` and `remember`."""
     fidelity = scenario.settings()
     yield Step(0.02, "Building")
     steps = build_steps(parameters, fidelity.tolerance, fidelity.vegetation_detail, place=place)
     model = yield from part_of_work(build_unseen(steps), 0.02, 1.0)
-    remember(model.root, parameters, scenario, built_from, found)
+    remember(model.root, parameters, scenario, built_from, reconstruction)
     if place.beside:
         move_beside(model.root, bpy.context.view_layer)
     return model

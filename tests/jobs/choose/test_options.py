@@ -38,11 +38,11 @@ def every(knobs: Table) -> list[Option]:
 
 
 def keeps(choice: Option, limits: dict[str, float]) -> bool:
-    return all(choice.found[kind][1] <= limit for kind, limit in limits.items())
+    return all(choice.errors[kind][1] <= limit for kind, limit in limits.items())
 
 
 def loss(choice: Option) -> float:
-    return max(estimate for estimate, _ in choice.found.values())
+    return max(estimate for estimate, _ in choice.errors.values())
 
 
 @given(tables(), limits_of)
