@@ -77,12 +77,12 @@ def run(arguments: argparse.Namespace) -> Outcome:
         return 0, result, canonical_json(result)
     _check(arguments)
     figures: dict[str, Any] = {}
-    kept = _read_kept(arguments)
+    former_figures = _read_kept(arguments)
 
     def measure() -> dict[str, str]:
         figures.update(_measure_all(arguments))
-        if kept:
-            figures["runs"] = join_runs(kept["runs"], figures["runs"])
+        if former_figures:
+            figures["runs"] = join_runs(former_figures["runs"], figures["runs"])
         add_scaling(figures["runs"])
         return {TABLE: markdown(figures)}
 
@@ -107,10 +107,10 @@ def _check(arguments: argparse.Namespace) -> None:
     for cores in arguments.cores:
         if not 1 <= cores <= available_cores():
             raise InputError("--cores", cores, f"must be 1 to {available_cores()}, the cores that are there")
-    beside = arguments.beside
-    if beside and not (beside / "synthroads_addon" / "__init__.py").is_file():
-        raise InputError(_BESIDE, str(beside), "must be a folder that holds the package synthroads_addon")
-    if arguments.parts == ["start"] and not beside:
+    version_folder = arguments.beside
+    if version_folder and not (version_folder / "synthroads_addon" / "__init__.py").is_file():
+        raise InputError(_BESIDE, str(version_folder), "must be a folder that holds the package synthroads_addon")
+    if arguments.parts == ["start"] and not version_folder:
         raise InputError("--parts", arguments.parts, f"start is measured beside another version: {_BESIDE} names it")
 
 
@@ -164,11 +164,13 @@ def _read_kept(arguments: argparse.Namespace) -> dict[str, Any] | None:
         raise InputError("--resume", None, "can't be given with --overwrite, which keeps nothing")
     if not path.is_file():
         return None
-    kept: dict[str, Any] = read_json(path)
+    former_figures: dict[str, Any] = read_json(path)
     for name, now in (("machine", _machine()), ("quick", arguments.quick)):
-        if kept.get(name) != now:
-            raise InputError(f"{path}: {name}", kept.get(name), f"must be {now!r}, as now; --overwrite replaces it")
-    return kept
+        if former_figures.get(name) != now:
+            raise InputError(
+                f"{path}: {name}", former_figures.get(name), f"must be {now!r}, as now; --overwrite replaces it"
+            )
+    return former_figures
 
 
 def _measure_in_process(part: dict[str, Any], cores: int) -> dict[str, Any]:
@@ -181,10 +183,10 @@ def _json_of(command: Sequence[str], name: str, cores: int, path: Path | None = 
     """Run a command on so many cores, with a folder on Python's path; return the JSON that it prints last."""
     environment = os.environ | ({"PYTHONPATH": str(path)} if path else {})
     with cores_of_children(cores):
-        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
-    if done.returncode:
-        raise RuntimeError(f"{name} failed: {done.stderr.strip()}")
-    result: dict[str, Any] = json.loads(done.stdout[done.stdout.index("{") :])
+        process = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    if process.returncode:
+        raise RuntimeError(f"{name} failed: {process.stderr.strip()}")
+    result: dict[str, Any] = json.loads(process.stdout[process.stdout.index("{") :])
     return result
 
 

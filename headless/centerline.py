@@ -109,8 +109,8 @@ def summary(result: dict[str, Any], output: Path) -> str:
     std = result["std"]
     lines = [f"{result['road']} carriageway, centreline of {result['length']:.0f} m (std {std['mean']:.2f} m)"]
     for view in result["views"]:
-        beside = view["from_centreline"].get("rms")
-        distance_text = "" if beside is None else f", {beside:.2f} m rms from it"
+        distance = view["from_centreline"].get("rms")
+        distance_text = "" if distance is None else f", {distance:.2f} m rms from it"
         lines.append(f"  {view['name']}: seen on {view['seen']:.0%}, agrees on {view['used']:.0%}{distance_text}")
     lines.append(f"  network: {result['network']['why']}")
     lines += [f"  {line}" for line in reservation_lines(result)]

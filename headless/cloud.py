@@ -39,9 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     change = tools.add_parser("convert", help="write another format, or merge classes")
     _file_arguments(change)
     _preview_arguments(tools.add_parser("preview", help="draw the cloud from above and in cross-section"))
-    together = tools.add_parser("merge", help="put several clouds into one")
-    together.add_argument("files", type=Path, nargs="+", metavar="FILE", help="clouds, in the order of their points")
-    together.add_argument("--output", required=True, type=Path, metavar="FILE", help="file to write")
+    merging = tools.add_parser("merge", help="put several clouds into one")
+    merging.add_argument("files", type=Path, nargs="+", metavar="FILE", help="clouds, in the order of their points")
+    merging.add_argument("--output", required=True, type=Path, metavar="FILE", help="file to write")
     part = tools.add_parser("crop", help="keep the points within a box, heights or a polygon")
     _file_arguments(part)
     _crop_arguments(part)
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _tile_arguments(tiles)
     for tool in (thin, change):
         tool.add_argument("--classes", metavar="NAME_OR_FILE", help="5, or a .json file of classes (as in the cloud)")
-    for tool in (thin, mapping, change, together, part, tiles):
+    for tool in (thin, mapping, change, merging, part, tiles):
         tool.add_argument("--overwrite", action="store_true", help="replace a file that is already there")
 
 
@@ -94,8 +94,8 @@ def _predicted_lines(figures: dict[str, Any]) -> list[str]:
         for name, row in figures["predicted_classes"].items()
     ]
     titles = ("predicted_class", "points", "share", f"IoU with {figures['class_field']}")
-    kept = len(titles) if agreement else len(titles) - 1
-    lines = ["", *text_table(titles[:kept], [row[:kept] for row in rows], range(1, kept))]
+    columns = len(titles) if agreement else len(titles) - 1
+    lines = ["", *text_table(titles[:columns], [row[:columns] for row in rows], range(1, columns))]
     if agreement and agreement["share"] is not None:
         agreement_text = (
             f"{figures['class_field']}: the same class for {agreement['share']:.1%} of {agreement['points']:,} points"
@@ -155,8 +155,8 @@ def _tile_arguments(parser: argparse.ArgumentParser) -> None:
 def _merge(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.cloud.tools.divide import merge
 
-    done = merge(arguments.files, arguments.output, arguments.overwrite, progress_bar(arguments))
-    return 0, done, f"{done['points']:,} points of {len(arguments.files)} clouds written to {arguments.output}"
+    result = merge(arguments.files, arguments.output, arguments.overwrite, progress_bar(arguments))
+    return 0, result, f"{result['points']:,} points of {len(arguments.files)} clouds written to {arguments.output}"
 
 
 def _crop(arguments: argparse.Namespace) -> Outcome:
@@ -164,17 +164,17 @@ def _crop(arguments: argparse.Namespace) -> Outcome:
 
     box, heights = (None if part is None else tuple(part) for part in (arguments.box, arguments.heights))
     where = (box, heights, arguments.polygon)
-    done = crop(arguments.file, arguments.output, *where, arguments.overwrite, progress_bar(arguments))
-    return 0, done, f"{done['points']:,} of {done['points_read']:,} points written to {arguments.output}"
+    result = crop(arguments.file, arguments.output, *where, arguments.overwrite, progress_bar(arguments))
+    return 0, result, f"{result['points']:,} of {result['points_read']:,} points written to {arguments.output}"
 
 
 def _tile(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.cloud.tools.divide import tile
 
     settings = (arguments.size, arguments.grid, arguments.fewest, arguments.format, arguments.overwrite)
-    done = tile(arguments.file, arguments.output, *settings, progress_bar(arguments))
-    points = sum(row["points"] for row in done["tiles"])
-    return 0, done, f"{len(done['tiles'])} tiles with {points:,} points written to {arguments.output}"
+    result = tile(arguments.file, arguments.output, *settings, progress_bar(arguments))
+    points = sum(row["points"] for row in result["tiles"])
+    return 0, result, f"{len(result['tiles'])} tiles with {points:,} points written to {arguments.output}"
 
 
 def _info(arguments: argparse.Namespace) -> Outcome:
@@ -190,33 +190,33 @@ def _subsample(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.cloud.tools.convert import subsample
 
     settings = (arguments.grid, arguments.classes, arguments.overwrite)
-    done = subsample(arguments.file, arguments.output, *settings, progress_bar(arguments))
-    return 0, done, f"{done['points']:,} of {done['points_read']:,} points written to {arguments.output}"
+    result = subsample(arguments.file, arguments.output, *settings, progress_bar(arguments))
+    return 0, result, f"{result['points']:,} of {result['points_read']:,} points written to {arguments.output}"
 
 
 def _map_intensity(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.cloud.tools.convert import map_intensity
 
     files = (arguments.file, arguments.target, arguments.output)
-    done = map_intensity(*files, arguments.per_class, arguments.overwrite, progress_bar(arguments))
-    lines = [f"{done['points']:,} points written to {arguments.output}"]
-    before, after = done["distance_before"], done["distance_after"]
+    result = map_intensity(*files, arguments.per_class, arguments.overwrite, progress_bar(arguments))
+    lines = [f"{result['points']:,} points written to {arguments.output}"]
+    before, after = result["distance_before"], result["distance_after"]
     lines.append(f"largest gap between the distributions (Kolmogorov-Smirnov): {before:.4f} before, {after:.6f} after")
-    lines += [f"  {name}: {gap:.6f}" for name, gap in done.get("class_distances", {}).items()]
-    if done.get("classes_mapped_together"):
-        names = ", ".join(done["classes_mapped_together"])
+    lines += [f"  {name}: {gap:.6f}" for name, gap in result.get("class_distances", {}).items()]
+    if result.get("classes_mapped_together"):
+        names = ", ".join(result["classes_mapped_together"])
         lines.append(f"not in the target, mapped together on all its points: {names}")
-    return 0, done, "\n".join(lines)
+    return 0, result, "\n".join(lines)
 
 
 def _convert(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.cloud.tools.convert import convert
 
-    done = convert(arguments.file, arguments.output, arguments.classes, arguments.overwrite, progress_bar(arguments))
-    lines = [f"{done['points']:,} points written to {arguments.output}"]
-    if done["left_out"]:
-        lines.append(f"left out, for want of a meaning here: {', '.join(done['left_out'])}")
-    return 0, done, "\n".join(lines)
+    result = convert(arguments.file, arguments.output, arguments.classes, arguments.overwrite, progress_bar(arguments))
+    lines = [f"{result['points']:,} points written to {arguments.output}"]
+    if result["left_out"]:
+        lines.append(f"left out, for want of a meaning here: {', '.join(result['left_out'])}")
+    return 0, result, "\n".join(lines)
 
 
 def _preview(arguments: argparse.Namespace) -> Outcome:
@@ -227,7 +227,7 @@ def _preview(arguments: argparse.Namespace) -> Outcome:
     if arguments.centerline:
         with open_cloud(arguments.file) as cloud:
             line = read_centerline(arguments.centerline, cloud.header.place)
-    done = draw_previews(
+    result = draw_previews(
         arguments.file,
         arguments.output,
         line=tuple(arguments.line) if arguments.line else None,
@@ -237,9 +237,9 @@ def _preview(arguments: argparse.Namespace) -> Outcome:
         overwrite=arguments.overwrite,
         only=arguments.picture,
     )
-    folder = arguments.output.parent if arguments.output.name in done["pictures"] else arguments.output
-    lines = [f"{name} shows {field}" for name, field in done["fields"].items()]
-    return 0, done, "\n".join([*lines, f"written to {folder}"])
+    folder = arguments.output.parent if arguments.output.name in result["pictures"] else arguments.output
+    lines = [f"{name} shows {field}" for name, field in result["fields"].items()]
+    return 0, result, "\n".join([*lines, f"written to {folder}"])
 
 
 def _positive(text: str) -> float:

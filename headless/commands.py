@@ -380,10 +380,10 @@ def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Nam
     except Exception as error:
         if was_stopped():  # which libraries turn into errors of their own, and workers into the loss of them
             return report_interrupt()
-        told = _error_line(error)
-        if told is None:
+        message = _error_line(error)
+        if message is None:
             raise
-        print(told, file=sys.stderr)
+        print(message, file=sys.stderr)
         return 2
 
 

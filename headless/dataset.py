@@ -83,9 +83,9 @@ def _verify(folder: Path) -> Outcome:
 
 def summary(manifest: Manifest, folder: Path) -> str:
     """Return a line on the scenes and points that were made, and where they are."""
-    done = [scene for scene in manifest.scenes if scene.status == "done"]
-    points = sum(scene.points or 0 for scene in done)
-    return f"{len(done)} of {len(manifest.scenes)} scenes, {points:,} points\nwritten to {folder}"
+    scenes = [scene for scene in manifest.scenes if scene.status == "done"]
+    points = sum(scene.points or 0 for scene in scenes)
+    return f"{len(scenes)} of {len(manifest.scenes)} scenes, {points:,} points\nwritten to {folder}"
 
 
 if __name__ == "__main__":

@@ -73,7 +73,7 @@ def add_without_argument(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads generate`; return exit code, the job's report as JSON data and printed text."""
-    begun = time.perf_counter()
+    start = time.perf_counter()
     _check_road_changes(arguments)
     scenario = load_scenario(arguments.scenario, [*choice_changes(arguments), *all_changes(arguments, _FIELDS)])
     scenario = scenario_without(scenario, arguments.without)
@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.jobs.generate import Job, generate
 
     files = (arguments.output, arguments.parameters, arguments.axis, arguments.axis_name, axis_place(arguments))
-    job = Job(scenario, *files, arguments.overwrite, arguments.road, new_file=True, begun=begun)
+    job = Job(scenario, *files, arguments.overwrite, arguments.road, new_file=True, begun=start)
     report = generate(job, progress_bar(arguments))
     return 0, report, summary(report, arguments.output)
 
@@ -93,10 +93,10 @@ def _check_road_changes(arguments: argparse.Namespace) -> None:
     from synthroads_addon.jobs.generate import FROM_AXIS, FROM_ROAD
 
     option = "--parameters" if arguments.parameters else "--axis" if arguments.axis else "--road"
-    said = FROM_ROAD if arguments.road else FROM_AXIS
+    fields = FROM_ROAD if arguments.road else FROM_AXIS
     for change in arguments.changes:
         for name in _road_fields(change):
-            if arguments.parameters or name in said:
+            if arguments.parameters or name in fields:
                 what = "course and place of the road" if arguments.axis else "the whole road"
                 text = f"road.{name} has no effect with {option}, whose file says {what}; leave one of the two out"
                 raise InputError("--set", change, text)

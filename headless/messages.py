@@ -44,7 +44,7 @@ _endings: list[Callable[[], None]] = []
 def messages(arguments: argparse.Namespace) -> Iterator[None]:
     """Context that logs to standard error as a command's flags say, and removes its progress display at the end."""
     set_up(arguments)
-    begun = time.perf_counter()
+    start = time.perf_counter()
     if logger.isEnabledFor(logging.DEBUG):
         import platform
 
@@ -65,7 +65,7 @@ def messages(arguments: argparse.Namespace) -> Iterator[None]:
         logger.removeFilter(remarks)
         while _endings:
             _endings.pop()()
-        logger.debug("all: took %.2f s", time.perf_counter() - begun)
+        logger.debug("all: took %.2f s", time.perf_counter() - start)
 
 
 def _log_warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
@@ -196,11 +196,11 @@ class _LineProgress:
         self._seen.add(self._stage)
         self._last = now
         after = f"after {now - self._begun:.0f} s"
-        told = f"{100.0 * self._share:.0f} % {after}" if self._rate.began else f"at work {after}"
+        state = f"{100.0 * self._share:.0f} % {after}" if self._rate.began else f"at work {after}"
         left = self._rate.left(now)
-        told += "" if left is None else f", about {duration(left)} left"
+        state += "" if left is None else f", about {duration(left)} left"
         detail = getattr(self._stage, "detail", "")
-        line = f"{self._stage}: {told}{f' ({detail})' if detail else ''}"
+        line = f"{self._stage}: {state}{f' ({detail})' if detail else ''}"
         if self._held is None:
             logger.info(line)
         else:

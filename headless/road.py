@@ -88,20 +88,20 @@ def run(arguments: argparse.Namespace) -> Outcome:
             round_kinks=arguments.round_kinks,
             deviations=folder / PICTURE,
         )
-        parameters, told = source.read()
-        report = told["axis"]
+        parameters, report_parts = source.read()
+        report = report_parts["axis"]
         road = RoadGeometry(parameters)
         (folder / PARAMETERS).write_text(parameters.to_json(), encoding="utf-8")
         line = centerline_geojson(road, sample_stations(road, scenario.settings().tolerance))
         (folder / CENTRELINE).write_text(canonical_json(line), encoding="utf-8")
         report |= {"remarks": remarks_so_far()}
         (folder / REPORT).write_text(canonical_json(report), encoding="utf-8")
-    lost = [text for text in report.get("left_out", []) if text.startswith(_SURFACE)]
-    lost += ["surface"] if report.get("whole", {}).get("surface_lost") else []
+    losses = [text for text in report.get("left_out", []) if text.startswith(_SURFACE)]
+    losses += ["surface"] if report.get("whole", {}).get("surface_lost") else []
     lines = [axis_summary(report), *report.get("summary", [])]
     lines += [f"left out: {text}" for text in report.get("left_out", [])]
     text = "\n".join([*lines, f"written to {arguments.output}"])
-    return 3 if lost and not arguments.only_axis else 0, report, text
+    return 3 if losses and not arguments.only_axis else 0, report, text
 
 
 def _compare(arguments: argparse.Namespace) -> Outcome:

@@ -87,14 +87,14 @@ def _origin(text: str) -> tuple[float, ...] | str:
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads scan`; return exit code, the job's report as JSON data and printed text."""
-    begun = time.perf_counter()
+    start = time.perf_counter()
     scenario = scenario_without(scenario_of(arguments), arguments.without)
     detail("scenario", scenario.to_dict())
     from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 
     same = {name: getattr(arguments, name) for name in _SAME}
     job = SceneScan(
-        scenario=scenario, tripods=tuple(arguments.tripod), also_from=tuple(arguments.also_from), begun=begun, **same
+        scenario=scenario, tripods=tuple(arguments.tripod), also_from=tuple(arguments.also_from), begun=start, **same
     )
     report = scan_scene(job, progress_bar(arguments))
     return 0, report, summary(report, arguments.output)

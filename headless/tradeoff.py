@@ -187,10 +187,10 @@ def _measure_row(scene: str, knob: str, value: Any) -> dict[str, Any]:
 def _measured_once(scene: str, knob: str, value: Any) -> dict[str, Any]:
     request = json.dumps({"scenario": scene, "knob": knob, "value": value})
     line = [sys.executable, str(Path(__file__).resolve()), "--output", ".", _ROW, request, "--json"]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise RuntimeError(f"{scene}: {knob} = {value} failed: {done.stderr.strip()}")
-    result: dict[str, Any] = json.loads(done.stdout)
+    process = subprocess.run(line, capture_output=True, text=True, check=False)
+    if process.returncode:
+        raise RuntimeError(f"{scene}: {knob} = {value} failed: {process.stderr.strip()}")
+    result: dict[str, Any] = json.loads(process.stdout)
     return result
 
 

@@ -67,8 +67,8 @@ def row_fault(row: Any, knob: str, value: Any) -> str | None:
     several = row.get("all_seconds", [1.0])
     if not isinstance(several, list) or not all(is_number(one) and one > 0.0 for one in several):
         return "all_seconds must be a list of numbers above 0"
-    wrong = next((name for name in ("machine", "colour_truth") if not isinstance(row.get(name, ""), str)), None)
-    return wrong and f"{wrong} must be a text"
+    faulty_field = next((name for name in ("machine", "colour_truth") if not isinstance(row.get(name, ""), str)), None)
+    return faulty_field and f"{faulty_field} must be a text"
 
 
 def measured_rows(results: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:

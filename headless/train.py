@@ -36,9 +36,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
     configuration = load_configuration(arguments.configuration, arguments.changes)
     detail("configuration", configuration.to_dict())
-    begun = Run.start(arguments.output, configuration, resume=arguments.resume, overwrite=arguments.overwrite)
-    note_at_interrupt(lambda: _kept(arguments, begun))
-    metrics = task(configuration.task).train(begun, progress_bar(arguments))
+    training = Run.start(arguments.output, configuration, resume=arguments.resume, overwrite=arguments.overwrite)
+    note_at_interrupt(lambda: _kept(arguments, training))
+    metrics = task(configuration.task).train(training, progress_bar(arguments))
     return 0, metrics, f"trained {arguments.output}: {summary(metrics)}"
 
 
@@ -51,10 +51,10 @@ def _kept(arguments: argparse.Namespace, run: Run[Any]) -> str:
     if not run.begun and not run.kept:
         return f"nothing was changed in {arguments.output}: it was still reading data"
     epochs = run.configuration.schedule.epochs
-    kept = f"epoch {run.kept} of {epochs} is kept" if run.kept else f"no epoch of {epochs} was finished"
+    state = f"epoch {run.kept} of {epochs} is kept" if run.kept else f"no epoch of {epochs} was finished"
     if not run.kept and (arguments.output / PRETRAINING / CHECKPOINT).is_file():
-        kept = "the pretraining's epochs are kept"
-    return f"{kept} in {arguments.output}; go on with: {shlex.join(['synthroads', 'train', *given])}"
+        state = "the pretraining's epochs are kept"
+    return f"{state} in {arguments.output}; go on with: {shlex.join(['synthroads', 'train', *given])}"
 
 
 def summary(metrics: dict[str, object]) -> str:

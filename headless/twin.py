@@ -98,9 +98,9 @@ def _written(path: Path) -> str:
     return f"written {path} ({path.stat().st_size / 1e6:.2f} MB)"
 
 
-def _line(report: Path, lost: dict[str, int]) -> str:
+def _line(report: Path, reasons: dict[str, int]) -> str:
     """Return a line of text on a format's report: its file name, and how many instances are missing and why."""
-    nothing = "; ".join(f"{count} not: {reason}" for reason, count in lost.items())
+    nothing = "; ".join(f"{count} not: {reason}" for reason, count in reasons.items())
     return f"        {report.name}: what became of each instance number{f'; {nothing}' if nothing else ''}"
 
 

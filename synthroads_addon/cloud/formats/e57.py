@@ -300,7 +300,7 @@ class E57Reader(CloudReader):
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
         """Yield the points of one scan after the other, in map coordinates, without invalid ones."""
-        done = 0
+        position = 0
         for number, (scan, fields, count) in enumerate(zip(self._scans, self._fields, self._counts, strict=True)):
             names = [name for name in sorted(_FIXED.keys() | _FLAGGED.keys() | self._layer_names()) if name in fields]
             intensities, colors = self._intensities[number], self._color_limits(scan, fields)
@@ -313,18 +313,18 @@ class E57Reader(CloudReader):
                     reader = reader or scan["points"].reader(buffers)
                     got = reader.read()
                 except Exception:
-                    raise damage_error(self.header.path, done, self.header.count) from None
+                    raise damage_error(self.header.path, position, self.header.count) from None
                 if got == 0:
-                    raise damage_error(self.header.path, done, self.header.count)
+                    raise damage_error(self.header.path, position, self.header.count)
                 part = {name: array[:got] for name, array in arrays.items()}
                 self._scale(part, intensities, colors)
-                block = self._block(part, got, _pose(scan), done)
+                block = self._block(part, got, _pose(scan), position)
                 if "cartesianInvalidState" in part and (invalid := part["cartesianInvalidState"] != _VALID).any():
                     self._remarks["points have no valid coordinates and are left out"] += int(np.count_nonzero(invalid))
                     block = block.select(~invalid)
-                check_coordinates(self.header.path, done, block.xyz)
+                check_coordinates(self.header.path, position, block.xyz)
                 yield block
-                done, left = done + got, left - got
+                position, left = position + got, left - got
             if reader:
                 reader.close()
 
@@ -408,7 +408,9 @@ class E57Reader(CloudReader):
             self._remarks[f"points have {what} beyond the file's limits: they are clipped to these limits"] += count
         return np.clip(share, 0.0, 1.0)
 
-    def _block(self, arrays: dict[str, AnyArray], count: int, pose: tuple[AnyArray, AnyArray], done: int) -> PointBlock:
+    def _block(
+        self, arrays: dict[str, AnyArray], count: int, pose: tuple[AnyArray, AnyArray], position: int
+    ) -> PointBlock:
         rotation, translation = pose
         present = [column for column in columns(self.header.attributes) if e57_name(column) in arrays]
         stored = {column.name: arrays[e57_name(column)].copy() for column in present}
@@ -420,7 +422,7 @@ class E57Reader(CloudReader):
             stored["return_number"] = np.ones(count, dtype=np.uint8)
         dark = np.zeros(count)
         stored["rgb"] = np.stack([arrays.get(name, dark) for name in _CHANNELS], axis=1)
-        return self._points(stored, count, done)
+        return self._points(stored, count, position)
 
 
 def _tells(limits: Limits | None) -> bool:

@@ -202,12 +202,12 @@ class PlyReader(CloudReader):
             assume(f"{self.header.path.name}: its property {label} is read as LAS codes of classes")
         full = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
         self._file.seek(self._start)
-        for done in range(0, self.header.count, size):
-            rows = min(size, self.header.count - done)
+        for position in range(0, self.header.count, size):
+            rows = min(size, self.header.count - position)
             data = self._file.read(rows * self._type.itemsize)
             if len(data) != rows * self._type.itemsize:
-                raise damage_error(self.header.path, done, self.header.count)
-            yield self._block(np.frombuffer(data, dtype=self._type), full, done)
+                raise damage_error(self.header.path, position, self.header.count)
+            yield self._block(np.frombuffer(data, dtype=self._type), full, position)
 
     def _channels(self) -> list[str]:
         """Return the names of the properties of red, green and blue."""
@@ -221,15 +221,15 @@ class PlyReader(CloudReader):
 
         def colors() -> Iterator[AnyArray]:
             self._file.seek(self._start)
-            for done in range(0, self.header.count, PEEK):
-                rows = min(PEEK, self.header.count - done)
+            for position in range(0, self.header.count, PEEK):
+                rows = min(PEEK, self.header.count - position)
                 data = self._file.read(rows * self._type.itemsize)
                 record = np.frombuffer(data[: len(data) // self._type.itemsize * self._type.itemsize], dtype=self._type)
                 yield np.stack([record[name] for name in self._channels()])
 
         return self._assumed_brightness(colors(), whole=all(kind.kind in "iu" for kind in kinds))
 
-    def _block(self, record: AnyArray, full: float, done: int) -> PointBlock:
+    def _block(self, record: AnyArray, full: float, position: int) -> PointBlock:
         stored_names, others = self._own, self._others
         stored = {
             c.name: record[stored_names[ply_name(c)]]
@@ -241,15 +241,15 @@ class PlyReader(CloudReader):
         }
         stored |= {name: record[field].copy() for name, field in others.items() if name in (*_FIELDS, *FLAGS)}
         if "source" in others:  # from 1, as in LAS; 0 is none, which strips count as 65535
-            source = self._fit(record[others["source"]], "strip", done)
+            source = self._fit(record[others["source"]], "strip", position)
             stored["strip"] = source - np.uint16(1)
         if not self.header.labelled:
             stored["class_id"] = record[others["class"]] if "class" in others else np.zeros(len(record))
         xyz = np.stack([record[name].astype(np.float64) for name in "xyz"], axis=1)
-        stored["xyz"] = check_coordinates(self.header.path, done, xyz)
+        stored["xyz"] = check_coordinates(self.header.path, position, xyz)
         if self.header.has_color:
             stored["rgb"] = sixteen_bits(np.stack([record[name] for name in self._channels()], axis=1), full)
-        return self._points(stored, len(record), done)
+        return self._points(stored, len(record), position)
 
 
 def _own_names() -> tuple[str, ...]:

@@ -176,8 +176,8 @@ class CloudWriter(ABC):
         fits = np.abs(values) <= most  # NaN isn't
         if not fits.all():
             worst = values[~fits.reshape(len(values), -1).all(axis=1)][0]
-            told = "finite" if not np.isfinite(worst).all() else f"at most {most:.2g}, as the format stores it"
-            raise OutputError(str(self.path), worst.tolist(), f"{name} must be {told}")
+            allowed_range = "finite" if not np.isfinite(worst).all() else f"at most {most:.2g}, as the format stores it"
+            raise OutputError(str(self.path), worst.tolist(), f"{name} must be {allowed_range}")
         return values
 
     def fit_values(self, values: AnyArray, kind: str, name: str) -> AnyArray:

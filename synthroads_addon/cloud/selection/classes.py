@@ -83,16 +83,16 @@ def read_real_cloud(path: Path, attribute: str | None = None, field: str = "--cl
     """
     with open_cloud(path) as cloud:
         header = cloud.header
-        blocks, kept = [], []
+        blocks, masks = [], []
         for block in cloud.blocks():
-            kept.append(cloud.usable_points(block, noise=attribute is not None))
-            blocks.append(without_flags(block.select(kept[-1])))
+            masks.append(cloud.usable_points(block, noise=attribute is not None))
+            blocks.append(without_flags(block.select(masks[-1])))
     if not sum(map(len, blocks)):
         raise InputError(str(path), 0, "has no points")
     points = concatenate(blocks)
     label = points.class_id.astype(np.int64)
     if attribute is not None:
-        label = _attribute(path, attribute, field)[np.concatenate(kept)]
+        label = _attribute(path, attribute, field)[np.concatenate(masks)]
     return RealCloud(
         xyz=points.xyz,
         intensity=points.intensity * (header.intensity_scale or 1.0),

@@ -244,6 +244,6 @@ def match_density(one: Patches, other: Patches, seed: int, most: int) -> tuple[P
         fewer = min(map(len, rows))
         for taken, its_rows in zip(chosen, rows, strict=True):
             taken.append(its_rows[:fewer])
-    kept = [np.concatenate([*taken, np.zeros(0, np.int64)]) for taken in chosen]
-    use = random.permutation(len(kept[0]))[:most]
-    return one.select(kept[0][use]), other.select(kept[1][use])
+    all_rows = [np.concatenate([*taken, np.zeros(0, np.int64)]) for taken in chosen]
+    use = random.permutation(len(all_rows[0]))[:most]
+    return one.select(all_rows[0][use]), other.select(all_rows[1][use])

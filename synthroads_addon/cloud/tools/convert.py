@@ -136,15 +136,15 @@ def draw_previews(
         InputError: the cloud can't be read, has no points or not what a picture shows, or the cut lies outside of it.
         OutputError: a picture is there already or can't be written.
     """
-    alone = output if output.suffix.lower() == ".png" and not output.is_dir() else None
-    folder = output.parent if alone else output
-    if alone and only is None:
+    single_file = output if output.suffix.lower() == ".png" and not output.is_dir() else None
+    folder = output.parent if single_file else output
+    if single_file and only is None:
         raise OutputError("--output", str(output), _one_of_several())
     with open_cloud(source) as cloud:
         kinds = _kinds_of(cloud, only)
-        if alone:
-            check_file_target(alone, overwrite=overwrite)
-        names = {kind: alone.name if alone else preview_file(kind) for kind in kinds}
+        if single_file:
+            check_file_target(single_file, overwrite=overwrite)
+        names = {kind: single_file.name if single_file else preview_file(kind) for kind in kinds}
         with output_folder(folder, names.values(), overwrite) as work:
             drawn, shown = _draw(cloud, work, kinds, line, station, centerline, depth)
             for kind, name in names.items():
@@ -388,15 +388,15 @@ def summary_of(cloud: CloudReader, writer: CloudWriter) -> dict[str, Any]:
 
 def report_losses(name: str, writers: Iterable[CloudWriter]) -> None:
     """Tell the user of how many points which flags were lost, for want of a field in the format written."""
-    lost: Counter[str] = Counter()
+    losses: Counter[str] = Counter()
     kind = ""
     for writer in writers:
-        lost.update(writer.lost)
+        losses.update(writer.lost)
         kind = writer.path.suffix.strip(".").upper()
-    if held := lost.pop(WITHHELD, 0):
+    if held := losses.pop(WITHHELD, 0):
         warn(f"{name}: {held:,} withheld points left out: {kind} has no field for the flag")
-    if lost:
-        listed = ", ".join(f"{flag} of {count:,} points" for flag, count in lost.items())
+    if losses:
+        listed = ", ".join(f"{flag} of {count:,} points" for flag, count in losses.items())
         warn(f"{name}: {listed} lost: {kind} has no field for them")
 
 
@@ -413,8 +413,8 @@ def pass_with_progress(
     blocks: Iterable[PointBlock], count: int, progress: Progress, stage: str
 ) -> Iterator[PointBlock]:
     """Yield blocks, and tell which share of a number of points is done."""
-    done = 0
+    count_passed = 0
     for block in blocks:
         yield block
-        done += len(block)
-        progress(stage, done / max(count, 1))
+        count_passed += len(block)
+        progress(stage, count_passed / max(count, 1))

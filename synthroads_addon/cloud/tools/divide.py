@@ -100,14 +100,14 @@ def _inside(
     rings: list[Float] | None,
 ) -> Bool:
     """Return which points (N, 3) lie within all that is given."""
-    kept = np.ones(len(xyz), dtype=bool)
+    mask = np.ones(len(xyz), dtype=bool)
     if box is not None:
-        kept &= np.all((xyz[:, :2] >= box[:2]) & (xyz[:, :2] <= box[2:]), axis=1)
+        mask &= np.all((xyz[:, :2] >= box[:2]) & (xyz[:, :2] <= box[2:]), axis=1)
     if heights is not None:
-        kept &= (xyz[:, 2] >= heights[0]) & (xyz[:, 2] <= heights[1])
+        mask &= (xyz[:, 2] >= heights[0]) & (xyz[:, 2] <= heights[1])
     if rings is not None:
-        kept &= points_in_rings(xyz[:, :2], rings)
-    return kept
+        mask &= points_in_rings(xyz[:, :2], rings)
+    return mask
 
 
 def tile(
@@ -156,12 +156,12 @@ def tile(
         scheme, offset = scheme_of(cloud, None), offset_of(cloud)
         names = {key: f"{source.stem}_{_corner(key[0], size)}_{_corner(key[1], size)}{ending}" for key in keys}
         with output_folder(folder, names.values(), overwrite) as work:
-            for done, (key, points) in enumerate(files.by_tile(), 1):
-                kept = points if grid is None else points.select(np.sort(keep_one_per_cell(points, grid)))
-                progress("tile", done / len(keys))
-                if len(kept) >= fewest:
+            for number, (key, points) in enumerate(files.by_tile(), 1):
+                tile_points = points if grid is None else points.select(np.sort(keep_one_per_cell(points, grid)))
+                progress("tile", number / len(keys))
+                if len(tile_points) >= fewest:
                     with writer_like(cloud, work / names[key], scheme, offset=offset) as writer:
-                        writer.write(kept)
+                        writer.write(tile_points)
                     written.append({"file": names[key], "points": writer.count})
                     writers.append(writer)
             report_losses(source.name, writers)

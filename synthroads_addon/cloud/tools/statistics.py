@@ -44,11 +44,11 @@ def cloud_statistics(cloud: CloudReader, radius: float = RADIUS, samples: int = 
     predicted = PredictedCounts(header) if header.predicted else None
     withheld = 0
     for block in cloud.blocks():
-        kept = cloud.usable_points(block, noise=True)
-        withheld += len(block) - int(np.count_nonzero(kept))
-        if not kept.any():
+        usable = cloud.usable_points(block, noise=True)
+        withheld += len(block) - int(np.count_nonzero(usable))
+        if not usable.any():
             continue
-        used = block.select(kept)
+        used = block.select(usable)
         first.add(used)
         if predicted:
             predicted.add(used)
@@ -97,13 +97,13 @@ class Moments:
         """Add points, by labels (N,) and quantities, each (N,), to the moments (Chan, Golub and LeVeque 1979)."""
         count = np.bincount(label, minlength=256)
         some = np.maximum(count, 1)
-        together = np.maximum(self.count + count, 1)
+        total = np.maximum(self.count + count, 1)
         for row, value in enumerate(values):
             mean = np.bincount(label, value, 256) / some
             squares = np.bincount(label, (value - mean[label]) ** 2, 256)
             step = np.where(count > 0, mean - self.mean[row], 0.0)
-            self.squares[row] += squares + step**2 * self.count * count / together
-            self.mean[row] += step * count / together
+            self.squares[row] += squares + step**2 * self.count * count / total
+            self.mean[row] += step * count / total
         self.count += count
 
     def mean_and_deviation(self, row: int, labels: list[int]) -> tuple[float, float]:
@@ -305,7 +305,7 @@ def _bounded_slices(counts: Index) -> Iterator[slice]:
     ends = np.cumsum(counts)
     first = 0
     while first < len(counts):
-        done = ends[first - 1] if first else 0
-        last = max(first + 1, int(np.searchsorted(ends, done + _PAIRS_AT_ONCE)))
+        position = ends[first - 1] if first else 0
+        last = max(first + 1, int(np.searchsorted(ends, position + _PAIRS_AT_ONCE)))
         yield slice(first, last)
         first = last

@@ -83,8 +83,8 @@ class SYNTHROADS_PG_settings(_Generated, bpy.types.PropertyGroup):
         """
         scenario = load_scenario(name)
         if Path(name).suffix != ".json":
-            kept = read_fields({key: FIELDS[key] for key in _KEPT}, self, None)
-            scenario = Scenario.from_dict(scenario.to_dict() | kept)
+            values = read_fields({key: FIELDS[key] for key in _KEPT}, self, None)
+            scenario = Scenario.from_dict(scenario.to_dict() | values)
         self.show_scenario(scenario)
         self.preset = name
 

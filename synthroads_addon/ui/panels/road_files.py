@@ -118,8 +118,10 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
         whole = has_whole_road(path)
         parameters, report = (RoadSource(scenario, road=path) if whole else RoadSource(scenario, axis=path)).read()
         text = f"Built {parameters.alignment.length:,.0f} m of road {'of' if whole else 'along'} {path.name}"
-        lost = "; parts of its surface were left out" if report["axis"].get("whole", {}).get("surface_lost") else ""
-        return parameters, f"{text}: {axis_summary(report['axis'])}{lost}"
+        loss_text = (
+            "; parts of its surface were left out" if report["axis"].get("whole", {}).get("surface_lost") else ""
+        )
+        return parameters, f"{text}: {axis_summary(report['axis'])}{loss_text}"
 
     def refuse(self, error: InputError) -> set[str]:
         """Report an error; if the fit misses its points, also keep a picture of it."""

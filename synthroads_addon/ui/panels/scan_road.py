@@ -195,17 +195,17 @@ def find_and_build(job: ReconstructionJob, scenario: Scenario, place: BuildTarge
         return run_reconstruction(job, lambda _, share: report(share))
 
     road: ReconstructedRoad = yield Aside(find, "Finding the road", 0.0, _FINDING)
-    kept = {
+    record = {
         "cloud": str(job.cloud),
         "judgement": road.report["judgement"],
         "measures": [*measure_lines(road.report), *_surface_lines(road.report["surface"])],
         "notes": road.report["notes"],
     }
     parameters = road.found.parameters
-    build = road_work(parameters, scenario, from_file(job.cloud), place, json.dumps(kept))
+    build = road_work(parameters, scenario, from_file(job.cloud), place, json.dumps(record))
     yield from part_of_work(build, _FINDING, 1.0)
-    length, said = parameters.alignment.length, verdict(road.report["judgement"])
-    return f"Built {length:,.0f} m of road from {job.cloud.name}. {said}"
+    length, sentence = parameters.alignment.length, verdict(road.report["judgement"])
+    return f"Built {length:,.0f} m of road from {job.cloud.name}. {sentence}"
 
 
 def _surface_lines(surface: dict[str, Any]) -> list[str]:

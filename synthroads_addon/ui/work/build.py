@@ -104,11 +104,11 @@ def next_seed(seed: int) -> int:
 
 def unused_seed(seed: int, scene: bpy.types.Scene) -> int:
     """Return a seed that none of a scene's roads was drawn from: this one if it can be, else one after it."""
-    taken = set()
+    seeds = set()
     for root in roads(scene):
         with suppress(InputError):  # what is kept of the road is damaged
-            taken.add(recall(root)[1].seed)
-    while seed in taken:
+            seeds.add(recall(root)[1].seed)
+    while seed in seeds:
         seed = next_seed(seed)
     return seed
 

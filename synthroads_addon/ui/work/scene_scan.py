@@ -79,9 +79,9 @@ def visible_scan_work(scan: VisibleScan) -> Work[Written]:
 
         def write(report: Report) -> int:
             counts, of_scene = measure(report)
-            told = {"scene": bpy.path.basename(bpy.data.filepath) or None, "counts": counts}
-            told["warnings"] = [*warnings, *of_scene, *warnings_of_counts(counts)]
-            files.write_report(work.folder, told, work.timer)
+            contents = {"scene": bpy.path.basename(bpy.data.filepath) or None, "counts": counts}
+            contents["warnings"] = [*warnings, *of_scene, *warnings_of_counts(counts)]
+            files.write_report(work.folder, contents, work.timer)
             return int(counts["points"])
 
         points = yield Aside(write, state, READ, 1.0, work.calls, work.notes)
@@ -133,9 +133,9 @@ def _save_copy(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Meas
     yield Step(READ)
 
     def measure(report: Report) -> tuple[dict[str, Any], Sequence[str]]:
-        done = saved.scan(report)
-        work.timer.stages.update(done.stages)
-        return done.counts, done.warnings
+        result = saved.scan(report)
+        work.timer.stages.update(result.stages)
+        return result.counts, result.warnings
 
     return measure
 
