@@ -137,8 +137,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
             save_recipe(sensor, arguments.save_recipe, device, table, arguments.overwrite)
         data |= {"sensor": sensor.to_dict()}
         lines += [f"{name}: {value}" for name, value in data["sensor"]["estimate"].items() if value is not None]
-    written = [str(path) for path, _ in files.values() if path]
-    return 0, data, "\n".join([*lines, *(f"written: {path}" for path in written)])
+    paths = [str(path) for path, _ in files.values() if path]
+    return 0, data, "\n".join([*lines, *(f"written: {path}" for path in paths)])
 
 
 def job_of(arguments: argparse.Namespace) -> CalibrationJob:

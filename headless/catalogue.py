@@ -73,8 +73,8 @@ def _member(member: Member) -> str | int:
     """Return a member of a class as its name or number, and a selector as text `field=value ...`."""
     if not isinstance(member, ClassSelector):
         return member
-    shown = {key: value for key, value in member.to_dict().items() if key != "where" and value} | member.where
-    return " ".join(f"{key}={value}" for key, value in shown.items())
+    values = {key: value for key, value in member.to_dict().items() if key != "where" and value} | member.where
+    return " ".join(f"{key}={value}" for key, value in values.items())
 
 
 def _assets(name: str) -> Entry:

@@ -72,18 +72,18 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 def _network(arguments: argparse.Namespace) -> tuple[Predictor | None, dict[str, Any]]:
     """Return the network's view that is asked for, or that of the shipped model for the cloud, and why it is that."""
-    given = arguments.run
-    if given == "none":
+    model = arguments.run
+    if model == "none":
         return None, {"model": None, "why": "no network, as asked"}
     try:
         from ml.centerline.learned_axis import learned_axis
         from ml.choice import choose_model
     except ModuleNotFoundError as error:
-        if given is not None or error.name != "torch":
+        if model is not None or error.name != "torch":
             raise
         return None, {"model": None, "why": "no network: PyTorch isn't installed"}
-    if given is not None:
-        return learned_axis(Path(given), arguments.cloud), {"model": given, "why": f"{given}, as asked"}
+    if model is not None:
+        return learned_axis(Path(model), arguments.cloud), {"model": model, "why": f"{model}, as asked"}
     try:
         choice = choose_model(arguments.cloud, "centerline")
     except InputError as error:

@@ -106,20 +106,20 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """Refuse a value that is none of an argument's choices, and name the one most like it."""
         if action.choices is not None and value not in action.choices:
-            known = [str(choice) for choice in action.choices]
-            message = f"invalid choice: {value!r} (choose from {', '.join(known)}){nearest_name(str(value), known)}"
+            names = [str(choice) for choice in action.choices]
+            message = f"invalid choice: {value!r} (choose from {', '.join(names)}){nearest_name(str(value), names)}"
             raise argparse.ArgumentError(action, message)
 
     def _refuse_unknown_option(self, words: Sequence[str]) -> None:
         """End the command where a word is no option of it, before it misses others, and name the one most like it."""
         if self._subparsers is not None or "--" in words:  # its sub-commands have the options; or what follows is none
             return
-        known = [name for action in self._actions if action.help != argparse.SUPPRESS for name in action.option_strings]
+        names = [name for action in self._actions if action.help != argparse.SUPPRESS for name in action.option_strings]
         for word in words:
             name = word.partition("=")[0]
             is_option = name.startswith("--") and " " not in name
             if is_option and not any(one.startswith(name) for one in self._option_string_actions):
-                self.error(f"unrecognized arguments: {word}{nearest_name(name, known)}")
+                self.error(f"unrecognized arguments: {word}{nearest_name(name, names)}")
 
     def error(self, message: str) -> Any:
         self.exit(2, f"{self.prog}: {message}\n")
@@ -257,10 +257,10 @@ def choice_summary(report: dict[str, Any]) -> list[str]:
     from synthroads_addon.scenario.tolerance import error_text
 
     choice = report["choice"]
-    chosen = ", ".join(f"{path}={value}" for path, value in choice["chosen"].items())
+    settings = ", ".join(f"{path}={value}" for path, value in choice["chosen"].items())
     errors = ", ".join(f"{name} {error_text(name, value)}" for name, value in choice["expected"]["errors"].items())
     at_most = ", ".join(f"{name} {error_text(name, value)}" for name, value in choice["expected"]["at_most"].items())
-    lines = [f"chosen: {chosen or 'nothing, as all is given'} ({choice['by']})", f"  expected errors: {errors}"]
+    lines = [f"chosen: {settings or 'nothing, as all is given'} ({choice['by']})", f"  expected errors: {errors}"]
     lines += [f"  at most, with a confidence of 95 %: {at_most}"] if at_most else []
     seconds = choice["expected"]["seconds"]
     return lines + ([f"  expected time: {seconds:.0f} s in all"] if seconds is not None else [])
@@ -281,12 +281,12 @@ def numbers(counts: Sequence[int], form: str) -> Callable[[str], tuple[float, ..
     return read
 
 
-def whole_number(most: int, shown: str) -> Callable[[str], int]:
+def whole_number(most: int, limit_text: str) -> Callable[[str], int]:
     """Return an argparse type that reads a whole number from 0 to a maximum."""
 
     def read(text: str) -> int:
         if not text.isascii() or not text.isdigit() or int(text) > most:
-            raise argparse.ArgumentTypeError(f"is '{text}': must be a whole number from 0 to {shown}")
+            raise argparse.ArgumentTypeError(f"is '{text}': must be a whole number from 0 to {limit_text}")
         return int(text)
 
     return read
@@ -349,8 +349,8 @@ def _add_common_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _writes_files(arguments: argparse.Namespace) -> bool:
     """Return whether a command's result goes to files, so that ``--quiet`` may drop what it prints."""
-    named = ("output", "save", "plot", "document", "writes")
-    return any(getattr(arguments, name, None) for name in named) and not getattr(arguments, "verify", False)
+    options = ("output", "save", "plot", "document", "writes")
+    return any(getattr(arguments, name, None) for name in options) and not getattr(arguments, "verify", False)
 
 
 def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Namespace) -> int:
@@ -402,8 +402,8 @@ def _name_fault(error: Exception) -> str | None:
     if not isinstance(error, OSError) or error.errno != errno.ENAMETOOLONG:
         return None
     name = str(error.filename or "a file")
-    shown = name if len(name) <= _SHOWN else f"{name[:_SHOWN]}..."
-    return f"{shown!r} is no name of a file: the system takes none as long ({len(name):,} characters)"
+    short_name = name if len(name) <= _SHOWN else f"{name[:_SHOWN]}..."
+    return f"{short_name!r} is no name of a file: the system takes none as long ({len(name):,} characters)"
 
 
 def _shortage_reason(error: Exception) -> str | None:

@@ -18,8 +18,8 @@ from synthroads_addon.jobs.dataset.cluster import TIMEOUT, Cluster
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads dataset` to its parser."""
-    known = ", ".join(recipe_names())
-    parser.add_argument("recipe", metavar="RECIPE", help=f"{known}, or a .yaml or .json file")
+    names = ", ".join(recipe_names())
+    parser.add_argument("recipe", metavar="RECIPE", help=f"{names}, or a .yaml or .json file")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the data set")
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--jobs", type=int, metavar="N", help="scenes made at the same time on this machine (1)")

@@ -33,8 +33,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
     trained = open_run(arguments.run)
     evaluation = Evaluation(arguments.data, arguments.split, arguments.output, arguments.mapping, arguments.yardstick)
     scores, tables = task(trained.configuration.task).evaluate(trained, evaluation, progress_bar(arguments))
-    written = f"written to {arguments.output}: {', '.join(scores['files'])}"
-    return 0, scores, f"{tables}\n\n{written}"
+    summary = f"written to {arguments.output}: {', '.join(scores['files'])}"
+    return 0, scores, f"{tables}\n\n{summary}"
 
 
 if __name__ == "__main__":

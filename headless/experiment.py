@@ -18,8 +18,8 @@ from synthroads_addon.base.errors import InputError
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads experiment` to its parser."""
-    known = ", ".join(names_in(EXPERIMENTS))
-    parser.add_argument("experiment", metavar="EXPERIMENT", help=f"YAML file, or one of {known}")
+    names = ", ".join(names_in(EXPERIMENTS))
+    parser.add_argument("experiment", metavar="EXPERIMENT", help=f"YAML file, or one of {names}")
     text = "folder that replaces {NAME} in the experiment's paths (can be repeated)"
     parser.add_argument("--data", type=_folder, action="append", default=[], metavar="NAME=FOLDER", help=text)
     parser.add_argument("--output", type=Path, required=True, metavar="DIR", help="folder for runs, scores and table")
@@ -55,8 +55,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
             raise InputError("--seeds", seed, "must be whole numbers from 0")
     note_at_interrupt(lambda: f"what is trained and tested is kept in {arguments.output}; the same command goes on")
     results = work.run_experiment(experiment, configured, arguments.output, seeds, progress_bar(arguments))
-    shown = work.table(experiment.title, results, list(configured))
-    text = f"{shown}\nwritten to {arguments.output}: {TABLE}, {RESULTS} and the runs"
+    table = work.table(experiment.title, results, list(configured))
+    text = f"{table}\nwritten to {arguments.output}: {TABLE}, {RESULTS} and the runs"
     return 0, {"title": experiment.title, "results": results}, text
 
 

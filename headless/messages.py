@@ -135,8 +135,8 @@ def progress_bar(arguments: argparse.Namespace) -> Progress:
         return silent
     set_up(arguments)  # for those that aren't run by `headless.commands.run`
     verbose = logger.isEnabledFor(logging.DEBUG)
-    shown = _bar() if sys.stderr is not None and sys.stderr.isatty() else _lines(arguments)
-    return _StageTimeProgress(shown) if verbose else shown
+    display = _bar() if sys.stderr is not None and sys.stderr.isatty() else _lines(arguments)
+    return _StageTimeProgress(display) if verbose else display
 
 
 def _lines(arguments: argparse.Namespace) -> _LineProgress:

@@ -62,8 +62,10 @@ def run(arguments: argparse.Namespace) -> Outcome:
 def next_step(cloud: Path, output: Path, task: str) -> str:
     """Return the command that draws what was written: the predicted classes, or the cloud along its centreline."""
     line = [] if task == "segmentation" else ["--centerline", str(output)]
-    shown = cloud if line else output
-    return shlex.join(["synthroads", "cloud", "preview", str(shown), *line, "--output", str(output.with_suffix(""))])
+    picture_cloud = cloud if line else output
+    return shlex.join(
+        ["synthroads", "cloud", "preview", str(picture_cloud), *line, "--output", str(output.with_suffix(""))]
+    )
 
 
 def labelled(metrics: dict[str, Any]) -> str:

@@ -139,9 +139,9 @@ def _distance(text: str) -> float:
 def _table(rows: list[dict[str, Any]]) -> str:
     cells = []
     for row in rows:
-        shown = [("no heights", not row["heights"]), ("in a junction", row["junction"])]
-        shown += [("one carriageway", row["carriageway"])]
-        notes = row["fault"] or ", ".join([*filter(None, [row["kind"]]), *(text for text, so in shown if so)])
+        labels = [("no heights", not row["heights"]), ("in a junction", row["junction"])]
+        labels += [("one carriageway", row["carriageway"])]
+        notes = row["fault"] or ", ".join([*filter(None, [row["kind"]]), *(text for text, so in labels if so)])
         lanes = "" if row["lanes"] is None else str(row["lanes"])
         length = "" if row["fault"] else f"{row['length']:,.1f} m"
         of_what = f"{row['points']} points" if row["points"] else str(row["elements"])

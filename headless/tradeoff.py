@@ -132,14 +132,14 @@ def _part(progress: Progress, number: int, count: int) -> Progress:
 
 def _measure_all(arguments: argparse.Namespace, scene: str, title: str, progress: Progress) -> list[dict[str, Any]]:
     """Measure the rows of the wanted knobs; return these and kept rows of others, in the order of `KNOBS`."""
-    chosen = set(knob_rows(arguments.knobs))
+    chosen_rows = set(knob_rows(arguments.knobs))
     results = []
     for number, (knob, value) in enumerate(knob_rows(KNOBS)):
         progress(f"{title} {knob} {value}", number / len(list(knob_rows(KNOBS))))
         path = arguments.output / _ROWS / title / f"{knob}-{_file_name(value)}.json"
         job = _fingerprint(scene, knob, value)
         result = _read_kept_row(path, job, knob, value) if arguments.resume else None
-        if result is None and (knob, value) in chosen:
+        if result is None and (knob, value) in chosen_rows:
             result = _measure_row(scene, knob, value)
             write_file(path, canonical_json({"job": job, "row": result}).encode(), overwrite=True)
         if result is not None:

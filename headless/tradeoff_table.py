@@ -60,10 +60,10 @@ def row_fault(row: Any, knob: str, value: Any) -> str | None:
         unknown = cost is None and name != "seconds"
         if not unknown and not (is_number(cost) and cost >= 0.0 and not (whole and isinstance(cost, float))):
             return f"{name} must be a {'whole ' if whole else ''}number from 0"
-    for name, known in (("errors", tuple(ROW_TITLES)), ("shares", _SHARES)):
+    for name, names in (("errors", tuple(ROW_TITLES)), ("shares", _SHARES)):
         part = row.get(name, {} if name == "shares" else None)
-        if not isinstance(part, dict) or not all(key in known and is_number(part[key]) for key in part):
-            return f"{name} must be numbers by name: {', '.join(known)}"
+        if not isinstance(part, dict) or not all(key in names and is_number(part[key]) for key in part):
+            return f"{name} must be numbers by name: {', '.join(names)}"
     several = row.get("all_seconds", [1.0])
     if not isinstance(several, list) or not all(is_number(one) and one > 0.0 for one in several):
         return "all_seconds must be a list of numbers above 0"
@@ -112,8 +112,8 @@ def front_lines(results: Sequence[Mapping[str, Any]]) -> list[str]:
     rows = []
     for row in presets:
         other = better_row(row, [one for one in job if one is not row], noise or 0.0)
-        shown = "-" if other is None else f"{other['value']}: {other['seconds']:.1f} s for {row['seconds']:.1f} s"
-        rows.append([str(row["value"]), "yes" if other is None else "no", shown])
+        faster_row = "-" if other is None else f"{other['value']}: {other['seconds']:.1f} s for {row['seconds']:.1f} s"
+        rows.append([str(row["value"]), "yes" if other is None else "no", faster_row])
     lines = markdown_table(["preset", "on the front", "faster, and as accurate in all errors"], rows)
     text = "times weren't measured twice, so every difference of time counts"
     if noise is not None:

@@ -190,8 +190,8 @@ def check_same_recipe(folder: Path, recipe_text: str, generator: str) -> Manifes
     if manifest.recipe_sha256 != hashlib.sha256(recipe_text.encode()).hexdigest():
         raise InputError("--resume", str(folder), "was begun with another recipe; choose another folder")
     if manifest.generator != generator:
-        made = f"was begun with {manifest.generator}; this is {generator}"
-        raise InputError("--resume", str(folder), f"{made}: only the same version gives the same bytes")
+        versions = f"was begun with {manifest.generator}; this is {generator}"
+        raise InputError("--resume", str(folder), f"{versions}: only the same version gives the same bytes")
     return manifest
 
 

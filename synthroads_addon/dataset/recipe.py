@@ -220,8 +220,8 @@ def _job(recipe: Recipe, number: int, group: SceneGroup, place: int, split: str)
 
 def _scenario(recipe: Recipe, group: SceneGroup, name: str, place: int) -> Scenario:
     seed = int(stream(recipe.seed, "scene", name).integers(LARGEST_SEED))
-    drawn = [_drawn_values(recipe.seed, name, part.draw) for part in (recipe, group)]
-    changes = [{"seed": seed}, recipe.set, drawn[0], group.set, drawn[1]]
+    draws = [_drawn_values(recipe.seed, name, part.draw) for part in (recipe, group)]
+    changes = [{"seed": seed}, recipe.set, draws[0], group.set, draws[1]]
     if group.variants:
         turn, place_in_turn = divmod(place, len(group.variants))
         order = stream(recipe.seed, "variants", group.name, turn).permutation(len(group.variants))

@@ -107,11 +107,11 @@ def axis_of_line(
     for text in line.remarks:
         warn("%s: %s: %s", path.name, line.name, text)
     outlines = [bring(path.name, outline, declared, system) for outline in line.outlines]
-    scenario, lost = with_mapped_section(f"{path.name}: {line.name}", line.section, scenario)
+    scenario, losses = with_mapped_section(f"{path.name}: {line.name}", line.section, scenario)
     points = _prepared(path.name, points, line.driven, scenario, place)
     sagitta = tell_spacing(path.name, outlines or [points])
     axis, limits, report = axis_of_points(path.name, points, declared, scenario, seen)
-    left_out = [*line.left_out, *lost]
+    left_out = [*line.left_out, *losses]
     if left_out:
         heads = ", ".join(text.partition(":")[0] for text in left_out)
         warn("%s: of %r is left out: %s; the report says where", path.name, line.name, heads)
@@ -152,8 +152,8 @@ def chosen_line(file: str, lines: Sequence[PointLine], name: str | None) -> Poin
         line = named_line(lines, name, file)
     else:
         usable = [one for one in lines if one.fault is None] or list(lines)
-        alone = [one for one in usable if not (one.junction or one.carriageway)] or usable
-        line = max(alone, key=line_length)
+        candidates = [one for one in usable if not (one.junction or one.carriageway)] or usable
+        line = max(candidates, key=line_length)
     if line.fault is not None:
         raise InputError(f"{file}: {line.name}: {line.fault.field}", line.fault.value, line.fault.allowed)
     if name is None and len(lines) > 1:

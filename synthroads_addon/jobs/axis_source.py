@@ -73,10 +73,10 @@ def axis_from_file(
     elif place.given:
         raise InputError(place.given, path.name, f"is for lines of points and paths; {kind} gives the axis itself")
     else:
-        read: list[tuple[RoadLine, ExactAxis]] = []
-        axis, limits, report = road_axis(path, scenario, name, round_kinks, lambda *both: read.append(both))
+        lines: list[tuple[RoadLine, ExactAxis]] = []
+        axis, limits, report = road_axis(path, scenario, name, round_kinks, lambda *both: lines.append(both))
         if picture:
-            deviation_picture(path.name, *line_deviation(*read[0])).save(picture, "PNG")
+            deviation_picture(path.name, *line_deviation(*lines[0])).save(picture, "PNG")
     _tell_overlap(path, axis, limits.half_width)
     if report.get("heights", ()) is None:
         vertical, source = _heights(axis, limits, seed)

@@ -114,7 +114,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
         AxisRefusedError: no road follows the axis; a picture of the fit is in the output folder.
         InputError: an input is wrong or the output can't be written; nothing is left half-written.
     """
-    begun, timer = job.begun or time.perf_counter(), StageTimer(progress)
+    start, timer = job.begun or time.perf_counter(), StageTimer(progress)
     check(job)
     if job.output is None:
         raise InputError("output", None, "must be a folder for the files; scan_to_arrays needs none")
@@ -122,7 +122,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     with output_folder(job.output, files.names, job.overwrite) as folder:
         road, report = make_job_road(job, timer)
         if set(job.scenario.outputs) & {"scene", *OF_POINTS}:
-            scene = open_job_scene(job, road, begun, timer, report)
+            scene = open_job_scene(job, road, start, timer, report)
             files = JobFiles(scene.scenario)
         files.write_road(folder, road, timer)
         report["instances"] = road.numbers.to_dict()
@@ -183,9 +183,9 @@ def check(job: Job) -> None:
         _tell_odd_place(scenario.road, system)
     check_formats(scenario.twin)
     sources = {"--parameters": job.parameters, "--axis": job.axis, "--road": job.road}
-    given = [name for name, path in sources.items() if path]
-    if len(given) > 1:
-        raise InputError(given[1], str(sources[given[1]]), f"can't be given together with {given[0]}")
+    names = [name for name, path in sources.items() if path]
+    if len(names) > 1:
+        raise InputError(names[1], str(sources[names[1]]), f"can't be given together with {names[0]}")
     if not scenario.outputs and not scenario.twin:
         raise InputError("outputs", [], f"must name at least one of {', '.join(FILES)}")
 

@@ -119,8 +119,8 @@ def _with_profile(
     points = tuple(
         VerticalPoint(station=p.station, elevation=p.elevation - up, radius=p.radius) for p in heights.points
     )
-    told = {"points": len(points), "deviation": heights.deviation, "deviation_station": heights.station}
-    return axis.model_copy(update={"vertical": points}), told
+    report = {"points": len(points), "deviation": heights.deviation, "deviation_station": heights.station}
+    return axis.model_copy(update={"vertical": points}), report
 
 
 def _lifted(parameters: RoadParameters) -> RoadGeometry:

@@ -121,15 +121,15 @@ def triangulate_ground(geometry: RoadGeometry, terrain: Terrain, road: Float, to
         road: (N,) stations at which the road's surface has rows.
         tolerance: that of the model, m.
     """
-    made: GroundMesh | None = None
+    mesh: GroundMesh | None = None
     for spacing in _SPACINGS:
         sides = (_side(geometry, terrain, 1.0, spacing), _side(geometry, terrain, -1.0, spacing))
         faces = (sides[0].triangles(road), sides[1].triangles(road))
-        made = GroundMesh(sides, faces, max(_deviation(geometry, part) for part in faces))
-        if made.deviation <= max(tolerance, GROUND_TOLERANCE):
+        mesh = GroundMesh(sides, faces, max(_deviation(geometry, part) for part in faces))
+        if mesh.deviation <= max(tolerance, GROUND_TOLERANCE):
             break
-    assert made
-    return made
+    assert mesh
+    return mesh
 
 
 def swales(name: str, terrain: Terrain, ground: GroundMesh) -> Iterator[tuple[str, Faces]]:

@@ -137,14 +137,14 @@ def _number(cloud: RealCloud, code: str, field: str) -> tuple[int, str]:
     if code.lstrip("-").isdigit():
         number = int(code)
         if number not in there:
-            known = ", ".join(str(value) for value in sorted(there)[:40])
-            raise InputError(field, number, f"no point has it; the file has {known}")
+            values_text = ", ".join(str(value) for value in sorted(there)[:40])
+            raise InputError(field, number, f"no point has it; the file has {values_text}")
         return number, str(number)
     names = {row.name: row.id for row in cloud.scheme.rows} if cloud.scheme else {}
     named = {name: row for name, row in names.items() if row in there}
     if code not in named:
-        known = f"one of {', '.join(sorted(named))}" if named else "a number, as the attribute has no names"
-        raise InputError(field, code, f"must be {known}{nearest_name(code, named)}")
+        values_text = f"one of {', '.join(sorted(named))}" if named else "a number, as the attribute has no names"
+        raise InputError(field, code, f"must be {values_text}{nearest_name(code, named)}")
     return named[code], f"{code} ({named[code]})"
 
 

@@ -393,8 +393,8 @@ def report_losses(name: str, writers: Iterable[CloudWriter]) -> None:
     for writer in writers:
         losses.update(writer.lost)
         kind = writer.path.suffix.strip(".").upper()
-    if held := losses.pop(WITHHELD, 0):
-        warn(f"{name}: {held:,} withheld points left out: {kind} has no field for the flag")
+    if withheld := losses.pop(WITHHELD, 0):
+        warn(f"{name}: {withheld:,} withheld points left out: {kind} has no field for the flag")
     if losses:
         listed = ", ".join(f"{flag} of {count:,} points" for flag, count in losses.items())
         warn(f"{name}: {listed} lost: {kind} has no field for them")

@@ -153,16 +153,18 @@ class _FirstPass:
         area = self._cells.area(labels)
         height, intensity, light = (self.moments.mean_and_deviation(row, labels) for row in range(3))
         colored = self.has_color and light != (0.0, 0.0)  # point formats with colours are used without them
-        known = [label for label in labels if label in rough]
-        weights = self.moments.count[known]
+        rough_classes = [label for label in labels if label in rough]
+        weights = self.moments.count[rough_classes]
         return {
             "points": count,
             "area_m2": area,
             "density": count / area,
             "height_mean": height[0],
             "height_std": height[1],
-            "roughness": float(np.average([rough[c][0] for c in known], weights=weights)) if known else None,
-            "roughness_samples": sum(rough[c][1] for c in known),
+            "roughness": float(np.average([rough[c][0] for c in rough_classes], weights=weights))
+            if rough_classes
+            else None,
+            "roughness_samples": sum(rough[c][1] for c in rough_classes),
             "intensity_mean": intensity[0],
             "intensity_std": intensity[1],
             "luminance_mean": light[0] if colored else None,
@@ -255,8 +257,8 @@ class _Roughness:
         inside = np.flatnonzero(np.all((column >= 0) & (column < 2**31), axis=1))
         key = column[inside, 0] << 31 | column[inside, 1]
         slot = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
-        known = self._keys[slot] == key
-        inside, slot = inside[known], slot[known]
+        matches = self._keys[slot] == key
+        inside, slot = inside[matches], slot[matches]
         for part in _bounded_slices(self._counts[slot]):
             counts = self._counts[slot[part]]
             point = np.repeat(inside[part], counts)

@@ -50,8 +50,8 @@ def model_knobs(scenario: Scenario, limits: Mapping[str, float]) -> tuple[ModelK
     if scenario.geometric_tolerance is not None:
         tolerances: tuple[float, ...] = (scenario.geometric_tolerance,) * len(details)
     elif limits:
-        allowed = min(limits.get("height", 1.0), _OF_POSITION * limits.get("position", 1.0), _COARSEST.tolerance)
-        tolerances = (max(allowed, _LEAST_TOLERANCE),) * len(details)
+        tolerance = min(limits.get("height", 1.0), _OF_POSITION * limits.get("position", 1.0), _COARSEST.tolerance)
+        tolerances = (max(tolerance, _LEAST_TOLERANCE),) * len(details)
     else:
         tolerances = (_COARSEST.tolerance, _FINEST.tolerance)[-len(details) :]
     return tuple(ModelKnobs(*pair) for pair in zip(tolerances, details, strict=True))

@@ -59,10 +59,10 @@ def options_within(knobs: Knobs, limits: Mapping[str, float]) -> list[list[Optio
     Raises:
         InputError: a knob has none; says what is the best to be had.
     """
-    kept = [[option for option in options if option.keeps(limits)] for options in knobs]
-    if [] in kept:
-        raise _tolerance_error(knobs[kept.index([])], limits)
-    return kept
+    options_of_knobs = [[option for option in options if option.keeps(limits)] for options in knobs]
+    if [] in options_of_knobs:
+        raise _tolerance_error(knobs[options_of_knobs.index([])], limits)
+    return options_of_knobs
 
 
 def _tolerance_error(options: Sequence[Option], limits: Mapping[str, float]) -> InputError:
@@ -74,8 +74,8 @@ def _tolerance_error(options: Sequence[Option], limits: Mapping[str, float]) -> 
             return InputError(f"tolerance.{kind}", limit, text)
     kinds = [kind for kind in limits if any(kind in option.errors for option in options)]
     nearest = min(options, key=lambda option: max(option.upper(kind) / max(limits[kind], _LEAST) for kind in kinds))
-    said = ", ".join(f"{kind}={error_text(kind, nearest.upper(kind))}" for kind in kinds)
-    return InputError("tolerance", None, f"{' and '.join(kinds)} can't be reached together: the nearest is {said}")
+    values = ", ".join(f"{kind}={error_text(kind, nearest.upper(kind))}" for kind in kinds)
+    return InputError("tolerance", None, f"{' and '.join(kinds)} can't be reached together: the nearest is {values}")
 
 
 def cheapest(knobs: Knobs, limits: Mapping[str, float]) -> Option:

@@ -100,12 +100,12 @@ class _Search:
         """Return the scenario with the chosen settings, and a report of the choice as JSON data."""
         budget = self.scenario.time_budget
         findings, choice = self._choose_by_tolerance() if budget is None else self._choose_by_time(budget)
-        here, kept = time.perf_counter(), choices.given_knobs(self.scenario)
-        asked = {"tolerance": self.limits or None, "time_budget": budget}
+        here, given_knobs = time.perf_counter(), choices.given_knobs(self.scenario)
+        goals = {"tolerance": self.limits or None, "time_budget": budget}
         return choices.with_changes(self.scenario, choice.changes), {
-            "asked": {name: value for name, value in asked.items() if value is not None},
-            "kept": kept,
-            "chosen": {path: value for path, value in choice.changes.items() if path not in kept},
+            "asked": {name: value for name, value in goals.items() if value is not None},
+            "kept": given_knobs,
+            "chosen": {path: value for path, value in choice.changes.items() if path not in given_knobs},
             "expected": {
                 "errors": {kind: float(f"{pair[0]:.6g}") for kind, pair in choice.errors.items()},
                 "at_most": {kind: float(f"{choice.errors[kind][1]:.6g}") for kind in self.limits},
@@ -168,10 +168,10 @@ class _Search:
         points: dict[tuple[ModelKnobs | None, int], list[PointBlock]] = {}
         for number, model in enumerate(self.models):
             trial = self._try_model(model)
-            for done, (rays, rings) in enumerate(self.rays.items(), 1):
+            for step, (rays, rings) in enumerate(self.rays.items(), 1):
                 points[model, rays] = trial.points(rings)
                 # The truth, colours and relief are measured afterwards: a fifth of it, by and large.
-                self.progress("choice", 0.8 * (number + done / len(self.rays)) / len(self.models))
+                self.progress("choice", 0.8 * (number + step / len(self.rays)) / len(self.models))
         exact = self.rays.get(CONVERGED) == RINGS[CONVERGED]
         truth = points[self.models[-1], CONVERGED] if exact else self._trial.points()
         return {knobs: beam_errors(mine, truth) for knobs, mine in points.items()}

@@ -57,9 +57,11 @@ def run_on_worker(folder: str) -> Outcome:
     outcome = run_task(folder, max(1, available_cores() // int(closing.worker.state.nthreads)), closing)
     if not closing.is_set():
         return outcome
-    if (begun := len(list(Path(folder).glob(f"{ATTEMPT}*")))) < MOST_WORKERS:
+    if (attempts := len(list(Path(folder).glob(f"{ATTEMPT}*")))) < MOST_WORKERS:
         raise Reschedule()
-    return Outcome(outcome.folder, f"its workers ended before the scene was done, {begun} times: give them more time")
+    return Outcome(
+        outcome.folder, f"its workers ended before the scene was done, {attempts} times: give them more time"
+    )
 
 
 @dataclass(frozen=True)

@@ -60,14 +60,14 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         with timer.stage("parameters"):
             road = RoadGeometry(sample_road(scenario.road, scenario.seed, scenario.title))
             JobFiles(scenario).write_road(folder, road, timer)
-        shown = RoadScene(scenario, road)
+        scene = RoadScene(scenario, road)
         with timer.stage("model"):
-            model = shown.build()
+            model = scene.build()
         with timer.stage("scene mesh"):
-            shown.read()
+            scene.read()
         with timer.stage("caster"):
-            plan = shown.plan()
-        files = shown.site.files(folder, plan.target.origin)
+            plan = scene.plan()
+        files = scene.site.files(folder, plan.target.origin)
         record_cloud([plan], files, timer)
         seconds, memory = timer.seconds, peak_memory_mb()
         # The scene, its caster and the materials are the same for every number of rays.

@@ -173,15 +173,15 @@ class LanePlan:
 
         A short one is part of the next (or the last), in which what it has begins at once, with its width there.
         """
-        kept: list[LaneSection] = []
+        sections_kept: list[LaneSection] = []
         waiting: LaneSection | None = None
         for section in sections:
             if section.end - section.start < SHORTEST_SECTION and section is not sections[-1]:
                 waiting = waiting or section
                 continue
-            kept.append(section if waiting is None else self._begin_earlier(section, waiting))
+            sections_kept.append(section if waiting is None else self._begin_earlier(section, waiting))
             waiting = None
-        return kept
+        return sections_kept
 
     def _begin_earlier(self, section: LaneSection, short: LaneSection) -> LaneSection:
         """Return a section extended back over a short one before it; adjusts the plan's widths there, in place."""

@@ -96,7 +96,7 @@ def _signal(parent: Element, ground: Ground, frame: RoadFrame, located: tuple[Fa
     }
     if signal.speed is not None:
         about |= {"value": signal.speed, "unit": "km/h"}
-    made = element(parent, "signal", about | ({"text": signal.text} if signal.text else {}))
+    entry = element(parent, "signal", about | ({"text": signal.text} if signal.text else {}))
     kind = thing.twin().opendrive.partition(".")[0]
-    element(made, "reference", {"elementType": "object", "elementId": thing.instance, "type": kind})
-    add_object_data(made, face.placed.name, thing.instance, object_type=type(thing).__name__)
+    element(entry, "reference", {"elementType": "object", "elementId": thing.instance, "type": kind})
+    add_object_data(entry, face.placed.name, thing.instance, object_type=type(thing).__name__)
