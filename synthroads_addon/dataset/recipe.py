@@ -127,7 +127,7 @@ class Recipe(ClosedModel):
     title: str = Field(min_length=1, max_length=200, description="Title.")
     description: str = Field("", description="What the set is for, in a few sentences: it stands in the data card.")
     licence: str = Field("CC-BY-4.0", min_length=1, description="Licence of the data (SPDX identifier).")
-    seed: int = quantity(1, "1", "Seed of everything random.", (0, LARGEST_SEED - 1))
+    seed: int = quantity(1, "1", "Seed of all random choices.", (0, LARGEST_SEED - 1))
     scenario: str = Field("rq31-600m", description="Built-in scenario or file that the groups start from.")
     set: dict[str, Any] = Field({}, description="Changes of every group's scenario, path: value.")
     draw: Draws = Field(

@@ -45,8 +45,10 @@ class Scenario(ClosedModel):
     type: Literal["Scenario"] = "Scenario"
     version: Literal["1.0"] = "1.0"
     title: str = Field("", description="Title for people.")
-    seed: int = quantity(1, "1", "Seed of everything random.", (0, 2**63 - 1))
-    fidelity: Literal["draft", "standard", "high"] = Field("standard", description="Point on the trade-off.")
+    seed: int = quantity(1, "1", "Seed of all random choices.", (0, 2**63 - 1))
+    fidelity: Literal["draft", "standard", "high"] = Field(
+        "standard", description="Speed against accuracy, as a preset."
+    )
     geometric_tolerance: float | None = quantity(
         None,
         "m",
@@ -64,7 +66,7 @@ class Scenario(ClosedModel):
         inherits="fidelity.vegetation_detail",
     )
     tolerance: Tolerance | None = Field(
-        None, description="Largest errors; the cheapest settings that keep them are chosen, but for knobs given here."
+        None, description="Largest errors; the fastest settings that keep them are chosen, except those given here."
     )
     time_budget: float | None = quantity(
         None, "s", "Time for the whole job; the best settings that fit it are chosen.", gt=0, le=1e7
@@ -72,7 +74,7 @@ class Scenario(ClosedModel):
     materials_table: str | None = Field(
         None,
         title="Table of Your Own",
-        description="JSON file, or shipped table, of materials in place of the usual ones of the same names.",
+        description="JSON file, or shipped table, of materials that replace the usual ones of the same names.",
         json_schema_extra=notes(unset="The shipped ones"),
     )
     road: RoadScenario = Field(RoadScenario(), description="The road's limits.")
@@ -82,7 +84,7 @@ class Scenario(ClosedModel):
     outputs: tuple[Output, ...] = Field(
         OUTPUTS,
         title="Files",
-        description="Files wanted; nothing is computed that none of them needs.",
+        description="Files to write; what none of them needs isn't computed.",
         json_schema_extra=notes(
             labels={
                 "parameters": "Parameter Set",
@@ -96,7 +98,7 @@ class Scenario(ClosedModel):
     twin: tuple[TwinFormat, ...] = Field(
         (),
         title="Semantic Model",
-        description="Formats of the geometric-semantic model that are wanted.",
+        description="Formats of the geometric-semantic model to write.",
         json_schema_extra=notes(labels={name: made.label for name, made in FORMATS.items()}),
     )
     ifc: IfcSettings | None = Field(
