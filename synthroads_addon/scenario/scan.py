@@ -109,7 +109,7 @@ class ScanScenario(DeviceChoice):
     )
     kernels: Literal["auto", "off"] = Field(
         "auto",
-        description="Use ray packets of Embree, compiled loops around it and compiled materials where this machine can; "
+        description="Use Embree's ray packets, compiled loops around it and compiled materials where this machine can; "
         "or cast every ray singly, with all materials rendered by Cycles and NumPy for the rest.",
         json_schema_extra=notes(labels={"auto": "Where Possible", "off": "Off"}),
     )
