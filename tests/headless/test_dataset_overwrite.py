@@ -245,7 +245,7 @@ def test_nothing_is_removed_where_the_scheduler_does_not_answer(
     before = content(old)
     words = [str(recipe), "--output", str(old), "--overwrite", "--scheduler", "tcp://127.0.0.1:1"]
     assert command("dataset", words) == 2
-    assert "nobody answers there" in capsys.readouterr().err
+    assert "no scheduler answers there" in capsys.readouterr().err
     assert content(old) == before
 
 

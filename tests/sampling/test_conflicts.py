@@ -76,7 +76,7 @@ def test_one_error_names_all_limits_that_conflict() -> None:
             {"pavement": {"pothole_size": {"minimum": 1.0, "maximum": 9.0}}},
             "pothole_size.maximum is 9, at most 5 is allowed",
         ),
-        ({"embankment_height": {"minimum": -30.0, "maximum": 5.0}}, "embankment_height.minimum is -30, -20"),
+        ({"embankment_height": {"minimum": -30.0, "maximum": 5.0}}, "embankment_height.minimum is -30, at least -20"),
         ({"furniture": {"overpass_clearance": {"minimum": 4.0, "maximum": 5.0}}}, "overpass_clearance.minimum is 4"),
         ({"furniture": {"construction_zone": 1.0}, "length": 90.0}, "furniture.construction_zone is 1, it needs 120 m"),
         (

@@ -179,7 +179,7 @@ CASES: dict[str, Case] = {
     "e57 beyond its limits": Case(
         e57(e57_rgb(np.where(EVERY_FIFTH, 300, 128), "int", 0, 65535), color_limits(0, 255)),
         {"rgb": np.where(EVERY_FIFTH, 65535, HALF)[:, None]},
-        ("12 points have a colour beyond the limits that the file names",),
+        ("12 points have a colour beyond the file's limits: they are clipped",),
     ),
     "las 8 bits": Case(las(7, red=128, green=128, blue=128), {"rgb": HALF}, (EIGHT_BIT_COLORS,)),
     "laz 8 bits, LAS 1.2": Case(
@@ -220,7 +220,7 @@ CASES: dict[str, Case] = {
     "e57 intensity beyond its limits": Case(
         e57({"intensity": (np.where(EVERY_FIFTH, 3.0, 0.5), "float", -9.0, 9.0)}, intensity_limits(0.0, 1.0)),
         {"intensity": np.where(EVERY_FIFTH, 1.0, 0.5)},
-        ("4 points have an intensity beyond the limits that the file names",),
+        ("4 points have an intensity beyond the file's limits: they are clipped",),
     ),
     "e57 limits of every scan": Case(
         e57(
