@@ -1,4 +1,4 @@
-"""Measure each stage of the demo job, and scans of meshes, beside what others' code alone takes, in the same run."""
+"""Measure each stage of the demo job, and scans of meshes, and compare with third-party code alone in the same run."""
 
 import argparse
 import json
@@ -44,19 +44,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads benchmark` to its parser."""
     cores = sorted({1, min(2, available_cores())})
     parser.add_argument("--output", type=Path, metavar="DIR", help=f"folder for {' and '.join(_FILES)}")
-    parser.add_argument("--document", type=Path, metavar="FILE", help="fill the tables of this Markdown file as well")
-    text = "numbers of cores (1, and 2 where there are so many)"
+    parser.add_argument("--document", type=Path, metavar="FILE", help="also fill the tables of this Markdown file")
+    text = "numbers of cores to measure with (1, and 2 where available)"
     parser.add_argument("--cores", nargs="+", type=int, default=cores, metavar="N", help=text)
-    text = f"any of {', '.join(PARTS)} (all; start, the first scan of a new process, needs {_BESIDE})"
+    text = f"parts to measure: {', '.join(PARTS)} (all; start, a new process's first scan, needs {_BESIDE})"
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=text)
-    text = "folder of another version, a checkout or where it is installed, whose scans are measured in turn with these"
+    text = "folder of another version (checkout or installation), whose scans are measured alternately with this one's"
     parser.add_argument(_BESIDE, type=Path, metavar="FOLDER", help=text)
     text = "scene to measure on (%(default)s)"
     parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help=text)
     add_changes_argument(parser)
-    parser.add_argument("--quick", action="store_true", help="a small scene: to see that all works, in seconds")
+    parser.add_argument("--quick", action="store_true", help="use a small scene, to check that everything works")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
-    text = "keep what the folder holds already of other parts and numbers of cores, measured on this machine"
+    text = "keep results of other parts and numbers of cores that this machine has already written to the folder"
     parser.add_argument("--resume", action="store_true", help=text)
     parser.add_argument(_PART, metavar="JSON", help=argparse.SUPPRESS)
 
@@ -67,15 +67,15 @@ def run(arguments: argparse.Namespace) -> Outcome:
         result = _measure_part(json.loads(arguments.part))
         return 0, result, canonical_json(result)
     _check(arguments)
-    found: dict[str, Any] = {}
-    kept = _read_kept(arguments)
+    figures: dict[str, Any] = {}
+    former_figures = _read_kept(arguments)
 
     def measure() -> dict[str, str]:
-        found.update(_measure_all(arguments))
-        if kept:
-            found["runs"] = join_runs(kept["runs"], found["runs"])
-        add_scaling(found["runs"])
-        return {TABLE: markdown(found)}
+        figures.update(_measure_all(arguments))
+        if former_figures:
+            figures["runs"] = join_runs(former_figures["runs"], figures["runs"])
+        add_scaling(figures["runs"])
+        return {TABLE: markdown(figures)}
 
     with ExitStack() as opened:
         folder = None
@@ -85,9 +85,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
             )
         table = put_tables(arguments.document, [TABLE], measure)[TABLE]
         if folder:
-            (folder / _FILES[0]).write_text(canonical_json(found), encoding="utf-8")
+            (folder / _FILES[0]).write_text(canonical_json(figures), encoding="utf-8")
             (folder / _FILES[1]).write_text(table, encoding="utf-8")
-    return 0, found, table + _verdict(found)
+    return 0, figures, table + _verdict(figures)
 
 
 def _check(arguments: argparse.Namespace) -> None:
@@ -98,10 +98,10 @@ def _check(arguments: argparse.Namespace) -> None:
     for cores in arguments.cores:
         if not 1 <= cores <= available_cores():
             raise InputError("--cores", cores, f"must be 1 to {available_cores()}, the cores that are there")
-    beside = arguments.beside
-    if beside and not (beside / "synthroads_addon" / "__init__.py").is_file():
-        raise InputError(_BESIDE, str(beside), "must be a folder that holds the package synthroads_addon")
-    if arguments.parts == ["start"] and not beside:
+    version_folder = arguments.beside
+    if version_folder and not (version_folder / "synthroads_addon" / "__init__.py").is_file():
+        raise InputError(_BESIDE, str(version_folder), "must be a folder that holds the package synthroads_addon")
+    if arguments.parts == ["start"] and not version_folder:
         raise InputError("--parts", arguments.parts, f"start is measured beside another version: {_BESIDE} names it")
 
 
@@ -119,15 +119,15 @@ def _measure_all(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def _runs(arguments: argparse.Namespace, about: dict[str, Any], folder: Path) -> dict[str, Any]:
     progress, runs = progress_bar(arguments), []
-    own = [part for part in arguments.parts if part != "start"]
+    measured_parts = [part for part in arguments.parts if part != "start"]
     for number, cores in enumerate(arguments.cores):
         run: dict[str, Any] = {"cores": cores, "lines": {}, "floors": [], "stages": {}, "scans": {}, "beside": []}
-        for step, part in enumerate(own):
+        for step, part in enumerate(measured_parts):
             progress(f"{part}, {cores}", (number + step / len(arguments.parts)) / len(arguments.cores))
-            found = _measure_in_process({**about, "part": part, "scene": str(folder / f"{part}.obj")}, cores)
-            run["floors"] += found["floors"]
+            figures = _measure_in_process({**about, "part": part, "scene": str(folder / f"{part}.obj")}, cores)
+            run["floors"] += figures["floors"]
             for name in ("lines", "stages", "scans"):
-                run[name] |= found.get(name, {})
+                run[name] |= figures.get(name, {})
         if arguments.beside:
             run["beside"] = _measure_beside(arguments, folder, cores, progress)
             run["lines"] |= beside_lines(run["beside"])
@@ -155,11 +155,13 @@ def _read_kept(arguments: argparse.Namespace) -> dict[str, Any] | None:
         raise InputError("--resume", None, "can't be given with --overwrite, which keeps nothing")
     if not path.is_file():
         return None
-    kept: dict[str, Any] = read_json(path)
+    former_figures: dict[str, Any] = read_json(path)
     for name, now in (("machine", _machine()), ("quick", arguments.quick)):
-        if kept.get(name) != now:
-            raise InputError(f"{path}: {name}", kept.get(name), f"must be {now!r}, as now; --overwrite replaces it")
-    return kept
+        if former_figures.get(name) != now:
+            raise InputError(
+                f"{path}: {name}", former_figures.get(name), f"must be {now!r}, as now; --overwrite replaces it"
+            )
+    return former_figures
 
 
 def _measure_in_process(part: dict[str, Any], cores: int) -> dict[str, Any]:
@@ -172,10 +174,10 @@ def _json_of(command: Sequence[str], name: str, cores: int, path: Path | None = 
     """Run a command on so many cores, with a folder on Python's path; return the JSON that it prints last."""
     environment = os.environ | ({"PYTHONPATH": str(path)} if path else {})
     with cores_of_children(cores):
-        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
-    if done.returncode:
-        raise RuntimeError(f"{name} failed: {done.stderr.strip()}")
-    result: dict[str, Any] = json.loads(done.stdout[done.stdout.index("{") :])
+        process = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    if process.returncode:
+        raise RuntimeError(f"{name} failed: {process.stderr.strip()}")
+    result: dict[str, Any] = json.loads(process.stdout[process.stdout.index("{") :])
     return result
 
 
@@ -197,7 +199,9 @@ def _measure_beside(
                 progress(f"{name}, {side}, {cores}", 0.0)
                 command = [sys.executable, script, str(folder / f"{scene}.obj"), *changes]
                 several[side].append(_json_of(command, f"{name} by {versions[side]}", cores, versions[side]))
-        rows.append({"name": name, "scene": scene} | {side: _medians(found) for side, found in several.items()})
+        rows.append(
+            {"name": name, "scene": scene} | {side: _medians(side_scans) for side, side_scans in several.items()}
+        )
     return rows
 
 

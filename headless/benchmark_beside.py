@@ -29,15 +29,15 @@ def measure(scene: Path, changes: list[str]) -> dict[str, Any]:
     from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
     from synthroads_addon.scenario.scenario import Scenario, load_scenario
 
-    begun: dict[str, float] = {}
-    spent: dict[str, float] = {}
+    begin_times: dict[str, float] = {}
+    durations: dict[str, float] = {}
 
     def note(stage: str, share: float) -> None:
         name = str(stage)
         if share == 0.0:
-            begun.setdefault(name, time.process_time())
+            begin_times.setdefault(name, time.process_time())
         elif share == 1.0:
-            spent[name] = time.process_time() - begun[name]
+            durations[name] = time.process_time() - begin_times[name]
 
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         plain = Path(folder) / "scenario.json"
@@ -45,7 +45,7 @@ def measure(scene: Path, changes: list[str]) -> dict[str, Any]:
         job = SceneScan(load_scenario(str(plain), changes), Path(folder) / "out", scene, up="z")
         counts = scan_scene(job, note)["counts"]
     return {
-        "scan": sum(spent.get(stage, 0.0) for stage in _STAGES),
+        "scan": sum(durations.get(stage, 0.0) for stage in _STAGES),
         "whole": time.process_time(),
         "pulses": counts["pulses"],
         "points": counts["points"],

@@ -144,12 +144,12 @@ def judge_lines(result: dict[str, Any]) -> Iterator[tuple[str, float, bool]]:
 def _limits(result: dict[str, Any]) -> list[str]:
     runs = result["runs"]
     titles = ["", *(f"{run['cores']} core{'s' * (run['cores'] > 1)}" for run in runs), "limit", f"on {CORES} cores"]
-    kept = {} if result["quick"] else {name: good for name, _, good in judge_lines(result)}
+    verdicts = {} if result["quick"] else {name: good for name, _, good in judge_lines(result)}
     rows = []
     for name, limit in LIMITS.items():
         values = [_number(run["lines"].get(name), limit.digits) for run in runs]
         bound = f"{'at most' if limit.most else 'at least'} {limit.limit:g} {limit.unit}"
-        verdict = {True: "kept", False: "**missed**", None: "–"}[kept.get(name)]
+        verdict = {True: "kept", False: "**missed**", None: "–"}[verdicts.get(name)]
         rows.append([limit.title, *values, bound, verdict])
     return markdown_table(titles, rows)
 

@@ -1,4 +1,4 @@
-"""Expected intensities of materials beside a real cloud's; fit the materials, save them to a material table, plot.
+"""Compare expected intensities of materials with a real cloud's; fit the materials, save them to a table, plot them.
 
 With labels:     synthroads calibrate --real CLOUD --material asphalt=road --material paint_white=road_marking
 Beside an axis:  synthroads calibrate --real CLOUD --axis CSV --paved=-7,-1 --line=-4 \\
@@ -42,19 +42,19 @@ _SAME = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads calibrate` to its parser."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    text = "material of the table, and the cloud's class by number or name, or paved or line (can be repeated)"
+    text = "material of the table, and its class in the cloud: a number, a name, paved or line (can be repeated)"
     parser.add_argument("--material", action="append", required=True, metavar="NAME[=CLASS]", help=text)
     _cloud_arguments(parser.add_argument_group("the real cloud"))
     _view_arguments(parser.add_argument_group("how it was seen"))
     _fit_arguments(parser.add_argument_group("the fit"))
     files = parser.add_argument_group("files")
-    files.add_argument("--table", type=Path, metavar="FILE", help="material table to begin with (the shipped one)")
+    files.add_argument("--table", type=Path, metavar="FILE", help="material table to start from (the shipped one)")
     files.add_argument("--save", type=Path, metavar="FILE", help="write the fitted materials to this table (.json)")
-    text = "write the device with the response, noise and spacing of the first material's points (.json)"
+    text = "write a device with the response, noise and spacing of the first material's points (.json)"
     files.add_argument("--save-device", type=Path, metavar="FILE", help=text)
-    text = "write a recipe that scans roads with it and with the fitted materials (.yaml)"
+    text = "write a recipe that scans roads with the saved device and the fitted materials (.yaml)"
     files.add_argument("--save-recipe", type=Path, metavar="FILE", help=text)
-    text = "take the sensor from formulas alone, without simulated scans that refine it"
+    text = "compute the sensor from formulas only, without refining it by simulated scans"
     files.add_argument("--formulas", action="store_true", help=text)
     files.add_argument("--plot", type=Path, metavar="FILE", help="draw the distributions (.png)")
     files.add_argument("--overwrite", action="store_true", help="replace files that are already there")
@@ -62,40 +62,41 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _cloud_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--real", type=Path, metavar="CLOUD", help="compare with this cloud (.laz, .las, .ply, ...)")
-    text = "extra attribute of it that holds the classes (its own classes)"
+    text = "extra attribute of the cloud that holds the classes (its classification)"
     group.add_argument("--class-field", metavar="NAME", help=text)
-    group.add_argument("--axis", type=Path, metavar="FILE", help="axis of its road: tells the classes by offset")
-    text = "offsets between which there is pavement, m, positive to the left (can be repeated)"
+    group.add_argument("--axis", type=Path, metavar="FILE", help="axis of the cloud's road; offsets give the classes")
+    text = "range of offsets that is pavement, m, positive to the left (can be repeated)"
     pair = numbers((2,), "FROM,TO")
     group.add_argument("--paved", type=pair, action="append", default=[], metavar="FROM,TO", help=text)
-    text = "offset of a marking (can be repeated)"
+    text = "offset of a marking, m (can be repeated)"
     group.add_argument("--line", type=numbers((1,), "a number"), action="append", default=[], metavar="M", help=text)
-    group.add_argument("--line-width", type=float, default=0.15, metavar="M", help="of the markings, m (0.15)")
+    group.add_argument("--line-width", type=float, default=0.15, metavar="M", help="width of the markings, m (0.15)")
 
 
 def _view_arguments(group: argparse._ArgumentGroup) -> None:
-    group.add_argument("--device", metavar="NAME", help="preset or file: its beam's divergence (a ray)")
-    group.add_argument("--incidence-deg", type=_numbers, default=(0.0,), metavar="D,D,...", help="angles, degrees (0)")
+    group.add_argument("--device", metavar="NAME", help="preset or file with the beam divergence (0)")
+    text = "incidence angles, degrees (0)"
+    group.add_argument("--incidence-deg", type=_numbers, default=(0.0,), metavar="D,D,...", help=text)
     text = "ranges, m (60)"
     group.add_argument("--range", type=_numbers, default=(60.0,), metavar="M,M,...", help=text, dest="ranges")
-    text = "one place that all was seen from, instead"
+    text = "position of the scanner, instead of --range and --incidence-deg"
     group.add_argument("--scanner", type=numbers((3,), "X,Y,Z"), metavar="X,Y,Z", help=text)
     reflections = ("lambert", "oren_nayar")
-    group.add_argument("--reflection", choices=reflections, default="lambert", help="as in the scan (lambert)")
-    group.add_argument("--attenuation", type=float, default=0.0, metavar="1/M", help="of the air, there and back (0)")
-    group.add_argument("--range-corrected", action="store_true", help="the device takes out the range's influence")
-    group.add_argument("--decibels", type=float, metavar="DB", help="its 16 bits span this many dB (they are linear)")
-    text = "numbers are made as the device's file says: compensated for the range, compressed, or as decibels"
+    group.add_argument("--reflection", choices=reflections, default="lambert", help="reflection model (lambert)")
+    group.add_argument("--attenuation", type=float, default=0.0, metavar="1/M", help="by the air, both ways (0)")
+    group.add_argument("--range-corrected", action="store_true", help="the device corrects intensities for range")
+    group.add_argument("--decibels", type=float, metavar="DB", help="the 16-bit values span this many dB (linear)")
+    text = "compute intensities as the device's file says: range-compensated, compressed, or in decibels"
     group.add_argument("--device-response", action="store_true", help=text)
-    text = "take a material's colours from an image that shows a surface M wide (1 m; can be repeated)"
+    text = "take a material's colours from an image of a surface M metres wide (1; can be repeated)"
     group.add_argument("--texture", action="append", default=[], metavar="NAME=IMAGE[@M]", help=text)
 
 
 def _fit_arguments(group: argparse._ArgumentGroup) -> None:
-    group.add_argument("--no-fit", action="store_true", help="compare only; the gain is still free")
-    text = f"besides the brightness: any of {', '.join(PARTS)}, or none (spread,wavelength)"
+    group.add_argument("--no-fit", action="store_true", help="compare only; fit nothing but the gain")
+    text = f"fit these besides the brightness: {', '.join(PARTS)}, or none (spread,wavelength)"
     group.add_argument("--fit", metavar="PART,...", default="spread,wavelength", help=text)
-    group.add_argument("--hold", metavar="NAME", help="keep this material's brightness: it says what the gain is")
+    group.add_argument("--hold", metavar="NAME", help="keep this material's brightness and fit the gain to it")
     group.add_argument("--gain", type=float, metavar="G", help="the device's gain, known from another cloud (free)")
 
 
@@ -137,8 +138,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
             save_recipe(sensor, arguments.save_recipe, device, table, arguments.overwrite)
         data |= {"sensor": sensor.to_dict()}
         lines += [f"{name}: {value}" for name, value in data["sensor"]["estimate"].items() if value is not None]
-    written = [str(path) for path, _ in files.values() if path]
-    return 0, data, "\n".join([*lines, *(f"written: {path}" for path in written)])
+    paths = [str(path) for path, _ in files.values() if path]
+    return 0, data, "\n".join([*lines, *(f"written: {path}" for path in paths)])
 
 
 def job_of(arguments: argparse.Namespace) -> CalibrationJob:

@@ -16,49 +16,51 @@ from synthroads_addon.scenario.scenario import SCENARIOS, load_scenario, scenari
 
 
 def _scenario(name: str) -> Entry:
-    made = load_scenario(name)
-    section = made.road.cross_section
+    scenario = load_scenario(name)
+    section = scenario.road.cross_section
     figures_by_name = {
         "cross_section": section if isinstance(section, str) else "by hand",
-        "design_class": made.road.design_class,
-        "length": made.road.length,
-        "platform": made.scan.platform.kind,
-        "device": made.scan.device,
-        "fidelity": made.fidelity,
+        "design_class": scenario.road.design_class,
+        "length": scenario.road.length,
+        "platform": scenario.scan.platform.kind,
+        "device": scenario.scan.device,
+        "fidelity": scenario.fidelity,
     }
-    return Entry(name, made.title, preset_file(SCENARIOS, ".json", name, scenario_names()), figures_by_name)
+    return Entry(name, scenario.title, preset_file(SCENARIOS, ".json", name, scenario_names()), figures_by_name)
 
 
 def _device(name: str) -> Entry:
-    made = load_device(name)
+    device = load_device(name)
     figures_by_name = {
-        "pattern": made.pattern.name,
-        "heads": len(made.heads),
-        "beams": made.channels,
-        "wavelength_nm": made.wavelength_nm,
-        "pulse_rates_khz": [mode.pulse_rate_khz for mode in made.modes],
-        "field_of_view_deg": [mode.field_of_view_deg for mode in made.modes],
-        "lines_per_second": list(made.lines_per_second),
-        "finest_angle_deg": made.finest_angle_deg,
-        "divergence_mrad": list(made.divergence_mrad),
-        "maximum_returns": made.maximum_returns,
-        "minimum_range": made.minimum_range,
-        "maximum_ranges": [mode.maximum_range for mode in made.modes],
+        "pattern": device.pattern.name,
+        "heads": len(device.heads),
+        "beams": device.channels,
+        "wavelength_nm": device.wavelength_nm,
+        "pulse_rates_khz": [mode.pulse_rate_khz for mode in device.modes],
+        "field_of_view_deg": [mode.field_of_view_deg for mode in device.modes],
+        "lines_per_second": list(device.lines_per_second),
+        "finest_angle_deg": device.finest_angle_deg,
+        "divergence_mrad": list(device.divergence_mrad),
+        "maximum_returns": device.maximum_returns,
+        "minimum_range": device.minimum_range,
+        "maximum_ranges": [mode.maximum_range for mode in device.modes],
     }
-    return Entry(name, made.title, preset_file(DEVICES, ".json", name, device_names()), figures_by_name, made.source)
+    return Entry(
+        name, device.title, preset_file(DEVICES, ".json", name, device_names()), figures_by_name, device.source
+    )
 
 
 def _recipe(name: str) -> Entry:
-    made = load_recipe(name)
-    splits = Counter(split for group in made.groups for split in group.splits())
+    recipe = load_recipe(name)
+    splits = Counter(split for group in recipe.groups for split in group.splits())
     figures_by_name = {
-        "scenes": sum(group.scenes for group in made.groups),
+        "scenes": sum(group.scenes for group in recipe.groups),
         "splits": dict(splits),
-        "scenario": made.scenario,
-        "layouts": list(made.layouts),
+        "scenario": recipe.scenario,
+        "layouts": list(recipe.layouts),
     }
     file = preset_file(RECIPES, ".yaml", name, recipe_names())
-    return Entry(name, made.title, file, figures_by_name, " ".join(made.description.split()))
+    return Entry(name, recipe.title, file, figures_by_name, " ".join(recipe.description.split()))
 
 
 def _classes(name: str) -> Entry:
@@ -71,19 +73,19 @@ def _member(member: Member) -> str | int:
     """Return a member of a class as its name or number, and a selector as text `field=value ...`."""
     if not isinstance(member, ClassSelector):
         return member
-    shown = {key: value for key, value in member.to_dict().items() if key != "where" and value} | member.where
-    return " ".join(f"{key}={value}" for key, value in shown.items())
+    values = {key: value for key, value in member.to_dict().items() if key != "where" and value} | member.where
+    return " ".join(f"{key}={value}" for key, value in values.items())
 
 
 def _assets(name: str) -> Entry:
-    made = {key: asset.class_name for key, asset in read_asset_library(name).assets.items()}
-    return Entry(name, f"{len(made)} assets", library_file(name), {"assets": made})
+    classes = {key: asset.class_name for key, asset in read_asset_library(name).assets.items()}
+    return Entry(name, f"{len(classes)} assets", library_file(name), {"assets": classes})
 
 
 def _materials(name: str) -> Entry:
-    made = read_material_table(name)
-    figures_by_name = {"materials": {key: round(row.reflectivity, 3) for key, row in made.items()}}
-    return Entry(name, f"{len(made)} materials in place of the usual ones", material_table_path(name), figures_by_name)
+    table = read_material_table(name)
+    figures_by_name = {"materials": {key: round(row.reflectivity, 3) for key, row in table.items()}}
+    return Entry(name, f"{len(table)} materials in place of the usual ones", material_table_path(name), figures_by_name)
 
 
 KINDS = {

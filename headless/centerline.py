@@ -1,4 +1,4 @@
-"""Find a road's centreline in a cloud by several views of it, with its deviations and where it isn't to be trusted."""
+"""Find the centreline of a road in a cloud by several methods, its standard deviations, and where it is doubtful."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads centerline` to its parser."""
     parser.add_argument("cloud", type=Path, metavar="CLOUD", help="cloud to read (.laz, .las, .ply, .e57, .npz)")
-    text = "centreline (.geojson); a report (.json) is written beside it (beside the cloud: of cloud.laz "
+    text = "centreline (.geojson); a report (.json) is written beside it (beside the cloud: "
     text += "cloud.laz-centerline.geojson)"
     parser.add_argument("--output", type=Path, metavar="FILE", help=text)
     parser.set_defaults(writes=True)
-    text = "kind of road, where it is known (auto: found out)"
+    text = "kind of road, if known (auto: found in the cloud)"
     parser.add_argument("--road", choices=("auto", "dual", "single"), default="auto", help=text)
-    text = "course of the road, roughly: CSV or GeoJSON in the cloud's coordinates (found in the cloud)"
+    text = "approximate course of the road: CSV or GeoJSON in the cloud's coordinates (found in the cloud)"
     parser.add_argument("--path", type=Path, metavar="FILE", help=text)
-    text = "folder of a trained centreline model, or a shipped one's name (`synthroads list models`): one more view of "
-    text += "the axis; none: only those that learn nothing (the shipped model trained on what is most like the cloud)"
+    text = "folder or name (`synthroads list models`) of a trained centreline model that estimates the axis as well; "
+    text += "none: use no trained model (the shipped model whose training data are most like the cloud)"
     parser.add_argument("--run", metavar="DIR_OR_NAME", help=text)
-    text = "known axis (CSV, GeoJSON) to compare with afterwards; it changes nothing"
+    text = "true axis (CSV, GeoJSON) to compare the result with; it does not influence the result"
     parser.add_argument("--truth", type=Path, metavar="FILE", help=text)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
 
@@ -59,31 +59,31 @@ def run(arguments: argparse.Namespace) -> Outcome:
     cloud = read_road_cloud(arguments.cloud)
     axis = read_axis(arguments.truth, cloud.place) if arguments.truth else None
     network, why = _network(arguments)
-    found = find_centreline(cloud, _options(arguments, cloud, network), progress_bar(arguments))
-    result = centreline_report(found, cloud) | {"network": why}
+    centreline = find_centreline(cloud, _options(arguments, cloud, network), progress_bar(arguments))
+    result = centreline_report(centreline, cloud) | {"network": why}
     if axis is not None:
-        result["comparison"] = compare_line(found.path, axis[:, :2] - cloud.origin[:2])
+        result["comparison"] = compare_line(centreline.path, axis[:, :2] - cloud.origin[:2])
     result["remarks"] = remarks_so_far()
-    text = canonical_json(centreline_geojson(found, cloud, arguments.cloud.stem))
+    text = canonical_json(centreline_geojson(centreline, cloud, arguments.cloud.stem))
     write_file(lines, text.encode(), overwrite=arguments.overwrite)
     write_file(table, canonical_json(result).encode(), overwrite=arguments.overwrite)
-    return 3 if found.judgement.doubts else 0, result, summary(result, lines)
+    return 3 if centreline.judgement.doubts else 0, result, summary(result, lines)
 
 
 def _network(arguments: argparse.Namespace) -> tuple[Predictor | None, dict[str, Any]]:
     """Return the network's view that is asked for, or that of the shipped model for the cloud, and why it is that."""
-    given = arguments.run
-    if given == "none":
+    model = arguments.run
+    if model == "none":
         return None, {"model": None, "why": "no network, as asked"}
     try:
         from ml.centerline.learned_axis import learned_axis
         from ml.choice import choose_model
     except ModuleNotFoundError as error:
-        if given is not None or error.name != "torch":
+        if model is not None or error.name != "torch":
             raise
         return None, {"model": None, "why": "no network: PyTorch isn't installed"}
-    if given is not None:
-        return learned_axis(Path(given), arguments.cloud), {"model": given, "why": f"{given}, as asked"}
+    if model is not None:
+        return learned_axis(Path(model), arguments.cloud), {"model": model, "why": f"{model}, as asked"}
     try:
         choice = choose_model(arguments.cloud, "centerline")
     except InputError as error:
@@ -109,9 +109,9 @@ def summary(result: dict[str, Any], output: Path) -> str:
     std = result["std"]
     lines = [f"{result['road']} carriageway, centreline of {result['length']:.0f} m (std {std['mean']:.2f} m)"]
     for view in result["views"]:
-        beside = view["from_centreline"].get("rms")
-        apart = "" if beside is None else f", {beside:.2f} m rms from it"
-        lines.append(f"  {view['name']}: seen on {view['seen']:.0%}, agrees on {view['used']:.0%}{apart}")
+        distance = view["from_centreline"].get("rms")
+        distance_text = "" if distance is None else f", {distance:.2f} m rms from it"
+        lines.append(f"  {view['name']}: seen on {view['seen']:.0%}, agrees on {view['used']:.0%}{distance_text}")
     lines.append(f"  network: {result['network']['why']}")
     lines += [f"  {line}" for line in reservation_lines(result)]
     return "\n".join([*lines, f"written to {output}"])

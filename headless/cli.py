@@ -17,23 +17,23 @@ COMMANDS = {
     "twin": "write a road's geometric-semantic model: CityJSON, IFC, OpenDRIVE, GeoJSON, OpenCRG",
     "dataset": "make a data set of many scenes from a recipe",
     "cloud": "describe, thin out, map, convert and draw point cloud files",
-    "scan": "scan a scene that is there already: .blend, .glb, .obj and others",
-    "compare": "say how real synthetic clouds are, beside real ones",
-    "calibrate": "compare intensities of materials with a real cloud, and fit them",
+    "scan": "scan an existing scene: .blend, .glb, .obj and others",
+    "compare": "measure how well synthetic clouds agree with real ones",
+    "calibrate": "compare intensities of materials with a real cloud's, and fit the materials",
     "gallery": "render pictures of scenes, objects and materials",
-    "tradeoff": "measure error against time for each knob",
-    "benchmark": "measure the speed of each stage against its floor and the limits",
+    "tradeoff": "measure error against time for each setting that trades one for the other",
+    "benchmark": "measure the speed of each stage, and compare it with its lower bound and its limit",
     "train": "train a segmentation or centreline model",
     "evaluate": "measure a trained model",
     "predict": "label a cloud, or find its road, with a trained model",
     "export": "write a trained network as ONNX",
-    "experiment": "train variants that differ in their data with several seeds, and compare their scores",
-    "pack": "pack a data set's labelled points into one small file, to train from elsewhere",
-    "forecast": "forecast how long a training of a segmentation takes on this machine",
-    "centerline": "find the centreline of the road in a cloud, and where it is to be trusted",
+    "experiment": "train variants that differ in their data, with several seeds, and compare their scores",
+    "pack": "pack a data set's labelled points into one small file, to train on another machine",
+    "forecast": "forecast how long the training of a segmentation takes on this machine",
+    "centerline": "find the centreline of the road in a cloud, and where it can be trusted",
     "reconstruct": "turn a cloud into the parameters of its road",
     "road": "turn a road of an OpenDRIVE, LandXML or IFC file into a parameter set",
-    "list": "list what comes under a name, and the fields that --set takes",
+    "list": "list shipped names (scenarios, devices, ...) and the fields that --set takes",
 }
 
 
@@ -66,7 +66,7 @@ def build_parser(commands: Collection[str] = COMMANDS) -> argparse.ArgumentParse
     """
     parser = Parser(prog="synthroads", description="Synthetic motorways, scanned and labelled.")
     parser.add_argument("--version", action="version", version=generator())
-    text = "print what makes a shell complete commands, options, names and files"
+    text = "print a script with which a shell completes commands, options, names and files"
     parser.add_argument("--print-completion", action=_PrintCompletion, choices=("bash", "fish", "zsh"), help=text)
     parsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, summary in COMMANDS.items():

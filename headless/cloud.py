@@ -16,28 +16,28 @@ from headless.progress import progress_bar
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads cloud` and its tools to the parser."""
     tools = parser.add_subparsers(dest="tool", required=True, metavar="TOOL")
-    _info_arguments(tools.add_parser("info", help="figures of all points and of each class"))
+    _info_arguments(tools.add_parser("info", help="print figures of all points and of each class"))
     thin = tools.add_parser("subsample", help="keep one point per cell of a grid")
     _file_arguments(thin)
     thin.add_argument("--grid", type=float, default=0.04, metavar="M", help="edge of a cell, m (0.04)")
-    mapping = tools.add_parser("map-intensity", help="map intensities on the distribution of another cloud")
+    mapping = tools.add_parser("map-intensity", help="map intensities to the distribution of another cloud")
     _file_arguments(mapping)
-    mapping.add_argument("--target", required=True, type=Path, metavar="FILE", help="cloud with the wanted intensities")
-    mapping.add_argument("--per-class", action="store_true", help="each class on the target's class of that name")
-    change = tools.add_parser("convert", help="write another format, or merged classes")
+    mapping.add_argument("--target", required=True, type=Path, metavar="FILE", help="cloud with the distribution")
+    mapping.add_argument("--per-class", action="store_true", help="map each class to the target's of the same name")
+    change = tools.add_parser("convert", help="write another format, or merge classes")
     _file_arguments(change)
-    _preview_arguments(tools.add_parser("preview", help="draw from above and a cross-section"))
-    together = tools.add_parser("merge", help="put several clouds into one")
-    together.add_argument("files", type=Path, nargs="+", metavar="FILE", help="clouds, in the order of their points")
-    together.add_argument("--output", required=True, type=Path, metavar="FILE", help="file to write")
-    part = tools.add_parser("crop", help="keep what lies within a box, heights or a polygon")
+    _preview_arguments(tools.add_parser("preview", help="draw the cloud from above and in cross-section"))
+    merging = tools.add_parser("merge", help="put several clouds into one")
+    merging.add_argument("files", type=Path, nargs="+", metavar="FILE", help="clouds, in the order of their points")
+    merging.add_argument("--output", required=True, type=Path, metavar="FILE", help="file to write")
+    part = tools.add_parser("crop", help="keep the points within a box, heights or a polygon")
     _file_arguments(part)
     _crop_arguments(part)
-    tiles = tools.add_parser("tile", help="cut into square tiles, thinned out if wanted")
+    tiles = tools.add_parser("tile", help="cut into square tiles, thinned out on request")
     _tile_arguments(tiles)
     for tool in (thin, change):
-        tool.add_argument("--classes", metavar="NAME_OR_FILE", help="5, or a .json file of classes (the cloud's own)")
-    for tool in (thin, mapping, change, together, part, tiles):
+        tool.add_argument("--classes", metavar="NAME_OR_FILE", help="5, or a .json file of classes (as in the cloud)")
+    for tool in (thin, mapping, change, merging, part, tiles):
         tool.add_argument("--overwrite", action="store_true", help="replace a file that is already there")
 
 
@@ -50,14 +50,15 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 def _file_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
-    parser.add_argument("--output", required=True, type=Path, metavar="FILE", help="file to write; its ending decides")
+    text = "file to write; its ending gives the format"
+    parser.add_argument("--output", required=True, type=Path, metavar="FILE", help=text)
 
 
 def _info_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
-    text = "of roughness's neighbourhood, m (0.5)"
+    text = "radius of the neighbourhood for the roughness, m (0.5)"
     parser.add_argument("--radius", type=_positive, default=0.5, metavar="M", help=text)
-    text = "points per class for the roughness (5000; 0: none)"
+    text = "points per class that the roughness is computed from (5000; 0: no roughness)"
     count = whole_number(10_000_000, "10 million")
     parser.add_argument("--samples", type=count, default=5000, metavar="N", help=text)
 
@@ -67,39 +68,39 @@ def _preview_arguments(parser: argparse.ArgumentParser) -> None:
     text = "folder for the pictures; with --picture a .png file"
     parser.add_argument("--output", required=True, type=Path, metavar="DIR_OR_FILE", help=text)
     kinds = ("class", "predicted", "intensity", "rgb", "section")
-    text = f"draw only this one: {', '.join(kinds)} (all that the cloud has)"
+    text = f"draw only this picture: {', '.join(kinds)} (all that the cloud has)"
     parser.add_argument("--picture", choices=kinds, metavar="KIND", help=text)
-    parser.add_argument("--station", type=float, metavar="M", help="where to cut, m along the line (the middle)")
-    parser.add_argument("--centerline", type=Path, metavar="FILE", help="GeoJSON line of the stations (the long axis)")
-    parser.add_argument("--line", type=float, nargs=4, metavar=("X1", "Y1", "X2", "Y2"), help="cut along this line")
-    parser.add_argument("--depth", type=_positive, default=1.0, metavar="M", help="thickness of the cut, m (1)")
+    parser.add_argument("--station", type=float, metavar="M", help="of the cross-section, m (the middle)")
+    parser.add_argument("--centerline", type=Path, metavar="FILE", help="GeoJSON line of stations (the long axis)")
+    parser.add_argument("--line", type=float, nargs=4, metavar=("X1", "Y1", "X2", "Y2"), help="line of the section")
+    parser.add_argument("--depth", type=_positive, default=1.0, metavar="M", help="depth of the cross-section, m (1)")
     parser.add_argument("--overwrite", action="store_true", help="replace pictures that are already there")
 
 
 def _crop_arguments(parser: argparse.ArgumentParser) -> None:
     names = ("X1", "Y1", "X2", "Y2")
-    parser.add_argument("--box", type=float, nargs=4, metavar=names, help="least x and y, then largest, map")
-    parser.add_argument("--heights", type=float, nargs=2, metavar=("LOW", "HIGH"), help="least and largest z")
-    parser.add_argument("--polygon", type=Path, metavar="FILE", help="GeoJSON polygons in the map's coordinates")
+    parser.add_argument("--box", type=float, nargs=4, metavar=names, help="smallest x and y, then largest, m")
+    parser.add_argument("--heights", type=float, nargs=2, metavar=("LOW", "HIGH"), help="smallest and largest z, m")
+    parser.add_argument("--polygon", type=Path, metavar="FILE", help="GeoJSON polygons in map coordinates")
 
 
 def _tile_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the tiles")
     parser.add_argument("--size", type=float, default=60.0, metavar="M", help="edge of a tile, m (60)")
-    text = "keep one point per cell of this edge, m, e.g. 0.04 (all points)"
+    text = "keep one point per cell with this edge, m, e.g. 0.04 (all points)"
     parser.add_argument("--grid", type=float, metavar="M", help=text)
     count = whole_number(10**9, "a thousand million")
     parser.add_argument("--fewest", type=count, default=1, metavar="N", help="leave out tiles with fewer points (1)")
-    text = "laz, las, ply, e57, npz (the cloud's own)"
+    text = "laz, las, ply, e57, npz (the cloud's format)"
     parser.add_argument("--format", choices=("laz", "las", "ply", "e57", "npz"), metavar="KIND", help=text)
 
 
 def _merge(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.cloud.tools.divide import merge
 
-    done = merge(arguments.files, arguments.output, arguments.overwrite, progress_bar(arguments))
-    return 0, done, f"{done['points']:,} points of {len(arguments.files)} clouds written to {arguments.output}"
+    result = merge(arguments.files, arguments.output, arguments.overwrite, progress_bar(arguments))
+    return 0, result, f"{result['points']:,} points of {len(arguments.files)} clouds written to {arguments.output}"
 
 
 def _crop(arguments: argparse.Namespace) -> Outcome:
@@ -107,17 +108,17 @@ def _crop(arguments: argparse.Namespace) -> Outcome:
 
     box, heights = (None if part is None else tuple(part) for part in (arguments.box, arguments.heights))
     where = (box, heights, arguments.polygon)
-    done = crop(arguments.file, arguments.output, *where, arguments.overwrite, progress_bar(arguments))
-    return 0, done, f"{done['points']:,} of {done['points_read']:,} points written to {arguments.output}"
+    result = crop(arguments.file, arguments.output, *where, arguments.overwrite, progress_bar(arguments))
+    return 0, result, f"{result['points']:,} of {result['points_read']:,} points written to {arguments.output}"
 
 
 def _tile(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.cloud.tools.divide import tile
 
     settings = (arguments.size, arguments.grid, arguments.fewest, arguments.format, arguments.overwrite)
-    done = tile(arguments.file, arguments.output, *settings, progress_bar(arguments))
-    points = sum(row["points"] for row in done["tiles"])
-    return 0, done, f"{len(done['tiles'])} tiles with {points:,} points written to {arguments.output}"
+    result = tile(arguments.file, arguments.output, *settings, progress_bar(arguments))
+    points = sum(row["points"] for row in result["tiles"])
+    return 0, result, f"{len(result['tiles'])} tiles with {points:,} points written to {arguments.output}"
 
 
 def _info(arguments: argparse.Namespace) -> Outcome:
@@ -133,33 +134,33 @@ def _subsample(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.cloud.tools.convert import subsample
 
     settings = (arguments.grid, arguments.classes, arguments.overwrite)
-    done = subsample(arguments.file, arguments.output, *settings, progress_bar(arguments))
-    return 0, done, f"{done['points']:,} of {done['points_read']:,} points written to {arguments.output}"
+    result = subsample(arguments.file, arguments.output, *settings, progress_bar(arguments))
+    return 0, result, f"{result['points']:,} of {result['points_read']:,} points written to {arguments.output}"
 
 
 def _map_intensity(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.cloud.tools.convert import map_intensity
 
     files = (arguments.file, arguments.target, arguments.output)
-    done = map_intensity(*files, arguments.per_class, arguments.overwrite, progress_bar(arguments))
-    lines = [f"{done['points']:,} points written to {arguments.output}"]
-    before, after = done["distance_before"], done["distance_after"]
+    result = map_intensity(*files, arguments.per_class, arguments.overwrite, progress_bar(arguments))
+    lines = [f"{result['points']:,} points written to {arguments.output}"]
+    before, after = result["distance_before"], result["distance_after"]
     lines.append(f"largest gap between the distributions (Kolmogorov-Smirnov): {before:.4f} before, {after:.6f} after")
-    lines += [f"  {name}: {gap:.6f}" for name, gap in done.get("class_distances", {}).items()]
-    if done.get("classes_mapped_together"):
-        names = ", ".join(done["classes_mapped_together"])
+    lines += [f"  {name}: {gap:.6f}" for name, gap in result.get("class_distances", {}).items()]
+    if result.get("classes_mapped_together"):
+        names = ", ".join(result["classes_mapped_together"])
         lines.append(f"not in the target, mapped together on all its points: {names}")
-    return 0, done, "\n".join(lines)
+    return 0, result, "\n".join(lines)
 
 
 def _convert(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.cloud.tools.convert import convert
 
-    done = convert(arguments.file, arguments.output, arguments.classes, arguments.overwrite, progress_bar(arguments))
-    lines = [f"{done['points']:,} points written to {arguments.output}"]
-    if done["left_out"]:
-        lines.append(f"left out, for want of a meaning here: {', '.join(done['left_out'])}")
-    return 0, done, "\n".join(lines)
+    result = convert(arguments.file, arguments.output, arguments.classes, arguments.overwrite, progress_bar(arguments))
+    lines = [f"{result['points']:,} points written to {arguments.output}"]
+    if result["left_out"]:
+        lines.append(f"left out, for want of a meaning here: {', '.join(result['left_out'])}")
+    return 0, result, "\n".join(lines)
 
 
 def _preview(arguments: argparse.Namespace) -> Outcome:
@@ -170,7 +171,7 @@ def _preview(arguments: argparse.Namespace) -> Outcome:
     if arguments.centerline:
         with open_cloud(arguments.file) as cloud:
             line = read_centerline(arguments.centerline, cloud.header.place)
-    done = draw_previews(
+    result = draw_previews(
         arguments.file,
         arguments.output,
         line=tuple(arguments.line) if arguments.line else None,
@@ -180,9 +181,9 @@ def _preview(arguments: argparse.Namespace) -> Outcome:
         overwrite=arguments.overwrite,
         only=arguments.picture,
     )
-    folder = arguments.output.parent if arguments.output.name in done["pictures"] else arguments.output
-    lines = [f"{name} shows {field}" for name, field in done["fields"].items()]
-    return 0, done, "\n".join([*lines, f"written to {folder}"])
+    folder = arguments.output.parent if arguments.output.name in result["pictures"] else arguments.output
+    lines = [f"{name} shows {field}" for name, field in result["fields"].items()]
+    return 0, result, "\n".join([*lines, f"written to {folder}"])
 
 
 def _positive(text: str) -> float:

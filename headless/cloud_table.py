@@ -21,7 +21,7 @@ def table(figures: dict[str, Any]) -> str:
     """Return a cloud's statistics as text: extent, attributes, and a table of figures by class."""
     lines = [f"{figures['file']}: {figures['kind']}, {figures['points']:,} points"]
     named = figures["coordinate_system"]
-    lines.append(f"coordinate system {named or 'not named: coordinates are taken for metres'}")
+    lines.append(f"coordinate system {named or 'not named: coordinates are read as metres'}")
     if named and figures["height_epsg"] is None:
         lines.append("what heights are counted from isn't named")
     if figures["bounds"]:
@@ -51,9 +51,11 @@ def _predicted_lines(figures: dict[str, Any]) -> list[str]:
         for name, row in figures["predicted_classes"].items()
     ]
     titles = ("predicted_class", "points", "share", f"IoU with {figures['class_field']}")
-    kept = len(titles) if agreement else len(titles) - 1
-    lines = ["", *text_table(titles[:kept], [row[:kept] for row in rows], range(1, kept))]
+    columns = len(titles) if agreement else len(titles) - 1
+    lines = ["", *text_table(titles[:columns], [row[:columns] for row in rows], range(1, columns))]
     if agreement and agreement["share"] is not None:
-        own = f"{figures['class_field']}: the same class for {agreement['share']:.1%} of {agreement['points']:,} points"
-        lines.append(f"beside the cloud's own {own}")
+        agreement_text = (
+            f"{figures['class_field']}: the same class for {agreement['share']:.1%} of {agreement['points']:,} points"
+        )
+        lines.append(f"beside the cloud's own {agreement_text}")
     return lines

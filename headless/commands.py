@@ -62,8 +62,8 @@ def command(name: str, argv: Sequence[str] | None = None) -> int:
 
 def _writes_files(arguments: argparse.Namespace) -> bool:
     """Return whether a command's result goes to files, so that ``--quiet`` may drop what it prints."""
-    named = ("output", "save", "plot", "document", "writes")
-    return any(getattr(arguments, name, None) for name in named) and not getattr(arguments, "verify", False)
+    options = ("output", "save", "plot", "document", "writes")
+    return any(getattr(arguments, name, None) for name in options) and not getattr(arguments, "verify", False)
 
 
 def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Namespace) -> int:
@@ -93,10 +93,10 @@ def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Nam
     except Exception as error:
         if was_stopped():  # which libraries turn into errors of their own, and workers into the loss of them
             return report_interrupt()
-        told = error_line(error)
-        if told is None:
+        message = error_line(error)
+        if message is None:
             raise
-        print(told, file=sys.stderr)
+        print(message, file=sys.stderr)
         return 2
 
 

@@ -1,4 +1,4 @@
-"""Compare synthetic clouds with real ones: statistics side by side, and how surely the two can be told apart.
+"""Compare synthetic clouds with real ones: statistics side by side, and how well a classifier separates the two.
 
 Each argument is a cloud, a folder of clouds, or a list (.yaml, .json) that says where each cloud's classes are.
 """
@@ -31,14 +31,12 @@ _NO_CLASSIFIER = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads compare` to its parser."""
+    parser.add_argument("synthetic", type=Path, metavar="SYNTHETIC", help="cloud, folder or list of clouds to judge")
     parser.add_argument(
-        "synthetic", type=Path, metavar="SYNTHETIC", help="cloud, folder or list of clouds to be judged"
-    )
-    parser.add_argument(
-        "real", type=Path, metavar="REAL", help="cloud, folder or list of real clouds; two for a yardstick"
+        "real", type=Path, metavar="REAL", help="cloud, folder or list of real clouds; two or more give a reference"
     )
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for report and picture")
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="draws patches and folds (1)")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the choice of patches and folds (1)")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
 
 

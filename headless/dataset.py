@@ -20,18 +20,18 @@ from synthroads_addon.jobs.dataset.cluster import TIMEOUT, Cluster
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads dataset` to its parser."""
-    known = ", ".join(recipe_names())
-    parser.add_argument("recipe", metavar="RECIPE", help=f"{known}, or a .yaml or .json file")
+    names = ", ".join(recipe_names())
+    parser.add_argument("recipe", metavar="RECIPE", help=f"{names}, or a .yaml or .json file")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the data set")
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--jobs", type=int, metavar="N", help="scenes made at once on this machine (1)")
+    where.add_argument("--jobs", type=int, metavar="N", help="scenes made at the same time on this machine (1)")
     where.add_argument(
-        "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers make them (none), tcp://HOST:PORT"
+        "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers make the scenes (none), tcp://HOST:PORT"
     )
     parser.add_argument(
-        "--worker-timeout", type=float, metavar="S", help="seconds that a scheduler may be without any worker (1800)"
+        "--worker-timeout", type=float, metavar="S", help="give up after this many seconds without a worker (1800)"
     )
-    parser.add_argument("--resume", action="store_true", help="continue what was begun in this folder")
+    parser.add_argument("--resume", action="store_true", help="continue the data set that was begun in this folder")
     parser.add_argument("--overwrite", action="store_true", help="replace the data set that is there")
     parser.add_argument(
         "--splits", nargs="+", metavar="SPLIT", help="make scenes of these splits only (all); --resume makes the others"
@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads dataset`; return exit code (3 if scenes failed), manifest as JSON data and printed text."""
     for name, keeps in (("--resume", arguments.resume), ("--verify", arguments.verify)):
         if keeps and arguments.overwrite:
-            raise InputError("--overwrite", None, f"can't be given with {name}, which keeps what is there")
+            raise InputError("--overwrite", None, f"can't be given with {name}, which keeps existing scenes")
     if arguments.verify:
         return _verify(arguments.output)
     workers = _workers(arguments)
@@ -85,9 +85,9 @@ def _verify(folder: Path) -> Outcome:
 
 def summary(manifest: Manifest, folder: Path) -> str:
     """Return a line on the scenes and points that were made, and where they are."""
-    done = [scene for scene in manifest.scenes if scene.status == "done"]
-    points = sum(scene.points or 0 for scene in done)
-    return f"{len(done)} of {len(manifest.scenes)} scenes, {points:,} points\nwritten to {folder}"
+    scenes = [scene for scene in manifest.scenes if scene.status == "done"]
+    points = sum(scene.points or 0 for scene in scenes)
+    return f"{len(scenes)} of {len(manifest.scenes)} scenes, {points:,} points\nwritten to {folder}"
 
 
 if __name__ == "__main__":

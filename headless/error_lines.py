@@ -40,9 +40,9 @@ def missing_package(error: ModuleNotFoundError) -> str:
     name = (error.name or "").partition(".")[0]
     if name in ("", "headless", "ml", "synthroads_addon"):
         raise error
-    wanted = f"synthroads[{EXTRAS[name]}]" if name in EXTRAS else "synthroads"
+    requirement = f"synthroads[{EXTRAS[name]}]" if name in EXTRAS else "synthroads"
     within = "install and enable the SynthRoads extension in Blender, or " if name not in EXTRAS else ""
-    return f"error: the package {name} is missing: {within}run pip install '{wanted}'"
+    return f"error: the package {name} is missing: {within}run pip install '{requirement}'"
 
 
 def _name_fault(error: Exception) -> str | None:
@@ -50,8 +50,8 @@ def _name_fault(error: Exception) -> str | None:
     if not isinstance(error, OSError) or error.errno != errno.ENAMETOOLONG:
         return None
     name = str(error.filename or "a file")
-    shown = name if len(name) <= _SHOWN else f"{name[:_SHOWN]}..."
-    return f"{shown!r} is no name of a file: the system takes none as long ({len(name):,} characters)"
+    short_name = name if len(name) <= _SHOWN else f"{name[:_SHOWN]}..."
+    return f"{short_name!r} is no name of a file: the system takes none as long ({len(name):,} characters)"
 
 
 def _shortage_reason(error: Exception) -> str | None:

@@ -15,14 +15,12 @@ from synthroads_addon.base.files import check_folder_target
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads evaluate` to its parser."""
     parser.add_argument("run", type=Path, metavar="RUN", help="folder of a trained run, or name of a shipped model")
-    parser.add_argument("data", type=Path, nargs="+", metavar="DATA", help="data sets' folders or clouds")
+    parser.add_argument("data", type=Path, nargs="+", metavar="DATA", help="folders of data sets, or clouds")
     parser.add_argument("--split", default="test", metavar="NAME", help="split of the data sets (test)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for tables and pictures")
-    text = "classes of clouds of others, for segmentation: semantickitti, ign or a JSON file (the cloud's own)"
+    text = "for segmentation: mapping of the clouds' classes to the model's: semantickitti, ign or a JSON file (none)"
     parser.add_argument("--mapping", metavar="MAPPING", help=text)
-    text = (
-        "public data set that the folders hold, for segmentation (`synthroads list yardsticks`) or a JSON file (ours)"
-    )
+    text = "for segmentation: public data set in the folders (`synthroads list yardsticks`), or a JSON file (none)"
     parser.add_argument("--yardstick", metavar="NAME", help=text)
 
 
@@ -35,8 +33,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
     trained = open_run(arguments.run)
     evaluation = Evaluation(arguments.data, arguments.split, arguments.output, arguments.mapping, arguments.yardstick)
     scores, tables = task(trained.configuration.task).evaluate(trained, evaluation, progress_bar(arguments))
-    written = f"written to {arguments.output}: {', '.join(scores['files'])}"
-    return 0, scores, f"{tables}\n\n{written}"
+    summary = f"written to {arguments.output}: {', '.join(scores['files'])}"
+    return 0, scores, f"{tables}\n\n{summary}"
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Run an experiment: several trainings that differ in their data, each with several seeds.
 
-One table has all scores. What is trained already isn't trained again: after an interruption the same command goes on.
+One table has all scores. Finished trainings are kept: after an interruption, run the same command again to go on.
 """
 
 import argparse
@@ -19,9 +19,9 @@ from synthroads_addon.base.errors import InputError
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads experiment` to its parser."""
-    known = ", ".join(names_in(EXPERIMENTS))
-    parser.add_argument("experiment", metavar="EXPERIMENT", help=f"YAML file, or one of {known}")
-    text = "folder that {NAME} in the experiment's paths stands for (can be repeated)"
+    names = ", ".join(names_in(EXPERIMENTS))
+    parser.add_argument("experiment", metavar="EXPERIMENT", help=f"YAML file, or one of {names}")
+    text = "folder that replaces {NAME} in the experiment's paths (can be repeated)"
     parser.add_argument("--data", type=_folder, action="append", default=[], metavar="NAME=FOLDER", help=text)
     parser.add_argument("--output", type=Path, required=True, metavar="DIR", help="folder for runs, scores and table")
     text = "configuration that all trainings start from: a name or a YAML file (the experiment's)"
@@ -56,8 +56,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
             raise InputError("--seeds", seed, "must be whole numbers from 0")
     note_at_interrupt(lambda: f"what is trained and tested is kept in {arguments.output}; the same command goes on")
     results = work.run_experiment(experiment, configured, arguments.output, seeds, progress_bar(arguments))
-    shown = work.table(experiment.title, results, list(configured))
-    text = f"{shown}\nwritten to {arguments.output}: {TABLE}, {RESULTS} and the runs"
+    table = work.table(experiment.title, results, list(configured))
+    text = f"{table}\nwritten to {arguments.output}: {TABLE}, {RESULTS} and the runs"
     return 0, {"title": experiment.title, "results": results}, text
 
 

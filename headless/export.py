@@ -15,7 +15,7 @@ from synthroads_addon.base.files import check_file_target
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads export` to its parser."""
     parser.add_argument("run", type=Path, metavar="RUN", help="folder of a trained run, or name of a shipped model")
-    text = "ONNX file to write (RUN.onnx in the folder that the command runs in)"
+    text = "ONNX file to write (RUN.onnx in the current folder)"
     parser.add_argument("--output", type=Path, metavar="FILE", help=text)
     parser.set_defaults(writes=True)
     parser.add_argument("--overwrite", action="store_true", help="replace a file that is already there")
@@ -31,18 +31,18 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
     trained = open_run(arguments.run)
     network = task(trained.configuration.task).exportable(trained)
-    told = write_onnx(network, target, overwrite=arguments.overwrite)
-    return 0, told, summary(told, target)
+    figures = write_onnx(network, target, overwrite=arguments.overwrite)
+    return 0, figures, summary(figures, target)
 
 
-def summary(told: dict[str, Any], target: Path) -> str:
+def summary(figures: dict[str, Any], target: Path) -> str:
     """Return what was written as text: inputs with their shapes, outputs, size, difference from PyTorch."""
-    lines = [f"  {name}: {' x '.join(map(str, shape))}" for name, shape in told["inputs"].items()]
-    beside = "not compared: onnxruntime isn't installed"
-    if told["difference"] is not None:
-        beside = f"within {told['difference']:.1e} of PyTorch"
-    size = f"{told['bytes'] / 1e6:.2f} MB"
-    return "\n".join([f"written {target}: {size}, {beside}", *lines, f"outputs: {', '.join(told['outputs'])}"])
+    lines = [f"  {name}: {' x '.join(map(str, shape))}" for name, shape in figures["inputs"].items()]
+    comparison = "not compared: onnxruntime isn't installed"
+    if figures["difference"] is not None:
+        comparison = f"within {figures['difference']:.1e} of PyTorch"
+    size = f"{figures['bytes'] / 1e6:.2f} MB"
+    return "\n".join([f"written {target}: {size}, {comparison}", *lines, f"outputs: {', '.join(figures['outputs'])}"])
 
 
 if __name__ == "__main__":

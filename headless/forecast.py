@@ -1,6 +1,6 @@
-"""Forecast how long a training of a segmentation takes on this machine, from a few of its steps.
+"""Forecast how long the training of a segmentation takes on this machine, from a few of its steps.
 
-Seconds per step, measured, are multiplied by the steps of the whole training. Scores after the epochs take more.
+The measured time per step is multiplied by the number of steps. Scoring after the epochs takes additional time.
 """
 
 import argparse
@@ -23,10 +23,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads forecast` to its parser."""
     text = "shipped configuration of a segmentation, or a YAML file"
     parser.add_argument("configuration", metavar="CONFIGURATION", help=text)
-    text = "steps that are measured (%(default)s)"
+    text = "number of steps to measure (%(default)s)"
     parser.add_argument("--steps", type=int, default=3, metavar="N", help=text)
     add_changes_argument(parser, "the configuration", "threads=1")
-    parser.add_argument("--output", type=Path, metavar="FILE", help="JSON file to write as well")
+    parser.add_argument("--output", type=Path, metavar="FILE", help="also write this JSON file")
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
@@ -44,12 +44,12 @@ def run(arguments: argparse.Namespace) -> Outcome:
     return 0, figures, summary(figures)
 
 
-def summary(found: dict[str, Any]) -> str:
+def summary(forecast: dict[str, Any]) -> str:
     """Return a forecast as a line of text: hours, steps, seconds per step, device, batch."""
     return (
-        f"{found['hours']:,.1f} hours for {found['steps']:,} steps of {found['seconds_per_step']:.2f} s, on "
-        f"{found['device']} with {found['threads']} threads ({found['tiles']:,} tiles, "
-        f"{found['batch_points']:,} points of a batch)"
+        f"{forecast['hours']:,.1f} hours for {forecast['steps']:,} steps of {forecast['seconds_per_step']:.2f} s, on "
+        f"{forecast['device']} with {forecast['threads']} threads ({forecast['tiles']:,} tiles, "
+        f"{forecast['batch_points']:,} points of a batch)"
     )
 
 

@@ -42,8 +42,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
     progress("pictures", 0.0)
     with ended_promptly():
-        made = make_gallery(arguments.output, quality, arguments.only, say)
-    return 0, {"pictures": [str(path) for path in made]}, f"{len(made)} pictures in {arguments.output}"
+        pictures = make_gallery(arguments.output, quality, arguments.only, say)
+    return 0, {"pictures": [str(path) for path in pictures]}, f"{len(pictures)} pictures in {arguments.output}"
 
 
 if __name__ == "__main__":

@@ -49,12 +49,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
     add_device_argument(parser)
     seed = whole_number(2**63 - 1, "2^63 - 1")
-    parser.add_argument("--seed", type=seed, metavar="N", help="seed of everything random (the scenario's own)")
-    text = "point on the trade-off (the scenario's own)"
+    parser.add_argument("--seed", type=seed, metavar="N", help="seed of all random choices (the scenario's own)")
+    text = "speed against accuracy, as a preset (the scenario's own)"
     parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help=text)
-    parser.add_argument("--parameters", type=Path, metavar="FILE", help="take this road instead of sampling one")
+    parser.add_argument("--parameters", type=Path, metavar="FILE", help="take this parameter set, and sample none")
     parser.add_argument("--axis", type=Path, metavar="FILE", help=AXIS_FILES)
-    text = "OpenDRIVE file whose whole road is taken: lanes, surface, marks, objects, signals"
+    text = "OpenDRIVE file whose road is taken whole: lanes, surface, markings, objects, signals"
     parser.add_argument("--road", type=Path, metavar="FILE", help=text)
     add_axis_name_argument(parser)
     add_choice_arguments(parser)
@@ -67,13 +67,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_without_argument(parser: argparse.ArgumentParser) -> None:
     """Declare ``--without``, which leaves an effect of the sensor out."""
-    text = f"leave an effect out, with the same rays and seed (can be repeated): {', '.join(EFFECTS)}"
+    text = f"leave out this effect; rays and seed stay the same (can be repeated): {', '.join(EFFECTS)}"
     parser.add_argument("--without", action="append", default=[], choices=list(EFFECTS), metavar="EFFECT", help=text)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads generate`; return exit code, the job's report as JSON data and printed text."""
-    begun = time.perf_counter()
+    start = time.perf_counter()
     _check_road_changes(arguments)
     scenario = load_scenario(arguments.scenario, [*choice_changes(arguments), *all_changes(arguments, _FIELDS)])
     scenario = scenario_without(scenario, arguments.without)
@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.jobs.generate import Job, generate
 
     files = (arguments.output, arguments.parameters, arguments.axis, arguments.axis_name, axis_place(arguments))
-    job = Job(scenario, *files, arguments.overwrite, arguments.road, new_file=True, begun=begun)
+    job = Job(scenario, *files, arguments.overwrite, arguments.road, new_file=True, begun=start)
     report = generate(job, progress_bar(arguments))
     return 0, report, summary(report, arguments.output)
 
@@ -93,10 +93,10 @@ def _check_road_changes(arguments: argparse.Namespace) -> None:
     from synthroads_addon.jobs.generate import FROM_AXIS, FROM_ROAD
 
     option = "--parameters" if arguments.parameters else "--axis" if arguments.axis else "--road"
-    said = FROM_ROAD if arguments.road else FROM_AXIS
+    fields = FROM_ROAD if arguments.road else FROM_AXIS
     for change in arguments.changes:
         for name in _road_fields(change):
-            if arguments.parameters or name in said:
+            if arguments.parameters or name in fields:
                 what = "course and place of the road" if arguments.axis else "the whole road"
                 text = f"road.{name} has no effect with {option}, whose file says {what}; leave one of the two out"
                 raise InputError("--set", change, text)

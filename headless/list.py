@@ -1,4 +1,4 @@
-"""List what comes under a name: scenarios, scanners, recipes, classes, trainings; and the fields that --set takes."""
+"""List shipped names (scenarios, scanners, recipes, classes, trainings, ...) and the fields that --set takes."""
 
 import argparse
 import json
@@ -39,10 +39,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads list` to its parser."""
     text = f"{', '.join(KINDS)}, or {_FIELDS}: what --set takes (the kinds themselves)"
     parser.add_argument("kind", nargs="?", metavar="KIND", help=text)
-    text = "only names (of fields: paths) that begin so; or files of your own, or folders of them (all that is shipped)"
+    text = "only names, or paths of fields, that begin with this; or your files or folders of them (all shipped names)"
     parser.add_argument("names", nargs="*", metavar="NAME_OR_FILE", help=text)
     parser.words = "names"  # type: ignore[attr-defined]
-    text = "whose fields: the scenario's, or those of a training (%(default)s)"
+    text = "list the fields of a scenario or of a training (%(default)s)"
     parser.add_argument("--of", choices=_OWNERS, default="scenario", help=text)
 
 
@@ -57,8 +57,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
     if name == _FIELDS:
         return _fields(arguments.of, names)
     if name not in KINDS:
-        known = [*KINDS, _FIELDS]
-        raise InputError("KIND", name, f"must be one of {', '.join(known)}{nearest_name(name, known)}")
+        kinds = [*KINDS, _FIELDS]
+        raise InputError("KIND", name, f"must be one of {', '.join(kinds)}{nearest_name(name, kinds)}")
     kind = KINDS[name]
     listed = entries(kind, names)
     rows = [(one.name, *row) for one in listed for row in kind.rows(one)]
@@ -75,30 +75,30 @@ def _kinds() -> Outcome:
     return 0, {"kinds": data}, "\n".join(text_table(("kind", "number", "what it is", "use"), rows))
 
 
-def _fields(owner: str, wanted: Sequence[str]) -> Outcome:
-    known = list(fields_of(_OWNERS[owner]()))
-    for text in wanted:
-        if not any(one.path.startswith(text) for one in known):
+def _fields(owner: str, prefixes: Sequence[str]) -> Outcome:
+    fields = list(fields_of(_OWNERS[owner]()))
+    for text in prefixes:
+        if not any(one.path.startswith(text) for one in fields):
             raise InputError(_FIELDS, text, f"no field of the {owner} begins so; `synthroads list fields` has them all")
-    listed = [one for one in known if not wanted or one.path.startswith(tuple(wanted))]
+    listed = [one for one in fields if not prefixes or one.path.startswith(tuple(prefixes))]
     intervals = tuple(f"{one.path}." for one in listed if one.interval)
-    shown = [one for one in listed if not (intervals and one.path.startswith(intervals))]
-    rows = [_row(one) for one in shown]
+    rest = [one for one in listed if not (intervals and one.path.startswith(intervals))]
+    rows = [_row(one) for one in rest]
     return 0, {_FIELDS: [one.to_dict() for one in listed]}, "\n".join(text_table(("path", "default", "meaning"), rows))
 
 
 def _row(one: FieldEntry) -> tuple[str, str, str]:
     """Return the table cells (path, default, meaning) of a field; an interval's two fields share one row."""
     if one.interval:
-        given = f"{one.default['minimum']:g} to {one.default['maximum']:g} {one.unit}" if one.default else ""
-        return f"{one.path}.{{minimum,maximum}}", given.strip(), f"{one.description} [two numbers{_in(one.unit)}]"
+        range_text = f"{one.default['minimum']:g} to {one.default['maximum']:g} {one.unit}" if one.default else ""
+        return f"{one.path}.{{minimum,maximum}}", range_text.strip(), f"{one.description} [two numbers{_in(one.unit)}]"
     text = "" if one.default is None or isinstance(one.default, dict) else json.dumps(one.default).strip('"')
-    allowed = f"{'one of ' if one.allowed else ''}{one.value}{_in(one.unit)}{', required' if one.required else ''}"
+    value_text = f"{'one of ' if one.allowed else ''}{one.value}{_in(one.unit)}{', required' if one.required else ''}"
     if len(text) > _LONGEST_DEFAULT:
-        text, allowed = "...", f"{allowed}; by default {text}"
+        text, value_text = "...", f"{value_text}; by default {text}"
     elif text and one.unit:
         text = f"{text} {one.unit}"
-    return one.path, text, f"{one.description} [{allowed}]"
+    return one.path, text, f"{one.description} [{value_text}]"
 
 
 def _in(unit: str) -> str:

@@ -28,7 +28,7 @@ _PACKAGES = ("bpy", "numpy", "embreex", "laspy", "lazrs", "pydantic", "torch", "
 def messages(arguments: argparse.Namespace) -> Iterator[None]:
     """Context that logs to standard error as a command's flags say, warnings of libraries and remarks on input too."""
     set_up(arguments)
-    begun = time.perf_counter()
+    start = time.perf_counter()
     if logger.isEnabledFor(logging.DEBUG):
         import platform
 
@@ -44,7 +44,7 @@ def messages(arguments: argparse.Namespace) -> Iterator[None]:
         remarks.tell_assumptions()
     finally:
         logger.removeFilter(remarks)
-        logger.debug("all: took %.2f s", time.perf_counter() - begun)
+        logger.debug("all: took %.2f s", time.perf_counter() - start)
 
 
 def _log_warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:

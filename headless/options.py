@@ -66,7 +66,7 @@ def add_allow_large_argument(parser: argparse.ArgumentParser) -> None:
     """Add the flag ``--allow-large``, which lifts the scenario's limit ``scan.most_pulses``."""
     from synthroads_addon.scenario.scan import MOST_POSSIBLE
 
-    text = "do a scan of any size: without it one of more pulses than scan.most_pulses is refused"
+    text = "allow a scan of any size; without it, a scan of more pulses than scan.most_pulses is refused"
     parser.add_argument("--allow-large", action="store_const", const=MOST_POSSIBLE, help=text)
 
 
@@ -78,7 +78,7 @@ def add_choice_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tolerance",
         metavar="KIND=VALUE,...",
-        help=f"choose the cheapest settings whose errors keep this, e.g. height=5mm,intensity=5%%; kinds: {kinds} "
+        help=f"choose the fastest settings that keep these errors, e.g. height=5mm,intensity=5%%; kinds: {kinds} "
         "(the fidelity's settings)",
     )
     parser.add_argument(
@@ -109,10 +109,10 @@ def choice_summary(report: dict[str, Any]) -> list[str]:
     from synthroads_addon.scenario.tolerance import error_text
 
     choice = report["choice"]
-    chosen = ", ".join(f"{path}={value}" for path, value in choice["chosen"].items())
+    settings = ", ".join(f"{path}={value}" for path, value in choice["chosen"].items())
     errors = ", ".join(f"{name} {error_text(name, value)}" for name, value in choice["expected"]["errors"].items())
     at_most = ", ".join(f"{name} {error_text(name, value)}" for name, value in choice["expected"]["at_most"].items())
-    lines = [f"chosen: {chosen or 'nothing, as all is given'} ({choice['by']})", f"  expected errors: {errors}"]
+    lines = [f"chosen: {settings or 'nothing, as all is given'} ({choice['by']})", f"  expected errors: {errors}"]
     lines += [f"  at most, with a confidence of 95 %: {at_most}"] if at_most else []
     seconds = choice["expected"]["seconds"]
     return lines + ([f"  expected time: {seconds:.0f} s in all"] if seconds is not None else [])
@@ -120,15 +120,13 @@ def choice_summary(report: dict[str, Any]) -> list[str]:
 
 def add_axis_name_argument(parser: argparse.ArgumentParser) -> None:
     """Declare ``--axis-name``, which chooses one of a file's roads, and where the axis lies beside a line of points."""
-    text = "road or alignment of the file, by its name (the longest); `synthroads road FILE --list` lists them"
+    text = "name of a road or alignment in the file (the longest); `synthroads road FILE --list` lists them"
     parser.add_argument("--axis-name", metavar="NAME", help=text)
-    text = "the axis lies so far beside the file's points, m; positive to the left in their direction (0)"
+    text = "distance from the file's points to the axis, m; positive: axis to their left, along their order (0)"
     parser.add_argument("--offset-from-path", type=float, metavar="METRES", help=text)
-    text = "the file's points run in the middle of this lane, 0 the outermost (instead of --offset-from-path)"
+    text = "lane in whose middle the file's points run, 0: the outermost (instead of --offset-from-path)"
     parser.add_argument("--path-lane", type=int, metavar="N", help=text)
-    text = (
-        "the file's points are so high above the road, m; with the geoid's height where they count from the ellipsoid"
-    )
+    text = "height of the file's points above the road, m; add the geoid height if their heights are ellipsoidal"
     parser.add_argument("--height-above-road", type=float, metavar="METRES", help=text)
 
 
@@ -147,7 +145,7 @@ def add_twin_argument(parser: argparse.ArgumentParser, default: Sequence[str] = 
     """Add the option ``--twin FORMATS``: names of formats separated by commas, as a list in ``twin``."""
     from synthroads_addon.twin.formats import TWIN_FORMATS
 
-    text = f"geometric-semantic models, with commas: {', '.join(TWIN_FORMATS)} ({','.join(default) or 'none'})"
+    text = f"geometric-semantic models, separated by commas: {', '.join(TWIN_FORMATS)} ({','.join(default) or 'none'})"
     parser.add_argument("--twin", type=_split_names, default=list(default), metavar="FORMATS", help=text)
 
 
@@ -181,12 +179,12 @@ def numbers(counts: Sequence[int], form: str) -> Callable[[str], tuple[float, ..
     return read
 
 
-def whole_number(most: int, shown: str) -> Callable[[str], int]:
+def whole_number(most: int, limit_text: str) -> Callable[[str], int]:
     """Return an argparse type that reads a whole number from 0 to a maximum."""
 
     def read(text: str) -> int:
         if not text.isascii() or not text.isdigit() or int(text) > most:
-            raise argparse.ArgumentTypeError(f"is '{text}': must be a whole number from 0 to {shown}")
+            raise argparse.ArgumentTypeError(f"is '{text}': must be a whole number from 0 to {limit_text}")
         return int(text)
 
     return read

@@ -1,6 +1,6 @@
-"""Pack the labelled points of a data set's roads into one small file, to be carried to where training is fast.
+"""Pack the labelled points of a data set's roads into one small file, to train on a faster machine.
 
-What doesn't fit into the limit is left out, of each road as much.
+Where they exceed the size limit, a random choice of tiles is packed, equally many of each road.
 """
 
 import argparse
@@ -24,11 +24,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--split", metavar="NAME", help="split to pack (all)")
     parser.add_argument("--output", required=True, type=Path, metavar="FILE", help="file to write, .npz")
     parser.add_argument("--classes", default="5", metavar="SCHEME", help="5, 17 or a JSON file (%(default)s)")
-    text = "edge of the grid's cells of which one point each is kept (%(default)s)"
+    text = "edge of the grid cells, each of which keeps one point, m (%(default)s)"
     parser.add_argument("--voxel", type=float, default=0.1, metavar="M", help=text)
-    text = "reach to either side of a road's centreline, m (30)"
+    text = "distance to either side of the centreline within which points are kept, m (30)"
     parser.add_argument("--corridor", type=float, default=30.0, metavar="M", help=text)
-    text = "largest file, 1e6 bytes (50)"
+    text = "largest size of the file, 1e6 bytes (50)"
     parser.add_argument("--limit-mb", type=float, default=50.0, metavar="MB", help=text)
     text = "seed of the choice of tiles (%(default)s)"
     parser.add_argument("--seed", type=int, default=1, metavar="N", help=text)

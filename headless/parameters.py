@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = f"design class of the RAA ({usual}, or the first that has the cross-section)"
     parser.add_argument("--design-class", choices=DESIGN_CLASSES, help=text)
     text = ", ".join(f"{section} for {name}" for name, section in USUAL_SECTION.items())
-    parser.add_argument("--cross-section", metavar="RQ", help=f"one of {sections} (the class's: {text})")
+    parser.add_argument("--cross-section", metavar="RQ", help=f"one of {sections} (that of the design class: {text})")
     text = f"length of the road, m ({RoadScenario().length:g})"
     parser.add_argument("--length", type=float, metavar="M", help=text)
     add_changes_argument(parser)

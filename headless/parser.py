@@ -49,20 +49,20 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """Refuse a value that is none of an argument's choices, and name the one most like it."""
         if action.choices is not None and value not in action.choices:
-            known = [str(choice) for choice in action.choices]
-            message = f"invalid choice: {value!r} (choose from {', '.join(known)}){nearest_name(str(value), known)}"
+            names = [str(choice) for choice in action.choices]
+            message = f"invalid choice: {value!r} (choose from {', '.join(names)}){nearest_name(str(value), names)}"
             raise argparse.ArgumentError(action, message)
 
     def _refuse_unknown_option(self, words: Sequence[str]) -> None:
         """End the command where a word is no option of it, before it misses others, and name the one most like it."""
         if self._subparsers is not None or "--" in words:  # its sub-commands have the options; or what follows is none
             return
-        known = [name for action in self._actions if action.help != argparse.SUPPRESS for name in action.option_strings]
+        names = [name for action in self._actions if action.help != argparse.SUPPRESS for name in action.option_strings]
         for word in words:
             name = word.partition("=")[0]
             is_option = name.startswith("--") and " " not in name
             if is_option and not any(one.startswith(name) for one in self._option_string_actions):
-                self.error(f"unrecognized arguments: {word}{nearest_name(name, known)}")
+                self.error(f"unrecognized arguments: {word}{nearest_name(name, names)}")
 
     def error(self, message: str) -> Any:
         self.exit(2, f"{self.prog}: {message}\n")
@@ -86,5 +86,5 @@ def _add_common_arguments(parser: argparse.ArgumentParser) -> None:
     amount = parser.add_mutually_exclusive_group()
     text = "print errors only; if no output file is given, also print the result"
     amount.add_argument("--quiet", action="store_true", help=text)
-    amount.add_argument("--verbose", action="store_true", help="print settings, versions and times of stages as well")
+    amount.add_argument("--verbose", action="store_true", help="also print settings, versions and times of stages")
     parser.add_argument("--json", action="store_true", help="print the result as JSON on standard output")

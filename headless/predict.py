@@ -18,17 +18,17 @@ from synthroads_addon.base.text.table import text_table
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads predict` to its parser."""
-    text = "cloud to read (.laz, .las, .ply, ...); before it the folder of a trained run, or a shipped model's name of "
-    text += "`synthroads list models` (the shipped segmentation that was trained on what is most like the cloud)"
+    text = "cloud to read (.laz, .las, .ply, ...); before it, the folder of a trained run or the name of a model from "
+    text += "`synthroads list models` (the shipped segmentation whose training data are most like the cloud)"
     parser.add_argument("files", nargs="*", metavar="[RUN] CLOUD", help=text)
     parser.words = "files"  # type: ignore[attr-defined]
     text = "labelled cloud (.laz, .las) for segmentation, centreline (.geojson) for a centreline model "
-    text += "(beside the cloud: of cloud.laz cloud-predicted.laz, or cloud.laz-predicted.geojson)"
+    text += "(beside cloud.laz: cloud-predicted.laz, or cloud.laz-predicted.geojson)"
     parser.add_argument("--output", type=Path, metavar="FILE", help=text)
     parser.set_defaults(writes=True)
-    text = "line along the road that a centreline model begins with, CSV or GeoJSON (found in the cloud)"
+    text = "for a centreline model: approximate line along the road, CSV or GeoJSON (found in the cloud)"
     parser.add_argument("--path", type=Path, metavar="FILE", help=text)
-    text = "write the classes' LAS codes to the field classification, besides predicted_class (segmentation)"
+    text = "for segmentation: also write the LAS codes of the classes to the field classification"
     parser.add_argument("--classification", action="store_true", help=text)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
 
@@ -62,8 +62,10 @@ def run(arguments: argparse.Namespace) -> Outcome:
 def next_step(cloud: Path, output: Path, task: str) -> str:
     """Return the command that draws what was written: the predicted classes, or the cloud along its centreline."""
     line = [] if task == "segmentation" else ["--centerline", str(output)]
-    shown = cloud if line else output
-    return shlex.join(["synthroads", "cloud", "preview", str(shown), *line, "--output", str(output.with_suffix(""))])
+    picture_cloud = cloud if line else output
+    return shlex.join(
+        ["synthroads", "cloud", "preview", str(picture_cloud), *line, "--output", str(output.with_suffix(""))]
+    )
 
 
 def labelled(metrics: dict[str, Any]) -> str:

@@ -112,11 +112,11 @@ class _LineProgress:
         self._seen.add(self._stage)
         self._last = now
         after = f"after {now - self._begun:.0f} s"
-        told = f"{100.0 * self._share:.0f} % {after}" if self._rate.began else f"at work {after}"
+        state = f"{100.0 * self._share:.0f} % {after}" if self._rate.began else f"at work {after}"
         left = self._rate.left(now)
-        told += "" if left is None else f", about {duration(left)} left"
+        state += "" if left is None else f", about {duration(left)} left"
         detail = getattr(self._stage, "detail", "")
-        line = f"{self._stage}: {told}{f' ({detail})' if detail else ''}"
+        line = f"{self._stage}: {state}{f' ({detail})' if detail else ''}"
         if self._held is None:
             logger.info(line)
         else:

@@ -1,4 +1,4 @@
-"""Turn a cloud into a road's parameters, with the deviations of the cloud from it, and its geometric-semantic model."""
+"""Turn a cloud into the parameters of its road, with deviations from the cloud, and a geometric-semantic model."""
 
 from __future__ import annotations
 
@@ -40,18 +40,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads reconstruct` to its parser."""
     parser.add_argument("cloud", type=Path, metavar="CLOUD", help="cloud to read (.laz, .las, .ply, .e57, .npz)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
-    text = "kind of road, where it is known (auto: found out)"
+    text = "kind of road, if known (auto: found in the cloud)"
     parser.add_argument("--road", choices=("auto", "dual", "single"), default="auto", help=text)
-    text = "course of the road, roughly: CSV or GeoJSON in the cloud's coordinates (found in the cloud)"
+    text = "approximate course of the road: CSV or GeoJSON in the cloud's coordinates (found in the cloud)"
     parser.add_argument("--path", type=Path, metavar="FILE", help=text)
-    text = "folder of a trained centreline model: one more view of the axis (those that learn nothing)"
+    text = "folder of a trained centreline model that estimates the axis as well (no trained model)"
     parser.add_argument("--run", type=Path, metavar="DIR", help=text)
-    text = "root mean square that the alignment may keep from the measured axis, m (0.03)"
+    text = "largest root mean square distance of the alignment from the measured axis, m (0.03)"
     parser.add_argument("--fit-tolerance", type=float, default=0.03, metavar="M", help=text)
     add_renamed_argument(parser, "--tolerance", "--fit-tolerance")
-    text = "take the widths of the standard cross-section that all measured ones are near to (the measured ones)"
+    text = "use the widths of the standard cross-section that matches all measured widths (the measured widths)"
     parser.add_argument("--snap", action="store_true", help=text)
-    text = "true parameters (.json) or axis (CSV, GeoJSON) to compare with afterwards; they change nothing"
+    text = "true parameters (.json) or axis (CSV, GeoJSON) to compare the result with; no influence on the result"
     parser.add_argument("--truth", type=Path, metavar="FILE", help=text)
     parser.add_argument("--no-picture", action="store_true", help=f"don't draw {PICTURE}")
     add_twin_argument(parser)
@@ -106,11 +106,11 @@ def _comparison(truth: Path | None, place: Placement) -> Callable[[RoadParameter
         from synthroads_addon.road.parameters import read_parameters
 
         parameters = read_parameters(truth)
-        return lambda found: compare(found, parameters)
+        return lambda road: compare(road, parameters)
     from synthroads_addon.road.axes.centerline import read_axis
 
     axis = read_axis(truth, place)
-    return lambda found: compare_axis(found, axis)
+    return lambda road: compare_axis(road, axis)
 
 
 def _job(arguments: argparse.Namespace) -> ReconstructionJob:
@@ -137,16 +137,16 @@ def _write(road: ReconstructedRoad, folder: Path, no_picture: bool) -> None:
     from synthroads_addon.road.geometry import RoadGeometry
     from synthroads_addon.road.tessellation import sample_stations
 
-    found = road.found
-    geometry = RoadGeometry(found.parameters)
-    (folder / PARAMETERS).write_text(found.parameters.to_json(), encoding="utf-8")
+    result = road.found
+    geometry = RoadGeometry(result.parameters)
+    (folder / PARAMETERS).write_text(result.parameters.to_json(), encoding="utf-8")
     line = centerline_geojson(geometry, sample_stations(geometry, 0.005))
-    line["features"][0]["properties"]["doubtful"] = found.judgement.to_dict()["doubtful"]
+    line["features"][0]["properties"]["doubtful"] = result.judgement.to_dict()["doubtful"]
     (folder / CENTRELINE).write_text(canonical_json(line), encoding="utf-8")
     if not no_picture:
         from synthroads_addon.reconstruction.picture import draw
 
-        draw(found, road.cloud, folder / PICTURE)
+        draw(result, road.cloud, folder / PICTURE)
 
 
 def summary(result: dict[str, Any], output: Path) -> str:

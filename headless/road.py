@@ -37,15 +37,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--list", action="store_true", help="list the file's roads or alignments, and write nothing")
     parser.add_argument("--output", type=Path, metavar="DIR", help="folder for the files (needed without --list)")
     add_axis_name_argument(parser)
-    text = "round kinks between elements by two clothoids at most M metres off (0.05); else they are refused"
+    text = "round kinks between elements by two clothoids, at most M metres away (0.05); by default kinks are refused"
     parser.add_argument("--round-kinks", type=_distance, nargs="?", const=0.05, metavar="M", help=text)
-    parser.add_argument("--only-axis", action="store_true", help="take the axis and its heights alone: no exit code 3")
-    text = "print in which fields the road of an OpenDRIVE file differs from this parameter set"
+    parser.add_argument("--only-axis", action="store_true", help="take only the axis and its heights; no exit code 3")
+    text = "print the fields in which the road of an OpenDRIVE file differs from this parameter set"
     parser.add_argument("--against", type=Path, metavar="PARAMETERS", help=text)
     names = ", ".join(scenario_names())
-    text = f"what the file doesn't say: {names}, or a .json file (%(default)s)"
+    text = f"scenario for what the file doesn't say: {names}, or a .json file (%(default)s)"
     parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help=text)
-    parser.add_argument("--seed", type=int, metavar="N", help="seed of what is drawn (the scenario's own)")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of all random choices (the scenario's own)")
     add_changes_argument(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
 
@@ -81,20 +81,20 @@ def run(arguments: argparse.Namespace) -> Outcome:
             round_kinks=arguments.round_kinks,
             deviations=folder / PICTURE,
         )
-        parameters, told = source.read()
-        report = told["axis"]
+        parameters, report_parts = source.read()
+        report = report_parts["axis"]
         road = RoadGeometry(parameters)
         (folder / PARAMETERS).write_text(parameters.to_json(), encoding="utf-8")
         line = centerline_geojson(road, sample_stations(road, scenario.settings().tolerance))
         (folder / CENTRELINE).write_text(canonical_json(line), encoding="utf-8")
         report |= {"remarks": remarks_so_far()}
         (folder / REPORT).write_text(canonical_json(report), encoding="utf-8")
-    lost = [text for text in report.get("left_out", []) if text.startswith(_SURFACE)]
-    lost += ["surface"] if report.get("whole", {}).get("surface_lost") else []
+    losses = [text for text in report.get("left_out", []) if text.startswith(_SURFACE)]
+    losses += ["surface"] if report.get("whole", {}).get("surface_lost") else []
     lines = [axis_summary(report), *report.get("summary", [])]
     lines += [f"left out: {text}" for text in report.get("left_out", [])]
     text = "\n".join([*lines, f"written to {arguments.output}"])
-    return 3 if lost and not arguments.only_axis else 0, report, text
+    return 3 if losses and not arguments.only_axis else 0, report, text
 
 
 def _compare(arguments: argparse.Namespace) -> Outcome:
@@ -106,12 +106,12 @@ def _compare(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.jobs.whole_road import differences_from
 
     scenario = load_scenario(arguments.scenario, all_changes(arguments, _FIELDS))
-    found, _ = differences_from(arguments.file, arguments.against, scenario, arguments.axis_name)
-    rows = [one._asdict() for one in found]
+    differences, _ = differences_from(arguments.file, arguments.against, scenario, arguments.axis_name)
+    rows = [one._asdict() for one in differences]
     report = {"file": str(arguments.file), "against": str(arguments.against), "differences": rows}
     cells = [
         (one.field, str(one.old), str(one.new), "" if one.station is None else f"at station {one.station:.1f} m")
-        for one in found
+        for one in differences
     ]
     if not cells:
         return 0, report, "no field differs"
@@ -132,9 +132,9 @@ def _distance(text: str) -> float:
 def _table(rows: list[dict[str, Any]]) -> str:
     cells = []
     for row in rows:
-        shown = [("no heights", not row["heights"]), ("in a junction", row["junction"])]
-        shown += [("one carriageway", row["carriageway"])]
-        notes = row["fault"] or ", ".join([*filter(None, [row["kind"]]), *(text for text, so in shown if so)])
+        labels = [("no heights", not row["heights"]), ("in a junction", row["junction"])]
+        labels += [("one carriageway", row["carriageway"])]
+        notes = row["fault"] or ", ".join([*filter(None, [row["kind"]]), *(text for text, so in labels if so)])
         lanes = "" if row["lanes"] is None else str(row["lanes"])
         length = "" if row["fault"] else f"{row['length']:,.1f} m"
         of_what = f"{row['points']} points" if row["points"] else str(row["elements"])

@@ -1,4 +1,4 @@
-"""Scan a scene that is there already: .blend, .glb, .gltf, .obj, .ply, .stl, .fbx or .usd; the file is only read."""
+"""Scan an existing scene: .blend, .glb, .gltf, .obj, .ply, .stl, .fbx or .usd; the file isn't changed."""
 
 import argparse
 import json
@@ -48,35 +48,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
     add_device_argument(parser)
     where = parser.add_mutually_exclusive_group()
-    text = "follow this line, CSV (x, y, z) or GeoJSON (the scene's road, else straight over its middle)"
+    text = "line to follow, CSV (x, y, z) or GeoJSON (the scene's road, else straight over its middle)"
     where.add_argument("--path", type=Path, metavar="FILE", help=text)
-    where.add_argument("--trajectory", metavar="FILE", help="CSV: time, x, y, z, roll, pitch, heading")
-    text = "stand here, on the surface or with the scanner at Z (can be repeated; --tripod=-4,7 where X < 0)"
+    where.add_argument("--trajectory", metavar="FILE", help="recorded path, CSV: time, x, y, z, roll, pitch, heading")
+    text = "place of a tripod on the surface, or of its scanner if Z is given (can be repeated; X < 0: --tripod=-4,7)"
     place = numbers((2, 3), "X,Y or X,Y,Z")
     where.add_argument("--tripod", type=place, action="append", default=[], metavar="X,Y[,Z]", help=text)
-    text = "flight height, or that of the scanner on a tripod, m (the platform's usual one)"
+    text = "height of the scanner above ground, in flight or on a tripod, m (the platform's usual one)"
     parser.add_argument("--height", type=float, metavar="M", help=text)
     parser.add_argument("--speed", type=float, metavar="M/S", help="speed over ground, m/s (the platform's usual one)")
     parser.add_argument("--rays", type=int, metavar="N", help="rays per pulse (the fidelity's own)")
     parser.add_argument("--classes", type=Path, metavar="FILE", help="JSON: classes by names (none), see docs/scan.md")
-    text = "the road that is scanned, by its root's name, where a .blend has several (the one that is active in it)"
+    text = "name of the root of the road to scan, if a .blend has several (the active one)"
     parser.add_argument("--road", metavar="NAME", help=text)
-    text = f"take the scan from it: {names}, or a .json file (the defaults of a scenario)"
+    text = f"scenario with the scan's settings: {names}, or a .json file (the defaults of a scenario)"
     parser.add_argument("--scenario", metavar="NAME_OR_FILE", help=text)
     add_changes_argument(parser)
     generate.add_without_argument(parser)
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise (the scenario's own)")
-    text = "point on the trade-off (the scenario's own)"
+    text = "speed against accuracy, as a preset (the scenario's own)"
     parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help=text)
     add_choice_arguments(parser)
     add_allow_large_argument(parser)
-    parser.add_argument("--epsg", type=int, metavar="N", help="coordinate system of the map (that of the scene's road)")
-    text = "map coordinates of the scene's origin (0,0,0); auto: the scene's own are the map's"
+    parser.add_argument("--epsg", type=int, metavar="N", help="EPSG code of the map (that of the scene's road)")
+    text = "map coordinates of the scene's origin (0,0,0); auto: the scene has map coordinates already"
     parser.add_argument("--origin", type=_origin, metavar="X,Y,Z", help=text)
-    parser.add_argument("--up", choices=("y", "z"), help="what points up in .obj (y), .ply and .stl (z)")
-    text = "whose state of the scene: that of renders, or of the viewport (render)"
+    parser.add_argument("--up", choices=("y", "z"), help="axis that points up in an .obj (y), .ply or .stl (z)")
+    text = "scan the scene as it is in renders, or in the viewport (render)"
     parser.add_argument("--visible", choices=("render", "viewport"), default="render", help=text)
-    text = "further folder with pictures and parts that a scene other than a .blend names (its own; can be repeated)"
+    text = "further folder with files that a scene (not a .blend) refers to (its own folder; can be repeated)"
     parser.add_argument("--also-from", type=Path, action="append", default=[], metavar="DIR", help=text)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
 
@@ -87,14 +87,14 @@ def _origin(text: str) -> tuple[float, ...] | str:
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads scan`; return exit code, the job's report as JSON data and printed text."""
-    begun = time.perf_counter()
+    start = time.perf_counter()
     scenario = scenario_without(scenario_of(arguments), arguments.without)
     detail("scenario", scenario.to_dict())
     from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 
     same = {name: getattr(arguments, name) for name in _SAME}
     job = SceneScan(
-        scenario=scenario, tripods=tuple(arguments.tripod), also_from=tuple(arguments.also_from), begun=begun, **same
+        scenario=scenario, tripods=tuple(arguments.tripod), also_from=tuple(arguments.also_from), begun=start, **same
     )
     report = scan_scene(job, progress_bar(arguments))
     return 0, report, summary(report, arguments.output)

@@ -89,9 +89,9 @@ def _wait_and_exit(child: int, spoken: _ErrorPipe, journal: int, opened: int) ->
     short = code < 0 and _memory_is_short(-code, spoken.held)
     remove_recorded_folders(journal)  # those that are still there
     if code < 0:
-        told = None if short else crash_line(-code, noted_file(opened))
-        _say(told or _line(-code, short))
-        code = 2 if short or told else 1
+        message = None if short else crash_line(-code, noted_file(opened))
+        _say(message or _line(-code, short))
+        code = 2 if short or message else 1
     elif code != 2:  # else a line says it all
         _say(spoken.held)
     os._exit(code)

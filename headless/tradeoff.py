@@ -39,14 +39,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scenario", action="append", metavar="NAME_OR_FILE", help=f"scene to measure on; can be repeated ({scenes})"
     )
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for tables, JSON and plots")
-    text = f"any of {', '.join(KNOBS)} (all)"
+    text = f"settings to measure: {', '.join(KNOBS)} (all)"
     parser.add_argument("--knobs", nargs="+", default=list(KNOBS), metavar="KNOB", help=text)
     parser.add_argument(
-        "--resume", action="store_true", help="keep the rows that the folder holds already; measure the others"
+        "--resume", action="store_true", help="keep the rows that are in the folder; measure the others"
     )
-    parser.add_argument("--overwrite", action="store_true", help="measure again what the folder holds already")
-    parser.add_argument("--document", type=Path, metavar="FILE", help="fill the tables of this Markdown file as well")
-    parser.add_argument("--pictures", type=Path, metavar="DIR", help="put the plots here as well")
+    parser.add_argument("--overwrite", action="store_true", help="measure the rows in the folder again")
+    parser.add_argument("--document", type=Path, metavar="FILE", help="also fill the tables of this Markdown file")
+    parser.add_argument("--pictures", type=Path, metavar="DIR", help="also write the plots to this folder")
     parser.add_argument(_ROW, metavar="JSON", help=argparse.SUPPRESS)
 
 
@@ -132,14 +132,14 @@ def _part(progress: Progress, number: int, count: int) -> Progress:
 
 def _measure_all(arguments: argparse.Namespace, scene: str, title: str, progress: Progress) -> list[dict[str, Any]]:
     """Measure the rows of the wanted knobs; return these and kept rows of others, in the order of `KNOBS`."""
-    chosen = set(knob_rows(arguments.knobs))
+    chosen_rows = set(knob_rows(arguments.knobs))
     results = []
     for number, (knob, value) in enumerate(knob_rows(KNOBS)):
         progress(f"{title} {knob} {value}", number / len(list(knob_rows(KNOBS))))
         path = arguments.output / _ROWS / title / f"{knob}-{_file_name(value)}.json"
         job = _fingerprint(scene, knob, value)
         result = _read_kept_row(path, job, knob, value) if arguments.resume else None
-        if result is None and (knob, value) in chosen:
+        if result is None and (knob, value) in chosen_rows:
             result = _measure_row(scene, knob, value)
             write_file(path, canonical_json({"job": job, "row": result}).encode(), overwrite=True)
         if result is not None:
@@ -187,10 +187,10 @@ def _measure_row(scene: str, knob: str, value: Any) -> dict[str, Any]:
 def _measured_once(scene: str, knob: str, value: Any) -> dict[str, Any]:
     request = json.dumps({"scenario": scene, "knob": knob, "value": value})
     line = [sys.executable, str(Path(__file__).resolve()), "--output", ".", _ROW, request, "--json"]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise RuntimeError(f"{scene}: {knob} = {value} failed: {done.stderr.strip()}")
-    result: dict[str, Any] = json.loads(done.stdout)
+    process = subprocess.run(line, capture_output=True, text=True, check=False)
+    if process.returncode:
+        raise RuntimeError(f"{scene}: {knob} = {value} failed: {process.stderr.strip()}")
+    result: dict[str, Any] = json.loads(process.stdout)
     return result
 
 

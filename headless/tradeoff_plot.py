@@ -26,16 +26,16 @@ def plot(results: Sequence[Row], path: Path) -> None:
     axes = figure.subplots(lines, columns, squeeze=False)
     for axis in axes.flat[len(panels) :]:
         axis.set_visible(False)
-    shown: dict[str, Any] = {}
+    handles: dict[str, Any] = {}
     for axis, name in zip(axes.flat, panels, strict=False):
         for knob in sorted(_knobs(measured), key=_ORDER.index):
             if _varies(measured, knob, name):
-                shown[_label(knob)] = _draw_knob(axis, [row for row in measured if row["knob"] == knob], knob, name)
+                handles[_label(knob)] = _draw_knob(axis, [row for row in measured if row["knob"] == knob], knob, name)
         _set_scales(axis, [abs(row["errors"][name]) for row in measured if name in row["errors"]])
         axis.set(xlabel="processor time of the whole job (s)", ylabel=ROW_TITLES[name])
         axis.grid(alpha=0.3)
-    if shown:
-        figure.legend(shown.values(), shown.keys(), loc="outside lower center", ncols=5, fontsize=9, frameon=False)
+    if handles:
+        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5, fontsize=9, frameon=False)
     save_figure(figure, path, dpi=90)
 
 

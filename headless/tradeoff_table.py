@@ -60,15 +60,15 @@ def row_fault(row: Any, knob: str, value: Any) -> str | None:
         unknown = cost is None and name != "seconds"
         if not unknown and not (is_number(cost) and cost >= 0.0 and not (whole and isinstance(cost, float))):
             return f"{name} must be a {'whole ' if whole else ''}number from 0"
-    for name, known in (("errors", tuple(ROW_TITLES)), ("shares", _SHARES)):
+    for name, names in (("errors", tuple(ROW_TITLES)), ("shares", _SHARES)):
         part = row.get(name, {} if name == "shares" else None)
-        if not isinstance(part, dict) or not all(key in known and is_number(part[key]) for key in part):
-            return f"{name} must be numbers by name: {', '.join(known)}"
+        if not isinstance(part, dict) or not all(key in names and is_number(part[key]) for key in part):
+            return f"{name} must be numbers by name: {', '.join(names)}"
     several = row.get("all_seconds", [1.0])
     if not isinstance(several, list) or not all(is_number(one) and one > 0.0 for one in several):
         return "all_seconds must be a list of numbers above 0"
-    wrong = next((name for name in ("machine", "colour_truth") if not isinstance(row.get(name, ""), str)), None)
-    return wrong and f"{wrong} must be a text"
+    faulty_field = next((name for name in ("machine", "colour_truth") if not isinstance(row.get(name, ""), str)), None)
+    return faulty_field and f"{faulty_field} must be a text"
 
 
 def measured_rows(results: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
@@ -92,9 +92,10 @@ def better_row(row: Mapping[str, Any], others: Iterable[Mapping[str, Any]], nois
     """
 
     def as_accurate(other: Mapping[str, Any]) -> bool:
-        found = other["errors"]
+        other_errors = other["errors"]
         return all(
-            name in found and abs(found[name]) <= (1.0 + ALIKE) * abs(error) for name, error in row["errors"].items()
+            name in other_errors and abs(other_errors[name]) <= (1.0 + ALIKE) * abs(error)
+            for name, error in row["errors"].items()
         )
 
     faster = [other for other in others if other["seconds"] < row["seconds"] * (1.0 - noise) and as_accurate(other)]
@@ -111,8 +112,8 @@ def front_lines(results: Sequence[Mapping[str, Any]]) -> list[str]:
     rows = []
     for row in presets:
         other = better_row(row, [one for one in job if one is not row], noise or 0.0)
-        shown = "-" if other is None else f"{other['value']}: {other['seconds']:.1f} s for {row['seconds']:.1f} s"
-        rows.append([str(row["value"]), "yes" if other is None else "no", shown])
+        faster_row = "-" if other is None else f"{other['value']}: {other['seconds']:.1f} s for {row['seconds']:.1f} s"
+        rows.append([str(row["value"]), "yes" if other is None else "no", faster_row])
     lines = markdown_table(["preset", "on the front", "faster, and as accurate in all errors"], rows)
     text = "times weren't measured twice, so every difference of time counts"
     if noise is not None:

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads train` to its parser."""
-    known = ", ".join(names_in(SHIPPED))
-    parser.add_argument("configuration", metavar="CONFIGURATION", help=f"YAML file, or one of {known}")
+    names = ", ".join(names_in(SHIPPED))
+    parser.add_argument("configuration", metavar="CONFIGURATION", help=f"YAML file, or one of {names}")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the run")
     parser.add_argument("--resume", action="store_true", help="go on with an interrupted training")
     parser.add_argument("--overwrite", action="store_true", help="begin anew in a folder that holds a run")
@@ -38,9 +38,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
     configuration = load_configuration(arguments.configuration, arguments.changes)
     detail("configuration", configuration.to_dict())
-    begun = Run.start(arguments.output, configuration, resume=arguments.resume, overwrite=arguments.overwrite)
-    note_at_interrupt(lambda: _kept(arguments, begun))
-    metrics = task(configuration.task).train(begun, progress_bar(arguments))
+    training = Run.start(arguments.output, configuration, resume=arguments.resume, overwrite=arguments.overwrite)
+    note_at_interrupt(lambda: _kept(arguments, training))
+    metrics = task(configuration.task).train(training, progress_bar(arguments))
     return 0, metrics, f"trained {arguments.output}: {summary(metrics)}"
 
 
@@ -49,14 +49,14 @@ def _kept(arguments: argparse.Namespace, run: Run[Any]) -> str:
     from ml.runs import CHECKPOINT, PRETRAINING
 
     changes = [word for change in arguments.changes for word in ("--set", change)]
-    given = [arguments.configuration, "--output", str(arguments.output), *changes, "--resume"]
+    words = [arguments.configuration, "--output", str(arguments.output), *changes, "--resume"]
     if not run.begun and not run.kept:
         return f"nothing was changed in {arguments.output}: it was still reading data"
     epochs = run.configuration.schedule.epochs
-    kept = f"epoch {run.kept} of {epochs} is kept" if run.kept else f"no epoch of {epochs} was finished"
+    state = f"epoch {run.kept} of {epochs} is kept" if run.kept else f"no epoch of {epochs} was finished"
     if not run.kept and (arguments.output / PRETRAINING / CHECKPOINT).is_file():
-        kept = "the pretraining's epochs are kept"
-    return f"{kept} in {arguments.output}; go on with: {shlex.join(['synthroads', 'train', *given])}"
+        state = "the pretraining's epochs are kept"
+    return f"{state} in {arguments.output}; go on with: {shlex.join(['synthroads', 'train', *words])}"
 
 
 def summary(metrics: dict[str, object]) -> str:

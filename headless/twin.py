@@ -41,13 +41,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("parameters", type=Path, metavar="PARAMETERS", help="parameter set (parameters.json)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
     add_twin_argument(parser, TWIN_FORMATS)
-    text = f"largest distance of chords from curved lines and surfaces, m ({TOLERANCE:g})"
+    text = f"largest distance between a chord and the curved line or surface, m ({TOLERANCE:g})"
     parser.add_argument("--max-deviation", type=float, default=TOLERANCE, metavar="M", help=text)
     add_renamed_argument(parser, "--tolerance", "--max-deviation")
-    text = "where IFC's objects stand: along the alignment, or by coordinates for viewers that know none (%(default)s)"
+    text = "placement of IFC objects: along the alignment, or local, for viewers without alignments (%(default)s)"
     placements = get_args(IfcPlacement)
     parser.add_argument("--ifc-placement", choices=placements, default=IfcSettings().placement, help=text)
-    text = "OpenDRIVE in a projection about the site without an offset, for readers of lat_0 and lon_0 alone"
+    text = "write OpenDRIVE in a local projection without offset, for programs that read lat_0 and lon_0 only"
     parser.add_argument("--local-projection", action="store_true", help=text)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
 
@@ -100,9 +100,9 @@ def _written(path: Path) -> str:
     return f"written {path} ({path.stat().st_size / 1e6:.2f} MB)"
 
 
-def _line(report: Path, lost: dict[str, int]) -> str:
+def _line(report: Path, reasons: dict[str, int]) -> str:
     """Return a line of text on a format's report: its file name, and how many instances are missing and why."""
-    nothing = "; ".join(f"{count} not: {reason}" for reason, count in lost.items())
+    nothing = "; ".join(f"{count} not: {reason}" for reason, count in reasons.items())
     return f"        {report.name}: what became of each instance number{f'; {nothing}' if nothing else ''}"
 
 

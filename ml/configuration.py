@@ -62,7 +62,7 @@ class Configuration(Part):
 
     task: str = Field(description="What is learned: centerline or segmentation.")
     title: str = Field("", description="Title for people.")
-    seed: int = quantity(1, ge=0, le=_LARGEST_SEED, unit="1", description="Seed of everything random.")
+    seed: int = quantity(1, ge=0, le=_LARGEST_SEED, unit="1", description="Seed of all random choices.")
     threads: int = quantity(0, ge=0, le=1024, unit="1", description="Threads of PyTorch; 0: one per core.")
     device: str = Field("auto", pattern=r"^(auto|cpu|cuda(:\d+)?)$", description="auto: CUDA where there is one.")
     workers: int = quantity(0, ge=0, le=256, unit="1", description="Processes that prepare batches; 0: this one.")

@@ -81,7 +81,7 @@ class Yardstick(Part):
         path = folder / self.names
         if not path.is_file() and self.numbers and next(folder.rglob("*.npy"), None):
             listed = ", ".join(f"{number} {name}" for number, name in self.numbers.items())
-            assume(f"{folder.name} has no {self.names}: the numbers of its classes are taken for {listed}")
+            assume(f"{folder.name} has no {self.names}: the numbers of its classes are read as {listed}")
             return self.mapping.model_copy(update={"classes": self._named(self.numbers)})
         if not path.is_file():
             wanted = ", ".join(self.mapping.classes)
@@ -148,7 +148,7 @@ def _sweep(path: Path) -> tuple[PointBlock, NDArray[np.int64]]:
 
 
 def _array(path: Path) -> Iterator[tuple[PointBlock, NDArray[np.int64]]]:
-    """Yield the points of an array (N, 4 or more) in a .npy file: x, y, z, number of the class; the rest is left aside.
+    """Yield the points of an array (N, 4 or more) in a .npy file: x, y, z, number of the class; the rest is ignored.
 
     Raises:
         InputError: it is no such array, or a coordinate isn't finite.
@@ -161,7 +161,7 @@ def _array(path: Path) -> Iterator[tuple[PointBlock, NDArray[np.int64]]]:
         shape = getattr(array, "shape", None)
         raise InputError(str(path), shape, "must be numbers of shape (N, 4): x, y, z, class")
     if array.shape[1] > 4:
-        warn(f"{path.name}: its columns after the fourth (x, y, z, class) are left aside")
+        warn(f"{path.name}: its columns after the fourth (x, y, z, class) are ignored")
     for done in range(0, len(array), BLOCK):
         rows = np.asarray(array[done : done + BLOCK], dtype=np.float64)
         xyz = _finite(path, rows[:, :3])

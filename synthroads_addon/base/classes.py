@@ -44,7 +44,7 @@ class ClassSelector(Model):
         if not any((self.class_name, self.material, self.thing, self.asset)):
             raise ValueError("must have at least one of class, material, thing, asset")
         if self.where and not self.thing:
-            raise ValueError("where needs a thing whose fields it names")
+            raise ValueError("where needs thing, whose fields it names")
         return self
 
 

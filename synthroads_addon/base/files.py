@@ -250,7 +250,7 @@ def check_file_target(path: Path, field: str = "--output", overwrite: bool = Fal
     if ending and path.suffix.lower() != ending:
         raise OutputError(field, str(path), f"must end in {ending}")
     if _is_there(path) and path.is_dir():
-        raise OutputError(field, str(path), "is a folder, the name of a file is needed")
+        raise OutputError(field, str(path), "is a folder; name a file")
     if _is_there(path) and not overwrite:
         remedy = "--overwrite replaces it" + ("" if field else ", --output names another file")
         raise OutputError(*_named(field, path), f"is there already; {remedy}")
@@ -269,7 +269,7 @@ def path_beside(file: Path, name: str, field: str) -> Path:
         InputError: it is the name of a folder as such: empty, a dot or a slash.
     """
     if not file.name:
-        raise InputError(field, str(file), "the name of a file is needed")
+        raise InputError(field, str(file), "must name a file")
     return file.with_name(name)
 
 

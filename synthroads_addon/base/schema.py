@@ -99,7 +99,7 @@ def _fields_fit(fields: dict[str, Any]) -> dict[str, Any]:
     return {"properties": fields, "required": needed}
 
 
-_FORMER = {"deprecated": True, "description": "Of earlier versions; nothing showed it. It is read and left out."}
+_FORMER = {"deprecated": True, "description": "Field of earlier versions, without effect. It is read and dropped."}
 
 
 def _complete_schema(schema: dict[str, Any], model: type[Any]) -> None:

@@ -85,8 +85,8 @@ class PointBlock:
 
     def with_arrays(self, arrays: Mapping[str, AnyArray | None]) -> PointBlock:
         """Return a copy of the block with these arrays replaced or added; None removes one."""
-        kept = {name: array for name, array in {**self.attributes(), **arrays}.items() if array is not None}
-        return make_block(**kept)
+        all_arrays = {name: array for name, array in {**self.attributes(), **arrays}.items() if array is not None}
+        return make_block(**all_arrays)
 
 
 POINT_TYPES: dict[str, tuple[str, int]] = {

@@ -64,8 +64,8 @@ class Strays:
         if self._body is None:
             parts = self._connected_parts()
             sizes = np.bincount(parts, self._counts, parts.max(initial=-1) + 1)
-            kept = sizes > max(_FEW, _SHARE * self._counts.sum())
-            self._body = self._keys[kept[parts]] if kept.any() else self._keys
+            large = sizes > max(_FEW, _SHARE * self._counts.sum())
+            self._body = self._keys[large[parts]] if large.any() else self._keys
         return self._body
 
     def _connected_parts(self) -> Index:

@@ -80,7 +80,7 @@ def distinguish(one: Patches, other: Patches, seed: int, name: str) -> Distincti
         raise InputError(
             name,
             len(first),
-            f"at least {FEWEST} patches must have densities of the clouds that it is compared with, "
+            f"at least {FEWEST} patches must have a density like the compared clouds, "
             f"{low:.0f} to {high:.0f} points/m2",
         )
     values = np.concatenate([first.values, second.values])

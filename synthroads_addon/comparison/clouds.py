@@ -47,13 +47,13 @@ class ListedCloud(ClosedModel):
     @model_validator(mode="after")
     def _offsets_need_an_axis(self) -> ListedCloud:
         if (self.axis is None) != (not self.paved):
-            raise ValueError("axis and paved tell the pavement together: one of them is missing")
+            raise ValueError("axis and paved locate the pavement together: one of the two is missing")
         return self
 
     @model_validator(mode="after")
     def _azimuths_need_a_scanner(self) -> ListedCloud:
         if self.azimuth_deg is not None and self.scanner is None:
-            raise ValueError("azimuth_deg counts about scanner, which is missing")
+            raise ValueError("azimuth_deg needs scanner, about which it is counted")
         return self
 
 
@@ -160,7 +160,7 @@ def _road(cloud: RealCloud, row: ListedCloud, file: str) -> RealClass:
         return class_by_label(cloud, row.road, f"{file}: {ROAD}")
     except InputError as error:
         if isinstance(row, UnlistedCloud):
-            remedy = "; a list of clouds (.yaml) in its place says which class is the pavement, or where it lies"
+            remedy = "; name a list of clouds (.yaml) instead, which says which class is the pavement, or where it is"
             raise InputError(error.field, error.value, f"{error.allowed}{remedy}") from None
         raise
 

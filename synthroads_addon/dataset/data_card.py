@@ -21,14 +21,14 @@ def data_card(recipe: Recipe, manifest: Manifest, jobs: Sequence[SceneJob]) -> s
 
 
 def _head(recipe: Recipe, manifest: Manifest) -> list[str]:
-    done = [scene for scene in manifest.scenes if scene.status == "done"]
-    points = sum(scene.points or 0 for scene in done)
-    length = math.fsum(scene.length or 0.0 for scene in done)
+    scenes = [scene for scene in manifest.scenes if scene.status == "done"]
+    points = sum(scene.points or 0 for scene in scenes)
+    length = math.fsum(scene.length or 0.0 for scene in scenes)
     lines = [f"# {recipe.title}", ""]
     if recipe.description:
         lines += [recipe.description, ""]
     lines += [
-        f"- **Content:** {len(done)} scenes, {length / 1000.0:.2f} km of road, {points:,} points, each with its label",
+        f"- **Content:** {len(scenes)} scenes, {length / 1000.0:.2f} km of road, {points:,} points, all labelled",
         f"- **Licence:** {recipe.licence}",
         f"- **Made by:** {manifest.generator} from `recipe.json` (seed {recipe.seed}): both give the same bytes",
         "- **Not real:** no measured data is in it, and no person",
@@ -64,14 +64,16 @@ def _drawn_fields(recipe: Recipe) -> list[str]:
 
 
 def _content(manifest: Manifest) -> list[str]:
-    done = [scene for scene in manifest.scenes if scene.status == "done"]
+    scenes = [scene for scene in manifest.scenes if scene.status == "done"]
     lines = ["## Scenes", "", "| scene | split | length (m) | points |", "|---|---|---|---|"]
-    lines += [f"| {scene.name} | {scene.split} | {scene.length or 0.0:.0f} | {scene.points or 0:,} |" for scene in done]
+    lines += [
+        f"| {scene.name} | {scene.split} | {scene.length or 0.0:.0f} | {scene.points or 0:,} |" for scene in scenes
+    ]
     totals: dict[str, Counter[str]] = {}
-    for scene in done:
+    for scene in scenes:
         totals.setdefault(scene.split, Counter()).update(scene.classes or {})
     splits = sorted(totals)
-    names = dict.fromkeys(name for scene in done for name in scene.classes or {})
+    names = dict.fromkeys(name for scene in scenes for name in scene.classes or {})
     lines += ["", "## Points by class", "", f"| class | {' | '.join(splits)} |", "|---|" + "---|" * len(splits)]
     for name in names:
         lines.append(f"| {name} | " + " | ".join(f"{totals[split][name]:,}" for split in splits) + " |")

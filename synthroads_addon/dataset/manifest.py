@@ -58,7 +58,7 @@ class SceneEntry(ClosedModel):
     @classmethod
     def _check_name(cls, name: str) -> str:
         if not stays_below(name) or len(PurePosixPath(name).parts) != 1:
-            raise ValueError(f"'{name}' is no name of a scene")
+            raise ValueError(f"'{name}' is not a valid name of a scene")
         return name
 
     @field_validator("files")
@@ -132,7 +132,7 @@ def published_name(name: object) -> str:
     """Return the name of a folder of a scene that is published whole; ValueError for any other."""
     place = PurePosixPath(str(name))
     if not isinstance(name, str) or not stays_below(name) or not any(_fits(place, pattern) for pattern in PUBLISHED):
-        raise ValueError(f"'{name}' is no folder that a data set makes")
+        raise ValueError(f"'{name}' is not a folder of a data set")
     return name
 
 
@@ -190,8 +190,8 @@ def check_same_recipe(folder: Path, recipe_text: str, generator: str) -> Manifes
     if manifest.recipe_sha256 != hashlib.sha256(recipe_text.encode()).hexdigest():
         raise InputError("--resume", str(folder), "was begun with another recipe; choose another folder")
     if manifest.generator != generator:
-        made = f"was begun with {manifest.generator}; this is {generator}"
-        raise InputError("--resume", str(folder), f"{made}: the same bytes come from the same version only")
+        versions = f"was begun with {manifest.generator}; this is {generator}"
+        raise InputError("--resume", str(folder), f"{versions}: only the same version gives the same bytes")
     return manifest
 
 
@@ -245,7 +245,7 @@ def _folders(folder: Path, scene: SceneEntry) -> Iterator[str]:
         for path in inside:
             file = path.relative_to(folder).as_posix()
             if (path.is_symlink() or not path.is_dir()) and file not in (scene.files or {}):
-                raise OutputError("--output", str(folder), f"holds {file}, which is not the data set's; move it away")
+                raise OutputError("--output", str(folder), f"holds {file}, not a part of the data set; move it away")
         yield name
 
 
@@ -269,7 +269,7 @@ def finish_removal(folder: Path) -> None:
     named = {name for scene in read_manifest(folder).scenes for name in scene.folders or ()}
     names = read_json(folder / REPLACED)
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise InputError(str(folder / REPLACED), None, "must be a list of the paths that are to be removed; remove it")
+        raise InputError(str(folder / REPLACED), None, "must be a list of paths to remove; delete this file")
     for name in names:
         path_inside(folder, name, folder / REPLACED)
     if named.isdisjoint(names):

@@ -139,7 +139,7 @@ class Recipe(ClosedModel):
     title: str = Field(min_length=1, max_length=200, description="Title.")
     description: str = Field("", description="What the set is for, in a few sentences: it stands in the data card.")
     licence: str = Field("CC-BY-4.0", min_length=1, description="Licence of the data (SPDX identifier).")
-    seed: int = quantity(1, "1", "Seed of everything random.", (0, LARGEST_SEED - 1))
+    seed: int = quantity(1, "1", "Seed of all random choices.", (0, LARGEST_SEED - 1))
     scenario: str = Field("rq31-600m", description="Built-in scenario or file that the groups start from.")
     set: dict[str, Any] = Field({}, description="Changes of every group's scenario, path: value.")
     draw: Draws = Field(
@@ -247,8 +247,8 @@ def _scenario(recipe: Recipe, read: dict[str, Any], group: SceneGroup, name: str
     if base not in read:
         read[base] = load_scenario(base).to_dict()
     seed = int(stream(recipe.seed, "scene", name).integers(LARGEST_SEED))
-    drawn = [_drawn_values(recipe.seed, name, part.draw) for part in (recipe, group)]
-    changes = [{"seed": seed}, recipe.set, drawn[0], group.set, drawn[1]]
+    draws = [_drawn_values(recipe.seed, name, part.draw) for part in (recipe, group)]
+    changes = [{"seed": seed}, recipe.set, draws[0], group.set, draws[1]]
     if group.variants:
         turn, place_in_turn = divmod(place, len(group.variants))
         order = stream(recipe.seed, "variants", group.name, turn).permutation(len(group.variants))

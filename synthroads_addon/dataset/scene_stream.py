@@ -98,10 +98,10 @@ def publish(folder: Path, number: int, files: Path, entry: SceneEntry, plan: Str
 
 def remove_scene(folder: Path, number: int) -> None:
     """Remove a scene from a stream, in one step as far as others see."""
-    aside = folder / f"{_REMOVED}{number:06d}"
-    shutil.rmtree(aside, ignore_errors=True)
-    scene_folder(folder, number).rename(aside)
-    shutil.rmtree(aside, ignore_errors=True)
+    removed = folder / f"{_REMOVED}{number:06d}"
+    shutil.rmtree(removed, ignore_errors=True)
+    scene_folder(folder, number).rename(removed)
+    shutil.rmtree(removed, ignore_errors=True)
 
 
 def scene_numbers(folder: Path) -> list[int]:
@@ -122,9 +122,9 @@ def remove_remains(folder: Path) -> None:
             remove_scene(folder, number)
 
 
-def write_wanted(folder: Path, wanted: range) -> None:
+def write_wanted(folder: Path, scenes: range) -> None:
     """Say which scenes are wanted by now: in their order those of them are made that aren't there."""
-    write_atomically(folder / WANTED, json.dumps([wanted.start, wanted.stop]))
+    write_atomically(folder / WANTED, json.dumps([scenes.start, scenes.stop]))
 
 
 def read_wanted(folder: Path) -> range:

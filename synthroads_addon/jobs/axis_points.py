@@ -107,11 +107,11 @@ def axis_of_line(
     for text in line.remarks:
         warn("%s: %s: %s", path.name, line.name, text)
     outlines = [bring(path.name, outline, declared, system) for outline in line.outlines]
-    scenario, lost = with_mapped_section(f"{path.name}: {line.name}", line.section, scenario)
+    scenario, losses = with_mapped_section(f"{path.name}: {line.name}", line.section, scenario)
     points = _prepared(path.name, points, line.driven, scenario, place)
     sagitta = tell_spacing(path.name, outlines or [points])
     axis, limits, report = axis_of_points(path.name, points, declared, scenario, seen)
-    left_out = [*line.left_out, *lost]
+    left_out = [*line.left_out, *losses]
     if left_out:
         heads = ", ".join(text.partition(":")[0] for text in left_out)
         warn("%s: of %r is left out: %s; the report says where", path.name, line.name, heads)
@@ -130,7 +130,9 @@ def _axis_of_text(
     seen: Callable[[AxisFit], None] | None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     if name is not None:
-        raise InputError("--axis-name", name, "is for files of several roads or lines: this one has one of points")
+        raise InputError(
+            "--axis-name", name, "is for files with several roads or lines; this file has one line of points"
+        )
     points, declared = read_declared_axis(path, Placement.of(MapSystem.of(scenario.epsg, scenario.height_epsg)))
     points = _prepared(path.name, points, has_times(path), scenario, place)
     sagitta = tell_spacing(path.name, [points])
@@ -150,8 +152,8 @@ def chosen_line(file: str, lines: Sequence[PointLine], name: str | None) -> Poin
         line = named_line(lines, name, file)
     else:
         usable = [one for one in lines if one.fault is None] or list(lines)
-        alone = [one for one in usable if not (one.junction or one.carriageway)] or usable
-        line = max(alone, key=line_length)
+        candidates = [one for one in usable if not (one.junction or one.carriageway)] or usable
+        line = max(candidates, key=line_length)
     if line.fault is not None:
         raise InputError(f"{file}: {line.name}: {line.fault.field}", line.fault.value, line.fault.allowed)
     if name is None and len(lines) > 1:
@@ -196,7 +198,7 @@ def _prepared(file: str, points: Float, driven: bool, scenario: RoadScenario, pl
     offset = place.aside(cross_section_of(scenario))
     if driven and offset is None:
         text = (
-            "%s is the path of a vehicle, and is taken for the axis itself: --offset-from-path METRES (positive to the "
+            "%s is the path of a vehicle, and is used as the axis itself: --offset-from-path METRES (positive to the "
         )
         warn(text + "left) or --path-lane N says where the axis lies beside it", file)
     if driven and place.height is None:

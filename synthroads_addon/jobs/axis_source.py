@@ -71,12 +71,12 @@ def axis_from_file(
         if picture:
             axis_picture(fits[0], path.name).save(picture, "PNG")
     elif place.given:
-        raise InputError(place.given, path.name, f"is for lines of points and paths: {kind} says where its axis lies")
+        raise InputError(place.given, path.name, f"is for lines of points and paths; {kind} gives the axis itself")
     else:
-        read: list[tuple[RoadLine, ExactAxis]] = []
-        axis, limits, report = road_axis(path, scenario, name, round_kinks, lambda *both: read.append(both))
+        lines: list[tuple[RoadLine, ExactAxis]] = []
+        axis, limits, report = road_axis(path, scenario, name, round_kinks, lambda *both: lines.append(both))
         if picture:
-            deviation_picture(path.name, *line_deviation(*read[0])).save(picture, "PNG")
+            deviation_picture(path.name, *line_deviation(*lines[0])).save(picture, "PNG")
     _tell_overlap(path, axis, limits.half_width)
     if report.get("heights", ()) is None:
         vertical, source = _heights(axis, limits, seed)
@@ -94,7 +94,7 @@ def _tell_heights(path: Path, heights: dict[str, Any]) -> None:
         text = "%s: parabolas are %.4f m off its heights at station %.1f m"
         warn(text, path.name, heights["deviation"], heights["deviation_station"])
     for step in heights.get("steps_left_out", []):
-        text = "%s: heights jump by %.3f m at station %.3f m: what follows is moved to meet what is before"
+        text = "%s: heights jump by %.3f m at station %.3f m: the profile after it is shifted to close the gap"
         warn(text, path.name, step["step"], step["station"])
 
 

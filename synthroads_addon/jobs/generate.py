@@ -96,13 +96,13 @@ class RoadSource:
         scenario = self.scenario
         if self.parameters:
             return read_parameters(self.parameters), {}
-        wanted = (self.axis_name, self.axis_place, self.round_kinks, self.deviations)
+        options = (self.axis_name, self.axis_place, self.round_kinks, self.deviations)
         if self.road:
-            parameters, report = road_from_file(self.road, scenario, *wanted)
+            parameters, report = road_from_file(self.road, scenario, *options)
             return parameters, {"axis": report}
         if self.axis:
             with draw_refused_fit(self.pictures):
-                axis, limits, report = axis_from_file(self.axis, scenario.road, scenario.seed, *wanted)
+                axis, limits, report = axis_from_file(self.axis, scenario.road, scenario.seed, *options)
             return sample_road(limits, scenario.seed, scenario.title, axis), {"axis": report}
         return sample_road(scenario.road, scenario.seed, scenario.title), {}
 
@@ -115,7 +115,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
         AxisRefusedError: no road follows the axis; a picture of the fit is in the output folder.
         InputError: an input is wrong or the output can't be written; nothing is left half-written.
     """
-    begun, timer = job.begun or time.perf_counter(), StageTimer(progress)
+    start, timer = job.begun or time.perf_counter(), StageTimer(progress)
     inputs = check(job)
     if job.output is None:
         raise InputError("output", None, "must be a folder for the files; scan_to_arrays needs none")
@@ -123,7 +123,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     with output_folder(job.output, files.names, job.overwrite) as folder:
         road, report = make_job_road(job, inputs, timer)
         if set(job.scenario.outputs) & {"scene", *OF_POINTS}:
-            scene = open_job_scene(job, road, inputs, begun, timer, report)
+            scene = open_job_scene(job, road, inputs, start, timer, report)
             files = JobFiles(scene.scenario)
         files.write_road(folder, road, timer)
         report["instances"] = road.numbers.to_dict()
@@ -187,9 +187,9 @@ def check(job: Job) -> ScenarioInputs:
         _tell_odd_place(scenario.road, system)
     check_formats(scenario.twin)
     sources = {"--parameters": job.parameters, "--axis": job.axis, "--road": job.road}
-    given = [name for name, path in sources.items() if path]
-    if len(given) > 1:
-        raise InputError(given[1], str(sources[given[1]]), f"can't be given together with {given[0]}")
+    names = [name for name, path in sources.items() if path]
+    if len(names) > 1:
+        raise InputError(names[1], str(sources[names[1]]), f"can't be given together with {names[0]}")
     if not scenario.outputs and not scenario.twin:
         raise InputError("outputs", [], f"must name at least one of {', '.join(FILES)}")
     return inputs

@@ -110,4 +110,4 @@ def empty_scan_warnings(counts: Mapping[str, Any]) -> list[str]:
     """Return a list with a warning if a scan has no points; empty otherwise, also if nothing was scanned."""
     if counts.get("points", 1):
         return []
-    return ["not one pulse came back: is the scene within the scanner's range and field of view?"]
+    return ["no pulse came back: is the scene within the scanner's range and field of view?"]

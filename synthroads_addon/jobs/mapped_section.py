@@ -45,51 +45,51 @@ def with_mapped_section(
     """
     if mapped is None:
         return scenario, []
-    lost = list[str]()
+    losses = list[str]()
     if mapped.lanes is None:
-        text = "%s: the map has no number of lanes: the cross-section is the scenario's"
+        text = "%s: the map gives no number of lanes: the scenario's cross-section is used"
         assume(text, name)
     elif scenario.lanes is not None:
         if scenario.lanes != mapped.lanes:
-            lost.append(f"lanes: {mapped.lanes} each way, road.lanes={scenario.lanes} is taken instead")
+            losses.append(f"lanes: {mapped.lanes} each way, road.lanes={scenario.lanes} is taken instead")
     else:
-        scenario, lost = _with_lanes(name, mapped, mapped.lanes, scenario)
+        scenario, losses = _with_lanes(name, mapped, mapped.lanes, scenario)
     if mapped.spread is None:
-        lost.append(_of_one_line(mapped.one_way, cross_section_of(scenario)))
+        losses.append(_of_one_line(mapped.one_way, cross_section_of(scenario)))
     if mapped.speed is not None:
         scenario = _with_speed(name, mapped.speed, scenario)
     if mapped.pavement is not None:
         share = 1.0 if mapped.pavement == "concrete" else 0.0
         pavement = scenario.pavement.model_copy(update={"concrete": share})
         scenario = scenario.model_copy(update={"pavement": pavement})
-    return scenario, lost
+    return scenario, losses
 
 
 def _of_one_line(one_way: bool, section: StandardCrossSection) -> str:
     """Return what becomes of a road that a map has as one line: a parameter set has two carriageways."""
     if not one_way:
         return f"lanes side by side: the road gets a median of {section.median:g} m between its directions"
-    aside = 0.5 * (section.median + math.fsum(section.lanes)) + section.inner_edge_strip
+    offset = 0.5 * (section.median + math.fsum(section.lanes)) + section.inner_edge_strip
     text = "lanes of one carriageway: the road gets two about this line, as their axis; --offset-from-path"
-    return f"{text} {aside:g} leaves the right one where the map has it"
+    return f"{text} {offset:g} leaves the right one where the map has it"
 
 
 def _with_lanes(name: str, mapped: MappedSection, lanes: int, scenario: RoadScenario) -> tuple[RoadScenario, list[str]]:
     """Return the scenario with the first cross-section for a map's lanes that meets no conflict."""
     if lanes > _MOST_LANES:
         return scenario, [f"lanes: {lanes} each way, at most {_MOST_LANES} are possible"]
-    known = set(conflicts(scenario, True))
-    for update, lost in _candidates(mapped, lanes, scenario):
+    conflicts_before = set(conflicts(scenario, True))
+    for update, losses in _candidates(mapped, lanes, scenario):
         changed = scenario.model_copy(update=update)
-        if set(conflicts(changed, True)) <= known:
+        if set(conflicts(changed, True)) <= conflicts_before:
             section = cross_section_of(changed)
             widths = ", ".join(f"{width:g}" for width in section.lanes)
-            shown = changed.cross_section if isinstance(changed.cross_section, str) else "by hand"
+            section_name = changed.cross_section if isinstance(changed.cross_section, str) else "by hand"
             text = (
                 "%s: %d lanes each way: cross-section %s, lanes of %s m, median of %g m; road.lanes=N asks for others"
             )
-            assume(text, name, lanes, shown, widths, section.median)
-            return changed, lost
+            assume(text, name, lanes, section_name, widths, section.median)
+            return changed, losses
     return scenario, [f"lanes: {lanes} each way, which no cross-section of {scenario.design_class} holds"]
 
 
@@ -102,16 +102,16 @@ def _candidates(
         widths = section.lanes
         if mapped.lane_width is not None and abs(math.fsum(widths) / lanes - mapped.lane_width) > _LANE_TOLERANCE:
             widths = (mapped.lane_width,) * lanes
-        median, lost = _median(mapped, section, widths)
+        median, losses = _median(mapped, section, widths)
         if widths == section.lanes and median == section.median:
-            yield update, lost
+            yield update, losses
         else:
-            yield {**update, "cross_section": _by_hand(section, widths, median)}, lost
+            yield {**update, "cross_section": _by_hand(section, widths, median)}, losses
     for update, _ in bases:  # without the map's widths, where they meet limits
-        lost = [f"lane width: {mapped.lane_width:g} m"] if mapped.lane_width is not None else []
+        losses = [f"lane width: {mapped.lane_width:g} m"] if mapped.lane_width is not None else []
         yield (
             update,
-            [*lost, *([f"median: by {mapped.spread:.1f} m between the carriageways"] if mapped.spread else [])],
+            [*losses, *([f"median: by {mapped.spread:.1f} m between the carriageways"] if mapped.spread else [])],
         )
 
 
@@ -119,26 +119,31 @@ def _bases(
     lanes: int, width: float | None, scenario: RoadScenario
 ) -> Iterator[tuple[dict[str, Any], StandardCrossSection]]:
     """Yield changes that give a scenario a cross-section with a number of lanes, and that cross-section."""
-    own = cross_section_of(scenario)
-    if len(own.lanes) == lanes:
-        yield {}, own
-    allowed = SECTIONS_OF_CLASS[scenario.design_class]
+    usual_section = cross_section_of(scenario)
+    if len(usual_section.lanes) == lanes:
+        yield {}, usual_section
+    section_names = SECTIONS_OF_CLASS[scenario.design_class]
     standard = [name for name in STANDARD_CROSS_SECTIONS if len(STANDARD_CROSS_SECTIONS[name].lanes) == lanes]
-    wanted = 3.75 if width is None else width
+    lane_width = 3.75 if width is None else width
     standard.sort(
         key=lambda name: (
-            name not in allowed,
-            abs(math.fsum(STANDARD_CROSS_SECTIONS[name].lanes) / lanes - wanted),
+            name not in section_names,
+            abs(math.fsum(STANDARD_CROSS_SECTIONS[name].lanes) / lanes - lane_width),
         )
     )
     for name in standard:
         section = STANDARD_CROSS_SECTIONS[name]
         yield {"cross_section": name, "design_class": design_class_of(name, scenario.design_class)}, section
-    widths = (own.lanes + own.lanes[-1:] * lanes)[:lanes]
+    widths = (usual_section.lanes + usual_section.lanes[-1:] * lanes)[:lanes]
     section = StandardCrossSection(
-        widths, own.hard_shoulder, own.outer_edge_strip, own.inner_edge_strip, own.median, own.verge
+        widths,
+        usual_section.hard_shoulder,
+        usual_section.outer_edge_strip,
+        usual_section.inner_edge_strip,
+        usual_section.median,
+        usual_section.verge,
     )
-    yield {"cross_section": _by_hand(section, widths, own.median)}, section
+    yield {"cross_section": _by_hand(section, widths, usual_section.median)}, section
 
 
 def _by_hand(section: StandardCrossSection, lanes: tuple[float, ...], median: float) -> FreeCrossSection:

@@ -94,8 +94,8 @@ class RoadScene:
     def build(self) -> RoadModel:
         """Build the road's model in the open file, in place of the one before, and return it."""
         settings, parameters = self.scenario.settings(), self.road.parameters
-        tolerance, detail, own = settings.tolerance, settings.vegetation_detail, self.inputs.materials
-        self.model = build_road(BuildRequest(parameters, tolerance, detail, own=own))
+        tolerance, detail, materials = settings.tolerance, settings.vegetation_detail, self.inputs.materials
+        self.model = build_road(BuildRequest(parameters, tolerance, detail, own=materials))
         self.scene = None
         return self.model
 

@@ -54,8 +54,8 @@ def _scan_road(job: Job, progress: Progress) -> ScanArrays:
     sink = scene.site.arrays()
     report["counts"] = scene.build_and_scan(sink, timer)
     add_warnings(report, scene)
-    told = JobFiles(scene.scenario).report(report, timer)
-    return sink.result(told, *_system(scene.site), road.numbers.name_of)
+    full_report = JobFiles(scene.scenario).report(report, timer)
+    return sink.result(full_report, *_system(scene.site), road.numbers.name_of)
 
 
 def _scan_scene(job: SceneScan, progress: Progress) -> ScanArrays:
@@ -63,9 +63,9 @@ def _scan_scene(job: SceneScan, progress: Progress) -> ScanArrays:
     scene, report = open_foreign_scene(job, check_scene_scan(job), timer)
     sink, road = scene.site.arrays(), scene.site.conditions.road
     add_counts(report, scene.scan(sink, timer))
-    told = JobFiles(scene.site.scenario, road=False).report(report, timer)
+    full_report = JobFiles(scene.site.scenario, road=False).report(report, timer)
     name_of = InstanceNumbers(road).name_of if road else _no_name
-    return sink.result(told, *_system(scene.site), name_of)
+    return sink.result(full_report, *_system(scene.site), name_of)
 
 
 def _no_name(number: int) -> None:

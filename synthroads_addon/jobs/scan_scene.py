@@ -163,7 +163,7 @@ def check_scene_scan(job: SceneScan) -> SceneInputs:
     if job.tripods:
         tripod = as_tripod(platform)
         if tripod.height is not None and any(len(place) == 3 for place in job.tripods):
-            raise InputError("--height", tripod.height, "can't be given with a tripod whose z is the scanner's own")
+            raise InputError("--height", tripod.height, "can't be given with a tripod whose Z is the scanner's height")
     if job.path and (job.tripods or isinstance(platform, RecordedTrajectory)):
         raise InputError("--path", str(job.path), "can't be given together with a trajectory or a tripod's positions")
     if job.epsg is not None:
@@ -208,7 +208,7 @@ def open_and_read(
         further: dict[str, Any] = {"class_ids": class_ids, "road": opened.road_id if opened else ""}
         road = RoadGeometry(parameters) if parameters else None
         if opened and (unit := scene_unit()) != 1.0:
-            warn("the scene's unit scale is %g: roads are built in metres, so that its units are taken for these", unit)
+            warn("the scene's unit scale is %g: roads are built in metres, so one unit is read as one metre", unit)
 
         def read() -> ScannedScene:
             return scanned_scene(
@@ -224,7 +224,7 @@ def open_and_read(
         warnings += [f"{edit.name} was edited by hand: {edit.reason}" for edit in edited.by_hand] if edited else []
         warnings += [f"{job.classes}: nothing in the scene is named as in {entry}" for entry in scene.unmatched]
         if strays := strays_of(scene.static) if len(scene.static) else None:
-            warnings += [f"{strays.count():,} vertices lie far from all others: path and previews leave them out"]
+            warnings += [f"{strays.count():,} vertices are far from all others: the path and the previews ignore them"]
     return scene, road, warnings
 
 

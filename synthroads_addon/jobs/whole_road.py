@@ -71,20 +71,20 @@ def _read_road(
 ) -> tuple[RoadParameters, dict[str, Any], GivenRoad | None]:
     """Return what `road_from_file` does, and what of the road the file gives; None where it has no lanes."""
     if not has_whole_road(path):
-        raise InputError(path.name, format_of(path), "OpenDRIVE is needed for a whole road: --axis takes other files")
+        raise InputError(path.name, format_of(path), "must be OpenDRIVE; for other files use --axis")
     line = (path, scenario.road, scenario.seed, name, place, round_kinks, picture)
     if choose_line(read_opendrive(path), name, path.name).lanes is None:
         axis, limits, report = axis_from_file(*line)
         return sample_road(limits, scenario.seed, scenario.title, axis), report, None
-    found = whole_road(path, scenario.road, name, round_kinks)
+    road = whole_road(path, scenario.road, name, round_kinks)
     axis, limits, report = axis_from_file(*line)
-    if found.heights is not None:
-        axis, report["heights"] = _with_profile(axis, limits, found, round_kinks)
-    limits = _wide_enough(path, limits, found)
-    parameters = sample_road(limits, scenario.seed, scenario.title, axis, found.given)
-    report["surface"] = deviations(found.pavements, _lifted(parameters), found.stations, found.loss)
+    if road.heights is not None:
+        axis, report["heights"] = _with_profile(axis, limits, road, round_kinks)
+    limits = _wide_enough(path, limits, road)
+    parameters = sample_road(limits, scenario.seed, scenario.title, axis, road.given)
+    report["surface"] = deviations(road.pavements, _lifted(parameters), road.stations, road.loss)
     report["left_out"] = [text for text in report["left_out"] if not _is_taken(text)]
-    return parameters, report | {"whole": found.loss.to_dict(), "summary": found.loss.lines()}, found.given
+    return parameters, report | {"whole": road.loss.to_dict(), "summary": road.loss.lines()}, road.given
 
 
 def differences_from(
@@ -110,17 +110,17 @@ def _is_taken(text: str) -> bool:
 
 
 def _with_profile(
-    axis: AlignmentObject, limits: RoadScenario, found: WholeRoad, round_kinks: float | None
+    axis: AlignmentObject, limits: RoadScenario, road: WholeRoad, round_kinks: float | None
 ) -> tuple[AlignmentObject, dict[str, Any]]:
     """Return an axis with the heights that the road's planes give it, and what the report says of them."""
-    assert found.heights is not None
-    heights = with_heights(found.line, found.heights, round_kinks)
+    assert road.heights is not None
+    heights = with_heights(road.line, road.heights, round_kinks)
     up = limits.map_origin[2]
     points = tuple(
         VerticalPoint(station=p.station, elevation=p.elevation - up, radius=p.radius) for p in heights.points
     )
-    told = {"points": len(points), "deviation": heights.deviation, "deviation_station": heights.station}
-    return axis.model_copy(update={"vertical": points}), told
+    report = {"points": len(points), "deviation": heights.deviation, "deviation_station": heights.station}
+    return axis.model_copy(update={"vertical": points}), report
 
 
 def _lifted(parameters: RoadParameters) -> RoadGeometry:
@@ -133,9 +133,9 @@ def _lifted(parameters: RoadParameters) -> RoadGeometry:
     return RoadGeometry(parameters.model_copy(update={"objects": objects}))
 
 
-def _wide_enough(path: Path, limits: RoadScenario, found: WholeRoad) -> RoadScenario:
+def _wide_enough(path: Path, limits: RoadScenario, road: WholeRoad) -> RoadScenario:
     """Return the scenario with ground that reaches beyond the road's edges."""
-    edge = max(_farthest(carriageway) for carriageway in found.given.carriageways.values()) + _BESIDE
+    edge = max(_farthest(carriageway) for carriageway in road.given.carriageways.values()) + _BESIDE
     if limits.half_width >= edge:
         return limits
     wider = float(np.ceil(edge))

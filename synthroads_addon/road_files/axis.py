@@ -164,8 +164,8 @@ def _placed(
     if declared is None:
         name = MapSystem.of(scenario.epsg).label
         remedy = "" if given else "; --set road.epsg=CODE names another"
-        assume("%s names no coordinate system: its coordinates are taken for %s%s", path.name, name, remedy)
-        return None, axis, f"as the file has it, taken for {name}"
+        assume("%s names no coordinate system: its coordinates are read as %s%s", path.name, name, remedy)
+        return None, axis, f"as the file has it, read as {name}"
     if declared.unit is None:
         raise InputError(f"{path.name}: coordinate system", declared.label, "must have metres: these are degrees")
     if not declared.in_metres:

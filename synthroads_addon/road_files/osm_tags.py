@@ -85,7 +85,7 @@ def kilometres_per_hour(text: str | None) -> tuple[float | None, str | None]:
     if found := _SPEED.fullmatch(word):
         return _number(found[1]) * _PER_HOUR[found[2]], None
     if (speed := _SPEED_WORDS.get(word.rpartition(":")[2])) is not None:
-        return speed, f"maxspeed={word[:40]!r} is taken for {speed:g} km/h"
+        return speed, f"maxspeed={word[:40]!r} is read as {speed:g} km/h"
     return None, None
 
 

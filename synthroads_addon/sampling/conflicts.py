@@ -136,15 +136,15 @@ def _ranges(scenario: RoadScenario) -> Iterator[str]:
     for path, (low, high) in _ALLOWED.items():
         limits: Interval = attrgetter(path)(scenario)
         if limits.minimum < low:
-            yield f"{path}.minimum is {limits.minimum:g}, {low:g} is the least"
+            yield f"{path}.minimum is {limits.minimum:g}, at least {low:g} is allowed"
         if limits.maximum > high:
-            yield f"{path}.maximum is {limits.maximum:g}, {high:g} is the most"
+            yield f"{path}.maximum is {limits.maximum:g}, at most {high:g} is allowed"
 
 
 def _land_use(scenario: RoadScenario) -> Iterator[str]:
     shares = scenario.landscape.forest_share.maximum, scenario.landscape.meadow_share.maximum
     if sum(shares) > 1.0:
-        yield f"landscape.forest_share.maximum and meadow_share.maximum are {sum(shares):g} together, 1 is the most"
+        yield f"landscape.forest_share.maximum and meadow_share.maximum are {sum(shares):g} together, at most 1 allowed"
 
 
 def _alignment(scenario: RoadScenario) -> Iterator[str]:
@@ -152,7 +152,7 @@ def _alignment(scenario: RoadScenario) -> Iterator[str]:
     if scenario.radius and scenario.radius.minimum < limits.radius:
         yield f"radius.minimum is {scenario.radius.minimum:g} m, {name} needs {limits.radius:g} m"
     if scenario.radius and scenario.radius.maximum > WIDEST_RADIUS:
-        yield f"radius.maximum is {scenario.radius.maximum:g} m, {WIDEST_RADIUS:g} m are allowed"
+        yield f"radius.maximum is {scenario.radius.maximum:g} m, at most {WIDEST_RADIUS:g} m are allowed"
     if not (grades := scenario.grade_percent):
         return
     for end, grade in (("minimum", grades.minimum), ("maximum", grades.maximum)):
@@ -162,8 +162,8 @@ def _alignment(scenario: RoadScenario) -> Iterator[str]:
     climb = gentlest / 100.0 * scenario.length / 2.0
     if climb > STEADY_CLIMB:
         yield (
-            f"grade_percent is {gentlest:g} % or more one way, over half of length {scenario.length:g} m that is "
-            f"{climb:.0f} m of height, {STEADY_CLIMB:g} m are allowed"
+            f"grade_percent is {gentlest:g} % or more one way, which over half of length {scenario.length:g} m "
+            f"is {climb:.0f} m of height, at most {STEADY_CLIMB:g} m are allowed"
         )
 
 

@@ -53,7 +53,7 @@ class Noise(ClosedModel):
     correlation_time: float = quantity(
         30.0,
         "s",
-        "Time in which a platform's errors fall to 1/e of correlation.",
+        "Time after which the correlation of a platform's errors is 1/e.",
         gt=0,
         le=10_000,
         title="Correlated over",

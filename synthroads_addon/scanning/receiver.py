@@ -64,7 +64,7 @@ class Receiver(ClosedModel):
     )
     response: Response | None = Field(
         None,
-        description="What number is made of the received power: the power itself, or a share of the full scale.",
+        description="Intensity value of an echo: the received power, or a share of the full scale.",
         json_schema_extra=notes(unset="The device's"),
     )
     bits: int | None = quantity(
@@ -98,7 +98,7 @@ class Receiver(ClosedModel):
     lost_numbers: float | None = quantity(
         None,
         "1",
-        "Share of the echoes whose number is 0 however bright they are.",
+        "Share of the echoes with intensity 0, independent of their brightness.",
         (0, 1),
         inherits="device.lost_numbers",
         unset="None",
@@ -123,7 +123,7 @@ class Receiver(ClosedModel):
     faint_range_sigma: float | None = quantity(
         None,
         "m",
-        "Standard deviation that the range of an echo at the detection threshold has besides; of stronger ones less.",
+        "Additional standard deviation of the range of an echo at the detection threshold; less for stronger ones.",
         (0, 10),
         title="Range of Faint Echoes",
         inherits="device.faint_range_sigma",
@@ -141,7 +141,7 @@ class Receiver(ClosedModel):
     range_walk: float | None = quantity(
         None,
         "m/dB",
-        "How much nearer an echo is ranged for each dB by which speckle and the strip's gain make it brighter.",
+        "Decrease of the range for each dB by which speckle and the strip's gain make an echo brighter.",
         (0, 0.1),
         inherits="device.range_walk",
         unset="None",
@@ -158,14 +158,14 @@ class Receiver(ClosedModel):
         None,
         "1",
         "Share of the range's standard deviation that comes of delays, which are exponential: the longer trailing edge "
-        "of real pulses. Points then lie rather too far than too near.",
+        "of real pulses. Ranges then are rather too long than too short.",
         (0, 0.95),
         inherits="device.range_delay",
         unset="None",
     )
     echo_separation: EchoSeparation | None = Field(
         None,
-        description="Echoes are parted by the range resolution alone, or where the sum of their pulses has two peaks.",
+        description="Echoes are separated by range resolution only, or where the sum of their pulses has two peaks.",
         json_schema_extra=notes(unset="The device's"),
     )
 

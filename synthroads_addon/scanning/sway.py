@@ -27,7 +27,7 @@ _CREST = 4.0
 class Motion(ClosedModel):
     """Random sway of the platform about its path: standard deviations (0 is none) and range of periods."""
 
-    position_sigma: float = quantity(0.0, "m", "Aside and in height, each axis.", (0, 10), title="Position")
+    position_sigma: float = quantity(0.0, "m", "Lateral and vertical position, each axis.", (0, 10), title="Position")
     attitude_sigma_deg: float = quantity(0.0, "deg", "Roll and pitch.", (0, 10), title="Roll, Pitch (°)")
     heading_sigma_deg: float = quantity(0.0, "deg", "Heading.", (0, 10), title="Heading (°)")
     shortest_period: float = quantity(
@@ -35,7 +35,7 @@ class Motion(ClosedModel):
     )
     longest_period: float = quantity(20.0, "s", "Longest period of the swaying.", (0.02, 1000), title="Longest Period")
     period_exponent: float = quantity(
-        0.0, "1", "Power of a period that its amplitude grows with; 0: all alike.", (0, 3), title="Slow Sway"
+        0.0, "1", "Exponent of the period in its amplitude; 0: the same for all.", (0, 3), title="Slow Sway"
     )
 
     @model_validator(mode="after")

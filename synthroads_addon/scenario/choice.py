@@ -27,15 +27,15 @@ def check_choice(scenario: Scenario, foreign: bool = False) -> None:
     if scenario.tolerance is not None and not limits:
         raise InputError("tolerance", None, "must limit at least one kind of error")
     colour, paths = scenario.colour, "can't be promised for whole light paths: colour.lighting must be direct"
-    layers = "can't be promised for intensities from the points' layers: take colour.intensity_from_layers out"
+    layers = "can't be promised for intensities from the points' layers: remove colour.intensity_from_layers"
     relief = "can't be promised for a relief of another strength than the surfaces': scan.relief must be 1"
-    none = "nothing has such an error, as points get no"
+    none = "there is no such error, as points get no"
     refusals = (
         ("intensity", colour.intensity_from_layers == "always", layers),
         ("relief", scenario.scan.relief != 1.0, relief),
         ("colour", colour.lighting == "path", paths),
         ("layers", colour.lighting == "path", paths),
-        ("height", foreign, "can't be promised of a scene that was built elsewhere"),
+        ("height", foreign, "can't be promised for a scene that was built elsewhere"),
         ("colour", not has_kind(scenario, "colour"), f"{none} colours: colour.rgb is false"),
         ("layers", not has_kind(scenario, "layers"), f"{none} layers: cloud.attributes names none of them"),
     )
@@ -43,4 +43,6 @@ def check_choice(scenario: Scenario, foreign: bool = False) -> None:
         if wrong and kind in limits:
             raise InputError(f"tolerance.{kind}", limits[kind], text)
     if not set(scenario.outputs) & set(OF_POINTS):
-        raise InputError("outputs", list(scenario.outputs), "must have the cloud or previews for settings to be chosen")
+        raise InputError(
+            "outputs", list(scenario.outputs), "must contain the cloud or previews so that settings can be chosen"
+        )

@@ -24,20 +24,20 @@ class CloudScenario(ClosedModel):
     )
     attributes: tuple[Attribute, ...] = Field(
         DEFAULT_ATTRIBUTES,
-        description="What is kept of each point beyond what every cloud holds.",
+        description="Attributes of each point beside those that every cloud has.",
         json_schema_extra=notes(labels={name: layer.label for name, layer in LAYERS.items()}),
     )
-    classes: str = Field("17", min_length=1, description="17, 5, 19, or a JSON file of classes of one's own.")
+    classes: str = Field("17", min_length=1, description="17, 5, 19, or a JSON file of your own classes.")
     point_spacing: float | None = quantity(
         None,
         "m",
-        "Grid of which one point per cell is kept; all if not given.",
+        "Edge of the grid cells, each of which keeps one point; all points if not given.",
         (0.001, 10),
         title="Thin Out to",
         unset="All points",
     )
     intensity: Intensity = Field(
-        "received", description="As received, or times the squared range: what instruments call reflectance."
+        "received", description="As received, or multiplied by the squared range, often called reflectance."
     )
     intensity_scale: float | None = quantity(
         None, "1", "16-bit steps per unit of intensity; by the usual range if not given.", gt=0, unset="By the range"

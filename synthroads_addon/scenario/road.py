@@ -53,21 +53,21 @@ class LaneChangeLimits(ClosedModel):
 class TurnoutLimits(ClosedModel):
     """Exits, entries and emergency bays."""
 
-    exits: float = share(0.3, "Probability that a carriageway long enough has an exit.")
-    entries: float = share(0.3, "Probability that a carriageway long enough has an entry.")
-    emergency_bays: float = share(0.3, "Probability that a carriageway long enough has an emergency bay.")
+    exits: float = share(0.3, "Probability that a sufficiently long carriageway has an exit.")
+    entries: float = share(0.3, "Probability that a sufficiently long carriageway has an entry.")
+    emergency_bays: float = share(0.3, "Probability that a sufficiently long carriageway has an emergency bay.")
     lane_length: Interval = interval(150.0, 300.0, "m", "Length of a deceleration or acceleration lane.")
-    taper_length: Interval = interval(30.0, 60.0, "m", "Length of its taper.")
+    taper_length: Interval = interval(30.0, 60.0, "m", "Length of the taper of that lane.")
     lane_width: Interval = interval(3.5, 3.75, "m", "Width of a deceleration or acceleration lane.")
-    shoulder_width: Interval = interval(0.0, 2.0, "m", "Hard shoulder beside it.")
-    ramp_length: Interval = interval(65.0, 100.0, "m", "Length of the ramp that is built; never above its A.")
+    shoulder_width: Interval = interval(0.0, 2.0, "m", "Width of the hard shoulder beside that lane.")
+    ramp_length: Interval = interval(65.0, 100.0, "m", "Length of the ramp; at most its clothoid parameter A.")
     ramp_clothoid: Interval = interval(75.0, 120.0, "m", "Clothoid parameter A of the ramp.")
     ramp_crossfall: Interval = interval(
-        2.5, 5.0, "%", "Fall of the ramp away from the main road; at most 5 % from the main road's."
+        2.5, 5.0, "%", "Crossfall of the ramp, away from the main road; at most 5 % from the main road's."
     )
-    ramp_grade: Interval = interval(-1.5, 1.5, "%", "Grade of the ramp against the main road's.")
+    ramp_grade: Interval = interval(-1.5, 1.5, "%", "Grade of the ramp relative to the main road.")
     bay_length: Interval = interval(40.0, 60.0, "m", "Length of an emergency bay at full width.")
-    bay_taper_length: Interval = interval(20.0, 30.0, "m", "Length of its tapers.")
+    bay_taper_length: Interval = interval(20.0, 30.0, "m", "Length of the tapers of an emergency bay.")
     bay_width: Interval = interval(3.0, 3.5, "m", "Width of an emergency bay.")
 
 
@@ -163,7 +163,7 @@ class VegetationLimits(ClosedModel):
         0.0, 0.0, "1/km", "Forest edges per km of either side.", title="Forest Edges (per km)"
     )
     forest_edge_length: Interval = interval(60.0, 200.0, "m", "Length of forest edges.", title="Their Length")
-    forest_depth: Interval = interval(12.0, 25.0, "m", "Depth of what is built of a forest.", title="Their Depth")
+    forest_depth: Interval = interval(12.0, 25.0, "m", "Depth of the modelled part of a forest.", title="Their Depth")
     forest_height: Interval = interval(12.0, 22.0, "m", "Height of a forest's trees.", title="Their Height")
 
 
@@ -218,7 +218,7 @@ class RoadScenario(ClosedModel):
     cross_section: CrossSection = Field(
         "RQ31",
         title="Cross-Section",
-        description="Standard cross-section, or one by hand; if not given, EKA2 has RQ28 and EKA3 RQ25.",
+        description="Standard cross-section, or a custom one; if not given, EKA2 has RQ28 and EKA3 RQ25.",
     )
     lanes: int | None = quantity(
         None,
@@ -272,7 +272,9 @@ class RoadScenario(ClosedModel):
     ditch_width: Interval = interval(
         0.0, 2.0, "m", "Width of ditches at the foot of embankments, a fifth of it deep; 0 for none.", title="Ditch"
     )
-    half_width: float = quantity(78.0, "m", "Reach built to either side.", (5, 1000), title="Reach Each Side")
+    half_width: float = quantity(
+        78.0, "m", "Distance to either side that is built.", (5, 1000), title="Reach Each Side"
+    )
     elevation_model: str | None = Field(
         None,
         description="File of a digital elevation model (GeoTIFF, ESRI ASCII grid) instead of generated ground.",
@@ -282,7 +284,7 @@ class RoadScenario(ClosedModel):
     height_epsg: int | None = quantity(
         None,
         "1",
-        "Vertical coordinate system that heights are counted in; not named if not given.",
+        "Vertical coordinate system of the heights; unnamed if not given.",
         (1024, 99_999_999),
         title="EPSG Code of Heights",
         unset="Not Named",
@@ -302,10 +304,10 @@ class RoadScenario(ClosedModel):
     textures: str | None = Field(
         None,
         title="Folder of Textures",
-        description="Folder of images in place of materials' layers, with a folder for each material.",
+        description="Folder of images that replace layers of materials, with a subfolder for each material.",
         json_schema_extra=notes(unset="None"),
     )
-    assets: tuple[str, ...] = Field((), description="Libraries of free assets to place from: roadside, or JSON files.")
+    assets: tuple[str, ...] = Field((), description="Libraries of assets to place: roadside, or JSON files.")
 
     @model_validator(mode="before")
     @classmethod

@@ -109,9 +109,8 @@ class ScanScenario(DeviceChoice):
     )
     kernels: Literal["auto", "off"] = Field(
         "auto",
-        description="Whether Embree casts rays that run side by side in packets, compiled loops do what is done around "
-        "it, and materials are worked out by programs, where this machine can; or every ray is cast by itself, Cycles "
-        "renders all materials, and NumPy does the rest.",
+        description="Use Embree's ray packets, compiled loops around it and compiled materials where this machine can; "
+        "or cast every ray singly, with all materials rendered by Cycles and NumPy for the rest.",
         json_schema_extra=notes(labels={"auto": "Where Possible", "off": "Off"}),
     )
     threads: int = quantity(0, "1", "Threads; 0 uses every core.", (0, 1024))

@@ -46,8 +46,10 @@ class Scenario(ClosedModel):
     type: Literal["Scenario"] = "Scenario"
     version: Literal["1.0"] = "1.0"
     title: str = Field("", description="Title for people.")
-    seed: int = quantity(1, "1", "Seed of everything random.", (0, 2**63 - 1))
-    fidelity: Literal["draft", "standard", "high"] = Field("standard", description="Point on the trade-off.")
+    seed: int = quantity(1, "1", "Seed of all random choices.", (0, 2**63 - 1))
+    fidelity: Literal["draft", "standard", "high"] = Field(
+        "standard", description="Speed against accuracy, as a preset."
+    )
     geometric_tolerance: float | None = quantity(
         None,
         "m",
@@ -65,7 +67,7 @@ class Scenario(ClosedModel):
         inherits="fidelity.vegetation_detail",
     )
     tolerance: Tolerance | None = Field(
-        None, description="Largest errors; the cheapest settings that keep them are chosen, but for knobs given here."
+        None, description="Largest errors; the fastest settings that keep them are chosen, except those given here."
     )
     time_budget: float | None = quantity(
         None, "s", "Time for the whole job; the best settings that fit it are chosen.", gt=0, le=1e7
@@ -73,7 +75,7 @@ class Scenario(ClosedModel):
     materials_table: str | None = Field(
         None,
         title="Table of Your Own",
-        description="JSON file, or shipped table, of materials in place of the usual ones of the same names.",
+        description="JSON file, or shipped table, of materials that replace the usual ones of the same names.",
         json_schema_extra=notes(unset="The shipped ones"),
     )
     road: RoadScenario = Field(RoadScenario(), description="The road's limits.")
@@ -83,7 +85,7 @@ class Scenario(ClosedModel):
     outputs: tuple[Output, ...] = Field(
         OUTPUTS,
         title="Files",
-        description="Files wanted; nothing is computed that none of them needs.",
+        description="Files to write; what none of them needs isn't computed.",
         json_schema_extra=notes(
             labels={
                 "parameters": "Parameter Set",
@@ -97,7 +99,7 @@ class Scenario(ClosedModel):
     twin: tuple[TwinFormat, ...] = Field(
         (),
         title="Semantic Model",
-        description="Formats of the geometric-semantic model that are wanted.",
+        description="Formats of the geometric-semantic model to write.",
         json_schema_extra=notes(labels={name: made.label for name, made in FORMATS.items()}),
     )
     ifc: IfcSettings | None = Field(
@@ -171,7 +173,7 @@ class Scenario(ClosedModel):
         if self.chooses:
             name = "time_budget" if self.tolerance is None else "tolerance"
             text = f"can't be kept on a road of {length:g} m, which is built by sections of {section:g} m: choose on a "
-            raise InputError(name, getattr(self, name), f"{text}shorter road, and set what was chosen")
+            raise InputError(name, getattr(self, name), f"{text}shorter road, and use its settings")
         if "scene" in self.outputs:
             text = f"can't have scene: a road of {length:g} m is built by sections of {section:g} m; leave scene out, "
             text += f"or set scan.section_length to {length / 2.0:g} or more"

@@ -147,7 +147,7 @@ def triangulate(faces: Faces) -> Int:
 
     So a polygon needs not be convex if its corner i faces the last one but i.
     """
-    found = []
+    triangles = []
     starts = np.cumsum(faces.sizes) - faces.sizes
     for size in np.unique(faces.sizes).tolist():
         rings = faces.corners[starts[faces.sizes == size][:, None] + np.arange(size)]
@@ -157,8 +157,8 @@ def triangulate(faces: Faces) -> Int:
             if high - low > 2:
                 order.append((low + 1, high - 1, high))
             low, high = low + 1, high - 1
-        found.append(rings[:, order].reshape(-1, 3))
-    return np.concatenate(found) if found else np.empty((0, 3), np.int64)
+        triangles.append(rings[:, order].reshape(-1, 3))
+    return np.concatenate(triangles) if triangles else np.empty((0, 3), np.int64)
 
 
 def enclosed_volume(faces: Faces) -> float:

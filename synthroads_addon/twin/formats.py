@@ -111,7 +111,7 @@ class IfcSettings(ClosedModel):
     placement: IfcPlacement = Field(
         "linear",
         title="Placement",
-        description="Where objects stand: along the alignment, or by coordinates for viewers that know no alignment.",
+        description="Placement of objects: along the alignment, or by coordinates for viewers without alignments.",
     )
 
 

@@ -121,15 +121,15 @@ def triangulate_ground(geometry: RoadGeometry, terrain: Terrain, road: Float, to
         road: (N,) stations at which the road's surface has rows.
         tolerance: that of the model, m.
     """
-    made: GroundMesh | None = None
+    mesh: GroundMesh | None = None
     for spacing in _SPACINGS:
         sides = (_side(geometry, terrain, 1.0, spacing), _side(geometry, terrain, -1.0, spacing))
         faces = (sides[0].triangles(road), sides[1].triangles(road))
-        made = GroundMesh(sides, faces, max(_deviation(geometry, part) for part in faces))
-        if made.deviation <= max(tolerance, GROUND_TOLERANCE):
+        mesh = GroundMesh(sides, faces, max(_deviation(geometry, part) for part in faces))
+        if mesh.deviation <= max(tolerance, GROUND_TOLERANCE):
             break
-    assert made
-    return made
+    assert mesh
+    return mesh
 
 
 def swales(name: str, terrain: Terrain, ground: GroundMesh) -> Iterator[tuple[str, Faces]]:
@@ -189,8 +189,8 @@ def _toe_distance(
         every = np.repeat(station, distance.shape[1])
         offset = (edge[:, None] + np.sign(reach)[:, None] * distance).ravel()
         ground = ground_elevation(geometry, terrain, every, offset).reshape(distance.shape)
-        apart = np.abs(ground - level[:, None]) - np.maximum(distance - begin, 0.0) / terrain.batter_slope
-        return np.where(np.isnan(apart), -1.0, apart)
+        excess = np.abs(ground - level[:, None]) - np.maximum(distance - begin, 0.0) / terrain.batter_slope
+        return np.where(np.isnan(excess), -1.0, excess)
 
     steps = np.linspace(0.0, 1.0, max(2, int(np.ceil(far.max() / _FIRST_LOOK)) + 1))
     met = excess_height(far[:, None] * steps) <= 0.0

@@ -98,15 +98,15 @@ class Trace:
         parameters, numbers = self._geometry.parameters, self._geometry.numbers
         about = {"type": "TwinReport", "version": "1.0", "generator": generator(), "format": name, "file": file}
         about |= {"identifier": parameters.metadata.identifier, "level_of_detail": self.level}
-        traced, lost = self._rows()
-        own = {key: item.instance for key, item in parameters.objects.items()}
-        reduced = [{"id": key, "instance": own[key], "reason": reason} for key, reason in self._reduced]
+        traced, losses = self._rows()
+        instances = {key: item.instance for key, item in parameters.objects.items()}
+        reduced = [{"id": key, "instance": instances[key], "reason": reason} for key, reason in self._reduced]
         passes = [
-            {"id": key, "instance": own[key], "first_pass_instance": one.first, "pass_step": one.step}
+            {"id": key, "instance": instances[key], "first_pass_instance": one.first, "pass_step": one.step}
             for key, one in numbers.passes.items()
         ]
         text = compact_json(about)[:-1]
-        for key, rows in (("lost", lost), ("reduced", reduced), ("passes", passes), ("instances", traced)):
+        for key, rows in (("lost", losses), ("reduced", reduced), ("passes", passes), ("instances", traced)):
             text += f',\n"{key}":[' + ",".join("\n" + compact_json(row) for row in rows) + "]"
         path.write_text(text + "}\n", encoding="utf-8", newline="\n")
 
@@ -116,7 +116,7 @@ class Trace:
         if not self._grown:  # the format has no plants
             for plant in placed_plants(self._geometry):
                 self.record_plant(plant)
-        traced, lost = [], []
+        traced, losses = [], []
         for number, name, kinds in self._numbers():
             entities = self._entities.get(number)
             if not entities and self._within.intersection(kinds):
@@ -125,8 +125,8 @@ class Trace:
                 traced.append({"instance": number, "id": name, "entities": entities})
             elif not self._is_only_parts(objects.get(name)):
                 reason = next((self._reasons[kind] for kind in kinds if kind in self._reasons), "")
-                lost.append({"instance": number, "id": name, "reason": reason})
-        return traced, lost
+                losses.append({"instance": number, "id": name, "reason": reason})
+        return traced, losses
 
     def _is_only_parts(self, item: RoadObject | None) -> bool:
         """Return whether an object consists of numbered parts only, so that no point has its own number."""

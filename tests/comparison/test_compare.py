@@ -117,7 +117,7 @@ def test_the_same_clouds_give_the_same_report(folder: Path) -> None:
     [
         ("type: CloudList\nclouds: []", "clouds is "),
         ("type: CloudList\nclouds: [{cloud: none.laz}]", "none.laz"),
-        ("type: CloudList\nclouds: [{cloud: real-0.laz, axis: a.csv}]", "axis and paved tell the pavement together"),
+        ("type: CloudList\nclouds: [{cloud: real-0.laz, axis: a.csv}]", "axis and paved locate the pavement together"),
         ("type: CloudList\nclouds: [{cloud: real-0.laz, roads: 3}]", "unknown key 'roads' (did you mean 'road'?)"),
         ("type: CloudList\nclouds: [{cloud: real-0.laz, class_field: user_data, road: '7'}]", "real-0.laz: road is 7"),
         (

@@ -115,7 +115,7 @@ def test_a_file_of_ones_own_among_a_scenes_is_named_and_nothing_is_touched(old: 
     (old / place).parent.mkdir(exist_ok=True)
     (old / place).write_text("mine")
     before = content(old)
-    with pytest.raises(OutputError, match=f"holds {place}, which is not the data set's; move it away"):
+    with pytest.raises(OutputError, match=f"holds {place}, not a part of the data set; move it away"):
         make(old, NEW, overwrite=True)
     assert content(old) == before
     assert not faults(old, read_manifest(old).scenes)
@@ -125,7 +125,7 @@ def test_a_place_that_the_new_set_needs_and_somebody_has_is_named(old: Path) -> 
     (old / "scenes" / "b-01").mkdir()
     (old / "scenes" / "b-01" / "mine.txt").touch()
     before = content(old)
-    with pytest.raises(OutputError, match="holds scenes/b-01, which is no scene's; move it away"):
+    with pytest.raises(OutputError, match="holds scenes/b-01, not a part of a scene; move it away"):
         make(old, NEW, overwrite=True)
     assert content(old) == before
 
@@ -149,11 +149,11 @@ def test_a_manifest_that_names_places_of_others_is_refused(old: Path, name: str)
     (old / "manifest.json").write_text(json.dumps(data))
     (old.parent / "mine").mkdir()
     before = content(old.parent)
-    with pytest.raises(InputError, match="is no folder that a data set makes"):
+    with pytest.raises(InputError, match="is not a folder of a data set"):
         make(old, NEW, overwrite=True)
     data["scenes"][0]["name"] = "../../mine"
     (old / "manifest.json").write_text(json.dumps(data))
-    with pytest.raises(InputError, match="is no name of a scene"):
+    with pytest.raises(InputError, match="is not a valid name of a scene"):
         make(old, NEW, overwrite=True)
     assert content(old.parent).keys() == before.keys()
 
@@ -245,7 +245,7 @@ def test_nothing_is_removed_where_the_scheduler_does_not_answer(
     before = content(old)
     words = [str(recipe), "--output", str(old), "--overwrite", "--scheduler", "tcp://127.0.0.1:1"]
     assert command("dataset", words) == 2
-    assert "nobody answers there" in capsys.readouterr().err
+    assert "no scheduler answers there" in capsys.readouterr().err
     assert content(old) == before
 
 
@@ -397,7 +397,7 @@ def test_a_disk_without_locks_still_keeps_another_run_out(tmp_path: Path, monkey
 def test_what_contradicts_it_is_refused_by_name(old: Path, other: str, capsys: pytest.CaptureFixture[str]) -> None:
     before = content(old)
     assert command("dataset", ["small-roads", "--output", str(old), "--overwrite", other]) == 2
-    assert capsys.readouterr().err == f"error: --overwrite: can't be given with {other}, which keeps what is there\n"
+    assert capsys.readouterr().err == f"error: --overwrite: can't be given with {other}, which keeps existing scenes\n"
     assert content(old) == before
 
 

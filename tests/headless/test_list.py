@@ -174,7 +174,7 @@ def test_fields_say_all_that_is_to_be_known(capsys: Capture) -> None:
     lines = shown(capsys, "fields", "road.undulation", "fidelity")
     assert [re.split(r"\s{2,}", line) for line in lines] == [
         ["path", "default", "meaning"],
-        ["fidelity", "standard", "Point on the trade-off. [one of draft, standard, high]"],
+        ["fidelity", "standard", "Speed against accuracy, as a preset. [one of draft, standard, high]"],
         [
             "road.undulation.{minimum,maximum}",
             "0.05 to 0.8 m",

@@ -167,8 +167,8 @@ def test_wrong_input_is_one_line(
         "begun with another recipe": run_here(capfd, other, folder, "--resume"),
         "holds other files": run_here(capfd, recipe, occupied),
         "must be 1 to 1024": run_here(capfd, recipe, tmp_path / "set", "--jobs", "0"),
-        "must be of the recipe's: test, train": run_here(capfd, recipe, tmp_path / "none", "--splits", "tset"),
-        "nobody answers there": run_here(capfd, recipe, tmp_path / "dask", "--scheduler", "tcp://127.0.0.1:1"),
+        "must be splits of the recipe: test, train": run_here(capfd, recipe, tmp_path / "none", "--splits", "tset"),
+        "no scheduler answers there": run_here(capfd, recipe, tmp_path / "dask", "--scheduler", "tcp://127.0.0.1:1"),
     }
     for words, (code, said) in cases.items():
         assert (code, said.count("\n")) == (2, 1), said

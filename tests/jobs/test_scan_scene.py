@@ -340,7 +340,7 @@ def test_a_scene_with_a_vertex_astray_is_scanned_where_it_is(
         points.append(len(las))
     assert points[1] == pytest.approx(points[0], rel=0.1)
     report = json.loads((tmp_path / "stray" / "report.json").read_text())
-    assert report["warnings"][0] == "1 vertices lie far from all others: path and previews leave them out"
+    assert report["warnings"][0] == "1 vertices are far from all others: the path and the previews ignore them"
     (tmp_path / "far.obj").write_text(ground + faces + "v 4e8 0 0\nf 1 2 82\n")
     capsys.readouterr()
     words = [str(tmp_path / "far.obj"), "--up", "z", "--output", str(tmp_path / "out"), "--quiet"]
@@ -375,8 +375,8 @@ def test_a_scan_without_a_point_is_told(tmp_path: Path, capsys: pytest.CaptureFi
     words += ["--set", "scan.platform.turn_seconds=0.2"]
     assert command("scan", words) == 0
     told = capsys.readouterr().out
-    assert "warning: not one pulse came back" in told
-    assert "not one pulse came back" in json.loads((tmp_path / "out" / "report.json").read_text())["warnings"][0]
+    assert "warning: no pulse came back" in told
+    assert "no pulse came back" in json.loads((tmp_path / "out" / "report.json").read_text())["warnings"][0]
 
 
 @pytest.fixture

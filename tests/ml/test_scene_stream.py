@@ -281,7 +281,7 @@ def test_producers_end_with_whoever_wanted_the_scenes(tmp_path: Path, monkeypatc
             time.sleep(0.05)
         with subprocess.Popen([*QUICK, str(folder), "1"], stdin=subprocess.PIPE) as second:
             assert second.wait() == 2
-        assert "another training is at work in the folder" in (folder / "failure.json").read_text()
+        assert "another training is running in this folder" in (folder / "failure.json").read_text()
         assert process.stdin is not None
         process.stdin.close()
         assert process.wait(60) == 0

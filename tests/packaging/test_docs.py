@@ -67,6 +67,30 @@ def test_every_page_is_in_the_navigation_once() -> None:
     assert named == Counter(pages | MADE_BY_THE_BUILD)
 
 
+def test_what_is_read_first_is_short() -> None:
+    guides = sorted((DOCS / "guide").glob("*.md"))
+    first = [README, DOCS / "start.md", DOCS / "tasks.md", *sorted((DOCS / "tutorials").glob("*.md")), *guides]
+    words = {name_of(page): len(page.read_text(encoding="utf-8").split()) for page in first}
+    assert words["README.md"] < 700
+    assert [name for name in map(name_of, guides) if words[name] > 1200] == []
+    assert sum(words.values()) < 20_000
+
+
+@pytest.mark.parametrize(
+    ("heading", "rows"),
+    [
+        ("What it needs", {"`rq31-600m` (standard fidelity)", "`tripod-200m`"}),
+        ("If it doesn't work", {"`synthroads: command not found`", "exit code 3"}),
+        ("Words", {"RQ 31", "EKA 1 A", "station", "strip", "return", "fidelity", "twin"}),
+    ],
+)
+def test_tasks_answers_the_usual_questions(heading: str, rows: set[str]) -> None:
+    text = (DOCS / "tasks.md").read_text(encoding="utf-8").partition(f"\n## {heading}\n")[2].partition("\n## ")[0]
+    first_cells = re.findall(r"(?m)^\| (.+?) \|", text)[1:]
+    assert rows <= set(first_cells)
+    assert heading != "If it doesn't work" or len(first_cells) >= 10
+
+
 @every_page
 def test_links_lead_somewhere(page: Path) -> None:
     text = page.read_text(encoding="utf-8")

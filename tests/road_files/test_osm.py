@@ -319,7 +319,7 @@ def test_values_of_tags() -> None:
     assert metres("wide") is None
     assert kilometres_per_hour("65 mph")[0] == pytest.approx(104.607, abs=1e-3)
     assert kilometres_per_hour("120") == (120.0, None)
-    assert kilometres_per_hour("DE:urban") == (50.0, "maxspeed='de:urban' is taken for 50 km/h")
+    assert kilometres_per_hour("DE:urban") == (50.0, "maxspeed='de:urban' is read as 50 km/h")
     for word in ("none", "signals", "DE:motorway", "", None, "fast"):
         assert kilometres_per_hour(word) == (None, None)
     assert driving_direction({"highway": "motorway"}) == 1

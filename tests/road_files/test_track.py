@@ -54,7 +54,7 @@ def test_the_axis_lies_beside_and_below_the_path(tmp_path: Path, noise: float) -
     text = " | ".join(remarks)
     assert "heights count from the ellipsoid" in text
     assert "stands still" in text
-    assert "is taken for the axis itself" not in text
+    assert "is used as the axis itself" not in text
     assert report["name"] == "drive"
 
 
@@ -63,7 +63,7 @@ def test_without_a_place_the_path_is_the_axis_and_that_is_said(tmp_path: Path) -
     with collected_remarks() as remarks:
         axis, scenario, _ = axis_from_file(path, UTM, 1)
     text = " | ".join(remarks)
-    assert "drive.sbet is the path of a vehicle, and is taken for the axis itself: --offset-from-path" in text
+    assert "drive.sbet is the path of a vehicle, and is used as the axis itself: --offset-from-path" in text
     assert "heights are those of the path: --height-above-road" in text
     assert distances(axis, scenario) == pytest.approx((5.375, 1.85), abs=0.06)
 

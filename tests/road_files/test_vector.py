@@ -141,7 +141,7 @@ def test_a_shapefile_needs_its_parts(tmp_path: Path) -> None:
     (tmp_path / "a.prj").unlink()
     with collected_remarks() as remarks:
         axis_from_file(path, RoadScenario(epsg=25833), 1)
-    assert "a.shp names no system: its coordinates are taken for EPSG:25833" in remarks
+    assert "a.shp names no system: its coordinates are read as EPSG:25833" in remarks
 
 
 def test_other_formats_are_opened_by_nobody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -48,7 +48,7 @@ def test_one_error_names_all_limits_that_conflict() -> None:
         ({"cross_section": {"lanes": [3.75], "median": 2.0}}, "cross_section.median is 2 m, 2.5 m are needed"),
         ({"half_width": 12.0}, "half_width is 12 m, the road alone reaches 15.5 m"),
         ({"radius": {"minimum": 500.0, "maximum": 2000.0}}, "radius.minimum is 500 m, EKA1A needs 900 m"),
-        ({"radius": {"minimum": 1e3, "maximum": 1e6}}, "radius.maximum is 1e+06 m, 100000 m are allowed"),
+        ({"radius": {"minimum": 1e3, "maximum": 1e6}}, "radius.maximum is 1e+06 m, at most 100000 m are allowed"),
         ({"grade_percent": {"minimum": -5.0, "maximum": 2.0}}, "grade_percent.minimum is -5 %, EKA1A allows 4 %"),
         ({"grade_percent": {"minimum": 3.0, "maximum": 4.0}, "length": 50_000.0}, "grade_percent is 3 % or more"),
         ({"turnouts": {"exits": 1.0}, "length": 5.0}, "turnouts.exits is 1, "),
@@ -68,9 +68,15 @@ def test_one_error_names_all_limits_that_conflict() -> None:
             "lane_changes.taper_length.maximum is 90 m, EKA1A needs 120 m",
         ),
         ({"cross_section": "RQ36", "lane_changes": {"share": 1.0}, "length": 90.0}, "lane_changes.share is 1, 140 m"),
-        ({"pavement": {"rut_depth": {"minimum": 0.0, "maximum": 0.02}}}, "rut_depth.minimum is 0, 1e-06 is the least"),
-        ({"pavement": {"pothole_size": {"minimum": 1.0, "maximum": 9.0}}}, "pothole_size.maximum is 9, 5 is the most"),
-        ({"embankment_height": {"minimum": -30.0, "maximum": 5.0}}, "embankment_height.minimum is -30, -20"),
+        (
+            {"pavement": {"rut_depth": {"minimum": 0.0, "maximum": 0.02}}},
+            "rut_depth.minimum is 0, at least 1e-06 is allowed",
+        ),
+        (
+            {"pavement": {"pothole_size": {"minimum": 1.0, "maximum": 9.0}}},
+            "pothole_size.maximum is 9, at most 5 is allowed",
+        ),
+        ({"embankment_height": {"minimum": -30.0, "maximum": 5.0}}, "embankment_height.minimum is -30, at least -20"),
         ({"furniture": {"overpass_clearance": {"minimum": 4.0, "maximum": 5.0}}}, "overpass_clearance.minimum is 4"),
         ({"furniture": {"construction_zone": 1.0}, "length": 90.0}, "furniture.construction_zone is 1, it needs 120 m"),
         (
@@ -79,7 +85,10 @@ def test_one_error_names_all_limits_that_conflict() -> None:
         ),
         ({"furniture": {"overpass": 1.0}, "length": 5.0}, "furniture.overpass is 1, it needs 6 m and length is 5 m"),
         ({"barriers": {"noise_barrier": 1.0}, "length": 90.0}, "barriers.noise_barrier is 1, it needs 100 m"),
-        ({"vehicles": {"trucks": {"minimum": 0.0, "maximum": 2.0}}}, "vehicles.trucks.maximum is 2, 1 is the most"),
+        (
+            {"vehicles": {"trucks": {"minimum": 0.0, "maximum": 2.0}}},
+            "vehicles.trucks.maximum is 2, at most 1 is allowed",
+        ),
     ],
 )
 def test_each_conflict_is_named(changes: dict, named: str) -> None:

@@ -117,7 +117,7 @@ class MapSystem:
         return self if self.in_metres else _metric(self)
 
     def same_as(self, other: MapSystem) -> bool:
-        """Return whether coordinates in plan mean the same in another system, heights left aside."""
+        """Return whether coordinates in plan mean the same in another system, heights ignored."""
         if self.epsg and self.epsg == other.epsg:
             return True
         return bool(_plan(self.text).equals(_plan(other.text), ignore_axis_order=True))
@@ -181,14 +181,10 @@ def metric_system(epsg: int, height_epsg: int | None = None, field: str = "epsg"
         name = field.replace("epsg", "height_epsg") if heights else field
         raise InputError(name, height_epsg if heights else epsg, problem.allowed) from None
     if system.unit is None:
-        raise InputError(
-            field, epsg, "must be a projected system, whose coordinates are metres: this one's are degrees"
-        )
+        raise InputError(field, epsg, "must be a projected system with coordinates in metres; this one has degrees")
     if not system.in_metres:
         instead = system.metric().label
-        raise InputError(
-            field, epsg, f"must have coordinates in metres, as {instead} has: this one's are in other units"
-        )
+        raise InputError(field, epsg, f"must have coordinates in metres, as {instead} has; this one has other units")
     return system
 
 
@@ -253,7 +249,7 @@ def _of_codes(epsg: int, height_epsg: int | None) -> MapSystem:
     if height_epsg is None:
         return system
     if system.height_unit is not None:
-        raise InputError("height_epsg", height_epsg, f"EPSG:{epsg} says already what heights are counted from")
+        raise InputError("height_epsg", height_epsg, f"EPSG:{epsg} already names the vertical coordinate system")
     try:
         vertical = _crs(f"EPSG:{height_epsg}")
     except CRSError:
@@ -318,19 +314,19 @@ def _parts(crs: CRS) -> Iterator[CRS]:
 def _described(text: str, crs: CRS, parts: list[CRS]) -> MapSystem:
     plan, vertical = parts[0], parts[1] if len(parts) > 1 else None
     if plan.is_vertical:
-        raise InputError("coordinate system", plan.name, "is one of heights alone: one of x and y is needed")
+        raise InputError("coordinate system", plan.name, "has heights only: a system with x and y is needed")
     if plan.is_geocentric:
-        raise InputError("coordinate system", plan.name, "is geocentric: x and y that run on a map are needed")
+        raise InputError("coordinate system", plan.name, "is geocentric: a projected system is needed")
     directions = [axis.direction.lower() for axis in plan.axis_info[:2]]
     if set(directions) & {"west", "south"} and directions[0] != directions[-1]:  # the two axes of a polar one run alike
         way = " and ".join(directions)
-        raise InputError("coordinate system", plan.name, f"runs {way}: one that runs east and north is needed")
+        raise InputError("coordinate system", plan.name, f"has axes {way}: axes east and north are needed")
     unit = None if plan.is_geographic else float(plan.axis_info[0].unit_conversion_factor) if plan.axis_info else 1.0
     height_unit, ellipsoidal = None, False
     if vertical is not None:
         axis = vertical.axis_info[0]
         if axis.direction.lower() == "down":
-            raise InputError("coordinate system", vertical.name, "counts downwards: heights are needed")
+            raise InputError("coordinate system", vertical.name, "has depths, counted downwards: heights are needed")
         height_unit = float(axis.unit_conversion_factor)
     elif len(plan.axis_info) == 3:
         height_unit, ellipsoidal = float(plan.axis_info[2].unit_conversion_factor), True

@@ -96,7 +96,7 @@ def bring(name: str, points: Float, declared: MapSystem | None, place: Placement
     else:
         points = _moved(name, points, source, system)
     if declared is None and source.unit is not None:
-        assume("%s names no system: its coordinates are taken for %s", name, source.label)
+        assume("%s names no system: its coordinates are read as %s", name, source.label)
     check_area(name, points, system, may_be_local=declared is None)
     return points
 
@@ -113,7 +113,7 @@ def check_heights(name: str, points: Float) -> Float:
     if points.shape[1] > 2 and len(points):
         row = int(np.abs(points[:, 2]).argmax())
         if abs(points[row, 2]) > HIGHEST:
-            allowed = f"no land lies so high, {HIGHEST:,.0f} m is the most: is z another column, or in another unit?"
+            allowed = f"no land lies higher than {HIGHEST:,.0f} m: is z another column, or in another unit?"
             raise InputError(f"{name}: z of point {row + 1}", float(points[row, 2]), allowed)
     return points
 
@@ -152,7 +152,7 @@ def _system_of_member(name: str, member: Any) -> MapSystem:
         return MapSystem.read(named)
     except UnknownSystemError:
         raise InputError(
-            f"{name} crs", named, "a coordinate system that PROJ knows is needed, EPSG:25832 say"
+            f"{name} crs", named, "a coordinate system that PROJ knows is needed, e.g. EPSG:25832"
         ) from None
 
 
@@ -165,7 +165,7 @@ def _seem_degrees(points: Float) -> bool:
 def _metres_without_target(name: str, points: Float, source: MapSystem) -> Float:
     if source.unit is None:
         raise InputError(f"{name} coordinates", points[0, :2].tolist(), _METRES)
-    warn("%s is in %s: what it is laid over names no system, and is taken to be in it", name, source.label)
+    warn("%s is in %s: the data beside it name no system, and are read in the same system", name, source.label)
     return points * source.scale
 
 
@@ -176,10 +176,10 @@ def _check_heights_alike(name: str, source: MapSystem, system: MapSystem) -> Non
         return
     known = source if source.unit is None else source.metric()
     if system.height_epsg and (source.ellipsoidal or known.height_epsg != system.height_epsg):
-        allowed = f"EPSG:{system.height_epsg} is needed: nothing here moves heights from one to the other"
+        allowed = f"EPSG:{system.height_epsg} is needed: heights can't be converted from one to the other"
         raise InputError(f"{name}: heights", f"counted from {own}" if source.ellipsoidal else own, allowed)
     if source.ellipsoidal:
-        warn("%s counts heights from the ellipsoid: they are kept as they are", name)
+        warn("%s has ellipsoidal heights: they are kept as they are", name)
 
 
 def _moved(name: str, points: Float, source: MapSystem, system: MapSystem) -> Float:
@@ -207,7 +207,7 @@ def check_area(name: str, points: Float, system: MapSystem, may_be_local: bool) 
         return
     place = [round(float(value), 3) for value in points[row, :2]]
     if may_be_local and np.abs(points[:, :2]).max() <= _LOCAL:
-        text = "%s: coordinates such as %s lie outside of the area of %s: they are taken for a site's own"
+        text = "%s: coordinates such as %s lie outside of the area of %s: they are read as a site's own"
         warn(text, name, place, system.label)
     elif outside[row] > _FAR:
         allowed = f"{system.label} is for {system.area}: is it the file's coordinate system, and is x east and y north?"

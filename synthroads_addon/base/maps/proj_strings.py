@@ -94,4 +94,4 @@ def _refuse_contradiction(text: str, kept: dict[str, str]) -> None:
     if away > 0.5 * _ZONE_WIDTH:
         wanted = f"contradicts itself: the meridian of zone {kept['zone']} is {meridian:g}, {away:.0f} degrees away"
         raise UnknownSystemError("coordinate system", text[:80], wanted)
-    warn("lon_0 and lat_0 beside a zone of UTM mean nothing and are left aside")
+    warn("lon_0 and lat_0 beside a zone of UTM mean nothing and are ignored")

@@ -290,17 +290,17 @@ class E57Reader(CloudReader):
         if not self.header.labelled:  # ours are in the unit of the notes, whatever the limits
             self._intensities = [self._limits(scan, "intensity", fields) for scan, fields in self._scanned()]
             pairs = zip(self._intensities, self._fields, strict=True)
-            given = [found for found, fields in pairs if "intensity" in fields]
+            given = [limits for limits, fields in pairs if "intensity" in fields]
             if given and None not in given:
                 self.header = replace(self.header, intensity_scale=SIXTEEN_BITS)
             elif any(given):
-                text = "only some of its scans say what intensities count to: all are taken as they stand"
+                text = "only some of its scans name the limits of intensities: intensities are read unscaled"
                 assume(f"{path.name}: {text}")
                 self._intensities = [None] * len(self._scans)
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
         """Yield the points of one scan after the other, in map coordinates, without invalid ones."""
-        done = 0
+        position = 0
         for number, (scan, fields, count) in enumerate(zip(self._scans, self._fields, self._counts, strict=True)):
             names = [name for name in sorted(_FIXED.keys() | _FLAGGED.keys() | self._layer_names()) if name in fields]
             intensities, colors = self._intensities[number], self._color_limits(scan, fields)
@@ -313,18 +313,18 @@ class E57Reader(CloudReader):
                     reader = reader or scan["points"].reader(buffers)
                     got = reader.read()
                 except Exception:
-                    raise damage_error(self.header.path, done, self.header.count) from None
+                    raise damage_error(self.header.path, position, self.header.count) from None
                 if got == 0:
-                    raise damage_error(self.header.path, done, self.header.count)
+                    raise damage_error(self.header.path, position, self.header.count)
                 part = {name: array[:got] for name, array in arrays.items()}
                 self._scale(part, intensities, colors)
-                block = self._block(part, got, _pose(scan), done)
+                block = self._block(part, got, _pose(scan), position)
                 if "cartesianInvalidState" in part and (invalid := part["cartesianInvalidState"] != _VALID).any():
                     self._remarks["points have no valid coordinates and are left out"] += int(np.count_nonzero(invalid))
                     block = block.select(~invalid)
-                check_coordinates(self.header.path, done, block.xyz)
+                check_coordinates(self.header.path, position, block.xyz)
                 yield block
-                done, left = done + got, left - got
+                position, left = position + got, left - got
             if reader:
                 reader.close()
 
@@ -340,26 +340,26 @@ class E57Reader(CloudReader):
         if name not in fields:
             return None
         group = "colorLimits" if name in _CHANNELS else f"{name}Limits"
-        found: Limits | None = None
+        limits: Limits | None = None
         try:
             if scan.isDefined(group) and all(scan[group].isDefined(f"{name}{end}") for end in _ENDS):
                 low, high = (_number_of(scan[group][f"{name}{end}"]) for end in _ENDS)
-                found = (low, high)
-            if not _tells(found):
-                found = _field_limits(self._e57.StructureNode(scan["points"].prototype())[name])
+                limits = (low, high)
+            if not _tells(limits):
+                limits = _field_limits(self._e57.StructureNode(scan["points"].prototype())[name])
         except Exception as problem:
             raise InputError(
                 str(self.header.path), None, f"is an E57 file that is damaged ({_error_text(problem)})"
             ) from None
-        return found if _tells(found) else None
+        return limits if _tells(limits) else None
 
     def _color_limits(self, scan: Any, fields: set[str]) -> dict[str, Limits]:
         """Return the limits of a scan's colour channels; where none are declared, by the largest value there is."""
         limits = {name: self._limits(scan, name, fields) for name in _CHANNELS if name in fields}
         if None in limits.values():
             full = self._assumed_brightness(self._colors(), whole=False)
-            return {name: found or (0.0, full) for name, found in limits.items()}
-        return {name: found for name, found in limits.items() if found}
+            return {name: bounds or (0.0, full) for name, bounds in limits.items()}
+        return {name: bounds for name, bounds in limits.items() if bounds}
 
     def _colors(self) -> Iterator[AnyArray]:
         """Yield the stored colours of all scans, in parts, invalid ones as NaN."""
@@ -390,7 +390,7 @@ class E57Reader(CloudReader):
         void = {name: part[flag] != 0 for flag, names in _FLAGGED.items() if flag in part for name in names}
         for flag, (name, *_) in _FLAGGED.items():
             if name in void and (count := int(np.count_nonzero(void[name]))):
-                self._remarks[f"points have an invalid {_PLAIN[flag]}: it is taken for 0"] += count
+                self._remarks[f"points have an invalid {_PLAIN[flag]}: it is read as 0"] += count
         spans = colors if intensities is None else {**colors, "intensity": intensities}
         for name in (*_CHANNELS, "intensity", "timeStamp"):
             if name not in part:
@@ -405,10 +405,12 @@ class E57Reader(CloudReader):
         """Return values (n,) as shares of what lies between their limits, to which those beyond are set."""
         share = (values - limits[0]) / (limits[1] - limits[0])
         if count := int(np.count_nonzero((share < 0.0) | (share > 1.0))):
-            self._remarks[f"points have {what} beyond the limits that the file names, to which it is set"] += count
+            self._remarks[f"points have {what} beyond the file's limits: they are clipped to these limits"] += count
         return np.clip(share, 0.0, 1.0)
 
-    def _block(self, arrays: dict[str, AnyArray], count: int, pose: tuple[AnyArray, AnyArray], done: int) -> PointBlock:
+    def _block(
+        self, arrays: dict[str, AnyArray], count: int, pose: tuple[AnyArray, AnyArray], position: int
+    ) -> PointBlock:
         rotation, translation = pose
         present = [column for column in columns(self.header.attributes) if e57_name(column) in arrays]
         stored = {column.name: arrays[e57_name(column)].copy() for column in present}
@@ -420,7 +422,7 @@ class E57Reader(CloudReader):
             stored["return_number"] = np.ones(count, dtype=np.uint8)
         dark = np.zeros(count)
         stored["rgb"] = np.stack([arrays.get(name, dark) for name in _CHANNELS], axis=1)
-        return self._points(stored, count, done)
+        return self._points(stored, count, position)
 
 
 def _tells(limits: Limits | None) -> bool:
@@ -444,7 +446,7 @@ def _declared_place(path: Path, text: str) -> Placement:
     """Return the placement that a file of others declares, whose coordinates are metres by the standard."""
     place = placed(path, *system_of_text(text))
     if place.declared is not None and place.scale is not None:
-        allowed = "isn't in metres, which E57's coordinates are by its standard: which of the two holds can't be told"
+        allowed = "isn't in metres, the unit of coordinates in the E57 standard: it is unclear which one is right"
         raise InputError(f"{path}: coordinate system", place.declared.label, allowed)
     return place
 

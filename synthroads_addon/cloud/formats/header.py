@@ -92,14 +92,14 @@ def placed(path: Path, declared: MapSystem | None, notes: Sequence[str] = ()) ->
     if declared.in_metres:
         return Placement(declared, declared, tuple(notes))
     system, units = declared.metric(), declared.scale
-    told = f"it is in {declared.label}, a unit of which is {units[0]:.9g} m: it is read in metres, in {system.label}"
+    note = f"it is in {declared.label}, a unit of which is {units[0]:.9g} m: it is read in metres, in {system.label}"
     if units[0] == 1.0:
-        told = f"its heights are in units of {units[2]:.9g} m: they are read in metres"
+        note = f"its heights are in units of {units[2]:.9g} m: they are read in metres"
     elif declared.height_unit is None:
-        told += "; it names no unit of heights, which are taken to have the same"
+        note += "; it names no unit of heights: the same unit is assumed"
     elif units[2] != units[0]:
-        told += f"; a unit of its heights is {units[2]:.9g} m"
-    return Placement(system, declared, (*notes, told))
+        note += f"; a unit of its heights is {units[2]:.9g} m"
+    return Placement(system, declared, (*notes, note))
 
 
 def system_of_text(text: str | None) -> tuple[MapSystem | None, list[str]]:
@@ -114,7 +114,7 @@ def system_of_text(text: str | None) -> tuple[MapSystem | None, list[str]]:
         return MapSystem.read(text), []
     except UnknownSystemError:
         shown = " ".join(text.split())[:60]
-        return None, [f"its coordinate system can't be read ({shown}): it is left aside, coordinates are metres"]
+        return None, [f"its coordinate system can't be read ({shown}): it is ignored, coordinates are metres"]
 
 
 def header_from_notes(
@@ -155,7 +155,7 @@ def header_from_notes(
     except (KeyError, TypeError, ValueError, OverflowError):
         offset = np.full(3, np.nan)
     if not np.isfinite(offset).all() or not isinstance(text, str | None):
-        raise InputError(str(path), None, "its notes on offset and coordinate system are damaged")
+        raise InputError(str(path), None, "its data on offset and coordinate system are damaged")
     place = placed(path, *system_of_text(text))
     return replace(
         header,

@@ -299,24 +299,24 @@ class LasReader(CloudReader):
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
         """Yield the points as blocks of at most ``size``, from the file's first point on."""
-        done, path = 0, self.header.path
+        position, path = 0, self.header.path
         if self._reader.points_read:
             self._reader.seek(0)
         full = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
-        while done < self.header.count:
-            count = min(size, self.header.count - done)
+        while position < self.header.count:
+            count = min(size, self.header.count - position)
             try:
                 record = self._reader.read_points(count)
             except _FAULTS:
-                raise damage_error(path, done, self.header.count) from None
+                raise damage_error(path, position, self.header.count) from None
             except BaseException as problem:
                 if type(problem).__name__ == "PanicException":  # the decompressor's own way to fail
-                    raise damage_error(path, done, self.header.count) from None
+                    raise damage_error(path, position, self.header.count) from None
                 raise
             if len(record) != count:
-                raise damage_error(path, done + len(record), self.header.count)
-            yield self._block(record, full, done)
-            done += count
+                raise damage_error(path, position + len(record), self.header.count)
+            yield self._block(record, full, position)
+            position += count
 
     def _check_size(self, path: Path) -> None:
         """Raise `InputError` if a LAS file ends before its points do or a LAZ file's chunks don't fill it."""
@@ -346,7 +346,7 @@ class LasReader(CloudReader):
 
         return self._assumed_brightness(colors(), whole=True)
 
-    def _block(self, record: Any, full: float, done: int) -> PointBlock:
+    def _block(self, record: Any, full: float, position: int) -> PointBlock:
         header = self._reader.header
         names = set(record.point_format.dimension_names)
         present = [column.name for column in columns(self.header.attributes) if column.name in names]
@@ -362,7 +362,7 @@ class LasReader(CloudReader):
             stored["rgb"] = rgb if full == SIXTEEN_BITS else sixteen_bits(rgb, full)
         stored["scan_angle_deg"] = _scan_angle(record, names)
         stored["strip"] = np.asarray(record["point_source_id"]) - np.uint16(1)
-        block = self._points(stored, len(record), done)
+        block = self._points(stored, len(record), position)
         return block if self.header.predicted is None else block.with_arrays({PREDICTED: np.array(record[PREDICTED])})
 
 
@@ -460,7 +460,7 @@ def _notes(path: Path, las: laspy.LasHeader, number: int) -> dict[str, Any]:
     record = next((v.record_data_bytes() for v in las.vlrs if v.user_id == OWN and v.record_id == number), None)
     notes = json.loads(record) if record else {}
     if not isinstance(notes, dict):
-        raise InputError(str(path), None, "its notes on intensity scale and classes are damaged")
+        raise InputError(str(path), None, "its data on intensity scale and classes are damaged")
     return notes
 
 
@@ -513,7 +513,7 @@ def _check_chunks(path: Path, start: int, record: bytes) -> None:
 
 
 def _damage_error(path: Path) -> InputError:
-    return InputError(str(path), None, "is damaged: the table of its chunks doesn't fit the file")
+    return InputError(str(path), None, "is damaged: its table of chunks doesn't match the file")
 
 
 def _chunk_sizes(path: Path, file: BinaryIO, start: int, record: bytes) -> list[int]:

@@ -40,7 +40,7 @@ def declared_system(path: Path, las: laspy.LasHeader) -> tuple[MapSystem | None,
         return named or other, notes
     if named.label != other.label and other.epsg and named.epsg != other.epsg:
         chosen, left = (named, other) if las.global_encoding.wkt else (other, named)
-        notes.append(f"it names two coordinate systems: {chosen.label} is used, {left.label} is left aside")
+        notes.append(f"it names two coordinate systems: {chosen.label} is used, {left.label} is ignored")
         return chosen, notes
     if named.height_unit is None and other.height_unit is not None:
         return (other if named.same_as(other) else named), notes
@@ -120,7 +120,7 @@ class _GeoKeys:
         try:
             return MapSystem.of(int(code)) if code != _OWN else None
         except InputError:
-            notes.append(f"its coordinate system EPSG:{code} is unknown: it is left aside")
+            notes.append(f"its coordinate system EPSG:{code} is unknown: it is ignored")
         return None
 
     def _nameless(self, unit: float, height_unit: float | None) -> MapSystem:
@@ -138,7 +138,7 @@ class _GeoKeys:
                 return MapSystem.of(system.epsg, known)
             except InputError:
                 continue
-        notes.append(f"its vertical coordinate system {code} is unknown: it is left aside")
+        notes.append(f"its vertical coordinate system {code} is unknown: it is ignored")
         return system
 
     def _unit(self, key: int, notes: list[str]) -> float | None:
@@ -149,5 +149,5 @@ class _GeoKeys:
         size = self.values.get(_PLAN_UNIT_SIZE) if key == _PLAN_UNIT and code == _OWN else _UNITS.get(code)
         if isinstance(size, float) and 0.0 < size < 1e6:
             return size
-        notes.append(f"its unit with the code {code} is unknown: it is left aside")
+        notes.append(f"its unit with the code {code} is unknown: it is ignored")
         return None

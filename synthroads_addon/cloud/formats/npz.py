@@ -122,16 +122,16 @@ class NpzReader(CloudReader):
         try:
             for member in members.values():
                 _npy_header(member)
-            for done in range(0, self.header.count, size):
-                rows = min(size, self.header.count - done)
+            for position in range(0, self.header.count, size):
+                rows = min(size, self.header.count - position)
                 try:
                     arrays = {name: self._rows(members[name], name, rows) for name in members}
                 except ARCHIVE_FAULTS:
-                    raise damage_error(self.header.path, done, self.header.count) from None
-                check_coordinates(self.header.path, done, arrays["xyz"])
+                    raise damage_error(self.header.path, position, self.header.count) from None
+                check_coordinates(self.header.path, position, arrays["xyz"])
                 if "rgb" in arrays and (full != SIXTEEN_BITS or arrays["rgb"].dtype.kind == "f"):
                     arrays["rgb"] = sixteen_bits(arrays["rgb"], full)
-                yield self._block(arrays, rows, done)
+                yield self._block(arrays, rows, position)
         finally:
             for member in members.values():
                 member.close()
@@ -145,8 +145,8 @@ class NpzReader(CloudReader):
         def colors() -> Iterator[AnyArray]:
             with self._file.open("rgb.npy") as member, suppress(*ARCHIVE_FAULTS):  # damage is found with the points
                 _npy_header(member)
-                for done in range(0, self.header.count, PEEK):
-                    yield self._rows(member, "rgb", min(PEEK, self.header.count - done))
+                for position in range(0, self.header.count, PEEK):
+                    yield self._rows(member, "rgb", min(PEEK, self.header.count - position))
 
         return self._assumed_brightness(colors(), whole=kind.kind in "iu")
 
@@ -156,13 +156,13 @@ class NpzReader(CloudReader):
         data = np.frombuffer(member.read(int(np.prod(rows)) * kind.itemsize), dtype=kind)
         return data.reshape(rows).copy()
 
-    def _block(self, arrays: dict[str, AnyArray], count: int, done: int) -> PointBlock:
+    def _block(self, arrays: dict[str, AnyArray], count: int, position: int) -> PointBlock:
         stored = {
             c.name: arrays[c.array] if c.component is None else arrays[c.array][:, c.component]
             for c in columns(self.header.attributes)
             if c.array in arrays
         }
-        return self._points(arrays | stored, count, done)
+        return self._points(arrays | stored, count, position)
 
     def _read_kinds(self, path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
         """Return shape and type of each array of the file that `PointBlock` knows, by name."""
@@ -185,10 +185,10 @@ class NpzReader(CloudReader):
         if "notes.npy" not in self._file.namelist():
             return None
         if self._file.getinfo("notes.npy").file_size > _LONGEST_NOTES:
-            raise ValueError("its notes are too long")
+            raise ValueError("its metadata are too long")
         with self._file.open("notes.npy") as member:
             if math.prod(_npy_header(member)[0]) != 1:
-                raise ValueError("its notes are no text")
+                raise ValueError("its metadata are not text")
         with self._file.open("notes.npy") as member:
             return json.loads(str(npy.read_array(member, allow_pickle=False)))
 

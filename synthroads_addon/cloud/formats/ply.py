@@ -166,7 +166,7 @@ class PlyReader(CloudReader):
         except BaseException:
             self._file.close()
             raise
-        self._own = {name: found for name in _own_names() if (found := self._stored_name(name))}
+        self._own = {name: stored for name in _own_names() if (stored := self._stored_name(name))}
         self._others = {} if isinstance(notes, dict) else self._names_of_others()
         used = {*"xyz", *self._own.values(), *self._others.values()}
         colored = all(name in self._own or name in self._others for name in _CHANNELS)
@@ -185,27 +185,29 @@ class PlyReader(CloudReader):
     def _names_of_others(self) -> dict[str, str]:
         """Return the properties of a file of others by the quantity that they are, as far as ours aren't there."""
         plain = {_plain(name): name for name in sorted(self._names, reverse=True)}
-        found = {what: next((plain[name] for name in names if name in plain), None) for what, names in _OTHERS.items()}
-        if not all(found[name] for name in _CHANNELS):
-            found |= dict.fromkeys(_CHANNELS)
+        names_by_kind = {
+            what: next((plain[name] for name in names if name in plain), None) for what, names in _OTHERS.items()
+        }
+        if not all(names_by_kind[name] for name in _CHANNELS):
+            names_by_kind |= dict.fromkeys(_CHANNELS)
         mine = {**{array: name for array, (name, _) in _FIELDS.items()}, "source": f"{_SCALAR}strip"}
-        return {what: name for what, name in found.items() if name and mine.get(what, what) not in self._own}
+        return {what: name for what, name in names_by_kind.items() if name and mine.get(what, what) not in self._own}
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
         """Yield the points as blocks of at most ``size``, from the file's first point on."""
         label = self._others.get("class")
         if self._assumed_scheme:
-            assume(f"{self.header.path.name}: its class_id is taken for numbers of the 17 classes")
+            assume(f"{self.header.path.name}: its class_id is read as numbers of the 17 classes")
         elif label and _plain(label) != _CLASSES[0]:
-            assume(f"{self.header.path.name}: its property {label} is taken for LAS codes of classes")
+            assume(f"{self.header.path.name}: its property {label} is read as LAS codes of classes")
         full = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
         self._file.seek(self._start)
-        for done in range(0, self.header.count, size):
-            rows = min(size, self.header.count - done)
+        for position in range(0, self.header.count, size):
+            rows = min(size, self.header.count - position)
             data = self._file.read(rows * self._type.itemsize)
             if len(data) != rows * self._type.itemsize:
-                raise damage_error(self.header.path, done, self.header.count)
-            yield self._block(np.frombuffer(data, dtype=self._type), full, done)
+                raise damage_error(self.header.path, position, self.header.count)
+            yield self._block(np.frombuffer(data, dtype=self._type), full, position)
 
     def _channels(self) -> list[str]:
         """Return the names of the properties of red, green and blue."""
@@ -219,29 +221,35 @@ class PlyReader(CloudReader):
 
         def colors() -> Iterator[AnyArray]:
             self._file.seek(self._start)
-            for done in range(0, self.header.count, PEEK):
-                rows = min(PEEK, self.header.count - done)
+            for position in range(0, self.header.count, PEEK):
+                rows = min(PEEK, self.header.count - position)
                 data = self._file.read(rows * self._type.itemsize)
                 record = np.frombuffer(data[: len(data) // self._type.itemsize * self._type.itemsize], dtype=self._type)
                 yield np.stack([record[name] for name in self._channels()])
 
         return self._assumed_brightness(colors(), whole=all(kind.kind in "iu" for kind in kinds))
 
-    def _block(self, record: AnyArray, full: float, done: int) -> PointBlock:
-        own, others = self._own, self._others
-        stored = {c.name: record[own[ply_name(c)]] for c in columns(self.header.attributes) if ply_name(c) in own}
-        stored |= {array: record[own[name]].copy() for array, (name, _) in _FIELDS.items() if name in own}
+    def _block(self, record: AnyArray, full: float, position: int) -> PointBlock:
+        stored_names, others = self._own, self._others
+        stored = {
+            c.name: record[stored_names[ply_name(c)]]
+            for c in columns(self.header.attributes)
+            if ply_name(c) in stored_names
+        }
+        stored |= {
+            array: record[stored_names[name]].copy() for array, (name, _) in _FIELDS.items() if name in stored_names
+        }
         stored |= {name: record[field].copy() for name, field in others.items() if name in (*_FIELDS, *FLAGS)}
         if "source" in others:  # from 1, as in LAS; 0 is none, which strips count as 65535
-            source = self._fit(record[others["source"]], "strip", done)
+            source = self._fit(record[others["source"]], "strip", position)
             stored["strip"] = source - np.uint16(1)
         if not self.header.labelled:
             stored["class_id"] = record[others["class"]] if "class" in others else np.zeros(len(record))
         xyz = np.stack([record[name].astype(np.float64) for name in "xyz"], axis=1)
-        stored["xyz"] = check_coordinates(self.header.path, done, xyz)
+        stored["xyz"] = check_coordinates(self.header.path, position, xyz)
         if self.header.has_color:
             stored["rgb"] = sixteen_bits(np.stack([record[name] for name in self._channels()], axis=1), full)
-        return self._points(stored, len(record), done)
+        return self._points(stored, len(record), position)
 
 
 def _own_names() -> tuple[str, ...]:

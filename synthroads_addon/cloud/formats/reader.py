@@ -59,13 +59,13 @@ class CloudReader(ABC):
             InputError: the file is truncated or damaged, or holds a coordinate that lies on no map, or an intensity
                 that is no number.
         """
-        done = 0
+        position = 0
         scale = self.header.place.scale
         self._remarks = remarks = Counter[str]()
         for stored in self._stored_blocks(size):
             block = stored if scale is None else replace(stored, xyz=stored.xyz * scale)
-            yield _check_block(self.header.path, done, block)
-            done += len(block)
+            yield _check_block(self.header.path, position, block)
+            position += len(block)
         for remark, count in remarks.items():
             warn(f"{self.header.path.name}: {count:,} {remark}")
 
@@ -76,8 +76,8 @@ class CloudReader(ABC):
             InputError: see `blocks`.
         """
         for block in self.blocks(size):
-            kept = self.usable_points(block)
-            yield without_flags(block if kept.all() else block.select(kept))
+            usable = self.usable_points(block)
+            yield without_flags(block if usable.all() else block.select(usable))
 
     def usable_points(self, block: PointBlock, *, noise: bool = False) -> Bool:
         """Return a mask (N,) of a block's points that may be worked with; the user is told how many may not.
@@ -99,21 +99,21 @@ class CloudReader(ABC):
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
         """Yield the file's points as blocks of at most ``size`` points, unchecked."""
 
-    def _points(self, stored: dict[str, AnyArray], count: int, done: int) -> PointBlock:
+    def _points(self, stored: dict[str, AnyArray], count: int, position: int) -> PointBlock:
         """Return the block of N points from stored columns and arrays, whole numbers checked; see `make_points`.
 
         Args:
             stored: as `make_points` takes them; arrays of `FLAGS` too.
             count: N.
-            done: points before them, for messages.
+            position: points before them, for messages.
 
         Raises:
             InputError: a number doesn't fit into its array: nothing wraps.
         """
-        fitted = {name: self._fit(values, name, done) for name, values in stored.items()}
+        fitted = {name: self._fit(values, name, position) for name, values in stored.items()}
         return make_points(fitted, self.header.attributes, count)
 
-    def _fit(self, values: AnyArray, name: str, done: int) -> AnyArray:
+    def _fit(self, values: AnyArray, name: str, position: int) -> AnyArray:
         """Return values (N, ...) in the type of whole numbers that their name has in blocks, where it has one.
 
         What is NaN, and a class of -1, stands for no value in the files of others: it becomes 0 and is remarked on.
@@ -125,20 +125,20 @@ class CloudReader(ABC):
         if name == "class_id" and values.dtype.kind != "u":
             none |= values == -1
         if none.any():
-            self._remarks[f"points have no {name} (NaN or -1): it is taken for 0"] += int(np.count_nonzero(none))
+            self._remarks[f"points have no {name} (NaN or -1): it is read as 0"] += int(np.count_nonzero(none))
             values = np.where(none, 0, values)
         if values.dtype.kind == "b":
             return values.astype(kind)
         whole = np.rint(values) if values.dtype.kind == "f" else values
         limits = np.iinfo(kind)
-        wrong = (whole < limits.min) | (whole > limits.max)
+        faults = (whole < limits.min) | (whole > limits.max)
         if values.dtype.kind == "f":
-            wrong |= np.abs(whole - values) > _NOT_WHOLE
-        if wrong.any():
-            point = int(np.argwhere(wrong)[0][0])
-            worst = values[wrong].flat[0]
+            faults |= np.abs(whole - values) > _NOT_WHOLE
+        if faults.any():
+            point = int(np.argwhere(faults)[0][0])
+            worst = values[faults].flat[0]
             allowed = f"must be a whole number from {limits.min} to {limits.max}"
-            raise InputError(f"{self.header.path}: {name} of point {done + point:,}", worst, allowed)
+            raise InputError(f"{self.header.path}: {name} of point {position + point:,}", worst, allowed)
         return whole.astype(kind)
 
     def _assumed_brightness(self, colors: Iterable[AnyArray], *, whole: bool) -> float:
@@ -156,8 +156,8 @@ class CloudReader(ABC):
                     break
             self._brightness = full_brightness(largest, whole=whole) if largest else SIXTEEN_BITS
             if largest and not (whole and self._brightness == SIXTEEN_BITS):
-                taken = brightness_text(self._brightness)
-                assume(f"{self.header.path.name}: its colours, {largest:g} at most, are taken for {taken}")
+                scale = brightness_text(self._brightness)
+                assume(f"{self.header.path.name}: its colours, {largest:g} at most, are read as {scale}")
         return self._brightness
 
     def close(self) -> None:
@@ -165,12 +165,12 @@ class CloudReader(ABC):
         self._file.close()
 
 
-def check_coordinates(path: Path, done: int, xyz: Float) -> Float:
+def check_coordinates(path: Path, position: int, xyz: Float) -> Float:
     """Return a block's coordinates (N, 3) unchanged; raise `InputError` if one isn't finite.
 
     Args:
         path: the file.
-        done: points before them.
+        position: points before them.
         xyz: the coordinates, m.
 
     Raises:
@@ -178,22 +178,22 @@ def check_coordinates(path: Path, done: int, xyz: Float) -> Float:
     """
     if not np.isfinite(xyz).all():
         point, axis = np.argwhere(~np.isfinite(xyz))[0]
-        raise InputError(f"{path}: {'xyz'[axis]} of point {done + point:,}", xyz[point, axis], "must be finite")
+        raise InputError(f"{path}: {'xyz'[axis]} of point {position + point:,}", xyz[point, axis], "must be finite")
     return xyz
 
 
-def _check_block(path: Path, done: int, block: PointBlock) -> PointBlock:
+def _check_block(path: Path, position: int, block: PointBlock) -> PointBlock:
     """Return a block unchanged; raise `InputError` if a coordinate is too large or an intensity isn't finite."""
     if not len(block):
         return block
-    xyz = check_coordinates(path, done, block.xyz)
+    xyz = check_coordinates(path, position, block.xyz)
     if max(xyz.max(), -xyz.min()) > FARTHEST:
         point, axis = divmod(int(np.abs(xyz).argmax()), 3)
         allowed = f"must be a map coordinate, at most {FARTHEST:g} m"
-        raise InputError(f"{path}: {'xyz'[axis]} of point {done + point:,}", float(xyz[point, axis]), allowed)
+        raise InputError(f"{path}: {'xyz'[axis]} of point {position + point:,}", float(xyz[point, axis]), allowed)
     if not np.isfinite(block.intensity).all():
         point = int(np.argmin(np.isfinite(block.intensity)))
-        raise InputError(f"{path}: intensity of point {done + point:,}", block.intensity[point], "must be finite")
+        raise InputError(f"{path}: intensity of point {position + point:,}", block.intensity[point], "must be finite")
     return block
 
 

@@ -119,7 +119,7 @@ class CloudWriter(ABC):
             return
         for column in self.columns:
             if block.array(column.array) is None:
-                raise OutputError(str(self.path), column.array, "is to be written, but the points don't have it")
+                raise OutputError(str(self.path), column.array, "can't be written: the points don't have it")
         if not self.keeps_flags:
             block = self._without_flags(block)
             if not len(block):
@@ -176,8 +176,8 @@ class CloudWriter(ABC):
         fits = np.abs(values) <= most  # NaN isn't
         if not fits.all():
             worst = values[~fits.reshape(len(values), -1).all(axis=1)][0]
-            told = "finite" if not np.isfinite(worst).all() else f"at most {most:.2g}, as the format stores it"
-            raise OutputError(str(self.path), worst.tolist(), f"{name} must be {told}")
+            allowed_range = "finite" if not np.isfinite(worst).all() else f"at most {most:.2g}, as the format stores it"
+            raise OutputError(str(self.path), worst.tolist(), f"{name} must be {allowed_range}")
         return values
 
     def fit_values(self, values: AnyArray, kind: str, name: str) -> AnyArray:

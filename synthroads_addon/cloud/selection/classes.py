@@ -83,16 +83,16 @@ def read_real_cloud(path: Path, attribute: str | None = None, field: str = "--cl
     """
     with open_cloud(path) as cloud:
         header = cloud.header
-        blocks, kept = [], []
+        blocks, masks = [], []
         for block in cloud.blocks():
-            kept.append(cloud.usable_points(block, noise=attribute is not None))
-            blocks.append(without_flags(block.select(kept[-1])))
+            masks.append(cloud.usable_points(block, noise=attribute is not None))
+            blocks.append(without_flags(block.select(masks[-1])))
     if not sum(map(len, blocks)):
         raise InputError(str(path), 0, "has no points")
     points = concatenate(blocks)
     label = points.class_id.astype(np.int64)
     if attribute is not None:
-        label = _attribute(path, attribute, field)[np.concatenate(kept)]
+        label = _attribute(path, attribute, field)[np.concatenate(masks)]
     return RealCloud(
         xyz=points.xyz,
         intensity=points.intensity * (header.intensity_scale or 1.0),
@@ -137,14 +137,14 @@ def _number(cloud: RealCloud, code: str, field: str) -> tuple[int, str]:
     if code.lstrip("-").isdigit():
         number = int(code)
         if number not in there:
-            known = ", ".join(str(value) for value in sorted(there)[:40])
-            raise InputError(field, number, f"no point has it; the file has {known}")
+            values_text = ", ".join(str(value) for value in sorted(there)[:40])
+            raise InputError(field, number, f"no point has it; the file has {values_text}")
         return number, str(number)
     names = {row.name: row.id for row in cloud.scheme.rows} if cloud.scheme else {}
     named = {name: row for name, row in names.items() if row in there}
     if code not in named:
-        known = f"one of {', '.join(sorted(named))}" if named else "a number: the attribute has no names"
-        raise InputError(field, code, f"must be {known}{nearest_name(code, named)}")
+        values_text = f"one of {', '.join(sorted(named))}" if named else "a number, as the attribute has no names"
+        raise InputError(field, code, f"must be {values_text}{nearest_name(code, named)}")
     return named[code], f"{code} ({named[code]})"
 
 

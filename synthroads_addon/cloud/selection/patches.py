@@ -74,9 +74,9 @@ def with_points_beside(cloud: RealCloud, points: RealClass) -> RealClass:
     """
     low, high = points.place.min(axis=0) - _BESIDE, points.place.max(axis=0) + _BESIDE
     near = cloud.xyz[((cloud.xyz > low) & (cloud.xyz < high)).all(axis=1)]
-    apart, own = cKDTree(points.place[:, :2]).query(near[:, :2], distance_upper_bound=_BESIDE)
-    others = np.isfinite(apart) & (apart > 0.0)
-    rise = near[others, 2] - points.place[own[others], 2]
+    distance, neighbour = cKDTree(points.place[:, :2]).query(near[:, :2], distance_upper_bound=_BESIDE)
+    others = np.isfinite(distance) & (distance > 0.0)
+    rise = near[others, 2] - points.place[neighbour[others], 2]
     return replace(points, beside=near[others, :2][np.abs(rise) < _RISE])
 
 
@@ -192,14 +192,14 @@ class _Neighbourhood:
         level = self.level[rows]
         skew, kurtosis = _shape(level)
         low, middle, high = np.quantile(level, (0.25, 0.5, 0.75))
-        apart = self.level[self.neighbour[rows, :3]] - level[:, None]
+        differences = self.level[self.neighbour[rows, :3]] - level[:, None]
         variance = float(level.var())
         return [
             high - low,
             skew,
             kurtosis,
-            float(np.abs(apart[:, 0]).mean()),
-            0.5 * float(np.mean(apart**2)) / max(variance, 1e-9),
+            float(np.abs(differences[:, 0]).mean()),
+            0.5 * float(np.mean(differences**2)) / max(variance, 1e-9),
             _correlation(level, residual),
             middle,
         ]
@@ -244,6 +244,6 @@ def match_density(one: Patches, other: Patches, seed: int, most: int) -> tuple[P
         fewer = min(map(len, rows))
         for taken, its_rows in zip(chosen, rows, strict=True):
             taken.append(its_rows[:fewer])
-    kept = [np.concatenate([*taken, np.zeros(0, np.int64)]) for taken in chosen]
-    use = random.permutation(len(kept[0]))[:most]
-    return one.select(kept[0][use]), other.select(kept[1][use])
+    all_rows = [np.concatenate([*taken, np.zeros(0, np.int64)]) for taken in chosen]
+    use = random.permutation(len(all_rows[0]))[:most]
+    return one.select(all_rows[0][use]), other.select(all_rows[1][use])

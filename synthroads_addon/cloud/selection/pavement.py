@@ -71,7 +71,7 @@ def road_classes(cloud: RealCloud, road: RoadClasses, owner: str | None = None) 
     fields = ("--paved", "--line") if owner is None else (f"{owner}paved", f"{owner}lines")
     result = {}
     if road.paved:
-        selection = f"{spans} m beside the axis, more than {CLEAR:g} m from the lines" if road.lines else f"{spans} m"
+        selection = f"{spans} m from the axis, more than {CLEAR:g} m from the lines" if road.lines else f"{spans} m"
         result["paved"] = select_class(cloud, np.flatnonzero(on & free), selection, fields[0])
     if road.lines:
         chosen, threshold = _points_on_dashes(cloud.intensity, station, offset, road, fields[1])
@@ -95,9 +95,9 @@ def _points_on_dashes(
         stretch = np.floor(station[near] / STRETCH)
         for number in np.unique(stretch):
             rows = near[stretch == number]
-            aside = offset[rows] - line
-            shift = _brightest_shift(aside, intensity[rows], half)
-            rows = rows[np.abs(aside - shift) <= half]
+            distance = offset[rows] - line
+            shift = _brightest_shift(distance, intensity[rows], half)
+            rows = rows[np.abs(distance - shift) <= half]
             if len(rows) >= _FEWEST_OF_LINE // 2:
                 points.append(rows)
                 medians.append(_median_along(station[rows], intensity[rows]))
@@ -108,10 +108,10 @@ def _points_on_dashes(
     return chosen[level > threshold], threshold
 
 
-def _brightest_shift(aside: Float, intensity: Float, half: float) -> float:
+def _brightest_shift(distance: Float, intensity: Float, half: float) -> float:
     """Return the lateral shift, m, that maximises the mean intensity within half a line's width of it."""
     shifts = np.arange(-REACH, REACH + 1e-9, 0.02)
-    inside = np.abs(aside[:, None] - shifts) <= half
+    inside = np.abs(distance[:, None] - shifts) <= half
     count = inside.sum(axis=0)
     mean = (intensity[:, None] * inside).sum(axis=0) / np.maximum(count, 1)
     return float(shifts[np.argmax(np.where(count >= max(5, count.max() // 3), mean, -np.inf))])

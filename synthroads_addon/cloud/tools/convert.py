@@ -145,15 +145,15 @@ def draw_previews(
         InputError: the cloud can't be read, has no points or not what a picture shows, or the cut lies outside of it.
         OutputError: a picture is there already or can't be written.
     """
-    alone = output if output.suffix.lower() == ".png" and not output.is_dir() else None
-    folder = output.parent if alone else output
-    if alone and only is None:
+    single_file = output if output.suffix.lower() == ".png" and not output.is_dir() else None
+    folder = output.parent if single_file else output
+    if single_file and only is None:
         raise OutputError("--output", str(output), _one_of_several())
     with open_cloud(source) as cloud:
         kinds = _kinds_of(cloud, only)
-        if alone:
-            check_file_target(alone, overwrite=overwrite)
-        names = {kind: alone.name if alone else preview_file(kind) for kind in kinds}
+        if single_file:
+            check_file_target(single_file, overwrite=overwrite)
+        names = {kind: single_file.name if single_file else preview_file(kind) for kind in kinds}
         with output_folder(folder, names.values(), overwrite) as work:
             drawn, shown = _draw(cloud, work, kinds, line, station, centerline, depth)
             for kind, name in names.items():
@@ -210,7 +210,7 @@ def _draw(
         return drawn, fields
     cut = concatenate(slab)
     if len(cut) == 0:
-        raise InputError("--line" if line else "--station", line or station, "cuts no points of the cloud")
+        raise InputError("--line" if line else "--station", line or station, "meets no points of the cloud")
     heights = float(cut.xyz[:, 2].min()), float(cut.xyz[:, 2].max())
     if line is None:
         reach = 1.02 * float(np.abs((cut.xyz[:, :2] - middle) @ right).max()) + 0.5
@@ -344,7 +344,7 @@ def scheme_of(cloud: CloudReader, classes: str | None) -> ClassScheme:
     scheme = class_scheme(classes)
     if any(scheme.selectors()):
         finer = ", ".join(row.name for row in scheme.fine.values() if any(row.selectors()))
-        raise InputError("--classes", classes, f"has {finer}, which a cloud's classes don't tell apart: scan with it")
+        raise InputError("--classes", classes, f"has {finer}, not distinguished in the cloud: scan with it")
     if not header.labelled or header.scheme.name != "17":
         held = f"the classes {header.scheme.name}" if header.labelled else "LAS codes only"
         raise InputError(str(header.path), None, f"holds {held}: only the 17 classes can be merged into {classes}")
@@ -397,15 +397,15 @@ def summary_of(cloud: CloudReader, writer: CloudWriter) -> dict[str, Any]:
 
 def report_losses(name: str, writers: Iterable[CloudWriter]) -> None:
     """Tell the user of how many points which flags were lost, for want of a field in the format written."""
-    lost: Counter[str] = Counter()
+    losses: Counter[str] = Counter()
     kind = ""
     for writer in writers:
-        lost.update(writer.lost)
+        losses.update(writer.lost)
         kind = writer.path.suffix.strip(".").upper()
-    if held := lost.pop(WITHHELD, 0):
-        warn(f"{name}: {held:,} withheld points left out: {kind} has no field for the flag")
-    if lost:
-        listed = ", ".join(f"{flag} of {count:,} points" for flag, count in lost.items())
+    if withheld := losses.pop(WITHHELD, 0):
+        warn(f"{name}: {withheld:,} withheld points left out: {kind} has no field for the flag")
+    if losses:
+        listed = ", ".join(f"{flag} of {count:,} points" for flag, count in losses.items())
         warn(f"{name}: {listed} lost: {kind} has no field for them")
 
 
@@ -422,8 +422,8 @@ def pass_with_progress(
     blocks: Iterable[PointBlock], count: int, progress: Progress, stage: str
 ) -> Iterator[PointBlock]:
     """Yield blocks, and tell which share of a number of points is done."""
-    done = 0
+    count_passed = 0
     for block in blocks:
         yield block
-        done += len(block)
-        progress(stage, done / max(count, 1))
+        count_passed += len(block)
+        progress(stage, count_passed / max(count, 1))

@@ -159,18 +159,18 @@ def read_display(
         size, places = len(chosen), drawing_order(len(chosen))
         xyz, class_id = np.empty((size, 3), np.float32), np.empty(size, np.uint8)
         rgb, brightness, counts = np.empty((size, 3), np.uint16), np.empty(size, np.float32), np.zeros(256, np.int64)
-        measure, done, kept = Brightness(), 0, 0
+        measure, position, filled = Brightness(), 0, 0
         for points in cloud.blocks(block):
             origin = np.floor(points.xyz[0]) if origin is None else np.asarray(origin, np.float64)
             counts += np.bincount(points.class_id, minlength=256)
-            last = int(np.searchsorted(chosen, done + len(points)))
-            here, into = chosen[kept:last] - done, places[kept:last]
+            last = int(np.searchsorted(chosen, position + len(points)))
+            here, into = chosen[filled:last] - position, places[filled:last]
             xyz[into] = points.xyz[here] - origin
             class_id[into] = points.class_id[here]
             rgb[into] = points.rgb[here]
             brightness[into] = np.nan_to_num(measure.values(points)[here])
-            done, kept = done + len(points), last
-            progress(done / cloud.header.count)
+            position, filled = position + len(points), last
+            progress(position / cloud.header.count)
         assert origin is not None
         rgb_8 = (rgb >> 8).astype(np.uint8)
         return DisplayCloud(cloud.header, origin, xyz, class_id, rgb_8, brightness, measure.text, counts)

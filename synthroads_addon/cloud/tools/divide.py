@@ -34,7 +34,7 @@ def merge(sources: list[Path], output: Path, overwrite: bool = False, progress: 
         OutputError: the output is there already or can't be written.
     """
     if len(sources) < 2:
-        raise InputError("FILE", len(sources), "must be two clouds or more")
+        raise InputError("FILE", len(sources), "must be at least two clouds")
     for source in sources:
         check_output(source, output, overwrite)
     with ExitStack() as stack:
@@ -85,11 +85,11 @@ def crop(
     """
     check_output(source, output, overwrite)
     if box is None and heights is None and polygon is None:
-        raise InputError("--box", None, "one of --box, --heights, --polygon says what is kept")
+        raise InputError("--box", None, "give --box, --heights or --polygon, to say which points are kept")
     if box is not None and not (box[0] <= box[2] and box[1] <= box[3]):
-        raise InputError("--box", list(box), "must be the least x and y, then the largest")
+        raise InputError("--box", list(box), "must be the smallest x and y, then the largest")
     if heights is not None and not heights[0] <= heights[1]:
-        raise InputError("--heights", list(heights), "must be the least, then the largest")
+        raise InputError("--heights", list(heights), "must be the smallest, then the largest")
     if polygon is not None:
         read_polygon(polygon)  # before the cloud is opened
     with open_cloud(source) as cloud:
@@ -98,7 +98,7 @@ def crop(
             for points in pass_with_progress(cloud.blocks(), cloud.header.count, progress, "crop"):
                 writer.write(points.select(_inside(points.xyz, box, heights, rings)))
             if not writer.count:
-                raise InputError(str(source), None, "has no points within what is to be kept")
+                raise InputError(str(source), None, "has no points within the chosen box, heights or polygon")
         return summary_of(cloud, writer) | {"points_read": cloud.header.count}
 
 
@@ -109,14 +109,14 @@ def _inside(
     rings: list[Float] | None,
 ) -> Bool:
     """Return which points (N, 3) lie within all that is given."""
-    kept = np.ones(len(xyz), dtype=bool)
+    mask = np.ones(len(xyz), dtype=bool)
     if box is not None:
-        kept &= np.all((xyz[:, :2] >= box[:2]) & (xyz[:, :2] <= box[2:]), axis=1)
+        mask &= np.all((xyz[:, :2] >= box[:2]) & (xyz[:, :2] <= box[2:]), axis=1)
     if heights is not None:
-        kept &= (xyz[:, 2] >= heights[0]) & (xyz[:, 2] <= heights[1])
+        mask &= (xyz[:, 2] >= heights[0]) & (xyz[:, 2] <= heights[1])
     if rings is not None:
-        kept &= points_in_rings(xyz[:, :2], rings)
-    return kept
+        mask &= points_in_rings(xyz[:, :2], rings)
+    return mask
 
 
 def tile(
@@ -165,17 +165,17 @@ def tile(
         scheme, offset = scheme_of(cloud, None), offset_of(cloud)
         names = {key: f"{source.stem}_{_corner(key[0], size)}_{_corner(key[1], size)}{ending}" for key in keys}
         with output_folder(folder, names.values(), overwrite) as work:
-            for done, (key, points) in enumerate(files.by_tile(), 1):
-                kept = points if grid is None else points.select(np.sort(keep_one_per_cell(points, grid)))
-                progress("tile", done / len(keys))
-                if len(kept) >= fewest:
+            for number, (key, points) in enumerate(files.by_tile(), 1):
+                tile_points = points if grid is None else points.select(np.sort(keep_one_per_cell(points, grid)))
+                progress("tile", number / len(keys))
+                if len(tile_points) >= fewest:
                     with writer_like(cloud, work / names[key], scheme, offset=offset) as writer:
-                        writer.write(kept)
+                        writer.write(tile_points)
                     written.append({"file": names[key], "points": writer.count})
                     writers.append(writer)
             report_losses(source.name, writers)
             if not written:
-                raise InputError("--fewest", fewest, "is more than any tile's points")
+                raise InputError("--fewest", fewest, "is more than the points of any tile")
     return {"file": source.name, "output": str(folder), "size": size, "grid": grid, "tiles": written}
 
 
@@ -250,4 +250,4 @@ def _check_alike(first: CloudReader, other: CloudReader) -> None:
         ("epoch of GPS time", one.standard_time, two.standard_time),
     ):
         if mine != theirs:
-            raise InputError(str(two.path), None, f"has other {what} than {one.path.name}: convert one of them first")
+            raise InputError(str(two.path), None, f"has a different {what} from {one.path.name}: convert one first")

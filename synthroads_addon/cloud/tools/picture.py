@@ -183,30 +183,30 @@ def _shared(filled: Bool, axis: int) -> float:
 
 def _close_gaps(picture: UInt8, filled: Bool) -> tuple[UInt8, Bool]:
     """Return copies of a picture and its mask in which empty cells between two filled ones take the colour of one."""
-    result, done = picture.copy(), filled.copy()
+    result, mask = picture.copy(), filled.copy()
     for axis in (0, 1):
         ends: list[slice] = [slice(None), slice(None)]
         before, between, behind = (
             tuple(ends[:axis] + [part] + ends[axis + 1 :]) for part in (slice(-2), slice(1, -1), slice(2, None))
         )
-        gap = filled[before] & filled[behind] & ~done[between]
+        gap = filled[before] & filled[behind] & ~mask[between]
         result[between][gap] = picture[before][gap]
-        done[between] |= gap
-    return result, done
+        mask[between] |= gap
+    return result, mask
 
 
 def _grow_cells(picture: UInt8, filled: Bool) -> tuple[UInt8, Bool]:
     """Return copies of a picture and its mask in which empty cells beside filled ones take their colours."""
-    result, done = picture.copy(), filled.copy()
+    result, mask = picture.copy(), filled.copy()
     for axis, step in ((1, 1), (1, -1), (0, 1), (0, -1)):
         near, color = np.roll(filled, step, axis), np.roll(picture, step, axis)
         edge: list[slice | int] = [slice(None), slice(None)]
         edge[axis] = 0 if step == 1 else -1
         near[tuple(edge)] = False  # nothing comes round from the other side
-        new = near & ~done
+        new = near & ~mask
         result[new] = color[new]
-        done |= new
-    return result, done
+        mask |= new
+    return result, mask
 
 
 PAPER, INK = (226, 231, 238), (40, 40, 44)
@@ -236,8 +236,8 @@ Legend = Sequence[tuple[str, Color]] | GrayBar | None
 
 def class_legend(rows: Sequence[PointClass], labels: UInt8) -> list[tuple[str, Color]]:
     """Return (name, colour) of the classes that occur among labels, in the scheme's order."""
-    seen = set(np.unique(labels).tolist())
-    return [(row.name.replace("_", " "), row.color) for row in rows if row.id in seen]
+    ids = set(np.unique(labels).tolist())
+    return [(row.name.replace("_", " "), row.color) for row in rows if row.id in ids]
 
 
 def grays(values: Float, filled: Bool, text: str) -> tuple[Float, GrayBar]:

@@ -69,9 +69,9 @@ def truth_table(header: CloudHeader) -> UInt8 | None:
         table: UInt8 = class_scheme(predicted.name).ids
         return table
     ids = {row.name: row.id for row in predicted.rows}
-    known = {row.id: ids[row.name] for row in header.scheme.rows if row.name in ids}
-    if not known:
+    ids_by_row = {row.id: ids[row.name] for row in header.scheme.rows if row.name in ids}
+    if not ids_by_row:
         return None
     table = np.full(256, UNLABELLED, dtype=np.uint8)
-    table[list(known)] = list(known.values())
+    table[list(ids_by_row)] = list(ids_by_row.values())
     return table

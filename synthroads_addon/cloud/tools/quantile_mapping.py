@@ -151,8 +151,8 @@ class IntensityMapping:
         rest = [label for label in have if label not in maps]
         self.classes_without_target = [names.get(label, str(label)) for label in rest]
         if rest:
-            together = QuantileMap(_total({label: have[label] for label in rest}), self._want)
-            maps |= dict.fromkeys(rest, together)
+            common_map = QuantileMap(_total({label: have[label] for label in rest}), self._want)
+            maps |= dict.fromkeys(rest, common_map)
         return maps
 
 

@@ -50,11 +50,11 @@ def cloud_statistics(cloud: CloudReader, radius: float = RADIUS, samples: int = 
     predicted = PredictedCounts(header) if header.predicted else None
     withheld = 0
     for block in cloud.blocks():
-        kept = cloud.usable_points(block, noise=True)
-        withheld += len(block) - int(np.count_nonzero(kept))
-        if not kept.any():
+        usable = cloud.usable_points(block, noise=True)
+        withheld += len(block) - int(np.count_nonzero(usable))
+        if not usable.any():
             continue
-        used = block.select(kept)
+        used = block.select(usable)
         first.add(used)
         if predicted:
             predicted.add(used)
@@ -103,13 +103,13 @@ class Moments:
         """Add points, by labels (N,) and quantities, each (N,), to the moments (Chan, Golub and LeVeque 1979)."""
         count = np.bincount(label, minlength=256)
         some = np.maximum(count, 1)
-        together = np.maximum(self.count + count, 1)
+        total = np.maximum(self.count + count, 1)
         for row, value in enumerate(values):
             mean = np.bincount(label, value, 256) / some
             squares = np.bincount(label, (value - mean[label]) ** 2, 256)
             step = np.where(count > 0, mean - self.mean[row], 0.0)
-            self.squares[row] += squares + step**2 * self.count * count / together
-            self.mean[row] += step * count / together
+            self.squares[row] += squares + step**2 * self.count * count / total
+            self.mean[row] += step * count / total
         self.count += count
 
     def mean_and_deviation(self, row: int, labels: list[int]) -> tuple[float, float]:
@@ -159,16 +159,18 @@ class _FirstPass:
         area = self._cells.area(labels)
         height, intensity, light = (self.moments.mean_and_deviation(row, labels) for row in range(3))
         colored = self.has_color and light != (0.0, 0.0)  # point formats with colours are used without them
-        known = [label for label in labels if label in rough]
-        weights = self.moments.count[known]
+        rough_classes = [label for label in labels if label in rough]
+        weights = self.moments.count[rough_classes]
         return {
             "points": count,
             "area_m2": area,
             "density": count / area,
             "height_mean": height[0],
             "height_std": height[1],
-            "roughness": float(np.average([rough[c][0] for c in known], weights=weights)) if known else None,
-            "roughness_samples": sum(rough[c][1] for c in known),
+            "roughness": float(np.average([rough[c][0] for c in rough_classes], weights=weights))
+            if rough_classes
+            else None,
+            "roughness_samples": sum(rough[c][1] for c in rough_classes),
             "intensity_mean": intensity[0],
             "intensity_std": intensity[1],
             "luminance_mean": light[0] if colored else None,
@@ -261,8 +263,8 @@ class _Roughness:
         inside = np.flatnonzero(np.all((column >= 0) & (column < 2**31), axis=1))
         key = column[inside, 0] << 31 | column[inside, 1]
         slot = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
-        known = self._keys[slot] == key
-        inside, slot = inside[known], slot[known]
+        matches = self._keys[slot] == key
+        inside, slot = inside[matches], slot[matches]
         for part in _bounded_slices(self._counts[slot]):
             counts = self._counts[slot[part]]
             point = np.repeat(inside[part], counts)
@@ -311,7 +313,7 @@ def _bounded_slices(counts: Index) -> Iterator[slice]:
     ends = np.cumsum(counts)
     first = 0
     while first < len(counts):
-        done = ends[first - 1] if first else 0
-        last = max(first + 1, int(np.searchsorted(ends, done + _PAIRS_AT_ONCE)))
+        position = ends[first - 1] if first else 0
+        last = max(first + 1, int(np.searchsorted(ends, position + _PAIRS_AT_ONCE)))
         yield slice(first, last)
         first = last

@@ -50,8 +50,8 @@ def model_knobs(scenario: Scenario, limits: Mapping[str, float]) -> tuple[ModelK
     if scenario.geometric_tolerance is not None:
         tolerances: tuple[float, ...] = (scenario.geometric_tolerance,) * len(details)
     elif limits:
-        allowed = min(limits.get("height", 1.0), _OF_POSITION * limits.get("position", 1.0), _COARSEST.tolerance)
-        tolerances = (max(allowed, _LEAST_TOLERANCE),) * len(details)
+        tolerance = min(limits.get("height", 1.0), _OF_POSITION * limits.get("position", 1.0), _COARSEST.tolerance)
+        tolerances = (max(tolerance, _LEAST_TOLERANCE),) * len(details)
     else:
         tolerances = (_COARSEST.tolerance, _FINEST.tolerance)[-len(details) :]
     return tuple(ModelKnobs(*pair) for pair in zip(tolerances, details, strict=True))
@@ -84,22 +84,22 @@ def colour_choices(scenario: Scenario, typical_range: float, returns: bool) -> d
         returns: whether this Blender has a pixel per return.
     """
     colour, scale = scenario.colour, image_scale(typical_range)
-    found: dict[str, dict[str, Any]] = {"material": {"colour.source": "material"}}
+    choices: dict[str, dict[str, Any]] = {"material": {"colour.source": "material"}}
     for name, preset in COLOUR_FIDELITIES.items():
         changes = {"colour.source": "images"} | {
             f"colour.{field}": getattr(preset, field) * (1.0 if field == "samples" else scale)
             for field in ("image_spacing", "ground_sampling_distance", "samples")
             if getattr(colour, field) is None and not (field == "samples" and colour.lighting == "direct")
         }
-        if changes not in found.values():
-            found[name] = changes
+        if changes not in choices.values():
+            choices[name] = changes
     if colour.engine == "cycles" and colour.lighting == "direct":
-        found["nodes"] = {"colour.source": "nodes"}
+        choices["nodes"] = {"colour.source": "nodes"}
     if returns and colour.engine == "cycles" and colour.lighting == "direct":
-        found["returns"] = {"colour.source": "returns"}
+        choices["returns"] = {"colour.source": "returns"}
     if colour.source == "auto":
-        return found
-    return {name: changes for name, changes in found.items() if changes["colour.source"] == colour.source}
+        return choices
+    return {name: changes for name, changes in choices.items() if changes["colour.source"] == colour.source}
 
 
 def with_changes(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:

@@ -22,19 +22,19 @@ class Option:
 
     Attributes:
         changes: of the scenario: dotted path -> value.
-        found: expected error and its upper bound by `tolerance.KINDS`; a kind that isn't there has none.
+        errors: expected error and its upper bound by `tolerance.KINDS`; a kind that isn't there has none.
         cost: what tells cheap from dear: the same on every machine, unlike the time.
         seconds: expected on this machine.
     """
 
     changes: Mapping[str, Any]
-    found: Errors
+    errors: Errors
     cost: float
     seconds: float = 0.0
 
     def upper(self, kind: str) -> float:
         """Return the upper confidence bound of a kind of error; 0 for a kind that the option has no error of."""
-        return self.found.get(kind, (0.0, 0.0))[1]
+        return self.errors.get(kind, (0.0, 0.0))[1]
 
     def keeps(self, limits: Mapping[str, float]) -> bool:
         """Return whether the upper bounds of all limited errors are within their limits."""
@@ -49,8 +49,8 @@ def combine(options: Iterable[Option]) -> Option:
     """Return one option for several knobs together: changes and errors merged, costs and seconds summed."""
     several = tuple(options)
     changes = {path: value for option in several for path, value in option.changes.items()}
-    found = {kind: pair for option in several for kind, pair in option.found.items()}
-    return Option(changes, found, sum(one.cost for one in several), sum(one.seconds for one in several))
+    errors = {kind: pair for option in several for kind, pair in option.errors.items()}
+    return Option(changes, errors, sum(one.cost for one in several), sum(one.seconds for one in several))
 
 
 def options_within(knobs: Knobs, limits: Mapping[str, float]) -> list[list[Option]]:
@@ -59,10 +59,10 @@ def options_within(knobs: Knobs, limits: Mapping[str, float]) -> list[list[Optio
     Raises:
         InputError: a knob has none; says what is the best to be had.
     """
-    kept = [[option for option in options if option.keeps(limits)] for options in knobs]
-    if [] in kept:
-        raise _tolerance_error(knobs[kept.index([])], limits)
-    return kept
+    options_of_knobs = [[option for option in options if option.keeps(limits)] for options in knobs]
+    if [] in options_of_knobs:
+        raise _tolerance_error(knobs[options_of_knobs.index([])], limits)
+    return options_of_knobs
 
 
 def _tolerance_error(options: Sequence[Option], limits: Mapping[str, float]) -> InputError:
@@ -70,12 +70,12 @@ def _tolerance_error(options: Sequence[Option], limits: Mapping[str, float]) -> 
     for kind, limit in limits.items():
         best = min(option.upper(kind) for option in options)
         if best > limit:
-            text = f"can't be kept here: the best to be had is {error_text(kind, best)}"
+            text = f"can't be reached here: the smallest possible error is {error_text(kind, best)}"
             return InputError(f"tolerance.{kind}", limit, text)
-    kinds = [kind for kind in limits if any(kind in option.found for option in options)]
+    kinds = [kind for kind in limits if any(kind in option.errors for option in options)]
     nearest = min(options, key=lambda option: max(option.upper(kind) / max(limits[kind], _LEAST) for kind in kinds))
-    said = ", ".join(f"{kind}={error_text(kind, nearest.upper(kind))}" for kind in kinds)
-    return InputError("tolerance", None, f"{' and '.join(kinds)} can't be kept together: the nearest is {said}")
+    values = ", ".join(f"{kind}={error_text(kind, nearest.upper(kind))}" for kind in kinds)
+    return InputError("tolerance", None, f"{' and '.join(kinds)} can't be reached together: the nearest is {values}")
 
 
 def cheapest(knobs: Knobs, limits: Mapping[str, float]) -> Option:
@@ -118,5 +118,5 @@ def too_short_error(seconds: float, fastest: float, tolerance: bool = False) -> 
 
 
 def _loss(choice: Option, reference: Mapping[str, float]) -> tuple[float, float, float]:
-    ratios = [choice.found.get(kind, (0.0, 0.0))[0] / max(base, _LEAST) for kind, base in reference.items()]
+    ratios = [choice.errors.get(kind, (0.0, 0.0))[0] / max(base, _LEAST) for kind, base in reference.items()]
     return round(max(ratios, default=0.0), 6), round(sum(ratios), 6), choice.seconds

@@ -99,28 +99,28 @@ class _Search:
     def decide(self) -> tuple[Scenario, dict[str, Any]]:
         """Return the scenario with the chosen settings, and a report of the choice as JSON data."""
         budget = self.scenario.time_budget
-        found, choice = self._choose_by_tolerance() if budget is None else self._choose_by_time(budget)
-        here, kept = time.perf_counter(), choices.given_knobs(self.scenario)
-        asked = {"tolerance": self.limits or None, "time_budget": budget}
+        findings, choice = self._choose_by_tolerance() if budget is None else self._choose_by_time(budget)
+        here, given_knobs = time.perf_counter(), choices.given_knobs(self.scenario)
+        goals = {"tolerance": self.limits or None, "time_budget": budget}
         return choices.with_changes(self.scenario, choice.changes), {
-            "asked": {name: value for name, value in asked.items() if value is not None},
-            "kept": kept,
-            "chosen": {path: value for path, value in choice.changes.items() if path not in kept},
+            "asked": {name: value for name, value in goals.items() if value is not None},
+            "kept": given_knobs,
+            "chosen": {path: value for path, value in choice.changes.items() if path not in given_knobs},
             "expected": {
-                "errors": {kind: float(f"{pair[0]:.6g}") for kind, pair in choice.found.items()},
-                "at_most": {kind: float(f"{choice.found[kind][1]:.6g}") for kind in self.limits},
+                "errors": {kind: float(f"{pair[0]:.6g}") for kind, pair in choice.errors.items()},
+                "at_most": {kind: float(f"{choice.errors[kind][1]:.6g}") for kind in self.limits},
                 "seconds": round(here - self.begun + choice.seconds, 1),
             },
-            "by": found.source,
+            "by": findings.source,
             "pilot_seconds": round(here - self.began_here, 3),
         }
 
     def _choose_by_tolerance(self) -> tuple[_Findings, Option]:
-        found = self._measure()
-        rays = int(cheapest(self._options(found), self.limits).changes.get("scan.rays_per_pulse", max(self.rays)))
+        findings = self._measure()
+        rays = int(cheapest(self._options(findings), self.limits).changes.get("scan.rays_per_pulse", max(self.rays)))
         self.times.calibrate(rays, *self._trial.time_scan(self.rays[rays]))
         self._time_relief()
-        return found, cheapest(self._options(found), self.limits)
+        return findings, cheapest(self._options(findings), self.limits)
 
     def _choose_by_time(self, budget: float) -> tuple[_Findings, Option]:
         def left() -> float:
@@ -136,8 +136,8 @@ class _Search:
         self._time_relief()
         self._time_many_rays(_TIMING * left())
         # The error of the height follows from the model, without a measurement.
-        found = self._measure() if set(self.limits) - {"height"} else self._table_errors()
-        return found, best_in_time(self._options(found), _SURE * left(), self._reference_errors(), self.limits)
+        findings = self._measure() if set(self.limits) - {"height"} else self._table_errors()
+        return findings, best_in_time(self._options(findings), _SURE * left(), self._reference_errors(), self.limits)
 
     def _time_relief(self) -> None:
         """Time the finest micro-relief there is to choose, with the fewest rays per pulse, as it costs by the point."""
@@ -168,10 +168,10 @@ class _Search:
         points: dict[tuple[ModelKnobs | None, int], list[PointBlock]] = {}
         for number, model in enumerate(self.models):
             trial = self._try_model(model)
-            for done, (rays, rings) in enumerate(self.rays.items(), 1):
+            for step, (rays, rings) in enumerate(self.rays.items(), 1):
                 points[model, rays] = trial.points(rings)
                 # The truth, colours and relief are measured afterwards: a fifth of it, by and large.
-                self.progress("choice", 0.8 * (number + done / len(self.rays)) / len(self.models))
+                self.progress("choice", 0.8 * (number + step / len(self.rays)) / len(self.models))
         exact = self.rays.get(CONVERGED) == RINGS[CONVERGED]
         truth = points[self.models[-1], CONVERGED] if exact else self._trial.points()
         return {knobs: beam_errors(mine, truth) for knobs, mine in points.items()}
@@ -192,18 +192,18 @@ class _Search:
     def _reference_errors(self) -> dict[str, float]:
         """Return the standard fidelity's error of each kind, by which errors are weighed against each other."""
         table, standard = self.times.table, FIDELITIES["standard"]
-        found = {"height": standard.tolerance, "relief": nearest_row(table.relief, standard.relief_octaves)}
-        found |= {**nearest_row(table.beam, standard.rays_per_pulse), **table.colour["standard"]}
-        return {kind: error for kind, error in found.items() if error > 0.0}
+        errors = {"height": standard.tolerance, "relief": nearest_row(table.relief, standard.relief_octaves)}
+        errors |= {**nearest_row(table.beam, standard.rays_per_pulse), **table.colour["standard"]}
+        return {kind: error for kind, error in errors.items() if error > 0.0}
 
-    def _options(self, found: _Findings) -> Knobs:
+    def _options(self, findings: _Findings) -> Knobs:
         """Return the options of every knob with their errors, costs and seconds expected on this machine."""
-        beam = [self._beam_option(*knobs, errors) for knobs, errors in found.beam.items()]
+        beam = [self._beam_option(*knobs, errors) for knobs, errors in findings.beam.items()]
         relief = [
             Option({"scan.relief_octaves": octaves}, errors, octaves, self.times.relief_seconds(octaves))
-            for octaves, errors in found.relief.items()
+            for octaves, errors in findings.relief.items()
         ]
-        colour = [self._colour_option(name, errors) for name, errors in found.colour.items()]
+        colour = [self._colour_option(name, errors) for name, errors in findings.colour.items()]
         rest = [Option({}, {}, 0.0, self.times.other_seconds(self.scenario))]
         return [options for options in (beam, relief, colour, rest) if options]
 

@@ -53,9 +53,9 @@ class Table:
 
     def pulse_seconds(self, rays: int) -> float:
         """Return the seconds per pulse for a number of rays, interpolated linearly between measured numbers."""
-        known = sorted((int(number), 1e-6 * value) for number, value in self.pulse.items())
-        rays = max(rays, known[0][0])
-        (a, low), (b, high) = next((pair for pair in pairwise(known) if rays <= pair[1][0]), (known[-2], known[-1]))
+        rows = sorted((int(number), 1e-6 * value) for number, value in self.pulse.items())
+        rays = max(rays, rows[0][0])
+        (a, low), (b, high) = next((pair for pair in pairwise(rows) if rays <= pair[1][0]), (rows[-2], rows[-1]))
         return low + (high - low) * (rays - a) / (b - a)
 
 

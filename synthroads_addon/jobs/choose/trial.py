@@ -104,24 +104,24 @@ class Trial:
         truth = shift_points(results, self.plan, FINEST)
         return {number: relief_errors(shift_points(results, self.plan, number), truth) for number in octaves}
 
-    def colour_errors(self, choices: Mapping[str, Mapping[str, Any]], wanted: frozenset[str]) -> dict[str, Errors]:
+    def colour_errors(self, choices: Mapping[str, Mapping[str, Any]], layers: frozenset[str]) -> dict[str, Errors]:
         """Return the errors of colours and material layers against the truest rendering, by colour source name.
 
         Of each image only what shows a scan line is rendered.
 
         Args:
             choices: name -> changes of the scenario.
-            wanted: ``rgb`` and layers.
+            layers: ``rgb`` and names of layers.
         """
         seen = [one.seen for one in self.scan_lines(RINGS[1], _COLOURED) if one.seen is not None and len(one.seen)]
-        request = replace(self.layer_request({}), wanted=wanted, pick=lambda views: views_near(views, seen))
+        request = replace(self.layer_request({}), wanted=layers, pick=lambda views: views_near(views, seen))
         true = truest_settings(request)
         truth = render_layers(replace(request, settings=true), seen)
         errors = {}
         for name, changes in choices.items():
             settings = self.layer_request(changes).settings
             mine = truth if settings == true else render_layers(replace(request, settings=settings), seen)
-            errors[name] = colour_errors(mine, truth, wanted)
+            errors[name] = colour_errors(mine, truth, layers)
         return errors
 
     def layer_request(self, changes: Mapping[str, Any]) -> LayerRequest:

@@ -23,7 +23,7 @@ _LOOK = 2.0
 """Seconds between two looks at who works on a cluster."""
 _SOON = 60.0
 """Seconds without any worker after which it is said."""
-TIMEOUT = "must be 1 s or more, and goes with --scheduler"
+TIMEOUT = "must be 1 s or more, and needs --scheduler"
 _logger = logging.getLogger("synthroads")
 
 
@@ -57,9 +57,11 @@ def run_on_worker(folder: str) -> Outcome:
     outcome = run_task(folder, max(1, available_cores() // int(closing.worker.state.nthreads)), closing)
     if not closing.is_set():
         return outcome
-    if (begun := len(list(Path(folder).glob(f"{ATTEMPT}*")))) < MOST_WORKERS:
+    if (attempts := len(list(Path(folder).glob(f"{ATTEMPT}*")))) < MOST_WORKERS:
         raise Reschedule()
-    return Outcome(outcome.folder, f"its workers ended before it did, {begun} times: they need more time")
+    return Outcome(
+        outcome.folder, f"its workers ended before the scene was done, {attempts} times: give them more time"
+    )
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,7 @@ def dask_workers(cluster: Cluster) -> Submit:
     try:
         client = distributed.Client(address, timeout=_ANSWER, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
-        raise InputError("--scheduler", address, f"nobody answers there ({error})") from None
+        raise InputError("--scheduler", address, f"no scheduler answers there ({error})") from None
 
     def submit(folders: list[str]) -> Iterator[Outcome]:
         with client:

@@ -48,10 +48,10 @@ def make_dataset(
         OutputError: the folder holds something else, or can't be written, or another run is at work in it.
     """
     if overwrite and resume:
-        raise InputError("--overwrite", None, "can't be given with --resume, which keeps what is there")
+        raise InputError("--overwrite", None, "can't be given with --resume, which keeps existing scenes")
     if not isinstance(jobs, Cluster) and not 1 <= jobs <= _MOST_JOBS:
         raise InputError("--jobs", jobs, f"must be 1 to {_MOST_JOBS}")
-    known = recipe if isinstance(recipe, Recipe) else load_recipe(str(recipe))
-    chosen = frozenset(splits) if splits else None
-    work = DatasetRun(change_recipe(known, changes), output.absolute(), resume, progress, chosen, overwrite)
+    base_recipe = recipe if isinstance(recipe, Recipe) else load_recipe(str(recipe))
+    split_names = frozenset(splits) if splits else None
+    work = DatasetRun(change_recipe(base_recipe, changes), output.absolute(), resume, progress, split_names, overwrite)
     return work.run(dask_workers(jobs) if isinstance(jobs, Cluster) else local_processes(jobs))

@@ -103,7 +103,7 @@ def _run_process(path: Path, threads: int, stopping: Stop) -> int:
 
 def _reason(code: int, log: Path) -> str:
     if code == EXIT_CODE:
-        return f"its process was told to end, {ATTEMPTS} times"
+        return f"its process was terminated, {ATTEMPTS} times"
     if code < 0:
         return f"its process was killed by signal {-code}, {ATTEMPTS} times (too little memory?)"
     lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
@@ -122,11 +122,11 @@ def local_processes(jobs: int) -> Submit:
     def submit(folders: list[str]) -> Iterator[Outcome]:
         stopping = Event()
         pool = ThreadPoolExecutor(jobs)
-        begun: list[str] = []
+        folders_begun: list[str] = []
         ended: list[str] = []
 
         def task(folder: str) -> Outcome:
-            begun.append(folder)
+            folders_begun.append(folder)
             try:
                 return run_task(folder, threads, stopping)
             finally:
@@ -139,7 +139,7 @@ def local_processes(jobs: int) -> Submit:
             stopping.set()
             pool.shutdown(wait=True, cancel_futures=True)
             # The pool doesn't know, and doesn't wait for, a thread that was just starting when the user interrupted.
-            while len(ended) < len(begun):
+            while len(ended) < len(folders_begun):
                 time.sleep(_TICK)
 
     return submit

@@ -83,9 +83,9 @@ class DatasetRun:
 
     def __post_init__(self) -> None:
         self.jobs = scene_jobs(self.recipe)
-        known = sorted({job.split for job in self.jobs})
-        for split in sorted((self.splits or frozenset()) - set(known)):
-            raise InputError("--splits", split, f"must be of the recipe's: {', '.join(known)}")
+        split_names = sorted({job.split for job in self.jobs})
+        for split in sorted((self.splits or frozenset()) - set(split_names)):
+            raise InputError("--splits", split, f"must be splits of the recipe: {', '.join(split_names)}")
         self._names = {job.name for job in self.jobs}
         self._sequences = {f"{job.number:02d}" for job in self.jobs}
         self._recipe_text = self.recipe.to_json()
@@ -120,12 +120,12 @@ class DatasetRun:
     def _make(self, submit: Submit) -> None:
         """Make the missing scenes of the chosen splits, and publish each when it is complete."""
         chosen = [job for job in self.jobs if self.splits is None or job.split in self.splits]
-        missing = [job for job in chosen if not self._is_done(job)]
-        done = len(chosen) - len(missing)
-        self.progress("scenes", done / len(chosen))
-        for number, outcome in enumerate(submit([self._write_task(job) for job in missing]), start=1):
+        jobs = [job for job in chosen if not self._is_done(job)]
+        first = len(chosen) - len(jobs)
+        self.progress("scenes", first / len(chosen))
+        for number, outcome in enumerate(submit([self._write_task(job) for job in jobs]), start=1):
             self._publish(outcome)
-            self.progress("scenes", (done + number) / len(chosen))
+            self.progress("scenes", (first + number) / len(chosen))
 
     def _open_folder(self) -> None:
         """Check that the folder is empty, or take over or remove the data set in it as requested."""
@@ -154,13 +154,13 @@ class DatasetRun:
             paths = [*paths_of_set(self.folder, read_manifest(self.folder)), *self._published_folders()]
             for path in self._unrecorded_folders(set(paths)):
                 name = path.relative_to(self.folder).as_posix()
-                raise OutputError("--output", str(self.folder), f"holds {name}, which is no scene's; move it away")
+                raise OutputError("--output", str(self.folder), f"holds {name}, not a part of a scene; move it away")
             begin_removal(self.folder, paths)
             write_manifest(self.folder, self._manifest())
         elif self.resume:
             manifest = check_same_recipe(self.folder, self._recipe_text, self._generator)
-            done = [scene for scene in manifest.scenes if scene.status == "done"]
-            self.entries = {scene.name: scene for scene in done if not faults(self.folder, [scene], checksums=False)}
+            scenes = [scene for scene in manifest.scenes if scene.status == "done"]
+            self.entries = {scene.name: scene for scene in scenes if not faults(self.folder, [scene], checksums=False)}
         else:
             allowed = "already holds a data set; --resume continues it, --overwrite replaces it"
             raise OutputError("--output", str(self.folder), allowed)
@@ -177,7 +177,7 @@ class DatasetRun:
             try:
                 names += map(published_name, read_json(path)["folders"])
             except (KeyError, TypeError, ValueError) as error:
-                raise InputError(str(path), None, f"isn't as a run leaves it ({error}); remove {WORK}") from None
+                raise InputError(str(path), None, f"is damaged ({error}); remove {WORK}") from None
         return names
 
     def _unrecorded_folders(self, known: Set[str] = frozenset()) -> list[Path]:
@@ -217,16 +217,16 @@ class DatasetRun:
         job = self.jobs[task["number"]]
         about: dict[str, Any] = {"name": job.name, "split": job.split, "seed": job.scenario.seed}
         if outcome.error is None:
-            done = json.loads((outcome.folder / DONE).read_text(encoding="utf-8"))
-            for name in done["folders"]:
+            result = json.loads((outcome.folder / DONE).read_text(encoding="utf-8"))
+            for name in result["folders"]:
                 target = self._place(published_name(name))
                 target.parent.mkdir(parents=True, exist_ok=True)
                 (outcome.folder / FILES / name).rename(target)
             self._describe_layouts()  # before it is recorded: a set that is stopped now can be learned from
-            entry = SceneEntry.from_dict({**about, "status": "done", **done}, "scene")
+            entry = SceneEntry.from_dict({**about, "status": "done", **result}, "scene")
             (outcome.folder / "report.json").replace(self._place(f"logs/{job.name}.json"))
             if not entry.points:
-                _logger.warning("warning: %s: not one pulse came back", job.name)
+                _logger.warning("warning: %s: no pulse came back", job.name)
             _logger.debug("%s is done: %s points", job.name, f"{entry.points:,}")
         else:
             entry = SceneEntry.from_dict({**about, "status": "failed", "error": outcome.error}, "scene")

@@ -36,14 +36,14 @@ def make_scene(task: dict[str, Any], folder: Path, threads: int) -> None:
     cloud = scene / scenario.cloud.file_names()[0]
     write_layouts(cloud, folder / FILES, recipe, job, origin)
     classes = points_by_class(cloud)
-    done = {
+    result = {
         "points": sum(classes.values()),
         "length": round(parameters.alignment.length, 6),
         "classes": classes,
         "files": file_entries(folder / FILES),
         "folders": [path.relative_to(folder / FILES).as_posix() for path in published_folders(folder / FILES)],
     }
-    write_atomically(folder / DONE, canonical_json(done))
+    write_atomically(folder / DONE, canonical_json(result))
 
 
 def points_by_class(cloud: Path) -> dict[str, int]:

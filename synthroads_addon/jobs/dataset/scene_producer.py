@@ -72,8 +72,8 @@ def make_scene(folder: Path, plan: StreamPlan, number: int, stopping: Stop, thre
     about: dict[str, Any] = {"name": job.name, "split": job.split, "seed": job.scenario.seed}
     files = outcome.folder / FILES
     if outcome.error is None:
-        done = json.loads((outcome.folder / DONE).read_text(encoding="utf-8"))
-        entry = SceneEntry.from_dict({**about, "status": "done", **done}, "scene")
+        result = json.loads((outcome.folder / DONE).read_text(encoding="utf-8"))
+        entry = SceneEntry.from_dict({**about, "status": "done", **result}, "scene")
     elif _is_of_scenario(outcome.folder):
         # The same seed fails again: the training goes on without it, each time that it is done again.
         shutil.rmtree(files, ignore_errors=True)
@@ -111,10 +111,10 @@ def produce(folder: Path, producers: int, make: Make, stopping: threading.Event)
             while not stopping.wait(_TICK):
                 for number in [number for number, future in running.items() if future.done()]:
                     running.pop(number).result()
-                missing = [k for k in read_wanted(folder) if k not in running and not is_made(folder, k)]
+                numbers = [k for k in read_wanted(folder) if k not in running and not is_made(folder, k)]
                 # What was removed since is no longer wanted: that is said before it is removed.
                 still = read_wanted(folder)
-                for number in [k for k in missing if k in still][: producers - len(running)]:
+                for number in [k for k in numbers if k in still][: producers - len(running)]:
                     running[number] = pool.submit(make, folder, plan, number, stopping)
         finally:
             stopping.set()
@@ -132,7 +132,7 @@ def serve(folder: Path, producers: int, make: Make, patience: float = _PATIENCE)
             return 0
         except LockHeldError:
             if waited >= patience:
-                write_failure(folder, Failure(number=0, error="another training is at work in the folder"))
+                write_failure(folder, Failure(number=0, error="another training is running in this folder"))
                 return 2
             waited += _TICK
             stopping.wait(_TICK)

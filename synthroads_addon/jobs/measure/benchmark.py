@@ -60,24 +60,24 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         with timer.stage("parameters"):
             road = RoadGeometry(sample_road(scenario.road, scenario.seed, scenario.title))
             JobFiles(scenario).write_road(folder, road, timer)
-        shown = RoadScene.of(scenario, road)
+        scene = RoadScene.of(scenario, road)
         with timer.stage("model"):
-            model = shown.build()
+            model = scene.build()
         with timer.stage("scene mesh"):
-            shown.read()
+            scene.read()
         with timer.stage("caster"):
-            plan = shown.plan()
-        files = shown.site.files(folder, plan.target.origin)
+            plan = scene.plan()
+        files = scene.site.files(folder, plan.target.origin)
         record_cloud([plan], files, timer)
         seconds, memory = timer.seconds, peak_memory_mb()
         # The scene, its caster and the materials are the same for every number of rays.
         bare = replace(plan, layers=replace(plan.layers, seen_points=False, measured=frozenset()))
         casting = {rays: _measure_casting(with_rings(bare, RINGS[rays])) for rays in _RAYS}
         writing = _measure_writing(files)
-        own = casting[plan.rays_per_pulse]
+        rates = casting[plan.rays_per_pulse]
         scanning = timer.stages["scan"]["seconds"]
         assert scanning is not None
-        whole = _scan_rate(files, scanning, own, writing)
+        whole = _scan_rate(files, scanning, rates, writing)
         floors = [*casting.values(), writing, whole]
         assert plan.layers.request is not None
         if scenario.colour.source != "material":
@@ -91,7 +91,7 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         "job": seconds / least,
         "model": building / bare_mesh_seconds(plan.target.triangles),
         "panel_edit": edit / bare_mesh_seconds(edited),
-        "casting": 100.0 * own["ours"] / own["floor"],
+        "casting": 100.0 * rates["ours"] / rates["floor"],
         "writing": 100.0 * writing["ours"] / writing["floor"],
     }
     if scenario.colour.source != "material":
@@ -139,7 +139,7 @@ def _measure_casting(plan: ScanPlan) -> Rate:
 def _best_rates(ours: Callable[[], float], floor: Callable[[], float]) -> dict[str, float]:
     """Return the best rates, in millions per second, of two functions called in turn; disturbances hit both."""
     rates = [(ours(), floor()) for _ in range(_TURNS)]
-    return {"ours": max(own for own, _ in rates) / 1e6, "floor": max(bare for _, bare in rates) / 1e6}
+    return {"ours": max(rate for rate, _ in rates) / 1e6, "floor": max(bare for _, bare in rates) / 1e6}
 
 
 def _measure_writing(files: CloudFiles) -> Rate:

@@ -105,14 +105,14 @@ def render_layers(request: LayerRequest, parts: Sequence[SeenPoints]) -> list[La
         return [sample_points(source, seen, request.wanted) for seen in parts]
 
 
-def colour_errors(mine: Sequence[LayerValues], truth: Sequence[LayerValues], wanted: frozenset[str]) -> Errors:
+def colour_errors(mine: Sequence[LayerValues], truth: Sequence[LayerValues], kinds: frozenset[str]) -> Errors:
     """Return the 95th percentile of CIEDE2000 and the largest RMSE of a layer, with bounds, where truth is known."""
     parts = [(a, b, known_rows(b)) for a, b in zip(mine, truth, strict=True)]
     result: Errors = {}
-    if "rgb" in wanted:
+    if "rgb" in kinds:
         result["colour"] = quantile_bound([colour_difference(*part) for part in parts], QUANTILE, "colour")
     layers = []
-    for name in sorted(wanted & set(MATERIAL_LAYERS)):
+    for name in sorted(kinds & set(MATERIAL_LAYERS)):
         squares = [squared_error(name, *part) for part in parts]
         total, number = np.array([s.sum() for s in squares]), np.array([float(s.size) for s in squares])
         layers.append(ratio_bound(total, number, name))

@@ -84,9 +84,9 @@ def measure_mesh_scans(name: str, file: Path, quick: bool) -> dict[str, Any]:
             "processor_rate": rate["ours"],
             "busy": rate["busy"],
         }
-        for rays, rate in found["rates"].items()
+        for rays, rate in figures["rates"].items()
     }
     if name == "waves":
-        memory = 1e6 * (found["memory_mb"] - before) / len(opened.static)
-        lines |= {"waves_memory": memory, "waves_opening": found["opening"], "waves_fixed": found["fixed"]}
-    return {"lines": lines, "floors": found["floors"], "scans": scans}
+        memory = 1e6 * (figures["memory_mb"] - before) / len(opened.static)
+        lines |= {"waves_memory": memory, "waves_opening": figures["opening"], "waves_fixed": figures["fixed"]}
+    return {"lines": lines, "floors": figures["floors"], "scans": scans}

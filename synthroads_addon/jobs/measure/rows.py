@@ -188,11 +188,11 @@ def _beam_errors(sample: StretchPoints, plan: ScanPlan | None) -> dict[str, floa
     """Return errors of first returns against a plan of the truth: position (mm), intensity, labels, density (%)."""
     mine = sample.result.points
     truth = mine if plan is None else join_results(record_as_measured(plan)).points
-    found = beam_errors([mine], [truth])
+    errors = beam_errors([mine], [truth])
     return {
-        "position_mm": 1e3 * found["position"][0],
-        "intensity_percent": 100.0 * found["intensity"][0],
-        "labels_percent": 100.0 * found["labels"][0],
+        "position_mm": 1e3 * errors["position"][0],
+        "intensity_percent": 100.0 * errors["intensity"][0],
+        "labels_percent": 100.0 * errors["labels"][0],
         "density_percent": 100.0 * (1.0 - sample.written / len(truth)),
     }
 

@@ -49,9 +49,9 @@ Rays = tuple[Float32, Float32]
 def road_mesh(scenario: Scenario) -> SceneMesh:
     """Build a scenario's road in a new Blender file, and return what stands still in it as triangles."""
     empty_file()
-    shown = RoadScene.of(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
-    shown.build()
-    return shown.read().static
+    scene = RoadScene.of(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
+    scene.build()
+    return scene.read().static
 
 
 def spread_blocks(plan: ScanPlan, count: int) -> tuple[Block, ...]:

@@ -97,8 +97,8 @@ class ArraySink(CloudSink):
     _count: int = 0
 
     def __post_init__(self) -> None:
-        wanted, layers = self.scenario.cloud.arrays(), layer_arrays()
-        self._types = POINT_TYPES | {name: layers[name] for name in layers if name in wanted}
+        array_names, layers = self.scenario.cloud.arrays(), layer_arrays()
+        self._types = POINT_TYPES | {name: layers[name] for name in layers if name in array_names}
         self._ids = self.scheme.ids
         self._parts: dict[str, list[AnyArray]] = {name: [] for name in self._types}
 
@@ -118,7 +118,7 @@ class ArraySink(CloudSink):
         for name, parts in self._parts.items():
             values = points.array(name)
             if values is None:
-                raise InputError("cloud.attributes", name, "is to be kept, but the points don't have it")
+                raise InputError("cloud.attributes", name, "is in cloud.attributes, but the points don't have it")
             parts.append(np.take(self._ids, values) if name == "class_id" else values)
         self._count += len(points)
 

@@ -127,8 +127,8 @@ class SectionScan:
         frame = model.origin - np.array(whole.transform.translate)
         class_ids = self._site.inputs.scheme.source_ids()
         static = scene_mesh(objects=list(model.objects.values()), class_ids=class_ids)
-        found = material_warnings(dict.fromkeys(static.materials, ()))
-        self.warnings += [text for text in found if text not in self.warnings]
+        section_warnings = material_warnings(dict.fromkeys(static.materials, ()))
+        self.warnings += [text for text in section_warnings if text not in self.warnings]
         passing = vehicles_through(section, self.cut, self._motions, self._scenario.scan.traffic_speed_factor)
         vehicles = {name: motion.vehicle for name, motion in passing.items()}
         motions = {name: ShiftedMotion(motion, frame) for name, motion in passing.items()}

@@ -90,7 +90,7 @@ class GantryLimits(Limits):
 
     gantries: float = share(0.3, "Probability of a gantry, where no spacing is given.")
     gantry_spacing: float | None = quantity(
-        None, "m", "Spacing of gantries; they then stand all along.", (1, 10_000), unset="Single ones"
+        None, "m", "Spacing of gantries, which then stand along the whole road.", (1, 10_000), unset="Single ones"
     )
     gantry_clearance: Interval = interval(5.0, 5.8, "m", "Clearance under gantries.")
 

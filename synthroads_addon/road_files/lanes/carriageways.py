@@ -134,7 +134,7 @@ def _boundary_lines(side: SideShape, loss: Loss) -> Polyline:
     widths = np.diff(line.values, axis=1)
     if widths.min() < -TOLD:
         at = float(line.stations[np.unravel_index(np.argmin(widths), widths.shape)[0]])
-        loss.approximate("lane widths", "they are negative, taken for 0", float(-widths.min()), at)
+        loss.approximate("lane widths", "they are negative, read as 0", float(-widths.min()), at)
         loss.surface = True
     values = np.column_stack([line.values[:, :1], line.values[:, :1] + np.cumsum(np.maximum(widths, 0.0), axis=1)])
     return Polyline(line.stations, values, line.jumps)
@@ -172,7 +172,7 @@ def _carriageway(
         lanes.append(Lane(width=_width(at, widths[:, 1 + n], _LANE)))
         loss.read["lanes"] += 1
         for kind in sorted(slot.kinds - DRIVEN):
-            loss.approximate("lanes", f"a {kind} lane between others is taken for one that is driven on")
+            loss.approximate("lanes", f"a {kind} lane between others is read as one that is driven on")
     verge_width, slope = widths[:, -1], verge.slope
     if verge_width.max() <= _NONE:
         verge_width = np.full(len(at), verge.width)

@@ -51,9 +51,11 @@ class RecordedTrajectory(Platform):
     file: str | None = Field(
         None, title="Trajectory", description="CSV with time, x, y, z, roll, pitch, heading; or SBET."
     )
-    keep_time: bool = Field(False, title="Keep Time", description="Points have the file's times, not its first as 0.")
+    keep_time: bool = Field(
+        False, title="Keep Time", description="Keep the times of the file, instead of counting from its first."
+    )
     height_shift: float = quantity(
-        0.0, "m", "Added to the file's heights; minus the geoid's where they count from the ellipsoid.", (-1000, 1000)
+        0.0, "m", "Added to the file's heights; minus the geoid height if they are ellipsoidal.", (-1000, 1000)
     )
 
     _content: TrajectoryContent | None = PrivateAttr(None)

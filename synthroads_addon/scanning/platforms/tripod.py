@@ -36,7 +36,7 @@ class Tripod(Platform):
         min_length=1,
         max_length=64,
         title="Offsets (m)",
-        description="Offsets from the centreline, used by turns, m; the pavement's outer edges if not given.",
+        description="Offsets from the centreline, used in turn, m; the pavement's outer edges if not given.",
         json_schema_extra=notes(unset="At the edges"),
     )
     stations: tuple[Finite, ...] | None = Field(
@@ -54,7 +54,7 @@ class Tripod(Platform):
         60.0, "s", "Time in which a tripod turns the scanner at each position.", gt=0, le=3600, title="Time of a Turn"
     )
     turn_deg: float = quantity(
-        360.0, "deg", "Angle of that turn; 0 for a head that turns by itself.", (0, 360), title="Angle of a Turn (°)"
+        360.0, "deg", "Angle of this turn; 0 if the head rotates by itself.", (0, 360), title="Angle of a Turn (°)"
     )
 
     def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> TripodPath:

@@ -149,8 +149,8 @@ class _Layout:
     def segment(self, number: int, design: Entity, curve: Entity) -> None:
         """Add an IfcAlignmentSegment with its design parameters and keep its curve for the composite curve."""
         key = f"{self.name}/{number}"
-        made = self.ifc.add_root("IfcAlignmentSegment", f"{self.entity}/{key}", Name=key, DesignParameters=design)
-        self.ifc.note_relation("IfcRelNests", self.layout, [made])
+        entity = self.ifc.add_root("IfcAlignmentSegment", f"{self.entity}/{key}", Name=key, DesignParameters=design)
+        self.ifc.note_relation("IfcRelNests", self.layout, [entity])
         self.curves.append(curve)
 
     def curve(self, placement: Entity, parent: tuple[Entity, float, float], transition: str) -> Entity:

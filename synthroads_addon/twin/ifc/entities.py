@@ -191,10 +191,10 @@ class IfcFile:
         if not bodies:
             return None
         body = self.add("IfcShapeRepresentation", self.contexts["Body"], "Body", kind, bodies)
-        made = self.add("IfcProductDefinitionShape", None, None, [body])
+        entity = self.add("IfcProductDefinitionShape", None, None, [body])
         if key is not None:
-            self._shapes[key] = made
-        return made
+            self._shapes[key] = entity
+        return entity
 
     def has_shape(self, key: object) -> bool:
         """Return whether a body with this key has been added."""
@@ -233,13 +233,13 @@ class IfcFile:
 
     def add_properties(self, item: Entity, name: str, values: Values) -> None:
         """Add a property set to an entity, none if it is empty; lists of strings become enumerated values."""
-        made = [self._property(key, value) for key, value in values.items()]
-        if not made:
+        entities = [self._property(key, value) for key, value in values.items()]
+        if not entities:
             return
         if name == "SynthRoads" and "instance" in values:
             self.trace.record_entity(values["instance"].wrappedValue, entity=item.is_a(), GlobalId=item.GlobalId)
         key = f"{item.GlobalId}/{name}"
-        definition = self.add_root("IfcPropertySet", key, Name=name, HasProperties=made)
+        definition = self.add_root("IfcPropertySet", key, Name=name, HasProperties=entities)
         self.add_root("IfcRelDefinesByProperties", key, RelatedObjects=[item], RelatingPropertyDefinition=definition)
 
     def _property(self, name: str, value: Entity | list[str]) -> Entity:

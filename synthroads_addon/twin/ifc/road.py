@@ -277,14 +277,14 @@ class _CarriagewayWriter:
         # A damage lies in the cells from the first that ends behind its start to the last that begins before its end.
         first = np.searchsorted(station[1:], ranges[:, 0], "right").tolist()
         last = np.searchsorted(station[:-1], ranges[:, 1], "left").tolist()
-        begun, ended = defaultdict(list), defaultdict(list)
+        starts, ended = defaultdict(list), defaultdict(list)
         for number, (begin, end) in enumerate(zip(first, last, strict=True)):
             if begin < end:
-                begun[begin].append(number)
+                starts[begin].append(number)
                 ended[end].append(number)
         here: set[int] = set()
-        for low, high in pairwise(sorted({0, len(station) - 1, *begun, *ended})):
-            here = (here - set(ended[low])) | set(begun[low])
+        for low, high in pairwise(sorted({0, len(station) - 1, *starts, *ended})):
+            here = (here - set(ended[low])) | set(starts[low])
             yield low, high, [damages[number] for number in sorted(here)]
 
     def _write_damage(self) -> None:

@@ -144,8 +144,8 @@ def grid_triangles(rows: int, columns: int, closed: bool = False, flip: bool = F
     """
     column = np.arange(columns if closed else columns - 1)
     first = (np.arange(rows - 1)[:, None] * columns + column).ravel()
-    beside = (np.arange(rows - 1)[:, None] * columns + (column + 1) % columns).ravel()
-    quads = np.column_stack([first, first + columns, beside + columns, beside])
+    second = (np.arange(rows - 1)[:, None] * columns + (column + 1) % columns).ravel()
+    quads = np.column_stack([first, first + columns, second + columns, second])
     if flip:
         quads = quads[:, ::-1]
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])

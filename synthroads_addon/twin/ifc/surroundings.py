@@ -37,9 +37,9 @@ def write_surroundings(scene: Scene, progress: Progress) -> None:
 
 
 def _geographic(scene: Scene, name: str, kind: str, shape: Entity | None, about: str | None = None) -> Entity:
-    made = scene.ifc.add_product("IfcGeographicElement", name, kind, about, Representation=shape)
-    scene.ifc.note_relation("IfcRelContainedInSpatialStructure", scene.site, [made])
-    return made
+    element = scene.ifc.add_product("IfcGeographicElement", name, kind, about, Representation=shape)
+    scene.ifc.note_relation("IfcRelContainedInSpatialStructure", scene.site, [element])
+    return element
 
 
 def _add_open_mesh(scene: Scene, faces: Faces) -> Entity | None:
@@ -50,9 +50,9 @@ def _add_open_mesh(scene: Scene, faces: Faces) -> Entity | None:
 def _write_ground(scene: Scene, name: str, item: Terrain, ground: GroundMesh) -> None:
     """Add the terrain beside the road, batters included, as an IfcGeographicElement."""
     meshes = [_add_open_mesh(scene, faces) for faces in ground.faces if len(faces)]
-    made = _geographic(scene, name, "TERRAIN", scene.ifc.shape(meshes, "Tessellation"))
-    scene.ifc.assign_material(made, "grass_ground")
-    scene.add_parameters(made, item)
+    element = _geographic(scene, name, "TERRAIN", scene.ifc.shape(meshes, "Tessellation"))
+    scene.ifc.assign_material(element, "grass_ground")
+    scene.add_parameters(element, item)
     for swale, faces in swales(name, item, ground):
         _write_swale(scene, swale, item, faces)
 
@@ -61,12 +61,12 @@ def _write_swale(scene: Scene, name: str, item: Terrain, faces: Faces) -> None:
     """Add the swales of one side to its roadside, as a surface that is the terrain's too."""
     ifc = scene.ifc
     shape = ifc.shape([_add_open_mesh(scene, faces)], "Tessellation")
-    made = ifc.add_product("IfcGeographicElement", name, "USERDEFINED", "Swale", Representation=shape)
-    scene.contain(made, scene.parts[f"roadside-{name.rpartition('-')[2]}"])
-    ifc.assign_material(made, "grass_ground")
+    element = ifc.add_product("IfcGeographicElement", name, "USERDEFINED", "Swale", Representation=shape)
+    scene.contain(element, scene.parts[f"roadside-{name.rpartition('-')[2]}"])
+    ifc.assign_material(element, "grass_ground")
     values = {"instance": ifc.value(item.instance), "class": ifc.value(item.points_class)}
     values |= {name: ifc.value(getattr(item, f"swale_{name}"), "m") for name in ("width", "depth")}
-    ifc.add_properties(made, "SynthRoads", values)
+    ifc.add_properties(element, "SynthRoads", values)
 
 
 # --- plants ---------------------------------------------------------------------------------------------------------
@@ -103,9 +103,9 @@ def _write_plant(scene: Scene, plant: PlacedPlant, stand: Entity) -> None:
         plant.scale,
     )
     kind = f"{about.kind} {about.species}"
-    made = ifc.add_product("IfcGeographicElement", plant.name, "VEGETATION", kind, placement, Representation=body)
-    ifc.note_relation("IfcRelAggregates", stand, [made])
-    _describe(scene, made, plant)
+    element = ifc.add_product("IfcGeographicElement", plant.name, "VEGETATION", kind, placement, Representation=body)
+    ifc.note_relation("IfcRelAggregates", stand, [element])
+    _describe(scene, element, plant)
 
 
 def _plant_items(scene: Scene, shape: PlantShape, species: str) -> list[Entity]:
@@ -125,10 +125,10 @@ def _write_strip(scene: Scene, strip: GrassStrip, stand: Entity) -> None:
     ifc = scene.ifc
     shape = ifc.shape([_add_open_mesh(scene, strip.faces)], "Tessellation")
     kind = f"grass {strip.about.species}"
-    made = ifc.add_product("IfcGeographicElement", strip.name, "VEGETATION", kind, Representation=shape)
-    ifc.note_relation("IfcRelAggregates", stand, [made])
-    ifc.assign_material(made, strip.about.species)
-    _describe(scene, made, strip)
+    element = ifc.add_product("IfcGeographicElement", strip.name, "VEGETATION", kind, Representation=shape)
+    ifc.note_relation("IfcRelAggregates", stand, [element])
+    ifc.assign_material(element, strip.about.species)
+    _describe(scene, element, strip)
 
 
 def _describe(scene: Scene, made: Entity, plant: PlacedPlant | GrassStrip) -> None:
@@ -143,9 +143,9 @@ def _write_vehicle(scene: Scene, placed: PlacedVehicle) -> None:
     """Add a vehicle at time 0 as its bounding box on the road."""
     ifc, item = scene.ifc, placed.vehicle
     place = scene.place(item.station, placed.offset)
-    made = ifc.add_product("IfcVehicle", placed.name, "VEHICLEWHEELED", item.model, place.placement)
+    element = ifc.add_product("IfcVehicle", placed.name, "VEHICLEWHEELED", item.model, place.placement)
     # The road's surface at a place of its lane: a pothole isn't part of where it stands.
-    assign_bodies(ifc, made, [(place.to_frame(placed.box()), "car_paint")])
-    scene.add_parameters(made, item)
-    scene.contain(made, scene.container(item.station, placed.offset))
+    assign_bodies(ifc, element, [(place.to_frame(placed.box()), "car_paint")])
+    scene.add_parameters(element, item)
+    scene.contain(element, scene.container(item.station, placed.offset))
     ifc.trace.record_box(placed)

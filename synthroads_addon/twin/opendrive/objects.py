@@ -79,12 +79,12 @@ class Objects:
         attributes: dict[str, Value] = {"type": kind, "subtype": subtype, "hdg": 0.0}
         attributes |= {"length": float(rows[-1, 0] - rows[0, 0]), "width": width}
         attributes["height"] = float(getattr(item, "height", 0.0))
-        made = self._placed(name, item, attributes, rows[0, :3])
+        entry = self._placed(name, item, attributes, rows[0, :3])
         for (s0, t0, z0, h0), (s1, t1, z1, h1) in zip(rows[:-1].tolist(), rows[1:].tolist(), strict=True):
             repeat: dict[str, Value] = {"s": s0, "length": s1 - s0, "distance": 0.0, "tStart": t0, "tEnd": t1}
             repeat |= {"heightStart": h0, "heightEnd": h1, "zOffsetStart": _fine(z0), "zOffsetEnd": _fine(z1)}
-            element(made, "repeat", {**repeat, "widthStart": width, "widthEnd": width})
-        _describe(made, name, item)
+            element(entry, "repeat", {**repeat, "widthStart": width, "widthEnd": width})
+        _describe(entry, name, item)
 
     def upright(self, name: str, item: StandingThing) -> None:
         """Add a standing thing as an object whose bodies are outlines; sign faces, which are signals, are left out."""
@@ -96,14 +96,14 @@ class Objects:
             corners = np.concatenate([body.sections.reshape(-1, 3) for body in bodies])
             width, length, _ = np.ptp(corners, axis=0).tolist()
             attributes |= {"length": length, "width": width, "height": float(corners[:, 2].max())}
-        made = self._object(name, item, attributes, (item.station, item.offset, self.ground.foot(name)))
-        outlines = element(made, "outlines") if bodies else made
+        entry = self._object(name, item, attributes, (item.station, item.offset, self.ground.foot(name)))
+        outlines = element(entry, "outlines") if bodies else entry
         for number, body in enumerate(bodies):
             outline = element(outlines, "outline", {"id": number, "outer": True, "closed": True})
             for corner, (u, v, low, high) in enumerate(_upright_outline(body).tolist()):
                 where: dict[str, Value] = {"id": corner, "u": u, "v": v, "z": _fine(low), "height": _fine(high - low)}
                 element(outline, "cornerLocal", where)
-        _describe(made, name, item)
+        _describe(entry, name, item)
 
     def underpasses(self) -> None:
         """Add a `tunnel` of type underpass, open to the sides, for every stretch of the road below a bridge."""
@@ -115,8 +115,8 @@ class Objects:
                 start, end = max(block.start, 0.0), min(block.end, self.ground.geometry.length)
                 number = item.instance if first else self.numbers.take()
                 about: dict[str, Value] = {"id": number, "name": name, "s": start, "length": end - start}
-                made = element(self.parent, "tunnel", {**about, "type": "underpass", "daylight": 1.0, "lighting": 0.0})
-                add_object_data(made, name, item.instance)
+                entry = element(self.parent, "tunnel", {**about, "type": "underpass", "daylight": 1.0, "lighting": 0.0})
+                add_object_data(entry, name, item.instance)
 
     # --- plants -----------------------------------------------------------------------------------------------------
 
@@ -136,8 +136,8 @@ class Objects:
             attributes: dict[str, Value] = {"type": kind[0], "subtype": kind[1], "hdg": 0.0}
             attributes |= {"radius": round(plant.breadth * plant.shape.crown_radius, 6)}
             attributes["height"] = round(plant.height, 6)
-            made = self._placed(plant.name, plant.about, attributes, row, plant.instance)
-            add_object_data(made, plant.name, plant.instance, species=plant.about.species)
+            entry = self._placed(plant.name, plant.about, attributes, row, plant.instance)
+            add_object_data(entry, plant.name, plant.instance, species=plant.about.species)
 
     # --- painted ----------------------------------------------------------------------------------------------------
 
@@ -156,14 +156,14 @@ class Objects:
         turn = item.rotation_deg if isinstance(item, Arrow) else 0.0
         heading = math.radians((turn + 180.0) % 360.0 - 180.0)
         attributes: dict[str, Value] = {"type": "roadMark", "subtype": subtype, "hdg": heading}
-        made = self._object(name, item, {**attributes, "height": item.film_thickness}, (*at, z))
+        entry = self._object(name, item, {**attributes, "height": item.film_thickness}, (*at, z))
         place = self.frame.road_coordinates(corners[:, 0], corners[:, 1], heights)
         rows = np.column_stack([place.s, place.t, place.h])
-        outlines = element(made, "outlines")
+        outlines = element(entry, "outlines")
         for number, part in enumerate(np.split(rows, np.cumsum([len(part) for part in parts])[:-1])):
             _road_outline(outlines, number, part, item.film_thickness)
-        element(made, "material", {"surface": "paint", "roadMarkColor": item.color})
-        _describe(made, name, item)
+        element(entry, "material", {"surface": "paint", "roadMarkColor": item.color})
+        _describe(entry, name, item)
 
     def loose_line(self, name: str, line: LineMarking, span: tuple[float, float], part: int) -> None:
         """Add part of a line marking that follows no lane as a `roadMark` object along corners."""
@@ -171,18 +171,18 @@ class Objects:
         corners = self._axis(line, *span)
         attributes: dict[str, Value] = {"type": "roadMark", "subtype": f"line_{line.kind}", "hdg": 0.0}
         attributes |= {"length": span[1] - span[0], "width": line.width, "height": line.film_thickness}
-        made = self._placed(name, line, attributes, corners[0], None if part == 1 else self.numbers.take())
-        _road_outline(element(made, "outlines"), 0, corners, 0.0, closed=False)
+        entry = self._placed(name, line, attributes, corners[0], None if part == 1 else self.numbers.take())
+        _road_outline(element(entry, "outlines"), 0, corners, 0.0, closed=False)
         marking: dict[str, Value] = {"color": line.color, "width": line.width, "zOffset": line.film_thickness}
         dash = line.dash_length or geometry.length
         period = line.dash_length + line.gap_length
         within = (span[0] - line.start_station) % period if period else 0.0
         first = period - within if CLOSE < within < period - CLOSE else 0.0
         marking |= {"lineLength": dash, "spaceLength": line.gap_length, "startOffset": first, "stopOffset": 0.0}
-        item = element(element(made, "markings"), "marking", marking)
+        item = element(element(entry, "markings"), "marking", marking)
         for number in range(len(corners)):
             element(item, "cornerReference", {"id": number})
-        add_object_data(made, name, line.instance, object_type="LineMarking", kind=line.kind)
+        add_object_data(entry, name, line.instance, object_type="LineMarking", kind=line.kind)
 
     def _axis(self, line: LineMarking, start: float, end: float) -> Float:
         """Return (N, 3) s, t and h of points along a line marking's axis, m, sampled within the chord tolerance."""
@@ -200,8 +200,8 @@ class Objects:
 
     def _object(self, name: str, item: RoadObject, attributes: dict[str, Value], place: tuple[float, ...]) -> Element:
         """Add and return an `object` element at a place given as station, offset and height, m."""
-        found = self.frame.road_coordinates(*(np.array([value]) for value in place))
-        return self._placed(name, item, attributes, np.array([found.s[0], found.t[0], found.h[0]]))
+        coordinates = self.frame.road_coordinates(*(np.array([value]) for value in place))
+        return self._placed(name, item, attributes, np.array([coordinates.s[0], coordinates.t[0], coordinates.h[0]]))
 
     def _placed(
         self, name: str, item: RoadObject, attributes: dict[str, Value], place: Float, number: int | None = None

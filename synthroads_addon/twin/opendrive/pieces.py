@@ -75,11 +75,11 @@ def fit_cubics(function: Function, borders: Float) -> Cubics:
         values = function((borders[:-1, None] + length[:, None] * _SHARES).ravel())
         values = values.reshape(len(length), len(_SHARES), -1)
         coefficients = _fit_lowest_degree(values, length)
-        wrong = np.abs(_sample_cubics(coefficients, length) - values).max(axis=(1, 2)) > _EXACT
-        wrong &= length > _SHORTEST
-        if not wrong.any():
+        faults = np.abs(_sample_cubics(coefficients, length) - values).max(axis=(1, 2)) > _EXACT
+        faults &= length > _SHORTEST
+        if not faults.any():
             return Cubics(borders, coefficients)
-        borders = np.sort(np.append(borders, (borders[:-1] + length / 2.0)[wrong]))
+        borders = np.sort(np.append(borders, (borders[:-1] + length / 2.0)[faults]))
 
 
 def fit_pieces(function: Callable[[Float, NDArray[np.intp]], Float], borders: Float) -> Cubics:
@@ -175,19 +175,19 @@ def merge_similar(rows: list[tuple[float, list[float]]], end: float) -> list[tup
         rows: place (m) from which a cubic holds, and its coefficients.
         end: place at which the last ends, m.
     """
-    kept = rows[:1]
+    merged = rows[:1]
     ends = [start for start, _ in rows[1:]] + [end]
     for (start, coefficients), until in zip(rows[1:], ends[1:], strict=True):
-        before_start, before = kept[-1]
-        apart = _shift_cubic(np.array(before), -before_start) - _shift_cubic(np.array(coefficients), -start)
-        if np.abs(apart).max() >= _TAKEN_FOR_ONE:
-            kept.append((start, coefficients))
+        before_start, before = merged[-1]
+        difference = _shift_cubic(np.array(before), -before_start) - _shift_cubic(np.array(coefficients), -start)
+        if np.abs(difference).max() >= _TAKEN_FOR_ONE:
+            merged.append((start, coefficients))
             continue
         at = before_start + (until - before_start) * _SHARES[:4]
         first, second = _value(np.array(before), at - before_start), _value(np.array(coefficients), at - start)
         values = np.where(at < start, first, second)[None, :, None]
-        kept[-1] = (before_start, _cubic_through(values, np.array([until - before_start]))[0, 0].tolist())
-    return kept
+        merged[-1] = (before_start, _cubic_through(values, np.array([until - before_start]))[0, 0].tolist())
+    return merged
 
 
 def _continues(cubic: Float, borders: Float, coefficients: Float, pieces: tuple[int, int]) -> bool:
@@ -220,9 +220,9 @@ def chord_stations(function: Function, borders: Float, tolerance: float, shortes
     while len(begin):
         values = function((begin[:, None] + length[:, None] * shares).ravel()).reshape(len(begin), 5, -1)
         on_chord = values[:, :1] + shares[:, None] * (values[:, -1:] - values[:, :1])
-        wrong = (np.abs(values - on_chord).max(axis=(1, 2)) > tolerance) & (length > 2.0 * shortest)
-        half = length[wrong] / 2.0
-        begin = np.concatenate([begin[wrong], begin[wrong] + half])
+        faults = (np.abs(values - on_chord).max(axis=(1, 2)) > tolerance) & (length > 2.0 * shortest)
+        half = length[faults] / 2.0
+        begin = np.concatenate([begin[faults], begin[faults] + half])
         length = np.concatenate([half, half])
         stations_so_far.append(begin[len(half) :])
     stations = np.sort(np.concatenate(stations_so_far))
@@ -238,11 +238,11 @@ def _divide_long(borders: Float, longest: float) -> Float:
 
 def _drop_straight_stations(stations: Float, values: Float) -> Float:
     """Return the stations without those at which the values are linear between their neighbours."""
-    kept = [0]
+    indices = [0]
     for i in range(1, len(stations) - 1):
-        before, after = kept[-1], i + 1
+        before, after = indices[-1], i + 1
         share = (stations[i] - stations[before]) / (stations[after] - stations[before])
         chord = values[before] + share * (values[after] - values[before])
         if np.abs(values[i] - chord).max() > _EXACT:
-            kept.append(i)
-    return stations[[*kept, len(stations) - 1]]
+            indices.append(i)
+    return stations[[*indices, len(stations) - 1]]

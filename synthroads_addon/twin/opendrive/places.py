@@ -91,6 +91,6 @@ class Ground:
             return np.column_stack([place.s - station, place.t, place.h, tall * share])
 
         stations = chord_stations(rows, merged_stations(bends, start, end), self.tolerance, shortest=0.05)
-        found = rows(stations)
-        found[:, 0] += stations
-        return found
+        samples = rows(stations)
+        samples[:, 0] += stations
+        return samples

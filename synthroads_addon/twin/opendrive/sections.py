@@ -143,12 +143,12 @@ class LanePlan:
         return np.asarray(other.carriageway.sign * other.distances(station)[:, 0])
 
     def _widths(self, station: Float) -> Float:
-        own = self.offsets(station)
+        offsets = self.offsets(station)
         sign = self.frame.section.carriageway.sign
-        widths = sign * (own[:, 1:] - own[:, :-1])
+        widths = sign * (offsets[:, 1:] - offsets[:, :-1])
         if self.frame.has_median:
             far = self.frame.t_coordinate(station, self._far_edge(station), self.median_fall(station))
-            widths = np.column_stack([widths, sign * (own[:, 0] - far)])
+            widths = np.column_stack([widths, sign * (offsets[:, 0] - far)])
         return np.asarray(widths, dtype=np.float64)
 
     def width_at_start(self, piece: int) -> Float:
@@ -173,15 +173,15 @@ class LanePlan:
 
         A short one is part of the next (or the last), in which what it has begins at once, with its width there.
         """
-        kept: list[LaneSection] = []
+        sections_kept: list[LaneSection] = []
         waiting: LaneSection | None = None
         for section in sections:
             if section.end - section.start < SHORTEST_SECTION and section is not sections[-1]:
                 waiting = waiting or section
                 continue
-            kept.append(section if waiting is None else self._begin_earlier(section, waiting))
+            sections_kept.append(section if waiting is None else self._begin_earlier(section, waiting))
             waiting = None
-        return kept
+        return sections_kept
 
     def _begin_earlier(self, section: LaneSection, short: LaneSection) -> LaneSection:
         """Return a section extended back over a short one before it; adjusts the plan's widths there, in place."""

@@ -38,7 +38,7 @@ class Face:
 
 def signal_faces(standing: Iterable[PlacedThing], numbers: FreeIds) -> list[Face]:
     """Return the signal faces of standing things; a face that is a separate part gets an id of its own."""
-    found = []
+    faces = []
     for placed in standing:
         assert isinstance(placed.thing, StandingThing)
         assert placed.frame
@@ -46,11 +46,13 @@ def signal_faces(standing: Iterable[PlacedThing], numbers: FreeIds) -> list[Face
             bodies = [body for body in placed.bodies if body.part == part and not body.detail]
             corners = np.concatenate([body.sections.reshape(-1, 3) for body in bodies])
             low, size = corners.min(axis=0), np.ptp(corners, axis=0)
-            own = bool(bodies[0].ifc)
-            number, name = (numbers.take(), f"{placed.name}-{place}") if own else (placed.thing.instance, placed.name)
+            separate_number = bool(bodies[0].ifc)
+            number, name = (
+                (numbers.take(), f"{placed.name}-{place}") if separate_number else (placed.thing.instance, placed.name)
+            )
             middle = placed.frame.to_local(np.array([low[0] + size[0] / 2.0, 0.0, low[2]]))
-            found.append(Face(placed, number, name, signal, middle, float(size[0]), float(size[2])))
-    return found
+            faces.append(Face(placed, number, name, signal, middle, float(size[0]), float(size[2])))
+    return faces
 
 
 def write_signals(parent: Element, ground: Ground, frame: RoadFrame, faces: Iterable[Face]) -> None:
@@ -94,7 +96,7 @@ def _signal(parent: Element, ground: Ground, frame: RoadFrame, located: tuple[Fa
     }
     if signal.speed is not None:
         about |= {"value": signal.speed, "unit": "km/h"}
-    made = element(parent, "signal", about | ({"text": signal.text} if signal.text else {}))
+    entry = element(parent, "signal", about | ({"text": signal.text} if signal.text else {}))
     kind = thing.twin().opendrive.partition(".")[0]
-    element(made, "reference", {"elementType": "object", "elementId": thing.instance, "type": kind})
-    add_object_data(made, face.placed.name, thing.instance, object_type=type(thing).__name__)
+    element(entry, "reference", {"elementType": "object", "elementId": thing.instance, "type": kind})
+    add_object_data(entry, face.placed.name, thing.instance, object_type=type(thing).__name__)

@@ -39,23 +39,23 @@ class SpeedLimits:
 
     def limits_between(self, start: float, end: float) -> list[tuple[float, float]]:
         """Return (station in m, limit in km/h) where each limit begins between two stations, the first at the start."""
-        found: list[tuple[float, float]] = []
+        limits: list[tuple[float, float]] = []
         for first, last, speed in self.stretches:
             low, high = max(first, start), min(last, end)
-            if high - low > CLOSE and (not found or found[-1][1] != speed):
-                found.append((low, speed))
-        return found
+            if high - low > CLOSE and (not limits or limits[-1][1] != speed):
+                limits.append((low, speed))
+        return limits
 
 
 def _changes(geometry: RoadGeometry, ahead: bool, without: float) -> list[tuple[float, float]]:
     """Return (station in m, limit in km/h) of the signs that change the limit, in driving order."""
-    found: dict[float, float] = {}
+    speeds: dict[float, float] = {}
     for item in geometry.parameters.of_type(TrafficSign).values():
         with_stations = abs((item.rotation_deg + 180.0) % 360.0 - 180.0) <= 90.0
         if with_stations != ahead or not 0.0 < item.station < geometry.length:
             continue
         if match := _LIMIT.fullmatch(item.code):
-            found[item.station] = float(match[1])
+            speeds[item.station] = float(match[1])
         elif _ENDS.match(item.code):
-            found[item.station] = without
-    return sorted(found.items(), reverse=not ahead)
+            speeds[item.station] = without
+    return sorted(speeds.items(), reverse=not ahead)

@@ -117,8 +117,8 @@ class Field:
         usual = getattr(model, "usual", {})
         if info is None or self.name in usual:
             return cast(Value, None if info is None else usual[self.name])
-        source, _, taken = (note_of(info, "inherits") or "").partition(".")
-        return SOURCES[source](settings, taken) if source else None
+        source, _, name = (note_of(info, "inherits") or "").partition(".")
+        return SOURCES[source](settings, name) if source else None
 
     def inherited_text(self, settings: Any) -> str:
         """Return the text for the value used while the field isn't given, with its unit, or Automatic."""
@@ -195,7 +195,7 @@ class OptionalField(Field):
             if hook:
                 hook(group, context)
 
-        text = f"{self.tooltip}. Tick to give a value of your own"
+        text = f"{self.tooltip}. Tick to set your own value"
         about = {"name": f"Own {self.label}", "description": text, "default": self.default is not None}
         return {self.checkbox_name: bpy.props.BoolProperty(**about, update=begin)}
 

@@ -171,8 +171,8 @@ NOT_HERE = ("tolerance", "time_budget")
 def make_fields(model: type[BaseModel], default: dict[str, Any], path: str, hooks: Hooks) -> dict[str, Field]:
     """Return the fields of a pydantic model by name, without constants and those that the panel lacks."""
     infos, before = model.model_fields.items(), f"{path}." if path else ""
-    made = (make_field(f"{before}{name}", info, default.get(name), hooks) for name, info in infos)
-    return {field.name: field for field in made if field}
+    fields = (make_field(f"{before}{name}", info, default.get(name), hooks) for name, info in infos)
+    return {field.name: field for field in fields if field}
 
 
 def make_field(path: str, info: FieldInfo, default: Any, hooks: Hooks) -> Field | None:

@@ -63,7 +63,7 @@ def with_preferences(scenario: Scenario) -> Scenario:
 
 
 class SYNTHROADS_OT_add_asset_library(bpy.types.Operator):
-    """Have Blender's asset browser show SynthRoads' node groups: guardrails, signs and roads along your own curves"""
+    """Show SynthRoads' node groups in Blender's asset browser: guardrails, signs and roads along your own curves"""
 
     bl_idname = "synthroads.add_asset_library"
     bl_label = "Add Asset Library"
@@ -72,17 +72,17 @@ class SYNTHROADS_OT_add_asset_library(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the library file exists and Blender doesn't have it yet."""
         if not (LIBRARY_FOLDER / LIBRARY_FILE).exists():
-            cls.poll_message_set("Only an installed extension has the library")
+            cls.poll_message_set("The library comes only with the installed extension")
             return False
         if _has_asset_library(context):
-            cls.poll_message_set("Blender has it already")
+            cls.poll_message_set("Blender already has the library")
             return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Add the folder to the asset libraries in Blender's preferences."""
         context.preferences.filepaths.asset_libraries.new(name=LIBRARY_NAME, directory=str(LIBRARY_FOLDER))
-        self.report({"INFO"}, f"The asset browser has the library {LIBRARY_NAME} now")
+        self.report({"INFO"}, f"The asset browser now has the library {LIBRARY_NAME}")
         return {"FINISHED"}
 
 
@@ -103,20 +103,20 @@ class SYNTHROADS_AP_preferences(bpy.types.AddonPreferences):
         name="Ray Caster",
         items=[(name, value_name(name, _CASTER), "") for name in get_args(_CASTER.annotation)],
         default=Preferences.caster,
-        description="How rays are cast, where a scenario leaves it open",
+        description="Ray caster to use where the scenario names none",
     )
     output_folder: bpy.props.StringProperty(
         name="Output Folder",
         subtype="DIR_PATH",
         default=Preferences.output_folder,
-        description="Where files go unless the panel says otherwise; // is the folder of the .blend file",
+        description="Folder for files unless the panel names another; // is the folder of the .blend file",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     library_folder: bpy.props.StringProperty(
         name="Library Folder",
         subtype="DIR_PATH",
         default="",
-        description="Your own scenarios and devices, in folders of these names; the panel's menus list them",
+        description="Folder with the subfolders scenarios and devices; the panel's menus list your files in them",
     )
 
     def draw(self, context: bpy.types.Context) -> None:

@@ -41,7 +41,7 @@ class SYNTHROADS_PG_settings(_Generated, bpy.types.PropertyGroup):
     """The panel's settings, convertible to and from a `Scenario`."""
 
     preset: bpy.props.StringProperty(
-        name="Scenario", default=FIRST, description="Scenario that these settings were taken from, built-in or a file"
+        name="Scenario", default=FIRST, description="Scenario that these settings come from, built-in or a file"
     )
     loaded: bpy.props.StringProperty(
         options={"HIDDEN"}, description="That scenario as JSON: its numbers have more digits than Blender's"
@@ -50,7 +50,7 @@ class SYNTHROADS_PG_settings(_Generated, bpy.types.PropertyGroup):
         name="Folder",
         subtype="DIR_PATH",
         default="",
-        description="Folder for the files; // is the folder of the .blend file, nothing the folder of the preferences",
+        description="Folder for the files; // is the folder of the .blend file; if empty, the preferences' folder",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     overwrite: bpy.props.BoolProperty(
@@ -70,7 +70,7 @@ class SYNTHROADS_PG_settings(_Generated, bpy.types.PropertyGroup):
         data = scenario.to_dict()
         for name in NOT_HERE:
             if name in data:
-                text = "only synthroads generate chooses by it; take it out of the scenario, and set the knobs here"
+                text = "only synthroads generate uses it; remove it from the scenario, and set the values here"
                 raise InputError(name, data[name], text)
         write_fields(FIELDS, self, data)
         self.loaded = json.dumps(data)
@@ -83,8 +83,8 @@ class SYNTHROADS_PG_settings(_Generated, bpy.types.PropertyGroup):
         """
         scenario = load_scenario(name)
         if Path(name).suffix != ".json":
-            kept = read_fields({key: FIELDS[key] for key in _KEPT}, self, None)
-            scenario = Scenario.from_dict(scenario.to_dict() | kept)
+            values = read_fields({key: FIELDS[key] for key in _KEPT}, self, None)
+            scenario = Scenario.from_dict(scenario.to_dict() | values)
         self.show_scenario(scenario)
         self.preset = name
 

@@ -77,7 +77,7 @@ class _CalibrationOperator(LongOperator):
 
 
 class SYNTHROADS_OT_compare_intensities(_CalibrationOperator, bpy.types.Operator):
-    """Show what intensities the materials are expected to give, beside those of the real cloud"""
+    """Show the expected intensities of the materials beside those of the real cloud"""
 
     bl_idname = "synthroads.compare_intensities"
     bl_label = "Compare"
@@ -116,7 +116,7 @@ class SYNTHROADS_OT_save_materials(bpy.types.Operator):
 
 
 class SYNTHROADS_OT_add_calibration_class(bpy.types.Operator):
-    """Add a material to be compared"""
+    """Add a material to the comparison"""
 
     bl_idname = "synthroads.add_calibration_class"
     bl_label = "Add Material"
@@ -132,7 +132,7 @@ class SYNTHROADS_OT_add_calibration_class(bpy.types.Operator):
 
 
 class SYNTHROADS_OT_remove_calibration_class(bpy.types.Operator):
-    """Remove a material from those compared"""
+    """Remove a material from the comparison"""
 
     bl_idname = "synthroads.remove_calibration_class"
     bl_label = "Remove Material"

@@ -31,7 +31,7 @@ def _materials(self: Any, context: bpy.types.Context, typed: str) -> Iterator[st
 
 
 def _devices() -> Iterator[tuple[str, str, str]]:
-    yield _RAY, "A Ray", "No footprint: every place is seen by itself"
+    yield _RAY, "A Ray", "Infinitely thin beam: no footprint"
     for name in device_names():
         wide, high = load_device(name).divergence_mrad
         yield name, load_device(name).title, f"Divergence {wide:g} × {high:g} mrad"
@@ -42,10 +42,10 @@ class SYNTHROADS_PG_calibration_class(bpy.types.PropertyGroup):
 
     material: bpy.props.StringProperty(name="Material", default="asphalt", search=_materials)
     told: bpy.props.StringProperty(
-        name="Class", description="Number or name of the cloud's class; paved or line beside an axis"
+        name="Class", description="Number or name of a class of the cloud; with an axis: paved or line"
     )
     texture: bpy.props.BoolProperty(
-        name="From Its Texture", description="Take the colours of the image that the scene's material has"
+        name="From Its Texture", description="Take the colours from the image texture of the scene's material"
     )
     texture_width: bpy.props.FloatProperty(
         name="Texture Width",
@@ -78,55 +78,63 @@ class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
 
     classes: bpy.props.CollectionProperty(type=SYNTHROADS_PG_calibration_class)
     active: bpy.props.IntProperty()
-    real: bpy.props.StringProperty(name="Real Cloud", subtype="FILE_PATH", description="None: expected values alone")
+    real: bpy.props.StringProperty(
+        name="Real Cloud",
+        subtype="FILE_PATH",
+        description="Cloud to compare with; if empty, only expected values are computed",
+    )
     class_field: bpy.props.StringProperty(
-        name="Class Field", description="Extra attribute of the cloud that holds the classes, if it isn't the usual one"
+        name="Class Field", description="Extra attribute of the cloud that holds the classes, if not the usual one"
     )
     axis: bpy.props.StringProperty(
         name="Axis",
         subtype="FILE_PATH",
-        description="Tells pavement and markings apart in a cloud without classes",
+        description="Axis of the road, which locates pavement and markings in a cloud without classes",
         update=_follow_axis,
     )
     paved: bpy.props.StringProperty(
-        name="Paved", default="-7 -1; 1 7", description="Offsets from the axis between which there is pavement, m"
+        name="Paved", default="-7 -1; 1 7", description="Ranges of offsets from the axis that are pavement, m"
     )
-    lines: bpy.props.StringProperty(name="Lines", default="-4 4", description="Offsets of the markings, m")
+    lines: bpy.props.StringProperty(name="Lines", default="-4 4", description="Offsets of markings from the axis, m")
     line_width: bpy.props.FloatProperty(name="Line Width", default=0.15, min=0.02, max=2.0, unit="LENGTH")
     device: bpy.props.EnumProperty(
-        name="Beam", items=list(_devices()), description="Whose footprint places are seen with"
+        name="Beam", items=list(_devices()), description="Device whose beam footprint is used"
     )
     angles: bpy.props.StringProperty(name="Incidence", default="0 20 40 60", description="Incidence angles, degrees")
     ranges: bpy.props.StringProperty(name="Ranges", default="60", description="Ranges, m")
-    use_scanner: bpy.props.BoolProperty(name="From One Place", description="Angles and ranges are those of one place")
-    scanner: bpy.props.FloatVectorProperty(name="Scanner", description="Its map coordinates", subtype="TRANSLATION")
+    use_scanner: bpy.props.BoolProperty(
+        name="From One Place", description="Compute angles and ranges from the position of one scanner"
+    )
+    scanner: bpy.props.FloatVectorProperty(
+        name="Scanner", description="Map coordinates of the scanner", subtype="TRANSLATION"
+    )
     reflection: bpy.props.EnumProperty(
         name="Reflection",
-        items=[("lambert", "Lambert", "Matt"), ("oren_nayar", "Oren-Nayar", "Rough, by the facets' slope")],
+        items=[("lambert", "Lambert", "Matt"), ("oren_nayar", "Oren-Nayar", "Rough, with facets of a given slope")],
     )
     range_corrected: bpy.props.BoolProperty(
-        name="Range Corrected", description="The device has taken the fall-off with the range out of its intensities"
+        name="Range Corrected", description="The device has corrected its intensities for range"
     )
     decibels: bpy.props.FloatProperty(
         name="Decibels",
-        description="What the 16 bits of the file span, dB; 0: intensities are linear",
+        description="Span of the file's 16-bit values, dB; 0: intensities are linear",
         min=0.0,
         max=200.0,
     )
     parts: bpy.props.EnumProperty(
         name="Fit",
-        description="What is fitted besides the brightness",
+        description="Properties to fit besides the brightness",
         items=[
-            ("spread", "Spread", "How much places differ"),
-            ("wavelength", "Wavelength", "Over what distance they differ"),
-            ("slope", "Facet Slope", "Fall-off with the incidence angle, with Oren-Nayar"),
+            ("spread", "Spread", "How much the brightness varies from place to place"),
+            ("wavelength", "Wavelength", "Distance over which the brightness varies"),
+            ("slope", "Facet Slope", "Fall-off with the incidence angle, for Oren-Nayar reflection"),
         ],
         options={"ENUM_FLAG"},
         default={"spread", "wavelength"},
     )
-    gain: bpy.props.FloatProperty(name="Gain", description="The device's, if it is known; 0: free", min=0.0)
+    gain: bpy.props.FloatProperty(name="Gain", description="Gain of the device, if known; 0: fitted", min=0.0)
     table: bpy.props.StringProperty(
-        name="Table", subtype="FILE_PATH", description="Material table to begin with, and to save to (.json)"
+        name="Table", subtype="FILE_PATH", description="Material table to start from, and to save to (.json)"
     )
 
     def job(self, fit: bool) -> CalibrationJob:

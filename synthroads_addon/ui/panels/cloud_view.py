@@ -33,9 +33,9 @@ _FAR = 20_000.0
 """A cloud farther than this (m) from the road's origin and beyond the road's length is likely to be of elsewhere."""
 _LABELS: dict[ColourBy, tuple[str, str]] = {
     "class": ("Class", "The classes' colours, as in the pictures of a scan"),
-    "intensity": ("Intensity", "Black to white, the darkest and brightest half percent cut; times the squared range"),
-    "rgb": ("RGB", "The points' own colours"),
-    "height": ("Height", "From dark blue to yellow, the lowest and highest half percent cut"),
+    "intensity": ("Intensity", "Black to white, clipped by 0.5 % at both ends; multiplied by the squared range"),
+    "rgb": ("RGB", "The colours that the cloud holds"),
+    "height": ("Height", "Dark blue to yellow, clipped by 0.5 % at both ends"),
 }
 _GRADIENT_STEPS, _SWATCH_SIZE = 10, 32
 _icons: Any = None
@@ -93,12 +93,12 @@ class SYNTHROADS_PG_cloud_view(bpy.types.PropertyGroup):
 
     file: bpy.props.StringProperty(
         name="File",
-        description=f"Cloud to show ({', '.join(AVAILABLE)}); the last scan's if empty",
+        description=f"Cloud to show ({', '.join(AVAILABLE)}); if empty, that of the last scan",
         subtype="FILE_PATH",
     )
     points: bpy.props.IntProperty(
         name="Points",
-        description="Largest number of points that are shown; of more, an even choice. Each takes 50 bytes of memory",
+        description="Largest number of points to show; a larger cloud is thinned evenly. 50 bytes of memory each",
         default=2_000_000,
         min=1_000,
         max=100_000_000,
@@ -107,32 +107,32 @@ class SYNTHROADS_PG_cloud_view(bpy.types.PropertyGroup):
     )
     by: bpy.props.EnumProperty(
         name="Colour",
-        description="What the points are coloured by",
+        description="Attribute that colours the points",
         items=[(name, *_LABELS[name]) for name in COLOURINGS],
         default="class",
         update=_redraw,
     )
     size: bpy.props.FloatProperty(
         name="Point Size",
-        description="Of a point on the screen, pixels",
+        description="Size of a point on the screen, pixels",
         default=2.0,
         min=1.0,
         max=20.0,
         update=_redraw,
     )
-    visible: bpy.props.BoolProperty(name="Visible", description="Show or hide", default=True, update=_redraw)
+    visible: bpy.props.BoolProperty(name="Visible", description="Show or hide the cloud", default=True, update=_redraw)
 
 
 class SYNTHROADS_OT_show_cloud(LongOperator, bpy.types.Operator):
-    """Show a cloud over the 3D view. It adds nothing to the file, and is neither scanned nor rendered"""
+    """Draw a cloud over the 3D view. The cloud isn't added to the file, nor scanned, nor rendered"""
 
     bl_idname = "synthroads.show_cloud"
     bl_label = "Show Cloud"
 
     filepath: bpy.props.StringProperty(
-        name="File", description="Cloud; the last scan's if empty", subtype="FILE_PATH", options={"SKIP_SAVE"}
+        name="File", description="Cloud to show; if empty, the last scan's", subtype="FILE_PATH", options={"SKIP_SAVE"}
     )
-    nothing_done = "the view is as before"
+    nothing_done = "the view wasn't changed"
 
     def job(self, context: bpy.types.Context) -> PanelJob[DisplayCloud]:
         """Return the reading of the cloud for display, relative to the scene's origin, as a job in a thread."""
@@ -159,7 +159,7 @@ class SYNTHROADS_OT_show_cloud(LongOperator, bpy.types.Operator):
 
 
 class SYNTHROADS_OT_hide_cloud(bpy.types.Operator):
-    """Show the cloud no more, and free its memory"""
+    """Hide the cloud, and free its memory"""
 
     bl_idname = "synthroads.hide_cloud"
     bl_label = "Remove Cloud"
@@ -184,7 +184,7 @@ class SYNTHROADS_OT_add_cloud(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads a plain set)
 
     radius: bpy.props.FloatProperty(
-        name="Radius", description="Of a point where it is rendered", default=0.02, min=0.001, max=1.0, unit="LENGTH"
+        name="Radius", description="Size of a point in renders", default=0.02, min=0.001, max=1.0, unit="LENGTH"
     )
 
     @classmethod
@@ -202,7 +202,7 @@ class SYNTHROADS_OT_add_cloud(bpy.types.Operator):
 
 
 class SYNTHROADS_OT_frame_cloud(bpy.types.Operator):
-    """Turn the 3D view to the whole cloud"""
+    """Show the whole cloud in the 3D view"""
 
     bl_idname = "synthroads.frame_cloud"
     bl_label = "Look at Cloud"

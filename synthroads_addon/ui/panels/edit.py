@@ -131,7 +131,7 @@ class SYNTHROADS_PG_edit(bpy.types.PropertyGroup):
 
 
 class SYNTHROADS_OT_show_plants(bpy.types.Operator):
-    """Leave the plants out of the view and of scans, or show them again. Without them the view follows edits faster"""
+    """Leave the plants out of the view and of scans, or show them again. Without plants, edits show faster"""
 
     bl_idname = "synthroads.show_plants"
     bl_label = "Hide Plants"

@@ -91,19 +91,19 @@ class SYNTHROADS_OT_export_cloud(FileOperator, bpy.types.Operator):
     check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
     filter_glob: bpy.props.StringProperty(default=ENDINGS_GLOB, options={"HIDDEN"})
     source: bpy.props.StringProperty(
-        name="Cloud", description="Cloud to read; the last scan's if empty", options={"SKIP_SAVE"}
+        name="Cloud", description="Cloud to read; if empty, that of the last scan", options={"SKIP_SAVE"}
     )
     format: bpy.props.EnumProperty(
-        name="Format", items=[(ending, *_FORMATS[ending]) for ending in AVAILABLE], description="Kind of file"
+        name="Format", items=[(ending, *_FORMATS[ending]) for ending in AVAILABLE], description="Format of the file"
     )
     classes: bpy.props.EnumProperty(
         name="Classes",
-        items=[("own", "As they are", "The cloud's own classes"), ("5", "5", "The 17 classes merged into five")],
-        description="Classes that are written",
+        items=[("own", "As they are", "The classes of the cloud"), ("5", "5", "The 17 classes merged into five")],
+        description="Classes to write",
     )
     spacing: bpy.props.FloatProperty(
         name="Spacing",
-        description="Edge of a grid's cells of which one point each is kept; all points if 0",
+        description="Edge of the grid cells, each of which keeps one point; 0 keeps all points",
         default=0.0,
         min=0.0,
         max=10.0,
@@ -163,7 +163,7 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         items=[(name, FORMATS[name].label, FORMATS[name].description) for name in TWIN_FORMATS],
         options={"ENUM_FLAG"},
         default={"cityjson"},
-        description="Formats that are written",
+        description="Formats to write",
     )
     tolerance: bpy.props.FloatProperty(
         name="Tolerance",
@@ -178,14 +178,14 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
     ifc_placement: bpy.props.EnumProperty(
         name="IFC Placement",
         items=[
-            ("linear", "Along the Alignment", "Objects stand at distances along the alignment, as the standard has it"),
-            ("local", "Coordinates", "Objects stand at coordinates, for viewers that don't know alignments"),
+            ("linear", "Along the Alignment", "Objects are placed by distance along the alignment, as in the standard"),
+            ("local", "Coordinates", "Objects are placed by coordinates, for viewers without alignments"),
         ],
-        description="What says in IFC where an object stands",
+        description="How objects are placed in IFC",
     )
     local_projection: bpy.props.BoolProperty(
         name="Local Projection",
-        description="OpenDRIVE in a projection about the site without an offset, for readers of lat_0 and lon_0 alone",
+        description="Write OpenDRIVE in a local projection without offset, for programs that read lat_0 and lon_0 only",
     )
     overwrite: bpy.props.BoolProperty(name="Replace Files", description="Replace files that are already there")
 
@@ -240,7 +240,7 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
 
 
 class SYNTHROADS_OT_install_ifc(FileChooser, bpy.types.Operator):
-    """Install the extension SynthRoads IFC from its file, synthroads_ifc-….zip: it brings what writes IFC"""
+    """Install the extension SynthRoads IFC from its file, synthroads_ifc-….zip, so that IFC can be written"""
 
     bl_idname = "synthroads.install_ifc"
     bl_label = "Install IFC"  # the button of Blender's file browser has no room for more
@@ -258,7 +258,7 @@ class SYNTHROADS_OT_install_ifc(FileChooser, bpy.types.Operator):
         install(filepath=str(path), repo=_REPOSITORY, enable_on_install=True)
         importlib.invalidate_caches()
         if missing_package("ifc"):
-            raise InputError("File", path.name, "was installed, but Blender can't load it: is it for this platform?")
+            raise InputError("File", path.name, "was installed, but Blender can't load it; is it for this platform?")
         self.report({"INFO"}, "IFC can be written")
 
 

@@ -36,7 +36,7 @@ def _set_device(context: bpy.types.Context, name_or_file: str) -> None:
 
 
 class SYNTHROADS_OT_choose_scenario(_Undoable, bpy.types.Operator):
-    """Take over this scenario. The seed and the fidelity stay as they are, unless it is a file with its own"""
+    """Use this scenario. Seed and fidelity stay as they are, unless the scenario is a file that sets them"""
 
     bl_idname = "synthroads.choose_scenario"
     bl_label = "Choose Scenario"
@@ -97,7 +97,7 @@ class _LibraryFile(JsonFileChooser):
 
 
 class SYNTHROADS_OT_load_scenario(_LibraryFile, _Undoable, bpy.types.Operator):
-    """Take over a scenario from a JSON file, the same as the command line takes"""
+    """Use a scenario from a JSON file, as the command line does"""
 
     bl_idname = "synthroads.load_scenario"
     bl_label = "Load Scenario"
@@ -176,7 +176,7 @@ class SYNTHROADS_OT_add_file(JsonFileChooser, _Undoable, bpy.types.Operator):
 
 
 class SYNTHROADS_OT_remove_file(_Undoable, bpy.types.Operator):
-    """Take this file off the list; the file itself stays"""
+    """Remove this file from the list; the file itself stays"""
 
     bl_idname = REMOVE_FILE
     bl_label = "Remove File"
@@ -194,7 +194,7 @@ class SYNTHROADS_OT_remove_file(_Undoable, bpy.types.Operator):
 
 
 class SYNTHROADS_OT_random_road(bpy.types.Operator):
-    """Draw another seed, and build its road within the limits. The same seed is always followed by the same"""
+    """Draw another seed, and build its road within the limits. After a given seed, the next is always the same"""
 
     bl_idname = "synthroads.random_road"
     bl_label = "Random Road"

@@ -25,8 +25,8 @@ def _road_items(state: Any, context: Any) -> list[tuple[str, str, str, str, int]
 
 def _shown_road(state: Any) -> int:
     scene = bpy.context.scene
-    found, shown = roads(scene), find_road(scene)
-    return found.index(shown) if shown in found else 0
+    scene_roads, shown = roads(scene), find_road(scene)
+    return scene_roads.index(shown) if shown in scene_roads else 0
 
 
 def _choose_road(state: Any, number: int) -> None:
@@ -49,7 +49,7 @@ class SYNTHROADS_PG_roads(bpy.types.PropertyGroup):
         items=_road_items,
         get=_shown_road,
         set=_choose_road,
-        description="Road that the panels are about: the active object's; its root becomes active where one is chosen",
+        description="Road that the panels show: that of the active object. A chosen road's root becomes active",
     )
 
 
@@ -68,8 +68,8 @@ def draw_road_choice(layout: bpy.types.UILayout, context: bpy.types.Context) -> 
 
 def draw_road_name(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the name of the road that a button applies to, if the scene has several."""
-    found = roads(context.scene)
-    if len(found) > 1 and (shown := find_road(context.scene)):
+    scene_roads = roads(context.scene)
+    if len(scene_roads) > 1 and (shown := find_road(context.scene)):
         draw_text(layout, shown.name, "EMPTY_ARROWS")
 
 

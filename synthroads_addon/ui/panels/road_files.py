@@ -87,7 +87,7 @@ class RoadLoader(FileOperator):
 
 
 class SYNTHROADS_OT_load_road(RoadLoader, bpy.types.Operator):
-    """Build the road of a parameter set, at the panel's fidelity. It takes the place of the road built before"""
+    """Build the road of a parameter set, at the panel's fidelity. It replaces the road that was built before"""
 
     bl_idname = "synthroads.load_road"
     bl_label = "Load Parameter Set"
@@ -100,7 +100,7 @@ class SYNTHROADS_OT_load_road(RoadLoader, bpy.types.Operator):
 
 
 class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
-    """Build the road of an OpenDRIVE file, or one along a centreline: that of a LandXML or IFC file as it is designed, or one fitted to points of a map (OpenStreetMap, GeoPackage, shapefile) or a survey (CSV with x, y, z, GeoJSON, KML, GPX, SBET). Its cross-section is then the panel's, with the lanes that OpenStreetMap has. It takes the place of the road built before"""  # noqa: E501 (a tooltip is one line)
+    """Build the road of an OpenDRIVE file, or a road along a centreline: the alignment of a LandXML or IFC file, or one fitted to the points of a map (OpenStreetMap, GeoPackage, shapefile) or a survey (CSV with x, y, z, GeoJSON, KML, GPX, SBET). The cross-section then comes from the panel, and the lanes from OpenStreetMap where given. The road replaces the one built before"""  # noqa: E501 (a tooltip is one line)
 
     bl_idname = "synthroads.load_axis"
     bl_label = "Along Centreline"
@@ -118,8 +118,10 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
         whole = has_whole_road(path)
         parameters, report = (RoadSource(scenario, road=path) if whole else RoadSource(scenario, axis=path)).read()
         text = f"Built {parameters.alignment.length:,.0f} m of road {'of' if whole else 'along'} {path.name}"
-        lost = "; some of its surface was left out" if report["axis"].get("whole", {}).get("surface_lost") else ""
-        return parameters, f"{text}: {axis_summary(report['axis'])}{lost}"
+        loss_text = (
+            "; parts of its surface were left out" if report["axis"].get("whole", {}).get("surface_lost") else ""
+        )
+        return parameters, f"{text}: {axis_summary(report['axis'])}{loss_text}"
 
     def refuse(self, error: InputError) -> set[str]:
         """Report an error; if the fit misses its points, also keep a picture of it."""
@@ -130,7 +132,7 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
 
 
 class SYNTHROADS_OT_show_fit(ShowPicture, bpy.types.Operator):
-    """Show in an image editor how far the road that was fitted last is from its points, along it"""
+    """Show in an image editor how far the last fitted road is from its points, by station"""
 
     bl_idname = "synthroads.show_fit"
     bl_label = "Show Missed Axis"

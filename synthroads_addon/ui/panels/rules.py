@@ -29,9 +29,9 @@ _STATION, _FOUND = "Station", "Found / limit"
 _BOX_SHARE, _TITLE_SHARE = 0.92, 0.36
 """Share of a row that is within a box, and that of a title in there."""
 _SURENESS = {
-    "confirmed": "printed in secondary sources",
-    "derived": "computed from what secondary sources print",
-    "unconfirmed": "common knowledge, not found in print",
+    "confirmed": "stated in secondary sources",
+    "derived": "computed from values in secondary sources",
+    "unconfirmed": "common knowledge, no printed source found",
     "definition": "a parameter set that breaks it is faulty",
 }
 
@@ -134,7 +134,7 @@ class SYNTHROADS_PG_violation(bpy.types.PropertyGroup):
     offset: bpy.props.FloatProperty()
     value: bpy.props.StringProperty()
     limit: bpy.props.StringProperty()
-    found: bpy.props.StringProperty(description="Both, short")
+    comparison: bpy.props.StringProperty(description="Both, short")
     text: bpy.props.StringProperty()
 
 
@@ -177,14 +177,14 @@ class SYNTHROADS_OT_show_violation(bpy.types.Operator):
     bl_label = "Look at the Place"
     bl_options = {"INTERNAL"}  # noqa: RUF012
 
-    index: bpy.props.IntProperty(name="Line", min=0, description="Line of the list, from 0")
+    index: bpy.props.IntProperty(name="Line", min=0, description="Row of the list, from 0")
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the list of broken rules has entries."""
         broken = len(context.window_manager.synthroads_rules.violations)
         if not broken:
-            cls.poll_message_set("Check the rules first: none is listed as broken")
+            cls.poll_message_set("Check the rules first; the list of broken rules is empty")
         return broken > 0
 
     @refusing
@@ -197,7 +197,7 @@ class SYNTHROADS_OT_show_violation(bpy.types.Operator):
 
 
 class SYNTHROADS_OT_clear_rules(bpy.types.Operator):
-    """Empty the list, and take the marker out of the 3D view"""
+    """Empty the list, and remove the marker from the 3D view"""
 
     bl_idname = "synthroads.clear_rules"
     bl_label = "Clear List"
@@ -225,7 +225,7 @@ class SYNTHROADS_UL_violations(bpy.types.UIList):
     ) -> None:
         """Draw one row of the list."""
         names = [row.name for row in data.violations]
-        _draw_columns(layout, (f"{item.station:,.0f} m", item.name, item.found), names)
+        _draw_columns(layout, (f"{item.station:,.0f} m", item.name, item.comparison), names)
 
     def filter_items(
         self, context: bpy.types.Context, data: SYNTHROADS_PG_rules, field: str
@@ -326,7 +326,7 @@ def _fill(rules: SYNTHROADS_PG_rules, parameters: RoadParameters, violations: li
         row.rule, row.object, row.text = violation.rule, violation.object, violation.text
         row.station, row.offset = violation.station, violation_offset(geometry, violation)
         row.value, row.limit = (_write_number(number, violation.unit) for number in (violation.value, violation.limit))
-        row.found = f"{_digits(violation.value)} / {_digits(violation.limit)} {violation.unit}".removesuffix(" 1")
+        row.comparison = f"{_digits(violation.value)} / {_digits(violation.limit)} {violation.unit}".removesuffix(" 1")
     rules["index"] = -1  # past its update: nothing was clicked yet
 
 

@@ -41,7 +41,7 @@ _BOX_SHARE = 0.92
 
 
 class SYNTHROADS_OT_road_from_scan(RoadLoader, bpy.types.Operator):
-    """Find the road that a cloud shows, and build it from its measured parameters. It takes the place of the road built before"""  # noqa: E501 (a tooltip is one line)
+    """Find the road in a cloud, and build it from its measured parameters. It replaces the road built before"""
 
     bl_idname = "synthroads.road_from_scan"
     bl_label = "Road from a Scan"
@@ -50,20 +50,20 @@ class SYNTHROADS_OT_road_from_scan(RoadLoader, bpy.types.Operator):
     road: bpy.props.EnumProperty(
         name="Carriageways",
         items=[
-            ("auto", "Found Out", "The cloud tells"),
+            ("auto", "Automatic", "Found in the cloud"),
             ("dual", "Dual", "Two carriageways with a median"),
             ("single", "Single", "One carriageway"),
         ],
-        description="Kind of road, where it is known",
+        description="Kind of road, if known",
     )
     course: bpy.props.StringProperty(
         name="Course",
         subtype="FILE_PATH",
-        description="Rough course of the road (CSV or GeoJSON, in the cloud's coordinates), where it isn't found",
+        description="Approximate course of the road (CSV or GeoJSON, in the cloud's coordinates), if it isn't found",
     )
     tolerance: bpy.props.FloatProperty(
         name="Tolerance",
-        description="Root mean square that the alignment may keep from the measured axis",
+        description="Largest root mean square distance of the alignment from the measured axis",
         default=FIT_TOLERANCE,
         min=TOLERANCES[0],
         max=TOLERANCES[1],
@@ -73,7 +73,7 @@ class SYNTHROADS_OT_road_from_scan(RoadLoader, bpy.types.Operator):
     )
     snap: bpy.props.BoolProperty(
         name="Standard Widths",
-        description="Take the widths of the standard cross-section that all measured ones are near to",
+        description="Use the widths of the standard cross-section that matches all measured widths",
     )
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -97,13 +97,13 @@ class SYNTHROADS_OT_road_from_scan(RoadLoader, bpy.types.Operator):
 
 
 class SYNTHROADS_OT_show_doubt(bpy.types.Operator):
-    """Look along the road at the begin of this stretch"""
+    """Look along the road at the beginning of this stretch"""
 
     bl_idname = "synthroads.show_doubt"
     bl_label = "Look at the Stretch"
     bl_options = {"INTERNAL"}  # noqa: RUF012 (Blender reads a plain set)
 
-    station: bpy.props.FloatProperty(name="Station", description="Along the road, m")
+    station: bpy.props.FloatProperty(name="Station", description="Distance along the road, m")
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -141,19 +141,19 @@ class SYNTHROADS_PT_scan_road(Sidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the doubts with their reasons, what was measured with its deviations, and the notes."""
-        layout, found = self.layout, found_road(find_road(context.scene))
-        assert found  # poll() has seen it
-        draw_text(layout, verdict(found["judgement"]), "ERROR" if is_doubtful(found) else "CHECKMARK")
-        for station, text in doubt_lines(found["judgement"]):
+        layout, result = self.layout, found_road(find_road(context.scene))
+        assert result  # poll() has seen it
+        draw_text(layout, verdict(result["judgement"]), "ERROR" if is_doubtful(result) else "CHECKMARK")
+        for station, text in doubt_lines(result["judgement"]):
             row = layout.box().row()
             draw_text(row.column(align=True), text, share=_BOX_SHARE, beside=1)
             row.operator(SYNTHROADS_OT_show_doubt.bl_idname, text="", icon="VIEWZOOM").station = station
         measures = layout.column(align=True)
-        for text in found["measures"]:
+        for text in result["measures"]:
             draw_text(measures, text)
-        for note in found["notes"]:
+        for note in result["notes"]:
             draw_text(layout, note, "INFO")
-        layout.operator(SYNTHROADS_OT_show_cloud.bl_idname, icon="POINTCLOUD_DATA").filepath = found["cloud"]
+        layout.operator(SYNTHROADS_OT_show_cloud.bl_idname, icon="POINTCLOUD_DATA").filepath = result["cloud"]
 
 
 def found_road(road: bpy.types.Object | None) -> dict[str, Any] | None:
@@ -167,24 +167,24 @@ def found_road(road: bpy.types.Object | None) -> dict[str, Any] | None:
 @lru_cache(maxsize=4)
 def _read(text: str) -> dict[str, Any] | None:
     try:
-        found: dict[str, Any] = json.loads(text)
-        return found if {"cloud", "judgement", "measures", "notes"} <= found.keys() else None
+        result: dict[str, Any] = json.loads(text)
+        return result if {"cloud", "judgement", "measures", "notes"} <= result.keys() else None
     except (TypeError, ValueError, AttributeError):  # edited by hand
         return None
 
 
-def is_doubtful(found: dict[str, Any]) -> bool:
+def is_doubtful(result: dict[str, Any]) -> bool:
     """Return whether any stretch of a found road isn't to be trusted."""
-    return any(True for _ in doubt_lines(found["judgement"]))
+    return any(True for _ in doubt_lines(result["judgement"]))
 
 
 def verdict(judgement: dict[str, Any]) -> str:
     """Return a sentence that says how far a found road is to be trusted."""
     places = sum(1 for _ in doubt_lines(judgement))
     if not places:
-        return "Nothing of it is doubtful"
+        return "No part of it is doubtful"
     share = 1.0 - judgement["trusted"]
-    axis = f", its axis on {share:.0%} of the length" if share > 0.0 else ""
+    axis = f", the axis on {share:.0%} of the length" if share > 0.0 else ""
     return f"The result is doubtful at {places} {'place' if places == 1 else 'places'}{axis}"
 
 
@@ -195,17 +195,17 @@ def find_and_build(job: ReconstructionJob, scenario: Scenario, place: BuildTarge
         return run_reconstruction(job, lambda _, share: report(share))
 
     road: ReconstructedRoad = yield Aside(find, "Finding the road", 0.0, _FINDING)
-    kept = {
+    record = {
         "cloud": str(job.cloud),
         "judgement": road.report["judgement"],
         "measures": [*measure_lines(road.report), *_surface_lines(road.report["surface"])],
         "notes": road.report["notes"],
     }
     parameters = road.found.parameters
-    build = road_work(parameters, scenario, from_file(job.cloud), place, json.dumps(kept))
+    build = road_work(parameters, scenario, from_file(job.cloud), place, json.dumps(record))
     yield from part_of_work(build, _FINDING, 1.0)
-    length, said = parameters.alignment.length, verdict(road.report["judgement"])
-    return f"Built {length:,.0f} m of road from {job.cloud.name}. {said}"
+    length, sentence = parameters.alignment.length, verdict(road.report["judgement"])
+    return f"Built {length:,.0f} m of road from {job.cloud.name}. {sentence}"
 
 
 def _surface_lines(surface: dict[str, Any]) -> list[str]:

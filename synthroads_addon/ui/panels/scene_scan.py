@@ -33,30 +33,28 @@ class SYNTHROADS_PG_scene_scan(bpy.types.PropertyGroup):
         name="Along",
         type=bpy.types.Object,
         poll=_is_guide,
-        description="Curve that the platform follows at its height, or camera: a tripod stands at its place, others "
-        "fly through its frames. Straight over the scene's middle if there is none",
+        description="Curve that the platform follows at its height, or camera: a tripod stands at the camera, another "
+        "platform follows its animation. If empty, the path is straight over the middle of the scene",
     )
     classes: bpy.props.StringProperty(
         name="Classes",
         subtype="FILE_PATH",
-        description="JSON file with classes by names of objects, materials and collections, as synthroads scan takes",
+        description="JSON file of classes by name of object, material or collection, as for synthroads scan",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     visible: bpy.props.EnumProperty(
         name="As Seen In",
         items=(
-            ("render", "Renders", "Objects, modifiers, particles and their levels as renders have them"),
-            ("viewport", "Viewport", "Objects, modifiers, particles and their levels as the viewport shows them"),
+            ("render", "Renders", "Objects, modifiers, particles and their levels as in renders"),
+            ("viewport", "Viewport", "Objects, modifiers, particles and their levels as in the viewport"),
         ),
-        description="Whose state of the scene is scanned",
+        description="State of the scene to scan",
     )
-    point_class: bpy.props.EnumProperty(
-        name="Class", items=_class_items, description="Class that the button gives to the selected objects"
-    )
+    point_class: bpy.props.EnumProperty(name="Class", items=_class_items, description="Class for the selected objects")
 
 
 class SYNTHROADS_OT_set_class(bpy.types.Operator):
-    """Give the selected objects this class: it is kept with them as the custom property synthroads_class"""
+    """Give the selected objects this class, as their custom property synthroads_class"""
 
     bl_idname = "synthroads.set_class"
     bl_label = "Set Class of Selected"

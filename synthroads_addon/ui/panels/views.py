@@ -15,7 +15,7 @@ from .rules import edited_parameters
 
 
 class SYNTHROADS_OT_add_views(bpy.types.Operator):
-    """Add the road's sun, sky and haze, and a driver's and an aerial camera; those added before are replaced. Scans leave them out"""  # noqa: E501 (a tooltip is one line)
+    """Add sun, sky and haze for the road, a driver's and an aerial camera, replacing earlier ones. Scans ignore them"""
 
     bl_idname = "synthroads.add_views"
     bl_label = "Add Sun, Sky, Cameras"
@@ -36,7 +36,7 @@ class SYNTHROADS_OT_add_views(bpy.types.Operator):
 
 
 class SYNTHROADS_OT_look_through(bpy.types.Operator):
-    """Look through this camera, which renders take from now on"""
+    """Look through this camera, and use it for renders"""
 
     bl_idname = "synthroads.look_through"
     bl_label = "Look Through Camera"
@@ -46,11 +46,11 @@ class SYNTHROADS_OT_look_through(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Make `camera` the scene's camera and show its view."""
-        found = dict(cameras_of(context.scene)).get(self.camera)
-        if found is None:
+        camera = dict(cameras_of(context.scene)).get(self.camera)
+        if camera is None:
             self.report({"ERROR"}, "Add the cameras first")
             return {"CANCELLED"}
-        context.scene.camera = found
+        context.scene.camera = camera
         space = view_of(context)
         if space:
             space.region_3d.view_perspective = "CAMERA"

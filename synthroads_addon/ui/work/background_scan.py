@@ -78,7 +78,7 @@ def _scan_visible(job: dict[str, Any], scenario: Scenario, timer: StageTimer) ->
         further = {"number_objects": True, "class_ids": inputs.scheme.source_ids(), "visible": job["visible"]}
         scene = scanned_scene(classes=classes, speed_factor=factor, **further)
     if not len(scene.static) and not scene.moving:
-        raise InputError("Scene", None, "nothing visible in it has faces that could be scanned")
+        raise InputError("Scene", None, "nothing visible has faces that can be scanned")
     site = route_site(scenario, inputs, SceneRoute(**job["route"]), scene.static)
     return ForeignScene(site, scene).scan(Path(job["folder"]), timer), scene.warnings
 

@@ -28,7 +28,7 @@ from .view import look_along
 
 
 class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
-    """Make a road from these settings. It takes the place of the shown road; all else stays as it is"""
+    """Build a road from these settings. It replaces the shown road; everything else stays as it is"""
 
     bl_idname = "synthroads.build"
     bl_label = "Build Road"
@@ -36,8 +36,8 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
 
     beside: bpy.props.BoolProperty(
         name="One More",
-        description="Build one more road beside what is there, with another seed where a road has this one, "
-        "instead of building the shown one anew",
+        description="Add a road to the scene instead of rebuilding the shown one; if a road has the same seed, "
+        "the next road gets another",
         options={"SKIP_SAVE"},
     )
 
@@ -105,11 +105,11 @@ def next_seed(seed: int) -> int:
 
 def unused_seed(seed: int, scene: bpy.types.Scene) -> int:
     """Return a seed that none of a scene's roads was drawn from: this one if it can be, else one after it."""
-    taken = set()
+    seeds = set()
     for root in roads(scene):
         with suppress(InputError):  # what is kept of the road is damaged
-            taken.add(recall(root)[1].seed)
-    while seed in taken:
+            seeds.add(recall(root)[1].seed)
+    while seed in seeds:
         seed = next_seed(seed)
     return seed
 
@@ -142,14 +142,18 @@ def build_work(scenario: Scenario, built_from: str, place: BuildTarget = MEANT) 
 
 
 def road_work(
-    parameters: RoadParameters, scenario: Scenario, built_from: str, place: BuildTarget = MEANT, found: str = ""
+    parameters: RoadParameters,
+    scenario: Scenario,
+    built_from: str,
+    place: BuildTarget = MEANT,
+    reconstruction: str = "",
 ) -> Work[RoadModel]:
     """Generator that builds a road from given parameters, as a job's work; see `build_work` and `remember`."""
     fidelity = scenario.settings()
     yield Step(0.02, "Building")
     steps = build_steps(BuildRequest(parameters, fidelity.tolerance, fidelity.vegetation_detail), place)
     model = yield from part_of_work(build_unseen(steps), 0.02, 1.0)
-    remember(model.root, parameters, scenario, built_from, found)
+    remember(model.root, parameters, scenario, built_from, reconstruction)
     if place.beside:
         move_beside(model.root, bpy.context.view_layer)
     return model

@@ -17,10 +17,10 @@ from .job import running_job
 RUNS_AS_EXTENSION = str(__package__).startswith("bl_ext.")
 """Whether Blender has installed this as an extension, which brings its packages with it: there is no pip."""
 IN_BLENDER = {
-    "twin": "needs the extension SynthRoads IFC, which comes beside this one: Output > Export installs it",
-    "e57": "is no format of the extension: the command synthroads cloud convert makes LAZ of it, and it of LAZ",
-    "maps": "is read outside of Blender: the command synthroads road makes a parameter set of it, for Load Set",
-    "cluster": "is for the command synthroads dataset, outside of Blender",
+    "twin": "needs the extension SynthRoads IFC: Output > Export installs its zip, which is beside this extension's",
+    "e57": "can't be used in the extension: the command synthroads cloud convert converts it to LAZ, and LAZ to it",
+    "maps": "can't be read in Blender: the command synthroads road makes a parameter set of it, for Load Set",
+    "cluster": "can only be used by the command synthroads dataset, outside of Blender",
 }
 """Sentences in Blender about a package that is missing, by the extra that brings it elsewhere."""
 
@@ -59,10 +59,10 @@ def is_free(operator: type[bpy.types.Operator], context: bpy.types.Context) -> b
     """Return whether long work may begin, for an operator's `poll`; else set its tooltip to the reason."""
     job = running_job()
     if job is not None:
-        operator.poll_message_set(f"{job.title} is still at work")
+        operator.poll_message_set(f"{job.title} is still running")
         return False
     if context.mode != "OBJECT":
-        operator.poll_message_set("Go back to object mode first")
+        operator.poll_message_set("Switch to Object Mode first")
         return False
     return True
 

@@ -281,15 +281,15 @@ class PanelJob(Generic[T]):
             else:
                 self._note(outcome, begin)
 
-    def _note(self, found: float | Step | Aside | None, begin: Callable[[Aside], None]) -> None:
+    def _note(self, turn: float | Step | Aside | None, begin: Callable[[Aside], None]) -> None:
         """Update progress from the value that the generator yielded; if it is an `Aside`, begin its thread."""
-        self._idle = found is None
-        if isinstance(found, Aside):
-            found = replace(found, work=self._with_remarks(found.work))
-            self._aside, self._state, self.share = found, found.state or self._state, found.first
-            begin(found)
-        elif found is not None:
-            step = found if isinstance(found, Step) else Step(found)
+        self._idle = turn is None
+        if isinstance(turn, Aside):
+            turn = replace(turn, work=self._with_remarks(turn.work))
+            self._aside, self._state, self.share = turn, turn.state or self._state, turn.first
+            begin(turn)
+        elif turn is not None:
+            step = turn if isinstance(turn, Step) else Step(turn)
             self.share, self._state = step.share, step.state or self._state
 
     def _with_remarks(self, work: Callable[[Report], Any]) -> Callable[[Report], Any]:

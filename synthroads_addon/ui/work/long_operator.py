@@ -123,7 +123,7 @@ class LongOperator:
         if isinstance(job.error, InputError):
             return self.refuse(job.error)
         traceback.print_exception(job.error)
-        self.report({"ERROR"}, f"{job.title} failed, {self.nothing_done}: {job.error!r} (the console says more)")
+        self.report({"ERROR"}, f"{job.title} failed, {self.nothing_done}: {job.error!r} (see the console)")
         return {"CANCELLED"}
 
     def _say(self, message: str, remarks: Sequence[str]) -> set[str]:
@@ -188,7 +188,7 @@ class FileOperator(FileChooser, LongOperator):
 
 
 class SYNTHROADS_OT_cancel(bpy.types.Operator):
-    """Stop what is at work; everything is left as it was before"""
+    """Stop the running work; everything stays as it was before"""
 
     bl_idname = "synthroads.cancel"
     bl_label = "Cancel"

@@ -117,7 +117,7 @@ class SavedScene:
         if messages.done is not None:
             return Scanned(**messages.done)
         if code < 0:
-            raise InputError("Blender", None, f"was ended in the background by signal {-code} (too little memory?)")
+            raise InputError("Blender", None, f"was ended by signal {-code} (too little memory?)")
         errors = (self.place / _ERRORS).read_text(encoding="utf-8", errors="replace").strip()
         raise RuntimeError(f"Blender in the background ended with exit code {code}: {errors or 'no message'}")
 

@@ -112,9 +112,9 @@ def _save_copy(scan: RoadScan, work: Workplace) -> Generator[Step, None, Measure
     yield Step(READ)
 
     def measure(report: Report) -> tuple[dict[str, Any], Sequence[str]]:
-        done = saved.scan(report)
-        work.timer.stages.update(done.stages)
-        return done.counts, done.warnings
+        result = saved.scan(report)
+        work.timer.stages.update(result.stages)
+        return result.counts, result.warnings
 
     return measure
 
@@ -162,19 +162,19 @@ def _write_files(scan: RoadScan, work: Workplace, measure: Measure, report: Repo
     files = JobFiles(scan.scenario)
     with followed_models(timer, report):
         files.write_road(folder, scan.road, timer)
-    told: dict[str, Any] = {}
+    contents: dict[str, Any] = {}
     of_scene: Sequence[str] = ()
     if set(files.outputs) & set(OF_POINTS):
-        told["counts"], of_scene = measure(report)
-    told |= {"instances": scan.road.numbers.to_dict()} | scan.edited.to_dict()
-    if warnings := [*of_scene, *empty_scan_warnings(told.get("counts", {}))]:
-        told["warnings"] = warnings
-    files.write_report(folder, told, timer)
-    return int(told["counts"]["points"]) if "counts" in told else 0
+        contents["counts"], of_scene = measure(report)
+    contents |= {"instances": scan.road.numbers.to_dict()} | scan.edited.to_dict()
+    if warnings := [*of_scene, *empty_scan_warnings(contents.get("counts", {}))]:
+        contents["warnings"] = warnings
+    files.write_report(folder, contents, timer)
+    return int(contents["counts"]["points"]) if "counts" in contents else 0
 
 
 class SYNTHROADS_OT_scan(LongOperator, bpy.types.Operator):
-    """Scan everything that is visible, and write the labelled points with pictures; of a road, its parameters"""
+    """Scan everything that is visible; write the labelled points, pictures and, for a road, its parameters"""
 
     bl_idname = "synthroads.scan"
     bl_label = "Scan"

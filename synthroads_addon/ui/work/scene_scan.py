@@ -83,9 +83,9 @@ def visible_scan_work(scan: VisibleScan) -> Work[Written]:
 
         def write(report: Report) -> int:
             counts, of_scene = measure(report)
-            told = {"scene": bpy.path.basename(bpy.data.filepath) or None, "counts": counts}
-            told["warnings"] = [*warnings, *of_scene, *warnings_of_counts(counts)]
-            files.write_report(work.folder, told, work.timer)
+            contents = {"scene": bpy.path.basename(bpy.data.filepath) or None, "counts": counts}
+            contents["warnings"] = [*warnings, *of_scene, *warnings_of_counts(counts)]
+            files.write_report(work.folder, contents, work.timer)
             return int(counts["points"])
 
         points = yield Aside(write, state, READ, 1.0, work.calls, work.notes)
@@ -117,7 +117,7 @@ def _read(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Measure |
         with timer.stage("scene mesh"):
             scene = copied.put_together()
         if not len(scene.static) and not scene.moving:
-            raise InputError("Scene", None, "nothing visible in it has faces that could be scanned")
+            raise InputError("Scene", None, "nothing visible has faces that can be scanned")
         site = route_site(scan.scenario, scan.inputs, scan.route, scene.static)
         with timer.stage("caster"):
             plan = site.plan(scene, services)
@@ -137,9 +137,9 @@ def _save_copy(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Meas
     yield Step(READ)
 
     def measure(report: Report) -> tuple[dict[str, Any], Sequence[str]]:
-        done = saved.scan(report)
-        work.timer.stages.update(done.stages)
-        return done.counts, done.warnings
+        result = saved.scan(report)
+        work.timer.stages.update(result.stages)
+        return result.counts, result.warnings
 
     return measure
 

@@ -31,10 +31,10 @@ def build_unseen(steps: Generator[float | None, None, T]) -> Generator[float | N
 
 def _hide() -> set[int]:
     """Hide the staging collections as the outliner's eye does; return their session numbers."""
-    found = [layer for layer in _layers() if STAGING in layer.collection and not layer.hide_viewport]
-    for layer in found:
+    layers = [layer for layer in _layers() if STAGING in layer.collection and not layer.hide_viewport]
+    for layer in layers:
         layer.hide_viewport = True  # `hide_viewport` of the collection itself would also keep it from being evaluated
-    return {layer.collection.session_uid for layer in found}
+    return {layer.collection.session_uid for layer in layers}
 
 
 def _show(hidden: set[int]) -> None:

@@ -90,8 +90,8 @@ def noise_codes(*codes: int) -> np.ndarray:
 
 WITHHELD = "4 points are withheld and left out"
 NOISE = "4 points of a class of noise (LAS codes 7 and 18) are left out"
-EIGHT_BIT_COLORS = "its colours, 128 at most, are taken for 8 bits (0 to 255)"
-INVALID_INTENSITY = "4 points have an invalid intensity: it is taken for 0"
+EIGHT_BIT_COLORS = "its colours, 128 at most, are read as 8 bits (0 to 255)"
+INVALID_INTENSITY = "4 points have an invalid intensity: it is read as 0"
 WIDE = {"isIntensityInvalid": (EVERY_FIFTH, "int", 0, 1)}
 HALF = 128 * 257
 SHARES = np.arange(COUNT) / COUNT
@@ -140,12 +140,12 @@ CASES: dict[str, Case] = {
     "e57 invalid colour": Case(
         e57({**e57_rgb(128, "int", 0, 255), "isColorInvalid": (EVERY_FIFTH, "int", 0, 1)}, color_limits(0, 255)),
         {"rgb": np.where(EVERY_FIFTH, 0, HALF)[:, None]},
-        ("4 points have an invalid colour: it is taken for 0",),
+        ("4 points have an invalid colour: it is read as 0",),
     ),
     "e57 invalid time": Case(
         e57({"timeStamp": (7.0, "float", 0.0, 1e9), "isTimeStampInvalid": (EVERY_FIFTH, "int", 0, 1)}),
         {"gps_time": np.where(EVERY_FIFTH, 0.0, 7.0)},
-        ("4 points have an invalid time: it is taken for 0",),
+        ("4 points have an invalid time: it is read as 0",),
     ),
     "e57 invalid places": Case(
         e57({"cartesianInvalidState": (EVERY_FIFTH * 2, "int", 0, 2)}),
@@ -169,17 +169,17 @@ CASES: dict[str, Case] = {
     "e57 floats without limits": Case(
         e57(e57_rgb(127.5, "float", -np.inf, np.inf)),
         {"rgb": 32768},
-        ("its colours, 127.5 at most, are taken for 8 bits (0 to 255)",),
+        ("its colours, 127.5 at most, are read as 8 bits (0 to 255)",),
     ),
     "e57 shares without limits": Case(
         e57(e57_rgb(0.5, "float", -np.inf, np.inf)),
         {"rgb": 32768},
-        ("its colours, 0.5 at most, are taken for shares from 0 to 1",),
+        ("its colours, 0.5 at most, are read as shares from 0 to 1",),
     ),
     "e57 beyond its limits": Case(
         e57(e57_rgb(np.where(EVERY_FIFTH, 300, 128), "int", 0, 65535), color_limits(0, 255)),
         {"rgb": np.where(EVERY_FIFTH, 65535, HALF)[:, None]},
-        ("12 points have a colour beyond the limits that the file names",),
+        ("12 points have a colour beyond the file's limits: they are clipped",),
     ),
     "las 8 bits": Case(las(7, red=128, green=128, blue=128), {"rgb": HALF}, (EIGHT_BIT_COLORS,)),
     "laz 8 bits, LAS 1.2": Case(
@@ -191,20 +191,20 @@ CASES: dict[str, Case] = {
     "ply ushort": Case(ply(rgb("<u2", HALF)), {"rgb": HALF}),
     "ply ushort of 8 bits": Case(ply(rgb("<u2", 128)), {"rgb": HALF}, (EIGHT_BIT_COLORS,)),
     "ply int of 8 bits": Case(ply(rgb("<i4", 128)), {"rgb": HALF}, (EIGHT_BIT_COLORS,)),
-    "ply shares": Case(ply(rgb("<f4", 0.5)), {"rgb": 32768}, ("0.5 at most, are taken for shares from 0 to 1",)),
-    "ply floats to 255": Case(ply(rgb("<f4", 127.5)), {"rgb": 32768}, ("127.5 at most, are taken for 8 bits",)),
+    "ply shares": Case(ply(rgb("<f4", 0.5)), {"rgb": 32768}, ("0.5 at most, are read as shares from 0 to 1",)),
+    "ply floats to 255": Case(ply(rgb("<f4", 127.5)), {"rgb": 32768}, ("127.5 at most, are read as 8 bits",)),
     "ply floats to 65535": Case(
-        ply(rgb("<f8", float(HALF))), {"rgb": HALF}, ("at most, are taken for numbers from 0 to 65,535",)
+        ply(rgb("<f8", float(HALF))), {"rgb": HALF}, ("at most, are read as numbers from 0 to 65,535",)
     ),
     "ply floats with NaN": Case(
         ply(rgb("<f4", np.where(EVERY_FIFTH, np.nan, 1.0))),
         {"rgb": np.where(EVERY_FIFTH, 0, 65535)[:, None]},
-        ("1 at most, are taken for shares from 0 to 1",),
+        ("1 at most, are read as shares from 0 to 1",),
     ),
     "ply diffuse": Case(ply(rgb("u1", 128, ("diffuse_red", "diffuse_green", "diffuse_blue"))), {"rgb": HALF}),
     "ply r g b": Case(ply(rgb("u1", 128, ("r", "g", "b"))), {"rgb": HALF}),
     "npz uint8": Case(npz(rgb=np.full((COUNT, 3), 128, np.uint8)), {"rgb": HALF}),
-    "npz shares": Case(npz(rgb=np.full((COUNT, 3), 0.5)), {"rgb": 32768}, ("0.5 at most, are taken for shares",)),
+    "npz shares": Case(npz(rgb=np.full((COUNT, 3), 0.5)), {"rgb": 32768}, ("0.5 at most, are read as shares",)),
     # Intensities of E57.
     "e57 intensity, 16 bits": Case(
         e57({"intensity": (SHARES * 65535, "int", 0, 65535)}, intensity_limits(0, 65535)),
@@ -220,7 +220,7 @@ CASES: dict[str, Case] = {
     "e57 intensity beyond its limits": Case(
         e57({"intensity": (np.where(EVERY_FIFTH, 3.0, 0.5), "float", -9.0, 9.0)}, intensity_limits(0.0, 1.0)),
         {"intensity": np.where(EVERY_FIFTH, 1.0, 0.5)},
-        ("4 points have an intensity beyond the limits that the file names",),
+        ("4 points have an intensity beyond the file's limits: they are clipped",),
     ),
     "e57 limits of every scan": Case(
         e57(
@@ -242,12 +242,12 @@ CASES: dict[str, Case] = {
     "ply label NaN": Case(
         ply({"scalar_Classification": ("<f4", NAN_FIFTH)}),
         {"class_id": np.where(EVERY_FIFTH, 0, 5)},
-        ("4 points have no class_id (NaN or -1): it is taken for 0",),
+        ("4 points have no class_id (NaN or -1): it is read as 0",),
     ),
     "ply label -1": Case(
         ply({"classification": ("<i4", np.where(EVERY_FIFTH, -1, 5))}),
         {"class_id": np.where(EVERY_FIFTH, 0, 5)},
-        ("4 points have no class_id (NaN or -1): it is taken for 0",),
+        ("4 points have no class_id (NaN or -1): it is read as 0",),
     ),
     "npz class 258": Case(npz(class_id=np.full(COUNT, 258)), {}, refused="class_id of point 0 is 258"),
     "npz strip 70000": Case(npz(strip=np.full(COUNT, 70000)), {}, refused="strip of point 0 is 70000"),
@@ -323,12 +323,12 @@ CASES: dict[str, Case] = {
         },
     ),
     "ply label without a meaning of its own": Case(
-        ply({"label": ("u1", 5)}), {"class_id": 5}, ("its property label is taken for LAS codes of classes",)
+        ply({"label": ("u1", 5)}), {"class_id": 5}, ("its property label is read as LAS codes of classes",)
     ),
     "ply of ours, written again without notes": Case(
         ply({"scalar_class_id": ("<f4", 3.0), "scalar_instance_id": ("<f4", 12.0)}),
         {"class_id": 3, "instance_id": 12},
-        ("its class_id is taken for numbers of the 17 classes",),
+        ("its class_id is read as numbers of the 17 classes",),
     ),
     "ply of another element": Case(ply({"intensity": ("<u2", 300)}, "testing"), {"intensity": 300.0}),
 }

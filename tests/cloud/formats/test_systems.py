@@ -117,12 +117,12 @@ UNDERSTOOD = {
     "two systems": (
         Declared(gdal(25832), keys=((1024, 1), (3072, 25833))),
         (25832, None),
-        ("two coordinate systems: EPSG:25832 is used, EPSG:25833 is left aside",),
+        ("two coordinate systems: EPSG:25832 is used, EPSG:25833 is ignored",),
     ),
     "two systems, keys count": (
         Declared(gdal(25832), bit=False, keys=((1024, 1), (3072, 25833))),
         (25833, None),
-        ("EPSG:25833 is used, EPSG:25832 is left aside",),
+        ("EPSG:25833 is used, EPSG:25832 is ignored",),
     ),
     "no system": (Declared("here be dragons"), (None, None), ("can't be read (here be dragons)",)),
     "text cut off": (Declared(gdal(25832)[:200]), (None, None), ("can't be read (PROJCS",)),
@@ -154,9 +154,9 @@ REFUSED = {
     "keys, degrees, model missing": (Declared(keys=((2048, 4258),)), "geographic, EPSG:4258.*degrees"),
     "geocentric": (Declared(gdal(4978)), "geocentric"),
     "keys, geocentric": (Declared(keys=((1024, 3),)), "geocentric.*the Earth's centre"),
-    "axes west and south": (Declared(gdal(2053)), "runs west and south"),
-    "heights alone": (Declared(gdal(7837)), "heights alone"),
-    "depths": (Declared(DEPTHS), "counts downwards"),
+    "axes west and south": (Declared(gdal(2053)), "has axes west and south"),
+    "heights alone": (Declared(gdal(7837)), "has heights only"),
+    "depths": (Declared(DEPTHS), "counted downwards"),
 }
 
 
@@ -242,19 +242,19 @@ def test_figures_of_a_cloud_in_feet_are_in_metres(tmp_path: Path) -> None:
 def test_clouds_with_other_heights_are_not_merged(tmp_path: Path) -> None:
     for name in ("pair", "pair with a code"):
         UNDERSTOOD[name][0].write(tmp_path / f"{name}.las")
-    with pytest.raises(InputError, match="has other coordinate system"):
+    with pytest.raises(InputError, match="has a different coordinate system"):
         merge([tmp_path / "pair.las", tmp_path / "pair with a code.las"], tmp_path / "out.las")
 
 
 @pytest.mark.parametrize(
     ("codes", "said"),
     [
-        ((7837, None), "epsg is 7837: .*heights alone"),
+        ((7837, None), "epsg is 7837: .*has heights only"),
         ((99999, None), "epsg is 99999: must be the EPSG code of a coordinate system"),
         ((4978, None), "epsg is 4978: .*geocentric"),
         ((25832, 25833), "height_epsg is 25833: must be the EPSG code of a vertical"),
-        ((5555, 7837), "height_epsg is 7837: EPSG:5555 says already"),
-        ((25832, 5715), "counts downwards"),
+        ((5555, 7837), "height_epsg is 7837: EPSG:5555 already names"),
+        ((25832, 5715), "counted downwards"),
     ],
     ids=str,
 )

@@ -106,7 +106,7 @@ def test_nothing_is_told_of_flags_that_no_point_has(tmp_path: Path) -> None:
 
 def test_clouds_whose_times_count_from_elsewhere_are_not_merged(tmp_path: Path) -> None:
     one, two = las_file(tmp_path / "a.las"), las_file(tmp_path / "b.las", standard_time=True)
-    with pytest.raises(Exception, match="has other epoch of GPS time than"):
+    with pytest.raises(Exception, match="has a different epoch of GPS time from"):
         merge([one, two], tmp_path / "both.las")
 
 

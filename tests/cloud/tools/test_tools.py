@@ -330,7 +330,7 @@ def test_previews_of_a_file(tmp_path: Path) -> None:
     assert cut["section_points"] == pytest.approx(20_000 * 0.5 / 12, rel=0.2)
     with pytest.raises(InputError, match=r"--station is 10000.0: must be 0 to"):
         draw_previews(tmp_path / "cloud.laz", tmp_path / "else", station=1e4)
-    with pytest.raises(InputError, match="cuts no points"):
+    with pytest.raises(InputError, match="meets no points"):
         draw_previews(tmp_path / "cloud.laz", tmp_path / "else", line=(0, 0, 1, 1))
     assert not (tmp_path / "else").exists()
 

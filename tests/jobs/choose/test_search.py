@@ -87,7 +87,7 @@ def test_a_tolerance_takes_what_keeps_it_and_leaves_what_is_given(tmp_path: Path
 @pytest.mark.slow
 @pytest.mark.usefixtures("few_lines")
 def test_what_cannot_be_kept_is_refused_with_the_best(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"tolerance.intensity is 0.01: can't be kept here: the best to be had is"):
+    with pytest.raises(InputError, match=r"tolerance.intensity is 0.01: can't be reached here: the smallest possible"):
         report_of(tmp_path / "out", "road.length=40", "tolerance=intensity=1%", "scan.rays_per_pulse=7")
     with pytest.raises(InputError, match=r"tolerance.height is 0.001: .* 20 mm"):
         report_of(tmp_path / "out", "road.length=40", "tolerance=height=1mm", "geometric_tolerance=0.02")
@@ -99,7 +99,9 @@ def test_what_cannot_be_kept_is_refused_with_the_best(tmp_path: Path) -> None:
         report_of(tmp_path / "out", "road.length=40", "tolerance=colour=1", "colour.rgb=false")
     with pytest.raises(InputError, match=r"tolerance.layers is 0.1: .* points get no layers"):
         report_of(tmp_path / "out", "road.length=40", "tolerance=layers=0.1")
-    with pytest.raises(InputError, match=r"tolerance.colour is 0.1: can't be kept here: the best to be had is \d"):
+    with pytest.raises(
+        InputError, match=r"tolerance.colour is 0.1: can't be reached here: the smallest possible error is \d"
+    ):
         report_of(tmp_path / "out", "road.length=40", "tolerance=colour=0.1", "colour.source=material")
     with pytest.raises(InputError, match="outputs"):
         report_of(tmp_path / "out", "road.length=40", "time_budget=60s", 'outputs=["parameters"]')

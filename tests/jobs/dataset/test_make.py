@@ -69,8 +69,8 @@ def test_a_scene_that_fails_stands_in_the_manifest(
     [
         ({"jobs": 0}, "--jobs is 0: must be 1 to 1024"),
         ({"jobs": 1025}, "--jobs is 1025"),
-        ({"resume": True, "overwrite": True}, "can't be given with --resume, which keeps what is there"),
-        ({"splits": ["no-such"]}, "--splits is 'no-such': must be of the recipe's: train"),
+        ({"resume": True, "overwrite": True}, "can't be given with --resume, which keeps existing scenes"),
+        ({"splits": ["no-such"]}, "--splits is 'no-such': must be splits of the recipe: train"),
         ({"changes": ["no.such=1"]}, "unknown key"),
     ],
 )

@@ -119,7 +119,7 @@ def test_a_scan_without_points_has_empty_arrays_and_a_remark() -> None:
     found = scan_to_arrays(scenario("road.length=20", "scan.attenuation=1"))
     assert found.xyz.shape == (0, 3)
     assert {name: len(array) for name, array in found.arrays.items()} == dict.fromkeys(found.arrays, 0)
-    assert "not one pulse came back" in found.remarks[0]
+    assert "no pulse came back" in found.remarks[0]
 
 
 def test_jobs_that_write_files_ask_for_a_folder() -> None:
@@ -146,5 +146,5 @@ def test_arrays_have_names_types_and_units() -> None:
 
 def test_points_without_an_array_that_is_asked_for_are_refused() -> None:
     sink = sink_of(Scenario.from_dict({"cloud": {"attributes": ["damage"]}}))
-    with sink.open(), pytest.raises(InputError, match=r"damage.: is to be kept, but the points don't have it"):
+    with sink.open(), pytest.raises(InputError, match=r"damage.: is in cloud.attributes, but the points"):
         sink.write(middle_pulses(scan_of(plane()), 10))

@@ -140,7 +140,7 @@ def test_arrays_of_truecity_as_its_repository_describes_them(
         ((classes, places, strength),) = tiles_of(tmp_path, "truecity", split)
     assert (classes, strength) == (["road", "ground", "vegetation", "-", "-"], None)
     assert places == pytest.approx(XYZ, abs=1e-3)
-    assert any("taken for 0 RoadSurface, 1 GroundSurface" in remark for remark in remarks)
+    assert any("read as 0 RoadSurface, 1 GroundSurface" in remark for remark in remarks)
     assert any("columns after the fourth" in remark for remark in remarks) == (columns > 4)
 
 

@@ -26,8 +26,8 @@ FLAT = np.column_stack([ROAD[:, :2], np.zeros(len(ROAD))])
 
 UNDERSTOOD: dict[str, tuple[Write, str]] = {
     "the road's own": (geojson(ROAD, urn(25832)), ""),
-    "none": (geojson(ROAD), "names no system: its coordinates are taken for EPSG:25832"),
-    "CSV, none": (csv(ROAD), "names no system: its coordinates are taken for EPSG:25832"),
+    "none": (geojson(ROAD), "names no system: its coordinates are read as EPSG:25832"),
+    "CSV, none": (csv(ROAD), "names no system: its coordinates are read as EPSG:25832"),
     "Web Mercator": (geojson(in_system(3857), urn(3857)), "moved from EPSG:3857 to EPSG:25832"),
     "next zone": (geojson(in_system(25833), urn(25833)), "moved from EPSG:25833 to EPSG:25832"),
     "Gauss-Krueger": (geojson(in_system(31466), urn(31466)), "to within"),
@@ -66,9 +66,9 @@ SWAPPED, SWISS = ROAD[:, [1, 0, 2]], ROAD - [294_000.0, 5_628_000.0, 0.0] + [2_6
 REFUSED: dict[str, tuple[Write, str]] = {
     "a column that counts": (lines(COUNTED), r"first column is '0, 1, 2 \.\.\.': the first column counts the lines"),
     "a column that counts, flat": (lines(COUNTED_FLAT), "the first column counts the lines"),
-    "height of a northing": (csv(ROAD[:, [0, 0, 1]], ""), r"z of point 41 is 5628240\.0: no land lies so high"),
-    "height in millimetres": (csv(ROAD * [1.0, 1.0, 1000.0]), "z of point .*: no land lies so high"),
-    "depth of the sea": (csv(ROAD - [0.0, 0.0, 20_000.0]), "no land lies so high, 9,000 m is the most"),
+    "height of a northing": (csv(ROAD[:, [0, 0, 1]], ""), r"z of point 41 is 5628240\.0: no land lies higher"),
+    "height in millimetres": (csv(ROAD * [1.0, 1.0, 1000.0]), "z of point .*: no land lies higher"),
+    "depth of the sea": (csv(ROAD - [0.0, 0.0, 20_000.0]), "no land lies higher than 9,000 m"),
     "x and y swapped": (csv(SWAPPED), r"outside of the system's area of use: EPSG:25832 is for longitudes 6\.0 to"),
     "Swiss, undeclared": (csv(SWISS), "outside of the system's area of use"),
     "Gauss-Krueger, undeclared": (csv(in_system(31466)), "outside of the system's area of use"),
@@ -79,7 +79,7 @@ REFUSED: dict[str, tuple[Write, str]] = {
     "unknown name": (geojson(ROAD, named("Gauss-Krueger")), "crs is 'Gauss-Krueger': a coordinate system"),
     "a PROJ string": (geojson(ROAD, named("+init=epsg:25832")), "crs is '\\+init=epsg:25832': a coordinate system"),
     "a link": (geojson(ROAD, {"type": "link", "properties": {"href": "crs.wkt"}}), "links aren't followed"),
-    "heights alone": (geojson(ROAD, urn(7837)), "heights alone"),
+    "heights alone": (geojson(ROAD, urn(7837)), "has heights only"),
     "geocentric": (geojson(ROAD, urn(4978)), "geocentric"),
     "comment of an unknown code": (csv(ROAD, "# crs: EPSG:99999\nx,y,z"), "axis.csv crs is 'EPSG:99999'"),
     "a .prj that is none": (csv(ROAD, prj="nothing"), r"axis\.prj crs is 'nothing'"),
@@ -132,7 +132,7 @@ def test_without_a_system_to_compare_with_it_is_told(tmp_path: Path) -> None:
     with logged() as messages:
         points = read_axis(geojson(in_system(25833), urn(25833))(tmp_path), Placement())
     np.testing.assert_allclose(points, in_system(25833))
-    assert ["names no system, and is taken to be in it" in message for message in messages] == [True]
+    assert ["name no system, and are read in the same system" in message for message in messages] == [True]
     with pytest.raises(InputError, match="metres of a projected system are needed, not degrees"):
         read_axis(geojson(in_system(4258), urn(4258))(tmp_path), Placement())
 

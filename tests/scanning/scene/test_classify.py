@@ -109,7 +109,7 @@ def test_assets_have_classes_of_the_scheme(tmp_path: Path) -> None:
     ("member", "message"),
     [
         ({}, "at least one of class, material, thing, asset"),
-        ({"where": {"model": "truck"}, "asset": "a"}, "where needs a thing"),
+        ({"where": {"model": "truck"}, "asset": "a"}, "where needs thing"),
         ({"class": "rode"}, "did you mean 'road'"),
         ({"thing": "Vehicel"}, "did you mean 'Vehicle'"),
         ({"thing": "Vehicle", "where": {"modle": "truck"}}, "must be a field of Vehicle.*did you mean 'model'"),

@@ -149,7 +149,7 @@ def test_what_the_panel_lacks_is_refused_not_ignored(name: str) -> None:
     panel = bpy.context.scene.synthroads
     before = panel.scenario()
     scenario = Scenario.from_dict({"tolerance": {"height": "5mm"}} if name == "tolerance" else {"time_budget": "60s"})
-    with pytest.raises(InputError, match=f"^{name} .*only synthroads generate chooses"):
+    with pytest.raises(InputError, match=f"^{name} .*only synthroads generate uses"):
         panel.show_scenario(scenario)
     assert panel.scenario() == before
 

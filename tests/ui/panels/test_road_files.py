@@ -213,4 +213,4 @@ def test_what_was_assumed_of_an_axis_is_told(cheap: Any, tmp_path: Path, monkeyp
 
     monkeypatch.setattr(LongOperator, "_say", note)
     assert bpy.ops.synthroads.load_axis(filepath=str(axis_file(tmp_path))) == {"FINISHED"}
-    assert ["axis.csv names no system: its coordinates are taken for EPSG:25832" in text for text in told] == [True]
+    assert ["axis.csv names no system: its coordinates are read as EPSG:25832" in text for text in told] == [True]

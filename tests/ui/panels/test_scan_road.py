@@ -85,7 +85,7 @@ def test_what_is_not_doubtful_is_said(settings: Any, cloud: Path, monkeypatch: p
     bpy.ops.synthroads.road_from_scan(filepath=str(cloud))
     assert scan_road.SYNTHROADS_PT_scan_road.poll(bpy.context)
     shown = lines(scan_road.SYNTHROADS_PT_scan_road)
-    assert shown[0] == "label 'Nothing of it is doubtful' <CHECKMARK>"
+    assert shown[0] == "label 'No part of it is doubtful' <CHECKMARK>"
     text = "\n".join(shown)
     report = run_reconstruction(ReconstructionJob(cloud)).report
     for line in ("dual carriageway of", "cm rms from the measured axis (std", *measure_lines(report)):

@@ -265,7 +265,7 @@ def test_buttons_wait_for_a_job(monkeypatch: pytest.MonkeyPatch) -> None:
     assert is_free(Operator, bpy.context)
     monkeypatch.setattr(job_module, "_running", PanelJob("Scan", work([])))
     assert not is_free(Operator, bpy.context)
-    assert said == ["Scan is still at work"]
+    assert said == ["Scan is still running"]
     monkeypatch.setattr(job_module, "_running", None)
     synthroads_addon.unregister()
 

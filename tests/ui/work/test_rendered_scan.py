@@ -155,7 +155,7 @@ def test_a_blender_that_is_missing_dies_or_fails_is_reported(tmp_path: Path) -> 
 
     with pytest.raises(InputError, match="Blender is '/no/blender': can't be started in the background"):
         outcome("/no/blender").scan(lambda share: None)
-    with pytest.raises(InputError, match="ended in the background by signal 9"):
+    with pytest.raises(InputError, match="ended by signal 9"):
         outcome("sh", "-c", "kill -9 $$").scan(lambda share: None)
     with pytest.raises(RuntimeError, match="exit code 3: what went wrong"):
         outcome("sh", "-c", "echo what went wrong >&2; exit 3").scan(lambda share: None)

@@ -143,7 +143,7 @@ def test_through_the_frames_of_a_moving_camera(yard: Any) -> None:
 def test_an_empty_scene_is_a_message(settings: Any, tmp_path: Path) -> None:
     choose(settings, **CHEAP)
     settings.output = str(tmp_path / "out")
-    with pytest.raises(RuntimeError, match="nothing visible in it has faces"):
+    with pytest.raises(RuntimeError, match="nothing visible has faces"):
         bpy.ops.synthroads.scan()
     assert not (tmp_path / "out").exists()
 
