@@ -69,13 +69,13 @@ def find_centreline(cloud: RoadCloud, options: Options | None = None, progress: 
     layout = find_layout(profiles, find_lines(profiles), options.road)
     cores = [0.5 * (band.low + band.high) for band in layout.bands] if layout.kind == "dual" else [0.0]
     beside, _ = line.project(road.path.place(road.axis.stations, road.axis.offsets))
-    rivals = np.interp(profiles.middles, beside, road.axis.open.astype(np.float64)) > 0.5
+    rivals = road.open_along(line, profiles.middles)
     std = np.hypot(DEFINITION, np.interp(line.stations, beside, road.axis.std))
     halves = {
         name: np.interp(line.stations, beside, half_width(road.axis, share, factor, DEFINITION))
         for name, (share, factor) in INTERVALS.items()
     }
-    judgement = judge(profiles, layout, cores, rivals, road.parted_line(line, profiles.middles))
+    judgement = judge(layout, cores, rivals, road.parted_line(line, profiles.middles))
     return Centreline(layout.kind, line, _heights(profiles), std, halves, road.axis, judgement, layout.notes)
 
 

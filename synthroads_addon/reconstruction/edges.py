@@ -7,7 +7,7 @@ import numpy as np
 
 from ..base.arrays import Float
 from .path import SPACING
-from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints, row_gaps
+from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
 from .smoothing import bisquare, fill_gaps, robust_scale
 
 FARTHEST = 8.0
@@ -33,32 +33,43 @@ class Edge:
     apart: Float
 
 
-def paved_edge(profiles: Profiles, paved: Grid, begin: Float, sign: int, farthest: float | Float = FARTHEST) -> Edge:
-    """Return in each of K stretches the offset, m, at which the pavement ends beyond a given one; NaN if unseen.
+@dataclass(frozen=True)
+class Pavement:
+    """Cross profiles and the pavement in them.
 
-    Args:
-        profiles: S rows along the path.
-        paved: (S, U) share of pavement; NaN without points.
-        begin: (K,) offsets that are paved for sure, one per stretch, m.
-        sign: +1 looks to the left, -1 to the right.
-        farthest: how far beyond ``begin`` it is looked for, m; a number, or (K,).
-
-    The edge parts pavement from what isn't so that the fewest bins are on the wrong side; around it the shares of both
-    are weighed, so that it is found more exactly than the bins.
+    Attributes:
+        profiles: S rows along a path.
+        share: (S, U) of pavement, from classes or from brightness; NaN without points.
     """
-    edges, apart = np.full(len(begin), np.nan), np.zeros(len(begin))
-    reach = np.broadcast_to(np.asarray(farthest, dtype=np.float64), begin.shape)
-    for number, place in enumerate(begin):
-        if not np.isfinite(place) or reach[number] < 2.0 * ACROSS:
-            continue
-        rows = slice(number * STRETCH, (number + 1) * STRETCH)
-        column = profiles.column(place)
-        end = profiles.column(place + sign * reach[number])
-        share = _mean(paved[rows, column : end + sign if end + sign >= 0 else None : sign])
-        edges[number] = _find_edge(share, float(profiles.offsets[column]), sign)
-        if profiles.points is not None and np.isfinite(edges[number]):
-            edges[number], apart[number] = _between_points(profiles.points, number, edges[number], sign)
-    return Edge(edges, apart if profiles.points is not None else row_gaps(profiles, edges))
+
+    profiles: Profiles
+    share: Grid
+
+    def edge(self, begin: Float, sign: int, farthest: float | Float = FARTHEST) -> Edge:
+        """Return in each of K stretches the offset, m, at which the pavement ends beyond a given one; NaN if unseen.
+
+        Args:
+            begin: (K,) offsets that are paved for sure, one per stretch, m.
+            sign: +1 looks to the left, -1 to the right.
+            farthest: how far beyond ``begin`` it is looked for, m; a number, or (K,).
+
+        The edge parts pavement from what isn't so that the fewest bins are on the wrong side; around it the shares of
+        both are weighed, so that it is found more exactly than the bins.
+        """
+        profiles = self.profiles
+        edges, gaps = np.full(len(begin), np.nan), np.zeros(len(begin))
+        reach = np.broadcast_to(np.asarray(farthest, dtype=np.float64), begin.shape)
+        for number, offset in enumerate(begin):
+            if not np.isfinite(offset) or reach[number] < 2.0 * ACROSS:
+                continue
+            rows = slice(number * STRETCH, (number + 1) * STRETCH)
+            column = profiles.column(offset)
+            end = profiles.column(offset + sign * reach[number])
+            share = _mean(self.share[rows, column : end + sign if end + sign >= 0 else None : sign])
+            edges[number] = _find_edge(share, float(profiles.offsets[column]), sign)
+            if profiles.points is not None and np.isfinite(edges[number]):
+                edges[number], gaps[number] = _between_points(profiles.points, number, edges[number], sign)
+        return Edge(edges, gaps if profiles.points is not None else profiles.row_gaps(edges))
 
 
 def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int) -> tuple[float, float]:

@@ -88,7 +88,6 @@ class Judgement:
 
 
 def judge(
-    profiles: Profiles,
     layout: RoadLayout,
     cores: Sequence[float],
     rivals: Bool | None = None,
@@ -97,19 +96,18 @@ def judge(
     """Assess where an axis, offset 0 of its profiles, isn't to be trusted, and why.
 
     Args:
-        profiles: along the axis.
-        layout: that these profiles show.
+        layout: that profiles along the axis show.
         cores: offsets of the carriageways' middles, m, about which is pavement for sure.
         rivals: (K,) where views of the axis disagree; nowhere if not given.
         parted: (K,) m, the middle between both branches of the middle line, where that parts (`FoundRoad.parted_line`).
     """
-    guides = axis_guides(layout)
+    profiles, guides = layout.profiles, axis_guides(layout)
     lines = np.mean([guide.measured for guide in guides], axis=0) if parted is None else parted
     if parted is None and np.isfinite(lines).any():  # else nothing tells how far the others are from the axis
         lines = np.where(np.isfinite(lines), lines, _carried(layout))
     middles = np.mean(pavement_edges(profiles, cores, layout.kind == "dual"), axis=0)
     if profiles.paved is not None:  # where neither brightness nor height tells the edge the classes do
-        middles = np.where(np.isfinite(middles), middles, _middles_by_class(profiles, layout))
+        middles = np.where(np.isfinite(middles), middles, _middles_by_class(layout))
     what, edges = "the pavement's middle", "the pavement's edges aren't seen on both sides"
     unseen = np.isnan(middles)
     if layout.kind == "dual":
@@ -123,7 +121,7 @@ def judge(
         f"{what} lies more than {FARTHEST_MIDDLE:g} m beside it": np.abs(middles) > FARTHEST_MIDDLE,
         "the ground on its lanes is too rough for a pavement": lane_roughness(profiles, cores) > ROUGHEST,
     }
-    reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(profiles, layout) > RAISED
+    reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(layout) > RAISED
     if rivals is not None:
         reasons[f"views of it disagree by more than {APART:g} m"] = rivals
     masks = {reason: _without_short_runs(mask) for reason, mask in reasons.items()}
@@ -134,7 +132,7 @@ def judge(
     return Judgement(doubts, float(1.0 - doubtful.mean()), lines, middles)
 
 
-def _middles_by_class(profiles: Profiles, layout: RoadLayout) -> Float:
+def _middles_by_class(layout: RoadLayout) -> Float:
     """Return the middle (K,), m, of what the classes call the pavement, or of what lies between two; NaN if unseen."""
     (right, left) = (layout.bands[0], layout.bands[-1])
     if layout.kind == "dual":
@@ -173,13 +171,13 @@ def lane_roughness(profiles: Profiles, cores: Sequence[float]) -> Float:
     return result
 
 
-def raised_lines(profiles: Profiles, layout: RoadLayout) -> Float:
+def raised_lines(layout: RoadLayout) -> Float:
     """Return how far (K,), m, the painted lines stand above the ground to both sides of them; NaN where not seen.
 
     The middle one of all lines counts: one may lie on a seam, or beside a gutter.
     """
     painted = [line for band in layout.bands for line in band.lines if line.width > 0.0]
-    height = remove_grade(profiles.height)
+    profiles, height = layout.profiles, remove_grade(layout.profiles.height)
     result = np.full((max(len(painted), 1), profiles.stretches), np.nan)
     for row, line in enumerate(painted):
         for number in np.flatnonzero(np.isfinite(line.measured)):

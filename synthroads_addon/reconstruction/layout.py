@@ -11,7 +11,7 @@ from scipy.signal import find_peaks
 from ..base.arrays import Bool, Float, otsu_threshold
 from ..base.errors import InputError
 from .branches import find_branch
-from .edges import FARTHEST, paved_edge
+from .edges import FARTHEST, Pavement
 from .lines import STANDARD_DASHES, USUAL, WAVELENGTH, Line
 from .path import SPACING
 from .profiles import ACROSS, STRETCH, Grid, Profiles
@@ -38,6 +38,9 @@ _BLUR = (6.0, 1.0)  # bins along and across
 _PAINT = 9  # bins: brighter strips of up to this width are paint
 _AXIS_WAVELENGTH = 60.0  # m: shorter swings of the axis are noise
 _ROUNDS = 4
+_COVERED = 0.3
+_CRACK = 0.3
+_LEVEL_BLUR = 10.0
 
 
 @dataclass(frozen=True)
@@ -97,19 +100,24 @@ class Band:
 
 @dataclass(frozen=True)
 class RoadLayout:
-    """Layout of a road: its carriageways, with their lines, and the pavement in the profiles.
+    """Layout of a road in profiles: its carriageways, with their lines, and the pavement.
 
     Attributes:
         kind: dual carriageway, or a single one.
         bands: from right to left: two of a dual carriageway, one of a single one.
-        paved: (S, U) share of pavement, from classes or from brightness.
+        pavement: in the profiles.
         notes: what was left out, in words.
     """
 
     kind: RoadKind
     bands: tuple[Band, ...]
-    paved: Grid
+    pavement: Pavement
     notes: tuple[str, ...]
+
+    @property
+    def profiles(self) -> Profiles:
+        """Return the profiles that show it."""
+        return self.pavement.profiles
 
 
 def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None = None) -> RoadLayout:
@@ -123,13 +131,13 @@ def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None =
     Raises:
         InputError: no carriageway can be made out.
     """
-    paved = profiles.paved if profiles.paved is not None else paved_by_brightness(profiles, lines)
-    notes = []
-    spans = paved_bands(profiles, paved)
+    share = profiles.paved if profiles.paved is not None else paved_by_brightness(profiles, lines)
+    pavement, notes = Pavement(profiles, share), []
+    spans = paved_spans(pavement)
     # Rural roads have gaps in their lines, and no turnouts.
     least = _SEEN_RURAL if len(spans) == 1 or wanted == "single" else _SEEN
-    parts = [_Part.of(profiles, paved, spans, number) for number in range(len(spans))]
-    bands = [_band(profiles, paved, part, part.main(lines, least)) for part in parts]
+    parts = [_Part.of(pavement, spans, number) for number in range(len(spans))]
+    bands = [_band(pavement, part, part.main(lines, least)) for part in parts]
     left_out = sum(all(line not in part.main(lines, least) for part in parts) for line in lines)
     if left_out:
         notes.append(f"{left_out} lines were seen on a small part of the road and left out")
@@ -141,20 +149,20 @@ def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None =
     chosen = pair or (max(bands, key=lambda band: (len(band.lines), band.width)),)
     if len(bands) > len(chosen):
         notes.append(f"{len(bands) - len(chosen)} other strips of pavement were left out")
-    return RoadLayout("dual" if pair else "single", chosen, paved, tuple(notes))
+    return RoadLayout("dual" if pair else "single", chosen, pavement, tuple(notes))
 
 
-def with_branch(layout: RoadLayout, profiles: Profiles) -> RoadLayout:
+def with_branch(layout: RoadLayout) -> RoadLayout:
     """Return a layout that tells where the middle line of a single carriageway parts into two.
 
     Args:
-        layout: that the profiles show.
-        profiles: along the middle line; along an axis that lies midway between two branches neither is easily followed.
+        layout: that profiles along the middle line show; along an axis that lies midway between two branches neither is
+            easily followed.
     """
     band = layout.bands[0]
     if layout.kind == "dual" or band.middle is None:
         return layout
-    return replace(layout, bands=(replace(band, branch=find_branch(profiles, band.middle)),))
+    return replace(layout, bands=(replace(band, branch=find_branch(layout.profiles, band.middle)),))
 
 
 @dataclass(frozen=True)
@@ -174,15 +182,15 @@ class _Part:
     length: float
 
     @classmethod
-    def of(cls, profiles: Profiles, paved: Grid, spans: list[tuple[float, float]], number: int) -> Self:
+    def of(cls, pavement: Pavement, spans: list[tuple[float, float]], number: int) -> Self:
         """Return the part of one of the strips: where lanes begin or end, or beside a turnout, another one begins."""
-        low, high = spans[number]
+        profiles, (low, high) = pavement.profiles, spans[number]
         begin = np.full(profiles.stretches, 0.5 * (low + high))
         usual, span = np.ones(profiles.stretches, dtype=bool), [low, high]
         for side, sign in enumerate((-1, 1)):
             next_to = number + sign
             room = abs(spans[next_to][1 - side] - span[side]) if 0 <= next_to < len(spans) else 2.0 * FARTHEST
-            edge = paved_edge(profiles, paved, begin, sign, 0.5 * (high - low) + min(FARTHEST, 0.5 * room)).offsets
+            edge = pavement.edge(begin, sign, 0.5 * (high - low) + min(FARTHEST, 0.5 * room)).offsets
             place = usual_place(sign * edge)
             if place is None:
                 continue
@@ -193,8 +201,8 @@ class _Part:
                 usual &= ~other
                 span[side] = sign * place
         if usual.sum() < _FEWEST_USUAL * len(usual):
-            return cls((low, high), np.ones(len(usual), dtype=bool), 1.0, covered_length(profiles))
-        return cls((span[0], span[1]), usual, float(usual.mean()), covered_length(profiles))
+            return cls((low, high), np.ones(len(usual), dtype=bool), 1.0, profiles.covered_length)
+        return cls((span[0], span[1]), usual, float(usual.mean()), profiles.covered_length)
 
     def main(self, lines: list[Line], least: float) -> list[Line]:
         """Return the lines that are seen along at least a share of the part."""
@@ -221,19 +229,14 @@ def usual_place(distance: Float) -> float | None:
     return float(np.median(near))
 
 
-def covered_length(profiles: Profiles) -> float:
-    """Return the length, m, of the path along which the profiles have points."""
-    return float((profiles.count.sum(axis=1) > 0).sum())
-
-
-def paved_bands(profiles: Profiles, paved: Grid) -> list[tuple[float, float]]:
+def paved_spans(pavement: Pavement) -> list[tuple[float, float]]:
     """Return the (low, high) offsets, m, of the strips that are paved along most of the road, wide ones only."""
-    known = np.isfinite(paved)
+    profiles, known = pavement.profiles, np.isfinite(pavement.share)
     rows = known.sum(axis=0)
-    share = np.where(known, paved, 0.0).sum(axis=0) / np.maximum(rows, 1)
-    on = (share > 0.5) & (rows > 0.3 * covered_length(profiles))
-    on = ndimage.binary_closing(on, iterations=round(0.3 / ACROSS))
-    columns = [part[0] for part in ndimage.find_objects(ndimage.label(on)[0])]
+    share = np.where(known, pavement.share, 0.0).sum(axis=0) / np.maximum(rows, 1)
+    strip = (share > 0.5) & (rows > _COVERED * profiles.covered_length)
+    strip = ndimage.binary_closing(strip, iterations=round(_CRACK / ACROSS))
+    columns = [part[0] for part in ndimage.find_objects(ndimage.label(strip)[0])]
     spans = [(profiles.offsets[c.start] - ACROSS / 2, profiles.offsets[c.stop - 1] + ACROSS / 2) for c in columns]
     return [(float(low), float(high)) for low, high in spans if high - low >= _NARROWEST_BAND]
 
@@ -243,37 +246,52 @@ def paved_by_brightness(profiles: Profiles, lines: list[Line]) -> Grid:
 
     Pavement is what is about as bright as the strips on both sides of the lane lines, after a blur of some metres:
     grass, soil and gravel are mostly brighter. Without a dashed line it is as bright as the smoother of two kinds of
-    ground. Otsu's threshold parts the differences from that brightness, if there
-    are two kinds of them; if not, all is pavement.
+    ground. Otsu's threshold parts the differences from that brightness, if there are two kinds of them; if not, all is
+    pavement.
     """
     brightness = _blur(profiles.brightness)
     known = np.isfinite(brightness)
-    sure = np.zeros(brightness.shape, dtype=bool)
+    everywhere = np.where(known, 1.0, np.nan).astype(np.float32)
+    if any(is_dashed(line) for line in lines):
+        reference = _bins_beside(profiles, _lane_lines(lines)) & known
+    else:
+        reference = _smoother_ground(profiles, brightness.astype(np.float64))
+    if not reference.any():
+        return everywhere
+    difference = np.abs(brightness - _level_along(brightness, reference)[:, None])
+    threshold = otsu_threshold(np.asarray(difference[known], dtype=np.float64))
+    pavement = float(np.median(difference[known & (difference <= threshold)]))
+    other_ground = float(np.median(difference[known & (difference > threshold)]))
+    # Otsu's method splits any histogram: the parts are two kinds of ground only if they lie clearly apart.
+    if other_ground - pavement < _LIKE * robust_scale(difference[reference]):
+        return everywhere
+    # Paint is brighter than the threshold, but lies on pavement: narrow gaps across are closed.
+    mask = ndimage.grey_closing(np.where(known, difference <= threshold, 0.0), size=(1, _PAINT))
+    return np.where(known, mask, np.nan).astype(np.float32)
+
+
+def _bins_beside(profiles: Profiles, lines: list[Line]) -> Bool:
+    """Return a mask (S, U) of the bins to both sides of lines, as far off as `_AROUND_DASHES` says."""
+    mask = np.zeros(profiles.brightness.shape, dtype=bool)
     rows = np.arange(len(profiles.stations))
-    for line in _lane_lines(lines):
-        place = np.interp(profiles.stations, line.stations, line.offsets, left=np.nan, right=np.nan)
+    for line in lines:
+        offset = np.interp(profiles.stations, line.stations, line.offsets, left=np.nan, right=np.nan)
         for low, high in ((-_AROUND_DASHES[1], -_AROUND_DASHES[0]), _AROUND_DASHES):
             for shift in np.arange(low, high + 1e-9, ACROSS):
-                column = np.rint((place + shift - profiles.offsets[0]) / ACROSS)
+                column = np.rint((offset + shift - profiles.offsets[0]) / ACROSS)
                 inside = np.isfinite(column) & (column >= 0) & (column < len(profiles.offsets))
-                sure[rows[inside], column[inside].astype(np.int64)] = True
-    sure &= known
-    if not any(is_dashed(line) for line in lines):
-        sure = _smoother_ground(profiles, brightness.astype(np.float64))
-    if not sure.any():
-        return np.where(known, 1.0, np.nan).astype(np.float32)
-    counts = np.maximum(sure.sum(axis=1), 1)
-    level = np.where(sure, brightness, 0.0).sum(axis=1) / counts
-    level = np.interp(rows, rows[sure.any(axis=1)], level[sure.any(axis=1)])
-    level = ndimage.gaussian_filter1d(level, 10.0, mode="nearest")
-    apart = np.abs(brightness - level[:, None])
-    spread = robust_scale(apart[sure])
-    reach = otsu_threshold(np.asarray(apart[known], dtype=np.float64))
-    below, above = float(np.median(apart[known & (apart <= reach)])), float(np.median(apart[known & (apart > reach)]))
-    if above - below < _LIKE * spread:
-        return np.where(known, 1.0, np.nan).astype(np.float32)
-    paved = ndimage.grey_closing(np.where(known, apart <= reach, 0.0), size=(1, _PAINT))  # paint lies on pavement
-    return np.where(known, paved, np.nan).astype(np.float32)
+                mask[rows[inside], column[inside].astype(np.int64)] = True
+    return mask
+
+
+def _level_along(brightness: Grid, reference: Bool) -> Float:
+    """Return the mean brightness (S,) of reference bins (S, U), smoothed along the road, and bridged where none is."""
+    count = np.maximum(reference.sum(axis=1), 1)
+    level = np.where(reference, brightness, 0.0).sum(axis=1) / count
+    known = reference.any(axis=1)
+    rows = np.arange(len(level))
+    level = np.interp(rows, rows[known], level[known])
+    return np.asarray(ndimage.gaussian_filter1d(level, _LEVEL_BLUR, mode="nearest"))
 
 
 def is_dashed(line: Line) -> bool:
@@ -317,7 +335,7 @@ def _place_in(line: Line, usual: Bool | None) -> float:
     return float(np.nanmedian(inside)) if np.isfinite(inside).any() else line.offset
 
 
-def _band(profiles: Profiles, paved: Grid, part: _Part, lines: list[Line]) -> Band:
+def _band(pavement: Pavement, part: _Part, lines: list[Line]) -> Band:
     """Return a strip of pavement with its lines; of two nearer than a lane the longer, more painted one is kept."""
     low, high = part.span
     place = {id(line): _place_in(line, part.usual) for line in lines}
@@ -332,16 +350,16 @@ def _band(profiles: Profiles, paved: Grid, part: _Part, lines: list[Line]) -> Ba
         if left - right > _WIDEST_LANE:
             count = round((left - right) / _USUAL_LANE)
             missing += [right + (left - right) * (i + 1) / count for i in range(count - 1)]
-    edges = _edge_line(profiles, paved, part.span, -1), _edge_line(profiles, paved, part.span, 1)
+    edges = _edge_line(pavement, part.span, -1), _edge_line(pavement, part.span, 1)
     return Band(low, high, kept, edges, missing, part.usual)
 
 
-def _edge_line(profiles: Profiles, paved: Grid, span: tuple[float, float], sign: int) -> Line:
+def _edge_line(pavement: Pavement, span: tuple[float, float], sign: int) -> Line:
     """Return one edge of a strip of pavement, smoothed, in the form of a line without paint."""
     low, high = span
-    stations = profiles.middles
+    stations = pavement.profiles.middles
     begin = np.full(len(stations), 0.5 * (low + high))
-    edge = paved_edge(profiles, paved, begin, sign, 0.5 * (high - low) + _BESIDE)
+    edge = pavement.edge(begin, sign, 0.5 * (high - low) + _BESIDE)
     weights = np.isfinite(edge.offsets).astype(np.float64)
     smoothed = smooth(edge.offsets, weights, STRETCH * SPACING, WAVELENGTH, usual=USUAL)
     return Line(

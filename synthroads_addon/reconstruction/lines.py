@@ -9,7 +9,7 @@ from scipy.signal import find_peaks
 
 from ..base.arrays import Bool, Float
 from .path import SPACING
-from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints, row_gaps
+from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
 from .smoothing import hidden_std, mean_with_std, smooth
 
 WAVELENGTH = 40.0
@@ -130,7 +130,7 @@ def _joined(profiles: Profiles, tracks: list[_Track]) -> list[_Track]:
 def _in_rows(profiles: Profiles, first: float, last: float, offset: float) -> bool:
     """Return whether points lie in rows about an offset along most of the way between two stations, m."""
     between = (profiles.middles >= first) & (profiles.middles <= last)
-    gaps = row_gaps(profiles, np.where(between, offset, np.nan))
+    gaps = profiles.row_gaps(np.where(between, offset, np.nan))
     return 2 * int((gaps > 0.0).sum()) > int(between.sum())
 
 
@@ -197,7 +197,7 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
     if (weights > 0.0).sum() < 4:
         return None
     width, width_std = mean_with_std(cover[inside][np.nan_to_num(share[inside]) > 0.5])
-    apart = row_gaps(profiles, measured)
+    apart = profiles.row_gaps(measured)
     if profiles.points is not None:
         on = np.where(inside & np.isfinite(share), share, 0.0) > 0.5
         measured, widths, apart = _between_points(profiles, profiles.points, measured, on)

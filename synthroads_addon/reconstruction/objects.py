@@ -20,7 +20,7 @@ from ..base.arrays import Bool, Float, Index
 from ..road.things import guardrail as sizes
 from .cloud import STANDING, PointKind, RoadCloud
 from .path import SPACING, CloudPath
-from .profiles import ACROSS, STRETCH, Profiles
+from .profiles import STRETCH, Profiles
 from .section import MeasuredSection
 from .smoothing import mean_with_std
 
@@ -49,7 +49,6 @@ USUAL_VERGE = 1.5
 """Width of the verge where classes don't tell, m."""
 _FARTHEST, _FARTHEST_UNKNOWN = 12.0, 4.0  # m outside of the pavement, of what has a class and what hasn't
 _IN_THE_MIDDLE = 0.4  # m from the axis: a guardrail there has a beam on either side
-_COARSE = 5  # bins of which a median makes the ground
 _BEYOND = 4.0  # m outside of the verge, where the ground no longer is the road's
 
 
@@ -236,9 +235,9 @@ def _stands_alone(tree: cKDTree, post: FoundPost, count: int) -> bool:
     return bool(around <= count)
 
 
-def standing_points(cloud: RoadCloud, path: CloudPath, profiles: Profiles, section: MeasuredSection) -> StandingPoints:
+def standing_points(cloud: RoadCloud, profiles: Profiles, section: MeasuredSection) -> StandingPoints:
     """Return the standing points within reach of the road, with heights above the surface below them."""
-    chosen = cloud.of(*STANDING)
+    chosen, path = cloud.of(*STANDING), profiles.path
     xyz, kind = cloud.xyz[chosen], cloud.kind[chosen]
     station, offset = path.project(xyz[:, :2])
     reach = max(_outer(section, 1), _outer(section, -1)) + _FARTHEST
@@ -247,24 +246,7 @@ def standing_points(cloud: RoadCloud, path: CloudPath, profiles: Profiles, secti
     outside = np.where(offset > 0.0, offset - _outer(section, 1), -offset - _outer(section, -1))
     kept = (outside < _FARTHEST_UNKNOWN) | (kind != PointKind.FURNITURE)
     station, offset, kind, height = station[kept], offset[kept], kind[kept], height[kept]
-    return StandingPoints(station, offset, height - ground_below(profiles, station, offset), kind)
-
-
-def ground_below(profiles: Profiles, station: Float, offset: Float) -> Float:
-    """Return the surface's height (N,), m, at stations and offsets (N,): medians of 5 m by 0.5 m, interpolated."""
-    rows, columns = profiles.height.shape
-    long, wide = -(-rows // _COARSE), -(-columns // _COARSE)
-    padded = np.full((long * _COARSE, wide * _COARSE), np.nan)
-    padded[:rows, :columns] = profiles.height
-    cells = padded.reshape(long, _COARSE, wide, _COARSE).swapaxes(1, 2).reshape(long, wide, -1)
-    known = np.isfinite(cells).any(axis=2)
-    coarse = np.full((long, wide), np.nan)
-    coarse[known] = np.nanmedian(cells[known], axis=1)
-    nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
-    filled = coarse[tuple(nearest)]
-    row = (station - profiles.stations[0]) / _COARSE + 0.5 / _COARSE - 0.5
-    column = (offset - profiles.offsets[0]) / (ACROSS * _COARSE) + 0.5 / _COARSE - 0.5
-    return np.asarray(ndimage.map_coordinates(filled, np.stack([row, column]), order=1, mode="nearest"))
+    return StandingPoints(station, offset, height - profiles.surface_height(station, offset), kind)
 
 
 def face_guardrails(barriers: list[FoundBarrier], section: MeasuredSection) -> list[FoundBarrier]:

@@ -46,7 +46,7 @@ def draw(found: Reconstruction, cloud: RoadCloud, path: FilePath) -> None:
 
 def plan(axes: Any, found: Reconstruction, geometry: RoadGeometry, span: tuple[float, float]) -> None:
     """Draw the road unrolled (offset over station), the reconstruction over the cloud's brightness."""
-    profiles = found.profiles
+    profiles = found.carriageways.profiles
     low, high = _reach(geometry)
     axes.imshow(
         _brightness(profiles).T,
@@ -73,7 +73,7 @@ def plan(axes: Any, found: Reconstruction, geometry: RoadGeometry, span: tuple[f
 
 def across(axes: Any, found: Reconstruction, geometry: RoadGeometry) -> None:
     """Draw a cross-section at mid-length: heights of the cloud's bins and the reconstructed surface."""
-    profiles = found.profiles
+    profiles = found.carriageways.profiles
     row = len(profiles.stations) // 2
     rows = slice(max(0, row - 5), row + 5)
     station = profiles.stations[rows]
@@ -100,7 +100,7 @@ def heights(axes: Any, found: Reconstruction, geometry: RoadGeometry) -> None:
     """Draw the measured heights of the carriageways, cm, less the reconstructed profile's."""
     stations = found.measured.stations
     level = geometry.profile.elevation(stations)
-    for name, surface in found.surfaces.items():
+    for name, surface in found.carriageways.surfaces.items():
         axes.plot(stations, 100.0 * (surface.height - level), ".", ms=3, label=f"{name} carriageway")
     axes.axhline(0.0, color=AXIS, lw=1.0, label="profile")
     axes.set(xlabel="station, m", ylabel="height above the profile, cm", title="pavement at its pivot line")

@@ -33,6 +33,10 @@ _MEMORY = 0.85  # of the template from one stretch to the next
 _PRIOR = 0.15  # of the best score is lost _REACH beside what was expected
 _WAVELENGTH = 60.0  # m
 _EDGE = 0.3  # weight of the pavement's edges beside paint
+_DENSE = 1.5
+"""Bins between points that are no gap. Chosen: a point's place within its bin is worth one bin."""
+_COARSE = 5
+"""Bins along and across of which a median is the ground's height. Chosen: 5 m by 0.5 m hold points of any scanner."""
 
 
 @dataclass(frozen=True)
@@ -99,21 +103,43 @@ class Profiles:
         """Return the index of the bin at an offset, the nearest one if it lies outside."""
         return int(np.clip(round((offset - self.offsets[0]) / ACROSS), 0, len(self.offsets) - 1))
 
+    @property
+    def covered_length(self) -> float:
+        """Return the length, m, of the path along which there are points."""
+        return SPACING * float((self.count.sum(axis=1) > 0).sum())
 
-def row_gaps(profiles: Profiles, offsets: Float) -> Float:
-    """Return the distance (K,), m, of the rows of points about an offset in each stretch; 0 where they lie densely.
+    def row_gaps(self, offsets: Float) -> Float:
+        """Return the distance (K,), m, of the rows of points about an offset in each stretch; 0 where they lie densely.
 
-    A scanner that follows the road leaves bins empty between rows: what is found there is found no better than that.
-    """
-    gaps = np.zeros(profiles.stretches)
-    for number in np.flatnonzero(np.isfinite(offsets)):
-        rows = slice(number * STRETCH, (number + 1) * STRETCH)
-        filled = np.flatnonzero((profiles.count[rows] > 0).any(axis=0))
-        column = profiles.column(float(offsets[number]))
-        before, beyond = filled[filled < column], filled[filled > column]
-        if len(before) and len(beyond):
-            gaps[number] = 0.5 * ACROSS * float(beyond[0] - before[-1])
-    return np.where(gaps > 1.5 * ACROSS, gaps, 0.0)
+        A scanner that follows the road leaves bins empty between rows: what lies there is known no better than that.
+        """
+        gaps = np.zeros(self.stretches)
+        for number in np.flatnonzero(np.isfinite(offsets)):
+            rows = slice(number * STRETCH, (number + 1) * STRETCH)
+            occupied = np.flatnonzero((self.count[rows] > 0).any(axis=0))
+            column = self.column(float(offsets[number]))
+            before, beyond = occupied[occupied < column], occupied[occupied > column]
+            if len(before) and len(beyond):
+                # Half the way between the bins on either side of it, as it lies in the middle between two rows.
+                gaps[number] = 0.5 * ACROSS * float(beyond[0] - before[-1])
+        return np.where(gaps > _DENSE * ACROSS, gaps, 0.0)
+
+    def surface_height(self, station: Float, offset: Float) -> Float:
+        """Return the surface's height (N,), m, at stations and offsets (N,): medians of 5 m by 0.5 m, interpolated."""
+        rows, columns = self.height.shape
+        long, wide = -(-rows // _COARSE), -(-columns // _COARSE)
+        padded = np.full((long * _COARSE, wide * _COARSE), np.nan)
+        padded[:rows, :columns] = self.height
+        cells = padded.reshape(long, _COARSE, wide, _COARSE).swapaxes(1, 2).reshape(long, wide, -1)
+        known = np.isfinite(cells).any(axis=2)
+        coarse = np.full((long, wide), np.nan)
+        coarse[known] = np.nanmedian(cells[known], axis=1)
+        nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
+        filled = coarse[tuple(nearest)]
+        # Of n bins each, the middle of coarse cell i is at the bins' middle n i + (n - 1) / 2.
+        row = (station - self.stations[0]) / _COARSE + 0.5 / _COARSE - 0.5
+        column = (offset - self.offsets[0]) / (ACROSS * _COARSE) + 0.5 / _COARSE - 0.5
+        return np.asarray(ndimage.map_coordinates(filled, np.stack([row, column]), order=1, mode="nearest"))
 
 
 def make_profiles(cloud: RoadCloud, path: CloudPath, half_width: float, exact: bool = False) -> Profiles:

@@ -129,13 +129,15 @@ def _cloud(cloud: RoadCloud) -> dict[str, Any]:
 
 def _centreline(found: Reconstruction) -> dict[str, Any]:
     """Return as JSON data the residuals, m, of the measured axis from the alignment, and its deviations."""
-    fit, std = found.measured.fit, found.centre.std[np.isfinite(found.centre.raw)]
+    fit, axis = found.measured.fit, found.carriageways.course.road.axis
+    seen = np.isfinite(axis.raw)
+    std = axis.std[seen]
     return {
         "elements": len(fit.alignment.elements),
         "from_alignment": fit.horizontal.to_dict("largest", 1),
         "height_from_profile": fit.height.to_dict("largest", 1),
         "std": {"mean": round(float(std.mean()), 4), "largest": round(float(std.max()), 4)},
-        "seen": round(float(np.isfinite(found.centre.raw).mean()), 4),
+        "seen": round(float(seen.mean()), 4),
     }
 
 
@@ -211,7 +213,7 @@ def _lines(found: Reconstruction, geometry: RoadGeometry) -> dict[str, Any]:
 def _excess_fall(found: Reconstruction, geometry: RoadGeometry, side: Side) -> Float:
     """Return the measured less the reconstructed crossfall (K,), m/m, in each stretch."""
     modelled = geometry.crossfall(geometry.sections[side].carriageway, found.measured.stations)
-    return found.surfaces[side].fall - modelled
+    return found.carriageways.surfaces[side].fall - modelled
 
 
 def _bay(bay: Bay) -> dict[str, Any]:

@@ -10,10 +10,9 @@ from scipy.signal import find_peaks
 
 from ..base.arrays import Bool, Float
 from ..road.guidelines import STANDARD_CROSS_SECTIONS, StandardCrossSection
-from .edges import FARTHEST, Edge, paved_edge
+from .edges import FARTHEST, Edge
 from .layout import Band, RoadKind, RoadLayout
 from .lines import Line
-from .profiles import Profiles
 from .smoothing import interval_mean, mean_with_std
 
 Side = Literal["left", "right"]
@@ -157,17 +156,16 @@ class MeasuredSection:
         return Estimate(left.value + right.value, float(np.hypot(left.std, right.std)))
 
 
-def measure_section(profiles: Profiles, layout: RoadLayout, marked: bool, axis_std: float = 0.0) -> MeasuredSection:
+def measure_section(layout: RoadLayout, marked: bool, axis_std: float = 0.0) -> MeasuredSection:
     """Return the cross-section, with standard deviations, that profiles along the alignment show.
 
     Args:
-        profiles: along the alignment, so that offset 0 is the axis.
-        layout: of these profiles.
+        layout: of profiles along the alignment, so that offset 0 is the axis.
         marked: whether paint is known by class; if not, lines look wider than they are and get the usual widths.
         axis_std: standard deviation of where the axis lies, m, from which all is measured.
     """
     bands = zip(SIDES, layout.bands * (2 if layout.kind == "single" else 1), strict=True)
-    parts = [_SidePart(profiles, layout, band, side, marked, axis_std) for side, band in bands]
+    parts = [_SidePart(layout, band, side, marked, axis_std) for side, band in bands]
     if layout.kind == "single":
         return MeasuredSection("single", {part.side: _half_section(part) for part in parts}, layout.bands[0].middle)
     sides = {part.side: _carriageway(part) if len(part.band.lines) > 1 else _assumed_section(part) for part in parts}
@@ -187,12 +185,11 @@ class _SidePart:
     """Inputs for measuring one side of the road.
 
     Attributes:
-        profiles, layout, marked, axis_std: as in `measure_section`.
+        layout, marked, axis_std: as in `measure_section`.
         band: the pavement that is its own, or that it has a half of.
         side: of the axis.
     """
 
-    profiles: Profiles
     layout: RoadLayout
     band: Band
     side: Side
@@ -206,7 +203,7 @@ class _SidePart:
 
     def everywhere(self, value: float) -> Float:
         """Return an array (K,) with the same value for each stretch."""
-        return np.full(self.profiles.stretches, value)
+        return np.full(self.layout.profiles.stretches, value)
 
     def outer_edge(self, first: Float, last: Float) -> Edge:
         """Return the pavement's outer edge, m from the axis, beyond a last line, or before it where it is narrower.
@@ -222,7 +219,7 @@ class _SidePart:
     def edge(self, begin: Float, outwards: bool = True, reach: float | Float = FARTHEST) -> Edge:
         """Return the pavement's edge beyond distances (K,), m, from the axis, as distances from the axis."""
         sign = self.sign if outwards else -self.sign
-        edge = paved_edge(self.profiles, self.layout.paved, self.sign * begin, sign, reach)
+        edge = self.layout.pavement.edge(self.sign * begin, sign, reach)
         return Edge(self.sign * edge.offsets, edge.apart)
 
 
@@ -379,7 +376,7 @@ def _summarise_side(
     where = usual if usual.sum() >= _FEWEST_STRETCHES else np.ones(len(usual), dtype=bool)
     paint_std = 0.0 if part.marked else _PAINT_STD
     places = [boundary.place(where, part.axis_std).widened(paint_std) for boundary in boundaries]
-    edge_std = 0.0 if part.profiles.paved is not None else _EDGE_STD
+    edge_std = 0.0 if part.layout.profiles.paved is not None else _EDGE_STD
     if part.layout.kind == "single":  # its lanes begin at the axis
         places[0] = replace(places[0], std=part.axis_std)
     outside = Estimate(_USUAL_STRIP, np.inf)

@@ -15,7 +15,7 @@ _ROUNDS = 6
 _MAD = 1.4826
 """A normal distribution's standard deviation over its median absolute deviation: 1 / 0.6745."""
 _BISQUARE = 4.685
-"""Scales of the residuals from which on a value counts nothing: Tukey's bisquare, 95 % efficient under normal errors."""
+"""Scales of the residuals from which on a value counts nothing: Tukey's bisquare, 95 % efficient for normal errors."""
 _LEAST_SCATTER = 0.01
 """Least scatter of single offsets beside the rows that they lie between, m. Chosen: rows wobble by about as much."""
 _MOST_INDEPENDENT = 5.0
@@ -26,7 +26,7 @@ _OUTLIER = 0.02
 """Likelihood of a value whose interval misses the mean, over that of one whose interval holds it. Chosen: a single
 fault moves the logarithm by 4 at most."""
 _FLOOR = 1e-9
-"""Weight, over the mean one, where nothing was measured. Chosen: holds the solution there, and moves it nowhere else."""
+"""Weight, over the mean one, where nothing was measured. Chosen: holds the solution there and moves no other."""
 _LARGEST_LAG = 0.95
 """Largest lag-1 correlation that is believed. Chosen: a value still counts as a fortieth of an independent one."""
 _FEWEST_LAGS = 8

@@ -66,7 +66,7 @@ def compare_widths(found: Reconstruction, truth: RoadParameters) -> list[WidthEr
     result = []
     for name, measured in found.measured.section.sides.items():
         other: Side = name if same else ("left" if name == "right" else "right")
-        marked = doubted | unlike_mask([one for one in found.unlike if one.side == name], at)
+        marked = doubted | unlike_mask([one for one in found.carriageways.unlike if one.side == name], at)
         pairs = _pairs(measured, here.sections[name], there.sections[other], at, station)
         bays = [bay for bay in found.measured.bays if bay.side == name]
         for what, error, std in pairs:
