@@ -18,6 +18,7 @@ from ..networks.centerline.models import TARGETS
 from .predictor import CenterlinePredictor, Regression
 
 _HEIGHT = TARGETS.index("height")
+"""Column of the height among the targets."""
 
 
 def find_road(

@@ -15,8 +15,10 @@ from synthroads_addon.reconstruction.path import CloudPath
 from ..shipped import open_run
 from ..tasks import Prediction, task
 
-_USUAL_STD = 0.1  # m, where the model tells none
-_GAP = 5.0  # m between points of a line across which nothing is told
+_USUAL_STD = 0.1
+"""Deviation where the model tells none, m. Chosen: about what trained models leave."""
+_GAP = 5.0
+"""Distance between points of a line across which nothing is told, m. Chosen: a stretch of the profiles."""
 
 
 def learned_axis(folder: FilePath, cloud_file: FilePath) -> Predictor:

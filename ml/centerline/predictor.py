@@ -27,6 +27,7 @@ from ..training_loop import move_to_device
 _NEAR = 2
 """A frame with no point in it nor in this many frames to either side has no prediction."""
 _HEIGHT = TARGETS.index("height")
+"""Column of the height among the targets."""
 
 
 class UseOptions(Part):

@@ -22,7 +22,9 @@ from ..data.roads import LearningRoad
 from ..scores.evaluation import CORRIDOR_COLUMNS, Predictor
 
 _LABELLED_SHARE, _MARKED_SHARE = 0.01, 0.001
+"""Shares of pavement and paint from which on labels are believed: as `reconstruction.cloud` does."""
 _FEWEST = 2000
+"""Points of a road at least: as `reconstruction.cloud.FEWEST_POINTS`."""
 
 
 def road_cloud(road: LearningRoad) -> RoadCloud:

@@ -39,6 +39,7 @@ from .scoring import Classifier, label_tile
 HEADER_TEXTS = range(26, 90)
 """Bytes of a LAS file that hold the system identifier and the generating software, of 32 each."""
 BLOCK = 500_000
+"""Points that are read or written at once. Chosen: bounds memory."""
 TILE = 48.0
 """Edge of the tiles, m."""
 MARGIN = 6.0

@@ -65,17 +65,20 @@ _MOST_STRIPS = 100_000
 _LEAST_COSINE = 0.02
 """Least cosine of an incidence angle. Chosen: 89 degrees, beyond which no pavement is seen."""
 _RING_DEG = 0.1
-"""Rings of a head are told apart by this much of their elevation, deg. Chosen: those of most heads are farther apart."""
+"""Rings of a head are told apart by this much of their elevation, deg. Chosen: those of most heads are farther
+apart."""
 _FEWEST_OF_RING, _FEWEST_RINGS = 30, 6
 """Points of a ring, and rings, that are needed. Chosen: for a median of each, and for second differences of these."""
 _OUTLIER = 4.0
-"""Residuals beyond so many interquartile ranges are of kerbs and cars. Chosen: 5.4 standard deviations of a sensor's."""
+"""Residuals beyond so many interquartile ranges are of kerbs and cars. Chosen: 5.4 standard deviations of a
+sensor's."""
 _LARGEST_DELAY = 0.9
 """Largest share of the range's deviation that is a delay. Chosen: some of every range noise is symmetric."""
 _SPEED_OF_PULSES = 2.0
 """Times of consecutive pulses differ by less than so many times the usual interval. Chosen: one missing is twice."""
 _STEP_QUANTILE = 0.05
-"""Quantile of the steps between stored numbers that is one step. Chosen: where some values don't occur steps are longer."""
+"""Quantile of the steps between stored numbers that is one step. Chosen: where some values don't occur steps are
+longer."""
 _INTERVAL_QUANTILE = 0.1
 """Quantile of the intervals between times that is one pulse's. Chosen: gaps make others longer."""
 
@@ -310,7 +313,7 @@ def _range_delay(range_residual: Float, fitted: float) -> float:
     inliers = range_residual[np.abs(range_residual) < _OUTLIER * iqr]
     third_moment = float(np.mean((inliers - inliers.mean()) ** 3))
     skewness = third_moment / max(float(inliers.std()) ** 3, 1e-30) / (1.0 - fitted) ** 1.5
-    # An exponential distribution's third moment is twice its deviation cubed: skewness = -2 q^3, as late echoes lie lower.
+    # An exponential distribution's third moment is twice its deviation cubed; late echoes lie lower: skewness = -2 q^3.
     return float(np.clip(np.cbrt(-skewness / 2.0), 0.0, _LARGEST_DELAY))
 
 

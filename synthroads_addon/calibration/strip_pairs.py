@@ -30,7 +30,8 @@ _BINS = 22
 _REACH = 2.2
 """Longest distance of a pair, in spacings of the points. Chosen: the second row of points lies within it."""
 _SHORT = 0.4
-"""Longest distance, in spacings, at which pairs are of two strips alone. Chosen: points of one strip keep farther off."""
+"""Longest distance, in spacings, at which pairs are of two strips alone. Chosen: points of one strip keep farther
+off."""
 _RANDOM = 0.82
 """Largest pair correlation at short distances that is read as strips. Chosen: 1 - 1 / S of 5.6 strips; points at random
 have 1, and many strips come near to that."""

@@ -22,12 +22,19 @@ from ..base.arrays import Float, Int
 from ..road.alignment import Alignment, Element
 
 FREE, EQUAL, ZERO = 0, 1, 2
+"""Kinds of elements: clothoid or parabola, arc or constant grade, line. In this order each has one freedom less."""
 NEAR = 40.0
-"""Distance around where they should be that feet are looked for within, m."""
+"""Distance around where they should be that feet are looked for within, m. Chosen: more than the points of an axis lie
+apart."""
 
-_QUADRATURE = 2.0  # m, step of the integrals in the Jacobian; the residuals themselves are exact
-_SHARE = 0.45  # of its room that a knot may use up in one step, so that neighbours never meet
-_STIFFNESS = 0.05  # of the first spline, relative to the density of the data; it spans gaps and leaves the rest alone
+_QUADRATURE = 2.0
+"""Step of the integrals in the Jacobian, m. Chosen: the residuals themselves are exact, so that this slows the steps at
+most."""
+_SHARE = 0.45
+"""Share of its room that a knot may use up in one step. Chosen: below a half, so that neighbours never meet."""
+_STIFFNESS = 0.05
+"""Stiffness of the first spline, relative to the density of the data. Chosen: it spans gaps and leaves the rest
+alone."""
 
 
 @dataclass(frozen=True)

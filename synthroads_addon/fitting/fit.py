@@ -29,29 +29,53 @@ from .chain import EQUAL, FREE, NEAR, ZERO, AxisData, Chain, ChainFit, Heights, 
 from .follow import followed, heights_followed
 from .search import Goal, descent, improve_fit, independent_count
 
-_WINDOW = 1200.0  # m
-_TAIL = 300.0  # m at a window's end that only steady what lies before
-_MOST_POINTS = 3000  # in a window; denser data are thinned for the search, not for the figures reported
-_HEIGHT_SHARE = 0.6  # of the tolerance that the heights' rms may use
-_END_ELEMENT = 20.0  # m: of a line or an arc at an end, to begin with
-_SPARED = 1.0  # twice the logarithm of likelihood that such an end may cost
-_EXACT = 1e-6  # m: rms up to which data lie on a chain of elements (no smooth curve comes so near with few of them),
-_ROUNDED = 3.5e-4  # m: or on one whose coordinates were rounded to 1 mm, where residuals are random
-_RANDOM = 0.5  # correlation of neighbouring residuals that still passes for random
-_GAP = 100.0  # m between points from which the chord between them is given some weight
+_WINDOW = 1200.0
+"""Length of a window, m. Chosen: the work grows with its third power."""
+_TAIL = 300.0
+"""Length at a window's end that only steadies what lies before, m. Chosen: more than an element's influence reaches."""
+_MOST_POINTS = 3000
+"""Points in a window at most. Chosen: denser data are thinned for the search, not for the figures reported."""
+_HEIGHT_SHARE = 0.6
+"""Share of the tolerance that the heights' root mean square may use. Chosen: heights are seen more exactly than they
+matter in plan."""
+_END_ELEMENT = 20.0
+"""Length of a line or an arc at an end, to begin with, m. Chosen: the fit changes it."""
+_SPARED = 1.0
+"""Twice the logarithm of likelihood that such an end may cost. Chosen: one standard deviation of one parameter."""
+_EXACT = 1e-6
+"""Root mean square up to which data lie on a chain of elements, m. Chosen: no smooth curve comes so near with few of
+them."""
+_ROUNDED = 3.5e-4
+"""The same of coordinates that were rounded to 1 mm, m, where residuals are random. Chosen: a millimetre over sqrt(12)
+is 2.9e-4."""
+_RANDOM = 0.5
+"""Correlation of neighbouring residuals that still passes for random. Chosen: what a missed element leaves is nearer to
+1."""
+_GAP = 100.0
+"""Distance of points from which on the chord between them is given some weight, m. Chosen: an element may bend there
+unseen."""
 _CHORD_WEIGHT = 1e-3
-_MARGIN = 0.98  # of the tolerance that the search aims at: it may see thinned points only
-_NEGLIGIBLE = 0.3  # of the tolerance: residuals below it are worth no element
-_FINER_HELPS = 0.8  # of the noise at most must be left by knots half as far apart: else the rest is noise
+"""Weight of a chord's points. Chosen: they hold where there is nothing else, and pull no real point."""
+_MARGIN = 0.98
+"""Share of the tolerance that the search aims at. Chosen: it may see thinned points only."""
+_NEGLIGIBLE = 0.3
+"""Share of the tolerance below which residuals are worth no element. Chosen: an eleventh of its square."""
+_FINER_HELPS = 0.8
+"""Share of the noise that knots half as far apart must leave at most to be needed. Chosen: else the rest is noise."""
 _SCATTER = (
     1.2  # times the noise is what fewer elements may leave where the tolerance asks for less: the data scatter so
 )
-_RELAXED = 1.5  # times what dense knots reach is aimed at where the tolerance cannot be had: less would fit noise
-_FLATTEST = 1e7  # m: a rounding of a larger radius bends by less than 1 mm over 100 m, and is written as a kink
+_RELAXED = 1.5
+"""Times what dense knots reach that is aimed at where the tolerance can't be had. Chosen: less would fit noise."""
+_FLATTEST = 1e7
+"""Largest radius of a rounding, m. Chosen: a larger one bends by less than 1 mm over 100 m, and is written as a
+kink."""
 REFUSED_BEYOND = 40.0
 """Times the tolerance that a point may be away from the road fitted to an axis: 2 m of the usual 5 cm. Real axes stay
 below 6, a corner of 90 degrees just passes; beyond that it is another line than the one that was measured."""
-_PLAY = 1e-5  # of a radius: roundings that touch must not overlap once stations and elevations are rounded
+_PLAY = 1e-5
+"""Share of a radius that is left out. Chosen: roundings that touch must not overlap once stations and elevations are
+rounded."""
 
 
 @dataclass(frozen=True)

@@ -31,9 +31,12 @@ RotationAxis = Literal["carriageway_axis", "inner_edge"]
 
 UNKNOWN_EPSG = 25832
 """Written where a cloud doesn't say its map system: a parameter set must name one (ETRS89 / UTM 32N)."""
-_CROSSFALL_TOLERANCE = 0.15  # %
+_CROSSFALL_TOLERANCE = 0.15
+"""Distance that the crossfall's polyline keeps from the measured one, %. Chosen: 5 mm over a lane."""
 _TERMINAL = 12.0
-_END = 5.0  # m: a barrier that ends so near to the road's end goes on beyond it
+"""Length over which a barrier is ramped down at its end, m. Chosen: as usual; it isn't measured."""
+_END = 5.0
+"""Distance from the road's end within which a barrier goes on beyond it, m. Chosen: a stretch."""
 
 
 @dataclass(frozen=True)

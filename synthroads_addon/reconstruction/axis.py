@@ -21,11 +21,19 @@ Predictor = Callable[[RoadCloud, CloudPath], tuple[Float, Float]]
 """Returns offset and standard deviation (M,) of the axis at each point of a path; NaN where it knows none."""
 
 
-_HALF_WIDTHS = (12.0, 45.0)  # m: least and largest reach of profiles
-_MARGIN = 8.0  # m of it outside of the surface that the first path was made from
-_REGISTRATIONS, _PARALLEL = 6, 0.3  # times that a path is laid beside lines at most, and m that it may still move by
-_GRIDS = (-0.5, -0.25, 0.25)  # bins that further grids lie beside the first
-_PASSES, _STILL = 4, 0.15  # times that the axis is looked for at most, and m that it may still move by
+_HALF_WIDTHS = (12.0, 45.0)
+"""Least and largest reach of profiles, m. Chosen: a rural road with its verges, and a motorway of four lanes each
+way."""
+_MARGIN = 8.0
+"""Reach outside of the surface that the first path was made from, m. Chosen: that path may be off by as much."""
+_REGISTRATIONS, _PARALLEL = 6, 0.3
+"""Times that a path is laid beside lines at most, and distance that it may still move by, m. Chosen: bounds the work;
+lines that bend by less are followed."""
+_GRIDS = (-0.5, -0.25, 0.25)
+"""Shifts of further grids beside the first, bins. Chosen: a fraction of a bin moves points to other bins."""
+_PASSES, _STILL = 4, 0.15
+"""Times that the axis is looked for at most, and distance that it may still move by, m. Chosen: bounds the work; a
+line's width."""
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,13 @@ from .views.intervals import half_width
 
 INTERVALS = {"interval_68": (0.68, 1.0), "interval_95": (0.95, 1.96)}
 """Intervals' probabilities, and the standard deviations that hold these of a normal distribution."""
-_AT_AXIS = 0.5  # m to either side whose ground gives the height
-_WAVELENGTH = 20.0  # m: shorter waves of the ground's height are smoothed away
+_AT_AXIS = 0.5
+"""Distance to either side of the axis whose ground gives the height, m. Chosen: as wide as rows of points lie apart."""
+_WAVELENGTH = 20.0
+"""Wavelength of which half of the ground's height is kept, m. Chosen: shorter waves are noise; vertical curves are
+longer."""
 _DIGITS = 4
+"""Digits of lengths in files. Chosen: a tenth of a millimetre."""
 
 
 @dataclass(frozen=True)

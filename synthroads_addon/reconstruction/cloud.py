@@ -22,18 +22,24 @@ from .path import CloudPath
 _Points = tuple[Float, NDArray[np.float32], NDArray[np.uint8]]
 
 FEWEST_POINTS = 2000
-"""Fewer points on the road's surface than this are no road that could be measured."""
-_LABELLED_SHARE = 0.01  # of the surface's points must be labelled pavement for the labels to be believed
-_UNSORTED_SHARE = 0.5  # of the points without any class: the cloud has to be sorted by height
+"""Fewer points on the road's surface than this are no road that could be measured. Chosen: ten on each metre of 200
+m."""
+_LABELLED_SHARE = 0.01
+"""Share of the surface's points that must be labelled pavement for the labels to be believed. Chosen: stray labels are
+less."""
+_UNSORTED_SHARE = 0.5
+"""Share of the points without any class from which on the cloud is sorted by height. Chosen: the most of them."""
 CELL = 0.5
 WINDOW = 9
 """Cells (m) whose lowest points make the ground, and the cells across which nothing that stands may fill: what is
 narrower than ``CELL * WINDOW`` falls off the ground."""
-_STEP = 0.15  # m: what rises more than this above the opened surface is no ground
+_STEP = 0.15
+"""Height above the opened surface from which on a point is no ground, m. Chosen: a kerb."""
 _MOST_CELLS = 1 << 24
 """Cells of one grid; points over more are worked on tile by tile, of which only those with points in them are made."""
 _TILE, _MARGIN = 1024, 128
-"""Cells along an edge of a tile, and around it those whose points count for its ground as well."""
+"""Cells along an edge of a tile, and around it those whose points count for its ground as well. Chosen: the margin is
+wider than the window, and than most gaps that are filled."""
 
 
 class PointKind(IntEnum):

@@ -18,10 +18,14 @@ from .path import CloudPath
 from .smoothing import difference_figures
 
 BARRIER_DISTANCE, POST_DISTANCE = 0.5, 1.0
-"""Barriers and delineators within so far of each other are the same, m."""
+"""Barriers and delineators within so far of each other are the same, m. Chosen: less than the distance of two of
+them."""
 _STEP = 1.0
+"""Step along the road at which both are compared, m. Chosen: as of the profiles."""
 _LANE_THERE = 1.0
+"""Width from which on a lane is there, m. Chosen: a narrower one begins or ends."""
 _FAR = 1e3
+"""Distance of a barrier that isn't there, m. Chosen: beyond any that counts."""
 _BARRIERS = (Guardrail, ConcreteBarrier, NoiseBarrier)
 
 

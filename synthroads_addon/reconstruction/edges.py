@@ -11,13 +11,19 @@ from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
 from .smoothing import bisquare, fill_gaps, robust_scale
 
 FARTHEST = 8.0
-"""How far beyond a carriageway's lines its edge is looked for, m."""
-_MIXED = 0.8  # m to either side of an edge in which pavement and verge are weighed
-_FEWEST = 0.15  # of the bins around an edge must have points
-_CLEAR = 0.2  # m inside of the edges: the surface is measured here
+"""How far beyond a carriageway's lines its edge is looked for, m. Chosen: a hard shoulder and an emergency bay."""
+_MIXED = 0.8
+"""Distance to either side of an edge in which pavement and verge are weighed, m. Chosen: grass that grows over it."""
+_FEWEST = 0.15
+"""Share of the bins around an edge that must have points. Chosen: rows of points leave most bins empty."""
+_CLEAR = 0.2
+"""Distance inside of the edges from which on the surface is measured, m. Chosen: gutters and grass lie on the rest."""
 _ROUNDS = 5
+"""Rounds of iteratively reweighted least squares. Chosen: a line across moves no more after them."""
 _FEWEST_BINS = 20
+"""Bins that height and crossfall of a stretch are told from. Chosen: a tenth of a lane's."""
 _FEWEST_POINTS = 6
+"""Points around an edge that tell where it is. Chosen: fewer may be stray ones."""
 
 
 @dataclass(frozen=True)

@@ -23,19 +23,28 @@ from .views.fusion import APART
 from .views.pavement import pavement_edges, remove_grade
 
 FARTHEST_MIDDLE = 0.75
-"""The middle between the pavement's edges may lie so far beside the axis, m."""
+"""The middle between the pavement's edges may lie so far beside the axis, m. Chosen: half of what a shoulder on one
+side alone adds."""
 FARTHEST_LINES = 0.5
-"""The lines that make the axis may lie so far beside it, m."""
+"""The lines that make the axis may lie so far beside it, m. Chosen: three widths of a line."""
 RAISED = 0.05
-"""Paint lies flat: lines that stand so far above the ground on either side are rails, kerbs or gutters' edges, m."""
+"""Paint lies flat: lines that stand so far above the ground on either side are rails, kerbs or gutters' edges, m.
+Chosen: half of a kerb, more than paint and range noise."""
 ROUGHEST = 0.04
-"""Pavements are seen smoother than this by any scanner that shows their edges, m."""
-_CORE = 1.5  # m to either side of a carriageway's middle that is pavement if anything is
-_ON_AND_BESIDE = ((-0.05, 0.05), (-0.6, -0.3), (0.3, 0.6))  # m from a line's middle: on it, to the right, to the left
+"""Pavements are seen smoother than this by any scanner that shows their edges, m. Chosen: grass and soil have more."""
+_CORE = 1.5
+"""Distance to either side of a carriageway's middle that is pavement if anything is, m. Chosen: a lane."""
+_ON_AND_BESIDE = ((-0.05, 0.05), (-0.6, -0.3), (0.3, 0.6))
+"""Distances from a line's middle, m: on it, to the right, to the left. Chosen: beyond the widest line, before the
+next."""
 _FEWEST_STEPS = 50
-_NEAR = 4  # stretches to either side of one whose evidence counts for it
-_SHORTEST_TRUST = 5  # stretches
-_SHORTEST = 3  # stretches: a shorter doubt is a fault in the picture
+"""Steps between bins that a roughness is told from. Chosen: its deviation is then known to a tenth."""
+_NEAR = 4
+"""Stretches to either side of one whose evidence counts for it. Chosen: 20 m, as an axis changes little in them."""
+_SHORTEST_TRUST = 5
+"""Stretches between doubts that are trusted at least. Chosen: 25 m, less of a road is of no use."""
+_SHORTEST = 3
+"""Stretches of the shortest doubt. Chosen: a shorter one is a fault in the picture."""
 
 
 @dataclass(frozen=True)

@@ -19,28 +19,63 @@ from .smoothing import bisquare, fill_gaps, hidden_std, mean_with_std, robust_sc
 
 RoadKind = Literal["dual", "single"]
 
-_SEEN = 0.5  # of the road's length: what is seen on less belongs to a turnout or is a fault
+_SEEN = 0.5
+"""Share of the road's length on which a line must be seen. Chosen: what is seen on less belongs to a turnout or is a
+fault."""
 _SEEN_RURAL = 0.3
-_OTHER_EDGE, _OTHER_STRETCHES = 0.75, 5  # m that an edge lies off the usual place, and stretches, on another part
-_FEWEST_USUAL = 0.25  # of the road: a part that is less isn't the usual one
-_TOGETHER = 0.2  # of the stretches with both edges: lines that are less often seen together give way to these
-_COMMON = 0.35  # of the most common place: others so common may be the usual one
-_NARROWEST_BAND, _NARROWEST_MEDIAN, _WIDEST_MEDIAN = 3.0, 0.8, 30.0  # m
-_UNMARKED_CARRIAGEWAY = 7.0  # m: so wide a strip of pavement is a carriageway even if its lines aren't seen
-_IN_THE_MIDDLE = 0.15  # of a carriageway's width from its middle
-_NEAR_EDGE = 4.5  # m: an outermost line lies within a hard shoulder's width of the edge
-_BESIDE = 3.0  # m beyond a strip's usual edge that its edge is looked for
-_BAND_MARGIN = 0.5  # m: an edge line may lie so far outside of what passes for pavement
-_NARROWEST_LANE, _WIDEST_LANE, _USUAL_LANE = 2.3, 5.2, 3.6  # m
-_AROUND_DASHES = (0.4, 1.4)  # m beside a lane line: pavement for sure
-_LIKE = 4.0  # times the pavement's own spread of brightness, at least, that other ground is off
-_BLUR = (6.0, 1.0)  # bins along and across
-_PAINT = 9  # bins: brighter strips of up to this width are paint
-_AXIS_WAVELENGTH = 60.0  # m: shorter swings of the axis are noise
+"""The same of a rural road. Chosen: their lines have gaps, and no turnouts come between."""
+_OTHER_EDGE, _OTHER_STRETCHES = 0.75, 5
+"""Distance of an edge from the usual place, m, and stretches that it lies there, on another part of the road. Chosen: a
+fifth of a lane, for 25 m; what is less or shorter is a fault."""
+_FEWEST_USUAL = 0.25
+"""Share of the road that the usual part has at least. Chosen: a part that is less isn't the usual one."""
+_TOGETHER = 0.2
+"""Share of the stretches with both edges in which two lines must be seen together. Chosen: lines that seldom are give
+way to the edges."""
+_COMMON = 0.35
+"""Share of the most common place's count from which on another place may be the usual one. Chosen: turnouts on a short
+road may be longer than what lies between them."""
+_NARROWEST_BAND, _NARROWEST_MEDIAN, _WIDEST_MEDIAN = 3.0, 0.8, 30.0
+"""Widths of pavement and median, m. Chosen: a lane; a concrete barrier on its own; carriageways that are farther apart
+are two roads."""
+_UNMARKED_CARRIAGEWAY = 7.0
+"""Width of pavement that is a carriageway even if its lines aren't seen, m. Chosen: two lanes."""
+_IN_THE_MIDDLE = 0.15
+"""Share of a carriageway's width that its middle line lies off its middle at most. Chosen: half a metre of a rural
+road."""
+_NEAR_EDGE = 4.5
+"""Distance of an outermost line from the edge, m, at most. Chosen: a hard shoulder's width and its edge strip's."""
+_BESIDE = 3.0
+"""Distance beyond a strip's usual edge that its edge is looked for, m. Chosen: less than a lane, whose edge is another
+part's."""
+_BAND_MARGIN = 0.5
+"""Distance that an edge line may lie outside of what passes for pavement, m. Chosen: what brightness or bins may miss
+of it."""
+_NARROWEST_LANE, _WIDEST_LANE, _USUAL_LANE = 2.3, 5.2, 3.6
+"""Widths of lanes, m. Chosen: below any lane of RAA and RAL; above it but less than two; the usual one."""
+_AROUND_DASHES = (0.4, 1.4)
+"""Distances beside a lane line that are pavement for sure, m. Chosen: off the paint, within a lane's half."""
+_LIKE = 4.0
+"""Times the pavement's own spread of brightness that other ground is off at least. Chosen: Otsu's method parts any
+histogram, a pavement's as well."""
+_BLUR = (6.0, 1.0)
+"""Standard deviations of the brightness' blur, bins along and across. Chosen: some metres along the road, where
+pavement changes little, and less than a line across it."""
+_PAINT = 9
+"""Widest strip of paint, bins. Chosen: double lines fit in 0.9 m."""
+_AXIS_WAVELENGTH = 60.0
+"""Wavelength of which half of the axis' swings is kept, m. Chosen: shorter ones are noise."""
 _ROUNDS = 4
+"""Votes, each about the axis of the one before. Chosen: it moves no more after them."""
 _COVERED = 0.3
+"""Share of the road on which a bin must have points to belong to a strip. Chosen: bins between rows of points are often
+empty."""
 _CRACK = 0.3
+"""Gaps in the pavement that are closed to either side, m. Chosen: seams and bins between rows of points; a median is
+wider."""
 _LEVEL_BLUR = 10.0
+"""Standard deviation of the blur of the pavement's brightness along the road, m. Chosen: single cars and stains vanish
+in it."""
 
 
 @dataclass(frozen=True)

@@ -13,27 +13,48 @@ from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
 from .smoothing import hidden_std, mean_with_std, smooth
 
 WAVELENGTH = 40.0
-"""Shorter swings of a line's offset, m, are noise."""
+"""Shorter swings of a line's offset, m, are noise. Chosen: less than a lane change's length, more than a painting
+machine's sway."""
 USUAL = 0.03
-"""Standard deviation of a line's offset in one stretch that is no fault, m."""
-_WINDOW, _STEP = 40, 10  # m: mean profiles in which lines are looked for
-_HEIGHT, _PROMINENCE = 0.10, 0.07  # of a line's peak in a mean profile
-_WIDEST = 1.2  # m: broader peaks are no lines
-_LINK = 0.35  # m that a line may move from one window to the next
-_LOST = 60.0  # m that a line may not be seen
-_SAME = 0.2  # m: pieces of a line that lies hidden in between begin so near beside where the last one ended
-_NEAR = 0.35  # m to either side of a line that its paint lies within
-_FEWEST = 0.3  # of a row must be painted to count
-_AROUND = 41  # rows around one, in which there is a dash
-_FULL = 0.3  # of a line's usual width: less is no paint
-_ROW = 0.04  # m across that points of one row wobble over
-_FEWEST_POINTS = 4  # on a line in a stretch
-_SOLID = 0.65  # of its length: a line painted there is solid
+"""Standard deviation of a line's offset in one stretch that is no fault, m. Chosen: a third of a line's width."""
+_WINDOW, _STEP = 40, 10
+"""Length of the mean profiles in which lines are looked for, and distance from one to the next, m. Chosen: some dashes
+in each, and four over each place."""
+_HEIGHT, _PROMINENCE = 0.10, 0.07
+"""Height and prominence of a line's peak in a mean profile, in a solid line's paint. Chosen: dashes cover a third of a
+window or more, worn and blurred ones a tenth."""
+_WIDEST = 1.2
+"""Width of the broadest peak that is a line, m. Chosen: double lines are narrower."""
+_LINK = 0.35
+"""Distance that a line may move from one window to the next, m. Chosen: 3.5 % of the way, as in a taper."""
+_LOST = 60.0
+"""Length that a line may not be seen, m. Chosen: a bridge or a lorry in between."""
+_SAME = 0.2
+"""Distance beside the last piece's end at which a line that lay hidden goes on, m. Chosen: the distance of two rows of
+points."""
+_NEAR = 0.35
+"""Distance to either side of a line that its paint lies within, m. Chosen: an edge line's width, and what the track is
+off."""
+_FEWEST = 0.3
+"""Share of a row that must be painted to count. Chosen: below it the row is an end of a dash or a fault."""
+_AROUND = 41
+"""Rows around one, in which there is a dash. Chosen: two periods of the longest pattern."""
+_FULL = 0.3
+"""Share of a line's usual width that is full paint at least. Chosen: less is no paint."""
+_ROW = 0.04
+"""Distance across that points of one row wobble over, m. Chosen: a scanner's range noise and sway within a stretch."""
+_FEWEST_POINTS = 4
+"""Points on a line in a stretch that tell where its edges are. Chosen: fewer may be stray ones."""
+_SOLID = 0.65
+"""Share of its length on which a solid line is painted. Chosen: dashes cover half at most."""
 _Track = list[tuple[float, float]]
 STANDARD_DASHES = ((6.0, 12.0), (4.0, 8.0), (3.0, 6.0), (6.0, 6.0), (3.0, 3.0))
-"""Usual lengths of dash and gap, m (RMS)."""
-_DASH_TOLERANCE = 0.6  # m
-_LONGEST_GAP = 16  # rows: where a line isn't painted for longer it isn't seen, or isn't there
+"""Usual lengths of dash and gap, m (RMS). The order is by how common they are."""
+_DASH_TOLERANCE = 0.6
+"""Distance from a usual pattern that passes for it, m. Chosen: a bin at each end of dash and gap."""
+_LONGEST_GAP = 16
+"""Rows without paint that are no gap between dashes. Chosen: more than the 12 m of the longest pattern; the line isn't
+seen there, or isn't there."""
 
 
 @dataclass(frozen=True, eq=False)

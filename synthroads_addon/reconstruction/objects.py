@@ -27,29 +27,50 @@ from .smoothing import mean_with_std
 BarrierKind = Literal["guardrail", "concrete", "noise"]
 
 CELL_ALONG, CELL_ACROSS = 1.0, 0.1
-"""Cells in which barriers are looked for, m."""
+"""Cells in which barriers are looked for, m. Chosen: a metre holds points of most scanners; across as of the
+profiles."""
 SHORTEST_BARRIER = 8.0
-"""Shorter linear clusters, m, are no barriers."""
-_HOLE = 8  # cells along a barrier that may be empty (hidden behind a lorry, say)
-_JOIN = 0.15  # m across that the cells of one barrier may lie apart
-_STEP = 0.25  # m: a barrier whose offset changes by more goes on as another one
-_STRETCH = 5.0  # m
+"""Shorter linear clusters, m, are no barriers. Chosen: cars are shorter."""
+_HOLE = 8
+"""Cells along a barrier that may be empty. Chosen: as hidden behind a lorry."""
+_JOIN = 0.15
+"""Distance across that the cells of one barrier may lie apart, m. Chosen: beam and post."""
+_STEP = 0.25
+"""Change of a barrier's offset from which on it goes on as another one, m. Chosen: more than single stretches
+scatter."""
+_STRETCH = 5.0
+"""Length of the stretches whose median is a barrier's offset, m. Chosen: as of the profiles."""
 _FEWEST_OF_BARRIER = 10
-_POST_APART = 0.4  # m: points nearer than this belong to one post
+"""Points of a barrier at least. Chosen: one on each metre."""
+_POST_APART = 0.4
+"""Distance of points that belong to one post at most, m. Chosen: posts have more to the next thing."""
 _FEWEST_OF_POST = 2
-_POST_WIDEST = 0.7  # m, of a post's points from side to side, position errors of strips included
+"""Points of a post at least. Chosen: single points are stray ones."""
+_POST_WIDEST = 0.7
+"""Width of a post's points from side to side at most, m. Chosen: a post, and position errors of strips."""
 _POST_HEIGHTS = {PointKind.POST: (0.1, 2.0), PointKind.FURNITURE: (0.45, 1.3)}
+"""Least and largest height of a post's highest point by class, m. Chosen: classes are believed; what has none must be
+as high as a delineator."""
 USUAL_POST = 1.0
-"""Height of a delineator, m: the highest of a few points on it lies lower."""
+"""Height of a delineator, m: the highest of a few points on it lies lower. Chosen: about a metre, as usual."""
 _BARRIER_HEIGHTS = (0.25, 1.6)
-_NOISE_FROM = 1.6  # m: higher walls are noise barriers, where the class doesn't tell
-_ALONE = 0.8  # m around a post of unknown class in which nothing else may stand
+"""Least and largest height of a guardrail of unknown class, m. Chosen: kerbs are lower, walls higher."""
+_NOISE_FROM = 1.6
+"""Height from which on a wall is a noise barrier where the class doesn't tell, m. Chosen: no guardrail is as high."""
+_ALONE = 0.8
+"""Distance around a post of unknown class in which nothing else may stand, m. Chosen: bushes and signs have
+neighbours."""
 _BEAM = sizes.POST[0] / 2.0 + 0.5 * max(point[0] for point in sizes.BEAM)
 USUAL_VERGE = 1.5
-"""Width of the verge where classes don't tell, m."""
-_FARTHEST, _FARTHEST_UNKNOWN = 12.0, 4.0  # m outside of the pavement, of what has a class and what hasn't
-_IN_THE_MIDDLE = 0.4  # m from the axis: a guardrail there has a beam on either side
-_BEYOND = 4.0  # m outside of the verge, where the ground no longer is the road's
+"""Width of the verge where classes don't tell, m. As in the standard cross-sections."""
+_FARTHEST, _FARTHEST_UNKNOWN = 12.0, 4.0
+"""Distances outside of the pavement at most, m, of what has a class and what hasn't. Chosen: noise barriers stand
+within the first; beyond the second what has no class is mostly vegetation."""
+_IN_THE_MIDDLE = 0.4
+"""Distance from the axis at which a guardrail has a beam on either side, m. Chosen: half of a double guardrail's
+width."""
+_BEYOND = 4.0
+"""Distance outside of the verge from which on the ground no longer is the road's, m. Chosen: a ditch's width."""
 
 
 @dataclass(frozen=True)

@@ -14,18 +14,33 @@ from ..road.alignment import Alignment
 from .smoothing import smooth
 
 SPACING = 1.0
-"""Distance of a path's points, m."""
+"""Distance of a path's points, m. Chosen: headings change little within it."""
 _ROUNDS = 3
-_CELL = 4.0  # m
+"""Rounds of a projection: two of Newton's steps along the path, and the offset from there. Chosen: from a place within
+`_CELL` they converge."""
+_CELL = 4.0
+"""Edge of the cells whose middle's place is the first guess of a projection, m. Chosen: far less than a road's
+radius."""
 _BLOCK = 500_000
-_STEP = 10.0  # m, of the march
-_REACH = 40.0  # m to either side that the road's surface is looked for at first
-_MARGIN = 3.0  # m that it may become wider from one step to the next
-_GAP = 90.0  # m without any surface that are crossed
-_FEWEST_CELLS = 8  # of surface in a step
-_START_RADII = (60.0, 120.0, 240.0)  # m: at the smallest within which the surface is longish the march begins
+"""Points that are projected at once. Chosen: bounds memory."""
+_STEP = 10.0
+"""Step of the march, m. Chosen: less than a carriageway's width."""
+_REACH = 40.0
+"""Distance to either side that the road's surface is looked for at first, m. Chosen: a wide motorway's half with its
+verges."""
+_MARGIN = 3.0
+"""Distance that the surface may become wider by from one step to the next, m. Chosen: a lane."""
+_GAP = 90.0
+"""Length without any surface that is crossed, m. Chosen: a bridge above."""
+_FEWEST_CELLS = 8
+"""Cells of surface in a step at least. Chosen: fewer tell no middle."""
+_START_RADII = (60.0, 120.0, 240.0)
+"""Radii about the middle of the surface, m, at the smallest of which it is longish the march begins. Chosen: from a
+rural road's to a motorway's with its verges."""
 _LONGISH = 2.0
-_WAVELENGTH = 120.0  # m: shorter swings of the first path are smoothed away
+"""Ratio of the deviations along and across from which on a surface is longish. Chosen: a square has 1."""
+_WAVELENGTH = 120.0
+"""Wavelength of which half of the first path's swings is kept, m. Chosen: shorter ones are the march's."""
 SHORTEST = 50.0
 """A shorter path than this, m, cannot be told from a square."""
 

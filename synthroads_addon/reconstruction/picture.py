@@ -17,10 +17,14 @@ from .profiles import Profiles
 from .reconstruct import Reconstruction
 
 AXIS, EDGE, MARK, BARRIER, POST, DOUBT = "#d1006b", "#ff8c00", "#00a2ff", "#7a3cff", "#00b050", "#ff0000"
-_SIZE = (13.0, 9.0)  # inches
+_SIZE = (13.0, 9.0)
+"""Width and height of the picture, inches. Chosen: fits a screen."""
 _DPI = 110
-_STRETCH = 150.0  # m of the road that are shown large
-_BEYOND = 6.0  # m outside of the pavement
+"""Pixels to an inch. Chosen: fits a screen."""
+_STRETCH = 150.0
+"""Length of the road that is shown large, m. Chosen: dashes can be told."""
+_BEYOND = 6.0
+"""Distance outside of the pavement that is shown, m. Chosen: barriers stand there."""
 
 
 @literal_texts()

@@ -17,22 +17,40 @@ from .smoothing import robust_scale, smooth
 Grid = NDArray[np.float32]
 
 ACROSS = 0.1
-"""Width of a bin across the path, m."""
+"""Width of a bin across the path, m. Chosen: a line's width."""
 STRETCH = 5
-"""Metres along the path that one offset of a line or an edge is measured on."""
-_BACKGROUND = (11, 25)  # bins along and across whose median is a surface without paint: 11 m, 2.5 m
+"""Metres along the path that one offset of a line or an edge is measured on. Chosen: enough points for a mean, short
+beside any dash and gap."""
+_BACKGROUND = (11, 25)
+"""Bins along and across whose median is a surface without paint. Chosen: 11 m by 2.5 m, of which a line fills
+little."""
 _PAINT_PERCENTILE = 99.0
-_ENOUGH = 1_500_000  # points to lay the road straight by
-_BLUR = 0.8  # bins
+"""Percentile of the brightness above the pavement's that is full paint. Chosen: paint is more than a hundredth of a
+road."""
+_ENOUGH = 1_500_000
+"""Points by which the road is laid straight at most. Chosen: bounds the work; more don't move it."""
+_BLUR = 0.8
+"""Standard deviation of the nearest blur by which empty bins are filled, bins. Chosen: their neighbours' mean."""
 STEP, WINDOW = 10, 20
-"""Metres from one stretch to the next, and in a stretch."""
+"""Metres from one stretch to the next, and in a stretch. Chosen: half of a stretch overlaps the next."""
 _SHEARS = np.linspace(-0.06, 0.06, 25)
-_REACH = 0.8  # m that a stretch may lie beside where the ones before it lead
-_LOOSE = 0.15  # more of it per stretch without lines
-_MEMORY = 0.85  # of the template from one stretch to the next
-_PRIOR = 0.15  # of the best score is lost _REACH beside what was expected
-_WAVELENGTH = 60.0  # m
-_EDGE = 0.3  # weight of the pavement's edges beside paint
+"""Slopes of a stretch against the path that are tried, m/m. Chosen: what the first path is off by, in steps of 0.1 m
+over a stretch."""
+_REACH = 0.8
+"""Distance that a stretch may lie beside where the ones before it lead, m. Chosen: less than from one line to
+another."""
+_LOOSE = 0.15
+"""What a stretch without lines adds to that, m. Chosen: a path may leave its course by 1.5 % there."""
+_MEMORY = 0.85
+"""Share of the template that stays from one stretch to the next. Chosen: it forgets over some 60 m, as markings
+change."""
+_PRIOR = 0.15
+"""Share of the best score that is lost `_REACH` beside what was expected. Chosen: decides between lines that are
+alike."""
+_WAVELENGTH = 60.0
+"""Wavelength of which half of the shifts' swings is kept, m. Chosen: shorter ones are noise."""
+_EDGE = 0.3
+"""Weight of the pavement's edges beside paint. Chosen: edges are rougher than lines, and there where no line is."""
 _DENSE = 1.5
 """Bins between points that are no gap. Chosen: a point's place within its bin is worth one bin."""
 _COARSE = 5

@@ -30,8 +30,11 @@ FIT_TOLERANCE = 0.03
 TOLERANCES = (0.005, 1.0)
 """Smallest and largest of those, m."""
 _MOST_POINTS = 400_000
-_FROM_EDGES = 0.1  # m: nearer to an edge of the pavement than this a point may lie beside it
-_FAULT = 0.5  # m: a point farther from the surface is none of it
+"""Points that the surface is compared with at most. Chosen: more don't move its figures."""
+_FROM_EDGES = 0.1
+"""Distance from an edge of the pavement within which a point may lie beside it, m. Chosen: a bin."""
+_FAULT = 0.5
+"""Distance from the surface beyond which a point is none of it, m. Chosen: cars and kerbs."""
 
 
 @dataclass(frozen=True)

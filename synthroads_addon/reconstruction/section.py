@@ -21,20 +21,39 @@ LineKind = Literal["outer_edge", "lane", "inner_edge"]
 
 EDGE_LINE, NARROW_LINE = 0.30, 0.15
 """Widths of outer edge lines and of all others on motorways, m (RMS)."""
-_RURAL_EDGE_LINE, _RURAL_LINE = 0.25, 0.12  # on other roads (RMS)
-_LINE_TOLERANCE = 0.05  # m: a measured width so near to a usual one is that
-_WIDEST_STRIP = 1.25  # m: pavement beyond the outermost lane that is wider has a hard shoulder
+_RURAL_EDGE_LINE, _RURAL_LINE = 0.25, 0.12
+"""The same on other roads, m (RMS)."""
+_LINE_TOLERANCE = 0.05
+"""Distance of a measured width from a usual one that passes for it, m. Chosen: a third of the narrowest line's
+width."""
+_WIDEST_STRIP = 1.25
+"""Width of an edge strip at most, m: pavement outside of the lanes that is wider has a hard shoulder. Chosen: the
+standard cross-sections have strips of 0.75 m at most, and shoulders of 2 m at least."""
 _USUAL_STRIP = 0.5
-_PAINT_STD, _EDGE_STD = 0.04, 0.08  # m that lines and edges found by brightness are off all along a road
-_FEWEST_EDGES = 0.2  # of the stretches must show an edge
-_AROUND, _SOLID = 7, 0.8  # stretches around one, and their share of paint: along a dashed line it is less
+"""Width of a strip that isn't seen, m. Chosen: that of most standard cross-sections."""
+_PAINT_STD, _EDGE_STD = 0.04, 0.08
+"""Deviation of lines and edges found by brightness that they share all along a road, m. Chosen: a quarter of a line's
+width, and a tuft of grass."""
+_FEWEST_EDGES = 0.2
+"""Share of the stretches that must show an edge for it to be seen. Chosen: what shows on fewer is a fault."""
+_AROUND, _SOLID = 7, 0.8
+"""Stretches around one, and their share of paint along a solid line. Chosen: 35 m hold whole periods; along a dashed
+line the share is less."""
 _FEWEST_STRETCHES = 6
-_COMMON = 0.35  # of the most common width: others so common may be the usual one
-_MODE = 0.4  # m about the most common width
-_NARROWEST, _WIDEST_LANE, _WIDEST_HALF = 2.3, 5.2, 8.0  # m from a single carriageway's axis to lines and edges
-_WIDEST = 6.0  # m that a strip or shoulder can be
+"""Stretches that a width is the mean of at least. Chosen: fewer are no usual part."""
+_COMMON = 0.35
+"""Share of the most common width's count from which on another one may be the usual one. Chosen: turnouts may be
+longer."""
+_MODE = 0.4
+"""Distance about the most common width that is the same one, m. Chosen: less than strips and shoulders differ by."""
+_NARROWEST, _WIDEST_LANE, _WIDEST_HALF = 2.3, 5.2, 8.0
+"""Distances from a single carriageway's axis to lines and edges, m. Chosen: the narrowest and the widest lane; a lane
+with a paved shoulder."""
+_WIDEST = 6.0
+"""Width of a strip or shoulder at most, m. Chosen: a hard shoulder and an emergency bay."""
 STANDARD_TOLERANCE = 0.15
-"""A cross-section all of whose widths are this near (m; half of it per lane) to a standard one's passes for it."""
+"""A cross-section all of whose widths are this near (m; half of it per lane) to a standard one's passes for it. Chosen:
+standard ones of as many lanes differ by more."""
 
 
 @dataclass(frozen=True)

@@ -19,19 +19,32 @@ from .section import MeasuredSection, Side, SideSection
 from .smoothing import correlation_factor, robust_scale
 
 APART = 0.75
-"""An edge of the pavement so far, m, from the usual one is another cross-section's."""
+"""An edge of the pavement so far, m, from the usual one is another cross-section's. Chosen: less than any bay or lane,
+more than an edge wanders."""
 SHORTEST = 25.0
-"""A shorter stretch, m, is a fault in the picture."""
-_BACK = 0.1  # m: an edge so near to the usual one is back
-_CLOSING = 3  # stretches that an edge may not be seen within a run
-_AROUND = 40.0  # m before and behind a run that its shape is fitted to
-_NEAREST = 10.0  # m from a bay to where the road's edge is first or last seen
-_MISFIT = 0.25  # m rms that a bay's shape may keep from its edge
-_NARROWEST, _WIDEST = 0.6 * EMERGENCY_BAY_WIDTH, 5.0  # m: of a bay
+"""A shorter stretch, m, is a fault in the picture. Chosen: five stretches; an emergency bay is longer."""
+_BACK = 0.1
+"""Distance of an edge from the usual one at which it is back, m. Chosen: a bin."""
+_CLOSING = 3
+"""Stretches that an edge may not be seen within a run. Chosen: 15 m, a lorry's length."""
+_AROUND = 40.0
+"""Length before and behind a run that its shape is fitted to, m. Chosen: more than a taper."""
+_NEAREST = 10.0
+"""Distance from a bay to where the road's edge is first or last seen, m. Chosen: else the bay may go on beyond the
+cloud."""
+_MISFIT = 0.25
+"""Root mean square that a bay's shape may keep from its edge, m. Chosen: exits and lanes that begin keep more."""
+_NARROWEST, _WIDEST = 0.6 * EMERGENCY_BAY_WIDTH, 5.0
+"""Widths of a bay, m. Chosen: about those of the guidelines' bays, and a lane with its strip."""
 _SHORTEST_BAY, _LONGEST_BAY = 0.4 * EMERGENCY_BAY_LENGTH, 3.0 * EMERGENCY_BAY_LENGTH
-_PAINTED = 0.6  # of a bay's length must be beside the edge line's paint, where that is seen
-_LEAST_TAPER = 5.0  # m
-_LEAST_SCATTER = 0.02  # m: of an edge's offset in one stretch
+"""Lengths of a bay at full width, m. Chosen: about those of the guidelines' bays."""
+_PAINTED = 0.6
+"""Share of a bay's length that must be beside the edge line's paint, where that is seen. Chosen: of a dashed line it is
+half."""
+_LEAST_TAPER = 5.0
+"""Length of a taper at least, m. Chosen: a stretch."""
+_LEAST_SCATTER = 0.02
+"""Scatter of an edge's offset in one stretch at least, m. Chosen: no pavement's edge is as straight as a line."""
 
 
 @dataclass(frozen=True)

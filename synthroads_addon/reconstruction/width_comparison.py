@@ -17,8 +17,10 @@ from .reconstruct import Reconstruction
 from .section import SideSection
 from .widenings import Bay, unlike_mask
 
-_ISLAND = 0.05  # m
-_LANE_THERE = 1.0  # m: a narrower lane begins or ends
+_ISLAND = 0.05
+"""Width from which on an island is there, m. Chosen: rounding leaves less."""
+_LANE_THERE = 1.0
+"""Width from which on a lane is there, m. Chosen: a narrower one begins or ends."""
 
 
 @dataclass(frozen=True)

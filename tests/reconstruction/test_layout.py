@@ -63,8 +63,8 @@ def part_of(offset: float, start: float, end: float) -> Line:
 
 
 def test_a_lane_that_begins_in_the_middle_leaves_the_section_of_the_longer_part() -> None:
-    outer = -9.5 - 3.5 * np.clip((ROWS - 135.0) / 30.0, 0.0, 1.0)
-    paved = (OFFSETS > outer[:, None]) & (OFFSETS < -2.0) | (OFFSETS > 2.0) & (OFFSETS < 9.5)
+    offsets, outer = OFFSETS, -9.5 - 3.5 * np.clip((ROWS - 135.0) / 30.0, 0.0, 1.0)
+    paved = (offsets > outer[:, None]) & (offsets < -2.0) | (offsets > 2.0) & (offsets < 9.5)
     lasting = [line(-6.0), line(-2.5), line(2.5), line(6.0), line(9.25)]
     right, left = find_layout(
         profiles(paved), [part_of(-9.25, 0.0, 135.0), part_of(-12.75, 165.0, 300.0), *lasting]

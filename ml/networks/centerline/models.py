@@ -44,6 +44,7 @@ _MIDDLE = {"lanes": 4.0, "lane_width": 3.5, "heading": 0.0}
 _NATURAL = {"lanes": 2.0, "lane_width": 0.3, "heading": 0.05}
 """Size of their deviations from it."""
 _LARGEST_LOG = 5.0
+"""Largest absolute logarithm of a deviation. Chosen: exp(5) m is beyond any error, and finite in half precision."""
 
 
 class ModelOptions(Part):

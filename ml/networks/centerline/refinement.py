@@ -15,6 +15,7 @@ _APART = (1, 3, 6)
 _PARABOLA_UNIT = 5.0
 """m: in this unit the places along a sequence are numbers of about one, of which parabolas are fitted well."""
 _FIRST_LOG_STD = -1.5
+"""Logarithm of the deviation, m, that an untrained network says. Chosen: 0.22 m, about what the first look leaves."""
 
 
 class Refinement(nn.Module):

@@ -1,8 +1,8 @@
 """Convolution over the cells that a cloud fills: what lies around a cell, and is there, by weights for each place.
 
 Graham, Engelcke and van der Maaten, "3D semantic segmentation with submanifold sparse convolutional networks" (2018):
-only filled cells have an output, so that surfaces stay as thin as they are. Of the cell n(i, k) at offset k from cell i,
-with inputs x, outputs y and weights W:
+only filled cells have an output, so that surfaces stay as thin as they are. Of the cell n(i, k) at offset k from cell
+i, with inputs x, outputs y and weights W:
 
     y_i = sum over k of x_n(i, k) W_k
     dL/dx_j = sum over k and all i with n(i, k) = j of dL/dy_i W_k^T
@@ -10,8 +10,8 @@ with inputs x, outputs y and weights W:
 
 On a CPU it is done offset by offset for the pairs of cells that are there (the rule book of that paper): of a surface
 not half of them. A GPU would wait for so many small steps; there all offsets are gathered (im2col), empty ones as
-zeros, and one product of matrices does the rest. Either way nothing of the size cells x offsets x channels is kept for the gradient, and no two numbers are added to
-one at the same time, so that all runs are the same.
+zeros, and one product of matrices does the rest. Either way nothing of the size cells x offsets x channels is kept for
+the gradient, and no two numbers are added to one at the same time, so that all runs are the same.
 """
 
 from collections.abc import Iterator

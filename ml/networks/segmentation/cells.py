@@ -41,7 +41,9 @@ Cells = dict[str, Tensor]
 LARGEST = (1 << BITS) - 2
 """Cells along an axis of a cloud, one to either side being left free."""
 _MOST_CLOUDS = 1 << 14
+"""Clouds of a batch at most. Chosen: with three places of 16 bits each their numbers fill 62 bits of 64."""
 _AXES = 3
+"""Of space: x, y, z."""
 _CROSS = [4, 10, 12, 13, 14, 16, 22]
 """Out of the 27 cells around one: itself and those that share a face with it."""
 _MULTIPLE = 8

@@ -17,7 +17,9 @@ BITS = 16
 Curve = Literal["hilbert", "z-order", "hilbert-transposed", "z-order-transposed"]
 CURVES: tuple[Curve, ...] = get_args(Curve)
 _AXES = 3
+"""Of space: x, y, z."""
 _OCTANTS = 1 << _AXES
+"""Of a cell: two halves along each axis."""
 _SPREAD = ((16, 0x00FF0000FF), (8, 0x00F00F00F00F), (4, 0x0C30C30C30C3), (2, 0x249249249249))
 """Steps that part the bits of a number so that two free ones lie between: shift, and what is kept."""
 

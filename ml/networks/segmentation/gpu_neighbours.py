@@ -20,7 +20,9 @@ from .neighbours import TINY, Neighbourhood, Neighbours, check_ends
 _PAIRS = {"cpu": 1 << 20}
 """Pairs of queries and candidates that are held at once."""
 _PAIRS_ELSEWHERE = 1 << 23
+"""The same on a GPU. Chosen: 32 MiB for each number of a pair in single precision."""
 _LARGEST_KEY = 2**62
+"""Cells that have numbers. Chosen: 63 bits, one of them to spare."""
 
 
 def build_neighbours(coord: Tensor, offset: Tensor, neighbourhood: Neighbourhood) -> Neighbours:

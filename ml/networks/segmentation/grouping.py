@@ -20,6 +20,7 @@ from ..base import full_precision
 _CHUNK = {"cpu": 1 << 18}
 """Gathered numbers at once: what a CPU's cache holds, or what a GPU needs to be busy."""
 _CHUNK_ELSEWHERE = 1 << 26
+"""The same on a GPU. Chosen: 256 MiB in single precision."""
 
 
 class Norm(nn.BatchNorm1d):

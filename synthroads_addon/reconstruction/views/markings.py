@@ -8,10 +8,15 @@ from ..path import SPACING
 from ..profiles import STRETCH
 from .view import View
 
-_PAINTED = 0.10  # m that lines found by brightness are off the axis where nothing scatters
-_CLASSED = 0.01  # by class
-_EDGES = 0.20  # edges in place of lines
-_CARRIED, _FAR = 0.5, 30.0  # m off where other lines carry the axis on, so far (m) from where its own were seen
+_PAINTED = 0.10
+"""Deviation of lines found by brightness where nothing scatters, m. Chosen: as measured bins are off."""
+_CLASSED = 0.01
+"""The same by class, m. Chosen: the points' own noise."""
+_EDGES = 0.20
+"""The same of edges in place of lines, m. Chosen: grass that grows over them."""
+_CARRIED, _FAR = 0.5, 30.0
+"""Deviation where other lines carry the axis on, m, reached so far (m) from where its own were seen. Chosen: lanes may
+begin to widen on the way."""
 
 
 def view_lines(layout: RoadLayout, axis: FoundAxis) -> View:

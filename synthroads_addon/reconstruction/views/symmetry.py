@@ -14,16 +14,28 @@ from ..smoothing import fill_gaps, robust_scale
 from .pavement import median_profile, remove_grade
 from .view import View
 
-_REACH = 8.0  # m to either side of the path that the axis is looked for in
-_LIMIT = 2.5  # spreads: what is farther off the middle counts as that far
-_APART = 0.6  # m: places nearer to each other than twice this are alike anyway
-_INDEPENDENT = 0.4  # m across that one independent value takes
-_FEWEST = 3.0  # m on either side that must have mirror images
-_CLEAR = 3.0  # standard deviations that the best axis lies above what chance gives
-_RIVAL = 0.75  # of the best: another place so good and farther than `_OTHER` away leaves the axis open
-_OTHER = 1.0  # m
-_NEAR_BEST = 0.92  # of the best: how wide the peak is there says how sure it is
-_FLOOR = 0.25  # m that the axis of symmetry is off the axis where nothing scatters
+_REACH = 8.0
+"""Distance to either side of the path that the axis is looked for in, m. Chosen: two lanes."""
+_LIMIT = 2.5
+"""Spreads from the middle beyond which a value counts as that far. Chosen: single bright signs have no say."""
+_APART = 0.6
+"""Half the distance of the nearest pairs, m. Chosen: nearer places are alike anyway."""
+_INDEPENDENT = 0.4
+"""Width that one independent value takes, m. Chosen: some bins, which a line and blur join."""
+_FEWEST = 3.0
+"""Width on either side that must have mirror images, m. Chosen: a lane."""
+_CLEAR = 3.0
+"""Standard deviations that the best axis lies above what chance gives. Chosen: one false in some 700."""
+_RIVAL = 0.75
+"""Share of the best from which on another place leaves the axis open, if it is farther than `_OTHER` away. Chosen: one
+nearly as good can't be ruled out."""
+_OTHER = 1.0
+"""Distance of another place, m. Chosen: as of fused views."""
+_NEAR_BEST = 0.92
+"""Share of the best at which the width of the peak says how sure it is. Chosen: above the peak's flanks."""
+_FLOOR = 0.25
+"""Deviation of the axis of symmetry from the axis where nothing scatters, m. Chosen: shoulders of two sides differ by
+as much."""
 
 
 def view_symmetry(profiles: Profiles) -> View:

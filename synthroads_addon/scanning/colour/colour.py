@@ -59,7 +59,9 @@ FROM_MATERIAL, FROM_NODES, NEARBY, FROM_RETURN = 0, 253, 254, 255
 """`LayerValues.source` of a material's mean, of its nodes at the very return, of a place of the same material close by,
 and of a pixel per return; n in between is the n-th best image."""
 _SRGB_POWER = np.float32(1 / 2.4)
+"""Exponent of sRGB's encoding (IEC 61966-2-1): 1 / 2.4."""
 _FALSE_COLOUR = ("roughness", "metallic", "specular")
+"""Layers that stand for red, green and blue in a picture of the surface."""
 
 
 @dataclass(frozen=True)

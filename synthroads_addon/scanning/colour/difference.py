@@ -6,9 +6,11 @@ from ...base.arrays import Bool, Float, UInt16
 from .colour import FROM_MATERIAL, NEARBY, LayerValues, decode_srgb
 
 _WHITE = np.array([0.95047, 1.0, 1.08883])
+"""Tristimulus values X, Y, Z of the white point D65 (CIE 1931, 2 degrees), Y being 1."""
 _TO_XYZ = np.array(
     [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
 )
+"""Matrix from linear sRGB to X, Y, Z (IEC 61966-2-1)."""
 
 
 def cie_lab(rgb: UInt16) -> Float:

@@ -21,7 +21,8 @@ CORNER = 10.0
 MEASURED = 0.05
 """Points of a measured line nearer than this (m) to the line through the others say nothing of its course."""
 
-_REPEATED = 1e-3  # m
+_REPEATED = 1e-3
+"""Distance of points that are one, m. Chosen: no course is told from less."""
 
 
 class PolylineGuide(Guide):

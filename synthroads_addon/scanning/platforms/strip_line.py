@@ -15,8 +15,10 @@ from .guides import Guide
 FOLD = 0.98
 """An offset may use up to this share of the radius: beyond it the offset line would turn back on itself."""
 
-_CELL = 1.0  # m, of a track's table
-_BLOCK = 65_536  # cells, or places, evaluated at a time
+_CELL = 1.0
+"""Length of a cell of a track's table, m. Chosen: the offset line's length is smooth within."""
+_BLOCK = 65_536
+"""Cells, or places, that are evaluated at a time. Chosen: bounds memory."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 

@@ -29,10 +29,14 @@ COLUMNS = ("time", "x", "y", "z", "roll", "pitch", "heading")
 """Names in the header; in any order and case, beside any others."""
 _LARGEST = 1e10
 """Largest time (s: GPS time counts thousands of millions) and angle (deg)."""
-_NEAREST = 8.0  # m, of the typical range
-_GRID = 1e-6  # s, that times may lie beside an even grid
+_NEAREST = 8.0
+"""Least typical range, m. Chosen: a car's scanner to the road beside it."""
+_GRID = 1e-6
+"""Time that a row may lie beside an even grid, s. Chosen: files have six decimals."""
 _SUBDIVISIONS = 50
-_STILL = 0.5  # m/s: slower than this a platform has no course
+"""Parts of the shortest interval that are tried as an even grid's step. Chosen: rows of files are thinned by less."""
+_STILL = 0.5
+"""Speed below which a platform has no course, m/s. Chosen: positions' noise is as fast."""
 _ACROSS, _BESIDE, _ALONG = 35.0, 8.0, 4.0
 """Median angles (deg) between heading and course: too wide in any case; odd where another convention fits as well."""
 _CONVENTION = "degrees clockwise from grid north"
