@@ -66,10 +66,10 @@ def axis_beside(document: object, origin: Float, path: CloudPath) -> tuple[Float
         order = np.argsort(station, kind="stable")
         given = told.get("std") or [_USUAL_STD] * len(points)
         deviation = np.array([_USUAL_STD if value is None else value for value in given], dtype=np.float64)
-        wanted = path.stations
-        after = np.clip(np.searchsorted(station[order], wanted), 1, len(points) - 1)
+        target = path.stations
+        after = np.clip(np.searchsorted(station[order], target), 1, len(points) - 1)
         low, high = station[order][after - 1], station[order][after]
-        near = (wanted >= low - 1e-9) & (wanted <= high + 1e-9) & (high - low <= _GAP)
-        offset = np.where(near, np.interp(wanted, station[order], beside[order]), offset)
-        std = np.where(near, np.interp(wanted, station[order], deviation[order]), std)
+        near = (target >= low - 1e-9) & (target <= high + 1e-9) & (high - low <= _GAP)
+        offset = np.where(near, np.interp(target, station[order], beside[order]), offset)
+        std = np.where(near, np.interp(target, station[order], deviation[order]), std)
     return offset, std

@@ -42,9 +42,9 @@ def fit_offsets(tiles: Sequence[CloudTile], classifier: Classifier, configuratio
     scores: list[Float32] = []
     truth: list[Int] = []
     for tile in chosen:
-        for inside, found in piece_scores(tile, scaling[tile.scene], classifier, settings):
+        for inside, piece in piece_scores(tile, scaling[tile.scene], classifier, settings):
             known = tile.segment[inside] != IGNORED
-            scores.append(found.float().cpu().numpy()[known])
+            scores.append(piece.float().cpu().numpy()[known])
             truth.append(tile.segment[inside][known].astype(np.int64))
     return best_offsets(np.concatenate(scores), np.concatenate(truth))
 

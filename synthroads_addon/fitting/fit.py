@@ -222,10 +222,10 @@ def axis_of_points(
 def _tell_misfit(name: str, fit: AxisFit) -> None:
     """Warn where the road fitted to an axis is farther off its points than the fit aimed at (root mean square)."""
     rows = (("across", fit.horizontal, fit.tolerance), ("in height", fit.height, _HEIGHT_SHARE * fit.tolerance))
-    for way, found, aim in rows:
-        if found.rms > aim:
+    for way, deviations, aim in rows:
+        if deviations.rms > aim:
             text = "%s: the fitted road is off its points by %.1f cm %s (rms), which is to be %g cm at most: worst"
-            sizes = (100.0 * found.rms, way, 100.0 * aim, 100.0 * found.worst, found.worst_station)
+            sizes = (100.0 * deviations.rms, way, 100.0 * aim, 100.0 * deviations.worst, deviations.worst_station)
             warn(f"{text} %.1f cm at station %.0f m", name, *sizes)
 
 
@@ -297,8 +297,8 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05, design_ends: bool = Fal
     origin = np.append(np.round(given[:, :2].mean(axis=0)), 0.0)
     local, weights = _bridge_gaps(given - origin)
     real = weights == 1.0
-    found = _follow_plan(local, real, tolerance) if follow else None
-    alignment, near = found or _fit_plan(local[:, :2], weights, _MARGIN * tolerance, design_ends)
+    design = _follow_plan(local, real, tolerance) if follow else None
+    alignment, near = design or _fit_plan(local[:, :2], weights, _MARGIN * tolerance, design_ends)
     reach = max(NEAR, 5.0 * float(np.median(np.diff(near))))
     station, offset = alignment.project_near(local[:, :2], near, reach)
     across = np.hypot(*(local[:, :2] - alignment.position(station)).T)
@@ -327,18 +327,18 @@ def _follow_plan(local: Float, real: NDArray[Any], tolerance: float) -> tuple[Al
     """
     points = local[real, :2]
     try:
-        found = followed(points, tolerance)
+        design = followed(points, tolerance)
     except (InputError, np.linalg.LinAlgError):  # lines that turn on the spot
         return None
-    if found is None:
+    if design is None:
         return None
     run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(local[:, :2], axis=0).T))])
-    if found.rank(points, tolerance)[0]:
+    if design.rank(points, tolerance)[0]:
         usual, near = _fit_plan(points, np.ones(len(points)), _MARGIN * tolerance, False)
         # Fewer elements are likelier than many where sparse points tell neither.
         if np.abs(usual.project_near(points, near, NEAR)[1]).max() <= 0.5 * tolerance:
             return usual, np.interp(run, run[real], near)
-    return found.alignment, np.interp(run, run[real], found.stations)
+    return design.alignment, np.interp(run, run[real], design.stations)
 
 
 def _follow_heights(station: Float, heights: Float, weights: Float, length: float, tolerance: float) -> Profile:
@@ -349,16 +349,16 @@ def _follow_heights(station: Float, heights: Float, weights: Float, length: floa
     def worst(profile: Profile) -> float:
         return float(np.abs(profile.elevation(at) - level).max())
 
-    found: Profile | None = None
+    design: Profile | None = None
     if (np.diff(at) > 0.0).all():
         try:
-            found = heights_followed(at, level, length)
+            design = heights_followed(at, level, length)
         except (InputError, np.linalg.LinAlgError):  # grades that no road has
-            found = None
-    if found is not None and worst(found) <= tolerance:
-        return found
+            design = None
+    if design is not None and worst(design) <= tolerance:
+        return design
     usual = _fit_heights(station, heights, weights, length, tolerance)
-    return usual if found is None or worst(usual) <= worst(found) else found
+    return usual if design is None or worst(usual) <= worst(design) else design
 
 
 def _check_points(points: ArrayLike) -> Float:

@@ -87,6 +87,8 @@ class Goal:
 
     def expected_score(self, square: float, chain: Chain, points: int) -> float:
         """Return the score (BIC, least is best) of a chain with a sum of squares, m^2; elements cost extra."""
+        # Schwarz 1978: BIC = n ln(RSS / n) + k ln n, here of n independent observations, with half a parameter more for
+        # each element (chosen: of two chains as free the one with fewer elements).
         misfit = np.log(max(square, 0.0) / points + self.floor**2)
         return self.count * misfit + (chain.freedom() + 0.5 * chain.size) * np.log(self.count)
 

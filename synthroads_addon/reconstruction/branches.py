@@ -54,8 +54,8 @@ def find_branch(profiles: Profiles, line: Line) -> Float:
     shown = (profiles.stations >= line.start) & (profiles.stations <= line.end) & np.isfinite(place)
     beside = np.zeros(len(place))
     if shown.sum() >= _LONG:
-        found = [_branch_beside(_gains(profiles, place, sign)[shown]) for sign in (-1, 1)]
-        beside[shown] = np.where(found[0] > found[1], -found[0], found[1])
+        branches = [_branch_beside(_gains(profiles, place, sign)[shown]) for sign in (-1, 1)]
+        beside[shown] = np.where(branches[0] > branches[1], -branches[0], branches[1])
     padded = np.zeros(profiles.stretches * STRETCH)
     padded[: len(beside)] = beside
     return _with_ends(np.median(padded.reshape(-1, STRETCH), axis=1))
@@ -96,8 +96,10 @@ def _gains(profiles: Profiles, place: Float, sign: int) -> Float:
     total = ndimage.uniform_filter(np.where(known, np.clip(paint, 0.0, 1.0), 0.0).astype(np.float64), _MEAN)
     mean = np.where(share > _KNOWN, total / np.maximum(share, 1e-9), np.nan)
     above = mean[:, :-side] - mean[:, side:]  # an island may be as bright as its line, a lane isn't
-    own = above[np.isfinite(above[:, 0]), 0]
-    painted = own[own > 0.5 * np.percentile(own, 80)] if len(own) else own  # a line may be dashed
+    contrast = above[np.isfinite(above[:, 0]), 0]
+    painted = (
+        contrast[contrast > 0.5 * np.percentile(contrast, 80)] if len(contrast) else contrast
+    )  # a line may be dashed
     level = float(np.median(painted)) if len(painted) else 0.0
     if level <= 0.0:
         return np.full(above.shape, -1.0)

@@ -211,14 +211,14 @@ def above_ground(xyz: Float) -> Float:
     order = np.lexsort(tile.T)
     starts = np.flatnonzero(np.r_[True, np.any(np.diff(tile[order], axis=0) != 0, axis=1)])
     groups = {(int(tile[part[0], 0]), int(tile[part[0], 1])): part for part in np.split(order, starts[1:])}
-    for (column, row), own in groups.items():
+    for (column, row), rows in groups.items():
         corner = np.array([column, row]) * CELL * _TILE
         beside = [groups.get((column + i, row + j)) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
-        around = np.concatenate([own, *(part for part in beside if part is not None)])
+        around = np.concatenate([rows, *(part for part in beside if part is not None)])
         reach = xyz[around, :2] - corner
         near = np.all((reach >= -_MARGIN * CELL) & (reach < (_TILE + _MARGIN) * CELL), axis=1)
-        near[: len(own)] = True
-        result[own] = _above_grid(xyz[around[near]])[: len(own)]
+        near[: len(rows)] = True
+        result[rows] = _above_grid(xyz[around[near]])[: len(rows)]
     return result
 
 

@@ -32,11 +32,11 @@ class Edge:
 
     Attributes:
         offsets: (K,) m; NaN where it isn't seen.
-        apart: (K,) distance of the points that it lies midway between, m; 0 where it is found by shares.
+        spacing: (K,) distance of the points that it lies midway between, m; 0 where it is found by shares.
     """
 
     offsets: Float
-    apart: Float
+    spacing: Float
 
 
 @dataclass(frozen=True)

@@ -155,13 +155,13 @@ class RoadLayout:
         return self.pavement.profiles
 
 
-def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None = None) -> RoadLayout:
+def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = None) -> RoadLayout:
     """Return the layout of carriageways and lanes that lines and pavement of the profiles show.
 
     Args:
         profiles: along a path parallel to the road.
         lines: all that were found.
-        wanted: the kind of road, where it is known.
+        kind: the kind of road, where it is known.
 
     Raises:
         InputError: no carriageway can be made out.
@@ -170,7 +170,7 @@ def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None =
     pavement, notes = Pavement(profiles, share), []
     spans = paved_spans(pavement)
     # Rural roads have gaps in their lines, and no turnouts.
-    least = _SEEN_RURAL if len(spans) == 1 or wanted == "single" else _SEEN
+    least = _SEEN_RURAL if len(spans) == 1 or kind == "single" else _SEEN
     parts = [_Part.of(pavement, spans, number) for number in range(len(spans))]
     bands = [_band(pavement, part, part.main(lines, least)) for part in parts]
     left_out = sum(all(line not in part.main(lines, least) for part in parts) for line in lines)
@@ -178,8 +178,8 @@ def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None =
         notes.append(f"{left_out} lines were seen on a small part of the road and left out")
     if not bands:
         raise InputError("road", None, "no carriageway can be made out in the cloud")
-    pair = None if wanted == "single" else _carriageway_pair(bands)
-    if pair is None and wanted == "dual":
+    pair = None if kind == "single" else _carriageway_pair(bands)
+    if pair is None and kind == "dual":
         raise InputError("--road", "dual", "only one carriageway can be made out in the cloud")
     chosen = pair or (max(bands, key=lambda band: (len(band.lines), band.width)),)
     if len(bands) > len(chosen):
@@ -402,7 +402,7 @@ def _edge_line(pavement: Pavement, span: tuple[float, float], sign: int) -> Line
         measured=edge.offsets,
         offsets=smoothed.values if weights.any() else np.full(len(stations), high if sign > 0 else low),
         std=smoothed.std,
-        apart=edge.apart,
+        spacing=edge.spacing,
         cover=np.zeros(len(stations)),
         start=float(stations[0]),
         end=float(stations[-1]),
@@ -453,14 +453,16 @@ def axis_from_lines(layout: RoadLayout) -> FoundAxis:
         InputError: no line and no edge was seen anywhere.
     """
     guides = axis_guides(layout)
-    own = [band.middle for band in layout.bands] if layout.kind == "single" and len(guides) == 1 else list(guides)
-    lines = list(guides) + [line for band in layout.bands for line in band.lines if line not in own]
+    guide_lines = (
+        [band.middle for band in layout.bands] if layout.kind == "single" and len(guides) == 1 else list(guides)
+    )
+    lines = list(guides) + [line for band in layout.bands for line in band.lines if line not in guide_lines]
     stations = lines[0].stations
-    given = np.mean([line.measured for line in guides], axis=0)
-    raw, start = given, given
+    centre = np.mean([line.measured for line in guides], axis=0)  # where the axis is by its own lines
+    raw, start = centre, centre
     if not any(np.isfinite(line.measured).any() for line in lines):
         raise InputError("road", None, "neither lines nor edges of a carriageway can be made out in the cloud")
-    if not np.isfinite(given).any():
+    if not np.isfinite(centre).any():
         measured = np.array([line.measured for line in lines])
         known = np.isfinite(measured).sum(axis=0)
         start = np.where(known > 0, np.nansum(measured, axis=0) / np.maximum(known, 1), np.nan)
@@ -468,10 +470,10 @@ def axis_from_lines(layout: RoadLayout) -> FoundAxis:
     for _ in range(_ROUNDS):
         raw = _vote_axis(lines, axis)
         # The votes fix the movement; where the axis lies, its own lines say.
-        raw = raw + _level(given - raw)
+        raw = raw + _level(centre - raw)
         axis = fill_gaps(raw)
     smoothed = smooth(raw, np.where(np.isfinite(raw), 1.0, 0.0), STRETCH * SPACING, _AXIS_WAVELENGTH, usual=USUAL)
-    level_std = mean_with_std(given - raw)[1]
+    level_std = mean_with_std(centre - raw)[1]
     level_std = float(np.hypot(level_std if np.isfinite(level_std) else 0.0, _shared_error(guides, smoothed.scatter)))
     known = np.isfinite(raw)
     held = np.interp(stations, stations[known], smoothed.values[known])  # no curve is guessed where nothing was seen
@@ -501,15 +503,16 @@ def _vote_axis(lines: list[Line], axis: Float) -> Float:
     """Return the axis offsets (K,), m, by a weighted vote of all lines, each less its mean distance from ``axis``."""
     offsets = np.array([line.measured for line in lines])
     std = np.array([line.std for line in lines])
-    apart = offsets - axis
-    middle = np.array([mean_with_std(row)[0] for row in apart])
-    spread = np.array([_robust_spread(row - value) for row, value in zip(apart, middle, strict=True)])
-    seen = np.isfinite(offsets) & np.isfinite(std)
-    weight = np.where(seen, 1.0 / (spread[:, None] ** 2 + np.where(seen, std, 1.0) ** 2 + 1e-6), 0.0)
+    distance = offsets - axis
+    mean = np.array([mean_with_std(row)[0] for row in distance])
+    scatter = np.array([_robust_spread(row - value) for row, value in zip(distance, mean, strict=True)])
+    known = np.isfinite(offsets) & np.isfinite(std)
+    # Inverse variances: of how steady a line is, and of each of its offsets; 1 mm^2 keeps them finite.
+    weight = np.where(known, 1.0 / (scatter[:, None] ** 2 + np.where(known, std, 1.0) ** 2 + 1e-6), 0.0)
     # A line whose distance changes, where a lane begins or ends, has no vote there.
-    away = np.where(seen, apart - middle[:, None], 0.0)
-    weight *= np.array([bisquare(row, max(width, USUAL)) for row, width in zip(away, spread, strict=True)])
-    votes = np.where(seen, offsets - middle[:, None], 0.0)
+    residual = np.where(known, distance - mean[:, None], 0.0)
+    weight *= np.array([bisquare(row, max(sigma, USUAL)) for row, sigma in zip(residual, scatter, strict=True)])
+    votes = np.where(known, offsets - mean[:, None], 0.0)
     total = weight.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(total > 0.0, (weight * votes).sum(axis=0) / total, np.nan)
@@ -517,7 +520,7 @@ def _vote_axis(lines: list[Line], axis: Float) -> Float:
 
 def _shared_error(guides: tuple[Line, ...], scatter: float) -> float:
     """Return the standard deviation, m, of the error that all offsets of the axis share, see `hidden_std`."""
-    return float(np.sqrt(sum(hidden_std(line.apart, scatter) ** 2 for line in guides))) / len(guides)
+    return float(np.sqrt(sum(hidden_std(line.spacing, scatter) ** 2 for line in guides))) / len(guides)
 
 
 def _robust_spread(values: Float) -> float:

@@ -66,7 +66,7 @@ class Line:
         measured: (K,) offset of its middle in each stretch, m; NaN where no paint was seen.
         offsets: (K,) the same, smoothed, m; NaN before its begin and behind its end.
         std: (K,) standard deviation of the offsets, m.
-        apart: (K,) distance of the points that each measured offset lies midway between, m; 0 where it is a mean.
+        spacing: (K,) distance of the points that each measured offset lies midway between, m; 0 where it is a mean.
         cover: (K,) share of each stretch that is painted; NaN without points.
         start, end: stations between which it was seen, m.
         width: mean width of its paint, m.
@@ -81,7 +81,7 @@ class Line:
     measured: Float
     offsets: Float
     std: Float
-    apart: Float
+    spacing: Float
     cover: Float
     start: float
     end: float
@@ -218,13 +218,13 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
     if (weights > 0.0).sum() < 4:
         return None
     width, width_std = mean_with_std(cover[inside][np.nan_to_num(share[inside]) > 0.5])
-    apart = profiles.row_gaps(measured)
+    spacing = profiles.row_gaps(measured)
     if profiles.points is not None:
         on = np.where(inside & np.isfinite(share), share, 0.0) > 0.5
-        measured, widths, apart = _between_points(profiles, profiles.points, measured, on)
+        measured, widths, spacing = _between_points(profiles, profiles.points, measured, on)
         weights = np.where(np.isfinite(measured), weights, 0.0)
         width, width_std = mean_with_std(widths)
-        width_std = float(np.hypot(width_std, hidden_std(2.0 * apart, width_std)))  # both edges lie between rows
+        width_std = float(np.hypot(width_std, hidden_std(2.0 * spacing, width_std)))  # both edges lie between rows
     if (weights > 0.0).sum() < 4:
         return None
     smoothed = smooth(measured, weights, STRETCH * SPACING, WAVELENGTH, usual=USUAL)
@@ -236,8 +236,8 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
         stations=grid,
         measured=measured,
         offsets=np.where(within, smoothed.values, np.nan),
-        std=np.where(within, np.hypot(smoothed.std, hidden_std(apart, smoothed.scatter)), np.nan),
-        apart=apart,
+        std=np.where(within, np.hypot(smoothed.std, hidden_std(spacing, smoothed.scatter)), np.nan),
+        spacing=spacing,
         cover=_cover_by_stretch(share),
         start=start,
         end=end,
@@ -328,7 +328,7 @@ def _between_points(profiles: Profiles, points: SurfacePoints, measured: Float, 
         on: (S,) whether there is paint in each row.
     """
     middle, width = np.full(len(measured), np.nan), np.full(len(measured), np.nan)
-    apart = np.zeros(len(measured))
+    spacing = np.zeros(len(measured))
     first = profiles.stations[0] - 0.5 * SPACING
     for number in np.flatnonzero(np.isfinite(measured)):
         near = points.near(int(number), measured[number] - _NEAR - 0.1, measured[number] + _NEAR + 0.1)
@@ -343,10 +343,10 @@ def _between_points(profiles: Profiles, points: SurfacePoints, measured: Float, 
         right, left = 0.5 * (offset[low - 1] + offset[low]), 0.5 * (offset[high - 1] + offset[high])
         middle[number], width[number] = 0.5 * (left + right), left - right
         gaps = offset[low] - offset[low - 1], offset[high] - offset[high - 1]
-        apart[number] = 0.5 * float(np.hypot(*gaps))
+        spacing[number] = 0.5 * float(np.hypot(*gaps))
         if offset[high - 1] - offset[low] < _ROW and min(gaps) < _ROW:
-            middle[number], apart[number] = _on_a_row(offset, low, high)
-    return middle, width, apart
+            middle[number], spacing[number] = _on_a_row(offset, low, high)
+    return middle, width, spacing
 
 
 def _on_a_row(offset: Float, low: int, high: int) -> tuple[float, float]:

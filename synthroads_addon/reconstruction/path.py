@@ -135,13 +135,13 @@ def _project(frames: Float, points: Float, along: Float) -> tuple[Float, Float]:
         change = frames[at + 1] - low
         heading = low[:, 2] + share * change[:, 2]
         beyond = (place - at)[:, None]
-        apart = points - low[:, :2] - beyond * change[:, :2]
+        vector = points - low[:, :2] - beyond * change[:, :2]
         cos, sin = np.cos(heading), np.sin(heading)
-        offset = apart[:, 1] * cos - apart[:, 0] * sin
+        offset = vector[:, 1] * cos - vector[:, 0] * sin
         if round_ < _ROUNDS - 1:
             # On the inside of a curve a step along the path is a shorter one beside it.
             shorter = np.maximum(1.0 - offset * change[:, 2] / SPACING, 0.2)
-            along = along + (apart[:, 0] * cos + apart[:, 1] * sin) / shorter
+            along = along + (vector[:, 0] * cos + vector[:, 1] * sin) / shorter
     return along, offset
 
 

@@ -28,7 +28,7 @@ _BEYOND = 6.0
 
 
 @literal_texts()
-def draw(found: Reconstruction, cloud: RoadCloud, path: FilePath) -> None:
+def draw(reconstruction: Reconstruction, cloud: RoadCloud, path: FilePath) -> None:
     """Draw a reconstruction (plan, detail, cross-section, heights) and write the picture as PNG."""
     import matplotlib  # takes half a second, and few ask for the picture
 
@@ -37,20 +37,20 @@ def draw(found: Reconstruction, cloud: RoadCloud, path: FilePath) -> None:
 
     figure = plt.figure(figsize=_SIZE, dpi=_DPI, layout="constrained")
     grid = figure.add_gridspec(3, 2, height_ratios=(1.3, 1.3, 1.0))
-    geometry = RoadGeometry(found.parameters)
-    plan(figure.add_subplot(grid[0, :]), found, geometry, (0.0, geometry.length))
+    geometry = RoadGeometry(reconstruction.parameters)
+    plan(figure.add_subplot(grid[0, :]), reconstruction, geometry, (0.0, geometry.length))
     middle = max(0.0, 0.5 * geometry.length - _STRETCH / 2.0)
-    plan(figure.add_subplot(grid[1, :]), found, geometry, (middle, min(geometry.length, middle + _STRETCH)))
-    across(figure.add_subplot(grid[2, 0]), found, geometry)
-    heights(figure.add_subplot(grid[2, 1]), found, geometry)
-    figure.suptitle(f"{shown_text(found.parameters.metadata.title)}: {cloud.read:,} points", fontsize=10)
+    plan(figure.add_subplot(grid[1, :]), reconstruction, geometry, (middle, min(geometry.length, middle + _STRETCH)))
+    across(figure.add_subplot(grid[2, 0]), reconstruction, geometry)
+    heights(figure.add_subplot(grid[2, 1]), reconstruction, geometry)
+    figure.suptitle(f"{shown_text(reconstruction.parameters.metadata.title)}: {cloud.read:,} points", fontsize=10)
     figure.savefig(path, metadata={"Software": None})
     plt.close(figure)
 
 
-def plan(axes: Any, found: Reconstruction, geometry: RoadGeometry, span: tuple[float, float]) -> None:
+def plan(axes: Any, reconstruction: Reconstruction, geometry: RoadGeometry, span: tuple[float, float]) -> None:
     """Draw the road unrolled (offset over station), the reconstruction over the cloud's brightness."""
-    profiles = found.carriageways.profiles
+    profiles = reconstruction.carriageways.profiles
     low, high = _reach(geometry)
     axes.imshow(
         _brightness(profiles).T,
@@ -67,7 +67,7 @@ def plan(axes: Any, found: Reconstruction, geometry: RoadGeometry, span: tuple[f
         for column in (0, bounds.shape[1] - 2):
             label = "pavement's edges" if number == 0 == column else None
             axes.plot(station, bounds[:, column], color=EDGE, lw=0.9, label=label)
-    for number, doubt in enumerate(found.judgement.doubts):
+    for number, doubt in enumerate(reconstruction.judgement.doubts):
         axes.axvspan(doubt.start, doubt.end, color=DOUBT, alpha=0.25, lw=0, label=None if number else "doubtful")
     _markings(axes, geometry, span)
     _objects(axes, geometry)
@@ -75,9 +75,9 @@ def plan(axes: Any, found: Reconstruction, geometry: RoadGeometry, span: tuple[f
     axes.legend(loc="upper right", fontsize=7, ncols=5)
 
 
-def across(axes: Any, found: Reconstruction, geometry: RoadGeometry) -> None:
+def across(axes: Any, reconstruction: Reconstruction, geometry: RoadGeometry) -> None:
     """Draw a cross-section at mid-length: heights of the cloud's bins and the reconstructed surface."""
-    profiles = found.carriageways.profiles
+    profiles = reconstruction.carriageways.profiles
     row = len(profiles.stations) // 2
     rows = slice(max(0, row - 5), row + 5)
     station = profiles.stations[rows]
@@ -100,11 +100,11 @@ def across(axes: Any, found: Reconstruction, geometry: RoadGeometry) -> None:
     )
 
 
-def heights(axes: Any, found: Reconstruction, geometry: RoadGeometry) -> None:
+def heights(axes: Any, reconstruction: Reconstruction, geometry: RoadGeometry) -> None:
     """Draw the measured heights of the carriageways, cm, less the reconstructed profile's."""
-    stations = found.measured.stations
+    stations = reconstruction.measured.stations
     level = geometry.profile.elevation(stations)
-    for name, surface in found.carriageways.surfaces.items():
+    for name, surface in reconstruction.carriageways.surfaces.items():
         axes.plot(stations, 100.0 * (surface.height - level), ".", ms=3, label=f"{name} carriageway")
     axes.axhline(0.0, color=AXIS, lw=1.0, label="profile")
     axes.set(xlabel="station, m", ylabel="height above the profile, cm", title="pavement at its pivot line")

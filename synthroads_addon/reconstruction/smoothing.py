@@ -127,17 +127,17 @@ def mean_with_std(values: Float) -> tuple[float, float]:
     return mean, scatter / float(np.sqrt(sample_size))
 
 
-def interval_mean(values: Float, apart: Float, axis_std: float = 0.0) -> tuple[float, float]:
+def interval_mean(values: Float, spacing: Float, axis_std: float = 0.0) -> tuple[float, float]:
     """Return the mean of values (K,) along the road that each lie midway between two rows of points, and its deviation.
 
-    A value is evenly likely everywhere between its rows, ``apart`` (K,) from each other, m, and so are all of them at
+    A value is evenly likely everywhere between its rows, ``spacing`` (K,) from each other, m, and so are all of them at
     once where the rows run beside the road: however many there are, they say no more than one. Where the rows wander
     only the places count that all intervals have in common. Intervals end softly, by how much values scatter beyond
     them, and weigh as `correlation_factor` says. Values that are means of many points have no interval. Where the axis
     that all is measured from wanders by its deviation ``axis_std``, m, the rows only seem to.
     """
-    known = np.isfinite(values) & np.isfinite(apart)
-    x, half = values[known], 0.5 * apart[known]
+    known = np.isfinite(values) & np.isfinite(spacing)
+    x, half = values[known], 0.5 * spacing[known]
     if not len(x):
         return float("nan"), float("inf")
     centre = mean_with_std(x)[0]
@@ -173,7 +173,7 @@ def _end_scatter(x: Float, half: Float, centre: float, axis_std: float) -> float
     return max(_LEAST_SCATTER, axis_std, robust_scale(excess), min(step, float(np.median(half)) + _LEAST_SCATTER))
 
 
-def hidden_std(apart: Float, scatter: float) -> float:
+def hidden_std(spacing: Float, scatter: float) -> float:
     """Return the standard deviation, m, of an offset's error that scatter hides, as points lie in rows along the road.
 
     What lies midway between two rows is off by up to half of their distance: evenly distributed, so by
@@ -181,10 +181,10 @@ def hidden_std(apart: Float, scatter: float) -> float:
     where they don't, what is missing in the scatter is an error that all of them share.
 
     Args:
-        apart: (K,) distances of the rows, m; 0 where the offset is a mean of many points.
+        spacing: (K,) distances of the rows, m; 0 where the offset is a mean of many points.
         scatter: standard deviation of single offsets about the mean, m.
     """
-    gaps = apart[np.isfinite(apart) & (apart > 0.0)]
+    gaps = spacing[np.isfinite(spacing) & (spacing > 0.0)]
     if not len(gaps):
         return 0.0
     # Variance of a uniform distribution of width d: d^2 / 12, less what scatters.

@@ -138,8 +138,8 @@ def _whole(run: slice, beside: Float, scatter: float) -> slice:
     away = ndimage.binary_closing(np.pad(away, _CLOSING), np.ones(_CLOSING))[_CLOSING:-_CLOSING]
     away[run] = True
     label, _ = ndimage.label(away)
-    ((found,),) = ndimage.find_objects((label == label[run.start]).astype(np.int8))
-    return slice(max(0, found.start - 1), min(len(beside), found.stop + 1))
+    ((extent,),) = ndimage.find_objects((label == label[run.start]).astype(np.int8))
+    return slice(max(0, extent.start - 1), min(len(beside), extent.stop + 1))
 
 
 def _bay(side: SideSection, stations: Float, run: slice) -> Bay | None:
@@ -203,21 +203,21 @@ def _fit_trapezoid(stations: Float, beside: Float, first: float, last: float) ->
     begin = np.array([first - 0.3 * taper, taper, max(last - first - 1.4 * taper, 5.0), taper, width])
     low = np.array([first - _AROUND, _LEAST_TAPER, 1.0, _LEAST_TAPER, 0.1])
     high = np.array([last, 80.0, last - first + _AROUND, 80.0, 10.0])
-    found = least_squares(
+    solution = least_squares(
         residual, np.clip(begin, low + 1e-6, high - 1e-6), bounds=(low, high), loss="soft_l1", f_scale=0.2
     )
-    normal = found.jac.T @ found.jac
-    return np.asarray(found.x), residual(found.x), np.linalg.pinv(normal, hermitian=True)
+    normal = solution.jac.T @ solution.jac
+    return np.asarray(solution.x), residual(solution.x), np.linalg.pinv(normal, hermitian=True)
 
 
 def _unlike_stretches(side: SideSection, stations: Float, runs: list[slice]) -> list[Unlike]:
     """Return the stretches of runs of wider or narrower pavement; those between which it never closes are one."""
     half, beside = 0.5 * STRETCH * SPACING, excess(side)
     scatter = robust_scale(beside[side.usual & np.isfinite(beside)])
-    found: dict[tuple[int, int], list[slice]] = {}
+    groups: dict[tuple[int, int], list[slice]] = {}
     for run in runs:
         whole = _whole(run, beside, scatter)
-        found.setdefault((whole.start, whole.stop), []).append(run)
+        groups.setdefault((whole.start, whole.stop), []).append(run)
     return [
         Unlike(
             side=side.side,
@@ -225,7 +225,7 @@ def _unlike_stretches(side: SideSection, stations: Float, runs: list[slice]) -> 
             end=round(stations[behind - 1] + half, 1),
             wider_by=round(float(np.nanmedian(np.concatenate([beside[run] for run in parts]))), 2),
         )
-        for (first, behind), parts in found.items()
+        for (first, behind), parts in groups.items()
     ]
 
 

@@ -59,7 +59,7 @@ def part_of(offset: float, start: float, end: float) -> Line:
     whole = line(offset)
     inside = (start < STATIONS) & (end > STATIONS)
     measured = np.where(inside, whole.measured, np.nan)
-    return Line(STATIONS, measured, measured, whole.std, whole.apart, whole.cover, start, end, 0.15)
+    return Line(STATIONS, measured, measured, whole.std, whole.spacing, whole.cover, start, end, 0.15)
 
 
 def test_a_lane_that_begins_in_the_middle_leaves_the_section_of_the_longer_part() -> None:

@@ -174,8 +174,8 @@ def normalised_max(features: Tensor, weight: Tensor, norm: Norm, grouping: Group
     """
     sign = norm.scale_sign()
     turned = weight * sign[:, None]
-    directions, own = turned[:, :3], turned[:, 3:]
-    values = features @ own.T
+    directions, weights = turned[:, :3], turned[:, 3:]
+    values = features @ weights.T
     mean, variance = _statistics(norm, sign, grouping, values, directions)
     scale = norm.weight * sign * torch.rsqrt(variance + norm.eps)
     top = gather_max(torch.addmm(values, grouping.support, directions.T), grouping.index)
@@ -196,8 +196,8 @@ def normalised_max_of_two(
         grouping: who looks at whom.
     """
     first, second = norms
-    directions, own = weights[0][:, :3], weights[0][:, 3:]
-    values = features @ own.T
+    directions, linear = weights[0][:, :3], weights[0][:, 3:]
+    values = features @ linear.T
     mean, variance = _statistics(first, torch.ones_like(first.weight), grouping, values, directions)
     scale = first.weight * torch.rsqrt(variance + first.eps)
     support = torch.addmm(values, grouping.support, directions.T) * scale

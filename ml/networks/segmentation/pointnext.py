@@ -81,8 +81,8 @@ class PointNeXtOptions(SegmentationNetwork):
 
     def onnx_inputs(self, batch: Batch) -> OnnxInputs:
         """Return the stages' points and who looks at whom, and their lengths' names."""
-        found = build_neighbours(batch["coord"], batch["offset"], self.neighbourhood)
-        inputs = {name: value for name, value in found.items() if not name.startswith("offset")}
+        neighbours = build_neighbours(batch["coord"], batch["offset"], self.neighbourhood)
+        inputs = {name: value for name, value in neighbours.items() if not name.startswith("offset")}
         return OnnxInputs(inputs, {name: {0: f"points{_rows_of(name)}"} for name in inputs})
 
 
@@ -142,11 +142,11 @@ class PointNeXt(nn.Module):
     def _groupings(self, neighbours: Neighbours, number: int, dtype: torch.dtype) -> tuple[Grouping, Grouping | None]:
         """Return the neighbourhoods of a stage's points in the stage before, and in their own (None without blocks)."""
         radius = self.options.neighbourhood.stage_radius(number)
-        before, own = (neighbours[f"positions{each}"].to(dtype) / radius for each in (number - 1, number))
-        group = Grouping(neighbours[f"group{number}"], before, own)
+        before, points = (neighbours[f"positions{each}"].to(dtype) / radius for each in (number - 1, number))
+        group = Grouping(neighbours[f"group{number}"], before, points)
         if self.options.blocks[number - 1] == 1:
             return group, None
-        return group, Grouping(neighbours[f"inner{number}"], own / 2, own / 2)
+        return group, Grouping(neighbours[f"inner{number}"], points / 2, points / 2)
 
 
 class Stage(nn.Module):

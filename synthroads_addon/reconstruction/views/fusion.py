@@ -114,9 +114,9 @@ def _mean_where(counted: Bool, values: Float) -> Float:
 def _agreement(offsets: Float, std: Float, seen: Bool) -> Bool:
     """Return (V, V, K) whether two views agree in a stretch; each seen one agrees with itself."""
     with np.errstate(invalid="ignore"):
-        apart = np.abs(offsets[:, None] - offsets[None])
+        distance = np.abs(offsets[:, None] - offsets[None])
         allowed = AGREEING * np.hypot(std[:, None], std[None])
-        return np.asarray(seen[:, None] & seen[None] & (apart <= allowed))
+        return np.asarray(seen[:, None] & seen[None] & (distance <= allowed))
 
 
 def _weighted_mean(offsets: Float, std: Float, member: Bool) -> tuple[Float, Float]:
@@ -140,5 +140,5 @@ def _along(stations: Float, raw: Float, deviation: Float) -> tuple[Float, Float]
     values = np.interp(stations, stations[known], smoothed.values[known])  # no curve is guessed where nothing was seen
     gap = STRETCH * SPACING * ndimage.distance_transform_edt(~known)
     std = np.interp(stations, stations[known], deviation[known])
-    own = np.where(known, np.abs(np.where(known, raw, 0.0) - values), 0.0)
-    return values, np.sqrt(std**2 + ndimage.uniform_filter1d(own, 5) ** 2 + np.square(_DRIFT * gap))
+    residual = np.where(known, np.abs(np.where(known, raw, 0.0) - values), 0.0)
+    return values, np.sqrt(std**2 + ndimage.uniform_filter1d(residual, 5) ** 2 + np.square(_DRIFT * gap))

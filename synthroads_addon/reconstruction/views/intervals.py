@@ -32,13 +32,13 @@ def half_width(axis: FusedAxis, share: float, factor: float, more: float = 0.0) 
         factor: standard deviations that hold it of a normal distribution.
         more: standard deviation, m, of one more error that all of the axis has.
     """
-    own = factor * np.hypot(axis.std, more)
+    minimum = factor * np.hypot(axis.std, more)
     seen = np.any([np.isfinite(view.offsets) for view in axis.views], axis=0)
     if not seen.any():
-        return own
+        return minimum
     density = ndimage.gaussian_filter1d(_density(axis), max(more, 1e-3) / _STEP, axis=1, mode="constant")
     density /= density.sum(axis=1, keepdims=True)
-    return np.where(seen, np.maximum(own, _quantile(density, share)), own)
+    return np.where(seen, np.maximum(minimum, _quantile(density, share)), minimum)
 
 
 def _quantile(density: Float, share: float) -> Float:
@@ -69,6 +69,6 @@ def _likelihood(view: View, at: Float, place: Float) -> Float:
     """Return the logarithm of a view's likelihood (K, P) of places, m, about an axis (K,); 0 where it sees nothing."""
     seen = np.isfinite(view.offsets)
     std = np.where(seen, view.std, 1.0)[:, None]
-    apart = (place - np.where(seen, view.offsets - at, 0.0)[:, None]) / std
-    right = np.exp(-0.5 * apart**2) / (np.sqrt(2.0 * np.pi) * std)
+    z = (place - np.where(seen, view.offsets - at, 0.0)[:, None]) / std
+    right = np.exp(-0.5 * z**2) / (np.sqrt(2.0 * np.pi) * std)
     return np.where(seen[:, None], np.log((1.0 - SLIPS) * right + SLIPS / (2.0 * _REACH)), 0.0)

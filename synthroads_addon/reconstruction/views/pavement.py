@@ -66,8 +66,8 @@ def pavement_edges(profiles: Profiles, cores: Sequence[float], dual: bool, at: f
     filled = np.array([fill_gaps(row) if np.isfinite(row).any() else row for row in brightness])
     smooth = ndimage.median_filter(filled, (1, _PAINT))
     levels = np.array([np.percentile(row[core], 30) if np.isfinite(row).all() else np.nan for row in smooth])
-    apart = np.abs(smooth - levels[:, None])
-    alike = known & ~(apart > _brightness_threshold(apart[known], apart[:, core]))
+    difference = np.abs(smooth - levels[:, None])
+    alike = known & ~(difference > _brightness_threshold(difference[known], difference[:, core]))
     inside = _without_patches(_close_cracks(alike) & ~steps)
     if dual:
         inside = _close_cracks(known & ~inside)
@@ -101,13 +101,13 @@ def _is_kerb(height: Float) -> Bool:
     return np.asarray(np.abs(rise) > _KERB)
 
 
-def _brightness_threshold(apart: Float, core: Float) -> float:
+def _brightness_threshold(difference: Float, core: Float) -> float:
     """Return the threshold of brightness differences beyond which ground is unpaved; inf if brightness can't tell."""
-    apart, core = apart[np.isfinite(apart)], core[np.isfinite(core)]
-    if not len(apart) or not len(core):
+    difference, core = difference[np.isfinite(difference)], core[np.isfinite(core)]
+    if not len(difference) or not len(core):
         return np.inf
-    reach = otsu_threshold(apart)
-    other = apart[apart > reach]
+    reach = otsu_threshold(difference)
+    other = difference[difference > reach]
     clear = len(other) > 0 and float(np.median(other)) > _LIKE * robust_scale(core)
     return reach if clear else np.inf
 

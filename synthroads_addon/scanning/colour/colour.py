@@ -287,36 +287,38 @@ class MaterialLayers:
             source: (N,) of `LayerValues`.
             wanted: layers.
         """
-        found = source != FROM_MATERIAL
-        everywhere = bool(found.all())
+        rendered = source != FROM_MATERIAL
+        everywhere = bool(rendered.all())
         layers: dict[str, Float32] = {}
         for name in sorted(needed_layers(wanted, self.mode)):
             values = self.constants.chosen(name, None, channels.get(name), points.material) if everywhere else None
             if values is not None:
                 layers[name] = values
             elif name in channels:
-                use = found & np.take(self.constants.varies[name], points.material)
+                use = rendered & np.take(self.constants.varies[name], points.material)
                 layers[name] = self.constants.complete(name, channels[name].copy(), use, points.material)
             else:
                 layers[name] = take_rows(self.constants.values[name], points.material)
         arrays: dict[str, NDArray[np.generic]] = {name: layers[name] for name in layers.keys() & wanted}
         if "rgb" in wanted:
-            arrays["rgb"] = self._rgb(points, layers, channels, found)
+            arrays["rgb"] = self._rgb(points, layers, channels, rendered)
         return LayerValues(arrays, source)
 
-    def _rgb(self, points: SeenPoints, layers: dict[str, Float32], channels: dict[str, Float32], found: Bool) -> UInt16:
+    def _rgb(
+        self, points: SeenPoints, layers: dict[str, Float32], channels: dict[str, Float32], rendered: Bool
+    ) -> UInt16:
         if self.mode == "false_colour":
             return encode_srgb(np.stack([layers[name] for name in _FALSE_COLOUR], axis=1))
         color = layers["base_color"]
         if self.mode == "unlit":
             return encode_srgb(color)
-        everywhere = bool(found.all())
+        everywhere = bool(rendered.all())
         if everywhere and "sun" in channels:
             sun = channels["sun"]
         else:
             sun = color * self.light.sunlight(points.normal)
             if "sun" in channels:
-                sun[found] = channels["sun"][found]
+                sun[rendered] = channels["sun"][rendered]
         if everywhere and "sky" not in channels and self.clouds is None and (loops := point_loops()) is not None:
             light, normal = self.light, np.asarray(points.normal, np.float32)
             linear = loops.daylight(
@@ -325,7 +327,7 @@ class MaterialLayers:
             return loops.encoded(linear, np.power(linear, _SRGB_POWER))
         sky = color * self.light.sky(points.normal)
         if "sky" in channels:
-            sky[found] = channels["sky"][found]
+            sky[rendered] = channels["sky"][rendered]
         if self.clouds is not None:
             sun = sun * self.clouds.transmission(points.position, points.time)[:, None]
         return encode_srgb(sun + sky)

@@ -81,13 +81,13 @@ class SceneSurfaces:
             corners = take_rows(mesh.vertices, take_rows(mesh.triangles, faces))
             shares = corner_shares(corners.astype(np.float64), place)
         for what, values in result.items():
-            found = np.zeros(len(rows), bool)
+            known = np.zeros(len(rows), bool)
             if mesh.surface is not None:
-                values[rows], found = mesh.surface.read(what, faces, shares, place, normal)
+                values[rows], known = mesh.surface.read(what, faces, shares, place, normal)
             if what.kind == "normal":
                 # Where the shading isn't smooth it is the face's own.
-                values[rows[found], :3] = values[rows[found], :3] @ rotation.T
-                values[rows[~found], :3] = towards[~found]
+                values[rows[known], :3] = values[rows[known], :3] @ rotation.T
+                values[rows[~known], :3] = towards[~known]
 
 
 def _initial_pose(part: MovingMesh) -> tuple[Float, Float]:

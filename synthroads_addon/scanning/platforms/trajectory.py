@@ -149,12 +149,12 @@ def check_headings(name: str, rows: Trajectory) -> None:
     def across(angle: Float) -> float:
         return float(np.median(np.abs(np.rad2deg(wrap_angle(np.deg2rad(angle - course))))))
 
-    own, others = across(heading), {what: across(angle) for what, angle in _conventions(heading).items()}
+    deviation, others = across(heading), {what: across(angle) for what, angle in _conventions(heading).items()}
     best = min(others, key=lambda what: others[what])
-    if own > _ACROSS or (own > _BESIDE and others[best] < _ALONG):
-        looks = f"; they look like {best}" if others[best] < _ALONG + 0.1 * own else ""
+    if deviation > _ACROSS or (deviation > _BESIDE and others[best] < _ALONG):
+        looks = f"; they look like {best}" if others[best] < _ALONG + 0.1 * deviation else ""
         text = "%s: headings lie %.0f degrees across the course (median); %s is needed, and roll and pitch in degrees%s"
-        warn(text, name, own, _CONVENTION, looks)
+        warn(text, name, deviation, _CONVENTION, looks)
 
 
 def _conventions(heading: Float) -> dict[str, Float]:
