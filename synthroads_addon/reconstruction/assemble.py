@@ -113,6 +113,7 @@ def _systems(cloud: RoadCloud) -> dict[str, str]:
 
 def _design_class(measured: RoadMeasurements) -> str:
     """Return the design class that the radii and the nearest standard cross-section allow, the fastest first."""
+    # Curvature times the class' least radius is at most 1; 2 % are the fit's.
     bend = max(max(abs(e.curvature_start), abs(e.curvature_end)) for e in measured.fit.alignment.elements)
     fast = [name for name, limits in LIMITS.items() if bend * limits.radius <= 1.02]
     preferred = fast[0] if fast else "EKA3"

@@ -146,6 +146,7 @@ def find_axis(
         progress("lines", number / _PASSES)
         if number > 1 and float(np.abs(road.axis.offsets).max()) <= _STILL:
             break
+        # The next path is the axis itself: lines beside it are then straight, and smoothing bends none of them.
         offsets = np.interp(road.path.stations, road.axis.stations, road.axis.offsets)
         road = _look_along(cloud, road.path.shift_by(offsets), half, options)
     layout = with_branch(road.layout)

@@ -92,6 +92,7 @@ def _gains(profiles: Profiles, place: Float, sign: int) -> Float:
     inside = (columns >= 0) & (columns < len(profiles.offsets))
     paint = np.take_along_axis(profiles.paint, np.clip(columns, 0, len(profiles.offsets) - 1), axis=1)
     known = inside & np.isfinite(paint)
+    # Mean of the known bins: the mean of all, unknown ones being 0, over the share of known ones.
     share = ndimage.uniform_filter(known.astype(np.float64), _MEAN)
     total = ndimage.uniform_filter(np.where(known, np.clip(paint, 0.0, 1.0), 0.0).astype(np.float64), _MEAN)
     mean = np.where(share > _KNOWN, total / np.maximum(share, 1e-9), np.nan)

@@ -74,6 +74,7 @@ def find_centreline(cloud: RoadCloud, options: Options | None = None, progress: 
     cores = [0.5 * (band.low + band.high) for band in layout.bands] if layout.kind == "dual" else [0.0]
     beside, _ = line.project(road.path.place(road.axis.stations, road.axis.offsets))
     rivals = road.open_along(line, profiles.middles)
+    # Two independent errors: of the axis, and of where people say that an axis lies.
     std = np.hypot(DEFINITION, np.interp(line.stations, beside, road.axis.std))
     halves = {
         name: np.interp(line.stations, beside, half_width(road.axis, share, factor, DEFINITION))

@@ -232,7 +232,9 @@ def _above_grid(xyz: Float) -> Float:
     empty = ~np.isfinite(lowest)
     nearest = ndimage.distance_transform_edt(empty, return_distances=False, return_indices=True)
     filled = lowest[tuple(nearest)]
+    # Opening: the largest of the smallest in a window, which nothing narrower than the window survives.
     opened = ndimage.grey_opening(filled, size=(WINDOW, WINDOW))
+    # Where little was opened away the lowest points themselves are the ground: an opening cuts off every crest.
     ground = ndimage.uniform_filter(np.where(filled - opened > _STEP, opened, filled), 3)
     place = xyz[:, :2] / CELL - low - 0.5
     under = ndimage.map_coordinates(ground, place.T, order=1, mode="nearest")

@@ -101,6 +101,7 @@ def _find_edge(share: Float, begin: float, sign: int) -> float:
     known = np.isfinite(share)
     if known.sum() < 4:
         return float("nan")
+    # The sum of (share - 1/2) up to an edge is largest where the fewest bins are on its wrong side.
     gain = np.append(0.0, np.cumsum(np.where(known, share - 0.5, 0.0)))
     at = int(gain.argmax())  # bins before it are paved
     reach = round(_MIXED / ACROSS)
@@ -110,6 +111,8 @@ def _find_edge(share: Float, begin: float, sign: int) -> float:
     # An edge that the cloud or the search ends at is no edge.
     if at >= len(share) - 1 or at == 0 or seen.mean() < _FEWEST or not np.isfinite(share[at : at + reach]).any():
         return float("nan")
+    # Around it the paved shares add up to the width that is paved: the edge is found to a part of a bin. Unknown bins
+    # count as what their side of the edge is.
     filled = np.where(seen, near, (np.arange(low, high) < at).astype(np.float64))
     return begin + sign * ACROSS * (low - 0.5 + float(filled.sum()))
 
@@ -143,6 +146,7 @@ def fit_surface(profiles: Profiles, low: Float, high: Float, pivot: Float) -> Su
         pivot: (K,) offsets at which the height is wanted, m.
     """
     result = np.full((2, len(pivot)), np.nan)
+    # Along the road heights differ by the grade more than across it by the crossfall: it is taken off first.
     slope = _grade(profiles)
     for number in range(len(pivot)):
         if not (np.isfinite(low[number]) and np.isfinite(high[number]) and high[number] - low[number] > 1.0):
@@ -164,6 +168,7 @@ def _grade(profiles: Profiles) -> Float:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # rows without points
         middle = np.nanmedian(profiles.height, axis=1)
+    # 31 m: short enough for vertical curves, long enough for the noise of a median over some rows.
     smoothed = np.convolve(np.pad(fill_gaps(middle), 15, mode="edge"), np.ones(31) / 31, mode="valid")
     grade = np.gradient(smoothed, SPACING)
     return grade[np.minimum(np.arange(profiles.stretches) * STRETCH + STRETCH // 2, len(grade) - 1)]

@@ -176,6 +176,7 @@ def lane_roughness(profiles: Profiles, cores: Sequence[float]) -> Float:
         rows = step[max(0, (number - _NEAR) * STRETCH) : (number + _NEAR + 1) * STRETCH]
         known = rows[np.isfinite(rows)]
         if len(known) >= _FEWEST_STEPS:
+            # A difference of two heights has sqrt(2) of their deviation.
             result[number] = robust_scale(known) / np.sqrt(2.0)
     return result
 
@@ -202,6 +203,7 @@ def raised_lines(layout: RoadLayout) -> Float:
 
 def _mean_height(profiles: Profiles, rows: Float, offset: float, low: float, high: float) -> float:
     """Return the median height, m, of some rows' bins between two distances (m) from an offset; NaN without any."""
+    # A median: a car beside the line doesn't raise the ground.
     bins = rows[:, profiles.column(offset + low) : profiles.column(offset + high) + 1]
     known = bins[np.isfinite(bins)]
     return float(np.median(known)) if len(known) else np.nan

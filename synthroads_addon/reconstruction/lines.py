@@ -198,6 +198,7 @@ def _expected_place(track: _Track, station: float) -> float:
     if len(track) < 3:
         return track[-1][1]
     (s0, u0), (s1, u1) = track[max(-5, -len(track))], track[-1]
+    # A track goes on straight for 20 m at most: beyond that a bend is as likely.
     slope = float(np.clip((u1 - u0) / (s1 - s0), -0.06, 0.06))
     return u1 + slope * min(station - s1, 20.0)
 
@@ -209,6 +210,7 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
     end = min(profiles.stations[-1], stations[-1] + half)
     middle, cover = _paint_by_row(profiles, stations, offsets)
     inside = _shown(profiles.stations, stations, half)
+    # The width where it is painted: a high percentile, as dashes leave most rows bare.
     usual = float(np.nanpercentile(cover[inside], 90)) if np.isfinite(cover[inside]).any() else 0.0
     if usual < 0.03:
         return None
@@ -266,6 +268,7 @@ def _paint_by_row(profiles: Profiles, stations: Float, offsets: Float) -> tuple[
     The mean is found twice, the second time around the smoothed first one, so that a track's own error doesn't pull.
     """
     place = np.interp(profiles.stations, stations, offsets)
+    # Twice: the first mean is pulled by how far the track is off, the second lies about the line itself.
     middle, _ = _paint_near(profiles, place)
     local = ndimage.median_filter(np.where(np.isfinite(middle), middle, place), size=21, mode="nearest")
     return _paint_near(profiles, local)
@@ -286,6 +289,7 @@ def _paint_near(profiles: Profiles, place: Float) -> tuple[Float, Float]:
     share = known.mean(axis=1)
     cover = np.where(share > 0.3, total / np.maximum(share, 1e-9) * ACROSS, np.nan)
     with np.errstate(invalid="ignore", divide="ignore"):
+        # Centre of gravity of the paint.
         mean = (clipped * profiles.offsets[columns]).sum(axis=1) / total
     return np.where(total > 0.15, mean, np.nan), cover
 
@@ -364,6 +368,7 @@ def _on_a_row(offset: Float, low: int, high: int) -> tuple[float, float]:
 def _best_span(marked: Bool) -> tuple[int, int]:
     """Return the span (first, behind the last) of points with most marked ones inside and unmarked ones outside."""
     total = np.append(0, np.cumsum(np.where(marked, 1, -1)))
+    # The span with the largest sum of +1 and -1 (Kadane): the largest rise of the running sum from a place before it.
     lowest = np.minimum.accumulate(total)
     high = int((total - lowest).argmax())
     return int(total[: high + 1].argmin()), high
@@ -398,6 +403,7 @@ def _dashes(stations: Float, cover: Float) -> tuple[float, float, float, float]:
         return share, 0.0, 0.0, float(stations[0])
     wave = filled[known]
     periods = np.arange(4.0, 40.0, 0.05)
+    # Schuster 1898: strength of the wave at each period, |mean of x exp(-2 pi i s / T)|.
     phasor = np.exp(-2j * np.pi * stations[known][None, :] / periods[:, None])
     strength = np.abs((phasor * (wave - wave.mean())).mean(axis=1))
     best = int(strength.argmax())
@@ -405,6 +411,7 @@ def _dashes(stations: Float, cover: Float) -> tuple[float, float, float, float]:
     for standard, gap in STANDARD_DASHES:
         if abs(standard + gap - period) < 0.5 * _DASH_TOLERANCE and abs(standard - dash) < 2.0 * _DASH_TOLERANCE:
             dash, period = standard, standard + gap
+    # The phase of the wave is the place of a dash's middle: s = angle T / (2 pi).
     angle = float(np.angle((np.exp(2j * np.pi * stations[known] / period) * (wave - wave.mean())).mean()))
     first = angle / (2.0 * np.pi) * period - 0.5 * dash  # half a dash before the middle of one
     first += period * np.ceil((stations[0] - first) / period)

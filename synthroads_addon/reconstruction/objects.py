@@ -154,6 +154,7 @@ def _linear_clusters(station: Float, offset: Float) -> list[Index]:
     reach = round(_JOIN / CELL_ACROSS)
     filled = np.zeros((row.max() + 2 * _HOLE + 1, column.max() + 2 * reach + 1), dtype=bool)
     filled[row + _HOLE, column + reach] = True
+    # Across first, so that the two faces of a barrier are one; along only holes are closed, as a gap is a gap.
     filled = ndimage.binary_dilation(filled, np.ones((1, 2 * reach + 1)))
     filled = ndimage.binary_closing(filled, np.ones((_HOLE, 1)))
     label, count = ndimage.label(filled, np.ones((3, 3)))
@@ -183,11 +184,13 @@ def _barrier(part: StandingPoints, kind: PointKind) -> FoundBarrier | None:
     count = len(part.station)
     if count < _FEWEST_OF_BARRIER:
         return None
+    # Of many points single ones lie beyond the end: percentiles, if a percentile is more than a point.
     start, end = np.percentile(part.station, [0.2, 99.8]) if count > 1000 else (part.station.min(), part.station.max())
     height = float(np.percentile(part.height, 95))
     if end - start < SHORTEST_BARRIER or not 0.2 < height < 12.0:
         return None
     index = np.floor((part.station - start) / _STRETCH).astype(np.int64)
+    # The upper part: the lower one is posts, grass and what is hidden behind.
     upper = part.height > 0.4 * height
     middles = np.array([np.median(part.offset[upper & (index == i)]) for i in np.unique(index[upper])])
     offset, std = mean_with_std(middles)
@@ -246,6 +249,7 @@ def _post(part: StandingPoints, kind: PointKind) -> FoundPost | None:
         return None
     if max(np.ptp(part.station), np.ptp(part.offset)) > _POST_WIDEST:
         return None
+    # Root mean square of both directions, over sqrt(n) as of a mean.
     spread = float(np.hypot(part.station.std(), part.offset.std())) / np.sqrt(2.0)
     std = float(np.hypot(spread / np.sqrt(count), 0.02))  # what is seen of a post is one side of it
     return FoundPost(float(np.median(part.station)), float(np.median(part.offset)), max(top, USUAL_POST), std, count)
@@ -307,6 +311,7 @@ def measure_ground(cloud: RoadCloud, path: CloudPath, section: MeasuredSection, 
     outermost = max(_outer(section, 1), _outer(section, -1)) + width
     if far.sum() < 200:
         return GroundShape(outermost + 10.0, 0.0, 0.05, width, seen)
+    # How far the ground lies below the axis at the same station.
     below = axis_height[np.clip(station[far].astype(np.int64), 0, len(axis_height) - 1)] - cloud.xyz[chosen[far], 2]
     reach = float(np.percentile(np.abs(offset[far]), 99))
     spread = float(np.clip(0.5 * (np.percentile(below, 84) - np.percentile(below, 16)), 0.05, 2.0))

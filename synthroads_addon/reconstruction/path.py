@@ -81,6 +81,7 @@ class CloudPath:
     def place(self, station: ArrayLike, offset: ArrayLike) -> Float:
         """Return points (N, 2) at stations and offsets (N,), the offset positive to the left."""
         position, heading = self.frame(station)
+        # Unit vector to the left of the heading.
         left = np.column_stack([-np.sin(heading), np.cos(heading)])
         return np.asarray(position + np.asarray(offset, dtype=np.float64)[:, None] * left)
 
@@ -140,6 +141,7 @@ def _project(frames: Float, points: Float, along: Float) -> tuple[Float, Float]:
         offset = vector[:, 1] * cos - vector[:, 0] * sin
         if round_ < _ROUNDS - 1:
             # On the inside of a curve a step along the path is a shorter one beside it.
+            # ds along the path is dt / (1 - kappa offset), of a step dt beside it.
             shorter = np.maximum(1.0 - offset * change[:, 2] / SPACING, 0.2)
             along = along + (vector[:, 0] * cos + vector[:, 1] * sin) / shorter
     return along, offset
@@ -205,6 +207,7 @@ def _march_start(cells: Float, tree: cKDTree) -> tuple[Float, float, float]:
     for radius in _START_RADII:
         near = cells[tree.query_ball_point(cells[middle], radius)]
         centre = near.mean(axis=0)
+        # Principal axes: the surface runs along that of the larger variance.
         spread, axes = np.linalg.eigh(np.cov((near - centre).T)) if len(near) > 2 else (np.ones(2), np.eye(2))
         if np.sqrt(spread[1]) > _LONGISH * np.sqrt(max(spread[0], 1e-9)):
             half = float(np.percentile(np.abs((near - centre) @ axes[:, 0]), 98))
@@ -226,6 +229,7 @@ def _march(cells: Float, tree: cKDTree, start: Float, direction: float, half: fl
             missing += _STEP
             continue
         missing = 0.0
+        # Percentiles: single cells of an entrance or a side road don't turn the march.
         low, high = np.percentile(across[inside], [3, 97])
         at = ahead + 0.5 * (low + high) * np.array([-forward[1], forward[0]])
         half = min(0.5 * (high - low) + _MARGIN, _REACH)

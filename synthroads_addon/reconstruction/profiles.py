@@ -221,8 +221,11 @@ def paint_share(brightness: Grid, paved: Grid | None) -> Grid:
     if not known.any():
         return np.full(brightness.shape, np.nan, dtype=np.float32)
     filled = _fill_bins(brightness, known)
+    # The median of a window is the pavement as long as paint fills less than half of it.
     above = np.where(known, filled - ndimage.median_filter(filled, size=_BACKGROUND), 0.0)
     spread = robust_scale(above[known] - np.median(above[known]))
+    # Without any paint the percentile is noise: four deviations of it are full paint at least, so that nothing passes
+    # for a line.
     full = max(float(np.percentile(above[known], _PAINT_PERCENTILE)), 4.0 * spread, 1e-12)
     return np.where(known, np.clip(above / full, -0.5, 1.5), np.nan).astype(np.float32)
 
@@ -272,6 +275,7 @@ def register_path(path: CloudPath, profiles: Profiles) -> CloudPath:
     shifts = np.where(weights > 0, [fit.shift for fit in fits], np.nan)
     shift = smooth(shifts, np.ones(len(shifts)), STEP * SPACING, _WAVELENGTH, usual=ACROSS).values
     along = path.stations - path.start
+    # Beyond the outermost stretches the path goes on as straight as these lead.
     ends = np.gradient(shift, middles)
     inside = np.interp(along, middles, shift)
     inside += np.where(along < middles[0], (along - middles[0]) * ends[0], 0.0)
@@ -343,10 +347,13 @@ def _fit_to(block: Float, template: Float, expected: float, reach: float) -> _Fi
     bins = int(np.ceil(reach / ACROSS))
     middle = round(expected / ACROSS)
     shifts = np.arange(middle - bins, middle + bins + 1)
+    # Cross-correlation of the profile under each shear with the template, at each shift.
     scores = np.array([np.roll(block, -shift, axis=1) @ template for shift in shifts])
     away = (shifts * ACROSS - expected) / reach
+    # A parabola in the distance from what was expected: of places as good the nearest is taken.
     judged = scores - _PRIOR * float(scores.max()) * away[:, None] ** 2
     at, shear = np.unravel_index(int(judged.argmax()), judged.shape)
+    # The normalised cross-correlation, scores / (|block| |template|), says how alike both are.
     size = float(np.sqrt((block[shear] ** 2).sum() * (template**2).sum()))
     if size <= 0.0 or scores[at, shear] < 0.3 * size:
         return None

@@ -76,6 +76,7 @@ class Bay:
         shape = np.append(shape, self.width)
         change = _trapezoid_jacobian(stations, shape)
         bent = np.abs(change[:, :4]).max(axis=1) > 0.0  # near its tapers: no bay is quite a trapezoid
+        # Propagated: the variance of f(shape) is J C J'.
         known = np.maximum(np.einsum("ki,ij,kj->k", change, self.covariance, change), 0.0)
         return np.sqrt(known + np.where(bent, _LEAST_SCATTER, 0.0) ** 2)
 
@@ -175,6 +176,7 @@ def _beside_line(side: SideSection, run: slice) -> bool:
 def _trapezoid(stations: Float, shape: Float) -> Float:
     """Return how much wider (K,), m, the pavement is by start, low taper, length, high taper and width (5,), m."""
     start, low, length, high, width = shape
+    # width x min(rise, 1, fall), each linear along its taper.
     rising = (stations - start) / low
     falling = (start + low + length + high - stations) / high
     return np.asarray(width * np.clip(np.minimum(rising, falling), 0.0, 1.0))
@@ -198,6 +200,7 @@ def _fit_trapezoid(stations: Float, beside: Float, first: float, last: float) ->
     def residual(shape: Float) -> Float:
         return _trapezoid(stations, shape) - beside
 
+    # Above the median: the tapers are part of the run.
     width = float(np.percentile(beside[(stations >= first) & (stations <= last)], 70))
     taper = min(EMERGENCY_BAY_TAPER, 0.3 * (last - first) + _LEAST_TAPER)
     begin = np.array([first - 0.3 * taper, taper, max(last - first - 1.4 * taper, 5.0), taper, width])
@@ -206,6 +209,7 @@ def _fit_trapezoid(stations: Float, beside: Float, first: float, last: float) ->
     solution = least_squares(
         residual, np.clip(begin, low + 1e-6, high - 1e-6), bounds=(low, high), loss="soft_l1", f_scale=0.2
     )
+    # Covariance of least squares for unit noise: (J'J)^-1; the pseudo-inverse, as a taper may be seen by no stretch.
     normal = solution.jac.T @ solution.jac
     return np.asarray(solution.x), residual(solution.x), np.linalg.pinv(normal, hermitian=True)
 

@@ -26,6 +26,7 @@ def view_extent(profiles: Profiles) -> View:
     there = filled.any(axis=1)
     if not there.any():
         return View("extent", np.full(stretches, np.nan), np.full(stretches, np.inf))
+    # The first filled bin from either side.
     ends = [profiles.offsets[filled.argmax(axis=1)], profiles.offsets[::-1][filled[:, ::-1].argmax(axis=1)]]
     low, high = (ndimage.median_filter(fill_gaps(np.where(there, end, np.nan)), 2 * _ALONG + 1) for end in ends)
     std = np.maximum(_LEAST, _SHARE * (high - low))

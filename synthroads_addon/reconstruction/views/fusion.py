@@ -69,6 +69,7 @@ def fuse(stations: Float, views: Sequence[View]) -> FusedAxis:
     offsets = np.array([view.offsets for view in views])
     std = np.array([view.std for view in views])
     seen = np.isfinite(offsets)
+    # A view leads by the trust of all that agree with it: one that is alone leads nowhere, however sure it says it is.
     together = _agreement(offsets, std, seen)
     trust = np.where(seen, 1.0 / (_TRUST + np.where(seen, std, 1.0)), 0.0)
     mass = np.einsum("vwk,wk->vk", together.astype(np.float64), trust)
@@ -78,6 +79,7 @@ def fuse(stations: Float, views: Sequence[View]) -> FusedAxis:
     columns = np.arange(len(stations))
     member = together[leader, :, columns].T & seen
     raw, deviation = _weighted_mean(offsets, std, member)
+    # Rivals are what the others say together, not one by one: several views may slip to the same place.
     against = seen & ~member & (np.abs(offsets - raw) > APART)
     lead, rival = (trust * member).sum(axis=0), (trust * against).sum(axis=0)
     opened = ndimage.binary_opening(rival > _RIVAL * lead, np.ones(3))
@@ -126,6 +128,7 @@ def _weighted_mean(offsets: Float, std: Float, member: Bool) -> tuple[Float, Flo
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.where(total > 0.0, (weight * np.where(member, offsets, 0.0)).sum(axis=0) / total, np.nan)
         square = (weight * np.square(np.where(member, offsets - mean, 0.0))).sum(axis=0)
+        # Birge 1932: the mean's variance 1 / sum of w is widened by chi^2 / (n - 1) where that is above 1.
         scatter = square / np.maximum(member.sum(axis=0) - 1, 1)
         return mean, np.sqrt(np.maximum(1.0, scatter) / total)
 
@@ -138,6 +141,7 @@ def _along(stations: Float, raw: Float, deviation: Float) -> tuple[Float, Float]
     weights = np.where(known, 1.0 / np.square(np.where(known, deviation, 1.0)), 0.0)
     smoothed = smooth(raw, weights, STRETCH * SPACING, _WAVELENGTH, usual=0.03)
     values = np.interp(stations, stations[known], smoothed.values[known])  # no curve is guessed where nothing was seen
+    # Nothing is known of the course within a gap but its ends: the deviation grows with the distance from these.
     gap = STRETCH * SPACING * ndimage.distance_transform_edt(~known)
     std = np.interp(stations, stations[known], deviation[known])
     residual = np.where(known, np.abs(np.where(known, raw, 0.0) - values), 0.0)

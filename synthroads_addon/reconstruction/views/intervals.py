@@ -36,6 +36,7 @@ def half_width(axis: FusedAxis, share: float, factor: float, more: float = 0.0) 
     seen = np.any([np.isfinite(view.offsets) for view in axis.views], axis=0)
     if not seen.any():
         return minimum
+    # One more independent error: densities convolve.
     density = ndimage.gaussian_filter1d(_density(axis), max(more, 1e-3) / _STEP, axis=1, mode="constant")
     density /= density.sum(axis=1, keepdims=True)
     return np.where(seen, np.maximum(minimum, _quantile(density, share)), minimum)
@@ -44,6 +45,7 @@ def half_width(axis: FusedAxis, share: float, factor: float, more: float = 0.0) 
 def _quantile(density: Float, share: float) -> Float:
     """Return how far (K,), m, to both sides of the middle a share of densities (K, P) lies."""
     middle = density.shape[1] // 2
+    # The interval is the same to both sides: shares are added up from the middle outwards.
     pairs = density[:, middle + 1 :] + density[:, middle - 1 :: -1]
     within = np.cumsum(np.column_stack([np.zeros(len(density)), density[:, middle], pairs]), axis=1)
     behind = np.maximum((within < share).argmin(axis=1), 1)[:, None]  # the first place by which it is reached
@@ -58,6 +60,7 @@ def _density(axis: FusedAxis) -> Float:
     kinds = [_EVIDENCE.get(view.name, view.name) for view in axis.views]
     for kind in dict.fromkeys(kinds):
         same = [view for view, other in zip(axis.views, kinds, strict=True) if other == kind]
+        # Views of one kind of evidence slip together: the mean of their logarithms counts as one view.
         known = np.sum([np.isfinite(view.offsets) for view in same], axis=0)
         result += (
             np.sum([_likelihood(view, axis.offsets, place) for view in same], axis=0) / np.maximum(known, 1)[:, None]
@@ -70,5 +73,6 @@ def _likelihood(view: View, at: Float, place: Float) -> Float:
     seen = np.isfinite(view.offsets)
     std = np.where(seen, view.std, 1.0)[:, None]
     z = (place - np.where(seen, view.offsets - at, 0.0)[:, None]) / std
+    # p = (1 - slips) N(place; offset, std) + slips / (2 reach): the tail keeps a single view from ruling a place out.
     right = np.exp(-0.5 * z**2) / (np.sqrt(2.0 * np.pi) * std)
     return np.where(seen[:, None], np.log((1.0 - SLIPS) * right + SLIPS / (2.0 * _REACH)), 0.0)

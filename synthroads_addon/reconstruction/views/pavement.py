@@ -65,6 +65,7 @@ def pavement_edges(profiles: Profiles, cores: Sequence[float], dual: bool, at: f
     core = np.any([np.abs(profiles.offsets - middle) < _CORE for middle in cores], axis=0)
     filled = np.array([fill_gaps(row) if np.isfinite(row).any() else row for row in brightness])
     smooth = ndimage.median_filter(filled, (1, _PAINT))
+    # Paint and wear are brighter than the pavement: a low percentile of the core is its own brightness.
     levels = np.array([np.percentile(row[core], 30) if np.isfinite(row).all() else np.nan for row in smooth])
     difference = np.abs(smooth - levels[:, None])
     alike = known & ~(difference > _brightness_threshold(difference[known], difference[:, core]))
@@ -96,6 +97,7 @@ def _is_kerb(height: Float) -> Bool:
     if not np.isfinite(height).any():
         return np.zeros(len(height), dtype=bool)
     filled = ndimage.median_filter(fill_gaps(height), 3)
+    # The rise over several bins: a kerb's face may be hidden, and its two levels lie some bins apart.
     rise = np.roll(filled, -_KERB_REACH) - np.roll(filled, _KERB_REACH)
     rise[:_KERB_REACH], rise[-_KERB_REACH:] = 0.0, 0.0
     return np.asarray(np.abs(rise) > _KERB)

@@ -82,6 +82,8 @@ def dash_power(paint: Float, stations: Float) -> Float:
         mean = np.where(known, paint, 0.0).sum(axis=0) / count
         level = np.where(known, paint - mean, 0.0)
         variance = np.maximum((level**2).sum(axis=0) / count, 1e-4)
+        # Schuster 1898: the periodogram |sum of (x - mean) exp(-2 pi i s / T)|^2 over n times the variance, which of
+        # noise is exponentially distributed with the mean 1.
         waves = np.exp(-2j * np.pi * stations[None, :] / np.array(PERIODS)[:, None])
         power = np.abs(waves @ level) ** 2 / (count * variance)
     return np.where(count >= _FEWEST_ROWS, power.max(axis=0), 0.0)
@@ -95,6 +97,7 @@ def _axis_of(power: Float, offsets: Float, dual: bool, middle: float) -> float:
     if not dual:
         if not len(peaks):
             return np.nan
+        # Dashes on both sides of a lane beat alike: which of two is the axis the beat doesn't tell.
         order = np.argsort(-blurred[peaks])
         if len(order) > 1 and blurred[peaks[order[1]]] > _RIVAL * blurred[peaks[order[0]]]:
             return np.nan

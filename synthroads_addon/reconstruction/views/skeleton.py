@@ -59,6 +59,7 @@ def _dark_cells(profiles: Profiles) -> tuple[Bool, Bool, Float]:
     if not (number > 0).any():
         return known & False, known, profiles.offsets[1::_CELL][:count]
     mean = np.where(number > 0, total / np.maximum(number, 1), np.nan)
+    # Empty cells take the median brightness: they pull the threshold to neither side.
     usual = float(np.nanmedian(mean))
     median = ndimage.median_filter(np.where(np.isfinite(mean), mean, usual), _MEDIAN)
     dark = known & (median <= otsu_threshold(np.asarray(median[known], dtype=np.float64)))

@@ -62,6 +62,7 @@ def _bend(height: Float) -> Float:
     """Return the second difference (U,) of a height profile over half a metre: kerbs and verges, not the crossfall."""
     if np.isfinite(height).sum() < 20:
         return np.full(len(height), np.nan)
+    # A second difference sees nothing of slopes, and the blur keeps range noise out of it.
     filled = ndimage.gaussian_filter1d(fill_gaps(height), 2.5)
     bend = np.gradient(np.gradient(filled))
     return np.where(np.isfinite(height), bend, np.nan)
@@ -72,6 +73,7 @@ def _in_spreads(values: Float) -> Float:
     if len(known) < 20:
         return np.full(len(values), np.nan)
     middle = float(np.median(known))
+    # Of a profile that is even but for a few bins the robust scale is nearly 0, and would blow up its noise.
     spread = max(robust_scale(known - middle), 0.3 * float(known.std()), 1e-9)
     return np.clip((values - middle) / spread, -_LIMIT, _LIMIT)
 
@@ -104,12 +106,15 @@ def _symmetry(values: Float) -> tuple[Float, Float]:
         (2 U - 1,) standard deviations above what unrelated values give, and number of pairs.
     """
     bins = values.shape[1]
+    # The autoconvolution sum of v_i v_(k - i) pairs each bin with its mirror image about k / 2: over the number of
+    # pairs and the variance it is their correlation, whose deviation for unrelated values is 1 / sqrt(pairs).
     total, pairs = np.zeros(2 * bins - 1), np.zeros(2 * bins - 1)
     for row in values:
         known = np.isfinite(row)
         variance = float(row[known].var()) if known.any() else 0.0
         if variance <= 0.0:
             continue
+        # Unknown bins are 0 and counted nowhere: they pull the correlation to neither side.
         level = np.where(known, row - row[known].mean(), 0.0)
         product = 0.5 * (fftconvolve(level, level) - _too_near(level * known, bins))
         count = 0.5 * (fftconvolve(known.astype(float), known.astype(float)) - _too_near(known.astype(float), bins))
@@ -117,6 +122,7 @@ def _symmetry(values: Float) -> tuple[Float, Float]:
         independent = np.maximum(count * ACROSS / _INDEPENDENT, 1.0)
         total += np.where(count > 0.0, product / np.maximum(count, 1.0) / variance * np.sqrt(independent), 0.0)
         pairs = np.maximum(pairs, count)
+    # The sum of C independent scores has the deviation sqrt(C).
     return total / np.sqrt(len(values)), pairs
 
 
