@@ -206,7 +206,7 @@ def estimate_sensor(
 
 @dataclass(frozen=True)
 class _BrightnessNoise:
-    """What the brightness of single echoes and strips varies by.
+    """Variation of the brightness between single echoes and between strips.
 
     Attributes:
         strips: that overlap, as far as known.

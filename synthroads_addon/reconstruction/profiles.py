@@ -40,7 +40,7 @@ _REACH = 0.8
 """Distance that a stretch may lie beside where the ones before it lead, m. Chosen: less than from one line to
 another."""
 _LOOSE = 0.15
-"""What a stretch without lines adds to that, m. Chosen: a path may leave its course by 1.5 % there."""
+"""Distance that a stretch without lines adds to that, m. Chosen: a path may leave its course by 1.5 % there."""
 _MEMORY = 0.85
 """Share of the template that stays from one stretch to the next. Chosen: it forgets over some 60 m, as markings
 change."""

@@ -53,6 +53,7 @@ def likelihood(error: Tensor, log_std: Tensor, known: Tensor, beta: float) -> Te
         beta: each term is multiplied by its variance to this power, which counts as a constant.
     """
     error = torch.where(known, error, torch.zeros_like(error))
+    # -ln N(error; 0, sigma) = (error / sigma)^2 / 2 + ln sigma + constant, times sigma^(2 beta) (Seitzer et al. 2022).
     ratio = error * torch.exp(-log_std)
     cost = functional.huber_loss(ratio, torch.zeros_like(ratio), reduction="none", delta=OUTLIER)
     terms = (cost + log_std) * torch.exp(2.0 * beta * log_std.detach())

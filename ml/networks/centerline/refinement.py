@@ -105,6 +105,7 @@ def parabola(frame: Tensor, center: Tensor, weight: Tensor, stiffness: Tensor) -
     along = points[..., 0] / _PARABOLA_UNIT
     powers = torch.stack([torch.ones_like(along), along, along * along], dim=-1)
     weighted = powers * weight[..., None]
+    # Ridge regression: (X'WX + diag(stiffness)) beta = X'Wy.
     normal = weighted.transpose(1, 2) @ powers + torch.diag(stiffness)
     factors = _solve(normal, (weighted * (points[..., 1] - middle)[..., None]).sum(1))
     value = (powers @ factors[..., None])[..., 0] + middle

@@ -67,6 +67,8 @@ def _hilbert_tables() -> tuple[list[int], list[int]]:
     for corner in range(_OCTANTS):
         for axis in range(_AXES):
             for octant in range(_OCTANTS):
+                # Hamilton and Rau-Chaplin 2008: an octant b of a cube that the curve enters at e, along axis d, is the
+                # inverse Gray code of (b xor e) rotated right by d + 1.
                 digit = _from_gray(_turned(octant ^ corner, -(axis + 1)))
                 entry = corner ^ _turned(_entry(digit), axis + 1)
                 digits.append(digit)
