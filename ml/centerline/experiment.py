@@ -93,7 +93,7 @@ def run_experiment(
     figures: dict[str, dict[str, Any]] = {name: {} for name in configured}
     for seed in seeds:
         for name, variant in experiment.variants.items():
-            found: dict[str, Any] = {}
+            results: dict[str, Any] = {}
             for turn in turns:
                 configuration, out = _without(with_seed(configured[name], seed), turn, roads), _without_name(turn)
                 learned = output / (variant.of or name)
@@ -101,12 +101,12 @@ def run_experiment(
                 if variant.of is None:
                     _train(configuration, folder, progress)
                 file = output / name / f"{out}-seed-{seed}.json"
-                found |= _test(Run(folder, configuration), {road: roads[road] for road in turn}, file, progress)
-            figures[name][str(seed)] = {road: found[road] for road in tested}
+                results |= _test(Run(folder, configuration), {road: roads[road] for road in turn}, file, progress)
+            figures[name][str(seed)] = {road: results[road] for road in tested}
             write_results(output, figures, table(experiment.title, figures, list(configured)))
         settings = configured[next(iter(configured))]
-        for rule, found in _rules(settings, seed, {road: roads[road] for road in tested}, output, progress).items():
-            figures.setdefault(rule, {})[str(seed)] = found
+        for rule, results in _rules(settings, seed, {road: roads[road] for road in tested}, output, progress).items():
+            figures.setdefault(rule, {})[str(seed)] = results
         write_results(output, figures, table(experiment.title, figures, list(configured)))
     return figures
 
@@ -117,14 +117,14 @@ def _real_roads(configured: Mapping[str, CenterlineConfiguration]) -> dict[str, 
     Raises:
         InputError: there are none, or two have one name.
     """
-    found: dict[str, tuple[Path, Path]] = {}
+    roads: dict[str, tuple[Path, Path]] = {}
     for configuration in configured.values():
         for cloud, axis in (files for road in configuration.data.measured for files in road.files()):
-            if found.setdefault(cloud.stem, (cloud, axis)) != (cloud, axis):
+            if roads.setdefault(cloud.stem, (cloud, axis)) != (cloud, axis):
                 raise InputError("data.real", cloud.stem, "is the name of several roads, by which they are left out")
-    if not found:
+    if not roads:
         raise InputError("data.real", [], "must name real roads, which the variants are tested on")
-    return found
+    return roads
 
 
 def _turns(left_out: Sequence[Sequence[str]], roads: Mapping[str, object]) -> list[list[str]]:
@@ -221,15 +221,15 @@ def _measure(
     progress: Progress,
 ) -> dict[str, dict[str, Any]]:
     """Return each predictor's figures by road as JSON data, all on the same points in the same frames."""
-    found: dict[str, dict[str, Any]] = {name: {} for name in predictors}
+    figures: dict[str, dict[str, Any]] = {name: {} for name in predictors}
     settings = configuration.slices
     for number, (road, (cloud, axis)) in enumerate(roads.items()):
         progress(f"measuring on {road}", number / len(roads))
         read: LearningRoad = read_measured(cloud, axis, settings.truth)
         case = measured_case(read, configuration.seed, settings)
         for name, predictor in predictors.items():
-            found[name][road] = to_json_data(evaluate(predictor, case))
-    return found
+            figures[name][road] = to_json_data(evaluate(predictor, case))
+    return figures
 
 
 def _are_figures(kept: Any, names: Set[str]) -> bool:
@@ -282,7 +282,7 @@ def table(title: str, results: Results, variants: Sequence[str]) -> str:
 
 def _spreads(seeds: Mapping[str, Mapping[str, Any]], roads: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Return the spread over seeds of each figure by road, and of all roads together, weighted by their slices."""
-    by_seed = [{road: _numbers(found[road]) for road in roads} for found in seeds.values()]
+    by_seed = [{road: _numbers(by_road[road]) for road in roads} for by_road in seeds.values()]
     for rows in by_seed:
         rows["all"] = over_roads([rows[road] for road in roads])
     return {road: over_seeds([rows[road] for rows in by_seed]) for road in (*roads, "all")}

@@ -26,8 +26,8 @@ class _FromTensors(nn.Module):
 
     def forward(self, *tensors: Tensor) -> tuple[Tensor, ...]:
         """Return the model's `OUTPUTS` for `INPUTS` of B sequences of S slices: see `networks.centerline.models`."""
-        found = self.model(dict(zip(INPUTS, tensors, strict=True)))
-        return tuple(found[name] for name in OUTPUTS)
+        outputs = self.model(dict(zip(INPUTS, tensors, strict=True)))
+        return tuple(outputs[name] for name in OUTPUTS)
 
 
 def exportable_network(predictor: CenterlinePredictor, seed: int) -> Exportable:

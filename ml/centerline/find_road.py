@@ -18,6 +18,7 @@ from ..networks.centerline.models import TARGETS
 from .predictor import CenterlinePredictor, Regression
 
 _HEIGHT = TARGETS.index("height")
+"""Column of the height among the targets."""
 
 
 def find_road(
@@ -40,13 +41,17 @@ def find_road(
     shape = (len(frames), len(TARGETS))
     value, raw, std = (np.full(shape, np.nan) for _ in range(3))
     widths = np.full((*shape, 2), np.nan)
-    for road, local, own in strips(cloud, ground, line, frames, progress):
-        found = predictor.regress(road, local)
+    for road, local, rows in strips(cloud, ground, line, frames, progress):
+        regression = predictor.regress(road, local)
         # Frames keep their stations, which rise strictly, from strip to strip.
-        number = np.searchsorted(frames.station, found.frames.station[own])
-        value[number] = found.value[own]
+        number = np.searchsorted(frames.station, regression.frames.station[rows])
+        value[number] = regression.value[rows]
         value[number, _HEIGHT] += road.origin[2]
-        raw[number], std[number], widths[number] = found.raw_std[own], found.std[own], found.widths[own]
+        raw[number], std[number], widths[number] = (
+            regression.raw_std[rows],
+            regression.std[rows],
+            regression.widths[rows],
+        )
         progress("finding the road", float(number[-1] + 1) / len(frames) if len(number) else 0.0)
     kept = _found_span(value[:, 0])
     codes = (ground.header.epsg, ground.header.height_epsg)
@@ -65,23 +70,23 @@ UNITS = {"lanes": "1", "heading": "rad"}
 """All other numbers are in metres."""
 
 
-def centerline_geojson(found: Regression, name: str, spacing: float) -> dict[str, Any]:
+def centerline_geojson(regression: Regression, name: str, spacing: float) -> dict[str, Any]:
     """Return centreline and pavement edges as a GeoJSON FeatureCollection, one LineString per stretch without a gap.
 
     Each has, per vertex, its station along the path, its standard deviation across the road and the half-widths of the
     intervals that cover 68 % and 95 %, m.
 
     Args:
-        found: by the model.
+        regression: by the model.
         name: of the collection.
         spacing: of the frames, m.
     """
     features = []
     for line in ("center", "left_edge", "right_edge"):
         column = TARGETS.index(line)
-        points = found.points(line)
+        points = regression.points(line)
         there = np.isfinite(points).all(axis=1)
-        far = np.concatenate([[True], np.diff(found.frames.station) > 1.5 * spacing])
+        far = np.concatenate([[True], np.diff(regression.frames.station) > 1.5 * spacing])
         ends = np.flatnonzero(far | ~there | ~np.concatenate([[False], there[:-1]]))
         for stretch in np.split(np.arange(len(there)), ends):
             part = stretch[there[stretch]]
@@ -89,28 +94,28 @@ def centerline_geojson(found: Regression, name: str, spacing: float) -> dict[str
                 continue
             properties = {
                 "feature": "centerline" if line == "center" else line,
-                "stations": _as_list(found.frames.station[part]),
-                "std": _as_list(found.std[part, column]),
-                "interval_68": _as_list(found.widths[part, column, 0]),
-                "interval_95": _as_list(found.widths[part, column, 1]),
+                "stations": _as_list(regression.frames.station[part]),
+                "std": _as_list(regression.std[part, column]),
+                "interval_68": _as_list(regression.widths[part, column, 0]),
+                "interval_95": _as_list(regression.widths[part, column, 1]),
             }
             geometry = {"type": "LineString", "coordinates": np.round(points[part], DIGITS).tolist()}
             features.append({"type": "Feature", "properties": properties, "geometry": geometry})
     collection: dict[str, Any] = {"type": "FeatureCollection", "name": name}
-    if found.epsg is not None:
-        urn = system_urn(found.epsg, found.height_epsg)
+    if regression.epsg is not None:
+        urn = system_urn(regression.epsg, regression.height_epsg)
         collection["crs"] = {"type": "name", "properties": {"name": urn}}
     return collection | {"features": features}
 
 
-def corridor_json(found: Regression, calibration: Mapping[str, Any]) -> dict[str, Any]:
+def corridor_json(regression: Regression, calibration: Mapping[str, Any]) -> dict[str, Any]:
     """Return the corridor as JSON data: per column a list of one number per frame, None where nothing was found.
 
     Args:
-        found: by the model.
+        regression: by the model.
         calibration: what is said about how far its deviations can be trusted.
     """
-    frames = found.frames
+    frames = regression.frames
     columns: dict[str, Any] = {
         "station": _as_list(frames.station),
         "x": _as_list(frames.position[:, 0]),
@@ -119,15 +124,15 @@ def corridor_json(found: Regression, calibration: Mapping[str, Any]) -> dict[str
     }
     for index, name in enumerate(TARGETS):
         digits = 6 if name == "heading" else DIGITS
-        columns[name] = _as_list(found.value[:, index], digits)
-        columns[f"{name}_std"] = _as_list(found.std[:, index], digits)
-        columns[f"{name}_68"] = _as_list(found.widths[:, index, 0], digits)
-        columns[f"{name}_95"] = _as_list(found.widths[:, index, 1], digits)
+        columns[name] = _as_list(regression.value[:, index], digits)
+        columns[f"{name}_std"] = _as_list(regression.std[:, index], digits)
+        columns[f"{name}_68"] = _as_list(regression.widths[:, index, 0], digits)
+        columns[f"{name}_95"] = _as_list(regression.widths[:, index, 1], digits)
     return {
         "type": "Corridor",
         "version": "1.0",
-        "epsg": found.epsg,
-        **({"height_epsg": found.height_epsg} if found.height_epsg else {}),
+        "epsg": regression.epsg,
+        **({"height_epsg": regression.height_epsg} if regression.height_epsg else {}),
         "units": {name: UNITS.get(name, "m") for name in ("center", *CORRIDOR)},
         "calibration": dict(calibration),
         "slices": columns,

@@ -15,8 +15,10 @@ from synthroads_addon.reconstruction.path import CloudPath
 from ..shipped import open_run
 from ..tasks import Prediction, task
 
-_USUAL_STD = 0.1  # m, where the model tells none
-_GAP = 5.0  # m between points of a line across which nothing is told
+_USUAL_STD = 0.1
+"""Deviation where the model tells none, m. Chosen: about what trained models leave."""
+_GAP = 5.0
+"""Distance between points of a line across which nothing is told, m. Chosen: a stretch of the profiles."""
 
 
 def learned_axis(folder: FilePath, cloud_file: FilePath) -> Predictor:
@@ -64,10 +66,10 @@ def axis_beside(document: object, origin: Float, path: CloudPath) -> tuple[Float
         order = np.argsort(station, kind="stable")
         given = told.get("std") or [_USUAL_STD] * len(points)
         deviation = np.array([_USUAL_STD if value is None else value for value in given], dtype=np.float64)
-        wanted = path.stations
-        after = np.clip(np.searchsorted(station[order], wanted), 1, len(points) - 1)
+        target = path.stations
+        after = np.clip(np.searchsorted(station[order], target), 1, len(points) - 1)
         low, high = station[order][after - 1], station[order][after]
-        near = (wanted >= low - 1e-9) & (wanted <= high + 1e-9) & (high - low <= _GAP)
-        offset = np.where(near, np.interp(wanted, station[order], beside[order]), offset)
-        std = np.where(near, np.interp(wanted, station[order], deviation[order]), std)
+        near = (target >= low - 1e-9) & (target <= high + 1e-9) & (high - low <= _GAP)
+        offset = np.where(near, np.interp(target, station[order], beside[order]), offset)
+        std = np.where(near, np.interp(target, station[order], deviation[order]), std)
     return offset, std

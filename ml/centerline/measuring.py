@@ -78,9 +78,9 @@ def measure_run(
     for number, one in enumerate(shown[:PICTURES]):
         progress("drawing", number / min(len(shown), PICTURES))
         files += _draw(evaluation.output, one, predictor, name)
-    found = {"corridor": corridor, "tables": as_data(measured), "files": files}
+    results = {"corridor": corridor, "tables": as_data(measured), "files": files}
     means = {figure: nan_to_none(spread.mean) for figure, spread in measured[name]["all"].items()}
-    return {"roads": len(shown), **means, **found}, report(measured, corridor)
+    return {"roads": len(shown), **means, **results}, report(measured, corridor)
 
 
 def read_cases(
@@ -121,10 +121,10 @@ def corridor_figures(predictor: CenterlinePredictor, shown: Sequence[Case]) -> d
     """Return mean absolute error, coverage, ... of each target over all roads' frames; None without known truth."""
     error, std, wide = [], [], []
     for one in shown:
-        found = predictor.regress(one.road, one.frames)
-        error.append(target_errors(found, one.road.known_truth))
-        std.append(found.std)
-        wide.append(found.widths)
+        regression = predictor.regress(one.road, one.frames)
+        error.append(target_errors(regression, one.road.known_truth))
+        std.append(regression.std)
+        wide.append(regression.widths)
     every, deviation, widths = np.concatenate(error), np.concatenate(std), np.concatenate(wide)
     rows = {}
     for index, name in enumerate(TARGETS):

@@ -27,6 +27,7 @@ from ..training_loop import move_to_device
 _NEAR = 2
 """A frame with no point in it nor in this many frames to either side has no prediction."""
 _HEIGHT = TARGETS.index("height")
+"""Column of the height among the targets."""
 
 
 class UseOptions(Part):
@@ -93,9 +94,12 @@ class CenterlinePredictor:
 
     def __call__(self, road: LearningRoad, frames: Frames) -> Float:
         """Return (M, 4 + 2 K) numbers, columns `evaluation.CORRIDOR_COLUMNS`, NaN where nothing is found."""
-        found = self.regress(road, frames)
-        center, corridor = (found.value[:, :1], found.std[:, :1]), (found.value[:, 1:], found.std[:, 1:])
-        return np.column_stack([*center, *corridor, found.widths[:, 0]])
+        regression = self.regress(road, frames)
+        center, corridor = (
+            (regression.value[:, :1], regression.std[:, :1]),
+            (regression.value[:, 1:], regression.std[:, 1:]),
+        )
+        return np.column_stack([*center, *corridor, regression.widths[:, 0]])
 
     def regress(self, road: LearningRoad, frames: Frames) -> Regression:
         """Return centreline and corridor in M frames with calibrated deviations; NaN where no points are near.
@@ -113,11 +117,11 @@ class CenterlinePredictor:
         shape = (len(frames), len(TARGETS))
         weight, value, spread = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         seen = np.zeros(len(frames), dtype=bool)
-        for number, height, filled, found, std in self._sequences(road, frames):
-            found[:, _HEIGHT] += height
+        for number, height, filled, estimate, std in self._sequences(road, frames):
+            estimate[:, _HEIGHT] += height
             inverse = 1.0 / std**2
             np.add.at(weight, number, inverse)
-            np.add.at(value, number, inverse * found)
+            np.add.at(value, number, inverse * estimate)
             np.add.at(spread, number, 1.0)
             np.logical_or.at(seen, number, filled)
         # The mean of the variances, each weighted by its inverse, is the harmonic one.
@@ -145,9 +149,9 @@ class CenterlinePredictor:
         """
         error, raw = [], []
         for road, frames in shown:
-            found = self.regress(road, frames)
-            error.append(target_errors(found, road.known_truth))
-            raw.append(found.raw_std)
+            regression = self.regress(road, frames)
+            error.append(target_errors(regression, road.known_truth))
+            raw.append(regression.raw_std)
         every = np.concatenate(error)
         other = copy(self)
         targets = zip(TARGETS, every.T, np.concatenate(raw).T, strict=True)
@@ -190,14 +194,14 @@ def smooth_line(frames: Frames, y: Float, std: Float, reach: int) -> Float:
     for part in stretches(frames):
         total = np.zeros((5, len(part)))
         for by in range(1 - reach, reach):
-            own = part[max(0, -by) : max(0, len(part) - max(0, by))]
-            other = own + by
-            dx, dy = (place[other] - frames.position[own]).T
-            ahead, aside = cos[own] * dx + sin[own] * dy, cos[own] * dy - sin[own] * dx
+            rows = part[max(0, -by) : max(0, len(part) - max(0, by))]
+            other = rows + by
+            dx, dy = (place[other] - frames.position[rows]).T
+            ahead, aside = cos[rows] * dx + sin[rows] * dy, cos[rows] * dy - sin[rows] * dx
             weight = np.nan_to_num((reach - abs(by)) / std[other] ** 2) * np.isfinite(aside)
             ahead, aside = np.nan_to_num(ahead), np.nan_to_num(aside)
             terms = (np.ones_like(ahead), ahead, aside, ahead * ahead, ahead * aside)
-            total[:, own - part[0]] += weight * np.stack(terms)
+            total[:, rows - part[0]] += weight * np.stack(terms)
         result[part] = np.where(np.isfinite(y[part]), _crossing_of(*total), np.nan)
     return result
 
@@ -209,10 +213,10 @@ def _crossing_of(one: Float, x: Float, y: Float, xx: Float, xy: Float) -> Float:
     return np.divide(y - slope * x, one, out=np.full_like(one, np.nan), where=one > 0.0)
 
 
-def target_errors(found: Regression, truth: Truth) -> Float:
+def target_errors(regression: Regression, truth: Truth) -> Float:
     """Return the regressed targets minus the truth (M, T), in the targets' units; NaN where either is missing."""
-    there = truth.at(found.frames)
-    return found.value - np.column_stack([there.center, there.corridor])
+    there = truth.at(regression.frames)
+    return regression.value - np.column_stack([there.center, there.corridor])
 
 
 assert TARGETS[1:] == CORRIDOR

@@ -22,7 +22,9 @@ from ..data.roads import LearningRoad
 from ..scores.evaluation import CORRIDOR_COLUMNS, Predictor
 
 _LABELLED_SHARE, _MARKED_SHARE = 0.01, 0.001
+"""Shares of pavement and paint from which on labels are believed: as `reconstruction.cloud` does."""
 _FEWEST = 2000
+"""Points of a road at least: as `reconstruction.cloud.FEWEST_POINTS`."""
 
 
 def road_cloud(road: LearningRoad) -> RoadCloud:
@@ -31,13 +33,13 @@ def road_cloud(road: LearningRoad) -> RoadCloud:
     for number, name in road.class_names.items():
         unsorted = name in UNSORTED_CLASSES
         table[number] = PointKind.GROUND if unsorted else KIND_OF_CLASS.get(name, PointKind.OTHER)
-    own = np.asarray(road.belonging)
-    kind: UInt8 = table[road.class_id[own]]
+    rows = np.asarray(road.belonging)
+    kind: UInt8 = table[road.class_id[rows]]
     paved = np.isin(kind, (PointKind.PAVEMENT, PointKind.MARKING))
     labelled = bool(paved.sum() > _LABELLED_SHARE * len(kind))
     marked = labelled and bool((kind == PointKind.MARKING).sum() > _MARKED_SHARE * paved.sum())
-    intensity = np.asarray(road.intensity[own], dtype=np.float32)
-    xyz = np.asarray(road.xyz[own], dtype=np.float64)
+    intensity = np.asarray(road.intensity[rows], dtype=np.float32)
+    xyz = np.asarray(road.xyz[rows], dtype=np.float64)
     return RoadCloud(xyz, intensity, kind, np.zeros(3), Placement(), labelled, marked, len(kind), {})
 
 
@@ -55,42 +57,42 @@ def views_predictor(network: Predictor | None = None) -> Predictor:
             if len(cloud.xyz) < _FEWEST:
                 raise InputError("road", len(cloud.xyz), f"at least {_FEWEST} points are needed")
             path, half = straighten_path(cloud, options)
-            found = find_axis(cloud, path, half, options)
+            road_axis = find_axis(cloud, path, half, options)
         except InputError:
             return np.full((len(frames), len(CORRIDOR_COLUMNS)), np.nan)
-        return _in_frames(found, frames)
+        return _in_frames(road_axis, frames)
 
     return predict
 
 
 def _network_view(network: Predictor, road: LearningRoad, frames: Frames) -> AxisPredictor:
-    found = network(road, frames)
+    centres = network(road, frames)
 
     def predict(cloud: RoadCloud, path: CloudPath) -> tuple[Float, Float]:
-        known = np.isfinite(found[:, 0])
+        known = np.isfinite(centres[:, 0])
         offset, std = np.full(len(path.points), np.nan), np.full(len(path.points), np.nan)
         if known.sum() < 2:
             return offset, std
-        station, beside = path.project(frames.at(found[:, 0])[known])
+        station, beside = path.project(frames.at(centres[:, 0])[known])
         order = np.argsort(station, kind="stable")
         inside = (path.stations >= station.min()) & (path.stations <= station.max())
         offset = np.where(inside, np.interp(path.stations, station[order], beside[order]), np.nan)
-        std = np.where(inside, np.interp(path.stations, station[order], found[known, 1][order]), np.nan)
+        std = np.where(inside, np.interp(path.stations, station[order], centres[known, 1][order]), np.nan)
         return offset, std
 
     return predict
 
 
-def _in_frames(found: FoundRoad, frames: Frames) -> Float:
+def _in_frames(road: FoundRoad, frames: Frames) -> Float:
     """Return y (m) at which a found axis crosses each of M frames, its deviation and intervals there, and no corridor.
 
     In the columns `CORRIDOR_COLUMNS`; what isn't known is NaN.
     """
-    axis = found.axis
-    along = found.path.stations
-    points = found.path.place(along, np.interp(along, axis.stations, axis.offsets))
+    axis = road.axis
+    along = road.path.stations
+    points = road.path.place(along, np.interp(along, axis.stations, axis.offsets))
     y, _ = MeasuredAxis(points).crossing(frames.position, frames.direction)
-    station, _ = found.path.project(frames.position)
+    station, _ = road.path.project(frames.position)
     halves = [half_width(axis, share, factor, DEFINITION) for share, factor in INTERVALS.values()]
     spread = [np.hypot(DEFINITION, axis.std), *halves]
     columns = [np.where(np.isfinite(y), np.interp(station, axis.stations, values), np.nan) for values in spread]

@@ -169,18 +169,18 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
     check_file_target(corridor, prediction.output_option, prediction.overwrite)
     ready = load_predictor(run)
     line = None if prediction.path is None else read_path(prediction.path, place=_place_of(prediction.cloud))
-    found = find_road(ready, prediction.cloud, line, progress)
+    regression = find_road(ready, prediction.cloud, line, progress)
     name = prediction.cloud.stem
-    text = canonical_json(centerline_geojson(found, name, ready.settings.frame_spacing))
+    text = canonical_json(centerline_geojson(regression, name, ready.settings.frame_spacing))
     calibration = {name: one.to_dict() for name, one in ready.calibration.items()}
-    table = canonical_json(to_json_data(corridor_json(found, calibration)))
+    table = canonical_json(to_json_data(corridor_json(regression, calibration)))
     write_file(lines, text.encode(), overwrite=prediction.overwrite)
     write_file(corridor, table.encode(), overwrite=prediction.overwrite)
-    there = np.isfinite(found.value[:, 0])
+    there = np.isfinite(regression.value[:, 0])
     return {
         "slices": len(there),
         "found": float(there.mean()) if len(there) else 0.0,
-        "mean_std": float(found.std[there, 0].mean()) if there.any() else None,
+        "mean_std": float(regression.std[there, 0].mean()) if there.any() else None,
         "files": [str(lines), str(corridor)],
     }
 
@@ -296,10 +296,10 @@ def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: 
         for road in roads.measured_validation
     ]
     calibrated, error = ready.calibrate((one.road, one.frames) for one in shown)
-    found = calibrated.calibration
-    data = to_json_data({name: one.to_dict() for name, one in found.items()})
+    calibration = calibrated.calibration
+    data = to_json_data({name: one.to_dict() for name, one in calibration.items()})
     write_file(run.folder / CALIBRATION, canonical_json(data).encode(), overwrite=True)
-    center = found["center"]
+    center = calibration["center"]
     return {
         "validation_mae": float(np.nanmean(np.abs(error[:, 0]))),
         "validation_68": center.after[0],

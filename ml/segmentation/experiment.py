@@ -99,12 +99,12 @@ def _are_tests(configuration: SegmentationConfiguration, kept: Any) -> bool:
 
 def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, output: Path) -> None:
     """Copy a run of the experiment that trained just the first part of fine-tuning to `target`, if there is one."""
-    wanted = lasting_data(configuration.model_copy(update={"set_up": "synthetic"}).to_dict())
+    data = lasting_data(configuration.model_copy(update={"set_up": "synthetic"}).to_dict())
     if (target / CONFIGURATION).is_file():
         return
     for file in sorted(output.glob(f"*/*/{CONFIGURATION}")):
         told = read_json(file)
-        if isinstance(told, dict) and lasting_data(told) == wanted and (file.parent / METRICS).is_file():
+        if isinstance(told, dict) and lasting_data(told) == data and (file.parent / METRICS).is_file():
             for name in (CONFIGURATION, CHECKPOINT, HISTORY):
                 write_file(target / name, (file.parent / name).read_bytes(), overwrite=True)
             return

@@ -44,10 +44,10 @@ def exportable_network(model: nn.Module, configuration: SegmentationConfiguratio
     points = _CLOUDS * _POINTS
     coord = torch.rand(points, 3, generator=draw) * torch.tensor([_CUBE, _CUBE, 1.0])
     offset = torch.arange(_POINTS, points + 1, _POINTS)
-    found = configuration.network.onnx_inputs({"coord": coord, "offset": offset})
+    geometry = configuration.network.onnx_inputs({"coord": coord, "offset": offset})
     feat = torch.randn(points, len(configuration.features), generator=draw)
-    names = tuple(found.inputs)
-    dynamic = {"feat": {0: "points0"}, **found.lengths}
+    names = tuple(geometry.inputs)
+    dynamic = {"feat": {0: "points0"}, **geometry.lengths}
     metadata = described(
         task="segmentation",
         classes=list(class_names(configuration.scheme())),
@@ -57,4 +57,4 @@ def exportable_network(model: nn.Module, configuration: SegmentationConfiguratio
         network=configuration.network.to_dict(),
     )
     wrapped = _FromTensors(model, names).eval()
-    return Exportable(wrapped, {"feat": feat, **found.inputs}, dynamic, ("scores",), metadata)
+    return Exportable(wrapped, {"feat": feat, **geometry.inputs}, dynamic, ("scores",), metadata)

@@ -44,7 +44,7 @@ def forecast(configuration: SegmentationConfiguration, steps: int) -> dict[str, 
         allowed = "makes its scenes while it trains: forecast with data that are there, and data.stream=null"
         raise InputError("data.stream", configuration.data.stream.recipe, allowed)
     device = chosen_device(configuration)
-    sources = [source for found in configuration.needed_sources().values() for source in found]
+    sources = [source for rows in configuration.needed_sources().values() for source in rows]
     count = sum(tile_count(source, configuration) for source in sources)
     wall, cpu = timed_steps(configuration, _first_tiles(sources, configuration), steps, device)
     crops = configuration.crops_per_epoch or configuration.crops_per_tile * count
@@ -77,15 +77,15 @@ def tile_count(source: Source, configuration: SegmentationConfiguration) -> int:
 
 def _first_tiles(sources: list[Source], configuration: SegmentationConfiguration) -> list[CloudTile]:
     """Return up to 8 tiles of at least a crop's points; raise `InputError` if there are none."""
-    found: list[CloudTile] = []
+    tiles: list[CloudTile] = []
     for tile in thin_tiles(sources, configuration, "first"):
         if len(tile) >= configuration.crop_points:
-            found.append(tile)
-        if len(found) == _TILES:
+            tiles.append(tile)
+        if len(tiles) == _TILES:
             break
-    if not found:
+    if not tiles:
         raise InputError("crop_points", configuration.crop_points, "must not exceed the points of every tile")
-    return found
+    return tiles
 
 
 def timed_steps(

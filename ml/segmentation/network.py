@@ -31,8 +31,8 @@ def scores_of(model: nn.Module, batch: Item) -> Tensor:
 
 def gpu_prepares(configuration: SegmentationConfiguration, device: torch.device) -> bool:
     """Return whether batches are prepared on the device, a GPU, and not by workers on the CPU."""
-    wanted = configuration.prepare_on == "auto"
-    return wanted and device.type != "cpu" and configuration.network.prepares_on_gpu
+    automatic = configuration.prepare_on == "auto"
+    return automatic and device.type != "cpu" and configuration.network.prepares_on_gpu
 
 
 def prepare_on_gpu(configuration: SegmentationConfiguration, batch: Item) -> Item:

@@ -39,6 +39,7 @@ from .scoring import Classifier, label_tile
 HEADER_TEXTS = range(26, 90)
 """Bytes of a LAS file that hold the system identifier and the generating software, of 32 each."""
 BLOCK = 500_000
+"""Points that are read or written at once. Chosen: bounds memory."""
 TILE = 48.0
 """Edge of the tiles, m."""
 MARGIN = 6.0
@@ -269,9 +270,9 @@ def write_copy(
             with laspy.open(temporary, "w", header=header, do_compress=compress) as writer:
                 done = 0
                 for old in reader.chunk_iterator(BLOCK):
-                    found = np.asarray(labels[done : done + len(old)])
-                    writer.write_points(extended_record(old, header, ids[found], codes))
-                    counts += np.bincount(found, minlength=256)
+                    places = np.asarray(labels[done : done + len(old)])
+                    writer.write_points(extended_record(old, header, ids[places], codes))
+                    counts += np.bincount(places, minlength=256)
                     done += len(old)
                     progress("writing", done / reader.header.point_count)
                 if done != len(labels):

@@ -157,14 +157,14 @@ class SegmentationConfiguration(Configuration):
             InputError: the set-up needs data of a kind and none are named.
         """
         alone = {"real": ("real",), "synthetic": ("synthetic",), "self_trained": ("synthetic",)}
-        wanted = alone.get(self.set_up, ("synthetic", "real"))
-        found = {"real": self.data.real, "synthetic": self.data.synthetic}
-        for domain in wanted:
-            if not found[domain] and not (domain == "synthetic" and self.data.stream is not None):
+        domains = alone.get(self.set_up, ("synthetic", "real"))
+        sources = {"real": self.data.real, "synthetic": self.data.synthetic}
+        for domain in domains:
+            if not sources[domain] and not (domain == "synthetic" and self.data.stream is not None):
                 raise InputError(f"data.{domain}", [], f"must name training data, which the set-up {self.set_up} needs")
         if self.set_up == "self_trained" and not self.data.target:
             raise InputError("data.target", [], "must name clouds to adapt to, which the set-up self_trained needs")
-        return {domain: found[domain] for domain in wanted}
+        return {domain: sources[domain] for domain in domains}
 
 
 def class_shares(tiles: Sequence[CloudTile], classes: int) -> Float:

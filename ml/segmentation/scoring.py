@@ -62,8 +62,8 @@ def overlapping_pieces(
         margin: seen around them, m.
         largest: points seen; squares with more are cut in four.
     """
-    wanted = np.arange(len(plan)) if own is None else np.flatnonzero(own)
-    if len(wanted) == 0:
+    members = np.arange(len(plan)) if own is None else np.flatnonzero(own)
+    if len(members) == 0:
         return
     position = np.asarray(plan, dtype=np.float64)
 
@@ -78,7 +78,7 @@ def overlapping_pieces(
             else:
                 yield core, around
 
-    yield from cut(wanted, np.arange(len(plan)), position[wanted].min(axis=0), edge, margin)
+    yield from cut(members, np.arange(len(plan)), position[members].min(axis=0), edge, margin)
 
 
 def label_tile(
@@ -136,8 +136,8 @@ def piece_scores(
                 total = scores.new_zeros(len(tile), scores.shape[1], dtype=torch.float32)
             total[torch.from_numpy(inside)] += scores.float().softmax(dim=1)
     if total is not None:
-        wanted = np.arange(len(tile)) if own is None else np.flatnonzero(own)
-        yield wanted, (total[torch.from_numpy(wanted)] / settings.votes).clamp_min(1e-9).log()
+        rows = np.arange(len(tile)) if own is None else np.flatnonzero(own)
+        yield rows, (total[torch.from_numpy(rows)] / settings.votes).clamp_min(1e-9).log()
 
 
 def _view_scores(

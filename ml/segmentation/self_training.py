@@ -28,8 +28,8 @@ def target_tiles(configuration: SegmentationConfiguration) -> list[CloudTile]:
     Raises:
         MissingFileError, InputError: there are none, they are damaged, or hold no points.
     """
-    found = thin_tiles(configuration.data.target, configuration, "target", labels=False)
-    tiles = large_enough(list(found), configuration)
+    thinned = thin_tiles(configuration.data.target, configuration, "target", labels=False)
+    tiles = large_enough(list(thinned), configuration)
     if not tiles:
         raise InputError("data.target", 0, "holds no points to learn from")
     return tiles

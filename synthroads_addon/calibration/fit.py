@@ -18,19 +18,28 @@ from .expected import Expectation, ReceiverModel
 Function = Callable[[Float], Float]
 
 FITTED = (0.25, 0.5, 0.75, 0.9)
-"""Quantiles that a fit holds."""
+"""Quantiles that a fit holds. Chosen: both spreads are told from either side of the median, and the tail above, where
+markings and gloss are."""
 SHOWN = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95)
 """Quantiles that a report shows: the others say how far the fit can be trusted beyond."""
 WAVELENGTHS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
-"""Wavelengths that are tried, m."""
+"""Wavelengths that are tried, m. Chosen: by factors of 2, from a tyre's width to a stretch of pavement that was laid at
+once."""
 BRIGHTEST = 0.98
-"""Largest reflectivity that a material is given."""
+"""Largest reflectivity that a material is given. Chosen: as of the whitest standards."""
 _SPREADS = (0.002, 1.5)
+"""Least and largest spread, in logarithms. Chosen: the first is none, the second a factor of 4.5."""
+_QUARTILE = 0.6745
+"""Quartile of the standard normal distribution."""
 _STEPS = 40
+"""Levenberg and Marquardt's steps at most. Chosen: three parameters take some ten."""
 _DONE = 1e-4
+"""Step, in logarithms, at which the fit ends. Chosen: a hundredth of a percent."""
 _CELLS = (0.4, 1.0, 2.5, 6.0, 15.0, 40.0)
-"""Squares within which points are compared, m."""
+"""Squares within which points are compared, m. Chosen: by factors of 2.5, across the wavelengths that are tried."""
 _FEWEST_PAIRS = 50
+"""Degrees of freedom of a variance within squares at least. Chosen: it is then known to a fifth (2 / n under the
+root)."""
 
 
 @dataclass(frozen=True)
@@ -74,19 +83,20 @@ def fit_level_and_spreads(
     """
     width = interquartile_range(quantiles)
 
-    def miss(x: Float) -> Float:
-        got = np.quantile(receiver.to_stored(apply_gain(expectation, material, _fit(x, material), beside)), FITTED)
-        return np.asarray((got - quantiles) / width)
+    def residual(x: Float) -> Float:
+        linear = apply_gain(expectation, material, _fit(x, material), beside)
+        return np.asarray((np.quantile(receiver.to_stored(linear), FITTED) - quantiles) / width)
 
     start = float(np.median(expectation.linear_intensities(material, beside[0] if beside else None)))
     if start <= 0.0:
         raise InputError("material", material.to_dict(), "gives nothing back at these incidence angles and ranges")
     level = np.log(float(receiver.to_linear(quantiles[1:2])[0]) / start)
     if not spread:
-        return _fit(_levenberg_marquardt(miss, np.array([level])), material)
-    linear = np.log(receiver.to_linear(quantiles))
-    first = [max(0.02, abs(float(linear[1 + side] - linear[1])) / 0.6745) for side in (-1, 1)]
-    return _fit(_levenberg_marquardt(miss, np.array([level, *np.log(first)])), material)
+        return _fit(_levenberg_marquardt(residual, np.array([level])), material)
+    # A quartile of a normal distribution lies 0.6745 standard deviations from its median; spreads are of logarithms.
+    log_linear = np.log(receiver.to_linear(quantiles))
+    sigma = [max(0.02, abs(float(log_linear[1 + side] - log_linear[1])) / _QUARTILE) for side in (-1, 1)]
+    return _fit(_levenberg_marquardt(residual, np.array([level, *np.log(sigma)])), material)
 
 
 def apply_gain(expectation: Expectation, material: Material, fit: Fit, beside: tuple[Material, float] | None) -> Float:
@@ -107,17 +117,21 @@ def _fit(x: Float, material: Material) -> Fit:
     return Fit(level, float(low), float(high))
 
 
-def _levenberg_marquardt(miss: Function, x: Float) -> Float:
-    damping, error = 1e-3, miss(x)
+def _levenberg_marquardt(residual: Function, x: Float) -> Float:
+    """Return the parameters at which the sum of squared residuals is least, from x (P,) downhill."""
+    damping, r = 1e-3, residual(x)
     for _ in range(_STEPS):
-        slope = np.column_stack([(miss(x + step) - miss(x - step)) / 2e-3 for step in 1e-3 * np.eye(len(x))])
-        normal = slope.T @ slope
+        # Quantiles of samples have steps: the derivative is taken over far more than one of these.
+        jacobian = np.column_stack([(residual(x + h) - residual(x - h)) / 2e-3 for h in 1e-3 * np.eye(len(x))])
+        normal = jacobian.T @ jacobian
+        # Marquardt 1963: (J'J + lambda diag(J'J)) delta = -J'r; lambda falls with each success and rises with each
+        # failure, by a factor of 5 (chosen).
         scale = np.diag(np.maximum(np.diag(normal), 1e-9))
-        move = np.clip(np.linalg.solve(normal + damping * scale, -slope.T @ error), -1.0, 1.0)
-        tried = miss(x + move)
-        if tried @ tried < error @ error:
-            x, error, damping = x + move, tried, max(damping / 5.0, 1e-9)
-            if np.abs(move).max() < _DONE:
+        delta = np.clip(np.linalg.solve(normal + damping * scale, -jacobian.T @ r), -1.0, 1.0)
+        trial = residual(x + delta)
+        if trial @ trial < r @ r:
+            x, r, damping = x + delta, trial, max(damping / 5.0, 1e-9)
+            if np.abs(delta).max() < _DONE:
                 break
         elif damping > 1e6:
             break
@@ -187,10 +201,13 @@ def fitted_slope(incidence: Float, linear: Float) -> float | None:
     if edges[-2] - edges[1] < np.deg2rad(10.0):
         return None
     owner = np.clip(np.searchsorted(edges, incidence, side="right") - 1, 0, 11)
+    # Equal numbers of points in each of twelve groups of angles, whose medians outliers don't move.
     angle = np.array([np.median(incidence[owner == number]) for number in range(12) if (owner == number).any()])
     median = np.array([np.median(linear[owner == number]) for number in range(12) if (owner == number).any()])
     slopes = np.linspace(0.0, 1.5, 76)
     a, b = (terms[:, None] for terms in facet_terms(slopes))
+    # Oren and Nayar 1994, seen from where the light is: cos(theta) (A + B sin(theta) tan(theta)), up to a factor, which
+    # the deviation of the logarithms leaves out.
     model = a * np.cos(angle) + b * np.sin(angle) ** 2
     misfit = np.log(median / model)
     return float(slopes[misfit.std(axis=1).argmin()])
@@ -228,17 +245,18 @@ def _variance_within(values: Float, squares: list[Index]) -> Float:
     for owner in squares:
         count = np.bincount(owner)
         mean = np.bincount(owner, values) / np.maximum(count, 1)
-        rest = ((values - mean[owner]) ** 2)[count[owner] > 1].sum()
-        freedom = (count[count > 1] - 1).sum()
-        result.append(rest / freedom / values.var() if freedom >= _FEWEST_PAIRS else np.nan)
+        square = ((values - mean[owner]) ** 2)[count[owner] > 1].sum()
+        freedom = (count[count > 1] - 1).sum()  # each square's mean takes one degree
+        result.append(square / freedom / values.var() if freedom >= _FEWEST_PAIRS else np.nan)
     return np.array(result)
 
 
 def _normal_scores(values: Float) -> Float:
     """Return normal scores (N,) of values by rank, by a rational approximation (Abramowitz & Stegun 26.2.23)."""
-    rank = np.empty(len(values))
-    rank[np.argsort(values, kind="stable")] = (np.arange(len(values)) + 0.5) / len(values)
-    tail = np.sqrt(-2.0 * np.log(np.minimum(rank, 1.0 - rank)))
-    top = 2.515517 + tail * (0.802853 + tail * 0.010328)
-    bottom = 1.0 + tail * (1.432788 + tail * (0.189269 + tail * 0.001308))
-    return np.asarray(np.sign(rank - 0.5) * (tail - top / bottom))
+    q = np.empty(len(values))
+    q[np.argsort(values, kind="stable")] = (np.arange(len(values)) + 0.5) / len(values)
+    # x = t - (c0 + c1 t + c2 t^2) / (1 + d1 t + d2 t^2 + d3 t^3), t = sqrt(-2 ln p), of the tail's probability p.
+    t = np.sqrt(-2.0 * np.log(np.minimum(q, 1.0 - q)))
+    numerator = 2.515517 + t * (0.802853 + t * 0.010328)
+    denominator = 1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308))
+    return np.asarray(np.sign(q - 0.5) * (t - numerator / denominator))

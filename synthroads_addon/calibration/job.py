@@ -393,13 +393,13 @@ def _real_classes(job: CalibrationJob) -> list[RealClass | None]:
     cloud: RealCloud = read_real_cloud(job.real, job.class_field)
     if job.road is not None:
         classes = road_classes(cloud, job.road)
-        found = [classes[str(target.real_class)] for target in job.targets]
+        points = [classes[str(target.real_class)] for target in job.targets]
     else:
-        found = [
+        points = [
             class_by_label(cloud, str(target.real_class), f"--material {target.material}") for target in job.targets
         ]
     # A sensor is fitted to the first one's patches.
-    return [with_points_beside(cloud, found[0]), *found[1:]]
+    return [with_points_beside(cloud, points[0]), *points[1:]]
 
 
 def _fit_input(job: CalibrationJob, target: MaterialTarget, before: Material, real: RealClass | None) -> _FitInput:

@@ -37,29 +37,50 @@ from .pulse_lines import pulse_step
 from .strip_pairs import strip_pairs
 
 EDGE = 1.5
-"""Edge of the squares, m."""
+"""Edge of the squares, m. Chosen: pavement is a parabola, and even in brightness, over so little."""
 FEWEST = 16
-"""Points of a square that is looked at."""
+"""Points of a square that is looked at. Chosen: well over the six coefficients of its parabola."""
 _FEWEST_SQUARES = 20
+"""Squares that are needed. Chosen: moments of 320 points or more."""
 _LEVELS = 12
-"""Groups of brightness between which the range noise is compared."""
+"""Groups of brightness between which the range noise is compared. Chosen: enough for a straight line through them."""
 _DECIBEL = np.log(10.0) / 10.0
+"""Natural logarithm of the power's factor in one dB, by which small deviations in dB become relative ones."""
+_NORMAL_IQR = 1.349
+"""Interquartile range of a normal distribution over its standard deviation: 2 x 0.6745."""
 _COEFFICIENTS = 6
+"""Of a parabola over x and y: 1, x, y, x^2, x y, y^2."""
 _FULL = 65_535.0
+"""Largest number of LAS intensities, which have 16 bits."""
 _MOST_BITS = 16
+"""Bits of LAS intensities."""
 _RANGE_FACTOR = 1.5
+"""Factor that the 95th percentile of the ranges must be over the 5th for their exponent. Chosen: 3.5 dB for 1 / r^2."""
 _PAUSE = 5.0
-"""Strips are parted by so many seconds without a point of the pavement."""
+"""Strips are parted by so many seconds without a point of the pavement. Chosen: a turn takes longer."""
 _FEWEST_OF_STRIP = 6
+"""Points of a strip in a square whose mean is compared with another strip's. Chosen: speckle averages out in them."""
 _MOST_STRIPS = 100_000
+"""Strips that have numbers. Chosen: two of them make one integer."""
 _LEAST_COSINE = 0.02
+"""Least cosine of an incidence angle. Chosen: 89 degrees, beyond which no pavement is seen."""
 _RING_DEG = 0.1
-"""Rings of a head are told apart by this much of their elevation."""
+"""Rings of a head are told apart by this much of their elevation, deg. Chosen: those of most heads are farther
+apart."""
 _FEWEST_OF_RING, _FEWEST_RINGS = 30, 6
-_OUTLIER, _LARGEST_DELAY = 4.0, 0.9
-"""Residuals beyond so many interquartile ranges are of kerbs and cars, not of the sensor; largest share of a delay."""
+"""Points of a ring, and rings, that are needed. Chosen: for a median of each, and for second differences of these."""
+_OUTLIER = 4.0
+"""Residuals beyond so many interquartile ranges are of kerbs and cars. Chosen: 5.4 standard deviations of a
+sensor's."""
+_LARGEST_DELAY = 0.9
+"""Largest share of the range's deviation that is a delay. Chosen: some of every range noise is symmetric."""
 _SPEED_OF_PULSES = 2.0
-"""Consecutive pulses lie nearer to each other than so many times their usual distance."""
+"""Times of consecutive pulses differ by less than so many times the usual interval. Chosen: one missing is twice."""
+_STEP_QUANTILE = 0.05
+"""Quantile of the steps between stored numbers that is one step. Chosen: where some values don't occur steps are
+longer."""
+_INTERVAL_QUANTILE = 0.1
+"""Quantile of the intervals between times that is one pulse's. Chosen: gaps make others longer."""
 
 
 @dataclass(frozen=True)
@@ -150,46 +171,78 @@ def estimate_sensor(
         InputError: too little pavement.
     """
     level = 10.0 * np.log10(np.maximum(linear, 1e-300))
-    time = road.time
-    strip = None if time is None else _strips(time)
+    strip = None if road.time is None else _strips(road.time)
     rows, squares = _squares_of(road.place, level, np.zeros(len(level), dtype=np.int64) if strip is None else strip)
     cosine = np.cos(np.broadcast_to(incidence, len(level)))[rows]
-    ranged = squares.height / np.maximum(cosine, _LEAST_COSINE)
-    told = strip_pairs(road.place[rows, :2], squares.owner, ranged, squares.level, EDGE) if strip is None else None
-    # What the parabola follows of a point's own deviation is lost to the covariance with its brightness.
-    shared = float(np.mean(ranged * squares.level)) / np.sqrt(1.0 - squares.fitted)
-    strips = 1 if strip is None else int(strip.max()) + 1
-    if told is not None:
-        step, speckle = told.gain_step, float(np.sqrt(told.noise)) * _DECIBEL
-        strips, shared = told.strips, told.covariance
-    else:
-        step, speckle = _gain_and_speckle(road.place[rows], squares, strip is None)
-    if strip is not None:
-        step = _gain_step(road.place, level, strip)
-    azimuth_step, gains = (None, None) if scanner is None else _rings(road.place - scanner, level)
-    steady, faint = _range_noise(ranged, squares)
-    walk = shared / max((speckle / _DECIBEL) ** 2, 1e-12)
+    range_residual = squares.height / np.maximum(cosine, _LEAST_COSINE)
+    brightness = _brightness_noise(road.place, level, rows, squares, range_residual, strip)
+    azimuth_step, laser_gain_db = (None, None) if scanner is None else _rings(road.place - scanner, level)
+    range_sigma, faint_range_sigma = _range_noise(range_residual, squares)
+    # Slope of the range over the brightness: cov(range, level) / var(level), of single echoes.
+    range_walk = brightness.covariance / max((brightness.speckle / _DECIBEL) ** 2, 1e-12)
     density = _density(road.place)
-    known = np.broadcast_to(np.asarray(distance, dtype=np.float64), len(level))
+    ranges = np.broadcast_to(np.asarray(distance, dtype=np.float64), len(level))
+    pulses = None if scanner is not None else _pulse_spacing(road.place, road.time, density, brightness.strips)
     return SensorEstimate(
         squares=squares.count,
-        range_sigma=steady,
-        faint_range_sigma=faint,
-        range_walk=max(walk, 0.0),
-        range_delay=_range_delay(ranged, squares.fitted),
-        speckle=speckle,
-        gain_step_db=step,
-        range_exponent=_range_exponent(level, known),
+        range_sigma=range_sigma,
+        faint_range_sigma=faint_range_sigma,
+        range_walk=max(range_walk, 0.0),
+        range_delay=_range_delay(range_residual, squares.fitted),
+        speckle=brightness.speckle,
+        gain_step_db=brightness.gain_step,
+        range_exponent=_range_exponent(level, ranges),
         bits=number_bits(road.intensity),
         zeros=road.zeros / max(road.zeros + len(level), 1),
         density=density,
-        strips=strips,
-        distance=float(np.median(known)) if np.isfinite(known).all() else None,
+        strips=brightness.strips,
+        distance=float(np.median(ranges)) if np.isfinite(ranges).all() else None,
         incidence=float(np.median(incidence)),
-        pulse_spacing=_pulse_spacing(road.place, time, density, strips) if scanner is None else None,
+        pulse_spacing=pulses,
         azimuth_step=azimuth_step,
-        laser_gain_db=gains,
+        laser_gain_db=laser_gain_db,
     )
+
+
+@dataclass(frozen=True)
+class _BrightnessNoise:
+    """Variation of the brightness between single echoes and between strips.
+
+    Attributes:
+        strips: that overlap, as far as known.
+        gain_step: between strips, dB.
+        speckle: relative standard deviation of the power.
+        covariance: of single echoes' range and brightness, m dB.
+    """
+
+    strips: int
+    gain_step: float
+    speckle: float
+    covariance: float
+
+
+def _brightness_noise(
+    place: Float, level: Float, rows: Index, squares: _Squares, range_residual: Float, strip: Index | None
+) -> _BrightnessNoise:
+    """Return the noise of the brightness: by strips where times tell them, else by pairs of points, else by kurtosis.
+
+    Args:
+        place: (M, 3) of all points, m.
+        level: (M,) brightness, dB.
+        rows: (N,) of these in squares.
+        squares: of these N points.
+        range_residual: (N,) m.
+        strip: (M,) of each point; None where times don't tell.
+    """
+    # What the parabola follows of a point's own deviation is lost to the covariance with its brightness.
+    covariance = float(np.mean(range_residual * squares.level)) / np.sqrt(1.0 - squares.fitted)
+    if strip is not None:
+        _, speckle = _gain_and_speckle(place[rows], squares, False)
+        return _BrightnessNoise(int(strip.max()) + 1, _gain_step(place, level, strip), speckle, covariance)
+    pairs = strip_pairs(place[rows, :2], squares.owner, range_residual, squares.level, EDGE)
+    if pairs is not None:
+        return _BrightnessNoise(pairs.strips, pairs.gain_step, float(np.sqrt(pairs.noise)) * _DECIBEL, pairs.covariance)
+    return _BrightnessNoise(1, *_gain_and_speckle(place[rows], squares, True), covariance)
 
 
 def _strips(time: Float) -> Index:
@@ -208,10 +261,10 @@ def _squares_of(place: Float, level: Float, strip: Index) -> tuple[Index, _Squar
     order = np.argsort(owner, kind="stable")
     groups = [rows for rows in np.split(order, np.cumsum(count)[:-1]) if len(rows) >= FEWEST]
     if len(groups) < _FEWEST_SQUARES:
-        found = f"{len(groups)} squares of {EDGE:g} m with {FEWEST} points of pavement"
-        allowed = f"has {found}; {_FEWEST_SQUARES} are needed"
-        raise InputError("--real", None, allowed)
+        count_text = f"{len(groups)} squares of {EDGE:g} m with {FEWEST} points of pavement"
+        raise InputError("--real", None, f"has {count_text}; {_FEWEST_SQUARES} are needed")
     height = [_about_parabola(place[rows]) for rows in groups]
+    # n / (n - 1): the mean that is taken off is of the same points.
     levels = [(level[rows] - level[rows].mean()) * np.sqrt(len(rows) / (len(rows) - 1.0)) for rows in groups]
     number = np.repeat(np.arange(len(groups)), [len(rows) for rows in groups])
     fitted = _COEFFICIENTS * len(groups) / len(number)
@@ -222,11 +275,12 @@ def _about_parabola(place: Float) -> Float:
     """Return the heights (N,) of points (N, 3) about their parabola, m, scaled to the variance of single points."""
     x, y, z = (place - place.mean(axis=0)).T
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
-    rest = z - terms @ np.linalg.lstsq(terms, z, rcond=None)[0]
-    return np.asarray(rest * np.sqrt(len(z) / (len(z) - float(_COEFFICIENTS))))
+    residual = z - terms @ np.linalg.lstsq(terms, z, rcond=None)[0]
+    # Var(residual) = sigma^2 (n - p) / n on average, of n points and p coefficients.
+    return np.asarray(residual * np.sqrt(len(z) / (len(z) - float(_COEFFICIENTS))))
 
 
-def _range_noise(ranged: Float, squares: _Squares) -> tuple[float, float]:
+def _range_noise(range_residual: Float, squares: _Squares) -> tuple[float, float]:
     """Return the standard deviations of a range: of bright echoes, and what one of the median power has besides, m.
 
     A residual's variance is that of its own point to the share 1 - h, and the mean of all to the share h that the
@@ -235,28 +289,32 @@ def _range_noise(ranged: Float, squares: _Squares) -> tuple[float, float]:
     level = squares.level
     edges = np.quantile(level, np.linspace(0.0, 1.0, _LEVELS + 1))
     group = np.clip(np.searchsorted(edges, level, side="right") - 1, 0, _LEVELS - 1)
-    power = 10.0 ** (-2.0 * level / 10.0)
-    weakness = np.bincount(group, power) / np.bincount(group)
+    # sigma^2(range) = a^2 + b^2 / P^2, with the power P over its median.
+    inverse_power2 = 10.0 ** (-2.0 * level / 10.0)
+    inverse_power2 = np.bincount(group, inverse_power2) / np.bincount(group)
     # Deviations by quartiles: single points on kerbs and cars don't count.
-    spread = [float(np.subtract(*np.quantile(ranged[group == number], (0.75, 0.25)))) for number in range(_LEVELS)]
-    variance = (np.array(spread) / 1.349) ** 2
+    quartiles = [np.quantile(range_residual[group == number], (0.75, 0.25)) for number in range(_LEVELS)]
+    iqr = [float(np.subtract(*pair)) for pair in quartiles]
+    variance = (np.array(iqr) / _NORMAL_IQR) ** 2
     # Of as many points each, a variance is known to a share of itself.
-    slope = float(np.polyfit(weakness, variance, 1, w=1.0 / np.maximum(variance, 1e-18))[0])
-    slope = min(max(slope / (1.0 - squares.fitted), 0.0), float(np.mean(variance)))
-    steady = max(float(np.mean(variance - slope * weakness)), 0.0)
-    return float(np.sqrt(steady)), float(np.sqrt(slope))
+    b2 = float(np.polyfit(inverse_power2, variance, 1, w=1.0 / np.maximum(variance, 1e-18))[0])
+    b2 = min(max(b2 / (1.0 - squares.fitted), 0.0), float(np.mean(variance)))
+    a2 = max(float(np.mean(variance - b2 * inverse_power2)), 0.0)
+    return float(np.sqrt(a2)), float(np.sqrt(b2))
 
 
-def _range_delay(ranged: Float, fitted: float) -> float:
+def _range_delay(range_residual: Float, fitted: float) -> float:
     """Return the share of the residuals' (N,) standard deviation that is an exponential delay, by their skewness.
 
     Of a point's own deviation the share ``fitted`` is lost to the parabola: of its cube three times as much as of its
     square.
     """
-    quartiles = np.quantile(ranged, (0.25, 0.75))
-    inner = ranged[np.abs(ranged) < _OUTLIER * float(np.diff(quartiles)[0])]
-    skew = float(np.mean((inner - inner.mean()) ** 3)) / max(float(inner.std()) ** 3, 1e-30) / (1.0 - fitted) ** 1.5
-    return float(np.clip(np.cbrt(-skew / 2.0), 0.0, _LARGEST_DELAY))
+    iqr = float(np.diff(np.quantile(range_residual, (0.25, 0.75)))[0])
+    inliers = range_residual[np.abs(range_residual) < _OUTLIER * iqr]
+    third_moment = float(np.mean((inliers - inliers.mean()) ** 3))
+    skewness = third_moment / max(float(inliers.std()) ** 3, 1e-30) / (1.0 - fitted) ** 1.5
+    # An exponential distribution's third moment is twice its deviation cubed; late echoes lie lower: skewness = -2 q^3.
+    return float(np.clip(np.cbrt(-skewness / 2.0), 0.0, _LARGEST_DELAY))
 
 
 def _gain_step(place: Float, level: Float, strip: Index) -> float:
@@ -264,14 +322,15 @@ def _gain_step(place: Float, level: Float, strip: Index) -> float:
     cell = np.floor(place[:, :2] / EDGE).astype(np.int64)
     rows, owner, count = np.unique(np.column_stack([cell, strip]), axis=0, return_inverse=True, return_counts=True)
     mean = np.bincount(owner.ravel(), level) / count
-    many = count >= _FEWEST_OF_STRIP
-    rows, mean = rows[many], mean[many]
-    same = np.flatnonzero((np.diff(rows[:, :2], axis=0) == 0).all(axis=1))
-    if not len(same):
+    dense = count >= _FEWEST_OF_STRIP
+    rows, mean = rows[dense], mean[dense]
+    # Rows are sorted by square, then strip: neighbours in the same square are two strips in it.
+    first = np.flatnonzero((np.diff(rows[:, :2], axis=0) == 0).all(axis=1))
+    if not len(first):
         return 0.0
-    apart = np.diff(mean)[same]
-    pairs = rows[same, 2] * _MOST_STRIPS + rows[same + 1, 2]
-    steps = [float(np.median(apart[pairs == pair])) for pair in np.unique(pairs)]
+    difference = np.diff(mean)[first]
+    pairs = rows[first, 2] * _MOST_STRIPS + rows[first + 1, 2]
+    steps = [float(np.median(difference[pairs == pair])) for pair in np.unique(pairs)]
     return float(np.sqrt(np.mean(np.square(steps))))
 
 
@@ -284,11 +343,13 @@ def _gain_and_speckle(place: Float, squares: _Squares, mixed: bool) -> tuple[flo
         mixed: whether squares hold points of several strips, for all that is known.
     """
     variance = float(np.mean(squares.level**2))
-    excess = float(np.mean(squares.level**4)) / variance**2 - 3.0
-    half = (max(-excess, 0.0) / 2.0) ** 0.25 * np.sqrt(variance) if mixed else 0.0
-    apart = _neighbour_steps(place, squares)
-    noise = max(0.5 * float(np.mean(apart**2)) - half**2, 0.0)
-    return 2.0 * float(half), float(np.sqrt(noise)) * _DECIBEL
+    excess_kurtosis = float(np.mean(squares.level**4)) / variance**2 - 3.0
+    # Two normal distributions G apart: excess kurtosis = -2 (G / 2)^4 / variance^2.
+    half_gain = (max(-excess_kurtosis, 0.0) / 2.0) ** 0.25 * np.sqrt(variance) if mixed else 0.0
+    difference = _neighbour_steps(place, squares)
+    # Half the mean square difference is the speckle's variance, and (G / 2)^2 more where neighbours are of any strip.
+    speckle_db2 = max(0.5 * float(np.mean(difference**2)) - half_gain**2, 0.0)
+    return 2.0 * float(half_gain), float(np.sqrt(speckle_db2)) * _DECIBEL
 
 
 def _neighbour_steps(place: Float, squares: _Squares) -> Float:
@@ -296,11 +357,12 @@ def _neighbour_steps(place: Float, squares: _Squares) -> Float:
     begins = np.flatnonzero(np.diff(squares.owner, prepend=-1))
     steps = []
     for first, end in zip(begins, np.append(begins[1:], len(squares.owner)), strict=True):
+        # From the first point: map coordinates squared would leave few digits to their differences.
         x, y = (place[first:end, axis] - place[first, axis] for axis in (0, 1))
-        apart = (x[:, None] - x) ** 2 + (y[:, None] - y) ** 2
-        np.fill_diagonal(apart, np.inf)
+        distance2 = (x[:, None] - x) ** 2 + (y[:, None] - y) ** 2
+        np.fill_diagonal(distance2, np.inf)
         level = squares.level[first:end]
-        steps.append(level[apart.argmin(axis=1)] - level)
+        steps.append(level[distance2.argmin(axis=1)] - level)
     return np.concatenate(steps)
 
 
@@ -311,19 +373,20 @@ def _rings(place: Float, level: Float) -> tuple[float | None, float | None]:
         place: (N, 3) from the scanner, m.
         level: (N,) brightness, dB.
     """
-    azimuth, flat = np.arctan2(place[:, 1], place[:, 0]), np.hypot(place[:, 0], place[:, 1])
-    ring = np.floor(np.rad2deg(np.arctan2(place[:, 2], flat)) / _RING_DEG).astype(np.int64)
-    steps, middles = [], []
+    azimuth, horizontal = np.arctan2(place[:, 1], place[:, 0]), np.hypot(place[:, 0], place[:, 1])
+    ring = np.floor(np.rad2deg(np.arctan2(place[:, 2], horizontal)) / _RING_DEG).astype(np.int64)
+    steps, medians = [], []
     for number in np.unique(ring):
-        mine = np.flatnonzero(ring == number)
-        if len(mine) >= _FEWEST_OF_RING:
-            steps.append(np.diff(np.sort(azimuth[mine])))
-            middles.append(float(np.median(level[mine])))
-    if len(middles) < _FEWEST_RINGS:
+        rows = np.flatnonzero(ring == number)
+        if len(rows) >= _FEWEST_OF_RING:
+            steps.append(np.diff(np.sort(azimuth[rows])))
+            medians.append(float(np.median(level[rows])))
+    if len(medians) < _FEWEST_RINGS:
         return None, None
-    # Neighbouring rings differ by their lasers; how the brightness goes with the range is taken off.
-    apart = np.diff(np.array(middles), 2) / np.sqrt(6.0)
-    return float(np.median(np.concatenate(steps))), float(np.sqrt(np.mean(apart**2)))
+    # Second differences take off how the brightness goes with the range; the variance of a - 2 b + c is six times that
+    # of one laser's gain.
+    gain = np.diff(np.array(medians), 2) / np.sqrt(6.0)
+    return float(np.median(np.concatenate(steps))), float(np.sqrt(np.mean(gain**2)))
 
 
 def _range_exponent(level: Float, distance: Float) -> float | None:
@@ -331,6 +394,7 @@ def _range_exponent(level: Float, distance: Float) -> float | None:
     low, high = np.quantile(distance, (0.05, 0.95))
     if not np.isfinite(distance).all() or high < _RANGE_FACTOR * low:
         return None
+    # level = 10 n log10(range) + constant.
     return float(np.polyfit(np.log10(distance), level, 1)[0] / 10.0)
 
 
@@ -340,7 +404,8 @@ def number_bits(stored: Float) -> int | None:
     steps = np.diff(values)
     if len(steps) < 2:
         return None
-    step = float(np.quantile(steps, 0.05))
+    step = float(np.quantile(steps, _STEP_QUANTILE))
+    # Of b bits that fill 65535 the step is 65535 / (2^b - 1).
     bits = round(float(np.log2(_FULL / max(step, 1.0) + 1.0)))
     return bits if bits < _MOST_BITS else None
 
@@ -350,15 +415,15 @@ def _density(place: Float) -> float:
     cell = np.floor(place[:, :2]).astype(np.int64)
     cells, count = np.unique(cell, axis=0, return_counts=True)
     keys = {tuple(row) for row in cells.tolist()}
-    around = ((1, 0), (-1, 0), (0, 1), (0, -1))
-    inner = [all((x + a, y + b) in keys for a, b in around) for x, y in cells.tolist()]
+    sides = ((1, 0), (-1, 0), (0, 1), (0, -1))
+    inner = [all((x + a, y + b) in keys for a, b in sides) for x, y in cells.tolist()]
     return float(count[np.array(inner)].mean()) if any(inner) else float(count.mean())
 
 
 def _pulse_spacing(place: Float, time: Float | None, density: float, strips: int) -> float | None:
     """Return the distance on the ground between consecutive pulses, m; None where neither times nor places tell."""
-    by_time = None if time is None else pulse_spacing(place, time)
-    return pulse_step(place, density, strips) if by_time is None else by_time
+    spacing = None if time is None else pulse_spacing(place, time)
+    return pulse_step(place, density, strips) if spacing is None else spacing
 
 
 def pulse_spacing(place: AnyArray, time: Float) -> float | None:
@@ -368,7 +433,7 @@ def pulse_spacing(place: AnyArray, time: Float) -> float | None:
     positive = interval[interval > 0.0]
     if len(positive) < FEWEST:
         return None
-    usual = float(np.quantile(positive, 0.1))
-    next_ = np.flatnonzero((interval > 0.0) & (interval < _SPEED_OF_PULSES * usual))
-    step = np.linalg.norm(np.diff(place[order, :2], axis=0)[next_], axis=1)
+    pulse_interval = float(np.quantile(positive, _INTERVAL_QUANTILE))
+    consecutive = np.flatnonzero((interval > 0.0) & (interval < _SPEED_OF_PULSES * pulse_interval))
+    step = np.linalg.norm(np.diff(place[order, :2], axis=0)[consecutive], axis=1)
     return float(np.median(step)) if len(step) >= FEWEST else None

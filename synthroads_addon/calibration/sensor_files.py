@@ -331,8 +331,8 @@ class _MovingSensor:
             edge, edge, self.material.model_copy(update={"spread_below": below, "spread_above": above})
         )
         setting = self._narrowed(device, scan, spacing["scan.platform"], edge)
-        found = simulate_pavement(scan, setting, pavement, self.name, seed)
-        return replace(found, intensity=found.intensity * found.distance**2) if self.range_corrected else found
+        points = simulate_pavement(scan, setting, pavement, self.name, seed)
+        return replace(points, intensity=points.intensity * points.distance**2) if self.range_corrected else points
 
     def _narrowed(self, device: Device, scan: ScanScenario, platform: Mapping[str, Any], edge: float) -> ScannerSetting:
         """Return the scanner's setting with a view of the pavement alone where its optics can have one."""

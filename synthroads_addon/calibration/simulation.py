@@ -39,8 +39,11 @@ from ..scanning.sway import with_motion
 from ..scenario.scan import ScanScenario
 
 _OVERRUN = 20.0
-"""The path goes on for so long before and behind the pavement, m: swaying scanners look there as well."""
+"""The path goes on for so long before and behind the pavement, m: swaying scanners look there as well. Chosen: some
+degrees of pitch from a UAV's height."""
 _LEAST_SLOPE = 1e-12
+"""Least downward component of a ray that meets the pavement. Chosen: keeps the division finite; such rays end beyond
+any range."""
 
 
 @dataclass

@@ -113,14 +113,14 @@ def read_compared(path: Path, row: ListedCloud) -> ComparedCloud:
         beside = road_classes(
             cloud, RoadClasses(path.parent / row.axis, row.paved, row.lines, row.line_width), f"{path.name}: "
         )
-        found = {ROAD: beside["paved"]} | ({"marking": beside["line"]} if "line" in beside else {})
+        classes = {ROAD: beside["paved"]} | ({"marking": beside["line"]} if "line" in beside else {})
     else:
-        found = {ROAD: _road(cloud, row, path.name)}
-        found |= _other_classes(cloud, row, path.name)
-        if "marking" in found:
-            found[ROAD] = _clear_of(found[ROAD], found["marking"])
-    found[ROAD] = with_points_beside(everything, found[ROAD])
-    return ComparedCloud(name_of(path, row), {name: _with_view(points, row) for name, points in found.items()})
+        classes = {ROAD: _road(cloud, row, path.name)}
+        classes |= _other_classes(cloud, row, path.name)
+        if "marking" in classes:
+            classes[ROAD] = _clear_of(classes[ROAD], classes["marking"])
+    classes[ROAD] = with_points_beside(everything, classes[ROAD])
+    return ComparedCloud(name_of(path, row), {name: _with_view(points, row) for name, points in classes.items()})
 
 
 def name_of(path: Path, row: ListedCloud) -> str:
@@ -167,17 +167,17 @@ def _road(cloud: RealCloud, row: ListedCloud, file: str) -> RealClass:
 
 def _other_classes(cloud: RealCloud, row: ListedCloud, file: str) -> dict[str, RealClass]:
     """Return the marking and vegetation points, by class, as far as the cloud has enough of them."""
-    found = {}
+    classes = {}
     for name in CLASSES[1:]:
         code = getattr(row, name)
         if code is not None:
             if not isinstance(row, UnlistedCloud):
                 _check_class(cloud, code, f"{file}: {name}")
             try:
-                found[name] = class_by_label(cloud, code, f"{file}: {name}")
+                classes[name] = class_by_label(cloud, code, f"{file}: {name}")
             except InputError:  # a cloud may well have none of them
                 continue
-    return found
+    return classes
 
 
 def _check_class(cloud: RealCloud, code: str, field: str) -> None:

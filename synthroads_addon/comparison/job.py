@@ -129,10 +129,10 @@ def compare_steps(synthetic: Path, real: Path, seed: int = 1) -> Generator[float
 
 
 def _compare_steps(synthetic: Path, real: Path, seed: int) -> Generator[float, None, CloudComparison]:
-    found = [find_clouds(path) for path in (synthetic, real)]
-    total, done = 2 * sum(map(len, found)), 0
+    clouds = [find_clouds(path) for path in (synthetic, real)]
+    total, done = 2 * sum(map(len, clouds)), 0
     described: list[list[DescribedCloud]] = [[], []]
-    for side, rows in zip(described, found, strict=True):
+    for side, rows in zip(described, clouds, strict=True):
         for path, row in rows:
             cloud = read_compared(path, row)
             side.append(DescribedCloud(cloud, make_patches(cloud.classes[ROAD], cloud.name)))

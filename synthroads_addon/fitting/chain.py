@@ -22,12 +22,19 @@ from ..base.arrays import Float, Int
 from ..road.alignment import Alignment, Element
 
 FREE, EQUAL, ZERO = 0, 1, 2
+"""Kinds of elements: clothoid or parabola, arc or constant grade, line. In this order each has one freedom less."""
 NEAR = 40.0
-"""Distance around where they should be that feet are looked for within, m."""
+"""Distance around where they should be that feet are looked for within, m. Chosen: more than the points of an axis lie
+apart."""
 
-_QUADRATURE = 2.0  # m, step of the integrals in the Jacobian; the residuals themselves are exact
-_SHARE = 0.45  # of its room that a knot may use up in one step, so that neighbours never meet
-_STIFFNESS = 0.05  # of the first spline, relative to the density of the data; it spans gaps and leaves the rest alone
+_QUADRATURE = 2.0
+"""Step of the integrals in the Jacobian, m. Chosen: the residuals themselves are exact, so that this slows the steps at
+most."""
+_SHARE = 0.45
+"""Share of its room that a knot may use up in one step. Chosen: below a half, so that neighbours never meet."""
+_STIFFNESS = 0.05
+"""Stiffness of the first spline, relative to the density of the data. Chosen: it spans gaps and leaves the rest
+alone."""
 
 
 @dataclass(frozen=True)
@@ -206,6 +213,9 @@ class Plan:
         A change of curvature at s' turns the rest of the road about the point there. The offset at s thus falls by
         t(s) . (z(s) - z(s')) for each radian; the foot's own shift has no effect.
         """
+        # As complex numbers z = x + i y, with t = exp(i heading): t . (z(s) - z(s')) is the real part of
+        # conj(t) (z(s) - z(s')). Integrated over a ramp w(s') it is Re(conj(t) z) W0 - Re(conj(t) W1), with the
+        # integrals W0 of w and W1 of w z; the offset falls by that.
         alignment = chain.alignment
         grid = quadrature_grid(chain, stations)
         origin = np.array([alignment.x, alignment.y])
@@ -288,6 +298,7 @@ def elevations(chain: Chain, stations: Float) -> Float:
     gap = np.diff(chain.knots)
     base = chain.pose[0] + np.concatenate(([0.0], np.cumsum(0.5 * gap * (chain.values[:-1] + chain.values[1:]))))
     element = np.clip(np.searchsorted(chain.knots, stations, side="right") - 1, 0, chain.size - 1)
+    # z(u) = z0 + u (g + g' u / 2) on an element whose grade begins with g and changes by g' per metre.
     u = stations - chain.knots[element]
     inside = np.clip(u, 0.0, gap[element])
     level = base[element] + inside * (chain.values[element] + 0.5 * chain.slopes[element] * inside)
@@ -345,17 +356,17 @@ def apply_step(data: AxisData, chain: Chain, step: Float) -> Chain:
     return replace(chain, pose=pose, values=values, knots=knots).tie_values()
 
 
-def least_squares(matrix: Float, wanted: Float) -> Float:
+def least_squares(matrix: Float, rhs: Float) -> Float:
     """Return the least-squares solution of ``matrix x = wanted`` (full rank), by QR: chains are ill-conditioned."""
-    return np.linalg.solve(*triangular(matrix, wanted))
+    return np.linalg.solve(*triangular(matrix, rhs))
 
 
-def triangular(matrix: Float, wanted: Float) -> tuple[Float, Float]:
+def triangular(matrix: Float, rhs: Float) -> tuple[Float, Float]:
     """Return R (P, P) and Q' b (P,) of a matrix Q R (N, P), N > P, and a right side b (N,).
 
     The right side is taken along as one more column, so that Q, the greater part of the work, is never put together.
     """
-    both = np.asarray(np.linalg.qr(np.column_stack((matrix, wanted)), mode="r"))
+    both = np.asarray(np.linalg.qr(np.column_stack((matrix, rhs)), mode="r"))
     return both[: matrix.shape[1], :-1], both[: matrix.shape[1], -1]
 
 
@@ -470,6 +481,7 @@ def _smooth_values(run: Float, values: Float, spacing: float, at: Float) -> Floa
     count = max(1, int(np.ceil(run[-1] / spacing)))
     width = run[-1] / count
     matrix = _cubic(run / width, count)
+    # Eilers and Marx 1996 (P-splines): (B'B + lambda D'D) a = B'y, here with D of third differences.
     bend = np.diff(np.eye(count + 3), 3, axis=0)
     normal = matrix.T @ matrix + _STIFFNESS * max(len(run) / count, 1e-3) * bend.T @ bend
     normal[np.diag_indices(len(normal))] += 1e-10 * len(run) / count  # two points alone determine no spline
@@ -481,6 +493,7 @@ def _cubic(place: Float, count: int) -> Float:
     """Return the values (N, count + 3) at places (N,) of the cubic B-splines over ``count`` unit intervals."""
     interval = np.clip(place.astype(np.int64), 0, count - 1)
     f = place - interval
+    # Uniform cubic B-splines: (1 - f)^3, 3 f^3 - 6 f^2 + 4, -3 f^3 + 3 f^2 + 3 f + 1 and f^3, each over 6.
     weights = np.stack(((1 - f) ** 3, 3 * f**3 - 6 * f**2 + 4, -3 * f**3 + 3 * f**2 + 3 * f + 1, f**3), axis=1) / 6
     matrix = np.zeros((len(place), count + 3))
     matrix[np.arange(len(place))[:, None], interval[:, None] + np.arange(4)] = weights
@@ -490,6 +503,8 @@ def _cubic(place: Float, count: int) -> Float:
 def _hat_integrals(station: Float, knots: Float) -> Float:
     """Return the integrals (N, K) from the first of even knots to each station of each knot's hat function."""
     width = knots[1] - knots[0]
+    # The hat 1 - |v| integrated from -1: (v + 1)^2 / 2 up to its top, 1/2 + v - v^2 / 2 behind it; of the first knot's
+    # the half before the knot isn't there.
     v = np.clip((station[:, None] - knots) / width, -1.0, 1.0)
     whole = np.where(v < 0.0, 0.5 * (v + 1.0) ** 2, 0.5 + v - 0.5 * v**2)
     whole[:, 0] -= 0.5

@@ -18,21 +18,28 @@ from .chain import EQUAL, FREE, ZERO
 from .pieces import Piece, border_between
 
 _ROOM = 0.45
-"""Share of an element's length that a knot may move in one step."""
+"""Share of an element's length that a knot may move in one step. Chosen: below a half, so that neighbours never
+meet."""
 _KINK = 2e-4
-"""Change of direction (rad) between two pieces from which a short element is put between them."""
+"""Change of direction (rad) between two pieces from which a short element is put between them. Chosen: 0.2 mm over a
+metre, what files' rounding leaves."""
 _STEPS = 25
+"""Levenberg and Marquardt's steps at most. Chosen: bounds the work; most fits end by themselves."""
 _ENOUGH = 1e-4
-"""Share of its sum of squares that a step must win for another one."""
+"""Share of its sum of squares that a step must win for another one. Chosen: less changes no coordinate that is
+written."""
 _UNDAMPED = 1e-11
+"""Least damping. Chosen: Gauss and Newton's step, and a matrix of full rank."""
 _REACH = 2
-"""Elements on either side of an edit that are fitted anew with it."""
+"""Elements on either side of an edit that are fitted anew with it. Chosen: what lies farther off hardly moves."""
 _REPAIRS = 40
+"""Edits of a repair at most. Chosen: bounds the work."""
 _SHORT = 0.02
-"""Shortest element, m."""
+"""Shortest element, m. Chosen: less than any element of a design."""
 _LIMIT = {1: 10.0, 2: 0.1}
-"""Largest grade, and curvature (1/m)."""
+"""Largest grade, and curvature (1/m). Chosen: beyond any road's; they keep steps of the fit in bounds."""
 _KINDS = {1: ZERO, 2: EQUAL, 3: FREE}
+"""Kind of element by the degree of a piece's polynomial, in plan."""
 
 
 @dataclass(frozen=True)
@@ -166,26 +173,26 @@ def match(model: Model, station: Float, values: Float, enough: float = 0.0) -> M
         enough: largest distance (m) at which it is good enough to stop.
     """
     model = _started(model, station, values)
-    found = Match(model, values - model.evaluate(station))
+    best = Match(model, values - model.evaluate(station))
     damping, matrix = 1e-6, model.jacobian(station)
     for _ in range(_STEPS):
-        if found.worst <= enough:
+        if best.worst <= enough:
             break
         scale = np.maximum(np.sqrt((matrix**2).sum(axis=0)), 1e-12)
         normal = np.vstack((matrix / scale, np.sqrt(damping) * np.eye(len(scale))))
-        step = np.linalg.lstsq(normal, np.append(found.rest, np.zeros(len(scale))), rcond=None)[0] / scale
-        model = found.model.moved(step)
+        step = np.linalg.lstsq(normal, np.append(best.rest, np.zeros(len(scale))), rcond=None)[0] / scale
+        model = best.model.moved(step)
         trial = Match(model, values - model.evaluate(station))
-        if trial.square < found.square:
-            gain = 1.0 - trial.square / found.square
-            found, damping, matrix = trial, max(0.1 * damping, _UNDAMPED), trial.model.jacobian(station)
+        if trial.square < best.square:
+            gain = 1.0 - trial.square / best.square
+            best, damping, matrix = trial, max(0.1 * damping, _UNDAMPED), trial.model.jacobian(station)
             if gain < _ENOUGH and damping <= _UNDAMPED:
                 break
         else:
             damping *= 10.0
             if damping > 1e3:
                 break
-    return found
+    return best
 
 
 def _started(model: Model, station: Float, values: Float) -> Model:
@@ -193,9 +200,9 @@ def _started(model: Model, station: Float, values: Float) -> Model:
     model = replace(model, values=np.zeros_like(model.values))
     matrix = model.jacobian(station)[:, : model.order + model.tie.shape[1]]
     scale = np.maximum(np.sqrt((matrix**2).sum(axis=0)), 1e-12)
-    found = np.linalg.lstsq(matrix / scale, values, rcond=1e-12)[0] / scale
-    ends = np.clip((model.tie @ found[model.order :]).reshape(-1, 2), -_LIMIT[model.order], _LIMIT[model.order])
-    return replace(model, start=found[: model.order], values=ends)
+    solution = np.linalg.lstsq(matrix / scale, values, rcond=1e-12)[0] / scale
+    ends = np.clip((model.tie @ solution[model.order :]).reshape(-1, 2), -_LIMIT[model.order], _LIMIT[model.order])
+    return replace(model, start=solution[: model.order], values=ends)
 
 
 def joined(pieces: Sequence[Piece], station: Float, order: int) -> Model:
@@ -232,13 +239,13 @@ def _kind(piece: Piece, order: int) -> int:
     return _KINDS[piece.degree] if order == 2 else (EQUAL if piece.degree == 1 else FREE)
 
 
-def repaired(found: Match, station: Float, values: Float, allowed: float) -> Match:
+def repaired(fit: Match, station: Float, values: Float, allowed: float) -> Match:
     """Return a match with elements freed, borders opened and elements put in where it is farther off than allowed."""
     for _ in range(_REPAIRS):
-        if found.worst <= allowed:
-            return found
-        at = float(station[int(np.abs(found.rest).argmax())])
-        model = found.model
+        if fit.worst <= allowed:
+            return fit
+        at = float(station[int(np.abs(fit.rest).argmax())])
+        model = fit.model
         element = int(np.clip(np.searchsorted(model.knots, at, "right") - 1, 0, model.size - 1))
         part = _Part.about(model, element, station, values)
         best, price = None, part.price(part.match(part.model, allowed), allowed)
@@ -247,14 +254,14 @@ def repaired(found: Match, station: Float, values: Float, allowed: float) -> Mat
             if part.price(tried, allowed) < price:
                 best, price = tried, part.price(tried, allowed)
         if best is None:
-            return found
+            return fit
         whole = _placed(part.put_back(model, best.model), station, values)
-        if whole.square >= found.square * (1.0 - 1e-3):
+        if whole.square >= fit.square * (1.0 - 1e-3):
             whole = match(whole.model, station, values, 0.1 * allowed)
-            if whole.square >= found.square * (1.0 - 1e-3):
-                return found
-        found = whole
-    return match(found.model, station, values, 0.1 * allowed)
+            if whole.square >= fit.square * (1.0 - 1e-3):
+                return fit
+        fit = whole
+    return match(fit.model, station, values, 0.1 * allowed)
 
 
 def _placed(model: Model, station: Float, values: Float) -> Match:
@@ -296,10 +303,10 @@ class _Part:
     def match(self, model: Model, allowed: float) -> Match:
         return match(model, self.station, self.values, 0.1 * allowed)
 
-    def price(self, found: Match, allowed: float) -> float:
+    def price(self, fit: Match, allowed: float) -> float:
         """Return what a match costs: least for the nearest that has few free parameters."""
-        square = max(found.square, len(found.rest) * (0.3 * allowed) ** 2)
-        return 4.0 * float(np.log(max(square, 1e-30))) + found.model.freedom()
+        square = max(fit.square, len(fit.rest) * (0.3 * allowed) ** 2)
+        return 4.0 * float(np.log(max(square, 1e-30))) + fit.model.freedom()
 
     def put_back(self, model: Model, part: Model) -> Model:
         """Return a model with the elements of this stretch replaced."""
@@ -360,24 +367,24 @@ def _split(model: Model, element: int, place: float, smooth_there: bool) -> Mode
     return replace(model, knots=knots, kinds=kinds, values=values, smooth=smooth)
 
 
-def simplified(found: Match, station: Float, values: Float, allowed: float) -> Match:
+def simplified(fit: Match, station: Float, values: Float, allowed: float) -> Match:
     """Return a match with what it can spare taken away: elements, their freedom, open borders."""
     element = 0
-    while element < found.model.size:
-        part = _Part.about(found.model, element, station, values)
+    while element < fit.model.size:
+        part = _Part.about(fit.model, element, station, values)
         # A stretch without points, between two that lie far apart, tells nothing of what would do there.
         simpler = sorted(_simpler(part.model, element - part.first), key=Model.freedom) if len(part.station) else ()
         for trial in simpler:
             tried = part.match(trial, allowed)
             if tried.worst <= allowed and tried.model.freedom() < part.model.freedom():
-                whole = _placed(part.put_back(found.model, tried.model), station, values)
+                whole = _placed(part.put_back(fit.model, tried.model), station, values)
                 if whole.worst > allowed:
                     whole = match(whole.model, station, values, 0.1 * allowed)
                 if whole.worst <= allowed:
-                    found, element = whole, max(-1, element - _REACH - 1)
+                    fit, element = whole, max(-1, element - _REACH - 1)
                     break
         element += 1
-    return found
+    return fit
 
 
 def _simpler(model: Model, element: int) -> Iterator[Model]:

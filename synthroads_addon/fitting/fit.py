@@ -29,29 +29,53 @@ from .chain import EQUAL, FREE, NEAR, ZERO, AxisData, Chain, ChainFit, Heights, 
 from .follow import followed, heights_followed
 from .search import Goal, descent, improve_fit, independent_count
 
-_WINDOW = 1200.0  # m
-_TAIL = 300.0  # m at a window's end that only steady what lies before
-_MOST_POINTS = 3000  # in a window; denser data are thinned for the search, not for the figures reported
-_HEIGHT_SHARE = 0.6  # of the tolerance that the heights' rms may use
-_END_ELEMENT = 20.0  # m: of a line or an arc at an end, to begin with
-_SPARED = 1.0  # twice the logarithm of likelihood that such an end may cost
-_EXACT = 1e-6  # m: rms up to which data lie on a chain of elements (no smooth curve comes so near with few of them),
-_ROUNDED = 3.5e-4  # m: or on one whose coordinates were rounded to 1 mm, where residuals are random
-_RANDOM = 0.5  # correlation of neighbouring residuals that still passes for random
-_GAP = 100.0  # m between points from which the chord between them is given some weight
+_WINDOW = 1200.0
+"""Length of a window, m. Chosen: the work grows with its third power."""
+_TAIL = 300.0
+"""Length at a window's end that only steadies what lies before, m. Chosen: more than an element's influence reaches."""
+_MOST_POINTS = 3000
+"""Points in a window at most. Chosen: denser data are thinned for the search, not for the figures reported."""
+_HEIGHT_SHARE = 0.6
+"""Share of the tolerance that the heights' root mean square may use. Chosen: heights are seen more exactly than they
+matter in plan."""
+_END_ELEMENT = 20.0
+"""Length of a line or an arc at an end, to begin with, m. Chosen: the fit changes it."""
+_SPARED = 1.0
+"""Twice the logarithm of likelihood that such an end may cost. Chosen: one standard deviation of one parameter."""
+_EXACT = 1e-6
+"""Root mean square up to which data lie on a chain of elements, m. Chosen: no smooth curve comes so near with few of
+them."""
+_ROUNDED = 3.5e-4
+"""The same of coordinates that were rounded to 1 mm, m, where residuals are random. Chosen: a millimetre over sqrt(12)
+is 2.9e-4."""
+_RANDOM = 0.5
+"""Correlation of neighbouring residuals that still passes for random. Chosen: what a missed element leaves is nearer to
+1."""
+_GAP = 100.0
+"""Distance of points from which on the chord between them is given some weight, m. Chosen: an element may bend there
+unseen."""
 _CHORD_WEIGHT = 1e-3
-_MARGIN = 0.98  # of the tolerance that the search aims at: it may see thinned points only
-_NEGLIGIBLE = 0.3  # of the tolerance: residuals below it are worth no element
-_FINER_HELPS = 0.8  # of the noise at most must be left by knots half as far apart: else the rest is noise
+"""Weight of a chord's points. Chosen: they hold where there is nothing else, and pull no real point."""
+_MARGIN = 0.98
+"""Share of the tolerance that the search aims at. Chosen: it may see thinned points only."""
+_NEGLIGIBLE = 0.3
+"""Share of the tolerance below which residuals are worth no element. Chosen: an eleventh of its square."""
+_FINER_HELPS = 0.8
+"""Share of the noise that knots half as far apart must leave at most to be needed. Chosen: else the rest is noise."""
 _SCATTER = (
     1.2  # times the noise is what fewer elements may leave where the tolerance asks for less: the data scatter so
 )
-_RELAXED = 1.5  # times what dense knots reach is aimed at where the tolerance cannot be had: less would fit noise
-_FLATTEST = 1e7  # m: a rounding of a larger radius bends by less than 1 mm over 100 m, and is written as a kink
+_RELAXED = 1.5
+"""Times what dense knots reach that is aimed at where the tolerance can't be had. Chosen: less would fit noise."""
+_FLATTEST = 1e7
+"""Largest radius of a rounding, m. Chosen: a larger one bends by less than 1 mm over 100 m, and is written as a
+kink."""
 REFUSED_BEYOND = 40.0
 """Times the tolerance that a point may be away from the road fitted to an axis: 2 m of the usual 5 cm. Real axes stay
 below 6, a corner of 90 degrees just passes; beyond that it is another line than the one that was measured."""
-_PLAY = 1e-5  # of a radius: roundings that touch must not overlap once stations and elevations are rounded
+_PLAY = 1e-5
+"""Share of a radius that is left out. Chosen: roundings that touch must not overlap once stations and elevations are
+rounded."""
 
 
 @dataclass(frozen=True)
@@ -198,10 +222,10 @@ def axis_of_points(
 def _tell_misfit(name: str, fit: AxisFit) -> None:
     """Warn where the road fitted to an axis is farther off its points than the fit aimed at (root mean square)."""
     rows = (("across", fit.horizontal, fit.tolerance), ("in height", fit.height, _HEIGHT_SHARE * fit.tolerance))
-    for way, found, aim in rows:
-        if found.rms > aim:
+    for way, deviations, aim in rows:
+        if deviations.rms > aim:
             text = "%s: the fitted road is off its points by %.1f cm %s (rms), which is to be %g cm at most: worst"
-            sizes = (100.0 * found.rms, way, 100.0 * aim, 100.0 * found.worst, found.worst_station)
+            sizes = (100.0 * deviations.rms, way, 100.0 * aim, 100.0 * deviations.worst, deviations.worst_station)
             warn(f"{text} %.1f cm at station %.0f m", name, *sizes)
 
 
@@ -289,8 +313,8 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05, design_ends: bool = Fal
     origin = np.append(np.round(given[:, :2].mean(axis=0)), 0.0)
     local, weights = _bridge_gaps(given - origin)
     real = weights == 1.0
-    found = _follow_plan(local, real, tolerance) if follow else None
-    alignment, near = found or _fit_plan(local[:, :2], weights, _MARGIN * tolerance, design_ends)
+    design = _follow_plan(local, real, tolerance) if follow else None
+    alignment, near = design or _fit_plan(local[:, :2], weights, _MARGIN * tolerance, design_ends)
     reach = max(NEAR, 5.0 * float(np.median(np.diff(near))))
     station, offset = alignment.project_near(local[:, :2], near, reach)
     across = np.hypot(*(local[:, :2] - alignment.position(station)).T)
@@ -319,18 +343,18 @@ def _follow_plan(local: Float, real: NDArray[Any], tolerance: float) -> tuple[Al
     """
     points = local[real, :2]
     try:
-        found = followed(points, tolerance)
+        design = followed(points, tolerance)
     except (InputError, np.linalg.LinAlgError):  # lines that turn on the spot
         return None
-    if found is None:
+    if design is None:
         return None
     run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(local[:, :2], axis=0).T))])
-    if found.rank(points, tolerance)[0]:
+    if design.rank(points, tolerance)[0]:
         usual, near = _fit_plan(points, np.ones(len(points)), _MARGIN * tolerance, False)
         # Fewer elements are likelier than many where sparse points tell neither.
         if np.abs(usual.project_near(points, near, NEAR)[1]).max() <= 0.5 * tolerance:
             return usual, np.interp(run, run[real], near)
-    return found.alignment, np.interp(run, run[real], found.stations)
+    return design.alignment, np.interp(run, run[real], design.stations)
 
 
 def _follow_heights(station: Float, heights: Float, weights: Float, length: float, tolerance: float) -> Profile:
@@ -341,16 +365,16 @@ def _follow_heights(station: Float, heights: Float, weights: Float, length: floa
     def worst(profile: Profile) -> float:
         return float(np.abs(profile.elevation(at) - level).max())
 
-    found: Profile | None = None
+    design: Profile | None = None
     if (np.diff(at) > 0.0).all():
         try:
-            found = heights_followed(at, level, length)
+            design = heights_followed(at, level, length)
         except (InputError, np.linalg.LinAlgError):  # grades that no road has
-            found = None
-    if found is not None and worst(found) <= tolerance:
-        return found
+            design = None
+    if design is not None and worst(design) <= tolerance:
+        return design
     usual = _fit_heights(station, heights, weights, length, tolerance)
-    return usual if found is None or worst(usual) <= worst(found) else found
+    return usual if design is None or worst(usual) <= worst(design) else design
 
 
 def _check_points(points: ArrayLike) -> Float:

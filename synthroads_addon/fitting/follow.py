@@ -126,16 +126,16 @@ def elements_of(station: Float, values: Float, order: int, unsure: float = 0.0) 
     while True:
         end = min(first + width, len(station))
         here, there = station[first:end], values[first:end]
-        found = _window(here, there, order, fine).model
+        model = _window(here, there, order, fine).model
         if end == len(station):
-            parts.append(found)
+            parts.append(model)
             return _chained(parts)
-        keep = _cut_after(found, here)
+        keep = _cut_after(model, here)
         if keep == 0:
             width *= 2
             continue
-        parts.append(_first_elements(found, keep))
-        first, width = int(np.searchsorted(station, found.knots[keep])), _WINDOW
+        parts.append(_first_elements(model, keep))
+        first, width = int(np.searchsorted(station, model.knots[keep])), _WINDOW
 
 
 def _window(station: Float, values: Float, order: int, fine: float) -> Match:
@@ -151,8 +151,8 @@ def _window(station: Float, values: Float, order: int, fine: float) -> Match:
         if order == 2 or len(pieces) > _MANY * len(rough) + 2:
             pieces, tolerance = rough, coarse
     allowed = max(_PLAY * tolerance, _ALLOWED)
-    found = match(joined(pieces, station, order), station, values, 0.1 * tolerance)
-    return simplified(repaired(found, station, values, allowed), station, values, allowed)
+    fit = match(joined(pieces, station, order), station, values, 0.1 * tolerance)
+    return simplified(repaired(fit, station, values, allowed), station, values, allowed)
 
 
 def _cut_after(model: Model, station: Float) -> int:

@@ -140,7 +140,7 @@ def cut_into_pieces(station: Float, values: Float, degrees: Sequence[int], toler
 def _reach(station: Float, values: Float, degree: int, tolerance: float) -> Int:
     """Return for each point (N,) the last one up to which all lie on one polynomial within a tolerance."""
     count = len(values)
-    found = np.empty(count, np.int64)
+    ends = np.empty(count, np.int64)
     last = 0
     for first in range(count):
         last = max(last, min(first + degree, count - 1))
@@ -153,8 +153,8 @@ def _reach(station: Float, values: Float, degree: int, tolerance: float) -> Int:
                 break
             else:
                 step = max(1, step // 4)
-        found[first] = last
-    return found
+        ends[first] = last
+    return ends
 
 
 def _fits(station: Float, values: Float, degree: int, tolerance: float) -> bool:
@@ -192,7 +192,7 @@ def border_between(before: Piece, after: Piece, low: float, high: float) -> floa
     for order in range(max(before.degree, after.degree) - 1, -1, -1):
         slope = before.at(middle, order + 1) - after.at(middle, order + 1)
         if slope != 0.0:
-            found = middle - (before.at(middle, order) - after.at(middle, order)) / slope
-            if low <= found <= high:
-                return found
+            station = middle - (before.at(middle, order) - after.at(middle, order)) / slope
+            if low <= station <= high:
+                return station
     return middle

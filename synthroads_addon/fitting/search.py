@@ -32,11 +32,17 @@ from .chain import (
     refine,
 )
 
-_CORRELATED = 20.0  # m
-_TRIALS, _STEPS = 3, 12  # refinements per decision, and the steps of each
-_PARTS = 4  # an element is split at one of the inner borders of so many parts
-_WORTH = 0.05  # least gain of score
-_HOPELESS = 10.0  # times the bound at which a descent ends
+_CORRELATED = 20.0
+"""Distance of independent errors of a measured axis, m. Chosen: a car's sway and a smoothed track's."""
+_TRIALS, _STEPS = 3, 12
+"""Refinements per decision, and the steps of each. Chosen: bounds the work; predictions are mostly right in their
+order."""
+_PARTS = 4
+"""Parts at one of whose inner borders an element is split. Chosen: the knot moves to its place afterwards."""
+_WORTH = 0.05
+"""Least gain of score for which an edit is made. Chosen: far below the cost of an element, ln n."""
+_HOPELESS = 10.0
+"""Times the bound at which a descent ends. Chosen: no later edit makes that good."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +87,8 @@ class Goal:
 
     def expected_score(self, square: float, chain: Chain, points: int) -> float:
         """Return the score (BIC, least is best) of a chain with a sum of squares, m^2; elements cost extra."""
+        # Schwarz 1978: BIC = n ln(RSS / n) + k ln n, here of n independent observations, with half a parameter more for
+        # each element (chosen: of two chains as free the one with fewer elements).
         misfit = np.log(max(square, 0.0) / points + self.floor**2)
         return self.count * misfit + (chain.freedom() + 0.5 * chain.size) * np.log(self.count)
 

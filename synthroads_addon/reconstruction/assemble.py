@@ -31,9 +31,12 @@ RotationAxis = Literal["carriageway_axis", "inner_edge"]
 
 UNKNOWN_EPSG = 25832
 """Written where a cloud doesn't say its map system: a parameter set must name one (ETRS89 / UTM 32N)."""
-_CROSSFALL_TOLERANCE = 0.15  # %
+_CROSSFALL_TOLERANCE = 0.15
+"""Distance that the crossfall's polyline keeps from the measured one, %. Chosen: 5 mm over a lane."""
 _TERMINAL = 12.0
-_END = 5.0  # m: a barrier that ends so near to the road's end goes on beyond it
+"""Length over which a barrier is ramped down at its end, m. Chosen: as usual; it isn't measured."""
+_END = 5.0
+"""Distance from the road's end within which a barrier goes on beyond it, m. Chosen: a stretch."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +113,7 @@ def _systems(cloud: RoadCloud) -> dict[str, str]:
 
 def _design_class(measured: RoadMeasurements) -> str:
     """Return the design class that the radii and the nearest standard cross-section allow, the fastest first."""
+    # Curvature times the class' least radius is at most 1; 2 % are the fit's.
     bend = max(max(abs(e.curvature_start), abs(e.curvature_end)) for e in measured.fit.alignment.elements)
     fast = [name for name, limits in LIMITS.items() if bend * limits.radius <= 1.02]
     preferred = fast[0] if fast else "EKA3"

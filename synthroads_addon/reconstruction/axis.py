@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import Float
+from ..base.arrays import Bool, Float
 from ..base.errors import InputError
 from ..base.progress import Progress, silent
 from .cloud import PointKind, RoadCloud
@@ -21,11 +21,19 @@ Predictor = Callable[[RoadCloud, CloudPath], tuple[Float, Float]]
 """Returns offset and standard deviation (M,) of the axis at each point of a path; NaN where it knows none."""
 
 
-_HALF_WIDTHS = (12.0, 45.0)  # m: least and largest reach of profiles
-_MARGIN = 8.0  # m of it outside of the surface that the first path was made from
-_REGISTRATIONS, _PARALLEL = 6, 0.3  # times that a path is laid beside lines at most, and m that it may still move by
-_GRIDS = (-0.5, -0.25, 0.25)  # bins that further grids lie beside the first
-_PASSES, _STILL = 4, 0.15  # times that the axis is looked for at most, and m that it may still move by
+_HALF_WIDTHS = (12.0, 45.0)
+"""Least and largest reach of profiles, m. Chosen: a rural road with its verges, and a motorway of four lanes each
+way."""
+_MARGIN = 8.0
+"""Reach outside of the surface that the first path was made from, m. Chosen: that path may be off by as much."""
+_REGISTRATIONS, _PARALLEL = 6, 0.3
+"""Times that a path is laid beside lines at most, and distance that it may still move by, m. Chosen: bounds the work;
+lines that bend by less are followed."""
+_GRIDS = (-0.5, -0.25, 0.25)
+"""Shifts of further grids beside the first, bins. Chosen: a fraction of a bin moves points to other bins."""
+_PASSES, _STILL = 4, 0.15
+"""Times that the axis is looked for at most, and distance that it may still move by, m. Chosen: bounds the work; a
+line's width."""
 
 
 @dataclass(frozen=True)
@@ -54,24 +62,40 @@ class FoundRoad:
     """A road found in a cloud, before anything is fitted to it.
 
     Attributes:
-        path: parallel to the road.
-        profiles, layout: along the path.
+        cloud: the points that it was found in.
+        half: width beside it within which there is something to see, m.
+        layout: that profiles along a path parallel to the road show.
         axis: that all views of it agree on.
     """
 
-    path: CloudPath
-    profiles: Profiles
+    cloud: RoadCloud
+    half: float
     layout: RoadLayout
     axis: FusedAxis
 
-    def parted_line(self, line: CloudPath, stations: Float) -> Float | None:
-        """Return the offsets (K,), m, from a line of what lies midway between a parted middle line's branches.
+    @property
+    def path(self) -> CloudPath:
+        """Return the path parallel to the road."""
+        return self.layout.profiles.path
+
+    def layout_along(self, path: CloudPath, kind: RoadKind | None) -> RoadLayout:
+        """Return the layout that profiles along another path show; InputError if they show no road of that kind."""
+        profiles = make_profiles(self.cloud, path, self.half, exact=True)
+        return find_layout(profiles, find_lines(profiles), kind)
+
+    def open_along(self, path: CloudPath, stations: Float) -> Bool:
+        """Return a mask (K,) of stations, m, along a path beside which the views of the axis disagree."""
+        station, _ = path.project(self.path.place(self.axis.stations, self.axis.offsets))
+        return np.interp(stations, station, self.axis.open.astype(np.float64)) > 0.5
+
+    def parted_line(self, path: CloudPath, stations: Float) -> Float | None:
+        """Return the offsets (K,), m, from a path of what lies midway between a parted middle line's branches.
 
         NaN where the middle line isn't seen; None where it doesn't part. Along an axis that goes between the branches
         neither is easily followed, so that they are those that were followed here.
 
         Args:
-            line: near the axis.
+            path: near the axis.
             stations: (K,) along it, m.
         """
         branch = self.layout.bands[0].branch
@@ -79,10 +103,10 @@ class FoundRoad:
             return None
         (guide,) = axis_guides(self.layout)
         known = np.isfinite(guide.measured)
-        station, beside = line.project(self.path.place(guide.stations[known], guide.measured[known]))
+        station, offset = path.project(self.path.place(guide.stations[known], guide.measured[known]))
         order = np.argsort(station, kind="stable")
-        apart = np.abs(stations[:, None] - station[None]).min(axis=1)
-        return np.where(apart <= STRETCH, np.interp(stations, station[order], beside[order]), np.nan)
+        distance = np.abs(stations[:, None] - station[None]).min(axis=1)
+        return np.where(distance <= STRETCH, np.interp(stations, station[order], offset[order]), np.nan)
 
 
 def straighten_path(cloud: RoadCloud, options: Options, progress: Progress = silent) -> tuple[CloudPath, float]:
@@ -117,46 +141,42 @@ def find_axis(
     of its passes that are done at most.
     """
     progress("lines", 0.0)
-    found = _look_along(cloud, path, half, options)
+    road = _look_along(cloud, path, half, options)
     for number in range(1, _PASSES):
         progress("lines", number / _PASSES)
-        if number > 1 and float(np.abs(found.axis.offsets).max()) <= _STILL:
+        if number > 1 and float(np.abs(road.axis.offsets).max()) <= _STILL:
             break
-        beside = np.interp(found.path.stations, found.axis.stations, found.axis.offsets)
-        found = _look_along(cloud, found.path.shift_by(beside), half, options)
-    layout = with_branch(found.layout, found.profiles)
-    learned = _learned_view(cloud, found.profiles, options)
-    first = find_fused_axis(found.profiles, layout, learned)
-    others = [_axis_in_grid(cloud, found, half, learned, share * ACROSS) for share in _GRIDS]
-    return replace(found, layout=layout, axis=mean_axis(first, [axis for axis in others if axis is not None]))
+        # The next path is the axis itself: lines beside it are then straight, and smoothing bends none of them.
+        offsets = np.interp(road.path.stations, road.axis.stations, road.axis.offsets)
+        road = _look_along(cloud, road.path.shift_by(offsets), half, options)
+    layout = with_branch(road.layout)
+    learned = _learned_view(cloud, layout.profiles, options)
+    first = find_fused_axis(layout, learned)
+    others = [_axis_in_grid(road, learned, share * ACROSS) for share in _GRIDS]
+    return replace(road, layout=layout, axis=mean_axis(first, [axis for axis in others if axis is not None]))
 
 
-def _axis_in_grid(
-    cloud: RoadCloud, found: FoundRoad, half: float, learned: list[View], beside: float
-) -> FusedAxis | None:
+def _axis_in_grid(road: FoundRoad, learned: list[View], shift: float) -> FusedAxis | None:
     """Return the axis as another grid of bins shows it, with offsets from the same path; None where it shows no road.
 
     Args:
-        cloud: the points.
-        found: along the path.
-        half: width beside it, m.
+        road: along the path.
         learned: views that don't come from a grid.
-        beside: m to the left of the path that the grid lies.
+        shift: m to the left of the path that the grid lies.
     """
-    profiles = make_profiles(cloud, found.path.beside(beside), half, exact=True)
     try:
-        layout = with_branch(find_layout(profiles, find_lines(profiles), found.layout.kind), profiles)
-        axis = find_fused_axis(profiles, layout, [replace(view, offsets=view.offsets - beside) for view in learned])
+        layout = with_branch(road.layout_along(road.path.beside(shift), road.layout.kind))
+        axis = find_fused_axis(layout, [replace(view, offsets=view.offsets - shift) for view in learned])
     except InputError:
         return None
-    return replace(axis, offsets=axis.offsets + beside, raw=axis.raw + beside)
+    return replace(axis, offsets=axis.offsets + shift, raw=axis.raw + shift)
 
 
 def _look_along(cloud: RoadCloud, path: CloudPath, half: float, options: Options) -> FoundRoad:
     """Return what a path shows: profiles, layout, and the axis by the views that learn nothing."""
     profiles = make_profiles(cloud, path, half, exact=True)
     layout = find_layout(profiles, find_lines(profiles), options.road)
-    return FoundRoad(path, profiles, layout, find_fused_axis(profiles, layout))
+    return FoundRoad(cloud, half, layout, find_fused_axis(layout))
 
 
 def _learned_view(cloud: RoadCloud, profiles: Profiles, options: Options) -> list[View]:

@@ -11,21 +11,38 @@ from ..base.arrays import Float, Int
 from .lines import Line
 from .profiles import ACROSS, STRETCH, Profiles
 
-_FARTHEST = 4.2  # m from one branch to the other: a turn lane with its lines
-_FIRST = 4  # bins from the line to where a branch begins
-_APART = 0.8  # m: what is nearer may be the line itself, and speaks for no branch
-_NEAR = -0.1  # gain there
-_MEAN = (3, 3)  # rows and bins whose mean is a place's paint
-_SIDE = 0.4  # m beside a line that isn't painted
-_KNOWN = 0.25  # of them that must hold points
-_PAINTED = 0.3  # of the line's own paint: more speaks for a branch, less against it
-_STEPS = 2  # bins across from one row to the next, at most: 1 in 5
-_TURNING = 0.15  # of a row's paint that a branch must bring more for each of them
-_ENTRY = 6.0  # rows' paint that a branch must bring
-_GAPS = 1.6, 2.5  # rows' paint that may be wanting on the way, where branches are less than a lane apart, and beyond
-_LANE = 2.3  # m
-_OPEN, _LONG = 1.0, 20  # m that branches come apart at least, and rows that they do
-_BACK = 8  # stretches in which a road that was wider becomes as wide as usual
+_FARTHEST = 4.2
+"""Distance from one branch to the other at most, m. Chosen: a turn lane with its lines."""
+_FIRST = 4
+"""Bins from the line to where a branch begins. Chosen: the line's own width and blur."""
+_APART = 0.8
+"""Distance from the line from which on paint speaks for a branch, m. Chosen: what is nearer may be the line itself."""
+_NEAR = -0.1
+"""Gain of a row nearer than that, in a row's paint. Chosen: a branch that stays there costs a little."""
+_MEAN = (3, 3)
+"""Rows and bins whose mean is a place's paint. Chosen: bins between points are empty."""
+_SIDE = 0.4
+"""Distance beside a line that isn't painted, m. Chosen: beyond the widest line's half."""
+_KNOWN = 0.25
+"""Share of these bins that must hold points. Chosen: of fewer the mean is chance."""
+_PAINTED = 0.3
+"""Share of the line's own paint from which on it speaks for a branch. Chosen: below any dashes, above wheel tracks."""
+_STEPS = 2
+"""Bins across from one row to the next at most. Chosen: 1 in 5, steeper than any taper."""
+_TURNING = 0.15
+"""Rows' paint that a branch must bring more for each bin across. Chosen: keeps it from zigzagging through noise."""
+_ENTRY = 6.0
+"""Rows' paint that a branch must bring in all. Chosen: a stop line or an arrow brings less."""
+_GAPS = 1.6, 2.5
+"""Rows' paint that may be wanting on the way, where branches are less than a lane apart, and beyond. Chosen: near the
+line a turn lane has no dashes yet; beyond it has gaps of some metres."""
+_LANE = 2.3
+"""Least width of a lane, m. Chosen: as in `layout`."""
+_OPEN, _LONG = 1.0, 20
+"""Distance that branches come apart at least, m, and rows that they do. Chosen: an island for a sign; what is shorter
+is no branch."""
+_BACK = 8
+"""Stretches in which a road that was wider becomes as wide as usual. Chosen: a taper of 40 m."""
 
 
 def find_branch(profiles: Profiles, line: Line) -> Float:
@@ -37,8 +54,8 @@ def find_branch(profiles: Profiles, line: Line) -> Float:
     shown = (profiles.stations >= line.start) & (profiles.stations <= line.end) & np.isfinite(place)
     beside = np.zeros(len(place))
     if shown.sum() >= _LONG:
-        found = [_branch_beside(_gains(profiles, place, sign)[shown]) for sign in (-1, 1)]
-        beside[shown] = np.where(found[0] > found[1], -found[0], found[1])
+        branches = [_branch_beside(_gains(profiles, place, sign)[shown]) for sign in (-1, 1)]
+        beside[shown] = np.where(branches[0] > branches[1], -branches[0], branches[1])
     padded = np.zeros(profiles.stretches * STRETCH)
     padded[: len(beside)] = beside
     return _with_ends(np.median(padded.reshape(-1, STRETCH), axis=1))
@@ -75,12 +92,15 @@ def _gains(profiles: Profiles, place: Float, sign: int) -> Float:
     inside = (columns >= 0) & (columns < len(profiles.offsets))
     paint = np.take_along_axis(profiles.paint, np.clip(columns, 0, len(profiles.offsets) - 1), axis=1)
     known = inside & np.isfinite(paint)
+    # Mean of the known bins: the mean of all, unknown ones being 0, over the share of known ones.
     share = ndimage.uniform_filter(known.astype(np.float64), _MEAN)
     total = ndimage.uniform_filter(np.where(known, np.clip(paint, 0.0, 1.0), 0.0).astype(np.float64), _MEAN)
     mean = np.where(share > _KNOWN, total / np.maximum(share, 1e-9), np.nan)
     above = mean[:, :-side] - mean[:, side:]  # an island may be as bright as its line, a lane isn't
-    own = above[np.isfinite(above[:, 0]), 0]
-    painted = own[own > 0.5 * np.percentile(own, 80)] if len(own) else own  # a line may be dashed
+    contrast = above[np.isfinite(above[:, 0]), 0]
+    painted = (
+        contrast[contrast > 0.5 * np.percentile(contrast, 80)] if len(contrast) else contrast
+    )  # a line may be dashed
     level = float(np.median(painted)) if len(painted) else 0.0
     if level <= 0.0:
         return np.full(above.shape, -1.0)

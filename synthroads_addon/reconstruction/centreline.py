@@ -21,9 +21,13 @@ from .views.intervals import half_width
 
 INTERVALS = {"interval_68": (0.68, 1.0), "interval_95": (0.95, 1.96)}
 """Intervals' probabilities, and the standard deviations that hold these of a normal distribution."""
-_AT_AXIS = 0.5  # m to either side whose ground gives the height
-_WAVELENGTH = 20.0  # m: shorter waves of the ground's height are smoothed away
+_AT_AXIS = 0.5
+"""Distance to either side of the axis whose ground gives the height, m. Chosen: as wide as rows of points lie apart."""
+_WAVELENGTH = 20.0
+"""Wavelength of which half of the ground's height is kept, m. Chosen: shorter waves are noise; vertical curves are
+longer."""
 _DIGITS = 4
+"""Digits of lengths in files. Chosen: a tenth of a millimetre."""
 
 
 @dataclass(frozen=True)
@@ -69,13 +73,14 @@ def find_centreline(cloud: RoadCloud, options: Options | None = None, progress: 
     layout = find_layout(profiles, find_lines(profiles), options.road)
     cores = [0.5 * (band.low + band.high) for band in layout.bands] if layout.kind == "dual" else [0.0]
     beside, _ = line.project(road.path.place(road.axis.stations, road.axis.offsets))
-    rivals = np.interp(profiles.middles, beside, road.axis.open.astype(np.float64)) > 0.5
+    rivals = road.open_along(line, profiles.middles)
+    # Two independent errors: of the axis, and of where people say that an axis lies.
     std = np.hypot(DEFINITION, np.interp(line.stations, beside, road.axis.std))
     halves = {
         name: np.interp(line.stations, beside, half_width(road.axis, share, factor, DEFINITION))
         for name, (share, factor) in INTERVALS.items()
     }
-    judgement = judge(profiles, layout, cores, rivals, road.parted_line(line, profiles.middles))
+    judgement = judge(layout, cores, rivals, road.parted_line(line, profiles.middles))
     return Centreline(layout.kind, line, _heights(profiles), std, halves, road.axis, judgement, layout.notes)
 
 
@@ -103,20 +108,20 @@ def _heights(profiles: Profiles) -> Float:
     return np.interp(profiles.path.stations, profiles.stations, held)
 
 
-def centreline_geojson(found: Centreline, cloud: RoadCloud, name: str) -> dict[str, Any]:
+def centreline_geojson(centreline: Centreline, cloud: RoadCloud, name: str) -> dict[str, Any]:
     """Return a centreline as a GeoJSON FeatureCollection in map coordinates, m.
 
     Its feature has, per vertex, the station along it, the standard deviation across it and the half-widths of the
     intervals that cover 68 % and 95 %, and the stretches where it isn't to be trusted.
     """
-    height = np.where(np.isfinite(found.height), found.height, 0.0)
-    points = np.column_stack([found.path.points, height]) + cloud.origin
+    height = np.where(np.isfinite(centreline.height), centreline.height, 0.0)
+    points = np.column_stack([centreline.path.points, height]) + cloud.origin
     properties = {
         "feature": "centerline",
-        "stations": _rounded(found.path.stations - found.path.start),
-        "std": _rounded(found.std),
-        **{name: _rounded(half) for name, half in found.half_widths.items()},
-        "doubtful": _from_start(found),
+        "stations": _rounded(centreline.path.stations - centreline.path.start),
+        "std": _rounded(centreline.std),
+        **{name: _rounded(half) for name, half in centreline.half_widths.items()},
+        "doubtful": _from_start(centreline),
     }
     geometry = {"type": "LineString", "coordinates": np.round(points, _DIGITS).tolist()}
     collection: dict[str, Any] = {"type": "FeatureCollection", "name": name}
@@ -125,28 +130,28 @@ def centreline_geojson(found: Centreline, cloud: RoadCloud, name: str) -> dict[s
     return collection | {"features": [{"type": "Feature", "properties": properties, "geometry": geometry}]}
 
 
-def centreline_report(found: Centreline, cloud: RoadCloud) -> dict[str, Any]:
+def centreline_report(centreline: Centreline, cloud: RoadCloud) -> dict[str, Any]:
     """Return what the views of a centreline say, and how far it is to be trusted, as JSON data; lengths in m."""
     views = []
-    for view in found.axis.views:
-        member = found.axis.members[view.name]
-        beside = difference_figures(view.offsets - found.axis.offsets, "mean", "rms", "largest")
+    for view in centreline.axis.views:
+        member = centreline.axis.members[view.name]
+        beside = difference_figures(view.offsets - centreline.axis.offsets, "mean", "rms", "largest")
         used = round(float(member.mean()), 4)
         views.append({"name": view.name, "seen": round(view.seen, 4), "used": used, "from_centreline": beside})
     return {
-        "road": found.kind,
-        "length": round(found.path.length, 2),
+        "road": centreline.kind,
+        "length": round(centreline.path.length, 2),
         "points": cloud.read,
         "views": views,
-        "std": {"mean": round(float(found.std.mean()), 4), "largest": round(float(found.std.max()), 4)},
-        "judgement": found.judgement.to_dict() | {"doubtful": _from_start(found)},
-        "notes": list(found.notes),
+        "std": {"mean": round(float(centreline.std.mean()), 4), "largest": round(float(centreline.std.max()), 4)},
+        "judgement": centreline.judgement.to_dict() | {"doubtful": _from_start(centreline)},
+        "notes": list(centreline.notes),
     }
 
 
-def _from_start(found: Centreline) -> list[dict[str, Any]]:
+def _from_start(centreline: Centreline) -> list[dict[str, Any]]:
     """Return the doubtful stretches as JSON data, stations counted from the line's first vertex."""
-    start, data = found.path.start, found.judgement.to_dict()["doubtful"]
+    start, data = centreline.path.start, centreline.judgement.to_dict()["doubtful"]
     return [one | {"start": round(one["start"] - start, 1), "end": round(one["end"] - start, 1)} for one in data]
 
 

@@ -22,18 +22,24 @@ from .path import CloudPath
 _Points = tuple[Float, NDArray[np.float32], NDArray[np.uint8]]
 
 FEWEST_POINTS = 2000
-"""Fewer points on the road's surface than this are no road that could be measured."""
-_LABELLED_SHARE = 0.01  # of the surface's points must be labelled pavement for the labels to be believed
-_UNSORTED_SHARE = 0.5  # of the points without any class: the cloud has to be sorted by height
+"""Fewer points on the road's surface than this are no road that could be measured. Chosen: ten on each metre of 200
+m."""
+_LABELLED_SHARE = 0.01
+"""Share of the surface's points that must be labelled pavement for the labels to be believed. Chosen: stray labels are
+less."""
+_UNSORTED_SHARE = 0.5
+"""Share of the points without any class from which on the cloud is sorted by height. Chosen: the most of them."""
 CELL = 0.5
 WINDOW = 9
 """Cells (m) whose lowest points make the ground, and the cells across which nothing that stands may fill: what is
 narrower than ``CELL * WINDOW`` falls off the ground."""
-_STEP = 0.15  # m: what rises more than this above the opened surface is no ground
+_STEP = 0.15
+"""Height above the opened surface from which on a point is no ground, m. Chosen: a kerb."""
 _MOST_CELLS = 1 << 24
 """Cells of one grid; points over more are worked on tile by tile, of which only those with points in them are made."""
 _TILE, _MARGIN = 1024, 128
-"""Cells along an edge of a tile, and around it those whose points count for its ground as well."""
+"""Cells along an edge of a tile, and around it those whose points count for its ground as well. Chosen: the margin is
+wider than the window, and than most gaps that are filled."""
 
 
 class PointKind(IntEnum):
@@ -205,14 +211,14 @@ def above_ground(xyz: Float) -> Float:
     order = np.lexsort(tile.T)
     starts = np.flatnonzero(np.r_[True, np.any(np.diff(tile[order], axis=0) != 0, axis=1)])
     groups = {(int(tile[part[0], 0]), int(tile[part[0], 1])): part for part in np.split(order, starts[1:])}
-    for (column, row), own in groups.items():
+    for (column, row), rows in groups.items():
         corner = np.array([column, row]) * CELL * _TILE
         beside = [groups.get((column + i, row + j)) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
-        around = np.concatenate([own, *(part for part in beside if part is not None)])
+        around = np.concatenate([rows, *(part for part in beside if part is not None)])
         reach = xyz[around, :2] - corner
         near = np.all((reach >= -_MARGIN * CELL) & (reach < (_TILE + _MARGIN) * CELL), axis=1)
-        near[: len(own)] = True
-        result[own] = _above_grid(xyz[around[near]])[: len(own)]
+        near[: len(rows)] = True
+        result[rows] = _above_grid(xyz[around[near]])[: len(rows)]
     return result
 
 
@@ -226,7 +232,9 @@ def _above_grid(xyz: Float) -> Float:
     empty = ~np.isfinite(lowest)
     nearest = ndimage.distance_transform_edt(empty, return_distances=False, return_indices=True)
     filled = lowest[tuple(nearest)]
+    # Opening: the largest of the smallest in a window, which nothing narrower than the window survives.
     opened = ndimage.grey_opening(filled, size=(WINDOW, WINDOW))
+    # Where little was opened away the lowest points themselves are the ground: an opening cuts off every crest.
     ground = ndimage.uniform_filter(np.where(filled - opened > _STEP, opened, filled), 3)
     place = xyz[:, :2] / CELL - low - 0.5
     under = ndimage.map_coordinates(ground, place.T, order=1, mode="nearest")

@@ -18,27 +18,31 @@ from .path import CloudPath
 from .smoothing import difference_figures
 
 BARRIER_DISTANCE, POST_DISTANCE = 0.5, 1.0
-"""Barriers and delineators within so far of each other are the same, m."""
+"""Barriers and delineators within so far of each other are the same, m. Chosen: less than the distance of two of
+them."""
 _STEP = 1.0
+"""Step along the road at which both are compared, m. Chosen: as of the profiles."""
 _LANE_THERE = 1.0
+"""Width from which on a lane is there, m. Chosen: a narrower one begins or ends."""
 _FAR = 1e3
+"""Distance of a barrier that isn't there, m. Chosen: beyond any that counts."""
 _BARRIERS = (Guardrail, ConcreteBarrier, NoiseBarrier)
 
 
-def compare(found: RoadParameters, truth: RoadParameters) -> dict[str, Any]:
+def compare(reconstructed: RoadParameters, truth: RoadParameters) -> dict[str, Any]:
     """Return the deviations, m, of a reconstructed road from the true one, as JSON data.
 
     Stations are the true ones, each metre; a place of the true road that the found one doesn't reach counts for
     ``covered`` alone. Barriers are compared metre by metre, delineators one to one.
     """
-    there, here = RoadGeometry(truth), RoadGeometry(found)
+    there, here = RoadGeometry(truth), RoadGeometry(reconstructed)
     station = np.arange(0.0, there.length, _STEP)
-    point = there.alignment.position(station) + _plan_shift(truth, found)
+    point = there.alignment.position(station) + _plan_shift(truth, reconstructed)
     at, offset = here.alignment.project(point)
     covered = (at > 0.0) & (at < here.length)
     turn = here.alignment.heading(at) - there.alignment.heading(station)
     same = bool(np.median(np.cos(turn[covered] if covered.any() else turn)) > 0.0)
-    height = here.profile.elevation(at) + found.transform.translate[2]
+    height = here.profile.elevation(at) + reconstructed.transform.translate[2]
     height = height - there.profile.elevation(station) - truth.transform.translate[2]
     sides = {side: _carriageway(there, here, side, same, station[covered], at[covered]) for side in there.sections}
     return {
@@ -46,37 +50,37 @@ def compare(found: RoadParameters, truth: RoadParameters) -> dict[str, Any]:
         "centreline": _figures(offset[covered]),
         "profile": _figures(height[covered]),
         "carriageways": sides,
-        "surface": _figures(_surface(there, here, station[covered], truth, found)),
-        "barriers": _barriers(there, here, _plan_shift(truth, found)),
-        "delineators": _posts(there, here, _plan_shift(truth, found)),
+        "surface": _figures(_surface(there, here, station[covered], truth, reconstructed)),
+        "barriers": _barriers(there, here, _plan_shift(truth, reconstructed)),
+        "delineators": _posts(there, here, _plan_shift(truth, reconstructed)),
     }
 
 
-def compare_axis(found: RoadParameters, axis: Float) -> dict[str, Any]:
+def compare_axis(reconstructed: RoadParameters, axis: Float) -> dict[str, Any]:
     """Return the lateral offsets, m, of a known line's points (N, 3), map coordinates, from a found road, as JSON.
 
     As in `compare`: signed offsets of the points that the found road reaches, and their share as ``covered``.
     Elevations are left aside: lines of road networks often have none.
     """
-    here = RoadGeometry(found)
-    at, offset = here.alignment.project(axis[:, :2] - np.array(found.transform.translate[:2]))
+    here = RoadGeometry(reconstructed)
+    at, offset = here.alignment.project(axis[:, :2] - np.array(reconstructed.transform.translate[:2]))
     covered = (at > 0.0) & (at < here.length)
     return {"covered": round(float(covered.mean()), 4), "centreline": _figures(offset[covered])}
 
 
-def compare_line(found: CloudPath, axis: Float) -> dict[str, Any]:
+def compare_line(line: CloudPath, axis: Float) -> dict[str, Any]:
     """Return the lateral offsets, m, of a known line's points (N, 2) from a found one in the same plane, as JSON data.
 
     As in `compare_axis`: signed offsets of the points that the found line reaches, and their share as ``covered``.
     """
-    at, offset = found.project(axis)
-    covered = (at > found.start) & (at < found.start + found.length)
+    at, offset = line.project(axis)
+    covered = (at > line.start) & (at < line.start + line.length)
     return {"covered": round(float(covered.mean()), 4), "centreline": _figures(offset[covered])}
 
 
-def _plan_shift(truth: RoadParameters, found: RoadParameters) -> Float:
+def _plan_shift(truth: RoadParameters, reconstructed: RoadParameters) -> Float:
     """Return the shift (2,), m, from local plan coordinates of the true set to those of the found one."""
-    return np.array(truth.transform.translate[:2]) - np.array(found.transform.translate[:2])
+    return np.array(truth.transform.translate[:2]) - np.array(reconstructed.transform.translate[:2])
 
 
 def _figures(difference: Float) -> dict[str, float]:
@@ -107,7 +111,7 @@ def _carriageway(
 
 
 def _surface(
-    there: RoadGeometry, here: RoadGeometry, station: Float, truth: RoadParameters, found: RoadParameters
+    there: RoadGeometry, here: RoadGeometry, station: Float, truth: RoadParameters, reconstructed: RoadParameters
 ) -> Float:
     """Return the height differences (N,), m, found less true surface, at places on the true pavement."""
     result = []
@@ -115,19 +119,21 @@ def _surface(
         for share in (0.1, 0.3, 0.5, 0.7, 0.9):
             bounds = side.distances(station)
             offset = float(side.carriageway.sign) * (bounds[:, 0] + share * (side.main_edge(station) - bounds[:, 0]))
-            at, beside = here.alignment.project(there.alignment.place(station, offset) + _plan_shift(truth, found))
-            high = here.elevation(at, beside) + found.transform.translate[2]
+            at, beside = here.alignment.project(
+                there.alignment.place(station, offset) + _plan_shift(truth, reconstructed)
+            )
+            high = here.elevation(at, beside) + reconstructed.transform.translate[2]
             result.append(high - there.elevation(station, offset) - truth.transform.translate[2])
     return np.concatenate(result)
 
 
-def _barriers(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str, Any]:
+def _barriers(there: RoadGeometry, here: RoadGeometry, shift: Float) -> dict[str, Any]:
     """Return as JSON data the length, recall and precision of all barriers, metre by metre, and their offsets, m."""
     true, reconstructed = (
         [item for item in road.parameters.objects.values() if isinstance(item, _BARRIERS)] for road in (there, here)
     )
-    recalled, error = _match_barriers(there, true, here, reconstructed, apart)
-    precise, _ = _match_barriers(here, reconstructed, there, true, -apart)
+    recalled, error = _match_barriers(there, true, here, reconstructed, shift)
+    precise, _ = _match_barriers(here, reconstructed, there, true, -shift)
     return {
         "true_length": round(float(len(recalled)), 1),
         "found_length": round(float(len(precise)), 1),
@@ -138,12 +144,12 @@ def _barriers(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str
 
 
 def _match_barriers(
-    one: RoadGeometry, items: list[Any], other: RoadGeometry, others: list[Any], apart: Float
+    one: RoadGeometry, items: list[Any], other: RoadGeometry, others: list[Any], shift: Float
 ) -> tuple[Bool, Float]:
     """Return for each metre of some barriers whether another one stands there, and for hits how far beside, m."""
     hit: list[Float] = []
     for item in items:
-        point = _along(one, item) + apart
+        point = _along(one, item) + shift
         station, offset = other.alignment.project(point)
         distance = np.full(len(point), _FAR)
         for rival in others:
@@ -162,14 +168,14 @@ def _along(road: RoadGeometry, item: LineObject) -> Float:
     return road.alignment.place(station, np.full(len(station), item.offset))
 
 
-def _posts(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str, Any]:
+def _posts(there: RoadGeometry, here: RoadGeometry, shift: Float) -> dict[str, Any]:
     """Return as JSON data count, recall and precision of delineators, matched one to one by least distance."""
     points = []
     for road in (there, here):
         items = [item for item in road.parameters.of_type(Delineator).values() if item.station <= road.length]
         places = np.array([(item.station, item.offset) for item in items]).reshape(-1, 2)
         points.append(road.alignment.place(*places.T))
-    true, reconstructed = points[0] + apart, points[1]
+    true, reconstructed = points[0] + shift, points[1]
     if not len(true) or not len(reconstructed):
         return {"true": len(true), "found": len(reconstructed), "recall": 0.0 if len(true) else None, "precision": None}
     distance = cdist(true, reconstructed)

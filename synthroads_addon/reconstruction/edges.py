@@ -7,17 +7,23 @@ import numpy as np
 
 from ..base.arrays import Float
 from .path import SPACING
-from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints, row_gaps
+from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
 from .smoothing import bisquare, fill_gaps, robust_scale
 
 FARTHEST = 8.0
-"""How far beyond a carriageway's lines its edge is looked for, m."""
-_MIXED = 0.8  # m to either side of an edge in which pavement and verge are weighed
-_FEWEST = 0.15  # of the bins around an edge must have points
-_CLEAR = 0.2  # m inside of the edges: the surface is measured here
+"""How far beyond a carriageway's lines its edge is looked for, m. Chosen: a hard shoulder and an emergency bay."""
+_MIXED = 0.8
+"""Distance to either side of an edge in which pavement and verge are weighed, m. Chosen: grass that grows over it."""
+_FEWEST = 0.15
+"""Share of the bins around an edge that must have points. Chosen: rows of points leave most bins empty."""
+_CLEAR = 0.2
+"""Distance inside of the edges from which on the surface is measured, m. Chosen: gutters and grass lie on the rest."""
 _ROUNDS = 5
+"""Rounds of iteratively reweighted least squares. Chosen: a line across moves no more after them."""
 _FEWEST_BINS = 20
+"""Bins that height and crossfall of a stretch are told from. Chosen: a tenth of a lane's."""
 _FEWEST_POINTS = 6
+"""Points around an edge that tell where it is. Chosen: fewer may be stray ones."""
 
 
 @dataclass(frozen=True)
@@ -26,39 +32,50 @@ class Edge:
 
     Attributes:
         offsets: (K,) m; NaN where it isn't seen.
-        apart: (K,) distance of the points that it lies midway between, m; 0 where it is found by shares.
+        spacing: (K,) distance of the points that it lies midway between, m; 0 where it is found by shares.
     """
 
     offsets: Float
-    apart: Float
+    spacing: Float
 
 
-def paved_edge(profiles: Profiles, paved: Grid, begin: Float, sign: int, farthest: float | Float = FARTHEST) -> Edge:
-    """Return in each of K stretches the offset, m, at which the pavement ends beyond a given one; NaN if unseen.
+@dataclass(frozen=True)
+class Pavement:
+    """Cross profiles and the pavement in them.
 
-    Args:
-        profiles: S rows along the path.
-        paved: (S, U) share of pavement; NaN without points.
-        begin: (K,) offsets that are paved for sure, one per stretch, m.
-        sign: +1 looks to the left, -1 to the right.
-        farthest: how far beyond ``begin`` it is looked for, m; a number, or (K,).
-
-    The edge parts pavement from what isn't so that the fewest bins are on the wrong side; around it the shares of both
-    are weighed, so that it is found more exactly than the bins.
+    Attributes:
+        profiles: S rows along a path.
+        share: (S, U) of pavement, from classes or from brightness; NaN without points.
     """
-    edges, apart = np.full(len(begin), np.nan), np.zeros(len(begin))
-    reach = np.broadcast_to(np.asarray(farthest, dtype=np.float64), begin.shape)
-    for number, place in enumerate(begin):
-        if not np.isfinite(place) or reach[number] < 2.0 * ACROSS:
-            continue
-        rows = slice(number * STRETCH, (number + 1) * STRETCH)
-        column = profiles.column(place)
-        end = profiles.column(place + sign * reach[number])
-        share = _mean(paved[rows, column : end + sign if end + sign >= 0 else None : sign])
-        edges[number] = _find_edge(share, float(profiles.offsets[column]), sign)
-        if profiles.points is not None and np.isfinite(edges[number]):
-            edges[number], apart[number] = _between_points(profiles.points, number, edges[number], sign)
-    return Edge(edges, apart if profiles.points is not None else row_gaps(profiles, edges))
+
+    profiles: Profiles
+    share: Grid
+
+    def edge(self, begin: Float, sign: int, farthest: float | Float = FARTHEST) -> Edge:
+        """Return in each of K stretches the offset, m, at which the pavement ends beyond a given one; NaN if unseen.
+
+        Args:
+            begin: (K,) offsets that are paved for sure, one per stretch, m.
+            sign: +1 looks to the left, -1 to the right.
+            farthest: how far beyond ``begin`` it is looked for, m; a number, or (K,).
+
+        The edge parts pavement from what isn't so that the fewest bins are on the wrong side; around it the shares of
+        both are weighed, so that it is found more exactly than the bins.
+        """
+        profiles = self.profiles
+        edges, gaps = np.full(len(begin), np.nan), np.zeros(len(begin))
+        reach = np.broadcast_to(np.asarray(farthest, dtype=np.float64), begin.shape)
+        for number, offset in enumerate(begin):
+            if not np.isfinite(offset) or reach[number] < 2.0 * ACROSS:
+                continue
+            rows = slice(number * STRETCH, (number + 1) * STRETCH)
+            column = profiles.column(offset)
+            end = profiles.column(offset + sign * reach[number])
+            share = _mean(self.share[rows, column : end + sign if end + sign >= 0 else None : sign])
+            edges[number] = _find_edge(share, float(profiles.offsets[column]), sign)
+            if profiles.points is not None and np.isfinite(edges[number]):
+                edges[number], gaps[number] = _between_points(profiles.points, number, edges[number], sign)
+        return Edge(edges, gaps if profiles.points is not None else profiles.row_gaps(edges))
 
 
 def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int) -> tuple[float, float]:
@@ -84,6 +101,7 @@ def _find_edge(share: Float, begin: float, sign: int) -> float:
     known = np.isfinite(share)
     if known.sum() < 4:
         return float("nan")
+    # The sum of (share - 1/2) up to an edge is largest where the fewest bins are on its wrong side.
     gain = np.append(0.0, np.cumsum(np.where(known, share - 0.5, 0.0)))
     at = int(gain.argmax())  # bins before it are paved
     reach = round(_MIXED / ACROSS)
@@ -93,6 +111,8 @@ def _find_edge(share: Float, begin: float, sign: int) -> float:
     # An edge that the cloud or the search ends at is no edge.
     if at >= len(share) - 1 or at == 0 or seen.mean() < _FEWEST or not np.isfinite(share[at : at + reach]).any():
         return float("nan")
+    # Around it the paved shares add up to the width that is paved: the edge is found to a part of a bin. Unknown bins
+    # count as what their side of the edge is.
     filled = np.where(seen, near, (np.arange(low, high) < at).astype(np.float64))
     return begin + sign * ACROSS * (low - 0.5 + float(filled.sum()))
 
@@ -126,6 +146,7 @@ def fit_surface(profiles: Profiles, low: Float, high: Float, pivot: Float) -> Su
         pivot: (K,) offsets at which the height is wanted, m.
     """
     result = np.full((2, len(pivot)), np.nan)
+    # Along the road heights differ by the grade more than across it by the crossfall: it is taken off first.
     slope = _grade(profiles)
     for number in range(len(pivot)):
         if not (np.isfinite(low[number]) and np.isfinite(high[number]) and high[number] - low[number] > 1.0):
@@ -147,6 +168,7 @@ def _grade(profiles: Profiles) -> Float:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # rows without points
         middle = np.nanmedian(profiles.height, axis=1)
+    # 31 m: short enough for vertical curves, long enough for the noise of a median over some rows.
     smoothed = np.convolve(np.pad(fill_gaps(middle), 15, mode="edge"), np.ones(31) / 31, mode="valid")
     grade = np.gradient(smoothed, SPACING)
     return grade[np.minimum(np.arange(profiles.stretches) * STRETCH + STRETCH // 2, len(grade) - 1)]

@@ -23,19 +23,28 @@ from .views.fusion import APART
 from .views.pavement import pavement_edges, remove_grade
 
 FARTHEST_MIDDLE = 0.75
-"""The middle between the pavement's edges may lie so far beside the axis, m."""
+"""The middle between the pavement's edges may lie so far beside the axis, m. Chosen: half of what a shoulder on one
+side alone adds."""
 FARTHEST_LINES = 0.5
-"""The lines that make the axis may lie so far beside it, m."""
+"""The lines that make the axis may lie so far beside it, m. Chosen: three widths of a line."""
 RAISED = 0.05
-"""Paint lies flat: lines that stand so far above the ground on either side are rails, kerbs or gutters' edges, m."""
+"""Paint lies flat: lines that stand so far above the ground on either side are rails, kerbs or gutters' edges, m.
+Chosen: half of a kerb, more than paint and range noise."""
 ROUGHEST = 0.04
-"""Pavements are seen smoother than this by any scanner that shows their edges, m."""
-_CORE = 1.5  # m to either side of a carriageway's middle that is pavement if anything is
-_ON_AND_BESIDE = ((-0.05, 0.05), (-0.6, -0.3), (0.3, 0.6))  # m from a line's middle: on it, to the right, to the left
+"""Pavements are seen smoother than this by any scanner that shows their edges, m. Chosen: grass and soil have more."""
+_CORE = 1.5
+"""Distance to either side of a carriageway's middle that is pavement if anything is, m. Chosen: a lane."""
+_ON_AND_BESIDE = ((-0.05, 0.05), (-0.6, -0.3), (0.3, 0.6))
+"""Distances from a line's middle, m: on it, to the right, to the left. Chosen: beyond the widest line, before the
+next."""
 _FEWEST_STEPS = 50
-_NEAR = 4  # stretches to either side of one whose evidence counts for it
-_SHORTEST_TRUST = 5  # stretches
-_SHORTEST = 3  # stretches: a shorter doubt is a fault in the picture
+"""Steps between bins that a roughness is told from. Chosen: its deviation is then known to a tenth."""
+_NEAR = 4
+"""Stretches to either side of one whose evidence counts for it. Chosen: 20 m, as an axis changes little in them."""
+_SHORTEST_TRUST = 5
+"""Stretches between doubts that are trusted at least. Chosen: 25 m, less of a road is of no use."""
+_SHORTEST = 3
+"""Stretches of the shortest doubt. Chosen: a shorter one is a fault in the picture."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +97,6 @@ class Judgement:
 
 
 def judge(
-    profiles: Profiles,
     layout: RoadLayout,
     cores: Sequence[float],
     rivals: Bool | None = None,
@@ -97,19 +105,18 @@ def judge(
     """Assess where an axis, offset 0 of its profiles, isn't to be trusted, and why.
 
     Args:
-        profiles: along the axis.
-        layout: that these profiles show.
+        layout: that profiles along the axis show.
         cores: offsets of the carriageways' middles, m, about which is pavement for sure.
         rivals: (K,) where views of the axis disagree; nowhere if not given.
         parted: (K,) m, the middle between both branches of the middle line, where that parts (`FoundRoad.parted_line`).
     """
-    guides = axis_guides(layout)
+    profiles, guides = layout.profiles, axis_guides(layout)
     lines = np.mean([guide.measured for guide in guides], axis=0) if parted is None else parted
     if parted is None and np.isfinite(lines).any():  # else nothing tells how far the others are from the axis
         lines = np.where(np.isfinite(lines), lines, _carried(layout))
     middles = np.mean(pavement_edges(profiles, cores, layout.kind == "dual"), axis=0)
     if profiles.paved is not None:  # where neither brightness nor height tells the edge the classes do
-        middles = np.where(np.isfinite(middles), middles, _middles_by_class(profiles, layout))
+        middles = np.where(np.isfinite(middles), middles, _middles_by_class(layout))
     what, edges = "the pavement's middle", "the pavement's edges aren't seen on both sides"
     unseen = np.isnan(middles)
     if layout.kind == "dual":
@@ -123,7 +130,7 @@ def judge(
         f"{what} lies more than {FARTHEST_MIDDLE:g} m beside it": np.abs(middles) > FARTHEST_MIDDLE,
         "the ground on its lanes is too rough for a pavement": lane_roughness(profiles, cores) > ROUGHEST,
     }
-    reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(profiles, layout) > RAISED
+    reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(layout) > RAISED
     if rivals is not None:
         reasons[f"views of it disagree by more than {APART:g} m"] = rivals
     masks = {reason: _without_short_runs(mask) for reason, mask in reasons.items()}
@@ -134,7 +141,7 @@ def judge(
     return Judgement(doubts, float(1.0 - doubtful.mean()), lines, middles)
 
 
-def _middles_by_class(profiles: Profiles, layout: RoadLayout) -> Float:
+def _middles_by_class(layout: RoadLayout) -> Float:
     """Return the middle (K,), m, of what the classes call the pavement, or of what lies between two; NaN if unseen."""
     (right, left) = (layout.bands[0], layout.bands[-1])
     if layout.kind == "dual":
@@ -169,17 +176,18 @@ def lane_roughness(profiles: Profiles, cores: Sequence[float]) -> Float:
         rows = step[max(0, (number - _NEAR) * STRETCH) : (number + _NEAR + 1) * STRETCH]
         known = rows[np.isfinite(rows)]
         if len(known) >= _FEWEST_STEPS:
+            # A difference of two heights has sqrt(2) of their deviation.
             result[number] = robust_scale(known) / np.sqrt(2.0)
     return result
 
 
-def raised_lines(profiles: Profiles, layout: RoadLayout) -> Float:
+def raised_lines(layout: RoadLayout) -> Float:
     """Return how far (K,), m, the painted lines stand above the ground to both sides of them; NaN where not seen.
 
     The middle one of all lines counts: one may lie on a seam, or beside a gutter.
     """
     painted = [line for band in layout.bands for line in band.lines if line.width > 0.0]
-    height = remove_grade(profiles.height)
+    profiles, height = layout.profiles, remove_grade(layout.profiles.height)
     result = np.full((max(len(painted), 1), profiles.stretches), np.nan)
     for row, line in enumerate(painted):
         for number in np.flatnonzero(np.isfinite(line.measured)):
@@ -195,6 +203,7 @@ def raised_lines(profiles: Profiles, layout: RoadLayout) -> Float:
 
 def _mean_height(profiles: Profiles, rows: Float, offset: float, low: float, high: float) -> float:
     """Return the median height, m, of some rows' bins between two distances (m) from an offset; NaN without any."""
+    # A median: a car beside the line doesn't raise the ground.
     bins = rows[:, profiles.column(offset + low) : profiles.column(offset + high) + 1]
     known = bins[np.isfinite(bins)]
     return float(np.median(known)) if len(known) else np.nan

@@ -11,7 +11,7 @@ from scipy.signal import find_peaks
 from ..base.arrays import Bool, Float, otsu_threshold
 from ..base.errors import InputError
 from .branches import find_branch
-from .edges import FARTHEST, paved_edge
+from .edges import FARTHEST, Pavement
 from .lines import STANDARD_DASHES, USUAL, WAVELENGTH, Line
 from .path import SPACING
 from .profiles import ACROSS, STRETCH, Grid, Profiles
@@ -19,25 +19,63 @@ from .smoothing import bisquare, fill_gaps, hidden_std, mean_with_std, robust_sc
 
 RoadKind = Literal["dual", "single"]
 
-_SEEN = 0.5  # of the road's length: what is seen on less belongs to a turnout or is a fault
+_SEEN = 0.5
+"""Share of the road's length on which a line must be seen. Chosen: what is seen on less belongs to a turnout or is a
+fault."""
 _SEEN_RURAL = 0.3
-_OTHER_EDGE, _OTHER_STRETCHES = 0.75, 5  # m that an edge lies off the usual place, and stretches, on another part
-_FEWEST_USUAL = 0.25  # of the road: a part that is less isn't the usual one
-_TOGETHER = 0.2  # of the stretches with both edges: lines that are less often seen together give way to these
-_COMMON = 0.35  # of the most common place: others so common may be the usual one
-_NARROWEST_BAND, _NARROWEST_MEDIAN, _WIDEST_MEDIAN = 3.0, 0.8, 30.0  # m
-_UNMARKED_CARRIAGEWAY = 7.0  # m: so wide a strip of pavement is a carriageway even if its lines aren't seen
-_IN_THE_MIDDLE = 0.15  # of a carriageway's width from its middle
-_NEAR_EDGE = 4.5  # m: an outermost line lies within a hard shoulder's width of the edge
-_BESIDE = 3.0  # m beyond a strip's usual edge that its edge is looked for
-_BAND_MARGIN = 0.5  # m: an edge line may lie so far outside of what passes for pavement
-_NARROWEST_LANE, _WIDEST_LANE, _USUAL_LANE = 2.3, 5.2, 3.6  # m
-_AROUND_DASHES = (0.4, 1.4)  # m beside a lane line: pavement for sure
-_LIKE = 4.0  # times the pavement's own spread of brightness, at least, that other ground is off
-_BLUR = (6.0, 1.0)  # bins along and across
-_PAINT = 9  # bins: brighter strips of up to this width are paint
-_AXIS_WAVELENGTH = 60.0  # m: shorter swings of the axis are noise
+"""The same of a rural road. Chosen: their lines have gaps, and no turnouts come between."""
+_OTHER_EDGE, _OTHER_STRETCHES = 0.75, 5
+"""Distance of an edge from the usual place, m, and stretches that it lies there, on another part of the road. Chosen: a
+fifth of a lane, for 25 m; what is less or shorter is a fault."""
+_FEWEST_USUAL = 0.25
+"""Share of the road that the usual part has at least. Chosen: a part that is less isn't the usual one."""
+_TOGETHER = 0.2
+"""Share of the stretches with both edges in which two lines must be seen together. Chosen: lines that seldom are give
+way to the edges."""
+_COMMON = 0.35
+"""Share of the most common place's count from which on another place may be the usual one. Chosen: turnouts on a short
+road may be longer than what lies between them."""
+_NARROWEST_BAND, _NARROWEST_MEDIAN, _WIDEST_MEDIAN = 3.0, 0.8, 30.0
+"""Widths of pavement and median, m. Chosen: a lane; a concrete barrier on its own; carriageways that are farther apart
+are two roads."""
+_UNMARKED_CARRIAGEWAY = 7.0
+"""Width of pavement that is a carriageway even if its lines aren't seen, m. Chosen: two lanes."""
+_IN_THE_MIDDLE = 0.15
+"""Share of a carriageway's width that its middle line lies off its middle at most. Chosen: half a metre of a rural
+road."""
+_NEAR_EDGE = 4.5
+"""Distance of an outermost line from the edge, m, at most. Chosen: a hard shoulder's width and its edge strip's."""
+_BESIDE = 3.0
+"""Distance beyond a strip's usual edge that its edge is looked for, m. Chosen: less than a lane, whose edge is another
+part's."""
+_BAND_MARGIN = 0.5
+"""Distance that an edge line may lie outside of what passes for pavement, m. Chosen: what brightness or bins may miss
+of it."""
+_NARROWEST_LANE, _WIDEST_LANE, _USUAL_LANE = 2.3, 5.2, 3.6
+"""Widths of lanes, m. Chosen: below any lane of RAA and RAL; above it but less than two; the usual one."""
+_AROUND_DASHES = (0.4, 1.4)
+"""Distances beside a lane line that are pavement for sure, m. Chosen: off the paint, within a lane's half."""
+_LIKE = 4.0
+"""Times the pavement's own spread of brightness that other ground is off at least. Chosen: Otsu's method parts any
+histogram, a pavement's as well."""
+_BLUR = (6.0, 1.0)
+"""Standard deviations of the brightness' blur, bins along and across. Chosen: some metres along the road, where
+pavement changes little, and less than a line across it."""
+_PAINT = 9
+"""Widest strip of paint, bins. Chosen: double lines fit in 0.9 m."""
+_AXIS_WAVELENGTH = 60.0
+"""Wavelength of which half of the axis' swings is kept, m. Chosen: shorter ones are noise."""
 _ROUNDS = 4
+"""Votes, each about the axis of the one before. Chosen: it moves no more after them."""
+_COVERED = 0.3
+"""Share of the road on which a bin must have points to belong to a strip. Chosen: bins between rows of points are often
+empty."""
+_CRACK = 0.3
+"""Gaps in the pavement that are closed to either side, m. Chosen: seams and bins between rows of points; a median is
+wider."""
+_LEVEL_BLUR = 10.0
+"""Standard deviation of the blur of the pavement's brightness along the road, m. Chosen: single cars and stains vanish
+in it."""
 
 
 @dataclass(frozen=True)
@@ -97,64 +135,69 @@ class Band:
 
 @dataclass(frozen=True)
 class RoadLayout:
-    """Layout of a road: its carriageways, with their lines, and the pavement in the profiles.
+    """Layout of a road in profiles: its carriageways, with their lines, and the pavement.
 
     Attributes:
         kind: dual carriageway, or a single one.
         bands: from right to left: two of a dual carriageway, one of a single one.
-        paved: (S, U) share of pavement, from classes or from brightness.
+        pavement: in the profiles.
         notes: what was left out, in words.
     """
 
     kind: RoadKind
     bands: tuple[Band, ...]
-    paved: Grid
+    pavement: Pavement
     notes: tuple[str, ...]
 
+    @property
+    def profiles(self) -> Profiles:
+        """Return the profiles that show it."""
+        return self.pavement.profiles
 
-def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None = None) -> RoadLayout:
+
+def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = None) -> RoadLayout:
     """Return the layout of carriageways and lanes that lines and pavement of the profiles show.
 
     Args:
         profiles: along a path parallel to the road.
         lines: all that were found.
-        wanted: the kind of road, where it is known.
+        kind: the kind of road, where it is known.
 
     Raises:
         InputError: no carriageway can be made out.
     """
-    paved = profiles.paved if profiles.paved is not None else paved_by_brightness(profiles, lines)
-    notes = []
-    spans = paved_bands(profiles, paved)
+    share = profiles.paved if profiles.paved is not None else paved_by_brightness(profiles, lines)
+    pavement, notes = Pavement(profiles, share), []
+    spans = paved_spans(pavement)
     # Rural roads have gaps in their lines, and no turnouts.
-    least = _SEEN_RURAL if len(spans) == 1 or wanted == "single" else _SEEN
-    parts = [_Part.of(profiles, paved, spans, number) for number in range(len(spans))]
-    bands = [_band(profiles, paved, part, part.main(lines, least)) for part in parts]
+    least = _SEEN_RURAL if len(spans) == 1 or kind == "single" else _SEEN
+    parts = [_Part.of(pavement, spans, number) for number in range(len(spans))]
+    bands = [_band(pavement, part, part.main(lines, least)) for part in parts]
     left_out = sum(all(line not in part.main(lines, least) for part in parts) for line in lines)
     if left_out:
         notes.append(f"{left_out} lines were seen on a small part of the road and left out")
     if not bands:
         raise InputError("road", None, "no carriageway can be made out in the cloud")
-    pair = None if wanted == "single" else _carriageway_pair(bands)
-    if pair is None and wanted == "dual":
+    pair = None if kind == "single" else _carriageway_pair(bands)
+    if pair is None and kind == "dual":
         raise InputError("--road", "dual", "only one carriageway can be made out in the cloud")
     chosen = pair or (max(bands, key=lambda band: (len(band.lines), band.width)),)
     if len(bands) > len(chosen):
         notes.append(f"{len(bands) - len(chosen)} other strips of pavement were left out")
-    return RoadLayout("dual" if pair else "single", chosen, paved, tuple(notes))
+    return RoadLayout("dual" if pair else "single", chosen, pavement, tuple(notes))
 
 
-def with_branch(layout: RoadLayout, profiles: Profiles) -> RoadLayout:
+def with_branch(layout: RoadLayout) -> RoadLayout:
     """Return a layout that tells where the middle line of a single carriageway parts into two.
 
     Args:
-        layout: that the profiles show.
-        profiles: along the middle line; along an axis that lies midway between two branches neither is easily followed.
+        layout: that profiles along the middle line show; along an axis that lies midway between two branches neither is
+            easily followed.
     """
     band = layout.bands[0]
     if layout.kind == "dual" or band.middle is None:
         return layout
-    return replace(layout, bands=(replace(band, branch=find_branch(profiles, band.middle)),))
+    return replace(layout, bands=(replace(band, branch=find_branch(layout.profiles, band.middle)),))
 
 
 @dataclass(frozen=True)
@@ -174,15 +217,15 @@ class _Part:
     length: float
 
     @classmethod
-    def of(cls, profiles: Profiles, paved: Grid, spans: list[tuple[float, float]], number: int) -> Self:
+    def of(cls, pavement: Pavement, spans: list[tuple[float, float]], number: int) -> Self:
         """Return the part of one of the strips: where lanes begin or end, or beside a turnout, another one begins."""
-        low, high = spans[number]
+        profiles, (low, high) = pavement.profiles, spans[number]
         begin = np.full(profiles.stretches, 0.5 * (low + high))
         usual, span = np.ones(profiles.stretches, dtype=bool), [low, high]
         for side, sign in enumerate((-1, 1)):
             next_to = number + sign
             room = abs(spans[next_to][1 - side] - span[side]) if 0 <= next_to < len(spans) else 2.0 * FARTHEST
-            edge = paved_edge(profiles, paved, begin, sign, 0.5 * (high - low) + min(FARTHEST, 0.5 * room)).offsets
+            edge = pavement.edge(begin, sign, 0.5 * (high - low) + min(FARTHEST, 0.5 * room)).offsets
             place = usual_place(sign * edge)
             if place is None:
                 continue
@@ -193,8 +236,8 @@ class _Part:
                 usual &= ~other
                 span[side] = sign * place
         if usual.sum() < _FEWEST_USUAL * len(usual):
-            return cls((low, high), np.ones(len(usual), dtype=bool), 1.0, covered_length(profiles))
-        return cls((span[0], span[1]), usual, float(usual.mean()), covered_length(profiles))
+            return cls((low, high), np.ones(len(usual), dtype=bool), 1.0, profiles.covered_length)
+        return cls((span[0], span[1]), usual, float(usual.mean()), profiles.covered_length)
 
     def main(self, lines: list[Line], least: float) -> list[Line]:
         """Return the lines that are seen along at least a share of the part."""
@@ -221,19 +264,14 @@ def usual_place(distance: Float) -> float | None:
     return float(np.median(near))
 
 
-def covered_length(profiles: Profiles) -> float:
-    """Return the length, m, of the path along which the profiles have points."""
-    return float((profiles.count.sum(axis=1) > 0).sum())
-
-
-def paved_bands(profiles: Profiles, paved: Grid) -> list[tuple[float, float]]:
+def paved_spans(pavement: Pavement) -> list[tuple[float, float]]:
     """Return the (low, high) offsets, m, of the strips that are paved along most of the road, wide ones only."""
-    known = np.isfinite(paved)
+    profiles, known = pavement.profiles, np.isfinite(pavement.share)
     rows = known.sum(axis=0)
-    share = np.where(known, paved, 0.0).sum(axis=0) / np.maximum(rows, 1)
-    on = (share > 0.5) & (rows > 0.3 * covered_length(profiles))
-    on = ndimage.binary_closing(on, iterations=round(0.3 / ACROSS))
-    columns = [part[0] for part in ndimage.find_objects(ndimage.label(on)[0])]
+    share = np.where(known, pavement.share, 0.0).sum(axis=0) / np.maximum(rows, 1)
+    strip = (share > 0.5) & (rows > _COVERED * profiles.covered_length)
+    strip = ndimage.binary_closing(strip, iterations=round(_CRACK / ACROSS))
+    columns = [part[0] for part in ndimage.find_objects(ndimage.label(strip)[0])]
     spans = [(profiles.offsets[c.start] - ACROSS / 2, profiles.offsets[c.stop - 1] + ACROSS / 2) for c in columns]
     return [(float(low), float(high)) for low, high in spans if high - low >= _NARROWEST_BAND]
 
@@ -243,37 +281,52 @@ def paved_by_brightness(profiles: Profiles, lines: list[Line]) -> Grid:
 
     Pavement is what is about as bright as the strips on both sides of the lane lines, after a blur of some metres:
     grass, soil and gravel are mostly brighter. Without a dashed line it is as bright as the smoother of two kinds of
-    ground. Otsu's threshold parts the differences from that brightness, if there
-    are two kinds of them; if not, all is pavement.
+    ground. Otsu's threshold parts the differences from that brightness, if there are two kinds of them; if not, all is
+    pavement.
     """
     brightness = _blur(profiles.brightness)
     known = np.isfinite(brightness)
-    sure = np.zeros(brightness.shape, dtype=bool)
+    everywhere = np.where(known, 1.0, np.nan).astype(np.float32)
+    if any(is_dashed(line) for line in lines):
+        reference = _bins_beside(profiles, _lane_lines(lines)) & known
+    else:
+        reference = _smoother_ground(profiles, brightness.astype(np.float64))
+    if not reference.any():
+        return everywhere
+    difference = np.abs(brightness - _level_along(brightness, reference)[:, None])
+    threshold = otsu_threshold(np.asarray(difference[known], dtype=np.float64))
+    pavement = float(np.median(difference[known & (difference <= threshold)]))
+    other_ground = float(np.median(difference[known & (difference > threshold)]))
+    # Otsu's method splits any histogram: the parts are two kinds of ground only if they lie clearly apart.
+    if other_ground - pavement < _LIKE * robust_scale(difference[reference]):
+        return everywhere
+    # Paint is brighter than the threshold, but lies on pavement: narrow gaps across are closed.
+    mask = ndimage.grey_closing(np.where(known, difference <= threshold, 0.0), size=(1, _PAINT))
+    return np.where(known, mask, np.nan).astype(np.float32)
+
+
+def _bins_beside(profiles: Profiles, lines: list[Line]) -> Bool:
+    """Return a mask (S, U) of the bins to both sides of lines, as far off as `_AROUND_DASHES` says."""
+    mask = np.zeros(profiles.brightness.shape, dtype=bool)
     rows = np.arange(len(profiles.stations))
-    for line in _lane_lines(lines):
-        place = np.interp(profiles.stations, line.stations, line.offsets, left=np.nan, right=np.nan)
+    for line in lines:
+        offset = np.interp(profiles.stations, line.stations, line.offsets, left=np.nan, right=np.nan)
         for low, high in ((-_AROUND_DASHES[1], -_AROUND_DASHES[0]), _AROUND_DASHES):
             for shift in np.arange(low, high + 1e-9, ACROSS):
-                column = np.rint((place + shift - profiles.offsets[0]) / ACROSS)
+                column = np.rint((offset + shift - profiles.offsets[0]) / ACROSS)
                 inside = np.isfinite(column) & (column >= 0) & (column < len(profiles.offsets))
-                sure[rows[inside], column[inside].astype(np.int64)] = True
-    sure &= known
-    if not any(is_dashed(line) for line in lines):
-        sure = _smoother_ground(profiles, brightness.astype(np.float64))
-    if not sure.any():
-        return np.where(known, 1.0, np.nan).astype(np.float32)
-    counts = np.maximum(sure.sum(axis=1), 1)
-    level = np.where(sure, brightness, 0.0).sum(axis=1) / counts
-    level = np.interp(rows, rows[sure.any(axis=1)], level[sure.any(axis=1)])
-    level = ndimage.gaussian_filter1d(level, 10.0, mode="nearest")
-    apart = np.abs(brightness - level[:, None])
-    spread = robust_scale(apart[sure])
-    reach = otsu_threshold(np.asarray(apart[known], dtype=np.float64))
-    below, above = float(np.median(apart[known & (apart <= reach)])), float(np.median(apart[known & (apart > reach)]))
-    if above - below < _LIKE * spread:
-        return np.where(known, 1.0, np.nan).astype(np.float32)
-    paved = ndimage.grey_closing(np.where(known, apart <= reach, 0.0), size=(1, _PAINT))  # paint lies on pavement
-    return np.where(known, paved, np.nan).astype(np.float32)
+                mask[rows[inside], column[inside].astype(np.int64)] = True
+    return mask
+
+
+def _level_along(brightness: Grid, reference: Bool) -> Float:
+    """Return the mean brightness (S,) of reference bins (S, U), smoothed along the road, and bridged where none is."""
+    count = np.maximum(reference.sum(axis=1), 1)
+    level = np.where(reference, brightness, 0.0).sum(axis=1) / count
+    known = reference.any(axis=1)
+    rows = np.arange(len(level))
+    level = np.interp(rows, rows[known], level[known])
+    return np.asarray(ndimage.gaussian_filter1d(level, _LEVEL_BLUR, mode="nearest"))
 
 
 def is_dashed(line: Line) -> bool:
@@ -317,7 +370,7 @@ def _place_in(line: Line, usual: Bool | None) -> float:
     return float(np.nanmedian(inside)) if np.isfinite(inside).any() else line.offset
 
 
-def _band(profiles: Profiles, paved: Grid, part: _Part, lines: list[Line]) -> Band:
+def _band(pavement: Pavement, part: _Part, lines: list[Line]) -> Band:
     """Return a strip of pavement with its lines; of two nearer than a lane the longer, more painted one is kept."""
     low, high = part.span
     place = {id(line): _place_in(line, part.usual) for line in lines}
@@ -332,16 +385,16 @@ def _band(profiles: Profiles, paved: Grid, part: _Part, lines: list[Line]) -> Ba
         if left - right > _WIDEST_LANE:
             count = round((left - right) / _USUAL_LANE)
             missing += [right + (left - right) * (i + 1) / count for i in range(count - 1)]
-    edges = _edge_line(profiles, paved, part.span, -1), _edge_line(profiles, paved, part.span, 1)
+    edges = _edge_line(pavement, part.span, -1), _edge_line(pavement, part.span, 1)
     return Band(low, high, kept, edges, missing, part.usual)
 
 
-def _edge_line(profiles: Profiles, paved: Grid, span: tuple[float, float], sign: int) -> Line:
+def _edge_line(pavement: Pavement, span: tuple[float, float], sign: int) -> Line:
     """Return one edge of a strip of pavement, smoothed, in the form of a line without paint."""
     low, high = span
-    stations = profiles.middles
+    stations = pavement.profiles.middles
     begin = np.full(len(stations), 0.5 * (low + high))
-    edge = paved_edge(profiles, paved, begin, sign, 0.5 * (high - low) + _BESIDE)
+    edge = pavement.edge(begin, sign, 0.5 * (high - low) + _BESIDE)
     weights = np.isfinite(edge.offsets).astype(np.float64)
     smoothed = smooth(edge.offsets, weights, STRETCH * SPACING, WAVELENGTH, usual=USUAL)
     return Line(
@@ -349,7 +402,7 @@ def _edge_line(profiles: Profiles, paved: Grid, span: tuple[float, float], sign:
         measured=edge.offsets,
         offsets=smoothed.values if weights.any() else np.full(len(stations), high if sign > 0 else low),
         std=smoothed.std,
-        apart=edge.apart,
+        spacing=edge.spacing,
         cover=np.zeros(len(stations)),
         start=float(stations[0]),
         end=float(stations[-1]),
@@ -400,14 +453,16 @@ def axis_from_lines(layout: RoadLayout) -> FoundAxis:
         InputError: no line and no edge was seen anywhere.
     """
     guides = axis_guides(layout)
-    own = [band.middle for band in layout.bands] if layout.kind == "single" and len(guides) == 1 else list(guides)
-    lines = list(guides) + [line for band in layout.bands for line in band.lines if line not in own]
+    guide_lines = (
+        [band.middle for band in layout.bands] if layout.kind == "single" and len(guides) == 1 else list(guides)
+    )
+    lines = list(guides) + [line for band in layout.bands for line in band.lines if line not in guide_lines]
     stations = lines[0].stations
-    given = np.mean([line.measured for line in guides], axis=0)
-    raw, start = given, given
+    centre = np.mean([line.measured for line in guides], axis=0)  # where the axis is by its own lines
+    raw, start = centre, centre
     if not any(np.isfinite(line.measured).any() for line in lines):
         raise InputError("road", None, "neither lines nor edges of a carriageway can be made out in the cloud")
-    if not np.isfinite(given).any():
+    if not np.isfinite(centre).any():
         measured = np.array([line.measured for line in lines])
         known = np.isfinite(measured).sum(axis=0)
         start = np.where(known > 0, np.nansum(measured, axis=0) / np.maximum(known, 1), np.nan)
@@ -415,10 +470,10 @@ def axis_from_lines(layout: RoadLayout) -> FoundAxis:
     for _ in range(_ROUNDS):
         raw = _vote_axis(lines, axis)
         # The votes fix the movement; where the axis lies, its own lines say.
-        raw = raw + _level(given - raw)
+        raw = raw + _level(centre - raw)
         axis = fill_gaps(raw)
     smoothed = smooth(raw, np.where(np.isfinite(raw), 1.0, 0.0), STRETCH * SPACING, _AXIS_WAVELENGTH, usual=USUAL)
-    level_std = mean_with_std(given - raw)[1]
+    level_std = mean_with_std(centre - raw)[1]
     level_std = float(np.hypot(level_std if np.isfinite(level_std) else 0.0, _shared_error(guides, smoothed.scatter)))
     known = np.isfinite(raw)
     held = np.interp(stations, stations[known], smoothed.values[known])  # no curve is guessed where nothing was seen
@@ -448,15 +503,16 @@ def _vote_axis(lines: list[Line], axis: Float) -> Float:
     """Return the axis offsets (K,), m, by a weighted vote of all lines, each less its mean distance from ``axis``."""
     offsets = np.array([line.measured for line in lines])
     std = np.array([line.std for line in lines])
-    apart = offsets - axis
-    middle = np.array([mean_with_std(row)[0] for row in apart])
-    spread = np.array([_robust_spread(row - value) for row, value in zip(apart, middle, strict=True)])
-    seen = np.isfinite(offsets) & np.isfinite(std)
-    weight = np.where(seen, 1.0 / (spread[:, None] ** 2 + np.where(seen, std, 1.0) ** 2 + 1e-6), 0.0)
+    distance = offsets - axis
+    mean = np.array([mean_with_std(row)[0] for row in distance])
+    scatter = np.array([_robust_spread(row - value) for row, value in zip(distance, mean, strict=True)])
+    known = np.isfinite(offsets) & np.isfinite(std)
+    # Inverse variances: of how steady a line is, and of each of its offsets; 1 mm^2 keeps them finite.
+    weight = np.where(known, 1.0 / (scatter[:, None] ** 2 + np.where(known, std, 1.0) ** 2 + 1e-6), 0.0)
     # A line whose distance changes, where a lane begins or ends, has no vote there.
-    away = np.where(seen, apart - middle[:, None], 0.0)
-    weight *= np.array([bisquare(row, max(width, USUAL)) for row, width in zip(away, spread, strict=True)])
-    votes = np.where(seen, offsets - middle[:, None], 0.0)
+    residual = np.where(known, distance - mean[:, None], 0.0)
+    weight *= np.array([bisquare(row, max(sigma, USUAL)) for row, sigma in zip(residual, scatter, strict=True)])
+    votes = np.where(known, offsets - mean[:, None], 0.0)
     total = weight.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(total > 0.0, (weight * votes).sum(axis=0) / total, np.nan)
@@ -464,7 +520,7 @@ def _vote_axis(lines: list[Line], axis: Float) -> Float:
 
 def _shared_error(guides: tuple[Line, ...], scatter: float) -> float:
     """Return the standard deviation, m, of the error that all offsets of the axis share, see `hidden_std`."""
-    return float(np.sqrt(sum(hidden_std(line.apart, scatter) ** 2 for line in guides))) / len(guides)
+    return float(np.sqrt(sum(hidden_std(line.spacing, scatter) ** 2 for line in guides))) / len(guides)
 
 
 def _robust_spread(values: Float) -> float:

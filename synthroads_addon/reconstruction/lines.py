@@ -9,31 +9,52 @@ from scipy.signal import find_peaks
 
 from ..base.arrays import Bool, Float
 from .path import SPACING
-from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints, row_gaps
+from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
 from .smoothing import hidden_std, mean_with_std, smooth
 
 WAVELENGTH = 40.0
-"""Shorter swings of a line's offset, m, are noise."""
+"""Shorter swings of a line's offset, m, are noise. Chosen: less than a lane change's length, more than a painting
+machine's sway."""
 USUAL = 0.03
-"""Standard deviation of a line's offset in one stretch that is no fault, m."""
-_WINDOW, _STEP = 40, 10  # m: mean profiles in which lines are looked for
-_HEIGHT, _PROMINENCE = 0.10, 0.07  # of a line's peak in a mean profile
-_WIDEST = 1.2  # m: broader peaks are no lines
-_LINK = 0.35  # m that a line may move from one window to the next
-_LOST = 60.0  # m that a line may not be seen
-_SAME = 0.2  # m: pieces of a line that lies hidden in between begin so near beside where the last one ended
-_NEAR = 0.35  # m to either side of a line that its paint lies within
-_FEWEST = 0.3  # of a row must be painted to count
-_AROUND = 41  # rows around one, in which there is a dash
-_FULL = 0.3  # of a line's usual width: less is no paint
-_ROW = 0.04  # m across that points of one row wobble over
-_FEWEST_POINTS = 4  # on a line in a stretch
-_SOLID = 0.65  # of its length: a line painted there is solid
+"""Standard deviation of a line's offset in one stretch that is no fault, m. Chosen: a third of a line's width."""
+_WINDOW, _STEP = 40, 10
+"""Length of the mean profiles in which lines are looked for, and distance from one to the next, m. Chosen: some dashes
+in each, and four over each place."""
+_HEIGHT, _PROMINENCE = 0.10, 0.07
+"""Height and prominence of a line's peak in a mean profile, in a solid line's paint. Chosen: dashes cover a third of a
+window or more, worn and blurred ones a tenth."""
+_WIDEST = 1.2
+"""Width of the broadest peak that is a line, m. Chosen: double lines are narrower."""
+_LINK = 0.35
+"""Distance that a line may move from one window to the next, m. Chosen: 3.5 % of the way, as in a taper."""
+_LOST = 60.0
+"""Length that a line may not be seen, m. Chosen: a bridge or a lorry in between."""
+_SAME = 0.2
+"""Distance beside the last piece's end at which a line that lay hidden goes on, m. Chosen: the distance of two rows of
+points."""
+_NEAR = 0.35
+"""Distance to either side of a line that its paint lies within, m. Chosen: an edge line's width, and what the track is
+off."""
+_FEWEST = 0.3
+"""Share of a row that must be painted to count. Chosen: below it the row is an end of a dash or a fault."""
+_AROUND = 41
+"""Rows around one, in which there is a dash. Chosen: two periods of the longest pattern."""
+_FULL = 0.3
+"""Share of a line's usual width that is full paint at least. Chosen: less is no paint."""
+_ROW = 0.04
+"""Distance across that points of one row wobble over, m. Chosen: a scanner's range noise and sway within a stretch."""
+_FEWEST_POINTS = 4
+"""Points on a line in a stretch that tell where its edges are. Chosen: fewer may be stray ones."""
+_SOLID = 0.65
+"""Share of its length on which a solid line is painted. Chosen: dashes cover half at most."""
 _Track = list[tuple[float, float]]
 STANDARD_DASHES = ((6.0, 12.0), (4.0, 8.0), (3.0, 6.0), (6.0, 6.0), (3.0, 3.0))
-"""Usual lengths of dash and gap, m (RMS)."""
-_DASH_TOLERANCE = 0.6  # m
-_LONGEST_GAP = 16  # rows: where a line isn't painted for longer it isn't seen, or isn't there
+"""Usual lengths of dash and gap, m (RMS). The order is by how common they are."""
+_DASH_TOLERANCE = 0.6
+"""Distance from a usual pattern that passes for it, m. Chosen: a bin at each end of dash and gap."""
+_LONGEST_GAP = 16
+"""Rows without paint that are no gap between dashes. Chosen: more than the 12 m of the longest pattern; the line isn't
+seen there, or isn't there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +66,7 @@ class Line:
         measured: (K,) offset of its middle in each stretch, m; NaN where no paint was seen.
         offsets: (K,) the same, smoothed, m; NaN before its begin and behind its end.
         std: (K,) standard deviation of the offsets, m.
-        apart: (K,) distance of the points that each measured offset lies midway between, m; 0 where it is a mean.
+        spacing: (K,) distance of the points that each measured offset lies midway between, m; 0 where it is a mean.
         cover: (K,) share of each stretch that is painted; NaN without points.
         start, end: stations between which it was seen, m.
         width: mean width of its paint, m.
@@ -60,7 +81,7 @@ class Line:
     measured: Float
     offsets: Float
     std: Float
-    apart: Float
+    spacing: Float
     cover: Float
     start: float
     end: float
@@ -130,7 +151,7 @@ def _joined(profiles: Profiles, tracks: list[_Track]) -> list[_Track]:
 def _in_rows(profiles: Profiles, first: float, last: float, offset: float) -> bool:
     """Return whether points lie in rows about an offset along most of the way between two stations, m."""
     between = (profiles.middles >= first) & (profiles.middles <= last)
-    gaps = row_gaps(profiles, np.where(between, offset, np.nan))
+    gaps = profiles.row_gaps(np.where(between, offset, np.nan))
     return 2 * int((gaps > 0.0).sum()) > int(between.sum())
 
 
@@ -177,6 +198,7 @@ def _expected_place(track: _Track, station: float) -> float:
     if len(track) < 3:
         return track[-1][1]
     (s0, u0), (s1, u1) = track[max(-5, -len(track))], track[-1]
+    # A track goes on straight for 20 m at most: beyond that a bend is as likely.
     slope = float(np.clip((u1 - u0) / (s1 - s0), -0.06, 0.06))
     return u1 + slope * min(station - s1, 20.0)
 
@@ -188,6 +210,7 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
     end = min(profiles.stations[-1], stations[-1] + half)
     middle, cover = _paint_by_row(profiles, stations, offsets)
     inside = _shown(profiles.stations, stations, half)
+    # The width where it is painted: a high percentile, as dashes leave most rows bare.
     usual = float(np.nanpercentile(cover[inside], 90)) if np.isfinite(cover[inside]).any() else 0.0
     if usual < 0.03:
         return None
@@ -197,13 +220,13 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
     if (weights > 0.0).sum() < 4:
         return None
     width, width_std = mean_with_std(cover[inside][np.nan_to_num(share[inside]) > 0.5])
-    apart = row_gaps(profiles, measured)
+    spacing = profiles.row_gaps(measured)
     if profiles.points is not None:
         on = np.where(inside & np.isfinite(share), share, 0.0) > 0.5
-        measured, widths, apart = _between_points(profiles, profiles.points, measured, on)
+        measured, widths, spacing = _between_points(profiles, profiles.points, measured, on)
         weights = np.where(np.isfinite(measured), weights, 0.0)
         width, width_std = mean_with_std(widths)
-        width_std = float(np.hypot(width_std, hidden_std(2.0 * apart, width_std)))  # both edges lie between rows
+        width_std = float(np.hypot(width_std, hidden_std(2.0 * spacing, width_std)))  # both edges lie between rows
     if (weights > 0.0).sum() < 4:
         return None
     smoothed = smooth(measured, weights, STRETCH * SPACING, WAVELENGTH, usual=USUAL)
@@ -215,8 +238,8 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
         stations=grid,
         measured=measured,
         offsets=np.where(within, smoothed.values, np.nan),
-        std=np.where(within, np.hypot(smoothed.std, hidden_std(apart, smoothed.scatter)), np.nan),
-        apart=apart,
+        std=np.where(within, np.hypot(smoothed.std, hidden_std(spacing, smoothed.scatter)), np.nan),
+        spacing=spacing,
         cover=_cover_by_stretch(share),
         start=start,
         end=end,
@@ -245,6 +268,7 @@ def _paint_by_row(profiles: Profiles, stations: Float, offsets: Float) -> tuple[
     The mean is found twice, the second time around the smoothed first one, so that a track's own error doesn't pull.
     """
     place = np.interp(profiles.stations, stations, offsets)
+    # Twice: the first mean is pulled by how far the track is off, the second lies about the line itself.
     middle, _ = _paint_near(profiles, place)
     local = ndimage.median_filter(np.where(np.isfinite(middle), middle, place), size=21, mode="nearest")
     return _paint_near(profiles, local)
@@ -265,6 +289,7 @@ def _paint_near(profiles: Profiles, place: Float) -> tuple[Float, Float]:
     share = known.mean(axis=1)
     cover = np.where(share > 0.3, total / np.maximum(share, 1e-9) * ACROSS, np.nan)
     with np.errstate(invalid="ignore", divide="ignore"):
+        # Centre of gravity of the paint.
         mean = (clipped * profiles.offsets[columns]).sum(axis=1) / total
     return np.where(total > 0.15, mean, np.nan), cover
 
@@ -307,7 +332,7 @@ def _between_points(profiles: Profiles, points: SurfacePoints, measured: Float, 
         on: (S,) whether there is paint in each row.
     """
     middle, width = np.full(len(measured), np.nan), np.full(len(measured), np.nan)
-    apart = np.zeros(len(measured))
+    spacing = np.zeros(len(measured))
     first = profiles.stations[0] - 0.5 * SPACING
     for number in np.flatnonzero(np.isfinite(measured)):
         near = points.near(int(number), measured[number] - _NEAR - 0.1, measured[number] + _NEAR + 0.1)
@@ -322,10 +347,10 @@ def _between_points(profiles: Profiles, points: SurfacePoints, measured: Float, 
         right, left = 0.5 * (offset[low - 1] + offset[low]), 0.5 * (offset[high - 1] + offset[high])
         middle[number], width[number] = 0.5 * (left + right), left - right
         gaps = offset[low] - offset[low - 1], offset[high] - offset[high - 1]
-        apart[number] = 0.5 * float(np.hypot(*gaps))
+        spacing[number] = 0.5 * float(np.hypot(*gaps))
         if offset[high - 1] - offset[low] < _ROW and min(gaps) < _ROW:
-            middle[number], apart[number] = _on_a_row(offset, low, high)
-    return middle, width, apart
+            middle[number], spacing[number] = _on_a_row(offset, low, high)
+    return middle, width, spacing
 
 
 def _on_a_row(offset: Float, low: int, high: int) -> tuple[float, float]:
@@ -343,6 +368,7 @@ def _on_a_row(offset: Float, low: int, high: int) -> tuple[float, float]:
 def _best_span(marked: Bool) -> tuple[int, int]:
     """Return the span (first, behind the last) of points with most marked ones inside and unmarked ones outside."""
     total = np.append(0, np.cumsum(np.where(marked, 1, -1)))
+    # The span with the largest sum of +1 and -1 (Kadane): the largest rise of the running sum from a place before it.
     lowest = np.minimum.accumulate(total)
     high = int((total - lowest).argmax())
     return int(total[: high + 1].argmin()), high
@@ -377,6 +403,7 @@ def _dashes(stations: Float, cover: Float) -> tuple[float, float, float, float]:
         return share, 0.0, 0.0, float(stations[0])
     wave = filled[known]
     periods = np.arange(4.0, 40.0, 0.05)
+    # Schuster 1898: strength of the wave at each period, |mean of x exp(-2 pi i s / T)|.
     phasor = np.exp(-2j * np.pi * stations[known][None, :] / periods[:, None])
     strength = np.abs((phasor * (wave - wave.mean())).mean(axis=1))
     best = int(strength.argmax())
@@ -384,6 +411,7 @@ def _dashes(stations: Float, cover: Float) -> tuple[float, float, float, float]:
     for standard, gap in STANDARD_DASHES:
         if abs(standard + gap - period) < 0.5 * _DASH_TOLERANCE and abs(standard - dash) < 2.0 * _DASH_TOLERANCE:
             dash, period = standard, standard + gap
+    # The phase of the wave is the place of a dash's middle: s = angle T / (2 pi).
     angle = float(np.angle((np.exp(2j * np.pi * stations[known] / period) * (wave - wave.mean())).mean()))
     first = angle / (2.0 * np.pi) * period - 0.5 * dash  # half a dash before the middle of one
     first += period * np.ceil((stations[0] - first) / period)

@@ -20,37 +20,57 @@ from ..base.arrays import Bool, Float, Index
 from ..road.things import guardrail as sizes
 from .cloud import STANDING, PointKind, RoadCloud
 from .path import SPACING, CloudPath
-from .profiles import ACROSS, STRETCH, Profiles
+from .profiles import STRETCH, Profiles
 from .section import MeasuredSection
 from .smoothing import mean_with_std
 
 BarrierKind = Literal["guardrail", "concrete", "noise"]
 
 CELL_ALONG, CELL_ACROSS = 1.0, 0.1
-"""Cells in which barriers are looked for, m."""
+"""Cells in which barriers are looked for, m. Chosen: a metre holds points of most scanners; across as of the
+profiles."""
 SHORTEST_BARRIER = 8.0
-"""Shorter linear clusters, m, are no barriers."""
-_HOLE = 8  # cells along a barrier that may be empty (hidden behind a lorry, say)
-_JOIN = 0.15  # m across that the cells of one barrier may lie apart
-_STEP = 0.25  # m: a barrier whose offset changes by more goes on as another one
-_STRETCH = 5.0  # m
+"""Shorter linear clusters, m, are no barriers. Chosen: cars are shorter."""
+_HOLE = 8
+"""Cells along a barrier that may be empty. Chosen: as hidden behind a lorry."""
+_JOIN = 0.15
+"""Distance across that the cells of one barrier may lie apart, m. Chosen: beam and post."""
+_STEP = 0.25
+"""Change of a barrier's offset from which on it goes on as another one, m. Chosen: more than single stretches
+scatter."""
+_STRETCH = 5.0
+"""Length of the stretches whose median is a barrier's offset, m. Chosen: as of the profiles."""
 _FEWEST_OF_BARRIER = 10
-_POST_APART = 0.4  # m: points nearer than this belong to one post
+"""Points of a barrier at least. Chosen: one on each metre."""
+_POST_APART = 0.4
+"""Distance of points that belong to one post at most, m. Chosen: posts have more to the next thing."""
 _FEWEST_OF_POST = 2
-_POST_WIDEST = 0.7  # m, of a post's points from side to side, position errors of strips included
+"""Points of a post at least. Chosen: single points are stray ones."""
+_POST_WIDEST = 0.7
+"""Width of a post's points from side to side at most, m. Chosen: a post, and position errors of strips."""
 _POST_HEIGHTS = {PointKind.POST: (0.1, 2.0), PointKind.FURNITURE: (0.45, 1.3)}
+"""Least and largest height of a post's highest point by class, m. Chosen: classes are believed; what has none must be
+as high as a delineator."""
 USUAL_POST = 1.0
-"""Height of a delineator, m: the highest of a few points on it lies lower."""
+"""Height of a delineator, m: the highest of a few points on it lies lower. Chosen: about a metre, as usual."""
 _BARRIER_HEIGHTS = (0.25, 1.6)
-_NOISE_FROM = 1.6  # m: higher walls are noise barriers, where the class doesn't tell
-_ALONE = 0.8  # m around a post of unknown class in which nothing else may stand
+"""Least and largest height of a guardrail of unknown class, m. Chosen: kerbs are lower, walls higher."""
+_NOISE_FROM = 1.6
+"""Height from which on a wall is a noise barrier where the class doesn't tell, m. Chosen: no guardrail is as high."""
+_ALONE = 0.8
+"""Distance around a post of unknown class in which nothing else may stand, m. Chosen: bushes and signs have
+neighbours."""
 _BEAM = sizes.POST[0] / 2.0 + 0.5 * max(point[0] for point in sizes.BEAM)
 USUAL_VERGE = 1.5
-"""Width of the verge where classes don't tell, m."""
-_FARTHEST, _FARTHEST_UNKNOWN = 12.0, 4.0  # m outside of the pavement, of what has a class and what hasn't
-_IN_THE_MIDDLE = 0.4  # m from the axis: a guardrail there has a beam on either side
-_COARSE = 5  # bins of which a median makes the ground
-_BEYOND = 4.0  # m outside of the verge, where the ground no longer is the road's
+"""Width of the verge where classes don't tell, m. As in the standard cross-sections."""
+_FARTHEST, _FARTHEST_UNKNOWN = 12.0, 4.0
+"""Distances outside of the pavement at most, m, of what has a class and what hasn't. Chosen: noise barriers stand
+within the first; beyond the second what has no class is mostly vegetation."""
+_IN_THE_MIDDLE = 0.4
+"""Distance from the axis at which a guardrail has a beam on either side, m. Chosen: half of a double guardrail's
+width."""
+_BEYOND = 4.0
+"""Distance outside of the verge from which on the ground no longer is the road's, m. Chosen: a ditch's width."""
 
 
 @dataclass(frozen=True)
@@ -134,6 +154,7 @@ def _linear_clusters(station: Float, offset: Float) -> list[Index]:
     reach = round(_JOIN / CELL_ACROSS)
     filled = np.zeros((row.max() + 2 * _HOLE + 1, column.max() + 2 * reach + 1), dtype=bool)
     filled[row + _HOLE, column + reach] = True
+    # Across first, so that the two faces of a barrier are one; along only holes are closed, as a gap is a gap.
     filled = ndimage.binary_dilation(filled, np.ones((1, 2 * reach + 1)))
     filled = ndimage.binary_closing(filled, np.ones((_HOLE, 1)))
     label, count = ndimage.label(filled, np.ones((3, 3)))
@@ -163,11 +184,13 @@ def _barrier(part: StandingPoints, kind: PointKind) -> FoundBarrier | None:
     count = len(part.station)
     if count < _FEWEST_OF_BARRIER:
         return None
+    # Of many points single ones lie beyond the end: percentiles, if a percentile is more than a point.
     start, end = np.percentile(part.station, [0.2, 99.8]) if count > 1000 else (part.station.min(), part.station.max())
     height = float(np.percentile(part.height, 95))
     if end - start < SHORTEST_BARRIER or not 0.2 < height < 12.0:
         return None
     index = np.floor((part.station - start) / _STRETCH).astype(np.int64)
+    # The upper part: the lower one is posts, grass and what is hidden behind.
     upper = part.height > 0.4 * height
     middles = np.array([np.median(part.offset[upper & (index == i)]) for i in np.unique(index[upper])])
     offset, std = mean_with_std(middles)
@@ -226,6 +249,7 @@ def _post(part: StandingPoints, kind: PointKind) -> FoundPost | None:
         return None
     if max(np.ptp(part.station), np.ptp(part.offset)) > _POST_WIDEST:
         return None
+    # Root mean square of both directions, over sqrt(n) as of a mean.
     spread = float(np.hypot(part.station.std(), part.offset.std())) / np.sqrt(2.0)
     std = float(np.hypot(spread / np.sqrt(count), 0.02))  # what is seen of a post is one side of it
     return FoundPost(float(np.median(part.station)), float(np.median(part.offset)), max(top, USUAL_POST), std, count)
@@ -236,9 +260,9 @@ def _stands_alone(tree: cKDTree, post: FoundPost, count: int) -> bool:
     return bool(around <= count)
 
 
-def standing_points(cloud: RoadCloud, path: CloudPath, profiles: Profiles, section: MeasuredSection) -> StandingPoints:
+def standing_points(cloud: RoadCloud, profiles: Profiles, section: MeasuredSection) -> StandingPoints:
     """Return the standing points within reach of the road, with heights above the surface below them."""
-    chosen = cloud.of(*STANDING)
+    chosen, path = cloud.of(*STANDING), profiles.path
     xyz, kind = cloud.xyz[chosen], cloud.kind[chosen]
     station, offset = path.project(xyz[:, :2])
     reach = max(_outer(section, 1), _outer(section, -1)) + _FARTHEST
@@ -247,24 +271,7 @@ def standing_points(cloud: RoadCloud, path: CloudPath, profiles: Profiles, secti
     outside = np.where(offset > 0.0, offset - _outer(section, 1), -offset - _outer(section, -1))
     kept = (outside < _FARTHEST_UNKNOWN) | (kind != PointKind.FURNITURE)
     station, offset, kind, height = station[kept], offset[kept], kind[kept], height[kept]
-    return StandingPoints(station, offset, height - ground_below(profiles, station, offset), kind)
-
-
-def ground_below(profiles: Profiles, station: Float, offset: Float) -> Float:
-    """Return the surface's height (N,), m, at stations and offsets (N,): medians of 5 m by 0.5 m, interpolated."""
-    rows, columns = profiles.height.shape
-    long, wide = -(-rows // _COARSE), -(-columns // _COARSE)
-    padded = np.full((long * _COARSE, wide * _COARSE), np.nan)
-    padded[:rows, :columns] = profiles.height
-    cells = padded.reshape(long, _COARSE, wide, _COARSE).swapaxes(1, 2).reshape(long, wide, -1)
-    known = np.isfinite(cells).any(axis=2)
-    coarse = np.full((long, wide), np.nan)
-    coarse[known] = np.nanmedian(cells[known], axis=1)
-    nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
-    filled = coarse[tuple(nearest)]
-    row = (station - profiles.stations[0]) / _COARSE + 0.5 / _COARSE - 0.5
-    column = (offset - profiles.offsets[0]) / (ACROSS * _COARSE) + 0.5 / _COARSE - 0.5
-    return np.asarray(ndimage.map_coordinates(filled, np.stack([row, column]), order=1, mode="nearest"))
+    return StandingPoints(station, offset, height - profiles.surface_height(station, offset), kind)
 
 
 def face_guardrails(barriers: list[FoundBarrier], section: MeasuredSection) -> list[FoundBarrier]:
@@ -304,6 +311,7 @@ def measure_ground(cloud: RoadCloud, path: CloudPath, section: MeasuredSection, 
     outermost = max(_outer(section, 1), _outer(section, -1)) + width
     if far.sum() < 200:
         return GroundShape(outermost + 10.0, 0.0, 0.05, width, seen)
+    # How far the ground lies below the axis at the same station.
     below = axis_height[np.clip(station[far].astype(np.int64), 0, len(axis_height) - 1)] - cloud.xyz[chosen[far], 2]
     reach = float(np.percentile(np.abs(offset[far]), 99))
     spread = float(np.clip(0.5 * (np.percentile(below, 84) - np.percentile(below, 16)), 0.05, 2.0))

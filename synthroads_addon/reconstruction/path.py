@@ -14,18 +14,33 @@ from ..road.alignment import Alignment
 from .smoothing import smooth
 
 SPACING = 1.0
-"""Distance of a path's points, m."""
+"""Distance of a path's points, m. Chosen: headings change little within it."""
 _ROUNDS = 3
-_CELL = 4.0  # m
+"""Rounds of a projection: two of Newton's steps along the path, and the offset from there. Chosen: from a place within
+`_CELL` they converge."""
+_CELL = 4.0
+"""Edge of the cells whose middle's place is the first guess of a projection, m. Chosen: far less than a road's
+radius."""
 _BLOCK = 500_000
-_STEP = 10.0  # m, of the march
-_REACH = 40.0  # m to either side that the road's surface is looked for at first
-_MARGIN = 3.0  # m that it may become wider from one step to the next
-_GAP = 90.0  # m without any surface that are crossed
-_FEWEST_CELLS = 8  # of surface in a step
-_START_RADII = (60.0, 120.0, 240.0)  # m: at the smallest within which the surface is longish the march begins
+"""Points that are projected at once. Chosen: bounds memory."""
+_STEP = 10.0
+"""Step of the march, m. Chosen: less than a carriageway's width."""
+_REACH = 40.0
+"""Distance to either side that the road's surface is looked for at first, m. Chosen: a wide motorway's half with its
+verges."""
+_MARGIN = 3.0
+"""Distance that the surface may become wider by from one step to the next, m. Chosen: a lane."""
+_GAP = 90.0
+"""Length without any surface that is crossed, m. Chosen: a bridge above."""
+_FEWEST_CELLS = 8
+"""Cells of surface in a step at least. Chosen: fewer tell no middle."""
+_START_RADII = (60.0, 120.0, 240.0)
+"""Radii about the middle of the surface, m, at the smallest of which it is longish the march begins. Chosen: from a
+rural road's to a motorway's with its verges."""
 _LONGISH = 2.0
-_WAVELENGTH = 120.0  # m: shorter swings of the first path are smoothed away
+"""Ratio of the deviations along and across from which on a surface is longish. Chosen: a square has 1."""
+_WAVELENGTH = 120.0
+"""Wavelength of which half of the first path's swings is kept, m. Chosen: shorter ones are the march's."""
 SHORTEST = 50.0
 """A shorter path than this, m, cannot be told from a square."""
 
@@ -66,6 +81,7 @@ class CloudPath:
     def place(self, station: ArrayLike, offset: ArrayLike) -> Float:
         """Return points (N, 2) at stations and offsets (N,), the offset positive to the left."""
         position, heading = self.frame(station)
+        # Unit vector to the left of the heading.
         left = np.column_stack([-np.sin(heading), np.cos(heading)])
         return np.asarray(position + np.asarray(offset, dtype=np.float64)[:, None] * left)
 
@@ -120,13 +136,14 @@ def _project(frames: Float, points: Float, along: Float) -> tuple[Float, Float]:
         change = frames[at + 1] - low
         heading = low[:, 2] + share * change[:, 2]
         beyond = (place - at)[:, None]
-        apart = points - low[:, :2] - beyond * change[:, :2]
+        vector = points - low[:, :2] - beyond * change[:, :2]
         cos, sin = np.cos(heading), np.sin(heading)
-        offset = apart[:, 1] * cos - apart[:, 0] * sin
+        offset = vector[:, 1] * cos - vector[:, 0] * sin
         if round_ < _ROUNDS - 1:
             # On the inside of a curve a step along the path is a shorter one beside it.
+            # ds along the path is dt / (1 - kappa offset), of a step dt beside it.
             shorter = np.maximum(1.0 - offset * change[:, 2] / SPACING, 0.2)
-            along = along + (apart[:, 0] * cos + apart[:, 1] * sin) / shorter
+            along = along + (vector[:, 0] * cos + vector[:, 1] * sin) / shorter
     return along, offset
 
 
@@ -190,6 +207,7 @@ def _march_start(cells: Float, tree: cKDTree) -> tuple[Float, float, float]:
     for radius in _START_RADII:
         near = cells[tree.query_ball_point(cells[middle], radius)]
         centre = near.mean(axis=0)
+        # Principal axes: the surface runs along that of the larger variance.
         spread, axes = np.linalg.eigh(np.cov((near - centre).T)) if len(near) > 2 else (np.ones(2), np.eye(2))
         if np.sqrt(spread[1]) > _LONGISH * np.sqrt(max(spread[0], 1e-9)):
             half = float(np.percentile(np.abs((near - centre) @ axes[:, 0]), 98))
@@ -211,6 +229,7 @@ def _march(cells: Float, tree: cKDTree, start: Float, direction: float, half: fl
             missing += _STEP
             continue
         missing = 0.0
+        # Percentiles: single cells of an entrance or a side road don't turn the march.
         low, high = np.percentile(across[inside], [3, 97])
         at = ahead + 0.5 * (low + high) * np.array([-forward[1], forward[0]])
         half = min(0.5 * (high - low) + _MARGIN, _REACH)

@@ -18,30 +18,34 @@ from .profiles import Profiles
 from .reconstruct import Reconstruction
 
 AXIS, EDGE, MARK, BARRIER, POST, DOUBT = "#d1006b", "#ff8c00", "#00a2ff", "#7a3cff", "#00b050", "#ff0000"
-_SIZE = (13.0, 9.0)  # inches
+_SIZE = (13.0, 9.0)
+"""Width and height of the picture, inches. Chosen: fits a screen."""
 _DPI = 110
-_STRETCH = 150.0  # m of the road that are shown large
-_BEYOND = 6.0  # m outside of the pavement
+"""Pixels to an inch. Chosen: fits a screen."""
+_STRETCH = 150.0
+"""Length of the road that is shown large, m. Chosen: dashes can be told."""
+_BEYOND = 6.0
+"""Distance outside of the pavement that is shown, m. Chosen: barriers stand there."""
 
 
 @literal_texts()
-def draw(found: Reconstruction, cloud: RoadCloud, path: FilePath) -> None:
+def draw(reconstruction: Reconstruction, cloud: RoadCloud, path: FilePath) -> None:
     """Draw a reconstruction (plan, detail, cross-section, heights) and write the picture as PNG."""
     figure = new_figure(*_SIZE)
     grid = figure.add_gridspec(3, 2, height_ratios=(1.3, 1.3, 1.0))
-    geometry = RoadGeometry(found.parameters)
-    plan(figure.add_subplot(grid[0, :]), found, geometry, (0.0, geometry.length))
+    geometry = RoadGeometry(reconstruction.parameters)
+    plan(figure.add_subplot(grid[0, :]), reconstruction, geometry, (0.0, geometry.length))
     middle = max(0.0, 0.5 * geometry.length - _STRETCH / 2.0)
-    plan(figure.add_subplot(grid[1, :]), found, geometry, (middle, min(geometry.length, middle + _STRETCH)))
-    across(figure.add_subplot(grid[2, 0]), found, geometry)
-    heights(figure.add_subplot(grid[2, 1]), found, geometry)
-    figure.suptitle(f"{shown_text(found.parameters.metadata.title)}: {cloud.read:,} points", fontsize=10)
+    plan(figure.add_subplot(grid[1, :]), reconstruction, geometry, (middle, min(geometry.length, middle + _STRETCH)))
+    across(figure.add_subplot(grid[2, 0]), reconstruction, geometry)
+    heights(figure.add_subplot(grid[2, 1]), reconstruction, geometry)
+    figure.suptitle(f"{shown_text(reconstruction.parameters.metadata.title)}: {cloud.read:,} points", fontsize=10)
     save_figure(figure, path, dpi=_DPI)
 
 
-def plan(axes: Any, found: Reconstruction, geometry: RoadGeometry, span: tuple[float, float]) -> None:
+def plan(axes: Any, reconstruction: Reconstruction, geometry: RoadGeometry, span: tuple[float, float]) -> None:
     """Draw the road unrolled (offset over station), the reconstruction over the cloud's brightness."""
-    profiles = found.profiles
+    profiles = reconstruction.carriageways.profiles
     low, high = _reach(geometry)
     axes.imshow(
         _brightness(profiles).T,
@@ -58,7 +62,7 @@ def plan(axes: Any, found: Reconstruction, geometry: RoadGeometry, span: tuple[f
         for column in (0, bounds.shape[1] - 2):
             label = "pavement's edges" if number == 0 == column else None
             axes.plot(station, bounds[:, column], color=EDGE, lw=0.9, label=label)
-    for number, doubt in enumerate(found.judgement.doubts):
+    for number, doubt in enumerate(reconstruction.judgement.doubts):
         axes.axvspan(doubt.start, doubt.end, color=DOUBT, alpha=0.25, lw=0, label=None if number else "doubtful")
     _markings(axes, geometry, span)
     _objects(axes, geometry)
@@ -66,9 +70,9 @@ def plan(axes: Any, found: Reconstruction, geometry: RoadGeometry, span: tuple[f
     axes.legend(loc="upper right", fontsize=7, ncols=5)
 
 
-def across(axes: Any, found: Reconstruction, geometry: RoadGeometry) -> None:
+def across(axes: Any, reconstruction: Reconstruction, geometry: RoadGeometry) -> None:
     """Draw a cross-section at mid-length: heights of the cloud's bins and the reconstructed surface."""
-    profiles = found.profiles
+    profiles = reconstruction.carriageways.profiles
     row = len(profiles.stations) // 2
     rows = slice(max(0, row - 5), row + 5)
     station = profiles.stations[rows]
@@ -91,11 +95,11 @@ def across(axes: Any, found: Reconstruction, geometry: RoadGeometry) -> None:
     )
 
 
-def heights(axes: Any, found: Reconstruction, geometry: RoadGeometry) -> None:
+def heights(axes: Any, reconstruction: Reconstruction, geometry: RoadGeometry) -> None:
     """Draw the measured heights of the carriageways, cm, less the reconstructed profile's."""
-    stations = found.measured.stations
+    stations = reconstruction.measured.stations
     level = geometry.profile.elevation(stations)
-    for name, surface in found.surfaces.items():
+    for name, surface in reconstruction.carriageways.surfaces.items():
         axes.plot(stations, 100.0 * (surface.height - level), ".", ms=3, label=f"{name} carriageway")
     axes.axhline(0.0, color=AXIS, lw=1.0, label="profile")
     axes.set(xlabel="station, m", ylabel="height above the profile, cm", title="pavement at its pivot line")

@@ -17,22 +17,44 @@ from .smoothing import robust_scale, smooth
 Grid = NDArray[np.float32]
 
 ACROSS = 0.1
-"""Width of a bin across the path, m."""
+"""Width of a bin across the path, m. Chosen: a line's width."""
 STRETCH = 5
-"""Metres along the path that one offset of a line or an edge is measured on."""
-_BACKGROUND = (11, 25)  # bins along and across whose median is a surface without paint: 11 m, 2.5 m
+"""Metres along the path that one offset of a line or an edge is measured on. Chosen: enough points for a mean, short
+beside any dash and gap."""
+_BACKGROUND = (11, 25)
+"""Bins along and across whose median is a surface without paint. Chosen: 11 m by 2.5 m, of which a line fills
+little."""
 _PAINT_PERCENTILE = 99.0
-_ENOUGH = 1_500_000  # points to lay the road straight by
-_BLUR = 0.8  # bins
+"""Percentile of the brightness above the pavement's that is full paint. Chosen: paint is more than a hundredth of a
+road."""
+_ENOUGH = 1_500_000
+"""Points by which the road is laid straight at most. Chosen: bounds the work; more don't move it."""
+_BLUR = 0.8
+"""Standard deviation of the nearest blur by which empty bins are filled, bins. Chosen: their neighbours' mean."""
 STEP, WINDOW = 10, 20
-"""Metres from one stretch to the next, and in a stretch."""
+"""Metres from one stretch to the next, and in a stretch. Chosen: half of a stretch overlaps the next."""
 _SHEARS = np.linspace(-0.06, 0.06, 25)
-_REACH = 0.8  # m that a stretch may lie beside where the ones before it lead
-_LOOSE = 0.15  # more of it per stretch without lines
-_MEMORY = 0.85  # of the template from one stretch to the next
-_PRIOR = 0.15  # of the best score is lost _REACH beside what was expected
-_WAVELENGTH = 60.0  # m
-_EDGE = 0.3  # weight of the pavement's edges beside paint
+"""Slopes of a stretch against the path that are tried, m/m. Chosen: what the first path is off by, in steps of 0.1 m
+over a stretch."""
+_REACH = 0.8
+"""Distance that a stretch may lie beside where the ones before it lead, m. Chosen: less than from one line to
+another."""
+_LOOSE = 0.15
+"""Distance that a stretch without lines adds to that, m. Chosen: a path may leave its course by 1.5 % there."""
+_MEMORY = 0.85
+"""Share of the template that stays from one stretch to the next. Chosen: it forgets over some 60 m, as markings
+change."""
+_PRIOR = 0.15
+"""Share of the best score that is lost `_REACH` beside what was expected. Chosen: decides between lines that are
+alike."""
+_WAVELENGTH = 60.0
+"""Wavelength of which half of the shifts' swings is kept, m. Chosen: shorter ones are noise."""
+_EDGE = 0.3
+"""Weight of the pavement's edges beside paint. Chosen: edges are rougher than lines, and there where no line is."""
+_DENSE = 1.5
+"""Bins between points that are no gap. Chosen: a point's place within its bin is worth one bin."""
+_COARSE = 5
+"""Bins along and across of which a median is the ground's height. Chosen: 5 m by 0.5 m hold points of any scanner."""
 
 
 @dataclass(frozen=True)
@@ -99,21 +121,43 @@ class Profiles:
         """Return the index of the bin at an offset, the nearest one if it lies outside."""
         return int(np.clip(round((offset - self.offsets[0]) / ACROSS), 0, len(self.offsets) - 1))
 
+    @property
+    def covered_length(self) -> float:
+        """Return the length, m, of the path along which there are points."""
+        return SPACING * float((self.count.sum(axis=1) > 0).sum())
 
-def row_gaps(profiles: Profiles, offsets: Float) -> Float:
-    """Return the distance (K,), m, of the rows of points about an offset in each stretch; 0 where they lie densely.
+    def row_gaps(self, offsets: Float) -> Float:
+        """Return the distance (K,), m, of the rows of points about an offset in each stretch; 0 where they lie densely.
 
-    A scanner that follows the road leaves bins empty between rows: what is found there is found no better than that.
-    """
-    gaps = np.zeros(profiles.stretches)
-    for number in np.flatnonzero(np.isfinite(offsets)):
-        rows = slice(number * STRETCH, (number + 1) * STRETCH)
-        filled = np.flatnonzero((profiles.count[rows] > 0).any(axis=0))
-        column = profiles.column(float(offsets[number]))
-        before, beyond = filled[filled < column], filled[filled > column]
-        if len(before) and len(beyond):
-            gaps[number] = 0.5 * ACROSS * float(beyond[0] - before[-1])
-    return np.where(gaps > 1.5 * ACROSS, gaps, 0.0)
+        A scanner that follows the road leaves bins empty between rows: what lies there is known no better than that.
+        """
+        gaps = np.zeros(self.stretches)
+        for number in np.flatnonzero(np.isfinite(offsets)):
+            rows = slice(number * STRETCH, (number + 1) * STRETCH)
+            occupied = np.flatnonzero((self.count[rows] > 0).any(axis=0))
+            column = self.column(float(offsets[number]))
+            before, beyond = occupied[occupied < column], occupied[occupied > column]
+            if len(before) and len(beyond):
+                # Half the way between the bins on either side of it, as it lies in the middle between two rows.
+                gaps[number] = 0.5 * ACROSS * float(beyond[0] - before[-1])
+        return np.where(gaps > _DENSE * ACROSS, gaps, 0.0)
+
+    def surface_height(self, station: Float, offset: Float) -> Float:
+        """Return the surface's height (N,), m, at stations and offsets (N,): medians of 5 m by 0.5 m, interpolated."""
+        rows, columns = self.height.shape
+        long, wide = -(-rows // _COARSE), -(-columns // _COARSE)
+        padded = np.full((long * _COARSE, wide * _COARSE), np.nan)
+        padded[:rows, :columns] = self.height
+        cells = padded.reshape(long, _COARSE, wide, _COARSE).swapaxes(1, 2).reshape(long, wide, -1)
+        known = np.isfinite(cells).any(axis=2)
+        coarse = np.full((long, wide), np.nan)
+        coarse[known] = np.nanmedian(cells[known], axis=1)
+        nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
+        filled = coarse[tuple(nearest)]
+        # Of n bins each, the middle of coarse cell i is at the bins' middle n i + (n - 1) / 2.
+        row = (station - self.stations[0]) / _COARSE + 0.5 / _COARSE - 0.5
+        column = (offset - self.offsets[0]) / (ACROSS * _COARSE) + 0.5 / _COARSE - 0.5
+        return np.asarray(ndimage.map_coordinates(filled, np.stack([row, column]), order=1, mode="nearest"))
 
 
 def make_profiles(cloud: RoadCloud, path: CloudPath, half_width: float, exact: bool = False) -> Profiles:
@@ -177,8 +221,11 @@ def paint_share(brightness: Grid, paved: Grid | None) -> Grid:
     if not known.any():
         return np.full(brightness.shape, np.nan, dtype=np.float32)
     filled = _fill_bins(brightness, known)
+    # The median of a window is the pavement as long as paint fills less than half of it.
     above = np.where(known, filled - ndimage.median_filter(filled, size=_BACKGROUND), 0.0)
     spread = robust_scale(above[known] - np.median(above[known]))
+    # Without any paint the percentile is noise: four deviations of it are full paint at least, so that nothing passes
+    # for a line.
     full = max(float(np.percentile(above[known], _PAINT_PERCENTILE)), 4.0 * spread, 1e-12)
     return np.where(known, np.clip(above / full, -0.5, 1.5), np.nan).astype(np.float32)
 
@@ -228,6 +275,7 @@ def register_path(path: CloudPath, profiles: Profiles) -> CloudPath:
     shifts = np.where(weights > 0, [fit.shift for fit in fits], np.nan)
     shift = smooth(shifts, np.ones(len(shifts)), STEP * SPACING, _WAVELENGTH, usual=ACROSS).values
     along = path.stations - path.start
+    # Beyond the outermost stretches the path goes on as straight as these lead.
     ends = np.gradient(shift, middles)
     inside = np.interp(along, middles, shift)
     inside += np.where(along < middles[0], (along - middles[0]) * ends[0], 0.0)
@@ -299,10 +347,13 @@ def _fit_to(block: Float, template: Float, expected: float, reach: float) -> _Fi
     bins = int(np.ceil(reach / ACROSS))
     middle = round(expected / ACROSS)
     shifts = np.arange(middle - bins, middle + bins + 1)
+    # Cross-correlation of the profile under each shear with the template, at each shift.
     scores = np.array([np.roll(block, -shift, axis=1) @ template for shift in shifts])
     away = (shifts * ACROSS - expected) / reach
+    # A parabola in the distance from what was expected: of places as good the nearest is taken.
     judged = scores - _PRIOR * float(scores.max()) * away[:, None] ** 2
     at, shear = np.unravel_index(int(judged.argmax()), judged.shape)
+    # The normalised cross-correlation, scores / (|block| |template|), says how alike both are.
     size = float(np.sqrt((block[shear] ** 2).sum() * (template**2).sum()))
     if size <= 0.0 or scores[at, shear] < 0.3 * size:
         return None

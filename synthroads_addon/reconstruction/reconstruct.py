@@ -1,11 +1,18 @@
-"""The whole way from a cloud to a parameter set, step by step."""
+"""The whole way from a cloud to a parameter set, stage by stage: each has one record, which holds those before it.
+
+1. `FoundRoad`: the road in the cloud, before anything is fitted to it (`find_axis`).
+2. `Course`: alignment and profile (`fit_course`).
+3. `Carriageways`: lanes, edges, surfaces and emergency bays along the alignment (`measure_carriageways`).
+4. `RoadMeasurements`: the same with what stands and lies beside the road (`measure_surroundings`), of which
+   `assemble_parameters` makes the parameter set.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..base.arrays import Bool, Float
+from ..base.arrays import Float
 from ..base.errors import InputError
 from ..base.maps.crs import MapSystem
 from ..base.progress import Progress, part_of, silent
@@ -14,19 +21,76 @@ from ..road.parameters import RoadParameters
 from .assemble import UNKNOWN_EPSG, RoadMeasurements, RotationAxis, assemble_parameters
 from .axis import FoundRoad, Options, find_axis, straighten_path
 from .cloud import RoadCloud
-from .edges import Surface, fit_surface, paved_edge
+from .edges import Surface, fit_surface
 from .judgement import Doubt, Judgement, judge
-from .layout import RoadLayout, find_layout
-from .lines import find_lines
+from .layout import RoadLayout
 from .objects import face_guardrails, find_barriers, find_posts, measure_ground, standing_points
 from .path import SPACING, CloudPath, alignment_path
-from .profiles import STRETCH, Profiles, make_profiles
+from .profiles import STRETCH, Profiles
 from .section import SIDES, MeasuredSection, Side, SideSection, carriageway_middles, measure_section, snap_to_standard
 from .smoothing import robust_scale, smooth
 from .views.fusion import FusedAxis
-from .widenings import Unlike, find_widenings
+from .widenings import Bay, Unlike, find_widenings
 
-_AROUND = 12.0  # m beyond the profiles' reach in which barriers may stand
+_AROUND = 12.0
+"""Distance beyond the profiles' reach in which barriers may stand, m. Chosen: as far as `objects` looks for them."""
+_OUTLIER = 4.0
+"""Deviations from the smoothed values from which on a measured one is a fault. Chosen: the fit smooths the others."""
+_LEAST_DEVIATION = 1e-3
+"""Least deviation, m, of values that are no faults. Chosen: what differs by less than 4 mm is no fault."""
+_HEIGHT_WAVELENGTH, _FALL_WAVELENGTH = 30.0, 15.0
+"""Waves of the height and the crossfall that keep half of their amplitude, m. Chosen: shorter than vertical curves, and
+than the runs over which a crossfall changes."""
+_FALL_STD = 0.002
+"""Deviation of a stretch's crossfall that is nothing unusual, m/m. Chosen: 7 mm over a lane."""
+_FEWEST_FALLS = 5
+"""Stretches whose crossfall must be known to be smoothed. Chosen: more than the coefficients of a parabola."""
+_INNER_SHARE, _INNER_ADVANTAGE = 0.5, 0.002
+"""Share of the carriageways' height difference at the axis, and m less, that may be left at the inner edges if the
+crossfall turns about these. Chosen: where the difference hardly tells both apart the usual axis of rotation stays."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """Alignment and profile fitted to the road in a cloud.
+
+    Attributes:
+        road: that they were fitted to.
+        fit: alignment and profile.
+        rotation: line about which the crossfall turns, whose height is the profile.
+        path: the alignment, each metre.
+    """
+
+    road: FoundRoad
+    fit: AxisFit
+    rotation: RotationAxis
+    path: CloudPath
+
+
+@dataclass(frozen=True)
+class Carriageways:
+    """Cross-section and surfaces of a road, in K stretches along its alignment.
+
+    Attributes:
+        course: of the road.
+        layout: that profiles along the alignment show.
+        section: widths of lanes, strips and shoulders.
+        surfaces: height and crossfall by side.
+        bays: emergency bays.
+        unlike: stretches whose pavement isn't as wide as the cross-section.
+    """
+
+    course: Course
+    layout: RoadLayout
+    section: MeasuredSection
+    surfaces: dict[Side, Surface]
+    bays: list[Bay]
+    unlike: list[Unlike]
+
+    @property
+    def profiles(self) -> Profiles:
+        """Return the profiles along the alignment."""
+        return self.layout.profiles
 
 
 @dataclass(frozen=True)
@@ -36,24 +100,15 @@ class Reconstruction:
     Attributes:
         parameters: the parameter set.
         measured: the same in numbers with standard deviations.
-        centre: the axis as all views of it show it, along ``path``.
-        path: parallel to the road, along which the lines were found.
-        profiles, layout: along the alignment.
-        surfaces: by side, along the alignment.
+        carriageways: what was found along the alignment, and before it was fitted.
         judgement: where its axis isn't to be trusted.
-        unlike: stretches whose pavement isn't as wide as the cross-section.
         notes: what a reader must know.
     """
 
     parameters: RoadParameters
     measured: RoadMeasurements
-    centre: FusedAxis
-    path: CloudPath
-    profiles: Profiles
-    layout: RoadLayout
-    surfaces: dict[Side, Surface]
+    carriageways: Carriageways
     judgement: Judgement
-    unlike: list[Unlike] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
 
@@ -65,130 +120,96 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     """
     options = options or Options()
     path, half = straighten_path(cloud, options, part_of(progress, 0.0, 0.3))
-    whole, cloud = cloud, cloud.near(path, half + _AROUND)
-    road = find_axis(cloud, path, half, options, part_of(progress, 0.3, 0.5))
-    path, profiles, layout = road.path, road.profiles, road.layout
+    road = find_axis(cloud.near(path, half + _AROUND), path, half, options, part_of(progress, 0.3, 0.5))
     progress("alignment", 0.5)
-    fit, rotation = fit_axis_and_profile(profiles, layout, road.axis, options.tolerance)
+    course = fit_course(road, options.tolerance)
     progress("section", 0.6)
-    along = alignment_path(fit.alignment)
-    profiles = make_profiles(cloud, along, half, exact=True)
-    layout = find_layout(profiles, find_lines(profiles), layout.kind)
-    section = measure_section(profiles, layout, cloud.marked, _axis_std(road.axis))
-    if options.snap:
-        section = snap_to_standard(section)
-    surfaces = {side: _surface(profiles, section, side, rotation) for side in SIDES}
-    progress("ground", 0.75)
-    ground = measure_ground(whole, along, section, fit.profile.elevation(along.stations))
-    progress("objects", 0.85)
-    standing = standing_points(cloud, along, profiles, section)
-    barriers, used = find_barriers(standing)
-    bays, others = find_widenings(section, profiles.middles)
-    measured = RoadMeasurements(
-        fit=fit,
-        cloud=cloud,
-        section=section,
-        stations=profiles.middles,
-        crossfall={side: _smooth_fall(surfaces[side]) for side in SIDES},
-        rotation=rotation,
-        barriers=face_guardrails(barriers, section),
-        posts=find_posts(standing, used),
-        ground=ground,
-        title=options.title,
-        bays=bays,
-    )
+    carriageways = measure_carriageways(course, options.snap)
+    measured = measure_surroundings(carriageways, cloud, options.title, progress)
     parameters = assemble_parameters(measured)
-    notes = [*layout.notes, *_notes(cloud, section, measured)]
-    parted = road.parted_line(along, profiles.middles)
-    judgement = judge(profiles, layout, carriageway_middles(section), _rivals_along(road, along, profiles), parted)
-    judgement = replace(judgement, sections=tuple(map(_section_doubt, others)))
-    return Reconstruction(parameters, measured, road.axis, path, profiles, layout, surfaces, judgement, others, notes)
+    judgement = judge_carriageways(carriageways)
+    notes = [*carriageways.layout.notes, *_notes(measured)]
+    return Reconstruction(parameters, measured, carriageways, judgement, notes)
 
 
-def _axis_std(axis: FusedAxis) -> float:
-    """Return the standard deviation, m, of where the axis lies along the whole road."""
-    return float(np.median(axis.std[np.isfinite(axis.raw)]))
-
-
-def _section_doubt(other: Unlike) -> Doubt:
-    """Return what is said of a stretch whose pavement is unlike the cross-section."""
-    unlike = f"{abs(other.wider_by):.1f} m {'wider' if other.wider_by > 0.0 else 'narrower'}"
-    return Doubt(other.start, other.end, (f"{other.side}: the pavement is {unlike} than the cross-section",))
-
-
-def _rivals_along(road: FoundRoad, along: CloudPath, profiles: Profiles) -> Bool:
-    """Return a mask (K,) of the alignment's stretches beside which the views of the axis disagree."""
-    station, _ = along.project(road.path.place(road.axis.stations, road.axis.offsets))
-    return np.interp(profiles.middles, station, road.axis.open.astype(np.float64)) > 0.5
-
-
-def fit_axis_and_profile(
-    profiles: Profiles, layout: RoadLayout, centre: FusedAxis, tolerance: float
-) -> tuple[AxisFit, RotationAxis]:
-    """Return the fitted alignment and profile, and the line about which the crossfall turns.
+def fit_course(road: FoundRoad, tolerance: float) -> Course:
+    """Return the alignment and profile fitted to a road's axis, and the line about which the crossfall turns.
 
     The profile is the height of that line, the same for both carriageways: of the two lines that a parameter set can
     name, the one at which the carriageways' heights differ less.
+
+    Args:
+        road: found in a cloud.
+        tolerance: of the alignment's fit to the axis, m (`fit_axis`).
+
+    Raises:
+        InputError: the surface's height isn't known, or no alignment fits.
     """
-    heights = {name: _pivot_heights(profiles, layout, centre, name) for name in ("carriageway_axis", "inner_edge")}
-    rotation: RotationAxis = "carriageway_axis"
-    if _height_difference(heights["inner_edge"]) < 0.5 * _height_difference(heights["carriageway_axis"]) - 0.002:
-        rotation = "inner_edge"
-    right, left = heights[rotation]
+    rotation, heights = _rotation_and_heights(road)
+    right, left = heights
     height = np.where(np.isfinite(left) & np.isfinite(right), 0.5 * (left + right), np.fmin(left, right))
     if not np.isfinite(height).any():
-        height = _ground_heights(profiles, centre)
-    known = np.isfinite(centre.raw)
+        height = _ground_heights(road)
+    known = np.isfinite(road.axis.raw)
     first, last = np.flatnonzero(known)[[0, -1]]
-    kept = slice(int(first), int(last) + 1)
-    if not np.isfinite(height[kept]).any():
+    seen = slice(int(first), int(last) + 1)
+    if not np.isfinite(height[seen]).any():
         raise InputError("road", None, "too few points of the road's surface to tell its height")
-    smoothed = smooth(height, np.isfinite(height).astype(np.float64), STRETCH * SPACING, 30.0)
-    offset = _replace_faults(centre.raw, centre.offsets)[kept]
-    plan = profiles.path.place(centre.stations[kept], offset)
-    return fit_axis(np.column_stack([plan, _replace_faults(height, smoothed.values)[kept]]), tolerance, True), rotation
+    smoothed = smooth(height, np.isfinite(height).astype(np.float64), STRETCH * SPACING, _HEIGHT_WAVELENGTH)
+    offset = _replace_faults(road.axis.raw, road.axis.offsets)[seen]
+    plan = road.path.place(road.axis.stations[seen], offset)
+    fit = fit_axis(np.column_stack([plan, _replace_faults(height, smoothed.values)[seen]]), tolerance, True)
+    return Course(road, fit, rotation, alignment_path(fit.alignment))
 
 
-def _ground_heights(profiles: Profiles, centre: FusedAxis) -> Float:
-    """Return the median heights (K,), m, of the ground within a metre of the axis, for want of a pavement's."""
-    result = np.full(profiles.stretches, np.nan)
-    for number, offset in enumerate(centre.offsets):
-        rows = slice(number * STRETCH, (number + 1) * STRETCH)
-        near = profiles.height[rows, profiles.column(offset - 1.0) : profiles.column(offset + 1.0) + 1]
-        if np.isfinite(near).any():
-            result[number] = float(np.nanmedian(near))
-    return result
+def _rotation_and_heights(road: FoundRoad) -> tuple[RotationAxis, tuple[Float, Float]]:
+    """Return the line about which the crossfall turns, and the heights (K,), m, of right and left carriageway there."""
+    edges = {sign: _carriageway_edges(road, sign) for sign in (-1, 1)}
+    by_rotation: dict[RotationAxis, tuple[Float, Float]] = {}
+    names: tuple[RotationAxis, ...] = ("carriageway_axis", "inner_edge")
+    for rotation in names:
+        right, left = (_fit_between(road.layout.profiles, sign, pair, rotation).height for sign, pair in edges.items())
+        by_rotation[rotation] = right, left
+    difference = {name: _height_difference(heights) for name, heights in by_rotation.items()}
+    turns_inside = difference["inner_edge"] < _INNER_SHARE * difference["carriageway_axis"] - _INNER_ADVANTAGE
+    chosen: RotationAxis = "inner_edge" if turns_inside else "carriageway_axis"
+    return chosen, by_rotation[chosen]
 
 
-def _replace_faults(raw: Float, smoothed: Float) -> Float:
-    """Return measured values (K,) with missing and outlying ones replaced by the smoothed ones.
+def _carriageway_edges(road: FoundRoad, sign: int) -> tuple[Float, Float]:
+    """Return the offsets (K,), m, of the inner and the outer edge of the right (-1) or left (+1) carriageway.
 
-    The fit smooths by itself: values that are smooth already would pass for exact and get an element for every bend.
+    Each edge keeps its median distance from the axis: single stretches, beside turnouts or where it is hidden, have no
+    say. Of a single carriageway the axis is the inner edge.
     """
-    apart = np.abs(raw - smoothed)
-    usual = robust_scale(apart[np.isfinite(apart)])
-    return np.where(np.isfinite(raw) & (apart <= 4.0 * max(usual, 1e-3)), raw, smoothed)
+    layout, axis = road.layout, road.axis.offsets
+    band = layout.bands[0 if sign < 0 else -1]
+    outermost = sign * (band.guide(sign).offset - float(np.median(axis)))
+    # Outwards from the outermost line, or from 1 m beside the axis where that lies nearer: paved for sure.
+    begin = axis + sign * max(outermost, 1.0)
+    outer = layout.pavement.edge(begin, sign).offsets
+    outer = axis + float(np.nanmedian(begin - axis if np.isnan(outer).all() else outer - axis))
+    if layout.kind == "single":
+        return axis.copy(), outer
+    innermost = sign * (band.guide(-sign).offset - float(np.median(axis)))
+    inner = layout.pavement.edge(axis + sign * innermost, -sign, innermost).offsets
+    distance = float(np.nanmedian(inner - axis)) if np.isfinite(inner).any() else sign * innermost
+    return axis + distance, outer
 
 
-def _pivot_heights(profiles: Profiles, layout: RoadLayout, centre: FusedAxis, rotation: str) -> tuple[Float, Float]:
-    """Return the heights (K,), m, of right and left carriageway at the line that the crossfall turns about."""
-    result = []
-    axis = centre.offsets
-    for name, sign in (("right", -1), ("left", 1)):
-        band = layout.bands[0] if name == "right" or layout.kind == "single" else layout.bands[1]
-        outermost = sign * (band.guide(sign).offset - float(np.median(axis)))
-        begin = axis + sign * max(outermost, 1.0)
-        outer = paved_edge(profiles, layout.paved, begin, sign).offsets
-        outer = axis + float(np.nanmedian(np.append(outer - axis, begin - axis if np.isnan(outer).all() else [])))
-        inner = axis.copy()
-        if layout.kind == "dual":
-            innermost = sign * (band.guide(-sign).offset - float(np.median(axis)))
-            edge = paved_edge(profiles, layout.paved, axis + sign * innermost, -sign, innermost).offsets
-            inner = axis + (float(np.nanmedian(edge - axis)) if np.isfinite(edge).any() else sign * innermost)
-        low, high = (inner, outer) if sign > 0 else (outer, inner)
-        pivot = inner if rotation == "inner_edge" else 0.5 * (inner + outer)
-        result.append(fit_surface(profiles, low, high, pivot).height)
-    return result[0], result[1]
+def _fit_between(profiles: Profiles, sign: int, edges: tuple[Float, Float], rotation: RotationAxis) -> Surface:
+    """Return the surface of the right (-1) or left (+1) carriageway between its edges, and its height at the rotation.
+
+    Args:
+        profiles: along a path or the alignment.
+        sign: of the side.
+        edges: (K,) offsets of the inner and the outer one, m.
+        rotation: the line at which the height is taken.
+    """
+    inner, outer = edges
+    pivot = inner if rotation == "inner_edge" else 0.5 * (inner + outer)
+    low, high = (inner, outer) if sign > 0 else (outer, inner)
+    return fit_surface(profiles, low, high, pivot)
 
 
 def _height_difference(heights: tuple[Float, Float]) -> float:
@@ -197,27 +218,119 @@ def _height_difference(heights: tuple[Float, Float]) -> float:
     return float(np.nanmedian(difference)) if np.isfinite(difference).any() else 0.0
 
 
-def _surface(profiles: Profiles, section: MeasuredSection, side: Side, rotation: RotationAxis) -> Surface:
+def _ground_heights(road: FoundRoad) -> Float:
+    """Return the median heights (K,), m, of the ground within a metre of the axis, for want of a pavement's."""
+    profiles = road.layout.profiles
+    result = np.full(profiles.stretches, np.nan)
+    for number, offset in enumerate(road.axis.offsets):
+        rows = slice(number * STRETCH, (number + 1) * STRETCH)
+        ground = profiles.height[rows, profiles.column(offset - 1.0) : profiles.column(offset + 1.0) + 1]
+        if np.isfinite(ground).any():
+            result[number] = float(np.nanmedian(ground))
+    return result
+
+
+def _replace_faults(raw: Float, smoothed: Float) -> Float:
+    """Return measured values (K,) with missing and outlying ones replaced by the smoothed ones.
+
+    The fit smooths by itself: values that are smooth already would pass for exact and get an element for every bend.
+    """
+    residual = np.abs(raw - smoothed)
+    deviation = max(robust_scale(residual[np.isfinite(residual)]), _LEAST_DEVIATION)
+    return np.where(np.isfinite(raw) & (residual <= _OUTLIER * deviation), raw, smoothed)
+
+
+def measure_carriageways(course: Course, snap: bool = False) -> Carriageways:
+    """Return the cross-section and surfaces that the cloud shows along the alignment.
+
+    Args:
+        course: with the road that it was fitted to.
+        snap: take the standard cross-section's widths where the measured ones are near enough.
+
+    Raises:
+        InputError: no carriageway can be made out along it.
+    """
+    road = course.road
+    layout = road.layout_along(course.path, road.layout.kind)
+    section = measure_section(layout, road.cloud.marked, _axis_std(road.axis))
+    if snap:
+        section = snap_to_standard(section)
+    surfaces = {side: _surface(layout.profiles, section.sides[side], course.rotation) for side in SIDES}
+    return Carriageways(course, layout, section, surfaces, *find_widenings(section, layout.profiles.middles))
+
+
+def _axis_std(axis: FusedAxis) -> float:
+    """Return the standard deviation, m, of where the axis lies along the whole road."""
+    return float(np.median(axis.std[np.isfinite(axis.raw)]))
+
+
+def _surface(profiles: Profiles, side: SideSection, rotation: RotationAxis) -> Surface:
     """Return height and crossfall of one carriageway's surface in each stretch along the alignment."""
-    measured_side = section.sides[side]
-    count = len(measured_side.usual)
-    inner = np.full(count, measured_side.inner_offset.value)
-    outer = inner + measured_side.paved_width.value
-    pivot = inner if rotation == "inner_edge" else 0.5 * (inner + outer)
-    low, high = (inner, outer) if measured_side.sign > 0 else (-outer, -inner)
-    return fit_surface(profiles, low, high, float(measured_side.sign) * pivot)
+    inner = np.full(len(side.usual), side.inner_offset.value)
+    outer = inner + side.paved_width.value
+    return _fit_between(profiles, side.sign, (side.sign * inner, side.sign * outer), rotation)
 
 
-def _smooth_fall(measured: Surface) -> Float:
+def measure_surroundings(
+    carriageways: Carriageways, cloud: RoadCloud, title: str = "", progress: Progress = silent
+) -> RoadMeasurements:
+    """Return all measurements of a road: its carriageways, what stands beside them, and the ground.
+
+    Args:
+        carriageways: measured.
+        cloud: the whole one: the ground reaches farther than the road's own points.
+        title: of the parameter set.
+        progress: is told of both stages, as of a reconstruction's.
+    """
+    course, section, profiles = carriageways.course, carriageways.section, carriageways.profiles
+    progress("ground", 0.75)
+    ground = measure_ground(cloud, course.path, section, course.fit.profile.elevation(course.path.stations))
+    progress("objects", 0.85)
+    standing = standing_points(course.road.cloud, profiles, section)
+    barriers, barrier_points = find_barriers(standing)
+    return RoadMeasurements(
+        fit=course.fit,
+        cloud=course.road.cloud,
+        section=section,
+        stations=profiles.middles,
+        crossfall={side: _smooth_fall(surface) for side, surface in carriageways.surfaces.items()},
+        rotation=course.rotation,
+        barriers=face_guardrails(barriers, section),
+        posts=find_posts(standing, barrier_points),
+        ground=ground,
+        title=title,
+        bays=carriageways.bays,
+    )
+
+
+def _smooth_fall(surface: Surface) -> Float:
     """Return the crossfall (K,), m/m, smoothed along the road; as measured where too few are known."""
-    known = np.isfinite(measured.fall)
-    if known.sum() < 5:
-        return measured.fall
-    return smooth(measured.fall, known.astype(np.float64), STRETCH * SPACING, 15.0, order=2, usual=0.002).values
+    known = np.isfinite(surface.fall)
+    if known.sum() < _FEWEST_FALLS:
+        return surface.fall
+    weights, spacing = known.astype(np.float64), STRETCH * SPACING
+    return smooth(surface.fall, weights, spacing, _FALL_WAVELENGTH, order=2, usual=_FALL_STD).values
 
 
-def _notes(cloud: RoadCloud, section: MeasuredSection, measured: RoadMeasurements) -> list[str]:
+def judge_carriageways(carriageways: Carriageways) -> Judgement:
+    """Return where a road's axis, and its cross-section, aren't to be trusted, and why."""
+    course, stations = carriageways.course, carriageways.profiles.middles
+    rivals = course.road.open_along(course.path, stations)
+    parted = course.road.parted_line(course.path, stations)
+    judgement = judge(carriageways.layout, carriageway_middles(carriageways.section), rivals, parted)
+    return replace(judgement, sections=tuple(map(_section_doubt, carriageways.unlike)))
+
+
+def _section_doubt(stretch: Unlike) -> Doubt:
+    """Return what is said of a stretch whose pavement is unlike the cross-section."""
+    difference = f"{abs(stretch.wider_by):.1f} m {'wider' if stretch.wider_by > 0.0 else 'narrower'}"
+    text = f"{stretch.side}: the pavement is {difference} than the cross-section"
+    return Doubt(stretch.start, stretch.end, (text,))
+
+
+def _notes(measured: RoadMeasurements) -> list[str]:
     """Return remarks on assumptions and gaps that a reader of the parameter set must know."""
+    cloud, section = measured.cloud, measured.section
     single = "a single carriageway: written as two carriageways that meet in the middle line, one per direction"
     remarks = [
         (cloud.strays > 0, f"{cloud.strays:,} points lie far from all others and weren't used"),

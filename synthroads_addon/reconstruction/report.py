@@ -30,8 +30,11 @@ FIT_TOLERANCE = 0.03
 TOLERANCES = (0.005, 1.0)
 """Smallest and largest of those, m."""
 _MOST_POINTS = 400_000
-_FROM_EDGES = 0.1  # m: nearer to an edge of the pavement than this a point may lie beside it
-_FAULT = 0.5  # m: a point farther from the surface is none of it
+"""Points that the surface is compared with at most. Chosen: more don't move its figures."""
+_FROM_EDGES = 0.1
+"""Distance from an edge of the pavement within which a point may lie beside it, m. Chosen: a bin."""
+_FAULT = 0.5
+"""Distance from the surface beyond which a point is none of it, m. Chosen: cars and kerbs."""
 
 
 @dataclass(frozen=True)
@@ -90,31 +93,31 @@ def run_reconstruction(job: ReconstructionJob, progress: Progress = silent) -> R
         InputError: a file can't be read, or no road can be made out in the cloud.
     """
     cloud = read_road_cloud(job.cloud, part_of(progress, 0.0, 0.2))
-    found = reconstruct(cloud, job.options(cloud), part_of(progress, 0.2, 0.95))
+    reconstruction = reconstruct(cloud, job.options(cloud), part_of(progress, 0.2, 0.95))
     progress("report", 0.95)
-    return ReconstructedRoad(found, cloud, report(found, cloud))
+    return ReconstructedRoad(reconstruction, cloud, report(reconstruction, cloud))
 
 
-def report(found: Reconstruction, cloud: RoadCloud) -> dict[str, Any]:
+def report(reconstruction: Reconstruction, cloud: RoadCloud) -> dict[str, Any]:
     """Return the reconstruction's report as JSON data: residuals, deviations, widths; m, crossfall in percent."""
-    geometry = RoadGeometry(found.parameters)
-    section = found.measured.section
-    violations = check(found.parameters)
+    geometry = RoadGeometry(reconstruction.parameters)
+    section = reconstruction.measured.section
+    violations = check(reconstruction.parameters)
     return {
         "cloud": _cloud(cloud),
         "road": section.kind,
         "length": round(geometry.length, 3),
-        "judgement": found.judgement.to_dict(),
-        "centreline": _centreline(found),
+        "judgement": reconstruction.judgement.to_dict(),
+        "centreline": _centreline(reconstruction),
         "section": section_report(section),
-        "surface": _surface(found, cloud, geometry),
-        "edges": {name: _edges(side, found, geometry) for name, side in section.sides.items()},
-        "lines": _lines(found, geometry),
-        "crossfall": {name: _figures(100.0 * _excess_fall(found, geometry, name)) for name in section.sides},
-        "emergency_bays": [_bay(bay) for bay in found.measured.bays],
-        "objects": _objects(found),
+        "surface": _surface(reconstruction, cloud, geometry),
+        "edges": {name: _edges(side, reconstruction, geometry) for name, side in section.sides.items()},
+        "lines": _lines(reconstruction, geometry),
+        "crossfall": {name: _figures(100.0 * _excess_fall(reconstruction, geometry, name)) for name in section.sides},
+        "emergency_bays": [_bay(bay) for bay in reconstruction.measured.bays],
+        "objects": _objects(reconstruction),
         "rules_broken": [asdict(violation) for violation in violations],
-        "notes": found.notes,
+        "notes": reconstruction.notes,
     }
 
 
@@ -127,15 +130,17 @@ def _cloud(cloud: RoadCloud) -> dict[str, Any]:
     }
 
 
-def _centreline(found: Reconstruction) -> dict[str, Any]:
+def _centreline(reconstruction: Reconstruction) -> dict[str, Any]:
     """Return as JSON data the residuals, m, of the measured axis from the alignment, and its deviations."""
-    fit, std = found.measured.fit, found.centre.std[np.isfinite(found.centre.raw)]
+    fit, axis = reconstruction.measured.fit, reconstruction.carriageways.course.road.axis
+    seen = np.isfinite(axis.raw)
+    std = axis.std[seen]
     return {
         "elements": len(fit.alignment.elements),
         "from_alignment": fit.horizontal.to_dict("largest", 1),
         "height_from_profile": fit.height.to_dict("largest", 1),
         "std": {"mean": round(float(std.mean()), 4), "largest": round(float(std.max()), 4)},
-        "seen": round(float(np.isfinite(found.centre.raw).mean()), 4),
+        "seen": round(float(seen.mean()), 4),
     }
 
 
@@ -163,7 +168,7 @@ def _side(side: SideSection) -> dict[str, Any]:
     return {"lanes": lanes, **{name: width.to_dict() for name, width in widths.items()}, **seen}
 
 
-def _surface(found: Reconstruction, cloud: RoadCloud, geometry: RoadGeometry) -> dict[str, Any]:
+def _surface(reconstruction: Reconstruction, cloud: RoadCloud, geometry: RoadGeometry) -> dict[str, Any]:
     """Return by side, as JSON data, how far, m, the pavement's points lie above the reconstructed surface."""
     chosen = np.flatnonzero(cloud.of(PointKind.PAVEMENT, PointKind.MARKING)) if cloud.labelled else cloud.surface
     chosen = chosen[:: max(1, len(chosen) // _MOST_POINTS)]
@@ -179,21 +184,24 @@ def _surface(found: Reconstruction, cloud: RoadCloud, geometry: RoadGeometry) ->
     return result
 
 
-def _edges(side: SideSection, found: Reconstruction, geometry: RoadGeometry) -> dict[str, Any]:
+def _edges(side: SideSection, reconstruction: Reconstruction, geometry: RoadGeometry) -> dict[str, Any]:
     """Return as JSON data how far, m, the edges seen in the stretches lie outside of the reconstructed ones."""
-    stations = found.measured.stations
+    stations = reconstruction.measured.stations
     section = geometry.sections[side.side]
     outer = np.where(side.usual, side.outer_edge.offsets - section.main_edge(stations), np.nan)
     inner = side.inner_edge.offsets - section.distances(stations)[:, 0]
-    return {"outer": _figures(outer), "inner": _figures(inner) if found.measured.section.kind == "dual" else {}}
+    return {
+        "outer": _figures(outer),
+        "inner": _figures(inner) if reconstruction.measured.section.kind == "dual" else {},
+    }
 
 
-def _lines(found: Reconstruction, geometry: RoadGeometry) -> dict[str, Any]:
+def _lines(reconstruction: Reconstruction, geometry: RoadGeometry) -> dict[str, Any]:
     """Return by marking, as JSON data, how far, m, it lies to the left of the reconstructed one, and its deviations."""
-    stations = found.measured.stations
+    stations = reconstruction.measured.stations
     result: dict[str, Any] = {}
-    section = found.measured.section
-    for name, marking in found.parameters.of_type(LineMarking).items():
+    section = reconstruction.measured.section
+    for name, marking in reconstruction.parameters.of_type(LineMarking).items():
         side = section.sides["left" if marking.carriageway.endswith("left") else "right"]
         line = section.middle if marking.kind == "free" else side.lines[len(side.lines) - 1 - marking.boundary]
         if line is None:
@@ -208,10 +216,10 @@ def _lines(found: Reconstruction, geometry: RoadGeometry) -> dict[str, Any]:
     return result
 
 
-def _excess_fall(found: Reconstruction, geometry: RoadGeometry, side: Side) -> Float:
+def _excess_fall(reconstruction: Reconstruction, geometry: RoadGeometry, side: Side) -> Float:
     """Return the measured less the reconstructed crossfall (K,), m/m, in each stretch."""
-    modelled = geometry.crossfall(geometry.sections[side].carriageway, found.measured.stations)
-    return found.surfaces[side].fall - modelled
+    modelled = geometry.crossfall(geometry.sections[side].carriageway, reconstruction.measured.stations)
+    return reconstruction.carriageways.surfaces[side].fall - modelled
 
 
 def _bay(bay: Bay) -> dict[str, Any]:
@@ -219,7 +227,7 @@ def _bay(bay: Bay) -> dict[str, Any]:
     return {name: round(value, 3) if isinstance(value, float) else value for name, value in values.items()}
 
 
-def _objects(found: Reconstruction) -> dict[str, Any]:
+def _objects(reconstruction: Reconstruction) -> dict[str, Any]:
     barriers = [
         {
             "kind": item.kind,
@@ -229,7 +237,7 @@ def _objects(found: Reconstruction) -> dict[str, Any]:
             "height": round(item.height, 2),
             "points": item.points,
         }
-        for item in found.measured.barriers
+        for item in reconstruction.measured.barriers
     ]
     delineators = [
         {
@@ -238,7 +246,7 @@ def _objects(found: Reconstruction) -> dict[str, Any]:
             "std": round(item.std, 3),
             "points": item.points,
         }
-        for item in found.measured.posts
+        for item in reconstruction.measured.posts
     ]
     return {"barriers": barriers, "delineators": delineators}
 
@@ -281,5 +289,5 @@ def reservation_lines(report: dict[str, Any]) -> Iterator[str]:
     yield from (text for _, text in doubt_lines(report["judgement"]))
     if "comparison" in report:
         off = report["comparison"]["centreline"]
-        apart = f"{off['mae']:.3f} m on average, {off['largest']:.3f} m at most" if off else "nothing in common"
-        yield f"from the truth: centreline {apart}"
+        difference = f"{off['mae']:.3f} m on average, {off['largest']:.3f} m at most" if off else "nothing in common"
+        yield f"from the truth: centreline {difference}"

@@ -10,10 +10,9 @@ from scipy.signal import find_peaks
 
 from ..base.arrays import Bool, Float
 from ..road.guidelines import STANDARD_CROSS_SECTIONS, StandardCrossSection
-from .edges import FARTHEST, Edge, paved_edge
+from .edges import FARTHEST, Edge
 from .layout import Band, RoadKind, RoadLayout
 from .lines import Line
-from .profiles import Profiles
 from .smoothing import interval_mean, mean_with_std
 
 Side = Literal["left", "right"]
@@ -22,20 +21,39 @@ LineKind = Literal["outer_edge", "lane", "inner_edge"]
 
 EDGE_LINE, NARROW_LINE = 0.30, 0.15
 """Widths of outer edge lines and of all others on motorways, m (RMS)."""
-_RURAL_EDGE_LINE, _RURAL_LINE = 0.25, 0.12  # on other roads (RMS)
-_LINE_TOLERANCE = 0.05  # m: a measured width so near to a usual one is that
-_WIDEST_STRIP = 1.25  # m: pavement beyond the outermost lane that is wider has a hard shoulder
+_RURAL_EDGE_LINE, _RURAL_LINE = 0.25, 0.12
+"""The same on other roads, m (RMS)."""
+_LINE_TOLERANCE = 0.05
+"""Distance of a measured width from a usual one that passes for it, m. Chosen: a third of the narrowest line's
+width."""
+_WIDEST_STRIP = 1.25
+"""Width of an edge strip at most, m: pavement outside of the lanes that is wider has a hard shoulder. Chosen: the
+standard cross-sections have strips of 0.75 m at most, and shoulders of 2 m at least."""
 _USUAL_STRIP = 0.5
-_PAINT_STD, _EDGE_STD = 0.04, 0.08  # m that lines and edges found by brightness are off all along a road
-_FEWEST_EDGES = 0.2  # of the stretches must show an edge
-_AROUND, _SOLID = 7, 0.8  # stretches around one, and their share of paint: along a dashed line it is less
+"""Width of a strip that isn't seen, m. Chosen: that of most standard cross-sections."""
+_PAINT_STD, _EDGE_STD = 0.04, 0.08
+"""Deviation of lines and edges found by brightness that they share all along a road, m. Chosen: a quarter of a line's
+width, and a tuft of grass."""
+_FEWEST_EDGES = 0.2
+"""Share of the stretches that must show an edge for it to be seen. Chosen: what shows on fewer is a fault."""
+_AROUND, _SOLID = 7, 0.8
+"""Stretches around one, and their share of paint along a solid line. Chosen: 35 m hold whole periods; along a dashed
+line the share is less."""
 _FEWEST_STRETCHES = 6
-_COMMON = 0.35  # of the most common width: others so common may be the usual one
-_MODE = 0.4  # m about the most common width
-_NARROWEST, _WIDEST_LANE, _WIDEST_HALF = 2.3, 5.2, 8.0  # m from a single carriageway's axis to lines and edges
-_WIDEST = 6.0  # m that a strip or shoulder can be
+"""Stretches that a width is the mean of at least. Chosen: fewer are no usual part."""
+_COMMON = 0.35
+"""Share of the most common width's count from which on another one may be the usual one. Chosen: turnouts may be
+longer."""
+_MODE = 0.4
+"""Distance about the most common width that is the same one, m. Chosen: less than strips and shoulders differ by."""
+_NARROWEST, _WIDEST_LANE, _WIDEST_HALF = 2.3, 5.2, 8.0
+"""Distances from a single carriageway's axis to lines and edges, m. Chosen: the narrowest and the widest lane; a lane
+with a paved shoulder."""
+_WIDEST = 6.0
+"""Width of a strip or shoulder at most, m. Chosen: a hard shoulder and an emergency bay."""
 STANDARD_TOLERANCE = 0.15
-"""A cross-section all of whose widths are this near (m; half of it per lane) to a standard one's passes for it."""
+"""A cross-section all of whose widths are this near (m; half of it per lane) to a standard one's passes for it. Chosen:
+standard ones of as many lanes differ by more."""
 
 
 @dataclass(frozen=True)
@@ -46,18 +64,18 @@ class Estimate:
     std: float
 
     @classmethod
-    def of(cls, values: Float, apart: Float | None = None, axis_std: float = 0.0) -> Self:
+    def of(cls, values: Float, spacing: Float | None = None, axis_std: float = 0.0) -> Self:
         """Return the robust mean of values (K,), in order along the road, with its standard deviation.
 
-        Of values midway between rows of points, ``apart`` (K,) from each other, m, it is that of `interval_mean`, which
-        asks for the deviation of the axis that they are measured from, m.
+        Of values midway between rows of points, ``spacing`` (K,) from each other, m, it is that of `interval_mean`,
+        which asks for the deviation of the axis that they are measured from, m.
         """
-        if apart is None or not (apart[np.isfinite(values)] > 0.0).any():
+        if spacing is None or not (spacing[np.isfinite(values)] > 0.0).any():
             return cls(*mean_with_std(values))
-        return cls(*interval_mean(values, apart, axis_std))
+        return cls(*interval_mean(values, spacing, axis_std))
 
     def __sub__(self, other: Self) -> Self:
-        """Return the difference of two numbers whose errors are independent."""
+        """Return the difference of two numbers whose errors are independent: Var(a - b) = Var(a) + Var(b)."""
         return type(self)(self.value - other.value, float(np.hypot(self.std, other.std)))
 
     def widened(self, std: float) -> Self:
@@ -119,8 +137,8 @@ class SideSection:
         width = np.where(self.usual, self.outer_edge.offsets - self.inner_edge.offsets, np.nan)
         if self.edge_seen and np.isfinite(width).any():
             inner, outer = (np.where(self.usual, edge.offsets, np.nan) for edge in (self.inner_edge, self.outer_edge))
-            low = Estimate.of(inner, self.inner_edge.apart, self.axis_std).widened(self.edge_stds[0])
-            return Estimate.of(outer, self.outer_edge.apart, self.axis_std).widened(self.edge_stds[1]) - low
+            low = Estimate.of(inner, self.inner_edge.spacing, self.axis_std).widened(self.edge_stds[0])
+            return Estimate.of(outer, self.outer_edge.spacing, self.axis_std).widened(self.edge_stds[1]) - low
         parts = [self.inner_strip, *self.lanes, self.outer_width]
         return Estimate(sum(p.value for p in parts), float(np.sqrt(sum(p.std**2 for p in parts))))
 
@@ -157,17 +175,16 @@ class MeasuredSection:
         return Estimate(left.value + right.value, float(np.hypot(left.std, right.std)))
 
 
-def measure_section(profiles: Profiles, layout: RoadLayout, marked: bool, axis_std: float = 0.0) -> MeasuredSection:
+def measure_section(layout: RoadLayout, marked: bool, axis_std: float = 0.0) -> MeasuredSection:
     """Return the cross-section, with standard deviations, that profiles along the alignment show.
 
     Args:
-        profiles: along the alignment, so that offset 0 is the axis.
-        layout: of these profiles.
+        layout: of profiles along the alignment, so that offset 0 is the axis.
         marked: whether paint is known by class; if not, lines look wider than they are and get the usual widths.
         axis_std: standard deviation of where the axis lies, m, from which all is measured.
     """
     bands = zip(SIDES, layout.bands * (2 if layout.kind == "single" else 1), strict=True)
-    parts = [_SidePart(profiles, layout, band, side, marked, axis_std) for side, band in bands]
+    parts = [_SidePart(layout, band, side, marked, axis_std) for side, band in bands]
     if layout.kind == "single":
         return MeasuredSection("single", {part.side: _half_section(part) for part in parts}, layout.bands[0].middle)
     sides = {part.side: _carriageway(part) if len(part.band.lines) > 1 else _assumed_section(part) for part in parts}
@@ -187,12 +204,11 @@ class _SidePart:
     """Inputs for measuring one side of the road.
 
     Attributes:
-        profiles, layout, marked, axis_std: as in `measure_section`.
+        layout, marked, axis_std: as in `measure_section`.
         band: the pavement that is its own, or that it has a half of.
         side: of the axis.
     """
 
-    profiles: Profiles
     layout: RoadLayout
     band: Band
     side: Side
@@ -206,7 +222,7 @@ class _SidePart:
 
     def everywhere(self, value: float) -> Float:
         """Return an array (K,) with the same value for each stretch."""
-        return np.full(self.profiles.stretches, value)
+        return np.full(self.layout.profiles.stretches, value)
 
     def outer_edge(self, first: Float, last: Float) -> Edge:
         """Return the pavement's outer edge, m from the axis, beyond a last line, or before it where it is narrower.
@@ -217,13 +233,13 @@ class _SidePart:
         edge = self.edge(last)
         nearer = self.edge(first, reach=last - first + FARTHEST)
         unseen = ~np.isfinite(edge.offsets)
-        return Edge(np.where(unseen, nearer.offsets, edge.offsets), np.where(unseen, nearer.apart, edge.apart))
+        return Edge(np.where(unseen, nearer.offsets, edge.offsets), np.where(unseen, nearer.spacing, edge.spacing))
 
     def edge(self, begin: Float, outwards: bool = True, reach: float | Float = FARTHEST) -> Edge:
         """Return the pavement's edge beyond distances (K,), m, from the axis, as distances from the axis."""
         sign = self.sign if outwards else -self.sign
-        edge = paved_edge(self.profiles, self.layout.paved, self.sign * begin, sign, reach)
-        return Edge(self.sign * edge.offsets, edge.apart)
+        edge = self.layout.pavement.edge(self.sign * begin, sign, reach)
+        return Edge(self.sign * edge.offsets, edge.spacing)
 
 
 def line_width(line: Line | None, kind: LineKind, road: RoadKind, marked: bool) -> float:
@@ -252,21 +268,21 @@ class _Boundary:
     Attributes:
         smoothed: (K,) along the road; NaN where it isn't there.
         measured: (K,) in single stretches; NaN where nothing was seen.
-        apart: (K,) distance of the rows of points that each lies midway between, 0 where it is a mean.
+        spacing: (K,) distance of the rows of points that each lies midway between, 0 where it is a mean.
         seen: whether it was: else it is put evenly between its neighbours.
         std: of what all places share, m.
     """
 
     smoothed: Float
     measured: Float
-    apart: Float
+    spacing: Float
     seen: bool = True
     std: float = 0.0
 
     @classmethod
     def of(cls, line: Line, sign: int) -> Self:
         """Return a line's middle as a boundary on the side of a sign."""
-        return cls(sign * line.offsets, sign * line.measured, line.apart)
+        return cls(sign * line.offsets, sign * line.measured, line.spacing)
 
     def shift(self, by: float, std: float) -> Self:
         """Return the boundary so much (m) farther outside, known no better than by a standard deviation, m."""
@@ -276,7 +292,7 @@ class _Boundary:
     def place(self, where: Bool, axis_std: float) -> Estimate:
         """Return the mean distance from the axis, of a standard deviation (m), in the stretches of a mask (K,), m."""
         values = np.where(where, self.measured, np.nan)
-        estimate = Estimate.of(values if np.isfinite(values).any() else self.measured, self.apart, axis_std)
+        estimate = Estimate.of(values if np.isfinite(values).any() else self.measured, self.spacing, axis_std)
         estimate = estimate.widened(self.std)
         return estimate if self.seen else replace(estimate, std=np.inf)
 
@@ -312,7 +328,7 @@ def _half_section(part: _SidePart) -> SideSection:
     else:  # no edge line at all: the lane reaches to the pavement's edge
         visible = bool(np.isfinite(outer.offsets).any())
         place = outer.offsets if visible else part.everywhere(0.5 * part.band.width)
-        columns.append(_Boundary(place, place, outer.apart, visible))
+        columns.append(_Boundary(place, place, outer.spacing, visible))
     lines += [None] * (len(columns) - len(lines))
     inner = Edge(nowhere, nowhere)
     half = _summarise_side(part, lines, columns, inner, outer)
@@ -345,7 +361,7 @@ def _assumed_section(part: _SidePart) -> SideSection:
     row = STANDARD_CROSS_SECTIONS[name]
     first = inner.offsets + row.inner_edge_strip
     places = [first + sum(row.lanes[::-1][:i]) for i in range(len(row.lanes) + 1)]
-    columns = [_Boundary(place, place, inner.apart, False) for place in places]
+    columns = [_Boundary(place, place, inner.spacing, False) for place in places]
     lines: list[Line | None] = [None] * len(columns)
     measured_side = _summarise_side(part, lines, columns, inner, outer)
     lanes = [Estimate(lane, np.inf) for lane in reversed(row.lanes)]
@@ -370,25 +386,26 @@ def _summarise_side(
     part: _SidePart, lines: list[Line | None], boundaries: list[_Boundary], inner: Edge, outer: Edge
 ) -> SideSection:
     """Return a side's widths, with standard deviations, from lines and edges measured in each stretch."""
-    last = boundaries[-1]
     edge_seen = _is_visible(outer)
-    outside_of_lanes = outer.offsets - _fill_with_median(last.smoothed)
+    outer_width = outer.offsets - _fill_with_median(boundaries[-1].smoothed)
     if part.band.usual is not None:
-        outside_of_lanes = np.where(part.band.usual, outside_of_lanes, np.nan)
-    usual = _usual_stretches(outside_of_lanes, lines[-1])
-    where = usual if usual.sum() >= _FEWEST_STRETCHES else np.ones(len(usual), dtype=bool)
+        outer_width = np.where(part.band.usual, outer_width, np.nan)
+    usual = _usual_stretches(outer_width, lines[-1])
+    mask = usual if usual.sum() >= _FEWEST_STRETCHES else np.ones(len(usual), dtype=bool)
     paint_std = 0.0 if part.marked else _PAINT_STD
-    places = [boundary.place(where, part.axis_std).widened(paint_std) for boundary in boundaries]
-    edge_std = 0.0 if part.profiles.paved is not None else _EDGE_STD
+    offsets = [boundary.place(mask, part.axis_std).widened(paint_std) for boundary in boundaries]
+    edge_std = 0.0 if part.layout.profiles.paved is not None else _EDGE_STD
     if part.layout.kind == "single":  # its lanes begin at the axis
-        places[0] = replace(places[0], std=part.axis_std)
+        offsets[0] = replace(offsets[0], std=part.axis_std)
     outside = Estimate(_USUAL_STRIP, np.inf)
     if edge_seen:
-        edge = Estimate.of(np.where(where, outer.offsets, np.nan), outer.apart, part.axis_std)  # as the lines
-        outside = edge.widened(edge_std) - places[-1]
+        # Over the same stretches as the lines, so that what all of them share goes out of the difference.
+        edge = Estimate.of(np.where(mask, outer.offsets, np.nan), outer.spacing, part.axis_std)
+        outside = edge.widened(edge_std) - offsets[-1]
     outside = Estimate(float(np.clip(outside.value, 0.0, 2.0 + _WIDEST)), outside.std)
     strip, shoulder = _share_pavement(outside)
-    inner_offset, inner_strip = _inner_widths(places[0], inner, where, edge_std, part.axis_std)
+    inner_offset, inner_strip = _inner_widths(offsets[0], inner, mask, edge_std, part.axis_std)
+    # The axis' own error is in no difference of two lines, but in the distance from it.
     inner_offset = inner_offset.widened(part.axis_std)
     return SideSection(
         side=part.side,
@@ -398,7 +415,7 @@ def _summarise_side(
         usual=usual,
         inner_offset=inner_offset,
         inner_strip=inner_strip,
-        lanes=[after - before for before, after in pairwise(places)],
+        lanes=[after - before for before, after in pairwise(offsets)],
         outer_width=outside,
         strip=strip,
         shoulder=shoulder,
@@ -410,53 +427,55 @@ def _summarise_side(
 
 
 def _inner_widths(
-    first: Estimate, inner: Edge, where: Bool, edge_std: float, axis_std: float
+    line: Estimate, inner: Edge, mask: Bool, edge_std: float, axis_std: float
 ) -> tuple[Estimate, Estimate]:
     """Return the distance of the pavement's inner edge from the axis, and the inner edge strip's width, m."""
     if _is_visible(inner):
-        offset = Estimate.of(np.where(where, inner.offsets, np.nan), inner.apart, axis_std).widened(edge_std)
-        strip = first - offset
+        offset = Estimate.of(np.where(mask, inner.offsets, np.nan), inner.spacing, axis_std).widened(edge_std)
+        strip = line - offset
     else:
-        offset = Estimate(first.value - _USUAL_STRIP, np.inf)
+        offset = Estimate(line.value - _USUAL_STRIP, np.inf)
         strip = Estimate(_USUAL_STRIP, np.inf)
     return (Estimate(max(0.0, offset.value), offset.std), Estimate(float(np.clip(strip.value, 0.0, 2.0)), strip.std))
 
 
-def _usual_stretches(outside: Float, line: Line | None) -> Bool:
+def _usual_stretches(width: Float, line: Line | None) -> Bool:
     """Return a mask (K,) of the stretches where the pavement outside of the lanes is the road's own, not a turnout's.
 
     Beside exits and entries the edge line is a dashed one; beside an emergency bay the pavement is wider.
     """
-    usual = np.isfinite(outside)
+    usual = np.isfinite(width)
     if line is not None and line.solid:
         cover = np.where(np.isfinite(line.cover), line.cover, 0.0)
         solid = ndimage.uniform_filter1d(cover, _AROUND, mode="nearest") > _SOLID
         usual &= solid if (solid & usual).sum() >= _FEWEST_STRETCHES else usual
     if not usual.any():
         return usual
-    count, edges = np.histogram(outside[usual], np.arange(-1.0, 10.0, 0.1))
-    common = ndimage.uniform_filter1d(count.astype(np.float64), 3)
-    # Turnouts make the pavement wider, and on a short road may be longer than what lies between them.
-    peak = int(find_peaks(np.pad(common, 1), height=_COMMON * common.max())[0][0]) - 1
-    return usual & (np.abs(outside - edges[peak] - 0.05) < _MODE)
+    count, edges = np.histogram(width[usual], np.arange(-1.0, 10.0, 0.1))
+    density = ndimage.uniform_filter1d(count.astype(np.float64), 3)
+    # Turnouts make the pavement wider, and on a short road may be longer than what lies between them: of the common
+    # widths the smallest is the road's own.
+    peak = int(find_peaks(np.pad(density, 1), height=_COMMON * density.max())[0][0]) - 1
+    return usual & (np.abs(width - edges[peak] - 0.05) < _MODE)
 
 
 def _order_lines(band: Band, sign: int) -> tuple[list[Line | None], list[_Boundary]]:
     """Return lines outwards (None: unseen), and where they lie; unseen ones evenly between their neighbours."""
-    seen: list[tuple[float, Line | None]] = [(sign * band.place(line), line) for line in band.lines]
-    seen += [(sign * offset, None) for offset in band.missing]
-    seen.sort(key=lambda item: item[0])
-    lines = [line for _, line in seen]
-    known = {number: _Boundary.of(line, sign) for number, line in enumerate(lines) if line is not None}
+    pairs: list[tuple[float, Line | None]] = [(sign * band.place(line), line) for line in band.lines]
+    pairs += [(sign * offset, None) for offset in band.missing]
+    pairs.sort(key=lambda pair: pair[0])
+    lines = [line for _, line in pairs]
+    measured = {number: _Boundary.of(line, sign) for number, line in enumerate(lines) if line is not None}
     boundaries = []
     for number in range(len(lines)):
-        if number in known:
-            boundaries.append(known[number])
+        if number in measured:
+            boundaries.append(measured[number])
             continue
-        before, after = max(i for i in known if i < number), min(i for i in known if i > number)
+        # Missing lines lie between measured ones only (`layout`), so that there is one on either side.
+        before, after = max(i for i in measured if i < number), min(i for i in measured if i > number)
         share = (number - before) / (after - before)
-        place = (1.0 - share) * known[before].smoothed + share * known[after].smoothed
-        boundaries.append(_Boundary(place, place, known[before].apart, False))
+        offset = (1.0 - share) * measured[before].smoothed + share * measured[after].smoothed
+        boundaries.append(_Boundary(offset, offset, measured[before].spacing, False))
     return lines, boundaries
 
 
@@ -486,12 +505,12 @@ def _misfit(side: SideSection, row: StandardCrossSection) -> float:
     """Return the largest difference of a width, m, a lane's counting twice; inf if the numbers of lanes differ."""
     if len(side.lanes) != len(row.lanes):
         return float("inf")
-    apart = [2.0 * abs(lane.value - width) for lane, width in zip(side.lanes, reversed(row.lanes), strict=True)]
-    apart.append(abs(side.inner_offset.value - row.median / 2.0))
-    apart.append(abs(side.inner_strip.value - row.inner_edge_strip))
+    differences = [2.0 * abs(lane.value - width) for lane, width in zip(side.lanes, reversed(row.lanes), strict=True)]
+    differences.append(abs(side.inner_offset.value - row.median / 2.0))
+    differences.append(abs(side.inner_strip.value - row.inner_edge_strip))
     if side.edge_seen:
-        apart.append(abs(side.outer_width.value - row.hard_shoulder - row.outer_edge_strip))
-    return max(apart)
+        differences.append(abs(side.outer_width.value - row.hard_shoulder - row.outer_edge_strip))
+    return max(differences)
 
 
 def snap_to_standard(section: MeasuredSection) -> MeasuredSection:

@@ -11,12 +11,26 @@ from ..base.arrays import Float
 ORDER = 3
 """Order of the differences that are held small: a curvature that changes linearly costs nothing."""
 _ROUNDS = 6
-_BISQUARE = 4.685  # times the residuals' scale: from here on a value counts nothing
-_LEAST_SCATTER = 0.01  # m: of single offsets, beside the rows that they lie between
-_MOST_SAY = 5.0  # independent values that all together count as: soft ends would shrink with each more
-_GRID = 0.002  # m
-_FAULTY = 0.02  # likelihood of a value whose interval misses the mean, relative to one whose interval holds it
-_FLOOR = 1e-9  # of the mean weight: what holds the solution where nothing was measured
+"""Rounds of iteratively reweighted least squares. Chosen: weights change little after them."""
+_MAD = 1.4826
+"""A normal distribution's standard deviation over its median absolute deviation: 1 / 0.6745."""
+_BISQUARE = 4.685
+"""Scales of the residuals from which on a value counts nothing: Tukey's bisquare, 95 % efficient for normal errors."""
+_LEAST_SCATTER = 0.01
+"""Least scatter of single offsets beside the rows that they lie between, m. Chosen: rows wobble by about as much."""
+_MOST_INDEPENDENT = 5.0
+"""Independent values that all intervals together count as, at most. Chosen: soft ends would shrink with each more."""
+_GRID = 0.002
+"""Step of the places at which the intervals' likelihood is worked out, m. Chosen: small beside `_LEAST_SCATTER`."""
+_OUTLIER = 0.02
+"""Likelihood of a value whose interval misses the mean, over that of one whose interval holds it. Chosen: a single
+fault moves the logarithm by 4 at most."""
+_FLOOR = 1e-9
+"""Weight, over the mean one, where nothing was measured. Chosen: holds the solution there and moves no other."""
+_LARGEST_LAG = 0.95
+"""Largest lag-1 correlation that is believed. Chosen: a value still counts as a fortieth of an independent one."""
+_FEWEST_LAGS = 8
+"""Fewest residuals whose correlation is worked out. Chosen: of fewer it is mostly chance."""
 
 
 @dataclass(frozen=True)
@@ -55,37 +69,40 @@ def smooth(
     if known.sum() <= order:
         level = float(np.median(values[known])) if known.any() else 0.0
         return SmoothedValues(np.full(count, level), np.full(count, np.inf), np.inf)
-    given = np.where(known, values, 0.0)
-    base = np.where(known, weights, 0.0)
-    base = base / base[known].mean()
+    y = np.where(known, values, 0.0)
+    w = np.where(known, weights, 0.0)
+    w = w / w[known].mean()
     order = min(order, count - 1)
-    stiffness = (wavelength / (2.0 * np.pi * spacing)) ** (2 * order)
-    penalty = stiffness * _difference_bands(count, order)
-    robust = known.astype(np.float64)
-    fitted, scatter = given, 0.0
+    # Whittaker 1923, Eilers 2003: (W + lambda D'D) z = W y. Of a wave of the angular frequency omega per step the share
+    # 1 / (1 + lambda omega^(2 order)) stays, half of it for lambda = (wavelength / (2 pi spacing))^(2 order).
+    penalty = (wavelength / (2.0 * np.pi * spacing)) ** (2 * order) * _difference_bands(count, order)
+    robustness = known.astype(np.float64)
+    z, scatter = y, 0.0
     for _ in range(_ROUNDS):
-        factor, fitted = _solve(penalty, base * robust, given)
-        residual = given - fitted
-        scatter = robust_scale(residual[known] * np.sqrt(base[known]))
-        robust = np.where(known, bisquare(residual * np.sqrt(base), max(scatter, usual, 1e-9)), 0.0)
-    factor, fitted = _solve(penalty, base * robust, given)
-    kept = known & (robust > 0.0)
-    residual = (given - fitted)[kept] * np.sqrt(base[kept])
+        cholesky, z = _solve(penalty, w * robustness, y)
+        residual = y - z
+        scatter = robust_scale(residual[known] * np.sqrt(w[known]))
+        robustness = np.where(known, bisquare(residual * np.sqrt(w), max(scatter, usual, 1e-9)), 0.0)
+    cholesky, z = _solve(penalty, w * robustness, y)
+    inliers = known & (robustness > 0.0)
+    residual = (y - z)[inliers] * np.sqrt(w[inliers])
     scatter = float(np.sqrt(np.mean(residual**2))) if len(residual) else 0.0
+    # Var(z_i) = scatter^2 [(W + lambda D'D)^-1]_ii, times what correlated residuals are worth less.
     widening = np.sqrt(correlation_factor(residual))
-    std = scatter * widening * np.sqrt(np.maximum(_inverse_diagonal(factor), 0.0))
-    return SmoothedValues(fitted, std, scatter)
+    std = scatter * widening * np.sqrt(np.maximum(_inverse_diagonal(cholesky), 0.0))
+    return SmoothedValues(z, std, scatter)
 
 
 def correlation_factor(residual: Float) -> float:
     """Return how many values, correlated (lag 1) as residuals (N,) are, tell as much as one independent value."""
-    if len(residual) < 8:
+    if len(residual) < _FEWEST_LAGS:
         return 1.0
     centred = residual - residual.mean()
-    square = float(centred @ centred)
-    lag = float(centred[1:] @ centred[:-1]) / square if square > 0.0 else 0.0
-    lag = min(max(lag, 0.0), 0.95)
-    return (1.0 + lag) / (1.0 - lag)
+    variance = float(centred @ centred)
+    rho = float(centred[1:] @ centred[:-1]) / variance if variance > 0.0 else 0.0
+    rho = min(max(rho, 0.0), _LARGEST_LAG)
+    # Of a first-order autoregression n values are worth n (1 - rho) / (1 + rho).
+    return (1.0 + rho) / (1.0 - rho)
 
 
 def mean_with_std(values: Float) -> tuple[float, float]:
@@ -97,48 +114,66 @@ def mean_with_std(values: Float) -> tuple[float, float]:
     values = values[np.isfinite(values)]
     if not len(values):
         return float("nan"), float("inf")
-    middle = float(np.median(values))
+    mean = float(np.median(values))
     for _ in range(_ROUNDS):
-        robust = bisquare(values - middle, max(robust_scale(values - middle), 1e-9))
-        total = float(robust.sum())
+        robustness = bisquare(values - mean, max(robust_scale(values - mean), 1e-9))
+        total = float(robustness.sum())
         if total <= 0.0:
             break
-        middle = float((robust * values).sum() / total)
-    kept = bisquare(values - middle, max(robust_scale(values - middle), 1e-9)) > 0.0
-    spread = float(np.sqrt(np.mean((values[kept] - middle) ** 2))) if kept.any() else 0.0
-    independent = max(1.0, kept.sum() / correlation_factor(values[kept] - middle))
-    return middle, spread / float(np.sqrt(independent))
+        mean = float((robustness * values).sum() / total)
+    inliers = bisquare(values - mean, max(robust_scale(values - mean), 1e-9)) > 0.0
+    scatter = float(np.sqrt(np.mean((values[inliers] - mean) ** 2))) if inliers.any() else 0.0
+    sample_size = max(1.0, inliers.sum() / correlation_factor(values[inliers] - mean))
+    return mean, scatter / float(np.sqrt(sample_size))
 
 
-def interval_mean(values: Float, apart: Float, axis_std: float = 0.0) -> tuple[float, float]:
+def interval_mean(values: Float, spacing: Float, axis_std: float = 0.0) -> tuple[float, float]:
     """Return the mean of values (K,) along the road that each lie midway between two rows of points, and its deviation.
 
-    A value is evenly likely everywhere between its rows, ``apart`` (K,) from each other, m, and so are all of them at
+    A value is evenly likely everywhere between its rows, ``spacing`` (K,) from each other, m, and so are all of them at
     once where the rows run beside the road: however many there are, they say no more than one. Where the rows wander
     only the places count that all intervals have in common. Intervals end softly, by how much values scatter beyond
     them, and weigh as `correlation_factor` says. Values that are means of many points have no interval. Where the axis
     that all is measured from wanders by its deviation ``axis_std``, m, the rows only seem to.
     """
-    known = np.isfinite(values) & np.isfinite(apart)
-    values, half = values[known], 0.5 * apart[known]
-    if not len(values):
+    known = np.isfinite(values) & np.isfinite(spacing)
+    x, half = values[known], 0.5 * spacing[known]
+    if not len(x):
         return float("nan"), float("inf")
-    middle = mean_with_std(values)[0]
-    beyond = np.maximum(np.abs(values - middle) - half, 0.0)
-    jump = robust_scale(np.diff(values)) / np.sqrt(2.0) if len(values) > 1 else 0.0
-    scatter = max(_LEAST_SCATTER, axis_std, robust_scale(beyond), min(jump, float(np.median(half)) + _LEAST_SCATTER))
-    low, high = values - np.maximum(half, 0.5 * _LEAST_SCATTER), values + np.maximum(half, 0.5 * _LEAST_SCATTER)
-    place = np.arange(np.percentile(low, 1) - scatter, np.percentile(high, 99) + scatter + _GRID, _GRID)
-    shares = ndtr((place - low[:, None]) / scatter) - ndtr((place - high[:, None]) / scatter)
-    likely = np.log(np.maximum(shares / np.maximum(shares.max(axis=1, keepdims=True), 1e-12), _FAULTY)).sum(axis=0)
-    likely *= min(1.0 / correlation_factor(values - middle), _MOST_SAY / len(values))
-    weight = np.exp(likely - likely.max())
-    weight /= weight.sum()
-    mean = float(weight @ place)
-    return mean, float(np.hypot(np.sqrt(weight @ (place - mean) ** 2), _GRID))
+    centre = mean_with_std(x)[0]
+    sigma = _end_scatter(x, half, centre, axis_std)
+    low, high = x - np.maximum(half, 0.5 * _LEAST_SCATTER), x + np.maximum(half, 0.5 * _LEAST_SCATTER)
+    mu = np.arange(np.percentile(low, 1) - sigma, np.percentile(high, 99) + sigma + _GRID, _GRID)
+    # A uniform distribution from low to high, convolved with a normal one of sigma:
+    # L_i(mu) = Phi((mu - low_i) / sigma) - Phi((mu - high_i) / sigma), over its largest, but no less than an outlier's.
+    likelihood = ndtr((mu - low[:, None]) / sigma) - ndtr((mu - high[:, None]) / sigma)
+    likelihood = np.maximum(likelihood / np.maximum(likelihood.max(axis=1, keepdims=True), 1e-12), _OUTLIER)
+    # The sum of logarithms counts K values; it is tempered (a power of the likelihood) to those that are independent.
+    log_likelihood = np.log(likelihood).sum(axis=0)
+    log_likelihood *= min(1.0 / correlation_factor(x - centre), _MOST_INDEPENDENT / len(x))
+    # Posterior over the grid under a flat prior: its mean, and its deviation with the grid's own.
+    posterior = np.exp(log_likelihood - log_likelihood.max())
+    posterior /= posterior.sum()
+    mean = float(posterior @ mu)
+    return mean, float(np.hypot(np.sqrt(posterior @ (mu - mean) ** 2), _GRID))
 
 
-def hidden_std(apart: Float, scatter: float) -> float:
+def _end_scatter(x: Float, half: Float, centre: float, axis_std: float) -> float:
+    """Return the standard deviation, m, of the ends of intervals (K,) about their true places.
+
+    Args:
+        x: middles of the intervals, m.
+        half: half of their lengths, m.
+        centre: robust mean of the middles, m.
+        axis_std: deviation of the axis that all is measured from, m.
+    """
+    excess = np.maximum(np.abs(x - centre) - half, 0.0)  # by how much an interval misses the mean
+    # Differences of neighbours have sqrt(2) of the scatter; what the intervals explain of it isn't the ends'.
+    step = robust_scale(np.diff(x)) / np.sqrt(2.0) if len(x) > 1 else 0.0
+    return max(_LEAST_SCATTER, axis_std, robust_scale(excess), min(step, float(np.median(half)) + _LEAST_SCATTER))
+
+
+def hidden_std(spacing: Float, scatter: float) -> float:
     """Return the standard deviation, m, of an offset's error that scatter hides, as points lie in rows along the road.
 
     What lies midway between two rows is off by up to half of their distance: evenly distributed, so by
@@ -146,22 +181,24 @@ def hidden_std(apart: Float, scatter: float) -> float:
     where they don't, what is missing in the scatter is an error that all of them share.
 
     Args:
-        apart: (K,) distances of the rows, m; 0 where the offset is a mean of many points.
+        spacing: (K,) distances of the rows, m; 0 where the offset is a mean of many points.
         scatter: standard deviation of single offsets about the mean, m.
     """
-    rows = apart[np.isfinite(apart) & (apart > 0.0)]
-    if not len(rows):
+    gaps = spacing[np.isfinite(spacing) & (spacing > 0.0)]
+    if not len(gaps):
         return 0.0
-    return float(np.sqrt(max(0.0, float(np.median(rows)) ** 2 / 12.0 - scatter**2)))
+    # Variance of a uniform distribution of width d: d^2 / 12, less what scatters.
+    return float(np.sqrt(max(0.0, float(np.median(gaps)) ** 2 / 12.0 - scatter**2)))
 
 
 def robust_scale(residual: Float) -> float:
     """Return a standard deviation estimated by the median absolute residual (N,) times 1.4826; 0 for none."""
-    return float(1.4826 * np.median(np.abs(residual))) if len(residual) else 0.0
+    return float(_MAD * np.median(np.abs(residual))) if len(residual) else 0.0
 
 
 def bisquare(residual: Float, scale: float) -> Float:
     """Return Tukey's bisquare weights (N,) of residuals: 1 at 0, falling to 0 at 4.685 times the scale."""
+    # Beaton and Tukey 1974: w(r) = (1 - (r / (c s))^2)^2 for |r| < c s, else 0.
     return np.asarray(np.maximum(1.0 - (residual / (_BISQUARE * scale)) ** 2, 0.0) ** 2)
 
 
@@ -175,7 +212,7 @@ def _difference_bands(count: int, order: int) -> Float:
     """Return D'D of the difference operator D of an order, in lower banded form (order + 1, N)."""
     stencil = np.array([1.0])
     for _ in range(order):
-        stencil = np.convolve(stencil, [-1.0, 1.0])
+        stencil = np.convolve(stencil, [-1.0, 1.0])  # (-1)^(d - k) binomial(d, k) in the end
     bands = np.zeros((order + 1, count))
     rows = count - order
     for i in range(order + 1):
@@ -192,27 +229,28 @@ def _solve(penalty: Float, weights: Float, values: Float) -> tuple[Float, Float]
     return factor, np.asarray(cho_solve_banded((factor, True), weights * values))
 
 
-def _inverse_diagonal(factor: Float) -> Float:
+def _inverse_diagonal(cholesky: Float) -> Float:
     """Return the diagonal (N,) of a banded matrix's inverse from its lower Cholesky factor (Takahashi's recursion)."""
-    width, count = factor.shape[0] - 1, factor.shape[1]
-    inverse = np.zeros((width + 1, count + width))  # bands below the diagonal
-    lower = factor / factor[0]
-    pivot = 1.0 / factor[0] ** 2
+    bandwidth, count = cholesky.shape[0] - 1, cholesky.shape[1]
+    z = np.zeros((bandwidth + 1, count + bandwidth))  # bands of the inverse, from the diagonal downwards
+    # Takahashi et al. 1973, of A = L D L' with a unit lower L: Z = D^-1 L^-1 + (I - L') Z. Column i needs the columns
+    # behind it only, so that they are worked out from the last to the first.
+    lower = cholesky / cholesky[0]
+    inverse_d = 1.0 / cholesky[0] ** 2
     for i in range(count - 1, -1, -1):
-        below = lower[1:, i]
-        block = _block(inverse, i + 1, width)
-        row = -block @ below
-        inverse[1:, i] = row
-        inverse[0, i] = pivot[i] - below @ row
-    return inverse[0, :count]
+        column = lower[1:, i]
+        z_column = -_block(z, i + 1, bandwidth) @ column
+        z[1:, i] = z_column
+        z[0, i] = inverse_d[i] - column @ z_column
+    return z[0, :count]
 
 
-def _block(inverse: Float, start: int, width: int) -> Float:
-    """Return the symmetric (width, width) block on the inverse's diagonal that begins at a row."""
+def _block(bands: Float, start: int, width: int) -> Float:
+    """Return the symmetric (width, width) block on a banded matrix's diagonal that begins at a row."""
     block = np.empty((width, width))
     for a in range(width):
         for b in range(a + 1):
-            block[a, b] = block[b, a] = inverse[a - b, start + b]
+            block[a, b] = block[b, a] = bands[a - b, start + b]
     return block
 
 

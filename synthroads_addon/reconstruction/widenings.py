@@ -19,19 +19,32 @@ from .section import MeasuredSection, Side, SideSection
 from .smoothing import correlation_factor, robust_scale
 
 APART = 0.75
-"""An edge of the pavement so far, m, from the usual one is another cross-section's."""
+"""An edge of the pavement so far, m, from the usual one is another cross-section's. Chosen: less than any bay or lane,
+more than an edge wanders."""
 SHORTEST = 25.0
-"""A shorter stretch, m, is a fault in the picture."""
-_BACK = 0.1  # m: an edge so near to the usual one is back
-_CLOSING = 3  # stretches that an edge may not be seen within a run
-_AROUND = 40.0  # m before and behind a run that its shape is fitted to
-_NEAREST = 10.0  # m from a bay to where the road's edge is first or last seen
-_MISFIT = 0.25  # m rms that a bay's shape may keep from its edge
-_NARROWEST, _WIDEST = 0.6 * EMERGENCY_BAY_WIDTH, 5.0  # m: of a bay
+"""A shorter stretch, m, is a fault in the picture. Chosen: five stretches; an emergency bay is longer."""
+_BACK = 0.1
+"""Distance of an edge from the usual one at which it is back, m. Chosen: a bin."""
+_CLOSING = 3
+"""Stretches that an edge may not be seen within a run. Chosen: 15 m, a lorry's length."""
+_AROUND = 40.0
+"""Length before and behind a run that its shape is fitted to, m. Chosen: more than a taper."""
+_NEAREST = 10.0
+"""Distance from a bay to where the road's edge is first or last seen, m. Chosen: else the bay may go on beyond the
+cloud."""
+_MISFIT = 0.25
+"""Root mean square that a bay's shape may keep from its edge, m. Chosen: exits and lanes that begin keep more."""
+_NARROWEST, _WIDEST = 0.6 * EMERGENCY_BAY_WIDTH, 5.0
+"""Widths of a bay, m. Chosen: about those of the guidelines' bays, and a lane with its strip."""
 _SHORTEST_BAY, _LONGEST_BAY = 0.4 * EMERGENCY_BAY_LENGTH, 3.0 * EMERGENCY_BAY_LENGTH
-_PAINTED = 0.6  # of a bay's length must be beside the edge line's paint, where that is seen
-_LEAST_TAPER = 5.0  # m
-_LEAST_SCATTER = 0.02  # m: of an edge's offset in one stretch
+"""Lengths of a bay at full width, m. Chosen: about those of the guidelines' bays."""
+_PAINTED = 0.6
+"""Share of a bay's length that must be beside the edge line's paint, where that is seen. Chosen: of a dashed line it is
+half."""
+_LEAST_TAPER = 5.0
+"""Length of a taper at least, m. Chosen: a stretch."""
+_LEAST_SCATTER = 0.02
+"""Scatter of an edge's offset in one stretch at least, m. Chosen: no pavement's edge is as straight as a line."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +76,7 @@ class Bay:
         shape = np.append(shape, self.width)
         change = _trapezoid_jacobian(stations, shape)
         bent = np.abs(change[:, :4]).max(axis=1) > 0.0  # near its tapers: no bay is quite a trapezoid
+        # Propagated: the variance of f(shape) is J C J'.
         known = np.maximum(np.einsum("ki,ij,kj->k", change, self.covariance, change), 0.0)
         return np.sqrt(known + np.where(bent, _LEAST_SCATTER, 0.0) ** 2)
 
@@ -125,8 +139,8 @@ def _whole(run: slice, beside: Float, scatter: float) -> slice:
     away = ndimage.binary_closing(np.pad(away, _CLOSING), np.ones(_CLOSING))[_CLOSING:-_CLOSING]
     away[run] = True
     label, _ = ndimage.label(away)
-    ((found,),) = ndimage.find_objects((label == label[run.start]).astype(np.int8))
-    return slice(max(0, found.start - 1), min(len(beside), found.stop + 1))
+    ((extent,),) = ndimage.find_objects((label == label[run.start]).astype(np.int8))
+    return slice(max(0, extent.start - 1), min(len(beside), extent.stop + 1))
 
 
 def _bay(side: SideSection, stations: Float, run: slice) -> Bay | None:
@@ -162,6 +176,7 @@ def _beside_line(side: SideSection, run: slice) -> bool:
 def _trapezoid(stations: Float, shape: Float) -> Float:
     """Return how much wider (K,), m, the pavement is by start, low taper, length, high taper and width (5,), m."""
     start, low, length, high, width = shape
+    # width x min(rise, 1, fall), each linear along its taper.
     rising = (stations - start) / low
     falling = (start + low + length + high - stations) / high
     return np.asarray(width * np.clip(np.minimum(rising, falling), 0.0, 1.0))
@@ -185,26 +200,28 @@ def _fit_trapezoid(stations: Float, beside: Float, first: float, last: float) ->
     def residual(shape: Float) -> Float:
         return _trapezoid(stations, shape) - beside
 
+    # Above the median: the tapers are part of the run.
     width = float(np.percentile(beside[(stations >= first) & (stations <= last)], 70))
     taper = min(EMERGENCY_BAY_TAPER, 0.3 * (last - first) + _LEAST_TAPER)
     begin = np.array([first - 0.3 * taper, taper, max(last - first - 1.4 * taper, 5.0), taper, width])
     low = np.array([first - _AROUND, _LEAST_TAPER, 1.0, _LEAST_TAPER, 0.1])
     high = np.array([last, 80.0, last - first + _AROUND, 80.0, 10.0])
-    found = least_squares(
+    solution = least_squares(
         residual, np.clip(begin, low + 1e-6, high - 1e-6), bounds=(low, high), loss="soft_l1", f_scale=0.2
     )
-    normal = found.jac.T @ found.jac
-    return np.asarray(found.x), residual(found.x), np.linalg.pinv(normal, hermitian=True)
+    # Covariance of least squares for unit noise: (J'J)^-1; the pseudo-inverse, as a taper may be seen by no stretch.
+    normal = solution.jac.T @ solution.jac
+    return np.asarray(solution.x), residual(solution.x), np.linalg.pinv(normal, hermitian=True)
 
 
 def _unlike_stretches(side: SideSection, stations: Float, runs: list[slice]) -> list[Unlike]:
     """Return the stretches of runs of wider or narrower pavement; those between which it never closes are one."""
     half, beside = 0.5 * STRETCH * SPACING, excess(side)
     scatter = robust_scale(beside[side.usual & np.isfinite(beside)])
-    found: dict[tuple[int, int], list[slice]] = {}
+    groups: dict[tuple[int, int], list[slice]] = {}
     for run in runs:
         whole = _whole(run, beside, scatter)
-        found.setdefault((whole.start, whole.stop), []).append(run)
+        groups.setdefault((whole.start, whole.stop), []).append(run)
     return [
         Unlike(
             side=side.side,
@@ -212,7 +229,7 @@ def _unlike_stretches(side: SideSection, stations: Float, runs: list[slice]) -> 
             end=round(stations[behind - 1] + half, 1),
             wider_by=round(float(np.nanmedian(np.concatenate([beside[run] for run in parts]))), 2),
         )
-        for (first, behind), parts in found.items()
+        for (first, behind), parts in groups.items()
     ]
 
 

@@ -17,8 +17,10 @@ from .reconstruct import Reconstruction
 from .section import SideSection
 from .widenings import Bay, unlike_mask
 
-_ISLAND = 0.05  # m
-_LANE_THERE = 1.0  # m: a narrower lane begins or ends
+_ISLAND = 0.05
+"""Width from which on an island is there, m. Chosen: rounding leaves less."""
+_LANE_THERE = 1.0
+"""Width from which on a lane is there, m. Chosen: a narrower one begins or ends."""
 
 
 @dataclass(frozen=True)
@@ -51,26 +53,26 @@ class WidthErrors:
         return off
 
 
-def compare_widths(found: Reconstruction, truth: RoadParameters) -> list[WidthErrors]:
+def compare_widths(reconstruction: Reconstruction, truth: RoadParameters) -> list[WidthErrors]:
     """Return the errors of all widths of a reconstruction's cross-section, beside its deviations."""
-    there, here = RoadGeometry(truth), RoadGeometry(found.parameters)
-    at = found.measured.stations
-    shift = np.array(found.parameters.transform.translate[:2]) - np.array(truth.transform.translate[:2])
+    there, here = RoadGeometry(truth), RoadGeometry(reconstruction.parameters)
+    at = reconstruction.measured.stations
+    shift = np.array(reconstruction.parameters.transform.translate[:2]) - np.array(truth.transform.translate[:2])
     position, heading, _ = here.alignment.frame(at)
     station, _ = there.alignment.project(position + shift)
     inside = (at > 0.0) & (at < here.length) & (station > 0.0) & (station < there.length)
     same = bool(np.median(np.cos(heading - there.alignment.heading(station))) > 0.0)
     doubted = np.zeros(len(at), dtype=bool)
-    for doubt in found.judgement.doubts:
+    for doubt in reconstruction.judgement.doubts:
         doubted |= (at >= doubt.start) & (at <= doubt.end)
     result = []
-    for name, measured in found.measured.section.sides.items():
+    for name, measured in reconstruction.measured.section.sides.items():
         other: Side = name if same else ("left" if name == "right" else "right")
-        marked = doubted | unlike_mask([one for one in found.unlike if one.side == name], at)
+        marked = doubted | unlike_mask([one for one in reconstruction.carriageways.unlike if one.side == name], at)
         pairs = _pairs(measured, here.sections[name], there.sections[other], at, station)
-        bays = [bay for bay in found.measured.bays if bay.side == name]
+        bays = [bay for bay in reconstruction.measured.bays if bay.side == name]
         for what, error, std in pairs:
-            if what in ("median", "inner strip") and found.measured.section.kind == "single":
+            if what in ("median", "inner strip") and reconstruction.measured.section.kind == "single":
                 continue  # they have none
             deviation = _with_bays(at, std, bays) if what == "outside" else np.full(len(at), std)
             result.append(WidthErrors(name, what, np.where(inside, error, np.nan), deviation, marked))
@@ -78,10 +80,10 @@ def compare_widths(found: Reconstruction, truth: RoadParameters) -> list[WidthEr
 
 
 def _pairs(
-    measured: SideSection, found: CarriagewaySection, true: CarriagewaySection, at: Float, station: Float
+    measured: SideSection, reconstructed: CarriagewaySection, true: CarriagewaySection, at: Float, station: Float
 ) -> Iterator[tuple[str, Float, float]]:
     """Yield (name, found less true (K,), deviation), m, of the widths of one side."""
-    widths = [_widths(section, where) for section, where in ((found, at), (true, station))]
+    widths = [_widths(section, where) for section, where in ((reconstructed, at), (true, station))]
     yield "median", widths[0][0] - widths[1][0], measured.inner_offset.std
     yield "inner strip", widths[0][1] - widths[1][1], measured.inner_strip.std
     there, lanes = widths[1][2], measured.lanes

@@ -12,6 +12,7 @@ from synthroads_addon.base.arrays import Float
 from synthroads_addon.reconstruction.axis import Options, find_axis, straighten_path
 from synthroads_addon.reconstruction.branches import find_branch
 from synthroads_addon.reconstruction.cloud import read_road_cloud
+from synthroads_addon.reconstruction.edges import Pavement
 from synthroads_addon.reconstruction.layout import Band, RoadLayout, axis_from_lines
 from synthroads_addon.reconstruction.lines import Line
 from synthroads_addon.reconstruction.path import CloudPath
@@ -95,11 +96,12 @@ def test_lines_beside_it_are_no_branches(seed: int) -> None:
 
 def test_the_axis_goes_between_the_branches() -> None:
     painted = (ROW > 120.0) & ((ROW < 180.0) | (ROW % 6.0 < 3.0))
-    branch = find_branch(drawn((TURN_LANE, painted)), middle_line())
+    profiles = drawn((TURN_LANE, painted))
+    branch = find_branch(profiles, middle_line())
     edges = middle_line(), middle_line()
     track = replace(middle_line(), measured=np.full(len(STATIONS), -1.8), offsets=np.full(len(STATIONS), -1.8))
     parted = Band(-3.5, 3.5, [track, middle_line()], edges, branch=branch)
-    axis = axis_from_lines(RoadLayout("single", (parted,), np.zeros((300, 160)), ()))
+    axis = axis_from_lines(RoadLayout("single", (parted,), Pavement(profiles, profiles.count), ()))
     assert np.abs(axis.offsets - 0.5 * beside(TURN_LANE)).max() < 0.4
 
 

@@ -15,6 +15,7 @@ from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.reconstruction.cloud import read_road_cloud
+from synthroads_addon.reconstruction.edges import Pavement
 from synthroads_addon.reconstruction.judgement import Judgement, judge
 from synthroads_addon.reconstruction.layout import Band, RoadLayout
 from synthroads_addon.reconstruction.lines import Line
@@ -60,10 +61,10 @@ def judged(ground: Profiles, *guides: Line) -> Judgement:
     """Return what is said of an axis made from one line in the middle, or from the inner ones of two carriageways."""
     if len(guides) == 1:
         bands = (Band(-4.0, 4.0, [guides[0]], (line(-4.0, 0.0), line(4.0, 0.0))),)
-        return judge(ground, RoadLayout("single", bands, ground.count, ()), [0.0])
+        return judge(RoadLayout("single", bands, Pavement(ground, ground.count), ()), [0.0])
     right, left = guides
     bands = (Band(-12.0, -2.0, [right], (line(-12.0, 0.0), right)), Band(2.0, 12.0, [left], (left, line(12.0, 0.0))))
-    return judge(ground, RoadLayout("dual", bands, ground.count, ()), [-7.0, 7.0])
+    return judge(RoadLayout("dual", bands, Pavement(ground, ground.count), ()), [-7.0, 7.0])
 
 
 def reasons(judgement: Judgement) -> set[str]:
@@ -135,7 +136,8 @@ def test_where_the_innermost_line_lies_between_rows_of_points_those_beside_it_ca
     edges = line(-12.0, 0.0), line(-2.0, 0.0)
     right = Band(-12.0, -2.0, [beside, inner], edges)
     left = Band(2.0, 12.0, [line(2.5)], (line(2.0, 0.0), line(12.0, 0.0)))
-    assert judge(ground, RoadLayout("dual", (right, left), ground.count, ()), [-7.0, 7.0]).doubts == []
+    layout = RoadLayout("dual", (right, left), Pavement(ground, ground.count), ())
+    assert judge(layout, [-7.0, 7.0]).doubts == []
 
 
 def test_where_brightness_tells_no_edge_the_classes_do() -> None:
@@ -163,7 +165,7 @@ def test_where_views_disagree_the_axis_is_open_and_what_lies_between_is_not_trus
     ground, rivals = profiles([(-3.5, 3.5)]), np.zeros(ROWS // 5, dtype=bool)
     rivals[[*range(8, 14), *range(19, 26)]] = True
     bands = (Band(-4.0, 4.0, [line(0.0)], (line(-4.0, 0.0), line(4.0, 0.0))),)
-    (doubt,) = judge(ground, RoadLayout("single", bands, ground.count, ()), [0.0], rivals).doubts
+    (doubt,) = judge(RoadLayout("single", bands, Pavement(ground, ground.count), ()), [0.0], rivals).doubts
     assert (doubt.start, doubt.end) == (30.0, 140.0)
     assert doubt.reasons == ("views of it disagree by more than 1 m",)
 

@@ -5,13 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synthroads_addon.base.arrays import Float
-from synthroads_addon.reconstruction.layout import Band, RoadLayout, axis_from_lines, axis_guides, find_layout
+from synthroads_addon.base.arrays import Bool, Float
+from synthroads_addon.reconstruction.edges import Pavement
+from synthroads_addon.reconstruction.layout import Band, RoadKind, RoadLayout, axis_from_lines, axis_guides, find_layout
 from synthroads_addon.reconstruction.lines import Line
 from synthroads_addon.reconstruction.path import CloudPath
 from synthroads_addon.reconstruction.profiles import Profiles
 
 STATIONS: Float = 5.0 * np.arange(60) + 2.5
+ROWS: Float = np.arange(300) + 0.5
+OFFSETS: Float = 0.1 * (np.arange(400) + 0.5) - 20.0
+
+
+def profiles(paved: Bool) -> Profiles:
+    """Return 300 m of level profiles with pavement in a mask (300, 400)."""
+    path = CloudPath(np.column_stack([np.arange(301.0), np.zeros(301)]), np.zeros(301))
+    ones = np.ones(paved.shape, np.float32)
+    return Profiles(path, ROWS, OFFSETS, ones, 0.0 * ones, paved.astype(np.float32), 0.0 * ones, ones)
+
+
+def layout(kind: RoadKind, *bands: Band) -> RoadLayout:
+    """Return a layout of bands on ground that is paved everywhere."""
+    ground = profiles(np.ones((len(ROWS), len(OFFSETS)), dtype=bool))
+    return RoadLayout(kind, bands, Pavement(ground, ground.count), ())
 
 
 def line(offset: float | Float, width: float = 0.15) -> Line:
@@ -33,7 +49,7 @@ def test_a_lane_that_ends_moves_the_axis_nowhere(begin: float) -> None:
     gap = np.where((STATIONS > 100.0) & (STATIONS < 140.0), np.nan, 0.0)
     for guide in guides:  # where its own lines are hidden the others carry the axis on
         guide.measured[:] += gap
-    axis = axis_from_lines(RoadLayout("dual", (right, left), np.zeros((300, 200)), ()))
+    axis = axis_from_lines(layout("dual", right, left))
     assert np.abs(axis.offsets).max() < 0.05
     assert np.isfinite(axis.raw).all()
 
@@ -43,19 +59,16 @@ def part_of(offset: float, start: float, end: float) -> Line:
     whole = line(offset)
     inside = (start < STATIONS) & (end > STATIONS)
     measured = np.where(inside, whole.measured, np.nan)
-    return Line(STATIONS, measured, measured, whole.std, whole.apart, whole.cover, start, end, 0.15)
+    return Line(STATIONS, measured, measured, whole.std, whole.spacing, whole.cover, start, end, 0.15)
 
 
 def test_a_lane_that_begins_in_the_middle_leaves_the_section_of_the_longer_part() -> None:
-    rows, offsets = 300, 0.1 * (np.arange(400) + 0.5) - 20.0
-    path = CloudPath(np.column_stack([np.arange(rows + 1.0), np.zeros(rows + 1)]), np.zeros(rows + 1))
-    station = np.arange(rows) + 0.5
-    outer = -9.5 - 3.5 * np.clip((station - 135.0) / 30.0, 0.0, 1.0)
+    offsets, outer = OFFSETS, -9.5 - 3.5 * np.clip((ROWS - 135.0) / 30.0, 0.0, 1.0)
     paved = (offsets > outer[:, None]) & (offsets < -2.0) | (offsets > 2.0) & (offsets < 9.5)
-    ones = np.ones(paved.shape, np.float32)
-    profiles = Profiles(path, station, offsets, ones, 0.0 * ones, paved.astype(np.float32), 0.0 * ones, ones)
     lasting = [line(-6.0), line(-2.5), line(2.5), line(6.0), line(9.25)]
-    right, left = find_layout(profiles, [part_of(-9.25, 0.0, 135.0), part_of(-12.75, 165.0, 300.0), *lasting]).bands
+    right, left = find_layout(
+        profiles(paved), [part_of(-9.25, 0.0, 135.0), part_of(-12.75, 165.0, 300.0), *lasting]
+    ).bands
     assert [right.place(one) for one in right.lines] == pytest.approx([-9.25, -6.0, -2.5], abs=0.02)
     assert (right.low, right.high) == (pytest.approx(-9.5, abs=0.1), pytest.approx(-2.0, abs=0.1))
     assert right.usual is not None
@@ -68,8 +81,8 @@ def test_a_lane_that_begins_in_the_middle_leaves_the_section_of_the_longer_part(
 def test_a_line_on_one_side_and_the_pavements_edge_on_the_other_make_no_middle() -> None:
     edges = line(-3.75, 0.0), line(3.75, 0.0)
     one_sided = Band(-3.75, 3.75, [line(3.2)], edges)
-    assert axis_guides(RoadLayout("single", (one_sided,), np.zeros((300, 200)), ())) == edges
+    assert axis_guides(layout("single", one_sided)) == edges
     both = Band(-3.75, 3.75, [line(-3.2), line(3.2)], edges)
-    assert axis_guides(RoadLayout("single", (both,), np.zeros((300, 200)), ())) == tuple(both.lines)
+    assert axis_guides(layout("single", both)) == tuple(both.lines)
     apart = Band(-3.75, 3.75, [part_of(-3.2, 0.0, 140.0), part_of(3.2, 150.0, 300.0)], edges)
-    assert axis_guides(RoadLayout("single", (apart,), np.zeros((300, 200)), ())) == edges  # never seen together
+    assert axis_guides(layout("single", apart)) == edges  # never seen together

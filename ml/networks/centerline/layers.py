@@ -152,6 +152,7 @@ class DeformableKernelPoints(nn.Module):
             seen: (N, K, width) tokens of the fixed kernel points at the same places.
         """
         places = self.places + self.spacing * torch.tanh(self.shift(seen)[..., 0])
+        # Linear weights h = max(0, 1 - |y - place| / spacing), as the influence of a KPConv's kernel points.
         away = (coord[:, None, :, 1] - places[..., None]) / self.spacing
         weight = (1.0 - away.abs()).clamp_min(0.0) * mask[:, None, :]
         mass = weight.sum(-1, keepdim=True)

@@ -53,6 +53,7 @@ def likelihood(error: Tensor, log_std: Tensor, known: Tensor, beta: float) -> Te
         beta: each term is multiplied by its variance to this power, which counts as a constant.
     """
     error = torch.where(known, error, torch.zeros_like(error))
+    # -ln N(error; 0, sigma) = (error / sigma)^2 / 2 + ln sigma + constant, times sigma^(2 beta) (Seitzer et al. 2022).
     ratio = error * torch.exp(-log_std)
     cost = functional.huber_loss(ratio, torch.zeros_like(ratio), reduction="none", delta=OUTLIER)
     terms = (cost + log_std) * torch.exp(2.0 * beta * log_std.detach())
@@ -89,20 +90,22 @@ def centerline_loss(options: LossOptions, half_width: float) -> Callable[[nn.Mod
 
     def loss(model: nn.Module, batch: Batch) -> tuple[Tensor, Figures]:
         output: Output = model(batch)
-        true, found = all_targets(batch), all_targets(output)
+        true, estimate = all_targets(batch), all_targets(output)
         known = ~torch.isnan(true)
-        error = (found - torch.where(known, true, found.detach())) / found.new_tensor(SCALE)
-        weight = found.new_tensor([1.0] + [options.corridor] * (len(TARGETS) - 1))
+        error = (estimate - torch.where(known, true, estimate.detach())) / estimate.new_tensor(SCALE)
+        weight = estimate.new_tensor([1.0] + [options.corridor] * (len(TARGETS) - 1))
         value = (weight * likelihood(error, output["log_std"], known, options.beta)).sum()
         rough = output["rough"] - torch.where(known[..., 0], true[..., 0], output["rough"].detach())
         far = functional.huber_loss(rough, torch.zeros_like(rough), reduction="none", delta=_ROUGH)
         value = value + options.rough * far.sum() / known[..., 0].sum().clamp_min(1)
         if options.places:
             number = output["logits"].shape[2]
-            places = torch.linspace(-half_width, half_width, number, device=found.device).expand(*found.shape[:2], -1)
+            places = torch.linspace(-half_width, half_width, number, device=estimate.device).expand(
+                *estimate.shape[:2], -1
+            )
             lines = [TARGETS.index(name) for name in LINES]
             entropy = cross_entropy(output["logits"], places, true[..., lines], known[..., lines])
-            share = found.new_tensor([1.0] + [options.edges] * (len(LINES) - 1))
+            share = estimate.new_tensor([1.0] + [options.edges] * (len(LINES) - 1))
             value = value + options.places * (share * entropy).sum()
         if options.fine:
             logits, places = output["fine_logits"][..., None], output["fine_places"]

@@ -44,6 +44,7 @@ _MIDDLE = {"lanes": 4.0, "lane_width": 3.5, "heading": 0.0}
 _NATURAL = {"lanes": 2.0, "lane_width": 0.3, "heading": 0.05}
 """Size of their deviations from it."""
 _LARGEST_LOG = 5.0
+"""Largest absolute logarithm of a deviation. Chosen: exp(5) m is beyond any error, and finite in half precision."""
 
 
 class ModelOptions(Part):
@@ -132,35 +133,35 @@ class CenterlineModel(nn.Module):
         coord, feat, mask = (batch[name].flatten(0, 1) for name in ("coord", "feat", "mask"))
         features = self.points(coord, feat)
         tokens, context = self.encode(self.kernel_points(coord, mask, features), coord, mask, features, shape[1])
-        found = {name: values.unflatten(0, shape) for name, values in self.heads(tokens, context).items()}
+        outputs = {name: values.unflatten(0, shape) for name, values in self.heads(tokens, context).items()}
         context = context.unflatten(0, shape)
         # Where to look again is no way for the second look's errors to reach the first.
-        guess, heading = self.line(found["center"].detach(), found, context, batch["frame"])
+        guess, heading = self.line(outputs["center"].detach(), outputs, context, batch["frame"])
         guess, heading = guess.detach(), heading.detach()
-        step, log_std, found["fine_logits"] = self.again(
+        step, log_std, outputs["fine_logits"] = self.again(
             batch["coord"], batch["mask"], features.unflatten(0, shape), guess, heading, context
         )
-        found["rough"], found["center"] = found["center"], guess + step
-        found["fine_places"] = guess[..., None] + self.again.places
-        found["log_std"] = _bound_values(torch.cat([log_std[..., None], found["log_std"]], dim=-1))
-        _, heading = self.line(found["center"].detach(), found, context, batch["frame"])
+        outputs["rough"], outputs["center"] = outputs["center"], guess + step
+        outputs["fine_places"] = guess[..., None] + self.again.places
+        outputs["log_std"] = _bound_values(torch.cat([log_std[..., None], outputs["log_std"]], dim=-1))
+        _, heading = self.line(outputs["center"].detach(), outputs, context, batch["frame"])
         place = CORRIDOR.index("heading")
-        found["corridor"] = torch.cat(
-            [found["corridor"][..., :place], heading[..., None], found["corridor"][..., place + 1 :]], dim=-1
+        outputs["corridor"] = torch.cat(
+            [outputs["corridor"][..., :place], heading[..., None], outputs["corridor"][..., place + 1 :]], dim=-1
         )
-        std = torch.exp(found["log_std"]) * found["log_std"].new_tensor(SCALE)
-        return found | {"center_std": std[..., 0], "corridor_std": std[..., 1:]}
+        std = torch.exp(outputs["log_std"]) * outputs["log_std"].new_tensor(SCALE)
+        return outputs | {"center_std": std[..., 0], "corridor_std": std[..., 1:]}
 
     def encode(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> Encoding:
         """Return the tokens encoded with their surroundings, and the context (N, D) of each of the N slices."""
         raise NotImplementedError
 
-    def line(self, center: Tensor, found: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
+    def line(self, center: Tensor, outputs: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
         """Return y (m) and direction (rad), both (B, S) in the slices' frames, of a line through regressed centres.
 
         Args:
             center: y of the centres, m; a constant.
-            found: the heads' other outputs.
+            outputs: the heads' other outputs.
             context: (B, S, D).
             frame: (B, S, 4).
         """
@@ -175,11 +176,11 @@ class SequenceModel(CenterlineModel):
         self.trust = nn.Linear(options.context, 1)
         self.stiffness = nn.Parameter(torch.tensor([-6.0, -4.0, -2.0]))
 
-    def line(self, center: Tensor, found: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
+    def line(self, center: Tensor, outputs: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
         """Return y (m) and direction (rad), both (B, S), of a parabola through the centres, weighted by context."""
         weight = torch.exp(2.0 * torch.tanh(0.5 * self.trust(context)[..., 0]))
         guess, heading = parabola(frame, center, weight, torch.exp(self.stiffness))
-        return guess, heading + found["corridor"][..., CORRIDOR.index("heading")]
+        return guess, heading + outputs["corridor"][..., CORRIDOR.index("heading")]
 
 
 def all_targets(values: Mapping[str, Tensor], kind: str = "") -> Tensor:

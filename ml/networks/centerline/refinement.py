@@ -15,6 +15,7 @@ _APART = (1, 3, 6)
 _PARABOLA_UNIT = 5.0
 """m: in this unit the places along a sequence are numbers of about one, of which parabolas are fitted well."""
 _FIRST_LOG_STD = -1.5
+"""Logarithm of the deviation, m, that an untrained network says. Chosen: 0.22 m, about what the first look leaves."""
 
 
 class Refinement(nn.Module):
@@ -104,6 +105,7 @@ def parabola(frame: Tensor, center: Tensor, weight: Tensor, stiffness: Tensor) -
     along = points[..., 0] / _PARABOLA_UNIT
     powers = torch.stack([torch.ones_like(along), along, along * along], dim=-1)
     weighted = powers * weight[..., None]
+    # Ridge regression: (X'WX + diag(stiffness)) beta = X'Wy.
     normal = weighted.transpose(1, 2) @ powers + torch.diag(stiffness)
     factors = _solve(normal, (weighted * (points[..., 1] - middle)[..., None]).sum(1))
     value = (powers @ factors[..., None])[..., 0] + middle

@@ -41,6 +41,6 @@ class Single(CenterlineModel):
             mixed = layer(mixed)
         return Tokens(mixed, moved.places, moved.heights), self.pool(mixed)
 
-    def line(self, center: Tensor, found: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
+    def line(self, center: Tensor, outputs: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
         """Return each slice's own centre y (m) and regressed heading (rad), both (B, S): no line joins slices."""
-        return center, found["corridor"][..., CORRIDOR.index("heading")]
+        return center, outputs["corridor"][..., CORRIDOR.index("heading")]

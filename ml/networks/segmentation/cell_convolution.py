@@ -1,12 +1,17 @@
 """Convolution over the cells that a cloud fills: what lies around a cell, and is there, by weights for each place.
 
 Graham, Engelcke and van der Maaten, "3D semantic segmentation with submanifold sparse convolutional networks" (2018):
-only filled cells have a result, so that surfaces stay as thin as they are.
+only filled cells have an output, so that surfaces stay as thin as they are. Of the cell n(i, k) at offset k from cell
+i, with inputs x, outputs y and weights W:
 
-On a CPU it is done place by place for the pairs of cells that are there: of a surface not half of them. A GPU would
-wait for so many small steps; there all places are gathered, empty ones as zeros, and one product of matrices does the
-rest. Either way nothing of the size cells x places x channels is kept for the gradient, and no two numbers are added to
-one at the same time, so that all runs are the same.
+    y_i = sum over k of x_n(i, k) W_k
+    dL/dx_j = sum over k and all i with n(i, k) = j of dL/dy_i W_k^T
+    dL/dW_k = sum over i of x_n(i, k)^T dL/dy_i
+
+On a CPU it is done offset by offset for the pairs of cells that are there (the rule book of that paper): of a surface
+not half of them. A GPU would wait for so many small steps; there all offsets are gathered (im2col), empty ones as
+zeros, and one product of matrices does the rest. Either way nothing of the size cells x offsets x channels is kept for
+the gradient, and no two numbers are added to one at the same time, so that all runs are the same.
 """
 
 from collections.abc import Iterator
@@ -16,25 +21,24 @@ import torch
 from torch import Tensor, nn
 
 _CHUNK = 1 << 26
-"""Numbers that are gathered at once on a GPU, to be busy."""
+"""Numbers that are gathered at once on a GPU. Chosen: 256 MiB in single precision, enough to keep a GPU busy."""
 
 
 class CellConvolution(nn.Module):
     """A layer without bias over the cells around each cell.
 
     Args:
-        places: around a cell, itself among them.
-        few: channels that go in.
-        many: channels that come out.
+        offsets: around a cell, its own among them.
+        in_channels, out_channels: as of PyTorch's convolutions.
     """
 
-    def __init__(self, places: int, few: int, many: int) -> None:
+    def __init__(self, offsets: int, in_channels: int, out_channels: int) -> None:
         super().__init__()
-        bound = (places * few) ** -0.5
-        self.weight = nn.Parameter(torch.empty(places, few, many).uniform_(-bound, bound))
+        bound = (offsets * in_channels) ** -0.5  # 1 / sqrt(fan in), as PyTorch's convolutions begin with
+        self.weight = nn.Parameter(torch.empty(offsets, in_channels, out_channels).uniform_(-bound, bound))
 
     def forward(self, values: Tensor, around: "Around") -> Tensor:
-        """Return features (M, many) of cells with features (M, few)."""
+        """Return features (M, out_channels) of cells with features (M, in_channels)."""
         device = values.device.type
         weight: Tensor = self.weight
         if torch.is_autocast_enabled(device):
@@ -47,8 +51,9 @@ class Around:
     """Which cells lie around which.
 
     Args:
-        near: (M, K) integers: the cells around each of M; M where there is none. Places must be in an order that is its
-            reverse when seen from the other cell, as rising ones are.
+        near: (M, K) integers: the cells n(i, k) around each of M; M where there is none. Offsets must be in an order
+            that is its reverse when seen from the other cell, as rising ones are: of K offsets k and K - 1 - k are
+            opposite.
     """
 
     def __init__(self, near: Tensor) -> None:
@@ -56,22 +61,22 @@ class Around:
         self._pairs: list[tuple[Tensor, Tensor]] | None = None
 
     def pairs(self) -> list[tuple[Tensor, Tensor]]:
-        """Return for each place the cells that have one there, and those that are there; made once."""
+        """Return for each offset k the cells i that have a cell there, and those cells n(i, k); made once."""
         if self._pairs is None:
-            across = self.near.T.contiguous()
-            there = across < across.shape[1]
-            counts = there.sum(dim=1).tolist()
-            own, other = there.nonzero()[:, 1], across[there].long()
-            self._pairs = list(zip(own.split(counts), other.split(counts), strict=True))
+            near_by_offset = self.near.T.contiguous()
+            mask = near_by_offset < near_by_offset.shape[1]
+            counts = mask.sum(dim=1).tolist()
+            centres, neighbours = mask.nonzero()[:, 1], near_by_offset[mask].long()
+            self._pairs = list(zip(centres.split(counts), neighbours.split(counts), strict=True))
         return self._pairs
 
 
 def convolve(values: Tensor, weight: Tensor, around: Around) -> Tensor:
-    """Return the sums (M, D) over the places around each cell of the values there (M, C) times `weight` (K, C, D)."""
+    """Return the sums (M, D) over the offsets around each cell of the values there (M, C) times `weight` (K, C, D)."""
     if torch.compiler.is_exporting():  # a graph without chunks and gradients
         return _gathered(_with_nothing(values), around.near) @ weight.flatten(0, 1)
-    way = _Pairwise if values.device.type == "cpu" else _Gathered
-    result: Tensor = way.apply(values, weight, around)
+    algorithm = _Pairwise if values.device.type == "cpu" else _Gathered
+    result: Tensor = algorithm.apply(values, weight, around)
     return result
 
 
@@ -81,8 +86,9 @@ class _Pairwise(torch.autograd.Function):
         ctx.save_for_backward(values, weight)
         ctx.around = around
         total = _sums(len(values), weight.shape[2], values)
-        for (own, other), matrix in zip(around.pairs(), weight, strict=True):
-            total.index_add_(0, own, (values.index_select(0, other) @ matrix).to(total.dtype))
+        # Within one offset no cell occurs twice on either side: no two summands meet, so that the order is fixed.
+        for (centres, neighbours), matrix in zip(around.pairs(), weight, strict=True):
+            total.index_add_(0, centres, (values.index_select(0, neighbours) @ matrix).to(total.dtype))
         return total.to(values.dtype)
 
     @staticmethod
@@ -90,12 +96,12 @@ class _Pairwise(torch.autograd.Function):
         values, weight = ctx.saved_tensors
         of_values = _sums(len(values), values.shape[1], values) if ctx.needs_input_grad[0] else None
         of_weight = torch.empty_like(weight) if ctx.needs_input_grad[1] else None
-        for place, (own, other) in enumerate(ctx.around.pairs()):
-            gradient = gradients[0].index_select(0, own)
+        for k, (centres, neighbours) in enumerate(ctx.around.pairs()):
+            gradient = gradients[0].index_select(0, centres)
             if of_values is not None:
-                of_values.index_add_(0, other, (gradient @ weight[place].T).to(of_values.dtype))
+                of_values.index_add_(0, neighbours, (gradient @ weight[k].T).to(of_values.dtype))
             if of_weight is not None:
-                of_weight[place] = values.index_select(0, other).T @ gradient
+                of_weight[k] = values.index_select(0, neighbours).T @ gradient
         return None if of_values is None else of_values.to(values.dtype), of_weight, None
 
 
@@ -110,7 +116,7 @@ class _Gathered(torch.autograd.Function):
         values, weight, near = ctx.saved_tensors
         gradient = gradients[0].contiguous()
         of_values = of_weight = None
-        if ctx.needs_input_grad[0]:  # who is to the left of one has it to the right: a convolution in reverse
+        if ctx.needs_input_grad[0]:  # n(i, k) = j means n(j, K - 1 - k) = i: a convolution with reversed offsets
             of_values = _product(gradient, weight.flip(0).transpose(1, 2), near)
         if ctx.needs_input_grad[1]:
             total = _sums(weight.shape[0] * weight.shape[1], weight.shape[2], weight)
@@ -122,7 +128,7 @@ class _Gathered(torch.autograd.Function):
 
 
 def _sums(rows: int, columns: int, like: Tensor) -> Tensor:
-    """Return zeros to add to: in single precision in the place of bfloat16."""
+    """Return zeros to add to: in single precision in the place of bfloat16, whose 8 bits soon drop summands."""
     return like.new_zeros(rows, columns, dtype=torch.float32 if like.dtype == torch.bfloat16 else like.dtype)
 
 
@@ -134,12 +140,12 @@ def _product(values: Tensor, weight: Tensor, near: Tensor) -> Tensor:
 
 
 def _with_nothing(values: Tensor) -> Tensor:
-    """Return the values (M, C) with a row of zeros after them, for places where there is no cell."""
+    """Return the values (M, C) with a row of zeros after them, for offsets at which there is no cell."""
     return torch.cat([values, values.new_zeros(1, values.shape[1])])
 
 
 def _gathered(padded: Tensor, near: Tensor) -> Tensor:
-    """Return the values (M, K C) around each cell, place by place."""
+    """Return the values (M, K C) around each cell, offset by offset."""
     return padded.index_select(0, near.reshape(-1)).unflatten(0, near.shape).flatten(1)
 
 

@@ -41,7 +41,9 @@ Cells = dict[str, Tensor]
 LARGEST = (1 << BITS) - 2
 """Cells along an axis of a cloud, one to either side being left free."""
 _MOST_CLOUDS = 1 << 14
+"""Clouds of a batch at most. Chosen: with three places of 16 bits each their numbers fill 62 bits of 64."""
 _AXES = 3
+"""Of space: x, y, z."""
 _CROSS = [4, 10, 12, 13, 14, 16, 22]
 """Out of the 27 cells around one: itself and those that share a face with it."""
 _MULTIPLE = 8
@@ -88,26 +90,26 @@ def build_cells(coord: Tensor, offset: Tensor, grid: Grid, *, always_masked: boo
     places, inside = _places(coord, cloud, clouds, grid.cell)
     keys, cell = torch.unique(_keys(cloud, places), return_inverse=True)
     points = torch.bincount(cell, minlength=len(keys)).to(coord.dtype)
-    found: Cells = {"cell0": cell, "share0": points.reciprocal()[cell], "inside0": inside}
+    cells: Cells = {"cell0": cell, "share0": points.reciprocal()[cell], "inside0": inside}
     for stage in range(grid.stages):
         if stage:
             cloud, places = _apart(keys)
             coarse, parent = torch.unique(_keys(cloud, places >> 1), return_inverse=True)
-            found |= {f"parent{stage}": parent, f"children{stage}": _children(places, parent, len(coarse))}
+            cells |= {f"parent{stage}": parent, f"children{stage}": _children(places, parent, len(coarse))}
             keys = coarse
         cloud, places = _apart(keys)
         counts = torch.bincount(cloud, minlength=clouds)
-        found[f"ends{stage}"] = counts.cumsum(0)
+        cells[f"ends{stage}"] = counts.cumsum(0)
         if stage < grid.attention_from:
             near = _cells_around(keys)
-            found[f"near{stage}"] = near[:, _CROSS].contiguous() if grid.cross else near
+            cells[f"near{stage}"] = near[:, _CROSS].contiguous() if grid.cross else near
             continue
         patch, place, filled = _patches(places, cloud, counts, grid)
-        found |= {f"grid{stage}": places.to(coord.dtype), f"patch{stage}": patch, f"place{stage}": place}
+        cells |= {f"grid{stage}": places.to(coord.dtype), f"patch{stage}": patch, f"place{stage}": place}
         if filled is not None or always_masked:
             full = torch.ones(patch.shape[1:], dtype=torch.bool, device=coord.device)
-            found[f"filled{stage}"] = full if filled is None else filled
-    return found
+            cells[f"filled{stage}"] = full if filled is None else filled
+    return cells
 
 
 def _points_of_clouds(coord: Tensor, offset: Tensor) -> Tensor:
@@ -165,12 +167,12 @@ def _cells_around(keys: Tensor) -> Tensor:
     count = len(keys)
     sides = torch.arange(-1, 2, device=keys.device)
     columns = ((sides[:, None] << BITS) + sides).flatten() << BITS
-    wanted = keys[:, None] + columns - 1
-    first = torch.searchsorted(keys, wanted)
+    targets = keys[:, None] + columns - 1
+    first = torch.searchsorted(keys, targets)
     ended = torch.cat([keys, keys.new_full((1,), -1)])
     near = torch.empty(count, 9, 3, dtype=torch.int32, device=keys.device)
     for up in range(3):
-        there = ended[first] == wanted + up
+        there = ended[first] == targets + up
         near[:, :, up] = torch.where(there, first, count)
         first += there
     return near.flatten(1)
@@ -191,8 +193,8 @@ def _patches(places: Tensor, cloud: Tensor, counts: Tensor, grid: Grid) -> tuple
 
     owner = torch.repeat_interleave(torch.arange(len(sizes), device=device), number, output_size=sum(numbers))
     size, parts = counts[owner], number[owner]
-    own = torch.arange(sum(numbers), device=device) - first[owner]
-    low, high = ((one * size + parts - 1).div(parts, rounding_mode="floor") for one in (own, own + 1))
+    nth = torch.arange(sum(numbers), device=device) - first[owner]
+    low, high = ((one * size + parts - 1).div(parts, rounding_mode="floor") for one in (nth, nth + 1))
     start = (low - (width - (high - low)).div(2, rounding_mode="floor")).clamp(min=0)
     start = torch.minimum(start, (size - width).clamp(min=0))
     slots = start[:, None] + torch.arange(width, device=device)

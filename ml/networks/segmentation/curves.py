@@ -17,7 +17,9 @@ BITS = 16
 Curve = Literal["hilbert", "z-order", "hilbert-transposed", "z-order-transposed"]
 CURVES: tuple[Curve, ...] = get_args(Curve)
 _AXES = 3
+"""Of space: x, y, z."""
 _OCTANTS = 1 << _AXES
+"""Of a cell: two halves along each axis."""
 _SPREAD = ((16, 0x00FF0000FF), (8, 0x00F00F00F00F), (4, 0x0C30C30C30C3), (2, 0x249249249249))
 """Steps that part the bits of a number so that two free ones lie between: shift, and what is kept."""
 
@@ -65,6 +67,8 @@ def _hilbert_tables() -> tuple[list[int], list[int]]:
     for corner in range(_OCTANTS):
         for axis in range(_AXES):
             for octant in range(_OCTANTS):
+                # Hamilton and Rau-Chaplin 2008: an octant b of a cube that the curve enters at e, along axis d, is the
+                # inverse Gray code of (b xor e) rotated right by d + 1.
                 digit = _from_gray(_turned(octant ^ corner, -(axis + 1)))
                 entry = corner ^ _turned(_entry(digit), axis + 1)
                 digits.append(digit)

@@ -20,7 +20,9 @@ from .neighbours import TINY, Neighbourhood, Neighbours, check_ends
 _PAIRS = {"cpu": 1 << 20}
 """Pairs of queries and candidates that are held at once."""
 _PAIRS_ELSEWHERE = 1 << 23
+"""The same on a GPU. Chosen: 32 MiB for each number of a pair in single precision."""
 _LARGEST_KEY = 2**62
+"""Cells that have numbers. Chosen: 63 bits, one of them to spare."""
 
 
 def build_neighbours(coord: Tensor, offset: Tensor, neighbourhood: Neighbourhood) -> Neighbours:
@@ -44,21 +46,23 @@ def build_neighbours(coord: Tensor, offset: Tensor, neighbourhood: Neighbourhood
     order = _geometric_order(local, cloud)
     # What the network sees is rounded to the coordinates' dtype, so neighbours are those of the rounded positions.
     points = _Points(local[order].double(), cloud, count)  # sorting by cloud leaves which point is of which
-    found: Neighbours = {"positions0": local, "offset0": ends}
+    neighbours: Neighbours = {"positions0": local, "offset0": ends}
     for stage, inner in enumerate(neighbourhood.inner, start=1):
         radius = neighbourhood.stage_radius(stage)
         sample = _grid_sample(points, radius * 2.0 / 3.0)
         kept = points.select(sample)
-        found[f"positions{stage}"] = kept.xyz.to(local.dtype)
-        found[f"offset{stage}"] = torch.searchsorted(kept.cloud, torch.arange(count, device=coord.device), right=True)
-        found[f"sample{stage}"] = sample
-        found[f"group{stage}"] = _first_in_ball(kept, points, radius, neighbourhood.neighbours)
+        neighbours[f"positions{stage}"] = kept.xyz.to(local.dtype)
+        neighbours[f"offset{stage}"] = torch.searchsorted(
+            kept.cloud, torch.arange(count, device=coord.device), right=True
+        )
+        neighbours[f"sample{stage}"] = sample
+        neighbours[f"group{stage}"] = _first_in_ball(kept, points, radius, neighbourhood.neighbours)
         if inner:
-            found[f"inner{stage}"] = _first_in_ball(kept, kept, 2 * radius, neighbourhood.neighbours)
+            neighbours[f"inner{stage}"] = _first_in_ball(kept, kept, 2 * radius, neighbourhood.neighbours)
         nearest, weight = _nearest_three(points, kept, radius)
-        found[f"nearest{stage}"], found[f"weight{stage}"] = nearest, weight.to(local.dtype)
+        neighbours[f"nearest{stage}"], neighbours[f"weight{stage}"] = nearest, weight.to(local.dtype)
         points = kept
-    return _in_given_order(found, order)
+    return _in_given_order(neighbours, order)
 
 
 @dataclass(frozen=True)
@@ -242,17 +246,17 @@ def _first_in_ball(queries: _Points, support: _Points, radius: float, limit: int
 
     Every query is a support point itself, so that no ball is empty.
     """
-    found = torch.full((len(queries), limit), -1, dtype=torch.int32, device=queries.xyz.device)
+    indices = torch.full((len(queries), limit), -1, dtype=torch.int32, device=queries.xyz.device)
     if not len(queries):
-        return found
+        return indices
     for query, other, distance in _pairs(queries, support, radius):
         near = distance < radius
         key = (query[near] * len(support) + other[near]).sort().values
         row = torch.div(key, len(support), rounding_mode="floor")
         rank = _ranks(row)
         taken = rank < limit
-        found[row[taken], rank[taken]] = (key % len(support))[taken].int()
-    return torch.where(found < 0, found[:, :1], found)
+        indices[row[taken], rank[taken]] = (key % len(support))[taken].int()
+    return torch.where(indices < 0, indices[:, :1], indices)
 
 
 def _ranks(sorted_values: Tensor) -> Tensor:
@@ -272,19 +276,19 @@ def _nearest_three(points: _Points, kept: _Points, radius: float) -> tuple[Tenso
         return weight.int(), weight
     begins = torch.searchsorted(kept.cloud, torch.arange(points.count, device=device))
     nearest = begins[points.cloud][:, None].repeat(1, 3)
-    wanted = torch.bincount(kept.cloud, minlength=points.count).clamp(max=3)[points.cloud]
+    count = torch.bincount(kept.cloud, minlength=points.count).clamp(max=3)[points.cloud]
     extent = float((kept.xyz.amax(dim=0) - kept.xyz.amin(dim=0)).amax())
     left, edge = torch.arange(len(points), device=device), 4.0 / 3.0 * radius
     while len(left):
         asked = points.select(left)
         place, distance = nearest[left], points.xyz.new_full((len(left), 3), torch.inf)
-        for query, other, apart in _pairs(asked, kept, edge):
-            order = torch.argsort(apart, stable=True)
+        for query, other, step in _pairs(asked, kept, edge):
+            order = torch.argsort(step, stable=True)
             order = order[torch.argsort(query[order], stable=True)]
             rank = _ranks(query[order])
             order, rank = order[rank < 3], rank[rank < 3]
-            place[query[order], rank], distance[query[order], rank] = other[order], apart[order]
-        last = distance.gather(1, (wanted[left] - 1)[:, None])[:, 0]
+            place[query[order], rank], distance[query[order], rank] = other[order], step[order]
+        last = distance.gather(1, (count[left] - 1)[:, None])[:, 0]
         done = (last <= edge) | torch.full_like(last, edge > 2.0 * (extent + radius), dtype=torch.bool)
         nearest[left[done]] = place[done]
         weight[left[done]] = 1.0 / (distance[done] + TINY)
@@ -292,9 +296,9 @@ def _nearest_three(points: _Points, kept: _Points, radius: float) -> tuple[Tenso
     return nearest.int(), weight / weight.sum(dim=1, keepdim=True)
 
 
-def _in_given_order(found: Neighbours, order: Tensor) -> Neighbours:
+def _in_given_order(neighbours: Neighbours, order: Tensor) -> Neighbours:
     """Return tensors whose indices into the clouds, found for points in `order`, are mapped back to the given order."""
     place = torch.empty_like(order)
     place[order] = torch.arange(len(order), device=order.device)
-    turned = {name: order[found[name].long()].to(found[name].dtype) for name in ("sample1", "group1")}
-    return found | turned | {name: found[name][place] for name in ("nearest1", "weight1")}
+    turned = {name: order[neighbours[name].long()].to(neighbours[name].dtype) for name in ("sample1", "group1")}
+    return neighbours | turned | {name: neighbours[name][place] for name in ("nearest1", "weight1")}

@@ -20,6 +20,7 @@ from ..base import full_precision
 _CHUNK = {"cpu": 1 << 18}
 """Gathered numbers at once: what a CPU's cache holds, or what a GPU needs to be busy."""
 _CHUNK_ELSEWHERE = 1 << 26
+"""The same on a GPU. Chosen: 256 MiB in single precision."""
 
 
 class Norm(nn.BatchNorm1d):
@@ -99,6 +100,7 @@ class Grouping:
         feature_mean = share @ features
         # About a constant: as `share` and `sums` are centred, its value changes nothing, neither here nor in gradients.
         centred = features - feature_mean.detach()
+        # Var(f + D r) = Var(f) + 2 Cov(f, D r) + D Cov(r) D', each over all pairs, from sums over points.
         variance = (
             share @ centred.square()
             + 2.0 * ((sums.T @ centred) * directions.T).sum(dim=0)
@@ -173,8 +175,8 @@ def normalised_max(features: Tensor, weight: Tensor, norm: Norm, grouping: Group
     """
     sign = norm.scale_sign()
     turned = weight * sign[:, None]
-    directions, own = turned[:, :3], turned[:, 3:]
-    values = features @ own.T
+    directions, weights = turned[:, :3], turned[:, 3:]
+    values = features @ weights.T
     mean, variance = _statistics(norm, sign, grouping, values, directions)
     scale = norm.weight * sign * torch.rsqrt(variance + norm.eps)
     top = gather_max(torch.addmm(values, grouping.support, directions.T), grouping.index)
@@ -195,8 +197,8 @@ def normalised_max_of_two(
         grouping: who looks at whom.
     """
     first, second = norms
-    directions, own = weights[0][:, :3], weights[0][:, 3:]
-    values = features @ own.T
+    directions, linear = weights[0][:, :3], weights[0][:, 3:]
+    values = features @ linear.T
     mean, variance = _statistics(first, torch.ones_like(first.weight), grouping, values, directions)
     scale = first.weight * torch.rsqrt(variance + first.eps)
     support = torch.addmm(values, grouping.support, directions.T) * scale
@@ -237,15 +239,15 @@ class _PairsMax(torch.autograd.Function):
     def forward(
         ctx: Any, support: Tensor, offset: Tensor, index: Tensor, weight: Tensor, moments: bool
     ) -> tuple[Tensor, Tensor, Tensor]:
-        (queries, limit), (many, few) = index.shape, weight.shape
+        (queries, limit), (out_channels, in_channels) = index.shape, weight.shape
         top, column = (
-            offset.new_empty(queries, many),
-            torch.empty(queries, many, dtype=torch.uint8, device=offset.device),
+            offset.new_empty(queries, out_channels),
+            torch.empty(queries, out_channels, dtype=torch.uint8, device=offset.device),
         )
-        total, product = offset.new_zeros(few), offset.new_zeros(few, few)
-        for rows in _chunks(queries, limit * many, offset.device):
+        total, product = offset.new_zeros(in_channels), offset.new_zeros(in_channels, in_channels)
+        for rows in _chunks(queries, limit * out_channels, offset.device):
             pairs = _pairs(support, offset[rows], index[rows])
-            after = (pairs @ weight.T).view(-1, limit, many)
+            after = (pairs @ weight.T).view(-1, limit, out_channels)
             top[rows] = after.amax(dim=1)
             column[rows] = _first_column(after, top[rows]).to(torch.uint8)
             if moments:
@@ -259,15 +261,15 @@ class _PairsMax(torch.autograd.Function):
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, Tensor, None, Tensor, None]:
         support, offset, index, weight, column = ctx.saved_tensors
         of_top, of_total, of_product = gradients
-        limit, many = index.shape[1], weight.shape[0]
+        limit, out_channels = index.shape[1], weight.shape[0]
         of_support, of_offset, of_weight = (torch.zeros_like(each) for each in (support, offset, weight))
         both = of_product + of_product.T
-        for rows in _chunks(len(index), limit * many, offset.device):
+        for rows in _chunks(len(index), limit * out_channels, offset.device):
             pairs = _pairs(support, offset[rows], index[rows])
-            of_after = pairs.new_zeros(len(of_top[rows]), limit, many)
+            of_after = pairs.new_zeros(len(of_top[rows]), limit, out_channels)
             of_after.scatter_(1, column[rows, None].long(), of_top[rows, None])
-            of_weight.addmm_(of_after.view(-1, many).T, pairs)
-            of_pairs = of_after.view(-1, many) @ weight
+            of_weight.addmm_(of_after.view(-1, out_channels).T, pairs)
+            of_pairs = of_after.view(-1, out_channels) @ weight
             if ctx.moments:
                 of_pairs.addmm_(pairs, both).add_(of_total)
             of_pairs.mul_(pairs.sign())  # through the ReLU
@@ -295,9 +297,9 @@ def pairs_max(
     """
     if torch.compiler.is_exporting():
         pairs = support.index_select(0, index.reshape(-1)).unflatten(0, index.shape)
-        few = weight.shape[1]
+        in_channels = weight.shape[1]
         after = torch.relu(pairs + offset[:, None]) @ weight.T
-        return after.amax(dim=1), offset.new_zeros(few), offset.new_zeros(few, few)
+        return after.amax(dim=1), offset.new_zeros(in_channels), offset.new_zeros(in_channels, in_channels)
     result: tuple[Tensor, Tensor, Tensor] = _PairsMax.apply(support, offset, index, weight, moments)
     return result
 

@@ -126,21 +126,21 @@ def _stages_of(coord: NDArray[np.floating], neighbourhood: Neighbourhood) -> dic
     order = geometric_order(local)
     # What the network sees is rounded to the coordinates' dtype, so neighbours are those of the rounded positions.
     points = local[order].astype(np.float64)
-    found: dict[str, NDArray[np.generic]] = {"positions0": local}
+    arrays: dict[str, NDArray[np.generic]] = {"positions0": local}
     tree = cKDTree(points) if len(points) else None
     for stage, inner in enumerate(neighbourhood.inner, start=1):
         radius = neighbourhood.stage_radius(stage)
         sample = _sample(points, radius, neighbourhood.sampling)
         kept = points[sample]
         kept_tree = cKDTree(kept) if len(kept) else None
-        found[f"positions{stage}"] = kept.astype(local.dtype)
-        found[f"sample{stage}"] = sample
-        found[f"group{stage}"] = _first_in_ball(kept_tree, tree, radius, neighbourhood.neighbours)
+        arrays[f"positions{stage}"] = kept.astype(local.dtype)
+        arrays[f"sample{stage}"] = sample
+        arrays[f"group{stage}"] = _first_in_ball(kept_tree, tree, radius, neighbourhood.neighbours)
         if inner:
-            found[f"inner{stage}"] = _first_in_ball(kept_tree, kept_tree, 2 * radius, neighbourhood.neighbours)
-        found[f"nearest{stage}"], found[f"weight{stage}"] = nearest_three(points, kept_tree)
+            arrays[f"inner{stage}"] = _first_in_ball(kept_tree, kept_tree, 2 * radius, neighbourhood.neighbours)
+        arrays[f"nearest{stage}"], arrays[f"weight{stage}"] = nearest_three(points, kept_tree)
         points, tree = kept, kept_tree
-    return _in_given_order(found, order)
+    return _in_given_order(arrays, order)
 
 
 def _about_middle(coord: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -151,12 +151,12 @@ def _about_middle(coord: NDArray[np.floating]) -> NDArray[np.floating]:
     return (exact - 0.5 * (exact.min(axis=0) + exact.max(axis=0))).astype(coord.dtype)
 
 
-def _in_given_order(found: dict[str, NDArray[np.generic]], order: Int) -> dict[str, NDArray[np.generic]]:
+def _in_given_order(arrays: dict[str, NDArray[np.generic]], order: Int) -> dict[str, NDArray[np.generic]]:
     """Return arrays whose indices into the cloud, found for points in `order`, are mapped back to the given order."""
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
-    turned = {name: order[found[name]] if len(order) else found[name] for name in ("sample1", "group1")}
-    return found | turned | {name: found[name][place] for name in ("nearest1", "weight1")}
+    turned = {name: order[arrays[name]] if len(order) else arrays[name] for name in ("sample1", "group1")}
+    return arrays | turned | {name: arrays[name][place] for name in ("nearest1", "weight1")}
 
 
 def geometric_order(points: NDArray[np.floating]) -> Int:
@@ -193,8 +193,8 @@ def farthest_sample(points: Float, count: int) -> Int:
     distance = np.full(len(points), np.inf)
     chosen = np.zeros(count, dtype=np.int64)
     for step in range(1, count):
-        apart = columns - columns[:, chosen[step - 1], None]
-        np.minimum(distance, np.square(apart, out=apart).sum(axis=0), out=distance)
+        difference = columns - columns[:, chosen[step - 1], None]
+        np.minimum(distance, np.square(difference, out=difference).sum(axis=0), out=distance)
         chosen[step] = distance.argmax()
     return chosen
 
@@ -206,7 +206,7 @@ def _first_in_ball(queries: cKDTree | None, support: cKDTree | None, radius: flo
     """
     if queries is None or support is None:
         return np.zeros((0, limit), dtype=np.int64)
-    found = np.full((queries.n, limit), -1, dtype=np.int64)
+    indices = np.full((queries.n, limit), -1, dtype=np.int64)
     for begin in range(0, queries.n, _CHUNK):
         part = queries if queries.n <= _CHUNK else cKDTree(queries.data[begin : begin + _CHUNK])
         pairs = part.sparse_distance_matrix(support, radius, output_type="ndarray")
@@ -216,8 +216,8 @@ def _first_in_ball(queries: cKDTree | None, support: cKDTree | None, radius: flo
         first = np.searchsorted(query, np.arange(part.n))
         rank = np.arange(len(key)) - first[query]
         inside = rank < limit
-        found[begin + query[inside], rank[inside]] = neighbour[inside]
-    return np.where(found < 0, found[:, :1], found)
+        indices[begin + query[inside], rank[inside]] = neighbour[inside]
+    return np.where(indices < 0, indices[:, :1], indices)
 
 
 def nearest_three(points: Float, tree: cKDTree | None) -> tuple[Int, Float]:

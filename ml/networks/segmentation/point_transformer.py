@@ -147,12 +147,12 @@ class PointTransformer(nn.Module):
         channels = options.channels
         drops = iter(torch.linspace(0.0, options.drop_path, sum(options.blocks)).tolist())
         self.stem = Pointwise(features + 3, channels[0])
-        self.pools = nn.ModuleList(Pool(few, many) for few, many in pairwise(channels))
+        self.pools = nn.ModuleList(Pool(*pair) for pair in pairwise(channels))
         self.stages = nn.ModuleList(
             Blocks(_block(options, stage, next(drops)) for _ in range(count))
             for stage, count in enumerate(options.blocks)
         )
-        self.unpools = nn.ModuleList(Unpool(few, many) for few, many in pairwise((channels[0], *channels)))
+        self.unpools = nn.ModuleList(Unpool(*pair) for pair in pairwise((channels[0], *channels)))
         self.decoder = nn.ModuleList(
             Blocks(_block(options, stage, 0.0) for _ in range(options.decoder_blocks))
             for stage in range(len(channels) - 1)
@@ -234,6 +234,8 @@ def rotations(places: Tensor, width: int) -> tuple[Tensor, Tensor]:
 
     A third of the pairs turns with each axis: pair k of K by the frequency ``_LONGEST_WAVE ** (-k / K)``.
     """
+    # Su et al. 2021 (RoPE), in three dimensions: the product of a turned query and a turned key depends on the
+    # difference of their places alone.
     pairs = width // 6
     frequency = _LONGEST_WAVE ** -(torch.arange(pairs, dtype=places.dtype, device=places.device) / pairs)
     angle = (places[:, :, None] * frequency).flatten(1)[:, None]
@@ -316,40 +318,49 @@ class AttentionBlock(nn.Module):
         assert view.patch is not None
         assert view.place is not None
         assert view.turns is not None
-        asked, offered, told = self.look(values).unflatten(1, (3, -1, self.head_width)).unbind(1)
-        asked, offered = (turned(each, *view.turns).to(told.dtype) for each in (asked, offered))
-        together = torch.stack([asked, offered, told], dim=1)
-        patches = together.index_select(0, view.patch.reshape(-1)).unflatten(0, view.patch.shape)
-        asked, offered, told = patches.transpose(1, 3).unbind(2)  # (P, heads, K, width of a head)
+        # Vaswani et al. 2017: softmax(Q K^T / sqrt(d)) V. Queries and keys are turned before cells are gathered, once
+        # for each cell and not once for each of the patches that it is in.
+        q, k, v = self.look(values).unflatten(1, (3, -1, self.head_width)).unbind(1)
+        q, k = (turned(each, *view.turns).to(v.dtype) for each in (q, k))
+        qkv = torch.stack([q, k, v], dim=1)
+        patches = qkv.index_select(0, view.patch.reshape(-1)).unflatten(0, view.patch.shape)
+        q, k, v = patches.transpose(1, 3).unbind(2)  # (P, heads, K, width of a head)
         mask = None if view.filled is None else view.filled[:, None, None]
-        seen = F.scaled_dot_product_attention(asked, offered, told, attn_mask=mask)
-        taken = seen.transpose(1, 2).flatten(2).flatten(0, 1).index_select(0, view.place)
-        joined: Tensor = self.join(taken)
+        attention = F.scaled_dot_product_attention(q, k, v, attn_mask=mask)
+        # Of the patches that a cell is in only one is asked for it: that in whose middle it lies.
+        by_cell = attention.transpose(1, 2).flatten(2).flatten(0, 1).index_select(0, view.place)
+        joined: Tensor = self.join(by_cell)
         return joined
 
 
 class Pool(nn.Module):
     """Layer to the cells of the next stage: of each channel the largest among a cell's up to eight."""
 
-    def __init__(self, few: int, many: int) -> None:
+    def __init__(self, in_channels: int, out_channels: int) -> None:
         super().__init__()
-        self.linear = nn.Linear(few, many, bias=False)
-        self.norm = Norm(many)
+        self.linear = nn.Linear(in_channels, out_channels, bias=False)
+        self.norm = Norm(out_channels)
 
     def forward(self, values: Tensor, children: Tensor) -> Tensor:
-        """Return features (M, many) of the wider cells from those of the cells within, (N, few)."""
+        """Return features (M, out_channels) of the wider cells from those of the cells within, (N, in_channels)."""
         return F.relu_(self.norm(gather_max(self.linear(values), children)))
 
 
 class Unpool(nn.Module):
     """Layer back to the stage before: what its cells had, and what the cell has that each lies in."""
 
-    def __init__(self, few: int, many: int) -> None:
+    def __init__(self, skip_channels: int, in_channels: int) -> None:
         super().__init__()
-        self.own = Pointwise(few, few)
-        self.wide = Pointwise(many, few)
+        self.own = Pointwise(skip_channels, skip_channels)
+        self.wide = Pointwise(in_channels, skip_channels)
 
-    def forward(self, own: Tensor, wide: Tensor, parent: Tensor) -> Tensor:
-        """Return features (N, few) of cells with (N, few) in wider cells with (M, many), those that `parent` names."""
-        joined: Tensor = self.own(own) + self.wide(wide).index_select(0, parent)
+    def forward(self, skip: Tensor, wide: Tensor, parent: Tensor) -> Tensor:
+        """Return features (N, skip channels) of cells from theirs before and those of the wider cells around them.
+
+        Args:
+            skip: of the stage before (N, skip channels).
+            wide: of the wider cells (M, in channels).
+            parent: (N,) the wider cell of each.
+        """
+        joined: Tensor = self.own(skip) + self.wide(wide).index_select(0, parent)
         return joined

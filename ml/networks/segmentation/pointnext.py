@@ -81,8 +81,8 @@ class PointNeXtOptions(SegmentationNetwork):
 
     def onnx_inputs(self, batch: Batch) -> OnnxInputs:
         """Return the stages' points and who looks at whom, and their lengths' names."""
-        found = build_neighbours(batch["coord"], batch["offset"], self.neighbourhood)
-        inputs = {name: value for name, value in found.items() if not name.startswith("offset")}
+        neighbours = build_neighbours(batch["coord"], batch["offset"], self.neighbourhood)
+        inputs = {name: value for name, value in neighbours.items() if not name.startswith("offset")}
         return OnnxInputs(inputs, {name: {0: f"points{_rows_of(name)}"} for name in inputs})
 
 
@@ -108,9 +108,9 @@ class PointNeXt(nn.Module):
         pairs = list(pairwise(channels))
         self.stem = nn.Linear(features, channels[0])
         self.stages = nn.ModuleList(
-            Stage(few, many, count, small) for (few, many), count in zip(pairs, options.blocks, strict=True)
+            Stage(*pair, count, small) for pair, count in zip(pairs, options.blocks, strict=True)
         )
-        self.propagations = nn.ModuleList(FeaturePropagation(few, many) for few, many in pairs)
+        self.propagations = nn.ModuleList(FeaturePropagation(*pair) for pair in pairs)
         self.head = nn.Sequential(
             Pointwise(channels[0], channels[0]), nn.Dropout(options.dropout), nn.Linear(channels[0], classes)
         )
@@ -142,23 +142,23 @@ class PointNeXt(nn.Module):
     def _groupings(self, neighbours: Neighbours, number: int, dtype: torch.dtype) -> tuple[Grouping, Grouping | None]:
         """Return the neighbourhoods of a stage's points in the stage before, and in their own (None without blocks)."""
         radius = self.options.neighbourhood.stage_radius(number)
-        before, own = (neighbours[f"positions{each}"].to(dtype) / radius for each in (number - 1, number))
-        group = Grouping(neighbours[f"group{number}"], before, own)
+        before, points = (neighbours[f"positions{each}"].to(dtype) / radius for each in (number - 1, number))
+        group = Grouping(neighbours[f"group{number}"], before, points)
         if self.options.blocks[number - 1] == 1:
             return group, None
-        return group, Grouping(neighbours[f"inner{number}"], own / 2, own / 2)
+        return group, Grouping(neighbours[f"inner{number}"], points / 2, points / 2)
 
 
 class Stage(nn.Module):
     """One encoder stage: a set abstraction that thins the points out, and the residual blocks that follow it."""
 
-    def __init__(self, few: int, many: int, count: int, small: bool) -> None:
+    def __init__(self, in_channels: int, out_channels: int, count: int, small: bool) -> None:
         super().__init__()
-        self.abstraction = SetAbstraction(few, many, small)
-        self.blocks = nn.ModuleList(InvertedResidual(many) for _ in range(count - 1))
+        self.abstraction = SetAbstraction(in_channels, out_channels, small)
+        self.blocks = nn.ModuleList(InvertedResidual(out_channels) for _ in range(count - 1))
 
     def forward(self, values: Tensor, sample: Tensor, group: Grouping, inner: Grouping | None) -> Tensor:
-        """Return features (M, many) of the stage's points from those of the stage before, (N, few)."""
+        """Return features (M, out_channels) of the stage's points from those of the stage before, (N, in_channels)."""
         thinned: Tensor = self.abstraction(values, sample, group)
         for block in self.blocks:
             thinned = block(thinned, inner)
@@ -168,14 +168,14 @@ class Stage(nn.Module):
 class Pointwise(nn.Module):
     """A pointwise layer: linear, batch norm and, if active, ReLU."""
 
-    def __init__(self, few: int, many: int, *, active: bool = True) -> None:
+    def __init__(self, in_channels: int, out_channels: int, *, active: bool = True) -> None:
         super().__init__()
-        self.linear = nn.Linear(few, many, bias=False)
-        self.norm = Norm(many)
+        self.linear = nn.Linear(in_channels, out_channels, bias=False)
+        self.norm = Norm(out_channels)
         self.active = active
 
     def forward(self, values: Tensor) -> Tensor:
-        """Return features (N, many) of points with features (N, few)."""
+        """Return features (N, out_channels) of points with features (N, in_channels)."""
         normed: Tensor = self.norm(self.linear(values))
         return F.relu_(normed) if self.active else normed
 
@@ -186,20 +186,20 @@ class SetAbstraction(nn.Module):
     In a small network there are two layers, and what each remaining point had is added.
     """
 
-    def __init__(self, few: int, many: int, small: bool) -> None:
+    def __init__(self, in_channels: int, out_channels: int, small: bool) -> None:
         super().__init__()
-        between = many // 2 if small else many
-        self.first = nn.Linear(3 + few, between, bias=False)
+        between = out_channels // 2 if small else out_channels
+        self.first = nn.Linear(3 + in_channels, between, bias=False)
         self.first_norm = Norm(between)
-        self.second = nn.Linear(between, many, bias=False) if small else None
-        self.second_norm = Norm(many) if small else None
-        self.skip = nn.Linear(few, many) if small else None
+        self.second = nn.Linear(between, out_channels, bias=False) if small else None
+        self.second_norm = Norm(out_channels) if small else None
+        self.skip = nn.Linear(in_channels, out_channels) if small else None
 
     def forward(self, values: Tensor, sample: Tensor, grouping: Grouping) -> Tensor:
-        """Return features (M, many) of the remaining points.
+        """Return features (M, out_channels) of the remaining points.
 
         Args:
-            values: of all points (N, few).
+            values: of all points (N, in_channels).
             sample: the remaining ones among them (M,).
             grouping: whom the remaining look at.
         """
@@ -232,22 +232,22 @@ class InvertedResidual(nn.Module):
 class FeaturePropagation(nn.Module):
     """Decoder layer that interpolates a stage's features to the stage before and fuses them with that one's."""
 
-    def __init__(self, few: int, many: int) -> None:
+    def __init__(self, skip_channels: int, in_channels: int) -> None:
         super().__init__()
-        self.join = nn.Linear(few + many, few, bias=False)
-        self.join_norm = Norm(few)
-        self.second = Pointwise(few, few)
+        self.join = nn.Linear(skip_channels + in_channels, skip_channels, bias=False)
+        self.join_norm = Norm(skip_channels)
+        self.second = Pointwise(skip_channels, skip_channels)
 
-    def forward(self, own: Tensor, thin: Tensor, nearest: Tensor, weight: Tensor) -> Tensor:
-        """Return decoded features (N, few) of the points of the stage before.
+    def forward(self, skip: Tensor, thin: Tensor, nearest: Tensor, weight: Tensor) -> Tensor:
+        """Return decoded features (N, skip_channels) of the points of the stage before.
 
         Args:
-            own: features of the stage before (N, few).
-            thin: of the thin stage (M, many).
+            skip: features of the stage before (N, skip_channels).
+            thin: of the thin stage (M, in_channels).
             nearest: (N, 3) three points of the thin stage.
             weight: (N, 3) their weights.
         """
-        here, there = self.join.weight.split([own.shape[1], thin.shape[1]], dim=1)
-        joined = torch.addmm(interpolate(thin @ there.T, nearest, weight), own, here.T)
+        here, there = self.join.weight.split([skip.shape[1], thin.shape[1]], dim=1)
+        joined = torch.addmm(interpolate(thin @ there.T, nearest, weight), skip, here.T)
         refined: Tensor = self.second(F.relu_(self.join_norm(joined)))
         return refined

@@ -155,30 +155,34 @@ def _below(shade: Shade, value: Value, limit: float) -> Value:
 def _vehicle_wear(shade: Shade) -> None:
     """Seams of a vehicle's doors, and dirt on its lower part."""
     place, seams = _attribute(shade, VEHICLE_PLACE), _attribute(shade, VEHICLE_SEAMS)
-    along, height = op.component(place, "Y"), op.component(place, "Z") - VEHICLE_BASE
-    on_it = 1.0 - _below(shade, height, -1.0)
+    y, z = op.component(place, "Y"), op.component(place, "Z") - VEHICLE_BASE
+    # Where the attribute is missing it is 0, and z far below any wheel: the mask (1 on vehicles, else 0) is by that.
+    vehicle_mask = 1.0 - _below(shade, z, -1.0)
     low, high = _SEAM_HEIGHTS
-    between = _below(shade, height, high) - _below(shade, height, low)
-    for axis in "XYZ":
+    door_mask = _below(shade, z, high) - _below(shade, z, low)
+    for axis in "XYZ":  # up to three seams along the vehicle, of which 0 stands for none
         seam = op.component(seams, axis)
-        there = _below(shade, op.unary("ABSOLUTE", along - seam), _SEAM_WIDTH / 2.0)
-        there = there * (1.0 - _below(shade, op.unary("ABSOLUTE", seam), 1e-6))
-        shade.scale(1.0 - there * between * _SEAM_DARK)
-    spread = shade.noise(0.35, 3.0, (1.0, 1.0, 0.6)) * 0.5 + 0.75
-    lower = op.minimum(op.maximum((_DIRT_ENDS - height) / _DIRT_ENDS, 0.0), 1.0)
-    share = lower * lower * spread * _DIRTIEST * on_it
+        seam_mask = _below(shade, op.unary("ABSOLUTE", y - seam), _SEAM_WIDTH / 2.0)
+        seam_mask = seam_mask * (1.0 - _below(shade, op.unary("ABSOLUTE", seam), 1e-6))
+        shade.scale(1.0 - seam_mask * door_mask * _SEAM_DARK)
+    # Share of dirt: _DIRTIEST (1 - z / _DIRT_ENDS)^2 times a noise about 0.75. Chosen: wheels throw most up low.
+    noise = shade.noise(0.35, 3.0, (1.0, 1.0, 0.6)) * 0.5 + 0.75
+    depth = op.minimum(op.maximum((_DIRT_ENDS - z) / _DIRT_ENDS, 0.0), 1.0)
+    share = depth * depth * noise * _DIRTIEST * vehicle_mask
+    # The factor is over the material's mean colour, so that the dirt's own colour is divided by that.
     dirt = tuple(part / mean for part, mean in zip(_DIRT_COLOR, shade.mean.base_color, strict=True))
     assert shade.factor is not None
     shade.factor = shade.factor * (1.0 - share) + op.vector(shade.tree, *dirt) * share
     assert shade.roughness is not None
-    shade.roughness = shade.roughness + share * 0.5
+    shade.roughness = shade.roughness + share * 0.5  # chosen: dust is matter than paint
 
 
 def _joints(shade: Shade) -> None:
     """Dark joints at whole elements, by the attribute ``station``."""
     station = op.component(_attribute(shade, "station"), "X")
-    beside = op.unary("ABSOLUTE", station % ELEMENT - ELEMENT / 2)
-    joint = shade.tree.node("ShaderNodeMath", beside, _JOINT / 2, operation="LESS_THAN").value
+    distance = op.unary("ABSOLUTE", station % ELEMENT - ELEMENT / 2)
+    joint = shade.tree.node("ShaderNodeMath", distance, _JOINT / 2, operation="LESS_THAN").value
+    # A joint keeps a fifth of the brightness (chosen); the divisor is the mean, so that the element's mean stays.
     shade.scale((1.0 - joint * 0.8) / (1.0 - 0.8 * _JOINT / ELEMENT))
 
 
@@ -187,8 +191,10 @@ def _rows(shade: Shade) -> None:
     across = op.dot(shade.place, _attribute(shade, ROWS))
     drills = op.unary("SINE", across * (2.0 * math.pi / _DRILL))
     shade.scale_texture(1.0 + drills * 0.07)
-    wheels = op.unary("ABSOLUTE", op.unary("ABSOLUTE", across % _TRAM - _TRAM / 2.0) - _TRAM / 2.0 + 1.0)
-    track = shade.tree.node("ShaderNodeMath", wheels, 0.25, operation="LESS_THAN").value
+    # Two wheels, 1 m to either side of each multiple of _TRAM, leave tracks of 0.5 m (chosen: a tractor's).
+    distance = op.unary("ABSOLUTE", op.unary("ABSOLUTE", across % _TRAM - _TRAM / 2.0) - _TRAM / 2.0 + 1.0)
+    track = shade.tree.node("ShaderNodeMath", distance, 0.25, operation="LESS_THAN").value
+    # Both cover 1 m of _TRAM: the divisor is the mean, so that the field's mean stays.
     shade.scale_texture((1.0 - track * 0.4) / (1.0 - 0.4 * 1.0 / _TRAM))
 
 

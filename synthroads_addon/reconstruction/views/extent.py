@@ -10,8 +10,11 @@ from ..profiles import STRETCH, Profiles
 from ..smoothing import fill_gaps
 from .view import View
 
-_ALONG = 2  # stretches to either side whose points count
-_LEAST, _SHARE = 0.5, 0.12  # m, and of the width: standard deviation of the middle
+_ALONG = 2
+"""Stretches to either side whose points count. Chosen: a gap in the cloud is shorter."""
+_LEAST, _SHARE = 0.5, 0.12
+"""Deviation of the middle: m at least, and share of the width. Chosen: clouds cut out along a road lie about it by no
+more."""
 
 
 def view_extent(profiles: Profiles) -> View:
@@ -23,6 +26,7 @@ def view_extent(profiles: Profiles) -> View:
     there = filled.any(axis=1)
     if not there.any():
         return View("extent", np.full(stretches, np.nan), np.full(stretches, np.inf))
+    # The first filled bin from either side.
     ends = [profiles.offsets[filled.argmax(axis=1)], profiles.offsets[::-1][filled[:, ::-1].argmax(axis=1)]]
     low, high = (ndimage.median_filter(fill_gaps(np.where(there, end, np.nan)), 2 * _ALONG + 1) for end in ends)
     std = np.maximum(_LEAST, _SHARE * (high - low))

@@ -13,18 +13,28 @@ from ..smoothing import smooth
 from .view import View
 
 AGREEING = 2.0
-"""Views agree where they lie within so many standard deviations of their difference."""
+"""Views agree where they lie within so many standard deviations of their difference. Chosen: 95 % of views that see the
+same place do."""
 APART = 1.0
-"""Views that lie farther apart, m, and weigh as much, leave the axis open."""
-_RIVAL = 0.5  # of the leading views' trust that others together need to be a rival
-_STEADY = 9  # stretches over which the lead is judged
-_TRUST = 0.1  # m beside a view's deviation: the surest isn't trusted above all others together
-_VAGUE = 0.5  # m: a view less sure than this leads the less
-_WAVELENGTH = 60.0  # m
+"""Views that lie farther apart, m, and weigh as much, leave the axis open. Chosen: less than half of a lane, more than
+views of one axis scatter by."""
+_RIVAL = 0.5
+"""Share of the leading views' trust that others together need to be a rival. Chosen: half as trustworthy is still a
+doubt."""
+_STEADY = 9
+"""Stretches over which the lead is judged. Chosen: 45 m, so that it doesn't change at each fault."""
+_TRUST = 0.1
+"""Distance beside a view's deviation, m. Chosen: the surest isn't trusted above all others together."""
+_VAGUE = 0.5
+"""Deviation from which on a view leads the less, m. Chosen: what agrees with everything leads nowhere."""
+_WAVELENGTH = 60.0
+"""Wavelength of which half of the axis' swings is kept, m. Chosen: shorter ones are noise."""
 DEFINITION = 0.15
 """Standard deviation, m, of where a road's axis is said to lie about where its markings and edges put it."""
-_SAME = 0.3  # m: axes of two grids that lie farther apart are two places
-_DRIFT = 0.02  # m per m of a gap that the axis may leave its course by
+_SAME = 0.3
+"""Distance of the axes of two grids that are one place, m. Chosen: three bins."""
+_DRIFT = 0.02
+"""Way that the axis may leave its course by in a gap, m per m. Chosen: a curve of 600 m does over 25 m."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +69,7 @@ def fuse(stations: Float, views: Sequence[View]) -> FusedAxis:
     offsets = np.array([view.offsets for view in views])
     std = np.array([view.std for view in views])
     seen = np.isfinite(offsets)
+    # A view leads by the trust of all that agree with it: one that is alone leads nowhere, however sure it says it is.
     together = _agreement(offsets, std, seen)
     trust = np.where(seen, 1.0 / (_TRUST + np.where(seen, std, 1.0)), 0.0)
     mass = np.einsum("vwk,wk->vk", together.astype(np.float64), trust)
@@ -68,6 +79,7 @@ def fuse(stations: Float, views: Sequence[View]) -> FusedAxis:
     columns = np.arange(len(stations))
     member = together[leader, :, columns].T & seen
     raw, deviation = _weighted_mean(offsets, std, member)
+    # Rivals are what the others say together, not one by one: several views may slip to the same place.
     against = seen & ~member & (np.abs(offsets - raw) > APART)
     lead, rival = (trust * member).sum(axis=0), (trust * against).sum(axis=0)
     opened = ndimage.binary_opening(rival > _RIVAL * lead, np.ones(3))
@@ -104,9 +116,9 @@ def _mean_where(counted: Bool, values: Float) -> Float:
 def _agreement(offsets: Float, std: Float, seen: Bool) -> Bool:
     """Return (V, V, K) whether two views agree in a stretch; each seen one agrees with itself."""
     with np.errstate(invalid="ignore"):
-        apart = np.abs(offsets[:, None] - offsets[None])
+        distance = np.abs(offsets[:, None] - offsets[None])
         allowed = AGREEING * np.hypot(std[:, None], std[None])
-        return np.asarray(seen[:, None] & seen[None] & (apart <= allowed))
+        return np.asarray(seen[:, None] & seen[None] & (distance <= allowed))
 
 
 def _weighted_mean(offsets: Float, std: Float, member: Bool) -> tuple[Float, Float]:
@@ -116,6 +128,7 @@ def _weighted_mean(offsets: Float, std: Float, member: Bool) -> tuple[Float, Flo
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.where(total > 0.0, (weight * np.where(member, offsets, 0.0)).sum(axis=0) / total, np.nan)
         square = (weight * np.square(np.where(member, offsets - mean, 0.0))).sum(axis=0)
+        # Birge 1932: the mean's variance 1 / sum of w is widened by chi^2 / (n - 1) where that is above 1.
         scatter = square / np.maximum(member.sum(axis=0) - 1, 1)
         return mean, np.sqrt(np.maximum(1.0, scatter) / total)
 
@@ -128,7 +141,8 @@ def _along(stations: Float, raw: Float, deviation: Float) -> tuple[Float, Float]
     weights = np.where(known, 1.0 / np.square(np.where(known, deviation, 1.0)), 0.0)
     smoothed = smooth(raw, weights, STRETCH * SPACING, _WAVELENGTH, usual=0.03)
     values = np.interp(stations, stations[known], smoothed.values[known])  # no curve is guessed where nothing was seen
+    # Nothing is known of the course within a gap but its ends: the deviation grows with the distance from these.
     gap = STRETCH * SPACING * ndimage.distance_transform_edt(~known)
     std = np.interp(stations, stations[known], deviation[known])
-    own = np.where(known, np.abs(np.where(known, raw, 0.0) - values), 0.0)
-    return values, np.sqrt(std**2 + ndimage.uniform_filter1d(own, 5) ** 2 + np.square(_DRIFT * gap))
+    residual = np.where(known, np.abs(np.where(known, raw, 0.0) - values), 0.0)
+    return values, np.sqrt(std**2 + ndimage.uniform_filter1d(residual, 5) ** 2 + np.square(_DRIFT * gap))

@@ -6,7 +6,6 @@ import numpy as np
 
 from ...base.arrays import Float
 from ..layout import FoundAxis, RoadLayout, axis_from_lines
-from ..profiles import Profiles
 from ..smoothing import fill_gaps
 from .extent import view_extent
 from .fusion import FusedAxis, fuse
@@ -18,26 +17,25 @@ from .symmetry import view_symmetry
 from .view import View
 
 
-def find_fused_axis(profiles: Profiles, layout: RoadLayout, others: Sequence[View] = ()) -> FusedAxis:
+def find_fused_axis(layout: RoadLayout, others: Sequence[View] = ()) -> FusedAxis:
     """Return the axis that all views of profiles, and others given (a network's), agree on.
 
     Args:
-        profiles: along a path parallel to the road.
-        layout: that these profiles show.
+        layout: that profiles along a path parallel to the road show.
         others: further views in the profiles' stretches.
     """
     lines = axis_from_lines(layout)
-    return fuse(profiles.middles, [*rule_views(profiles, layout, lines), *others])
+    return fuse(layout.profiles.middles, [*rule_views(layout, lines), *others])
 
 
-def rule_views(profiles: Profiles, layout: RoadLayout, lines: FoundAxis) -> list[View]:
+def rule_views(layout: RoadLayout, lines: FoundAxis) -> list[View]:
     """Return the views that learn nothing: lines, marking period, brightness, dark skeleton, cross-profile, extent."""
-    dual = layout.kind == "dual"
+    profiles, dual = layout.profiles, layout.kind == "dual"
     cores = [0.5 * (band.low + band.high) for band in layout.bands]
     level = float(np.median(lines.offsets))
     uneven = _unevenness(layout)
     return [
-        view_lines(profiles, layout, lines),
+        view_lines(layout, lines),
         view_period(profiles, dual, level),
         view_brightness(profiles, cores, dual),
         view_skeleton(profiles, cores).less_sure(0.5 * uneven),

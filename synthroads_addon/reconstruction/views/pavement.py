@@ -15,16 +15,30 @@ from ..profiles import ACROSS, STRETCH, Grid, Profiles
 from ..smoothing import fill_gaps, robust_scale
 from .view import View
 
-_ROWS = 10  # m along the road to either side of a stretch's middle that its median profile is taken from
-_CORE = 1.5  # m to either side of a carriageway's middle that is pavement if anything is
-_PAINT = 11  # bins: brighter strips of up to this width are paint
-_KERB, _KERB_REACH = 0.05, 3  # m that a kerb rises, and bins to either side of it
-_CRACK = 9  # bins: narrower gaps in the pavement, or in the median, are cracks and seams
-_PATCH = 5  # stretches: what differs from the ground before and behind it for less is a patch, a stain, an entrance
+_ROWS = 10
+"""Distance along the road to either side of a stretch's middle that its median profile is taken from, m. Chosen: cars
+and stains are shorter."""
+_CORE = 1.5
+"""Distance to either side of a carriageway's middle that is pavement if anything is, m. Chosen: a lane."""
+_PAINT = 11
+"""Widest bright strip that is paint, bins. Chosen: double lines."""
+_KERB, _KERB_REACH = 0.05, 3
+"""Height that a kerb rises by, m, and bins to either side of it. Chosen: the lowest kerbs; over 0.6 m a crossfall of 8
+% rises by less."""
+_CRACK = 9
+"""Widest gap in the pavement, or in the median, that is a crack or a seam, bins. Chosen: a median is wider."""
+_PATCH = 5
+"""Stretches in which what differs from the ground before and behind it is a patch, a stain, an entrance. Chosen: 25
+m."""
 _FEWEST_ROWS = 3
-_BEYOND = 6  # bins beyond an edge, half of which must be known: else the cloud ends there, not the pavement
-_LIKE = 4.0  # times the pavement's own spread of brightness, at least, that other ground is off
-_FLOOR = 0.25  # m that the middle of the pavement is off the axis where nothing scatters
+"""Rows with points of a median. Chosen: of fewer it is a single car's or stain's."""
+_BEYOND = 6
+"""Bins beyond an edge, half of which must be known. Chosen: else the cloud ends there, not the pavement."""
+_LIKE = 4.0
+"""Times the pavement's own spread of brightness that other ground is off at least. Chosen: as in `layout`."""
+_FLOOR = 0.25
+"""Deviation of the pavement's middle from the axis where nothing scatters, m. Chosen: shoulders of two sides differ by
+as much."""
 
 
 def view_brightness(profiles: Profiles, cores: Sequence[float], dual: bool) -> View:
@@ -51,9 +65,10 @@ def pavement_edges(profiles: Profiles, cores: Sequence[float], dual: bool, at: f
     core = np.any([np.abs(profiles.offsets - middle) < _CORE for middle in cores], axis=0)
     filled = np.array([fill_gaps(row) if np.isfinite(row).any() else row for row in brightness])
     smooth = ndimage.median_filter(filled, (1, _PAINT))
+    # Paint and wear are brighter than the pavement: a low percentile of the core is its own brightness.
     levels = np.array([np.percentile(row[core], 30) if np.isfinite(row).all() else np.nan for row in smooth])
-    apart = np.abs(smooth - levels[:, None])
-    alike = known & ~(apart > _brightness_threshold(apart[known], apart[:, core]))
+    difference = np.abs(smooth - levels[:, None])
+    alike = known & ~(difference > _brightness_threshold(difference[known], difference[:, core]))
     inside = _without_patches(_close_cracks(alike) & ~steps)
     if dual:
         inside = _close_cracks(known & ~inside)
@@ -82,18 +97,19 @@ def _is_kerb(height: Float) -> Bool:
     if not np.isfinite(height).any():
         return np.zeros(len(height), dtype=bool)
     filled = ndimage.median_filter(fill_gaps(height), 3)
+    # The rise over several bins: a kerb's face may be hidden, and its two levels lie some bins apart.
     rise = np.roll(filled, -_KERB_REACH) - np.roll(filled, _KERB_REACH)
     rise[:_KERB_REACH], rise[-_KERB_REACH:] = 0.0, 0.0
     return np.asarray(np.abs(rise) > _KERB)
 
 
-def _brightness_threshold(apart: Float, core: Float) -> float:
+def _brightness_threshold(difference: Float, core: Float) -> float:
     """Return the threshold of brightness differences beyond which ground is unpaved; inf if brightness can't tell."""
-    apart, core = apart[np.isfinite(apart)], core[np.isfinite(core)]
-    if not len(apart) or not len(core):
+    difference, core = difference[np.isfinite(difference)], core[np.isfinite(core)]
+    if not len(difference) or not len(core):
         return np.inf
-    reach = otsu_threshold(apart)
-    other = apart[apart > reach]
+    reach = otsu_threshold(difference)
+    other = difference[difference > reach]
     clear = len(other) > 0 and float(np.median(other)) > _LIKE * robust_scale(core)
     return reach if clear else np.inf
 

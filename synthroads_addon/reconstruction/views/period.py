@@ -16,14 +16,25 @@ from .view import View
 
 PERIODS = (18.0, 12.0, 9.0, 6.0)
 """Dash and gap together, m: 6 + 12, 4 + 8 and 6 + 6, 3 + 6, 3 + 3 (RMS)."""
-_WINDOW = 90  # m
+_WINDOW = 90
+"""Length of paint whose period is looked for, m. Chosen: five of the longest period."""
 _FEWEST_ROWS = 45
-_CLEAR = 12.0  # power over that of noise, whose mean is 1
-_WIDTH = 3  # bins across that count as one: about a line and the points beside it
-_LANE = 2.3  # m: dashed lines are at least this far apart
-_RIVAL = 0.5  # of the best's power: another dashed line so strong leaves a single carriageway's axis open
-_FLOOR = 0.12  # m that a dashed line is off the axis where nothing scatters
-_TURN = 0.01  # m per m beside a window's middle that a path may leave the line by, at the ends
+"""Rows with points in it. Chosen: half of them."""
+_CLEAR = 12.0
+"""Power from which on a wave is no noise, whose mean is 1. Chosen: noise exceeds it with a probability of exp(-12) at
+each period."""
+_WIDTH = 3
+"""Bins across that count as one. Chosen: a line and the points beside it."""
+_LANE = 2.3
+"""Least distance of dashed lines, m. Chosen: a lane, as in `layout`."""
+_RIVAL = 0.5
+"""Share of the best's power from which on another dashed line leaves a single carriageway's axis open. Chosen: as of
+fused views."""
+_FLOOR = 0.12
+"""Deviation of a dashed line from the axis where nothing scatters, m. Chosen: a line's width."""
+_TURN = 0.01
+"""Way that a path may leave the line by beside a window's middle, at the ends, m per m. Chosen: half of what a gap may
+hide."""
 
 
 def view_period(profiles: Profiles, dual: bool, middle: float) -> View:
@@ -71,6 +82,8 @@ def dash_power(paint: Float, stations: Float) -> Float:
         mean = np.where(known, paint, 0.0).sum(axis=0) / count
         level = np.where(known, paint - mean, 0.0)
         variance = np.maximum((level**2).sum(axis=0) / count, 1e-4)
+        # Schuster 1898: the periodogram |sum of (x - mean) exp(-2 pi i s / T)|^2 over n times the variance, which of
+        # noise is exponentially distributed with the mean 1.
         waves = np.exp(-2j * np.pi * stations[None, :] / np.array(PERIODS)[:, None])
         power = np.abs(waves @ level) ** 2 / (count * variance)
     return np.where(count >= _FEWEST_ROWS, power.max(axis=0), 0.0)
@@ -84,6 +97,7 @@ def _axis_of(power: Float, offsets: Float, dual: bool, middle: float) -> float:
     if not dual:
         if not len(peaks):
             return np.nan
+        # Dashes on both sides of a lane beat alike: which of two is the axis the beat doesn't tell.
         order = np.argsort(-blurred[peaks])
         if len(order) > 1 and blurred[peaks[order[1]]] > _RIVAL * blurred[peaks[order[0]]]:
             return np.nan

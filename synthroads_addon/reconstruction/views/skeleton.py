@@ -13,13 +13,22 @@ from ...base.arrays import Bool, Float, otsu_threshold
 from ..profiles import ACROSS, STRETCH, Profiles
 from .view import View
 
-_CELL = 3  # bins across of one cell: square cells of a metre along would be too coarse across
-_MEDIAN = (7, 5)  # cells along and across whose median is a cell's brightness
-_PAINT = 5  # cells: narrower light strips are paint
-_NARROWEST, _WIDEST = 1.2, 12.0  # m from the ridge to the dark's edge
-_RIDGE = 0.9  # of the largest distance in a row: nearer to it is the ridge
-_FEWEST = 0.5  # of the cells about a ridge must be known
-_FLOOR = 0.35  # m that the ridge is off the axis where nothing scatters
+_CELL = 3
+"""Bins across of one cell. Chosen: 0.3 m hold points of any scanner; square cells of a metre would be too coarse."""
+_MEDIAN = (7, 5)
+"""Cells along and across whose median is a cell's brightness. Chosen: 7 m by 1.5 m, in which paint and stains are the
+lesser part."""
+_PAINT = 5
+"""Widest light strip that is paint, cells. Chosen: double lines, after the median."""
+_NARROWEST, _WIDEST = 1.2, 12.0
+"""Distance from the ridge to the dark's edge, m. Chosen: narrower dark is a gutter or a crack, wider no carriageway."""
+_RIDGE = 0.9
+"""Share of the largest distance in a row that is the ridge. Chosen: it is then some cells wide, whose mean scatters
+less."""
+_FEWEST = 0.5
+"""Share of the cells about a ridge that must be known. Chosen: half of them."""
+_FLOOR = 0.35
+"""Deviation of the ridge from the axis where nothing scatters, m. Chosen: a cell's width."""
 
 
 def view_skeleton(profiles: Profiles, cores: Sequence[float]) -> View:
@@ -50,6 +59,7 @@ def _dark_cells(profiles: Profiles) -> tuple[Bool, Bool, Float]:
     if not (number > 0).any():
         return known & False, known, profiles.offsets[1::_CELL][:count]
     mean = np.where(number > 0, total / np.maximum(number, 1), np.nan)
+    # Empty cells take the median brightness: they pull the threshold to neither side.
     usual = float(np.nanmedian(mean))
     median = ndimage.median_filter(np.where(np.isfinite(mean), mean, usual), _MEDIAN)
     dark = known & (median <= otsu_threshold(np.asarray(median[known], dtype=np.float64)))

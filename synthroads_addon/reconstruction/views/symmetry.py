@@ -14,16 +14,28 @@ from ..smoothing import fill_gaps, robust_scale
 from .pavement import median_profile, remove_grade
 from .view import View
 
-_REACH = 8.0  # m to either side of the path that the axis is looked for in
-_LIMIT = 2.5  # spreads: what is farther off the middle counts as that far
-_APART = 0.6  # m: places nearer to each other than twice this are alike anyway
-_INDEPENDENT = 0.4  # m across that one independent value takes
-_FEWEST = 3.0  # m on either side that must have mirror images
-_CLEAR = 3.0  # standard deviations that the best axis lies above what chance gives
-_RIVAL = 0.75  # of the best: another place so good and farther than `_OTHER` away leaves the axis open
-_OTHER = 1.0  # m
-_NEAR_BEST = 0.92  # of the best: how wide the peak is there says how sure it is
-_FLOOR = 0.25  # m that the axis of symmetry is off the axis where nothing scatters
+_REACH = 8.0
+"""Distance to either side of the path that the axis is looked for in, m. Chosen: two lanes."""
+_LIMIT = 2.5
+"""Spreads from the middle beyond which a value counts as that far. Chosen: single bright signs have no say."""
+_APART = 0.6
+"""Half the distance of the nearest pairs, m. Chosen: nearer places are alike anyway."""
+_INDEPENDENT = 0.4
+"""Width that one independent value takes, m. Chosen: some bins, which a line and blur join."""
+_FEWEST = 3.0
+"""Width on either side that must have mirror images, m. Chosen: a lane."""
+_CLEAR = 3.0
+"""Standard deviations that the best axis lies above what chance gives. Chosen: one false in some 700."""
+_RIVAL = 0.75
+"""Share of the best from which on another place leaves the axis open, if it is farther than `_OTHER` away. Chosen: one
+nearly as good can't be ruled out."""
+_OTHER = 1.0
+"""Distance of another place, m. Chosen: as of fused views."""
+_NEAR_BEST = 0.92
+"""Share of the best at which the width of the peak says how sure it is. Chosen: above the peak's flanks."""
+_FLOOR = 0.25
+"""Deviation of the axis of symmetry from the axis where nothing scatters, m. Chosen: shoulders of two sides differ by
+as much."""
 
 
 def view_symmetry(profiles: Profiles) -> View:
@@ -50,6 +62,7 @@ def _bend(height: Float) -> Float:
     """Return the second difference (U,) of a height profile over half a metre: kerbs and verges, not the crossfall."""
     if np.isfinite(height).sum() < 20:
         return np.full(len(height), np.nan)
+    # A second difference sees nothing of slopes, and the blur keeps range noise out of it.
     filled = ndimage.gaussian_filter1d(fill_gaps(height), 2.5)
     bend = np.gradient(np.gradient(filled))
     return np.where(np.isfinite(height), bend, np.nan)
@@ -60,6 +73,7 @@ def _in_spreads(values: Float) -> Float:
     if len(known) < 20:
         return np.full(len(values), np.nan)
     middle = float(np.median(known))
+    # Of a profile that is even but for a few bins the robust scale is nearly 0, and would blow up its noise.
     spread = max(robust_scale(known - middle), 0.3 * float(known.std()), 1e-9)
     return np.clip((values - middle) / spread, -_LIMIT, _LIMIT)
 
@@ -92,12 +106,15 @@ def _symmetry(values: Float) -> tuple[Float, Float]:
         (2 U - 1,) standard deviations above what unrelated values give, and number of pairs.
     """
     bins = values.shape[1]
+    # The autoconvolution sum of v_i v_(k - i) pairs each bin with its mirror image about k / 2: over the number of
+    # pairs and the variance it is their correlation, whose deviation for unrelated values is 1 / sqrt(pairs).
     total, pairs = np.zeros(2 * bins - 1), np.zeros(2 * bins - 1)
     for row in values:
         known = np.isfinite(row)
         variance = float(row[known].var()) if known.any() else 0.0
         if variance <= 0.0:
             continue
+        # Unknown bins are 0 and counted nowhere: they pull the correlation to neither side.
         level = np.where(known, row - row[known].mean(), 0.0)
         product = 0.5 * (fftconvolve(level, level) - _too_near(level * known, bins))
         count = 0.5 * (fftconvolve(known.astype(float), known.astype(float)) - _too_near(known.astype(float), bins))
@@ -105,6 +122,7 @@ def _symmetry(values: Float) -> tuple[Float, Float]:
         independent = np.maximum(count * ACROSS / _INDEPENDENT, 1.0)
         total += np.where(count > 0.0, product / np.maximum(count, 1.0) / variance * np.sqrt(independent), 0.0)
         pairs = np.maximum(pairs, count)
+    # The sum of C independent scores has the deviation sqrt(C).
     return total / np.sqrt(len(values)), pairs
 
 

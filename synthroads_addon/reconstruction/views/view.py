@@ -10,8 +10,10 @@ from ..path import SPACING
 from ..profiles import STRETCH
 from ..smoothing import smooth
 
-_WAVELENGTH = 60.0  # m: shorter swings of an axis are noise
-_RELIABLE = 0.02  # m: a view is never surer than this of one stretch
+_WAVELENGTH = 60.0
+"""Wavelength of which half of an axis' swings is kept, m. Chosen: shorter ones are noise."""
+_RELIABLE = 0.02
+"""Deviation of one stretch below which no view is, m. Chosen: paint itself sways by as much."""
 
 
 @dataclass(frozen=True)

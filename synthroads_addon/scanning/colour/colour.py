@@ -59,7 +59,9 @@ FROM_MATERIAL, FROM_NODES, NEARBY, FROM_RETURN = 0, 253, 254, 255
 """`LayerValues.source` of a material's mean, of its nodes at the very return, of a place of the same material close by,
 and of a pixel per return; n in between is the n-th best image."""
 _SRGB_POWER = np.float32(1 / 2.4)
+"""Exponent of sRGB's encoding (IEC 61966-2-1): 1 / 2.4."""
 _FALSE_COLOUR = ("roughness", "metallic", "specular")
+"""Layers that stand for red, green and blue in a picture of the surface."""
 
 
 @dataclass(frozen=True)
@@ -285,36 +287,38 @@ class MaterialLayers:
             source: (N,) of `LayerValues`.
             wanted: layers.
         """
-        found = source != FROM_MATERIAL
-        everywhere = bool(found.all())
+        rendered = source != FROM_MATERIAL
+        everywhere = bool(rendered.all())
         layers: dict[str, Float32] = {}
         for name in sorted(needed_layers(wanted, self.mode)):
             values = self.constants.chosen(name, None, channels.get(name), points.material) if everywhere else None
             if values is not None:
                 layers[name] = values
             elif name in channels:
-                use = found & np.take(self.constants.varies[name], points.material)
+                use = rendered & np.take(self.constants.varies[name], points.material)
                 layers[name] = self.constants.complete(name, channels[name].copy(), use, points.material)
             else:
                 layers[name] = take_rows(self.constants.values[name], points.material)
         arrays: dict[str, NDArray[np.generic]] = {name: layers[name] for name in layers.keys() & wanted}
         if "rgb" in wanted:
-            arrays["rgb"] = self._rgb(points, layers, channels, found)
+            arrays["rgb"] = self._rgb(points, layers, channels, rendered)
         return LayerValues(arrays, source)
 
-    def _rgb(self, points: SeenPoints, layers: dict[str, Float32], channels: dict[str, Float32], found: Bool) -> UInt16:
+    def _rgb(
+        self, points: SeenPoints, layers: dict[str, Float32], channels: dict[str, Float32], rendered: Bool
+    ) -> UInt16:
         if self.mode == "false_colour":
             return encode_srgb(np.stack([layers[name] for name in _FALSE_COLOUR], axis=1))
         color = layers["base_color"]
         if self.mode == "unlit":
             return encode_srgb(color)
-        everywhere = bool(found.all())
+        everywhere = bool(rendered.all())
         if everywhere and "sun" in channels:
             sun = channels["sun"]
         else:
             sun = color * self.light.sunlight(points.normal)
             if "sun" in channels:
-                sun[found] = channels["sun"][found]
+                sun[rendered] = channels["sun"][rendered]
         if everywhere and "sky" not in channels and self.clouds is None and (loops := point_loops()) is not None:
             light, normal = self.light, np.asarray(points.normal, np.float32)
             linear = loops.daylight(
@@ -323,7 +327,7 @@ class MaterialLayers:
             return loops.encoded(linear, np.power(linear, _SRGB_POWER))
         sky = color * self.light.sky(points.normal)
         if "sky" in channels:
-            sky[found] = channels["sky"][found]
+            sky[rendered] = channels["sky"][rendered]
         if self.clouds is not None:
             sun = sun * self.clouds.transmission(points.position, points.time)[:, None]
         return encode_srgb(sun + sky)

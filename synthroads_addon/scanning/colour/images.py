@@ -25,6 +25,7 @@ _STEEPEST = 0.02
 _LEAST_WEIGHT = 0.05
 """Share of the four pixels around a point that must show its surface."""
 _NOWHERE = np.float32(1e9)
+"""Misfit of an image that doesn't show a point. Chosen: beyond that of any that does."""
 REACH = 0.3
 """How far away a place may lie that stands for a point, m."""
 _STEPS = 2

@@ -102,6 +102,7 @@ class CloudShadows:
     def transmission(self, position: Float, time: ArrayLike) -> Float32:
         """Return the share (N,) of the direct sun at local positions (N, 3), m, and times (N,) or one time, s."""
         position = position + self._frame
+        # Along the sun's ray down to height 0, where the field is; then back with the wind to where it was at time 0.
         plan = position[:, :2] - position[:, 2:3] * self._slope
         plan = plan - np.asarray(time, np.float64).reshape(-1, 1) * self.drift
         scaled = plan / self._cell
@@ -131,6 +132,7 @@ def _cloud_field(cover: float, seed: int) -> Float32:
 def _upsample(values: Float, cells: int) -> Float:
     """Return a periodic field's rows (n, m) upsampled to (n * cells, m), with cubic steps between them."""
     t = (np.arange(cells) / cells)[:, None]
+    # Cubic Hermite step 3 t^2 - 2 t^3: without slope at both ends, so that the field has no creases.
     step = t * t * (3.0 - 2.0 * t)
     following = np.roll(values, -1, axis=0)
     blended = values[:, None, :] * (1.0 - step) + following[:, None, :] * step

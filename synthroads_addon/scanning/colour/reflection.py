@@ -18,15 +18,18 @@ from ...base.arithmetic.loops import PointLoops, point_loops
 from ...base.arrays import Float, Float32, dot_rows
 
 _COSINES, _ROUGHNESSES, _LEVELS = 24, 16, 12
-"""Grid of the tables: cosine of the view, roughness, and root of the reflectance at a right angle."""
+"""Grid of the tables: cosine of the view, roughness, and root of the reflectance at a right angle. Chosen: albedos are
+smooth in all three, so that few entries interpolate them."""
 _SAMPLES = 24
-"""Microfacets in each of two directions that an entry of the tables is the mean of."""
+"""Microfacets in each of two directions that an entry of the tables is the mean of. Chosen: 576 evenly spread ones."""
 _SMOOTHEST = 0.08
-"""Least roughness: smoother surfaces throw the sun into a spot that no return lies in."""
+"""Least roughness. Chosen: smoother surfaces throw the sun into a spot that no return lies in."""
 _MATT_F0 = 0.08
-"""Reflectance at a right angle of a specular of 1; that of 0.5 is glass's, 4 %."""
+"""Reflectance at a right angle of a specular of 1, as of Blender's Principled BSDF; that of 0.5 is glass's, 4 %."""
 _BRIGHTEST = 0.999
-"""Largest reflectance at a right angle."""
+"""Largest reflectance at a right angle. Chosen: that of 1 has an infinite index of refraction."""
+_LEAST_COSINE = 1e-4
+"""Least cosine of the view to the normal. Chosen: keeps the lobe's division by it finite where views graze."""
 
 
 def reflected_sunlight(
@@ -41,33 +44,35 @@ def reflected_sunlight(
         sun: (3,) unit vector towards the sun.
     """
     sun32 = sun.astype(np.float32)
-    towards_sun = np.clip(normal @ sun32, 0.0, None)
+    n_l = np.clip(normal @ sun32, 0.0, None)
     if (loops := point_loops()) is not None:
-        return _by_loops(loops, (color, roughness, metallic, specular), (normal, view, sun32), towards_sun)
-    towards_view = np.clip(dot_rows(normal, view), 1e-4, 1.0)
-    half = view + sun32
-    half /= np.maximum(np.sqrt(dot_rows(half, half)), 1e-6)[:, None]
-    across, between = dot_rows(normal, half), dot_rows(view, half)
+        return _by_loops(loops, (color, roughness, metallic, specular), (normal, view, sun32), n_l)
+    n_v = np.clip(dot_rows(normal, view), _LEAST_COSINE, 1.0)
+    # Walter et al. 2007: h = (i + o) / |i + o|, here i the sun and o the view.
+    h = view + sun32
+    h /= np.maximum(np.sqrt(dot_rows(h, h)), 1e-6)[:, None]
+    n_h, v_h = dot_rows(normal, h), dot_rows(view, h)
     rough = np.maximum(roughness, _SMOOTHEST)
-    gloss = _gloss(rough, towards_sun, towards_view, np.clip(across, 0.0, 1.0))
+    lobe = _gloss(rough, n_l, n_v, np.clip(n_h, 0.0, 1.0))
     tables = _tables()
-    place = tables.place(rough, towards_view)
-    bounced = tables.once(place), tables.average(place)
-    level = np.minimum(_MATT_F0 * specular, _BRIGHTEST)
-    root = np.sqrt(level)
-    albedo, average = tables.albedo(place, root), _mean_fresnel(level, root)
-    again = _compensation(average, bounced)
-    share = (1.0 - metallic) * gloss * _dielectric(level, between) * again
-    matt = ((1.0 - metallic) * (1.0 - albedo) * towards_sun)[:, None]
-    result = color * matt + share[:, None]
+    place = tables.place(rough, n_v)
+    single = tables.single(place), tables.average(place)
+    f0 = np.minimum(_MATT_F0 * specular, _BRIGHTEST)
+    root = np.sqrt(f0)
+    albedo, f_avg = tables.albedo(place, root), _mean_fresnel(f0, root)
+    gloss = (1.0 - metallic) * lobe * _dielectric(f0, v_h) * _compensation(f_avg, single)
+    # The matt base gets what the gloss leaves: (1 - albedo of the gloss) N.L, by Lambert.
+    matt = ((1.0 - metallic) * (1.0 - albedo) * n_l)[:, None]
+    result = color * matt + gloss[:, None]
     metal = np.flatnonzero(metallic > 0.0)
     if len(metal):
-        rise = (1.0 - np.clip(between[metal], 0.0, 1.0)) ** 5
-        base = color[metal]
-        fresnel = base + (1.0 - base) * rise[:, None]
-        mean = base + (1.0 - base) / 21.0
-        inside = bounced[0][metal, None], bounced[1][metal, None]
-        result[metal] += (metallic[metal] * gloss[metal])[:, None] * fresnel * _compensation(mean, inside)
+        # Schlick 1994: F = F0 + (1 - F0) (1 - V.H)^5; its mean over all directions is F0 + (1 - F0) / 21.
+        schlick = (1.0 - np.clip(v_h[metal], 0.0, 1.0)) ** 5
+        metal_f0 = color[metal]
+        fresnel = metal_f0 + (1.0 - metal_f0) * schlick[:, None]
+        metal_f_avg = metal_f0 + (1.0 - metal_f0) / 21.0
+        metal_single = single[0][metal, None], single[1][metal, None]
+        result[metal] += (metallic[metal] * lobe[metal])[:, None] * fresnel * _compensation(metal_f_avg, metal_single)
     return np.asarray(result, np.float32)
 
 
@@ -75,66 +80,74 @@ def _by_loops(
     loops: PointLoops,
     layers: tuple[Float32, Float32, Float32, Float32],
     vectors: tuple[Float32, Float32, Float32],
-    towards_sun: Float32,
+    n_l: Float32,
 ) -> Float32:
     """Return the sunlight that surfaces reflect by compiled loops, see `reflected_sunlight`; powers are NumPy's."""
     color, roughness, metallic, specular = layers
-    seen, across, between = loops.halves(*vectors)
-    rough, rise = np.asarray(np.maximum(roughness, _SMOOTHEST), np.float32), np.zeros_like(between)
+    n_v, n_h, v_h = loops.halves(*vectors)
+    rough, schlick = np.asarray(np.maximum(roughness, _SMOOTHEST), np.float32), np.zeros_like(v_h)
     metal = np.flatnonzero(metallic > 0.0)
-    rise[metal] = (1.0 - np.clip(between[metal], 0.0, 1.0)) ** 5
+    schlick[metal] = (1.0 - np.clip(v_h[metal], 0.0, 1.0)) ** 5
     tables = _tables()
-    square = np.asarray(rough**4, np.float32)
-    surfaces: list[Float32] = [color, rough, square, metallic, specular, towards_sun, seen, across, between, rise]
+    alpha2 = np.asarray(rough**4, np.float32)  # alpha = roughness^2
+    surfaces: list[Float32] = [color, rough, alpha2, metallic, specular, n_l, n_v, n_h, v_h, schlick]
     return loops.reflected(tables.arrays, (*tables.steps, _MATT_F0, _BRIGHTEST), surfaces)
 
 
-_Bounced = tuple[Float32, Float32]
-"""Share of light that microfacets throw out at once, and its mean over all directions."""
+_SingleScatter = tuple[Float32, Float32]
+"""Albedo E of microfacets that throw light out at once, for the view, and its mean E_avg over all directions."""
 
 
-def _gloss(rough: Float32, sun: Float32, view: Float32, across: Float32) -> Float32:
-    """Return pi * D * G2 / (4 * cosine of the view) of GGX microfacets (N,): the specular lobe without Fresnel."""
-    square = rough**4
-    spread = across * across * (square - 1.0) + 1.0
-    distribution = square / (spread * spread)  # times pi
-    shadow = 1.0 / (1.0 + _smith(square, sun) + _smith(square, view))
-    return np.asarray(np.where(sun > 0.0, distribution * shadow / (4.0 * view), 0.0), np.float32)
+def _gloss(rough: Float32, n_l: Float32, n_v: Float32, n_h: Float32) -> Float32:
+    """Return pi D G2 / (4 N.V) of GGX microfacets (N,): the specular lobe times N.L and pi, without Fresnel."""
+    alpha2 = rough**4  # alpha = roughness^2
+    # Walter et al. 2007, as pi D = alpha^2 / ((N.H)^2 (alpha^2 - 1) + 1)^2.
+    denominator = n_h * n_h * (alpha2 - 1.0) + 1.0
+    pi_d = alpha2 / (denominator * denominator)
+    # Heitz 2014, heights of masking and shadowing correlated: G2 = 1 / (1 + Lambda(L) + Lambda(V)).
+    g2 = 1.0 / (1.0 + _smith(alpha2, n_l) + _smith(alpha2, n_v))
+    return np.asarray(np.where(n_l > 0.0, pi_d * g2 / (4.0 * n_v), 0.0), np.float32)
 
 
-def _smith(square: NDArray[np.floating], cosine: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Return Smith's masking function lambda of GGX, of squared widths alpha^2, at cosines to the normal."""
-    squared = np.maximum(cosine * cosine, 1e-9)
-    return 0.5 * (np.sqrt(1.0 + square * (1.0 - squared) / squared) - 1.0)
+def _smith(alpha2: NDArray[np.floating], cosine: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return Smith's masking function of GGX at cosines to the normal; ``alpha2`` is the facets' alpha^2."""
+    # Heitz 2014: Lambda = (-1 + sqrt(1 + alpha^2 tan^2 theta)) / 2, with tan^2 = (1 - cos^2) / cos^2.
+    cosine2 = np.maximum(cosine * cosine, 1e-9)
+    return 0.5 * (np.sqrt(1.0 + alpha2 * (1.0 - cosine2) / cosine2) - 1.0)
 
 
-def _dielectric(level: NDArray[np.floating], cosine: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Return a dielectric's Fresnel reflectance at cosines of incidence; ``level`` is that at a right angle."""
-    root = np.sqrt(level)
-    eta = (1.0 + root) / (1.0 - root)
+def _dielectric(f0: NDArray[np.floating], cosine: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return a dielectric's Fresnel reflectance at cosines of incidence; ``f0`` is that at a right angle."""
+    root = np.sqrt(f0)
+    eta = (1.0 + root) / (1.0 - root)  # F0 = ((eta - 1) / (eta + 1))^2
+    # Walter et al. 2007, with c = |V.H| and g^2 = eta^2 - 1 + c^2:
+    # F = 1/2 ((g - c) / (g + c))^2 (1 + ((c (g + c) - 1) / (c (g - c) + 1))^2).
     c = np.clip(cosine, 0.0, 1.0)
     g = np.sqrt(np.maximum(eta * eta - 1.0 + c * c, 1e-12))
     a, b = (g - c) / (g + c), (c * (g + c) - 1.0) / (c * (g - c) + 1.0)
-    return np.asarray(np.where(level > 0.0, 0.5 * a * a * (1.0 + b * b), 0.0))
+    return np.asarray(np.where(f0 > 0.0, 0.5 * a * a * (1.0 + b * b), 0.0))
 
 
-def _compensation(mean: NDArray[np.floating], bounced: _Bounced) -> NDArray[np.floating]:
-    """Return the factor by which light that bounces between microfacets makes a gloss brighter (Turquin 2019).
+def _compensation(f_avg: NDArray[np.floating], single: _SingleScatter) -> NDArray[np.floating]:
+    """Return the factor by which light that bounces between microfacets makes a gloss brighter.
 
     Args:
-        mean: reflectance, over all directions.
-        bounced: see `_Bounced`.
+        f_avg: mean Fresnel reflectance over all directions.
+        single: see `_SingleScatter`.
     """
-    once, average = bounced
-    missing = (1.0 - once) / once
-    return np.asarray(1.0 + missing * mean * mean * average / (1.0 - mean * (1.0 - average)))
+    e, e_avg = single
+    # Turquin 2019: the lobe times 1 + F_ms (1 - E) / E, with the share F_ms of the missing light that isn't absorbed
+    # on its further bounces (Kulla and Conty 2017): F_ms = F_avg^2 E_avg / (1 - F_avg (1 - E_avg)).
+    missing = (1.0 - e) / e
+    return np.asarray(1.0 + missing * f_avg * f_avg * e_avg / (1.0 - f_avg * (1.0 - e_avg)))
 
 
-def _mean_fresnel(level: Float32, root: Float32) -> Float32:
+def _mean_fresnel(f0: Float32, root: Float32) -> Float32:
     """Return a dielectric's mean Fresnel reflectance (N,), by that at a right angle and its root."""
     eta = (1.0 + root) / (1.0 - root)
-    average = np.where(level > 0.0, (eta - 1.0) / (4.08567 + 1.00071 * eta), 0.0)
-    return np.asarray(average, np.float32)
+    # Kulla and Conty 2017, their fit for eta > 1: F_avg = (eta - 1) / (4.08567 + 1.00071 eta).
+    f_avg = np.where(f0 > 0.0, (eta - 1.0) / (4.08567 + 1.00071 * eta), 0.0)
+    return np.asarray(f_avg, np.float32)
 
 
 _GridStep = tuple[NDArray[np.intp], Float32]
@@ -159,19 +172,20 @@ class _AlbedoTables:
 
     def __init__(self) -> None:
         u, v = (axis.ravel() for axis in np.meshgrid(*((np.arange(_SAMPLES) + 0.5) / _SAMPLES for _ in range(2))))
-        cosine = np.linspace(0.02, 1.0, _COSINES)
+        cosine = np.linspace(0.02, 1.0, _COSINES)  # from 0.02: at 0 tan theta is infinite
         rough = np.linspace(_SMOOTHEST, 1.0, _ROUGHNESSES)
         root = np.linspace(0.0, np.sqrt(_MATT_F0), _LEVELS)
-        self._once = np.empty((_ROUGHNESSES, _COSINES), np.float32)
+        self._single = np.empty((_ROUGHNESSES, _COSINES), np.float32)
         self._albedo = np.empty((_ROUGHNESSES, _COSINES, _LEVELS), np.float32)
-        for i, width in enumerate(rough**2):
-            weight, between = _visible_facets(width, cosine, u, v)
-            once = weight.mean(axis=1)
-            self._once[i] = once
-            for k, level in enumerate(root**2):
-                self._albedo[i, :, k] = np.einsum("ij,ij->i", weight, _dielectric(level, between)) / len(u) / once
-        over = np.maximum(np.gradient(cosine**2), 0.0)
-        self._average = (self._once * over).sum(axis=1) / over.sum()
+        for i, alpha in enumerate(rough**2):
+            weight, v_h = _visible_facets(alpha, cosine, u, v)
+            e = weight.mean(axis=1)  # E = mean of G2 / G1 over the visible normals
+            self._single[i] = e
+            for k, f0 in enumerate(root**2):
+                self._albedo[i, :, k] = np.einsum("ij,ij->i", weight, _dielectric(f0, v_h)) / len(u) / e
+        # E_avg = 2 x integral of E mu dmu = integral of E d(mu^2).
+        measure = np.maximum(np.gradient(cosine**2), 0.0)
+        self._average = (self._single * measure).sum(axis=1) / measure.sum()
         self._cosine, self._rough, self._root = (
             (axis[0], (len(axis) - 1) / (axis[-1] - axis[0]), len(axis) - 1) for axis in (cosine, rough, root)
         )
@@ -179,7 +193,7 @@ class _AlbedoTables:
     @property
     def arrays(self) -> tuple[Float32, Float32, Float]:
         """Return the tables: (R, V) after one bounce, (R, V, L) of dielectrics, and (R,) means of the first."""
-        return self._once, self._albedo, self._average
+        return self._single, self._albedo, self._average
 
     @property
     def steps(self) -> tuple[float, ...]:
@@ -191,9 +205,9 @@ class _AlbedoTables:
         steps = _grid_step(rough, self._rough), _grid_step(view, self._cosine)
         return _Place(*steps, steps[0][0] * _COSINES + steps[1][0])
 
-    def once(self, place: _Place) -> Float32:
+    def single(self, place: _Place) -> Float32:
         """Return the directional albedo (N,) of GGX mirrors after one bounce, interpolated."""
-        return _bilinear(self._once, place, place.entry)
+        return _bilinear(self._single, place, place.entry)
 
     def average(self, place: _Place) -> Float32:
         """Return the one-bounce albedo's cosine-weighted mean over all directions (N,), interpolated."""
@@ -252,33 +266,40 @@ def _bilinear(table: Float32, place: _Place, entry: NDArray[np.intp], levels: in
     return np.asarray(low * (1.0 - u) + high * u, np.float32)
 
 
-def _visible_facets(width: float, cosine: Float, u: Float, v: Float) -> tuple[Float, Float]:
-    """Return weights G2 / G1 and cosines to the view of GGX microfacets, sampled by visible normals (Heitz 2018).
+def _visible_facets(alpha: float, cosine: Float, u1: Float, u2: Float) -> tuple[Float, Float]:
+    """Return weights G2 / G1 and cosines to the view of GGX microfacets, sampled by visible normals.
 
-    The mean of the weights is the share of the light that comes out after one bounce.
+    By Heitz 2018, "Sampling the GGX distribution of visible normals", whose symbols and order of steps these are. The
+    mean of the weights is the share of the light that comes out after one bounce.
 
     Args:
-        width: alpha of the facets.
+        alpha: width of the facets.
         cosine: (J,) of the view to the surface's normal.
-        u, v: (S,) of 0 to 1: where each sample lies.
+        u1, u2: (S,) of 0 to 1: where each sample lies.
 
     Returns:
         (J, S) each.
     """
     mu = cosine[:, None]
-    along = width * np.sqrt(1.0 - mu * mu)
-    length = np.sqrt(along * along + mu * mu)
-    along, up = along / length, mu / length  # the view (x, 0, z), seen by facets as wide as high
-    radius, angle = np.sqrt(u), 2.0 * np.pi * v
-    x, y = radius * np.cos(angle), radius * np.sin(angle)
-    share = 0.5 * (1.0 + up)
-    y = (1.0 - share) * np.sqrt(np.maximum(1.0 - x * x, 0.0)) + share * y
-    z = np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
-    half = np.stack([width * (z * along - y * up), np.broadcast_to(width * x, z.shape), y * along + z * up])
-    half[2] = np.maximum(half[2], 1e-9)
-    half /= np.sqrt(np.einsum("kij,kij->ij", half, half))
-    between = np.clip(half[0] * np.sqrt(1.0 - mu * mu) + half[2] * mu, 0.0, 1.0)
-    out = 2.0 * between * half[2] - mu
-    square = np.asarray(width * width)
-    seen, both = _smith(square, mu), _smith(square, np.maximum(out, 1e-6))
-    return np.where(out > 0.0, (1.0 + seen) / (1.0 + seen + both), 0.0), between
+    sine = np.sqrt(1.0 - mu * mu)  # the view Ve = (sine, 0, mu)
+    # 1. The view of the hemisphere that the facets' ellipsoid becomes: Vh = (alpha Ve_x, 0, Ve_z), made a unit vector.
+    vh_x = alpha * sine
+    length = np.sqrt(vh_x * vh_x + mu * mu)
+    vh_x, vh_z = vh_x / length, mu / length
+    # 2. A point (t1, t2) of the hemisphere's area as Vh sees it, in the basis T1 = (0, 1, 0), T2 = Vh x T1.
+    r, phi = np.sqrt(u1), 2.0 * np.pi * u2
+    t1, t2 = r * np.cos(phi), r * np.sin(phi)
+    s = 0.5 * (1.0 + vh_z)
+    t2 = (1.0 - s) * np.sqrt(np.maximum(1.0 - t1 * t1, 0.0)) + s * t2
+    # 3. Back onto the hemisphere: Nh = t1 T1 + t2 T2 + sqrt(1 - t1^2 - t2^2) Vh.
+    t3 = np.sqrt(np.maximum(1.0 - t1 * t1 - t2 * t2, 0.0))
+    # 4. Normal of the ellipsoid: Ne = (alpha Nh_x, alpha Nh_y, max(0, Nh_z)), made a unit vector.
+    ne = np.stack([alpha * (t3 * vh_x - t2 * vh_z), np.broadcast_to(alpha * t1, t3.shape), t2 * vh_x + t3 * vh_z])
+    ne[2] = np.maximum(ne[2], 1e-9)
+    ne /= np.sqrt(np.einsum("kij,kij->ij", ne, ne))
+    v_h = np.clip(ne[0] * sine + ne[2] * mu, 0.0, 1.0)
+    n_l = 2.0 * v_h * ne[2] - mu  # the view mirrored: L = 2 (V.H) H - V
+    # G2 / G1 = (1 + Lambda(V)) / (1 + Lambda(V) + Lambda(L)); light that leaves into the surface is lost.
+    alpha2 = np.asarray(alpha * alpha)
+    lambda_v, lambda_l = _smith(alpha2, mu), _smith(alpha2, np.maximum(n_l, 1e-6))
+    return np.where(n_l > 0.0, (1.0 + lambda_v) / (1.0 + lambda_v + lambda_l), 0.0), v_h

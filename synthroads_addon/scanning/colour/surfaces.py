@@ -84,13 +84,13 @@ class SceneSurfaces:
         located = None if mesh.surface is None else mesh.surface.locate(faces)
         result: dict[SurfaceInput, Float32] = {}
         for what in inputs:
-            values, found = np.zeros((len(faces), 4), np.float32), np.zeros(len(faces), bool)
+            values, known = np.zeros((len(faces), 4), np.float32), np.zeros(len(faces), bool)
             if mesh.surface is not None and located is not None:
-                values, found = mesh.surface.read(what, located, shares, place, normal)
+                values, known = mesh.surface.read(what, located, shares, place, normal)
             if what.kind == "normal" and towards is not None:
                 # Where the shading isn't smooth it is the face's own.
-                values[found, :3] = values[found, :3] @ rotation.T
-                values[~found, :3] = towards[~found]
+                values[known, :3] = values[known, :3] @ rotation.T
+                values[~known, :3] = towards[~known]
             result[what] = values
         return result
 

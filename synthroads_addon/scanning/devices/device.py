@@ -14,7 +14,9 @@ from ..patterns.registry import PatternModel
 from ..receiver import Receiver
 
 DEVICES = PRESETS / "devices"
+"""Folder of the shipped devices."""
 SPEED_OF_LIGHT = 299_792_458.0
+"""In vacuum, m/s: exact by the definition of the metre (SI)."""
 
 BRIGHTEST = 1000.0
 """Largest effective reflectance looked for: of retro-reflective sheeting at a right angle (a white target: 1)."""

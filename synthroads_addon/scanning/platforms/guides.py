@@ -19,8 +19,10 @@ from ...road.profile import Profile
 from ...road.section_geometry import CarriagewaySection
 from ...road.terrain import surface_elevation
 
-_SAMPLES = 201  # stations at which a lane's place is looked up
-_FULL_LANE = 1.99  # m; what is narrower is a lane that begins or ends
+_SAMPLES = 201
+"""Stations at which a lane's place is looked up. Chosen: half a percent of the road from one to the next."""
+_FULL_LANE = 1.99
+"""Width of a lane that is whole, m. Chosen: a narrower one begins or ends; schemas allow 2 m and more."""
 
 
 class Guide:

@@ -11,14 +11,20 @@ from ...base.errors import InputError
 TURNAROUND = 10.0
 """Seconds between two strips."""
 KNOT_ERROR = 2e-5
-"""Largest error of interpolation between two knots, m, in the place of a point at `KNOT_RANGE` from the scanner."""
+"""Largest error of interpolation between two knots, m, in the place of a point at `KNOT_RANGE` from the scanner.
+Chosen: a hundredth of a good scanner's range noise."""
 KNOT_RANGE = 100.0
-"""m."""
+"""Range at which a turn's error counts, m. Chosen: most points of a road are nearer."""
 
-_SLOWEST_KNOTS = 0.25  # s, where nothing turns or accelerates
-_FASTEST_KNOTS = 1e-6  # s
-_MARGIN = 0.95  # of `KNOT_ERROR`
-_MOST_STRIPS = 65_536  # a point's strip is a number of 16 bits
+_SLOWEST_KNOTS = 0.25
+"""Interval of knots where nothing turns or accelerates, s. Chosen: few knots, between which sway and bends would
+show."""
+_FASTEST_KNOTS = 1e-6
+"""Least interval of knots, s. Chosen: that of pulses at 1 MHz."""
+_MARGIN = 0.95
+"""Share of `KNOT_ERROR` that is aimed at. Chosen: the error is estimated."""
+_MOST_STRIPS = 65_536
+"""Strips of a path: a point's strip is a number of 16 bits."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,8 @@ CORNER = 10.0
 MEASURED = 0.05
 """Points of a measured line nearer than this (m) to the line through the others say nothing of its course."""
 
-_REPEATED = 1e-3  # m
+_REPEATED = 1e-3
+"""Distance of points that are one, m. Chosen: no course is told from less."""
 
 
 class PolylineGuide(Guide):
@@ -127,6 +128,7 @@ def _clothoid_lengths(turn: Float, reach: Float) -> Float:
     tangent from the corner is x + y tan(f / 2) long.
     """
     nodes, weights = np.polynomial.legendre.leggauss(20)
+    # Gauss and Legendre's rule of 20 nodes on 0 to 1 is exact to rounding for any turn that isn't refused.
     angle = np.abs(turn)[:, None] / 2.0 * ((nodes + 1.0) / 2.0) ** 2
     x, y = np.cos(angle) @ weights / 2.0, np.sin(angle) @ weights / 2.0
     half = np.abs(turn) / 2.0

@@ -15,8 +15,10 @@ from .guides import Guide
 FOLD = 0.98
 """An offset may use up to this share of the radius: beyond it the offset line would turn back on itself."""
 
-_CELL = 1.0  # m, of a track's table
-_BLOCK = 65_536  # cells, or places, evaluated at a time
+_CELL = 1.0
+"""Length of a cell of a track's table, m. Chosen: the offset line's length is smooth within."""
+_BLOCK = 65_536
+"""Cells, or places, that are evaluated at a time. Chosen: bounds memory."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
@@ -109,6 +111,7 @@ class StripTrack:
         run = distance if self.forward else self.length - distance
         cell = np.clip(np.searchsorted(table.distance, run, side="right") - 1, 0, len(table.rate) - 1)
         size = table.distance[cell + 1] - table.distance[cell]
+        # Cubic Hermite interpolation: p0 + t (m0 + t (3 d - 2 m0 - m1 + t (m0 + m1 - 2 d))), d = p1 - p0.
         t = (run - table.distance[cell]) / size
         before, after = table.station[cell], table.station[cell + 1]
         (start, end), rise = table.rate[cell].T * size, after - before
@@ -137,6 +140,7 @@ class StripTrack:
         """Return plan and heading of the guide, the track's advance along and across it by station, and its offset."""
         plan, heading, curvature, stretch = self.guide.frame(station)
         offset, slope = self.offsets(station)
+        # A line at an offset n beside curvature kappa is (1 - kappa n) times as long.
         lever = 1.0 - curvature * offset
         self._refuse_fold(station, offset, curvature, lever)
         return plan, heading, stretch * lever, slope, offset
@@ -155,6 +159,7 @@ class StripTrack:
 
     def _build(self) -> _Table:
         station = self._borders()
+        # The cell ends just before a break: there the curvature is still that of the element before.
         before, after = station[:-1], np.nextafter(station[1:], -np.inf)  # curvature on this side of a break
         distance, rate, course = np.zeros(len(station)), np.empty((len(before), 2)), np.empty((len(before), 2))
         for start in range(0, len(before), _BLOCK):
@@ -214,6 +219,7 @@ class EasedFunction:
         nodes = self._at_nodes(numbers)
         first = np.searchsorted(numbers, cell - 1.0)
         before, start, end, after = (self._near(nodes[first + 1], nodes[first + k]) for k in range(4))
+        # Catmull and Rom 1974: slopes at nodes are half the difference of their neighbours.
         t = (distance / self.step - cell)[:, None]
         m0, m1, rise = (end - before) / 2.0, (after - start) / 2.0, end - start
         return start + t * (m0 + t * (3.0 * rise - 2.0 * m0 - m1 + t * (m0 + m1 - 2.0 * rise)))

@@ -32,10 +32,14 @@ _HEAD = 4096
 """Bytes by which SBET is told from CSV."""
 _LARGEST = 1e10
 """Largest time (s: GPS time counts thousands of millions) and angle (deg)."""
-_NEAREST = 8.0  # m, of the typical range
-_GRID = 1e-6  # s, that times may lie beside an even grid
+_NEAREST = 8.0
+"""Least typical range, m. Chosen: a car's scanner to the road beside it."""
+_GRID = 1e-6
+"""Time that a row may lie beside an even grid, s. Chosen: files have six decimals."""
 _SUBDIVISIONS = 50
-_STILL = 0.5  # m/s: slower than this a platform has no course
+"""Parts of the shortest interval that are tried as an even grid's step. Chosen: rows of files are thinned by less."""
+_STILL = 0.5
+"""Speed below which a platform has no course, m/s. Chosen: positions' noise is as fast."""
 _ACROSS, _BESIDE, _ALONG = 35.0, 8.0, 4.0
 """Median angles (deg) between heading and course: too wide in any case; odd where another convention fits as well."""
 _CONVENTION = "degrees clockwise from grid north"
@@ -168,12 +172,12 @@ def check_headings(name: str, rows: Trajectory) -> None:
     def across(angle: Float) -> float:
         return float(np.median(np.abs(np.rad2deg(wrap_angle(np.deg2rad(angle - course))))))
 
-    own, others = across(heading), {what: across(angle) for what, angle in _conventions(heading).items()}
+    deviation, others = across(heading), {what: across(angle) for what, angle in _conventions(heading).items()}
     best = min(others, key=lambda what: others[what])
-    if own > _ACROSS or (own > _BESIDE and others[best] < _ALONG):
-        looks = f"; they look like {best}" if others[best] < _ALONG + 0.1 * own else ""
+    if deviation > _ACROSS or (deviation > _BESIDE and others[best] < _ALONG):
+        looks = f"; they look like {best}" if others[best] < _ALONG + 0.1 * deviation else ""
         text = "%s: headings lie %.0f degrees across the course (median); %s is needed, and roll and pitch in degrees%s"
-        warn(text, name, own, _CONVENTION, looks)
+        warn(text, name, deviation, _CONVENTION, looks)
 
 
 def _conventions(heading: Float) -> dict[str, Float]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.arrays import Float
+from synthroads_addon.reconstruction.edges import Pavement
 from synthroads_addon.reconstruction.layout import Band, RoadLayout, axis_from_lines
 from synthroads_addon.reconstruction.lines import Line
 from synthroads_addon.reconstruction.path import CloudPath
@@ -92,8 +93,8 @@ def test_where_one_carriageway_is_wider_symmetry_says_little(outer: float, uneve
         Band(outer, -2.0, [], (edges_of(outer), edges_of(-2.0))),
         Band(2.0, 11.0, [], (edges_of(2.0), edges_of(11.0))),
     )
-    layout = RoadLayout("dual", bands, road.count, ())
-    views = {view.name: view for view in rule_views(road, layout, axis_from_lines(layout))}
+    layout = RoadLayout("dual", bands, Pavement(road, road.count), ())
+    views = {view.name: view for view in rule_views(layout, axis_from_lines(layout))}
     alone = {"cross-profile": view_symmetry(road), "skeleton": view_skeleton(road, [0.5 * (outer - 2.0), 6.5])}
     for (name, own), share in zip(alone.items(), (1.0, 0.5), strict=True):
         assert views[name].std == pytest.approx(np.hypot(own.std, share * uneven))
