@@ -27,7 +27,7 @@ VARIABLE = "SYNTHROADS_KEEP_GROUPS"
 ROADS = 8
 """Roads whose groups are kept, the latest. Chosen: the shipped scenarios, and some of the user's own."""
 _NEW_SHARE = 0.2
-"""Share of a road's groups that must be new for it to replace one of `ROADS`. Chosen: a fifth costs what writing does."""
+"""Share of a road's groups that must be new for it to replace one of `ROADS`. Chosen: to write takes as long."""
 _EXTENSION = "bl_ext."
 """Beginning of the name of a package that Blender runs as an extension."""
 _SUFFIX = re.compile(r"( \(older\))?(\.[0-9]{3,})?$")
