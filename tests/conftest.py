@@ -127,8 +127,11 @@ def _empty_scene() -> None:
 
 @cache
 def _kept_groups() -> KeptGroups:
-    """Return the node groups that tests have made so far."""
+    """Return the node groups that tests have made so far; builds keep none of their own."""
+    from synthroads_addon.blender.nodes import kept_groups
     from tests.helpers.scenes.kept_groups import KeptGroups
+
+    kept_groups.kept_file = lambda: None  # type: ignore[assignment]
 
     KEPT_GROUPS.mkdir(exist_ok=True)
     return KeptGroups(KEPT_GROUPS)

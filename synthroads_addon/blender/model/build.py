@@ -20,6 +20,7 @@ from ..compat import modifier_input, object_inputs, set_modifier_input
 from ..labels import CLASS_PROPERTY
 from ..materials import remove_unused_materials, used_materials
 from ..nodes.builder import remove_unused_groups
+from ..nodes.kept_groups import keep_groups, may_keep_groups, restore_names
 from ..things.model_builder import ROLE, BuildRequest, ModelBuilder
 from ..things.registry import model_parts, required_parts
 from .edits import POSTS, keep_built
@@ -176,6 +177,7 @@ class _Build:
         renew_ids()
         self.log = DataBlockLog()
         self.share = 0.0
+        self._keeps_groups = may_keep_groups()
         root = place.root(scene)
         with self.log.record():
             self._collection = new_staging(scene)
@@ -233,7 +235,10 @@ class _Build:
         origin = np.array(parameters.transform.translate) + builder.origin
         place_root(root, origin, scene, self._place.keep_moves)
         remove_unused_materials(used)
+        if self._keeps_groups:
+            keep_groups()
         remove_unused_groups()
+        restore_names()
         builder.materials.take_usual_names()
         return RoadModel(root, collection, builder.objects, origin)
 

@@ -31,10 +31,10 @@ import bpy
 from ...base.files import PRESETS
 from ...base.turns.stepper import yield_if_due
 from .changes import Change, make_changes
+from .kept_groups import KEY as KEY  # by which others know a group too
+from .kept_groups import note_made, take_kept_group
 from .layout import arrange
 
-KEY = "synthroads_key"
-"""Custom property of a group: hash of what it was built from."""
 MATERIALS = "synthroads_materials"
 """Custom property of a group: entries of the material table by the names of the inputs that usually have them."""
 _TAGS = {"GEOMETRY": "GEOMETRY", "VECTOR": "VECTOR"}
@@ -365,7 +365,7 @@ def node_group(
     description: str = "",
     kind: str = "GeometryNodeTree",
 ) -> bpy.types.NodeTree:
-    """Return the node group of a name and arguments, reused from the open file if its version is the same, else built.
+    """Return the node group of a name and arguments, of the same version from the open file or a kept one, else built.
 
     Args:
         name: as shown in Blender; an older version of that name is renamed.
@@ -380,6 +380,9 @@ def node_group(
             return group
     if (old := bpy.data.node_groups.get(name)) and KEY in old:
         old.name = f"{name} (older)"
+    if (kept := take_kept_group(key)) is not None:
+        return kept
+    note_made()
     group = bpy.data.node_groups.new(name, kind)
     group[KEY] = key
     group.description = description or (build.__doc__ or "").strip().partition("\n")[0]
