@@ -197,7 +197,8 @@ class BlockScan:
         rows = None if towards is None else np.flatnonzero(towards)
         if plan.emission.outline is None or plan.rays_per_pulse == 1:
             return rows
-        near = np.flatnonzero(~self._missing(plan.emission.outline, beams if rows is None else beams.select(rows), motions))
+        left = beams if rows is None else beams.select(rows)
+        near = np.flatnonzero(~self._missing(plan.emission.outline, left, motions))
         if len(near) == (len(beams.time) if rows is None else len(rows)):
             return rows
         return near if rows is None else rows[near]

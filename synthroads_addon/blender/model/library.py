@@ -11,7 +11,8 @@ from ...base.files import PRESETS
 from ..files import empty_file
 from ..materials import material
 from ..nodes import points
-from ..nodes.builder import CATALOGUES, KEY, MATERIALS, usual_materials
+from ..nodes.builder import CATALOGUES, MATERIALS, usual_materials
+from ..nodes.kept_groups import KEY
 from ..things.registry import model_parts
 
 LIBRARY_FOLDER = PRESETS / "node_groups"

@@ -8,7 +8,8 @@ from typing import Any
 
 import bpy
 
-from ..nodes.builder import KEY, remove_unused_groups
+from ..nodes.builder import remove_unused_groups
+from ..nodes.kept_groups import KEY
 from ..things.model_builder import ROLE
 from .roads import ROAD
 

@@ -31,8 +31,7 @@ import bpy
 from ...base.files import PRESETS
 from ...base.turns.stepper import yield_if_due
 from .changes import Change, make_changes
-from .kept_groups import KEY as KEY  # by which others know a group too
-from .kept_groups import note_made, take_kept_group
+from .kept_groups import KEY, note_made, take_kept_group
 from .layout import arrange
 
 MATERIALS = "synthroads_materials"

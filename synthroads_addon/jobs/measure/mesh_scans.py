@@ -75,9 +75,9 @@ def measure_mesh_scans(name: str, file: Path, quick: bool) -> dict[str, Any]:
     before, timer = peak_memory_mb() or 0.0, StageTimer()
     inputs = check_scene_scan(job)
     opened, road, _ = open_and_read(job, inputs, timer, {})
-    found = measure_scene(scene_site(job, inputs, opened.static, road), opened, file, name, _RAYS[name], timer)
-    packed = {rays: rate.get("packets", rate["single rays"]) for rays, rate in found["rates"].items()}
-    lines = {f"{name}_{rays}": 100.0 * rate["ours"] / packed[rays] for rays, rate in found["rates"].items()}
+    figures = measure_scene(scene_site(job, inputs, opened.static, road), opened, file, name, _RAYS[name], timer)
+    packed = {rays: rate.get("packets", rate["single rays"]) for rays, rate in figures["rates"].items()}
+    lines = {f"{name}_{rays}": 100.0 * rate["ours"] / packed[rays] for rays, rate in figures["rates"].items()}
     scans = {
         f"{name}_{rays}": {
             "pulses_per_second": rate["pulses_per_second"],
