@@ -174,7 +174,7 @@ def scan_of(scenario, geometry, scene):
 @pytest.mark.parametrize(("name", "driven"), [("mobile-mapping-300m", True), ("rq31-600m", False)])
 def test_a_vehicle_carries_the_scanner_where_the_platform_is_one(demo, name: str, driven: bool) -> None:
     _, geometry, scene = demo
-    assert scan_of(load_scenario(name), geometry, scene).on_vehicle is driven
+    assert scan_of(load_scenario(name), geometry, scene).emission.on_vehicle is driven
 
 
 @pytest.mark.keep_scene

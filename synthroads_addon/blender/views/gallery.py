@@ -30,6 +30,7 @@ from ..materials.surface_layers import PROPERTY
 from ..model.build import build_road
 from ..scene.evaluated import scene_mesh
 from ..things.meshes import attribute
+from ..things.model_builder import BuildRequest
 from . import pictures
 from .landscape import add_landscape
 from .sward import Lawn, add_sward
@@ -143,7 +144,7 @@ class _Scene:
 def _build_scene(settings: dict[str, Any]) -> _Scene:
     empty_file()
     parameters = sample_road(RoadScenario.from_dict(settings["road"]), settings["seed"])
-    build_road(parameters, _TOLERANCE)
+    build_road(BuildRequest(parameters, _TOLERANCE))
     pictures.light(_DAYLIGHT)
     add_landscape(bpy.context.scene, parameters, _HERE)
     return _Scene(parameters, Lawn.of(bpy.context.scene, _HERE))
