@@ -143,12 +143,12 @@ def read_echoes(result: BlockResult, plan: ScanPlan) -> BlockResult:
     """
     points, readout, setting = result.points, result.readout or Readout(), plan.setting
     strong = np.flatnonzero(readout.detected(points.intensity, setting.threshold))
-    time, strip, nth = points.gps_time[strong], points.strip[strong], points.return_number[strong]
+    time, strip, nth = (np.take(one, strong) for one in (points.gps_time, points.strip, points.return_number))
     begins = np.ones(len(strong), dtype=bool)
     # Some heads fire several lasers at once: pulses of one time are told apart by their numbers, which begin anew.
     begins[1:] = (time[1:] != time[:-1]) | (strip[1:] != strip[:-1]) | (nth[1:] <= nth[:-1])
     recorded, number, returns = number_returns(np.cumsum(begins), setting.device.maximum_returns)
-    rows, seen = strong[recorded], result.seen
+    rows, seen = strong if recorded.all() else strong[recorded], result.seen
     if len(rows) < len(points):
         points, readout = points.select(rows), readout.select(rows)
         seen = None if seen is None else seen.select(rows)

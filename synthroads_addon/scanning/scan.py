@@ -498,7 +498,7 @@ class BlockScan:
         distance = echoes.range + plan.reception.noise.range_bias
         if errors.range is not None:
             delayed = setting.receiver.range_delay or 0.0
-            range_errors = errors.range_errors(number_in_block[pulse], number, delayed)
+            range_errors = errors.range_errors(np.take(number_in_block, pulse), number, delayed)
             distance = distance + range_sigma(setting, echoes.range, along, echoes.intensity) * range_errors
             if setting.receiver.range_walk:
                 gain = strip_gain(plan.reception.strip_errors, plan.run.seed, strip.index)

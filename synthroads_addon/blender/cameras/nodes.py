@@ -173,9 +173,9 @@ class NodeLayers:
         self, calculator: LayerCalculator, points: SeenPoints, rows: Index, channels: dict[str, Float32]
     ) -> None:
         """Evaluate the layers of the points of `rows` and write them into the channels, in place."""
-        material = points.material[rows]
+        material = np.take(points.material, rows)
         order = np.argsort(material, kind="stable")
-        rows, material = rows[order], material[order]
+        rows, material = np.take(rows, order), np.take(material, order)
         values = self._inputs(calculator, points, rows, material)
 
         def calculate() -> dict[str, Float32]:
@@ -234,7 +234,7 @@ class NodeLayers:
         if points.sunlit is not None:
             lit &= points.sunlit
         rows = np.flatnonzero(lit)
-        material = points.material[rows]
+        material = np.take(points.material, rows)
 
         constants = self.material.constants
 

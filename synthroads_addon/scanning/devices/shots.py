@@ -64,7 +64,9 @@ class Columns(NamedTuple):
         """Return the ``count`` columns of a table."""
         if self.rows is None:
             return _repeated(table, self.first, count)
-        return np.take(table, (self.rows + self.first) % table.shape[-1], axis=-1)
+        # Repeated up to the last one: remainders of all would take longer.
+        most = int(self.rows[-1]) + 1 if count else 0
+        return np.take(_repeated(table, self.first, most), self.rows, axis=-1)
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "step": (_INT64, (_INT64, _POINTER, _POINTER)),
     "evaluate": (None, (_INT64, *[_POINTER] * 3)),
     "candidates": (_INT64, (_INT64, _POINTER, _POINTER, _INT64, *[_POINTER] * 3, ctypes.c_double, *[_POINTER] * 3)),
-    "place": (None, (_INT64, _POINTER, _POINTER)),
+    "place": (_INT32, (_INT64, _POINTER, _POINTER)),
     "face_sun": (None, (_INT64, *[_POINTER] * 3, ctypes.c_double, *[_POINTER] * 2)),
     "sort_faces": (None, (_POINTER, _INT64, *[_POINTER] * 6)),
     "clear": (None, (_POINTER, _INT64, *[_POINTER] * 7)),
@@ -98,7 +98,9 @@ class _Echoes(ctypes.Structure):
         ("hits", _INT64),
         *((name, _POINTER) for name in ("time", "scan_angle", "origin", "measured_origin", "measured_direction")),
         ("pulses", _INT64),
-        *((name, _POINTER) for name in ("planes", "class_id", "instance_id", "material")),
+        ("planes", _POINTER),
+        ("faces", _INT64),
+        *((name, _POINTER) for name in ("class_id", "instance_id", "material")),
         ("map_origin", ctypes.c_double * 3),
         ("epoch", ctypes.c_double),
     )
@@ -393,9 +395,6 @@ class CompiledPoints:
         """
         e, count = echoes, len(echoes.pulse)
         hits, pulses, faces = len(e.face), len(e.time), len(e.planes)
-        for name, numbers, most in (("pulse", e.pulse, pulses), ("hit", e.hit, hits), ("face", e.face, faces)):
-            if len(numbers) and not (numbers.min() >= 0 and numbers.max() < most):
-                raise IndexError(f"{name} {numbers.min()} to {numbers.max()} of {most}")
         begin = e.begin if e.begin is None else _as(np.float64, (3, hits), begin=e.begin)[0]
         of_hits: list[AnyArray | None] = [
             *_as(np.int64, (count,), pulse=e.pulse, hit=e.hit),
@@ -410,8 +409,8 @@ class CompiledPoints:
             *_as(np.float64, (pulses,), time=e.time, scan_angle=e.scan_angle),
             *_as(np.float64, (3, pulses), **vectors),
         ]
+        (planes,) = _as(np.float64, (faces, 4), planes=e.planes)
         of_faces = [
-            *_as(np.float64, (faces, 4), planes=e.planes),
             *_as(np.uint8, e.class_id.shape, class_id=e.class_id),
             *_as(np.uint32, e.class_id.shape, instance_id=e.instance_id),
             *_as(np.uint16, e.class_id.shape, material=e.material),
@@ -421,7 +420,7 @@ class CompiledPoints:
         told = _Echoes(
             *(None if one is None else one.ctypes.data for one in of_hits),
             *(hits, *(one.ctypes.data for one in of_pulses)),
-            *(pulses, *(one.ctypes.data for one in of_faces)),
+            *(pulses, planes.ctypes.data, faces, *(one.ctypes.data for one in of_faces)),
             (ctypes.c_double * 3)(*e.map_origin),
             e.epoch,
         )
@@ -433,7 +432,8 @@ class CompiledPoints:
             *(np.empty((known, 3), np.float32), np.empty(known)),
         )
         addresses = [one.ctypes.data if len(one) else None for one in placed]
-        self._functions["place"](count, ctypes.byref(told), ctypes.byref(_Placed(*addresses)))
+        if not self._functions["place"](count, ctypes.byref(told), ctypes.byref(_Placed(*addresses))):
+            raise IndexError(f"a pulse of {pulses}, a hit of {hits} or a face of {faces} isn't there")
         return placed
 
     def facing(self, normal: Float, position: Float, direction: Float, off: float) -> tuple[Bool, Float]:

@@ -104,5 +104,5 @@ def _values_of_errors(echoes: Echoes, errors: Errors, number: Index) -> tuple[Fl
     drawn = (errors.speckle, errors.receiver, errors.number, errors.lost)
     if all(values is None for values in drawn):
         return None, None, None, None
-    pulse, nth = number[echoes.pulse], number_echoes(echoes.pulse)
+    pulse, nth = np.take(number, echoes.pulse), number_echoes(echoes.pulse)
     return tuple(None if values is None else values_of_echoes(values, pulse, nth) for values in drawn)

@@ -17,6 +17,7 @@ typedef struct {
     const double *measured_origin, *measured_direction;
     int64_t pulses;
     const double *planes;                  /* (faces, 4) */
+    int64_t faces;
     const uint8_t *class_id;               /* (faces), as what follows */
     const uint32_t *instance_id;
     const uint16_t *material;
@@ -35,10 +36,19 @@ typedef struct {
     double *time;
 } Placed;
 
-INLINE void any_place(int64_t count, const Echoes *e, const Placed *p)
+INLINE int within_length(int64_t number, int64_t length)
+{
+    return number >= 0 && number < length;
+}
+
+/* Returns whether all pulses, hits and faces are there; if not, what is written means nothing. */
+INLINE int any_place(int64_t count, const Echoes *e, const Placed *p)
 {
     for (int64_t i = 0; i < count; i++) {
-        const int64_t pulse = e->pulse[i], hit = e->hit[i], face = e->face[hit];
+        const int64_t pulse = e->pulse[i], hit = e->hit[i];
+        if (!within_length(pulse, e->pulses) || !within_length(hit, e->hits) || !within_length(e->face[hit], e->faces))
+            return 0;
+        const int64_t face = e->face[hit];
         const double range = e->range[i], side = e->along[hit] > 0.0 ? -1.0 : 1.0;
         for (int j = 0; j < 3; j++) {
             double place = e->measured_direction[j * e->pulses + pulse] * range;
@@ -62,9 +72,10 @@ INLINE void any_place(int64_t count, const Echoes *e, const Placed *p)
             p->narrow_normal[3 * i + j] = (float)normal;
         }
     }
+    return 1;
 }
 
-EXPORT_WIDE(void, place, (int64_t count, const Echoes *echoes, const Placed *placed), (count, echoes, placed))
+EXPORT_WIDE(int, place, (int64_t count, const Echoes *echoes, const Placed *placed), (count, echoes, placed))
 
 /* Writes which surfaces face the sun, and places (3, count) so far off them, by `normal` and `position` (count, 3). */
 INLINE void any_face_sun(int64_t count, const double *restrict normal, const double *restrict position,
