@@ -56,7 +56,7 @@ def test_what_was_found_is_remembered_by_points_and_frames(monkeypatch: pytest.M
     fewer = np.arange(len(known)) % 2 == 0
     other = kept.regress(known.select(fewer), places)
     assert not np.array_equal(other.value, wanted.value)
-    remembering.regress(known, places.select(np.arange(len(places)) > 3))
+    kept.regress(known, places.select(np.arange(len(places)) > 3))
     assert len(seen) == 4
 
 
