@@ -49,8 +49,10 @@ def facet_terms(slope: ArrayLike) -> tuple[Float, Float]:
         slope: (...,) standard deviation of the facets' slope angle sqrt(v), rad; for 0 they are exactly 1 and 0.
 
     Example:
-        >>> facet_terms(0.0), tuple(round(float(term), 3) for term in facet_terms(0.3))
-        ((1.0, 0.0), (0.893, 0.225))
+        >>> [float(term) for term in facet_terms(0.0)]
+        [1.0, 0.0]
+        >>> [round(float(term), 3) for term in facet_terms(0.3)]
+        [0.893, 0.225]
     """
     # Beyond 1e6 nothing changes any more, and the square stays finite.
     variance = np.square(np.minimum(np.abs(np.asarray(slope, dtype=np.float64)), 1e6))

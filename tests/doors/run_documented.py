@@ -37,7 +37,7 @@ _AT_ONCE = 2
 _PATH = re.compile(r"(?<![\w/.-])(?:out/[\w./-]*\w|[\w-]+\.(?:csv|glb|json|laz|osm|xodr|yaml))(?![\w/])")
 """File or folder of the reader's own in a line."""
 _WRITTEN = re.compile(r"--(?:output|save)[= ](\S+)")
-"""What a command writes."""
+"""Path behind the options that name what a command writes."""
 
 
 @dataclass(frozen=True)

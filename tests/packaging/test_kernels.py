@@ -97,6 +97,8 @@ def test_what_was_compiled_is_taken_until_source_options_or_compiler_change(
     assert [built(), built()] == [1, 0]
     source.write_text('#include "half.h"\nint more;\n', encoding="utf-8")
     assert [built(), built()] == [1, 0]
+    monkeypatch.setitem(TARGETS, "linux-x64", ("x86_64-linux-gnu.2.28", "so"))
+    assert [built(), built()] == [1, 0]
     monkeypatch.setattr(builder, "_OPTIONS", ("-O3",))
     assert [built(), built()] == [1, 0]
     monkeypatch.setattr(builder, "version", lambda name: "0.99")

@@ -54,9 +54,9 @@ def test_what_was_found_is_remembered_by_points_and_frames(monkeypatch: pytest.M
     np.testing.assert_allclose(again.regress(known, places).std, wanted.raw_std * factors)
     assert len(seen) == 2
     fewer = np.arange(len(known)) % 2 == 0
-    other = remembering.regress(known.select(fewer), places)
+    other = kept.regress(known.select(fewer), places)
     assert not np.array_equal(other.value, wanted.value)
-    remembering.regress(known, places.select(np.arange(len(places)) > 3))
+    kept.regress(known, places.select(np.arange(len(places)) > 3))
     assert len(seen) == 4
 
 
