@@ -166,7 +166,7 @@ class PlyReader(CloudReader):
         except BaseException:
             self._file.close()
             raise
-        self._own = {name: stored for name in _own_names() if (stored := self._stored_name(name))}
+        self._own = {name: label for name in _own_names() if (label := self._stored_name(name))}
         self._others = {} if isinstance(notes, dict) else self._names_of_others()
         used = {*"xyz", *self._own.values(), *self._others.values()}
         colored = all(name in self._own or name in self._others for name in _CHANNELS)

@@ -143,7 +143,7 @@ def _number(cloud: RealCloud, code: str, field: str) -> tuple[int, str]:
     names = {row.name: row.id for row in cloud.scheme.rows} if cloud.scheme else {}
     named = {name: row for name, row in names.items() if row in there}
     if code not in named:
-        values_text = f"one of {', '.join(sorted(named))}" if named else "a number, as the attribute has no names"
+        values_text = f"one of {', '.join(sorted(named))}" if named else "a number: the attribute has no names"
         raise InputError(field, code, f"must be {values_text}{nearest_name(code, named)}")
     return named[code], f"{code} ({named[code]})"
 

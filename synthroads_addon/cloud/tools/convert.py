@@ -344,7 +344,7 @@ def scheme_of(cloud: CloudReader, classes: str | None) -> ClassScheme:
     scheme = class_scheme(classes)
     if any(scheme.selectors()):
         finer = ", ".join(row.name for row in scheme.fine.values() if any(row.selectors()))
-        raise InputError("--classes", classes, f"has {finer}, not distinguished in the cloud: scan with it")
+        raise InputError("--classes", classes, f"has {finer}, which the cloud doesn't distinguish: scan with it")
     if not header.labelled or header.scheme.name != "17":
         held = f"the classes {header.scheme.name}" if header.labelled else "LAS codes only"
         raise InputError(str(header.path), None, f"holds {held}: only the 17 classes can be merged into {classes}")

@@ -54,7 +54,7 @@ def test_clouds_that_do_not_fit_together_are_refused_by_what_differs(tmp_path: P
     files = [tmp_path / name for name in ("a.laz", "b.laz")]
     for file, epsg in zip(files, (25832, 25833), strict=True):
         cloud(file, epsg=epsg)
-    with pytest.raises(InputError, match=r"b\.laz.*other coordinate system than a\.laz"):
+    with pytest.raises(InputError, match=r"b\.laz.*different coordinate system from a\.laz"):
         merge(files, tmp_path / "c.laz")
     with pytest.raises(InputError, match="two clouds"):
         merge(files[:1], tmp_path / "c.laz")

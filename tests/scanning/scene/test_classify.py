@@ -128,5 +128,5 @@ def test_a_cloud_that_is_there_cannot_be_split(tmp_path: Path, points) -> None:
     with open_writer(tmp_path / "all.npz", None, points.xyz[0], 1e7) as writer:
         writer.write(points)
     scheme(tmp_path, ROWS, extends="17")
-    with pytest.raises(InputError, match="has bench, truck, heavy, concrete_pavement, which a cloud's classes don't"):
+    with pytest.raises(InputError, match="has bench, truck, heavy, concrete_pavement, which the cloud doesn't"):
         convert(tmp_path / "all.npz", tmp_path / "mine.npz", str(tmp_path / "mine.json"))

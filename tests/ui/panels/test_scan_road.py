@@ -110,7 +110,7 @@ def test_doubts_stand_in_the_panel_by_station_with_their_reasons(
     assert doubt.end > ROUGH[0]
     assert "the ground on its lanes is too rough for a pavement" in doubt.reasons
     shown = lines(scan_road.SYNTHROADS_PT_scan_road)
-    said = f"The result is doubtful at 1 place, its axis on {1.0 - judgement.trusted:.0%} of the length"
+    said = f"The result is doubtful at 1 place, the axis on {1.0 - judgement.trusted:.0%} of the length"
     assert shown[0] == f"label '{said}' <ERROR>"
     place = f"doubtful from {doubt.start:.0f} to {doubt.end:.0f} m: {doubt.reasons[0]}"
     row = next(line for line in shown if place in line)
