@@ -33,8 +33,11 @@ from .rules import views_predictor
 from .task import CenterlineConfiguration, load_predictor, train
 
 VIEWS, PATH = "views", "the displaced path"
+"""Names of the rules in tables."""
 _SHOWN = ("mae", "chamfer_full", "coverage_68", "coverage_95")
+"""Figures that have a table."""
 _LONGEST_NAME = 80
+"""Characters of a folder's name at most. Chosen: file systems allow 255 bytes, and paths have several folders."""
 Results = Mapping[str, Mapping[str, Mapping[str, Mapping[str, float | None]]]]
 """Variant or rule -> seed -> road -> figures, as JSON data."""
 

@@ -14,7 +14,9 @@ from ..onnx_export import Exportable, described
 from .predictor import CenterlinePredictor
 
 INPUTS = ("coord", "feat", "mask", "frame")
+"""Names of the exported network's inputs."""
 OUTPUTS = ("center", "center_std", "corridor", "corridor_std")
+"""Names of its outputs."""
 
 
 class _FromTensors(nn.Module):

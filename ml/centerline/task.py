@@ -58,6 +58,7 @@ else:
     NetworkModel = network_union("centerline", "transformer")
 
 _FIRST_WEIGHTS = "first weights"
+"""Name of the random stream that the network begins with."""
 
 
 class CenterlineConfiguration(Configuration):
@@ -79,6 +80,7 @@ class CenterlineConfiguration(Configuration):
 
 
 CONFIGURATION = CenterlineConfiguration
+"""Class of the task's configurations."""
 
 
 def train(run: Run[CenterlineConfiguration], progress: Progress = silent) -> dict[str, Any]:

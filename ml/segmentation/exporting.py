@@ -10,9 +10,11 @@ from ..onnx_export import Exportable, described
 from .recipes import SegmentationConfiguration
 
 _CLOUDS = 3
+"""Clouds of the example."""
 _POINTS = 600
+"""Points of each."""
 _CUBE = 8.0
-"""Clouds of the example, the points of each, and the edge of the flat box that they lie in, m."""
+"""Edge of the flat box that they lie in, m. Chosen: enough to fill some cells of each stage."""
 
 
 class _FromTensors(nn.Module):

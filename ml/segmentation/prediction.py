@@ -41,10 +41,11 @@ HEADER_TEXTS = range(26, 90)
 BLOCK = 500_000
 """Points that are read or written at once. Chosen: bounds memory."""
 TILE = 48.0
-"""Edge of the tiles, m."""
+"""Edge of the tiles, m. Chosen: two pieces along each edge."""
 MARGIN = 6.0
 """Width that a tile sees of the tiles around it, m: at least that of the pieces within."""
 _RECORD = np.dtype([("place", "<f4", 3), ("rgb", "<u2", 3), ("intensity", "<u2"), ("index", "<i8")])
+"""What is kept of a point in a tile's file."""
 
 _COPC = "copc"
 """User id of the records of cloud-optimised files."""

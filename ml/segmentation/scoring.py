@@ -33,10 +33,11 @@ from .recipes import SegmentationConfiguration
 EDGE = 24.0
 """Edge of the pieces that are predicted at a time, m: about as wide as a crop of training."""
 MARGIN = 4.0
-"""Width that is seen around a piece, m."""
+"""Width that is seen around a piece, m. Chosen: what lies farther off says little of a point."""
 LARGEST = 100_000
-"""Points of a piece, margin included; what has more is cut in four, down to `_SMALLEST_EDGE`."""
+"""Points of a piece, margin included; what has more is cut in four, down to `_SMALLEST_EDGE`. Chosen: bounds memory."""
 _SMALLEST_EDGE = 1.5
+"""Edge of the smallest pieces, m. Chosen: a smaller one shows no shape."""
 _GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 """Angle from one view to the next, rad: however many there are, they point to all sides."""
 

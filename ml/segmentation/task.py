@@ -46,11 +46,12 @@ OFFSETS = "offsets"
 MIXED = "start_share"
 """Key of the share of the start's weights that those of the checkpoint were mixed with."""
 _ONE_TILE = 5_000_000
-"""Points of a cloud up to which it is scored as one tile."""
+"""Points of a cloud up to which it is scored as one tile. Chosen: bounds memory."""
 SegmentationRun = Run[SegmentationConfiguration]
 
 
 CONFIGURATION = SegmentationConfiguration
+"""Class of the task's configurations."""
 
 
 def train(run: SegmentationRun, progress: Progress = silent) -> dict[str, Any]:

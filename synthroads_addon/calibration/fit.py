@@ -21,7 +21,7 @@ FITTED = (0.25, 0.5, 0.75, 0.9)
 """Quantiles that a fit holds. Chosen: both spreads are told from either side of the median, and the tail above, where
 markings and gloss are."""
 SHOWN = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95)
-"""Quantiles that a report shows: the others say how far the fit can be trusted beyond."""
+"""Quantiles that a report shows: the others say how far the fit can be trusted beyond. Chosen: both tails."""
 WAVELENGTHS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 """Wavelengths that are tried, m. Chosen: by factors of 2, from a tyre's width to a stretch of pavement that was laid at
 once."""

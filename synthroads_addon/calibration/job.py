@@ -44,10 +44,15 @@ from .fit import (
 
 Part = Literal["spread", "wavelength", "slope", "compression"]
 PARTS: tuple[Part, ...] = ("spread", "wavelength", "slope", "compression")
+"""Parts of a fit that a job may ask for."""
 _ROAD = ("paved", "line")
+"""Classes by place that `RoadClasses` tells."""
 _MOST_VIEWS = 60
+"""Views of a class in a report at most. Chosen: as many as a picture shows."""
 _LEAST_CONTRAST = 1.2
+"""Factor between the powers of classes from which on they tell a compression. Chosen: less is in their noise."""
 _COMPRESSIONS = (0.05, 1.1)
+"""Exponents of a compression that are believed. Chosen: roots are common; no device expands by much."""
 
 
 @dataclass(frozen=True)

@@ -28,9 +28,13 @@ from .fit import FITTED
 from .job import Calibration, ClassComparison
 
 _REAL, _REAL_EDGE = (203, 210, 219), (140, 150, 164)
+"""Red, green, blue of the real cloud's bars and their outlines."""
 _WIDTH, _PANEL, _MARGIN = 1200, 250, 16
+"""Sizes in pixels. Chosen: fit a page."""
 _BINS = 70
+"""Bars of a histogram. Chosen: some pixels each."""
 _ANGLES = np.linspace(0.0, 89.5, 180)
+"""Incidence angles of curves, deg. Chosen: smooth at that width; at 90 nothing comes back."""
 
 
 def save_plot(result: Calibration, path: Path, overwrite: bool = False) -> None:

@@ -27,21 +27,28 @@ from ..cloud.selection.classes import RealClass
 from ..cloud.selection.patches import FEATURES, make_patches
 
 _WINDOWS = 8
-"""Windows of the real pavement that are scanned anew."""
+"""Windows of the real pavement that are scanned anew. Chosen: their scatter is the statistics' own."""
 _NARROWEST, _WIDEST, _POINTS = 8.0, 30.0, 15_000.0
-"""Edge of such a window, m, and points of one that is pavement all over."""
+"""Edge of such a window, m, and points of one that is pavement all over. Chosen: several patches in each."""
 _REACH, _SHARE = 1.5, 0.5
-"""A place is pavement where so large a share of the usual points lies within so many usual distances of it."""
+"""A place is pavement where so large a share of the usual points lies within so many usual distances of it. Chosen: at
+the pavement's edge half of them are missing."""
 _USED = tuple(name for name in FEATURES if name not in ("curvature", "level_db"))
 """Statistics that are compared: a patch's curvature is its road's, and its level says how the whole road varies."""
 _LOGARITHMIC = ("residual_mm", "intensity_iqr_db", "neighbour_noise_db", "spacing_variation", "eighth_neighbour")
+"""Statistics that are compared by their logarithms. Chosen: they are scales, and vary by factors."""
 _BRIGHTNESS_GROUPS = 8
+"""Groups of brightness between which a patch's range noise is compared. Chosen: a slope and its noise."""
 _PRIOR = 1.5
-"""Standard deviation of a setting about where the search begins, in the search's own units."""
+"""Standard deviation of a setting about where the search begins, in the search's own units. Chosen: a factor of 4.5
+where the search goes by logarithms."""
 _STEP, _LARGEST_MOVE = 0.25, 0.6
+"""Step of the derivatives, and largest move, in the search's own units. Chosen: above the simulation's noise; within
+what is nearly linear."""
 _ROUNDS, _MOVES = 3, 3
-"""How often the derivatives are measured, and moves with their updates."""
+"""How often the derivatives are measured, and moves with their updates. Chosen: bounds the scans that are simulated."""
 _LEAST_SCATTER = 0.01
+"""Least deviation of a statistic's mean over the windows. Chosen: no statistic is fitted more exactly."""
 _LEAST_LOGARITHM = 1e-6
 """Coarse numbers and lattices have statistics of 0."""
 

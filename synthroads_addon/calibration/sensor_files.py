@@ -38,14 +38,18 @@ from .simulation import LevelPavement, simulate_pavement
 
 SPREAD, SPREAD_OF_STRIPS = 0.05, 0.15
 """Recipes draw fitted values from a range of this share to either side; what differs from strip to strip from another.
-"""
+Chosen: devices of a kind differ by less than strips of a survey."""
 SPEED = 60.0
-"""Speed of an aircraft, m/s, where times don't say it."""
+"""Speed of an aircraft, m/s, where times don't say it. Chosen: as survey aircraft fly."""
 AIRBORNE = 200.0
-"""Scanners farther away than this, m, fly in an aircraft, nearer ones on a UAV or stand."""
+"""Scanners farther away than this, m, fly in an aircraft, nearer ones on a UAV or stand. Chosen: UAVs fly below 120 m
+in most countries."""
 _LEAST_STEP_DB = 0.5
+"""Step of the gain from which on there are two strips at least, dB. Chosen: more than one strip's estimate leaves by
+chance."""
 _LEAST_SPREAD, _MOST_NOISE = 0.02, 0.95
-"""Spread that a material keeps when the sensor explains all of it, and share of the variance that is taken off."""
+"""Spread that a material keeps when the sensor explains all of it, and share of the variance that is taken off. Chosen:
+no pavement is quite even."""
 USUAL: dict[str, dict[str, tuple[float, float]]] = {
     "airborne": {
         "scan.motion.position_sigma": (0.2, 0.8),
@@ -72,13 +76,18 @@ _SWAY = {
     "airborne": {"shortest_period": 0.02, "longest_period": 20.0, "period_exponent": 0.65},
     "uav": {"shortest_period": 0.5, "longest_period": 10.0, "period_exponent": 1.0},
 }
+"""Periods and exponent of the sway by platform: an aircraft shakes fast, a UAV swings."""
 _RATIO, _DENSITY, _TEXTURE, _ASLANT = "spacing ratio", "density", "texture", "aslant"
 """Names of the values that are fitted besides settings of the scenario: pulses' spacing over lines', points, the
 materials' spread, and the angle at which the second strip sees the road, deg."""
 _FROM_ABOVE, _USUAL_ASLANT = -3.0, 18.0
-"""Angles at which one strip sees the road, and at which the search for the other one's begins, deg."""
+"""Angles at which one strip sees the road, and at which the search for the other one's begins, deg. Chosen: strips of a
+survey overlap so that what one has below it the next has at its side."""
 _USUAL_RATIO, _USUAL_NORMAL = 1.2, 0.7
+"""Spacing of pulses over that of lines, and share of speckle that is normal, with which the search begins. Chosen: as
+surveys are planned; between both kinds."""
 _PERIOD = "scan.motion.shortest_period"
+"""Path of the sway's shortest period in a scenario."""
 _FITTED_SWAY = {
     "airborne": {"scan.motion.attitude_sigma_deg": (1e-3, 10.0)},
     "uav": {
@@ -91,18 +100,27 @@ _FITTED_SWAY = {
 """Limits of what is fitted of the sway and the mirror's angles. Statistics of patches hardly tell apart what moves
 single pulses and what moves lines: of aircraft, whose lines are straight, only how strongly they tremble is fitted."""
 _OF_STRIPS = tuple(f"scan.strip_errors.{name}" for name in ("gain_step_db", "drift_sigma"))
+"""Settings that differ from strip to strip."""
 _SHARES = ("scan.noise.speckle_normal", "scan.receiver.range_delay", "scan.receiver.compression")
+"""Settings that are shares, of 1 at most."""
 _VIEW_MARGIN = 1.1
+"""Tangent of the narrowed field of view over that of the pavement's edge. Chosen: the edge is scanned from both
+sides."""
 _AT_THE_EDGE = 4.0
-"""The road lies so far from the edge of the field of view at least, deg: aircraft sway."""
+"""The road lies so far from the edge of the field of view at least, deg: aircraft sway. Chosen: more than their roll in
+calm air."""
 _FREE = {"scan.mirror_clock": "free"}
+"""Settings of every simulated scan: whose mirror keeps no time with the pulses."""
 _KNOWN = 1.1
-"""Factor within which the spacing stays that times or lines tell."""
+"""Factor within which the spacing stays that times or lines tell. Chosen: about what these estimates are off."""
 _MOST_STRIPS = 8
+"""Strips that are simulated at most. Chosen: bounds the work."""
 _MOST_SPREAD = 1.0
+"""Largest spread that the search gives a material. Chosen: a factor of e."""
 _POWER = {"scan.receiver.response": "power", "scan.receiver.bits": None}
 """Simulated scans give the received power, as what they are compared with is led back to it."""
 _DIGITS = 4
+"""Digits of numbers in files. Chosen: more than any is known to."""
 _MOST_BITS, _MOST_FULL_SCALE = 16, 1e4
 """Limits of a receiver's numbers."""
 

@@ -18,6 +18,8 @@ from ..base.arrays import Float
 from ..cloud.selection.patches import Patches
 
 MOST_PAIRS = 400
+"""Pairs of patches between which a chamfer distance is worked out at most. Chosen: its mean is then known to a
+twentieth of one's deviation."""
 
 
 def density_aware_chamfer(one: Float, other: Float, scale: float) -> float:

@@ -31,7 +31,9 @@ MOST = 1500
 FEWEST = 60
 """Patches of each side that a comparison needs. Chosen: twelve in each fold."""
 _MOST_OF_KERNEL = 600
+"""Patches that the kernel two-sample test takes at most. Chosen: its work grows with their square."""
 _TREES = 100
+"""Trees of the forest: scikit-learn's own number."""
 
 
 @dataclass(frozen=True)

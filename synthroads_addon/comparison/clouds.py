@@ -18,7 +18,9 @@ from ..cloud.selection.patches import with_points_beside
 from ..cloud.selection.pavement import CLEAR, RoadClasses, road_classes
 
 LISTS = (".yaml", ".yml", ".json")
+"""Endings of lists of clouds."""
 ROAD = "road"
+"""Name of the class that every cloud must have."""
 CLASSES = (ROAD, "marking", "vegetation")
 """Classes that are compared; the first is needed."""
 _Azimuth = Annotated[float, Field(ge=-180.0, le=180.0)]

@@ -16,9 +16,13 @@ from ..cloud.selection.patches import FEATURES
 from .job import CloudComparison, DescribedCloud
 
 _COLUMNS = 6
+"""Panels beside each other. Chosen: fit a page."""
 _BINS = 40
+"""Bars of a histogram. Chosen: a few patches in each."""
 _SYNTHETIC, _REAL = "#d6681a", "#5b7aa3"
+"""Colours of both sides, told apart by the colour-blind."""
 _INCHES = (15.0, 9.0)
+"""Width and height of the picture. Chosen: fit a screen."""
 
 
 @literal_texts()

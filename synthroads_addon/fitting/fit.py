@@ -62,9 +62,8 @@ _NEGLIGIBLE = 0.3
 """Share of the tolerance below which residuals are worth no element. Chosen: an eleventh of its square."""
 _FINER_HELPS = 0.8
 """Share of the noise that knots half as far apart must leave at most to be needed. Chosen: else the rest is noise."""
-_SCATTER = (
-    1.2  # times the noise is what fewer elements may leave where the tolerance asks for less: the data scatter so
-)
+_SCATTER = 1.2
+"""Times the noise that fewer elements may leave where the tolerance asks for less. Chosen: the data scatter so."""
 _RELAXED = 1.5
 """Times what dense knots reach that is aimed at where the tolerance can't be had. Chosen: less would fit noise."""
 _FLATTEST = 1e7

@@ -18,38 +18,50 @@ from .design import Match, Model, joined, match, repaired, simplified
 from .pieces import Piece, cut_into_pieces, noise_of, unrolled
 
 _WINDOW = 400
-"""Points of a window."""
+"""Points of a window. Chosen: bounds the work, which grows with its square."""
 _TRUSTED = 0.6
-"""Share of a window in which its elements don't depend on what comes behind it."""
+"""Share of a window in which its elements don't depend on what comes behind it. Chosen: elements near the end may go on
+beyond it."""
 _OWN = 5
-"""Points of the element that another window begins with, at least."""
+"""Points of the element that another window begins with, at least. Chosen: more than the coefficients of a piece."""
 _ELEMENTS, _KEPT = 36, 24
-"""Most elements that are fitted together, and how many of them are kept if others follow."""
+"""Most elements that are fitted together, and how many of them are kept if others follow. Chosen: bounds the work; a
+third of them give way to what follows."""
 _STEPS = 12
+"""Steps of a fit at most. Chosen: bounds the work; it begins near its end."""
 _FINE = 5e-5
-"""Least distance (m) within which points count as on a piece."""
+"""Least distance (m) within which points count as on a piece. Chosen: half of the rounding of files with four
+decimals."""
 _ALLOWED = 2.5e-4
 """Least distance (m) that points may be off elements fitted together: files' own gaps are as large."""
 _PLAY = 2.0
-"""Times the distance from pieces that points may be off elements fitted together."""
+"""Times the distance from pieces that points may be off elements fitted together. Chosen: elements together have less
+freedom than pieces."""
 _COARSE = (5e-3, 1e-2, 2e-2)
-"""Distances (m) in place of the fine one where finer pieces would be many: curves that are none of ours."""
+"""Distances (m) in place of the fine one where finer pieces would be many: curves that are none of ours. Chosen: by
+factors of 2, up to what is seen of no road."""
 _TRUST = (5e-3, 2e-2)
-"""Least distances (m) of points from pieces that are tried in turn where none is not good enough."""
+"""Least distances (m) of points from pieces that are tried in turn where none is not good enough. Chosen: files'
+rounding, then a curve's approximation by others."""
 _SPARSE = 60
-"""Points up to which nothing tells noise from elements too short for them: they are trusted."""
+"""Points up to which nothing tells noise from elements too short for them: they are trusted. Chosen: a few points to
+each element."""
 _NOISY = 2e-3
-"""Standard deviation (m) of points that are no design's."""
+"""Standard deviation (m) of points that are no design's. Chosen: files of designs round to 1 mm."""
 _PASSES = 2
+"""Times that unrolling and fitting go in turn. Chosen: the second begins from the first's elements."""
 _CUBIC = 0.02
 """Share of a chord's length times the third power of its turn, by which unrolling is off at most."""
 _NOISES = 6.0
-"""Standard deviations of the points' noise that they may be off."""
+"""Standard deviations of the points' noise that they may be off. Chosen: none of some hundred million normal points is
+farther off."""
 _SHARE = 0.45
+"""Freedom of the pieces over the points from which on there are too many. Chosen: then each follows its own points."""
 _FLAT = 1e-10
-"""Change of grade below which none is seen."""
+"""Change of grade below which none is seen. Chosen: a nanometre over 10 m."""
 _MANY = 2.0
-"""Times as many pieces as with the coarse tolerance are too many for the fine one."""
+"""Times as many pieces as with the coarse tolerance are too many for the fine one. Chosen: a design's pieces are as
+many with either."""
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,11 @@ from ..base.arrays import Float, Int
 _QUARTER = 0.3186
 """Quantile of |x| below which a quarter of a normal distribution with standard deviation 1 lies."""
 _COSTS = {1: 2.0, 2: 3.0, 3: 3.5}
-"""Cost of a piece by its degree: fewer and simpler pieces are preferred."""
+"""Cost of a piece by its degree: fewer and simpler pieces are preferred. Chosen: about the numbers of their
+coefficients."""
 _CORE = 0.1
-"""Share of a piece's points at either end that its polynomial is not taken from, if enough are left."""
+"""Share of a piece's points at either end that its polynomial is not taken from, if enough are left. Chosen: borders
+aren't known yet; points near them may be the next piece's."""
 
 
 class Piece(NamedTuple):

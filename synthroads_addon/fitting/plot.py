@@ -29,9 +29,11 @@ from .fit import REFUSED_BEYOND, AxisFit, AxisRefusedError, Deviations
 FILE = "axis-fit.png"
 """Name of the picture beside a job's files."""
 _WIDTH, _PANEL, _ROW, _MARGIN, _LEFT = 1200, 200, 290, 16, 90
+"""Sizes in pixels. Chosen: fit a page."""
 _FINE = 1e-4
-"""Least reach of a picture of a file's line, m."""
+"""Least reach of a picture of a file's line, m. Chosen: below it all files lie on one line."""
 _RED: Color = (200, 30, 40)
+"""Red, green, blue of what is refused."""
 
 
 @contextmanager

@@ -27,6 +27,7 @@ _LANE_THERE = 1.0
 _FAR = 1e3
 """Distance of a barrier that isn't there, m. Chosen: beyond any that counts."""
 _BARRIERS = (Guardrail, ConcreteBarrier, NoiseBarrier)
+"""Classes of objects that are compared as barriers."""
 
 
 def compare(reconstructed: RoadParameters, truth: RoadParameters) -> dict[str, Any]:

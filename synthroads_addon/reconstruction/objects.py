@@ -61,6 +61,7 @@ _ALONE = 0.8
 """Distance around a post of unknown class in which nothing else may stand, m. Chosen: bushes and signs have
 neighbours."""
 _BEAM = sizes.POST[0] / 2.0 + 0.5 * max(point[0] for point in sizes.BEAM)
+"""Distance of a beam's seen face from a guardrail's axis, m, by the guardrail's own sizes."""
 USUAL_VERGE = 1.5
 """Width of the verge where classes don't tell, m. As in the standard cross-sections."""
 _FARTHEST, _FARTHEST_UNKNOWN = 12.0, 4.0

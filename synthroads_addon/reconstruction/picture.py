@@ -18,6 +18,7 @@ from .profiles import Profiles
 from .reconstruct import Reconstruction
 
 AXIS, EDGE, MARK, BARRIER, POST, DOUBT = "#d1006b", "#ff8c00", "#00a2ff", "#7a3cff", "#00b050", "#ff0000"
+"""Colours of what is drawn over the cloud's grey."""
 _SIZE = (13.0, 9.0)
 """Width and height of the picture, inches. Chosen: fits a screen."""
 _DPI = 110

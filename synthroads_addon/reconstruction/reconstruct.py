@@ -268,7 +268,8 @@ def _surface(profiles: Profiles, side: SideSection, rotation: RotationAxis) -> S
     """Return height and crossfall of one carriageway's surface in each stretch along the alignment."""
     inner = np.full(len(side.usual), side.inner_offset.value)
     outer = inner + side.paved_width.value
-    return _fit_between(profiles, side.sign, (side.sign * inner, side.sign * outer), rotation)
+    left = float(side.sign)  # distances from the axis become offsets to the left
+    return _fit_between(profiles, side.sign, (left * inner, left * outer), rotation)
 
 
 def measure_surroundings(

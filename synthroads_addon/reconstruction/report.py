@@ -26,9 +26,11 @@ from .smoothing import difference_figures
 from .widenings import Bay
 
 FIT_TOLERANCE = 0.03
-"""Root mean square, m, that the alignment may keep from the measured axis unless another is given."""
+"""Root mean square, m, that the alignment may keep from the measured axis unless another is given. Chosen: above the
+noise of a measured axis, below what a lane's width is known to."""
 TOLERANCES = (0.005, 1.0)
-"""Smallest and largest of those, m."""
+"""Smallest and largest of those, m. Chosen: below the first only noise is followed, beyond the second no lane is
+kept."""
 _MOST_POINTS = 400_000
 """Points that the surface is compared with at most. Chosen: more don't move its figures."""
 _FROM_EDGES = 0.1

@@ -17,6 +17,7 @@ from .smoothing import interval_mean, mean_with_std
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, ...] = ("right", "left")
+"""Both sides, in the order of ascending offsets."""
 LineKind = Literal["outer_edge", "lane", "inner_edge"]
 
 EDGE_LINE, NARROW_LINE = 0.30, 0.15

@@ -9,7 +9,8 @@ from scipy.special import ndtr
 from ..base.arrays import Float
 
 ORDER = 3
-"""Order of the differences that are held small: a curvature that changes linearly costs nothing."""
+"""Order of the differences that are held small: a curvature that changes linearly costs nothing. Chosen: clothoids have
+such a curvature."""
 _ROUNDS = 6
 """Rounds of iteratively reweighted least squares. Chosen: weights change little after them."""
 _MAD = 1.4826

@@ -17,9 +17,10 @@ from torch.nn import functional
 from ..base import full_precision
 
 FAR = 3.0
-"""Heights of points beyond this, m, look alike to a model."""
+"""Heights of points beyond this, m, look alike to a model. Chosen: above barriers and kerbs, below what stands beside a
+road."""
 _FEW = 0.25
-"""Mass of a cell, in points, against which what it gathers fades to zero."""
+"""Mass of a cell, in points, against which what it gathers fades to zero. Chosen: a quarter of a point."""
 
 
 @dataclass

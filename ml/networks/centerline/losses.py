@@ -36,7 +36,7 @@ class LossOptions(Part):
 
 
 _ROUGH = 0.5
-"""Errors of the first look beyond this, m, count linearly."""
+"""Errors of the first look beyond this, m, count linearly. Chosen: the second look mends smaller ones."""
 OUTLIER = 3.0
 """Deviations beyond which the likelihood's tails are exponential: one wrong slice may not outweigh all others."""
 

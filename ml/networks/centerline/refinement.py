@@ -11,7 +11,8 @@ from ..base import full_precision
 from .layers import GridConvolution, RelativeAttention, cell_features, cell_sums
 
 _APART = (1, 3, 6)
-"""How far the cells lie apart that each convolution looks at; five of them."""
+"""How far the cells lie apart that each convolution looks at; five of them. Chosen: together they see the whole
+grid."""
 _PARABOLA_UNIT = 5.0
 """m: in this unit the places along a sequence are numbers of about one, of which parabolas are fitted well."""
 _FIRST_LOG_STD = -1.5

@@ -16,6 +16,7 @@ BITS = 16
 """Of a cell's number along an axis; the code of a cell takes three times as many."""
 Curve = Literal["hilbert", "z-order", "hilbert-transposed", "z-order-transposed"]
 CURVES: tuple[Curve, ...] = get_args(Curve)
+"""All of them."""
 _AXES = 3
 """Of space: x, y, z."""
 _OCTANTS = 1 << _AXES

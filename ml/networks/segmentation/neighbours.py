@@ -49,9 +49,9 @@ _POINTS_INTO = {
 """Arrays of indices: into which stage, counted from their own, and their dtype."""
 Sampling = Literal["grid", "farthest"]
 _STRIDE = 4
-"""One in so many points stays."""
+"""One in so many points stays. As PointNet++ and PointNeXt do."""
 _CHUNK = 1 << 15
-"""Queries whose pairs are held at once."""
+"""Queries whose pairs are held at once. Chosen: bounds memory."""
 TINY = 1e-8
 """Added to distances, m, before they are inverted: as in PointNet++."""
 

@@ -34,8 +34,10 @@ from .grouping import Norm, gather_max
 from .pointnext import Pointwise
 
 _LARGEST_WIDTH = 2048
+"""Channels of a stage at most. Chosen: more than any network of that kind has; a slip would fill the memory."""
 _LONGEST_WAVE = 100.0
-"""Base of the rotations' frequencies, which fall from one by equal ratios towards one over this."""
+"""Base of the rotations' frequencies, which fall from one by equal ratios towards one over this. Chosen: patches are
+some hundred cells long."""
 
 
 @network("segmentation")

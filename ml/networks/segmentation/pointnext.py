@@ -35,7 +35,7 @@ _SIZES: dict[str, tuple[int, tuple[int, ...]]] = {
 S has two layers with a residual in its set abstractions, the others one without.
 """
 _EXPANSION = 4
-"""Channels within a block, as a multiple of those outside."""
+"""Channels within a block, as a multiple of those outside. As Qian et al. 2022 have it."""
 
 
 @network("segmentation")

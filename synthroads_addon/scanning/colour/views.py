@@ -14,15 +14,17 @@ from ..scene.mesh import SceneMesh
 from .colour import ColourSettings
 
 OVERLAP = 1.3
-"""Length that an image covers as a multiple of the image spacing: what stands up is seen from aside."""
+"""Length that an image covers as a multiple of the image spacing: what stands up is seen from aside. Chosen: neighbours
+see each other's edges."""
 _STEEPEST = np.tan(np.deg2rad(62.0))
-"""Tangent of the largest angle off the axis that a camera facing down sees."""
+"""Tangent of the largest angle off the axis that a camera facing down sees. Chosen: an image's size grows with it."""
 _HIGH = 20.0
-"""Platforms that are higher above the ground than this look down; others look around, m."""
+"""Platforms that are higher above the ground than this look down; others look around, m. Chosen: above masts of
+vehicles, below UAVs."""
 _BESIDE = 3.0
 """How far beyond an image's limit along the path the scene counts for its width."""
 _SAMPLE = 40_000
-"""Vertices, and as many places on faces, that the images are cut out by."""
+"""Vertices, and as many places on faces, that the images are cut out by. Chosen: bounds the work."""
 _NADIR = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """Camera's axes (right, up, backwards) as columns in a level frame that looks forward (x), left (y) and up (z)."""
 
@@ -196,7 +198,9 @@ def _turned_ahead(cos: float, sin: float) -> Float:
 
 
 _UP = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+"""Axes of a camera that looks up, as `_NADIR`."""
 _QUARTERS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
+"""Directions ahead, left, back and right, as (x, y)."""
 _AROUND: Sequence[Float] = (*(_turned_ahead(*quarter) for quarter in _QUARTERS), _UP, _NADIR)
 """Axes of cameras that look ahead, left, back, right, up and down, in a level frame."""
 

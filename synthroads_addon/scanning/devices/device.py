@@ -19,7 +19,8 @@ SPEED_OF_LIGHT = 299_792_458.0
 """In vacuum, m/s: exact by the definition of the metre (SI)."""
 
 BRIGHTEST = 1000.0
-"""Largest effective reflectance looked for: of retro-reflective sheeting at a right angle (a white target: 1)."""
+"""Largest effective reflectance looked for: of retro-reflective sheeting at a right angle (a white target: 1). Chosen:
+bounds the search for a device's range."""
 
 _Divergence = Annotated[float, Field(strict=True, ge=0, le=100)]
 MirrorClock = Literal["locked", "free"]

@@ -18,9 +18,12 @@ from .path import KNOT_RANGE, Strip, knot_spacing_for, make_strips
 from .platform import Platform
 from .strip_line import EasedFunction, StripTrack, Sway
 
-_HEIGHT_STEP = 1.0  # m
-_ATTITUDE_STEP = 5.0  # m
+_HEIGHT_STEP = 1.0
+"""Step at which the height along a track is sampled, m. Chosen: vertical curves are far longer."""
+_ATTITUDE_STEP = 5.0
+"""Step of the attitude, m. Chosen: a vehicle's own length."""
 _TRACKS_KEPT = 4
+"""Tracks that are kept. Chosen: blocks in work at once are of few strips."""
 
 
 class MovingPlatform(Platform):

@@ -9,7 +9,7 @@ from ...base.arrays import Float
 from ...base.errors import InputError
 
 TURNAROUND = 10.0
-"""Seconds between two strips."""
+"""Seconds between two strips. Chosen: tells strips apart by their times; real ones take longer."""
 KNOT_ERROR = 2e-5
 """Largest error of interpolation between two knots, m, in the place of a point at `KNOT_RANGE` from the scanner.
 Chosen: a hundredth of a good scanner's range noise."""

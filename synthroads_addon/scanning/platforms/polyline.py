@@ -16,9 +16,11 @@ from ...road.profile import IntersectionPoint, Profile
 from .guides import Guide
 
 CORNER = 10.0
-"""A corner is rounded from this far (m) before it on, or from nearly half way to the nearer neighbouring point."""
+"""A corner is rounded from this far (m) before it on, or from nearly half way to the nearer neighbouring point. Chosen:
+as a car turns in."""
 MEASURED = 0.05
-"""Points of a measured line nearer than this (m) to the line through the others say nothing of its course."""
+"""Points of a measured line nearer than this (m) to the line through the others say nothing of its course. Chosen: what
+a smoothed track jitters by."""
 
 _REPEATED = 1e-3
 """Distance of points that are one, m. Chosen: no course is told from less."""

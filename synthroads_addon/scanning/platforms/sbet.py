@@ -18,7 +18,7 @@ RECORD = 17 * 8
 _NORTHWARD = 1e-5
 """Degrees by which a place is moved north to see where true north points on the map: about a metre."""
 _NO_WANDER = 1e-6
-"""Wander angles up to this, rad, change nothing."""
+"""Wander angles up to this, rad, change nothing. Chosen: 0.2 arc seconds."""
 
 
 def is_sbet(start: bytes, size: int) -> bool:

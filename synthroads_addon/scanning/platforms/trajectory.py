@@ -41,9 +41,12 @@ _SUBDIVISIONS = 50
 _STILL = 0.5
 """Speed below which a platform has no course, m/s. Chosen: positions' noise is as fast."""
 _ACROSS, _BESIDE, _ALONG = 35.0, 8.0, 4.0
-"""Median angles (deg) between heading and course: too wide in any case; odd where another convention fits as well."""
+"""Median angles (deg) between heading and course: too wide in any case; odd where another convention fits as well.
+Chosen: crab angles of aircraft stay below the first."""
 _CONVENTION = "degrees clockwise from grid north"
+"""Convention of the headings that files must have."""
 _LARGEST_TURN = np.deg2rad(150.0)
+"""Turn from one row to the next that is refused, rad. Chosen: near half a turn its sense is lost."""
 
 
 class RecordedTrajectory(Platform):

@@ -14,9 +14,10 @@ from .moving import MovingPath, MovingPlatform
 from .strip_line import StripTrack
 
 AXLES = 3.0
-"""Distance between a vehicle's axles, m: its pitch is that of the line through both."""
+"""Distance between a vehicle's axles, m: its pitch is that of the line through both. Chosen: as of a van."""
 WHEELS = 1.6
-"""Distance between a vehicle's left and right wheels, m: its roll is that of the line through both."""
+"""Distance between a vehicle's left and right wheels, m: its roll is that of the line through both. Chosen: as of a
+car."""
 
 
 class Vehicle(MovingPlatform):
