@@ -28,12 +28,11 @@ def test_pulses_on_a_plane_meet_one_face(rays: int) -> None:
 
 
 def test_a_wire_between_the_rays_that_are_asked_is_missed() -> None:
-    """Slats no wider than the gaps between four rays: some pulses are believed to meet one face alone, and don't."""
-    flat = plane()
-    edges = np.arange(-40.0, 40.0, 0.04)
-    corners = [[(x, -40.0, 1.0), (x + 0.004, -40.0, 1.0), (x, 40.0, 1.0)] for x in edges]
+    """Of pulses that four rays let believe that they meet one face alone, some meet a wire as well."""
+    flat, edges = plane(), np.arange(-300.0, 300.0, 0.2)
+    corners = [[(x, -300.0, 1.0), (x + 0.02, -300.0, 1.0), (x, 300.0, 1.0)] for x in edges]
     vertices = np.concatenate([flat.vertices, np.array(corners, np.float32).reshape(-1, 3)])
-    slats = len(flat.vertices) + np.arange(3 * len(edges)).reshape(-1, 3)
-    found = measure_loops.faces(planned(mesh_of(vertices, np.concatenate([flat.triangles, slats])), 19))
+    wires = len(flat.vertices) + np.arange(3 * len(edges)).reshape(-1, 3)
+    found = measure_loops.faces(planned(mesh_of(vertices, np.concatenate([flat.triangles, wires])), 19))
     assert found["wrong"] > 0.01
     assert found["one face"] < found["believed"]
