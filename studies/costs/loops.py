@@ -1,8 +1,10 @@
 """Time what is done for the pulses of a scenario by compiled loops and by NumPy, in turn, on one thread.
 
     python studies/costs/loops.py mobile-mapping-300m --set road.length=100 --set scan.rays_per_pulse=7
+    python studies/costs/loops.py rq31-600m --set road.length=60 --set scan.traffic_speed_factor=0 --faces
 
-Casting is in both, in packets. Of each block the shortest of some runs counts, in processor time.
+Casting is in both, in packets. Of each block the shortest of some runs counts, in processor time. With ``--faces`` it
+says how many pulses have all their rays on one face, and what could be saved of these rays, where nothing moves.
 """
 
 from __future__ import annotations
@@ -10,20 +12,26 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from synthroads_addon.jobs.open_scene import RoadScene
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scanning.beam import conical_directions
 from synthroads_addon.scanning.kernels.library import NoKernelError
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.scan import BlockScan
 from synthroads_addon.scenario.scenario import load_scenario
 
 BLOCKS, RUNS, PULSES = 4, 5, 40_000
+_SPREAD, _PROBES = 10, 3
+"""Blocks spread over the path for `faces`; rays of the outer ring that are cast with the axis to guess by."""
 
 
 def plan_of(scenario: str, changes: list[str]) -> ScanPlan:
@@ -54,15 +62,72 @@ def times(plan: ScanPlan) -> tuple[float, float]:
     return result[0], result[1]
 
 
+def shortest(work: Callable[[], object]) -> float:
+    """Return the least processor time, s, that some runs of work take in this thread."""
+    spent = []
+    for _ in range(RUNS):
+        begin = time.thread_time()
+        work()
+        spent.append(time.thread_time() - begin)
+    return min(spent)
+
+
+def faces(plan: ScanPlan) -> dict[str, float]:
+    """Return shares of pulses whose rays all meet one face, and seconds of casting, of pulses that diverge.
+
+    Returns:
+        ``one face``: of the pulses whose axis meets anything; ``believed``: those whose axis and three rays of the
+        outer ring meet one face; ``wrong``: of these, those another ray of which meets another face; seconds of casting
+        all rays (``cast``), those four (``four``) and the axis (``axis``), of all that is done for pulses
+        (``pulses``), and of blocks as a whole (``blocks``).
+    """
+    blocks, scan, pattern = list(plan.blocks()), BlockScan(plan), plan.pattern
+    chosen = np.unique(np.linspace(0, len(blocks) - 1, _SPREAD).astype(int)[1:-1])
+    outer = sum(plan.rings[:-1]) + 1 + np.arange(_PROBES) * plan.rings[-1] // _PROBES
+    probes = [0, *outer.tolist()]
+    counts = dict.fromkeys(("hits", "one face", "believed", "wrong"), 0)
+    seconds = dict.fromkeys(("cast", "four", "axis", "pulses", "blocks"), 0.0)
+    for strip, number in (blocks[i] for i in chosen):
+        first, count = plan.cut.pulse_span(strip, number)
+        count = min(count, PULSES)
+        poses = scan.poses_between(strip, *(plan.cut.time(strip, pulse) for pulse in (first, first + count - 1)))
+        pulses = scan.emit(strip, poses, None, first, count)
+        if plan.outline is not None:
+            there = ~plan.outline.passed_by(pulses.origin, pulses.direction, plan.setting.maximum_range)
+            pulses = pulses.select(np.flatnonzero(there))
+        assert pulses.in_plane is not None
+        assert pulses.across is not None
+        frame = (pulses.in_plane, pulses.across, pattern, plan.setting.divergence)
+        rows = np.ascontiguousarray(conical_directions(pulses.direction, *frame).transpose(2, 1, 0), np.float32)
+        begins = np.ascontiguousarray(np.broadcast_to(pulses.origin.T[:, None], rows.shape), np.float32)
+        found = {}
+        for name, which in (("cast", [*range(len(pattern))]), ("four", probes), ("axis", [0])):
+            rays = [np.ascontiguousarray(part[:, which].reshape(-1, 3)) for part in (begins, rows)]
+            seconds[name] += shortest(lambda rays=rays: plan.target.caster.cast(*rays, plan.setting.maximum_range))
+            found[name] = plan.target.caster.cast(*rays, plan.setting.maximum_range).reshape(len(rows), -1)
+        hits = found["axis"][:, 0] >= 0
+        one, believed = ((found[name] == found["axis"]).all(axis=1) & hits for name in ("cast", "four"))
+        for name, mask in (("hits", hits), ("one face", one), ("believed", believed), ("wrong", believed & ~one)):
+            counts[name] += int(mask.sum())
+        seconds["pulses"] += shortest(lambda: scan.traced_echoes(strip, pulses, poses.motions, 0))
+        seconds["blocks"] += shortest(lambda: scan.scan_pulses(strip, first, count, number))
+    share = {name: counts[name] / max(1, counts["hits"]) for name in ("one face", "believed")}
+    return {**share, "wrong": counts["wrong"] / max(1, counts["believed"]), **seconds}
+
+
 def main() -> int:
     """Print the times of the command line's scenario."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("scenario", help="a shipped one's name, or a file")
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="as for synthroads generate")
+    parser.add_argument("--faces", action="store_true", help="say how many pulses meet one face alone")
     arguments = parser.parse_args()
     plan = plan_of(arguments.scenario, arguments.set)
-    compiled, numpys = times(plan)
     print(plan.summary()["kernels"])
+    if arguments.faces:
+        print(", ".join(f"{name} {value:.4f}" for name, value in faces(plan).items()))
+        return 0
+    compiled, numpys = times(plan)
     print(f"compiled {compiled:.3f} s, NumPy {numpys:.3f} s, ratio {compiled / numpys:.2f}")
     return 0
 

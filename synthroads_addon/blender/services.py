@@ -17,7 +17,7 @@ from ..scanning.relief.normal_images import NormalImage
 from ..scanning.scene.caster import Caster
 from ..scanning.scene.mesh import SceneMesh
 from .cameras import HAS_RETURN_CAMERA, MaterialSnapshot, layer_source, snapshot_layers, varying_materials
-from .cameras.surfaces import normal_images, scene_constants, transparencies
+from .cameras.surfaces import normal_images, scene_constants, transparencies, varying_materials_by_layer
 from .casters import make_caster
 from .materials import constants
 
@@ -35,7 +35,8 @@ class BlenderServices:
 
     def reflectance_varies(self, names: Sequence[str]) -> bool:
         """Return whether a layer that the intensity depends on varies over some of these materials."""
-        return bool(scene_constants(names).varying_layers(OF_INTENSITY))
+        varying = varying_materials_by_layer(names)
+        return any(varying[layer].any() for layer in OF_INTENSITY)
 
     def normal_images(self, names: Sequence[str]) -> dict[int, NormalImage]:
         """Return the normal images of the open file's materials of these names, by their index."""

@@ -8,6 +8,7 @@ from contextlib import ExitStack, contextmanager
 import bpy
 import numpy as np
 
+from ...base.arrays import Bool
 from ...scanning.colour.colour import MATERIAL_LAYERS, SurfaceConstants, surface_constants
 from ...scanning.colour.transparency import Transparency
 from ...scanning.relief.normal_images import NormalImage
@@ -23,11 +24,17 @@ NUMBER = "sr_material"
 
 def scene_constants(names: Sequence[str]) -> SurfaceConstants:
     """Return the mean layers of the named materials, and which layers vary on which."""
+    means = constants(names)  # of each image once: that takes a twentieth of a second and more
+    return surface_constants([means[name] for name in names], varying_materials_by_layer(names))
+
+
+def varying_materials_by_layer(names: Sequence[str]) -> dict[str, Bool]:
+    """Return masks (M,) of the M named materials on which each layer of `MATERIAL_LAYERS` varies, by its name."""
     varying = {layer: np.zeros(len(names), bool) for layer in MATERIAL_LAYERS}
     for index, item in numbered_materials(names):
         for layer, expression in layer_expressions(item).items():
             varying[layer][index] |= varies(expression)
-    return surface_constants([constants(names)[name] for name in names], varying)
+    return varying
 
 
 def normal_images(names: Sequence[str]) -> dict[int, NormalImage]:

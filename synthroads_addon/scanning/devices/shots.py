@@ -118,12 +118,20 @@ def shot_run(setting: ScannerSetting, first: int, count: int, with_frame: bool =
 
 
 def _repeated(table: AnyArray, first: int, count: int) -> AnyArray:
-    """Return the columns (..., count) from ``first`` on of a table (..., M) that repeats, copied in stretches."""
+    """Return the columns (..., count) from ``first`` on of a table (..., M) that repeats, a copy.
+
+    All whole repetitions are copied at once: NumPy lets go of Python's lock for each copy, and threads wait to have it
+    back.
+    """
     length = table.shape[-1]
     if first + count <= length:
         return table[..., first : first + count].copy()
-    whole, rest = divmod(first + count - length, length)
-    return np.concatenate([table[..., first:], *[table] * whole, table[..., :rest]], axis=-1)
+    begin = length - first
+    whole, rest = divmod(count - begin, length)
+    result, end = np.empty((*table.shape[:-1], count), table.dtype), begin + whole * length
+    result[..., :begin], result[..., end:] = table[..., first:], table[..., :rest]
+    result[..., begin:end].reshape(*table.shape[:-1], whole, length)[...] = table[..., None, :]
+    return result
 
 
 @lru_cache(maxsize=4)

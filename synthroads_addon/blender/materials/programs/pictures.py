@@ -67,7 +67,8 @@ def _pixels(image: bpy.types.Image) -> Pixels:
     if image.is_float:
         result: Pixels = np.ones((height, width, 4), np.float32)
     else:  # a quarter of the memory
-        result, own = np.full((height, width, 4), 255, np.uint8), np.rint(own * np.float32(255.0))
+        result = np.full((height, width, 4), 255, np.uint8)
+        np.rint(np.multiply(own, np.float32(255.0), out=own), out=own)
     result[:, :, :3] = own[:, :, : min(count, 3)]
     if kept == 4:
         result[:, :, 3] = own[:, :, 3]
