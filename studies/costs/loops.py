@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -109,8 +110,8 @@ def faces(plan: ScanPlan) -> dict[str, float]:
         one, believed = ((found[name] == found["axis"]).all(axis=1) & hits for name in ("cast", "four"))
         for name, mask in (("hits", hits), ("one face", one), ("believed", believed), ("wrong", believed & ~one)):
             counts[name] += int(mask.sum())
-        seconds["pulses"] += shortest(lambda: scan.traced_echoes(strip, pulses, poses.motions, 0))
-        seconds["blocks"] += shortest(lambda: scan.scan_pulses(strip, first, count, number))
+        seconds["pulses"] += shortest(partial(scan.traced_echoes, strip, pulses, poses.motions, 0))
+        seconds["blocks"] += shortest(partial(scan.scan_pulses, strip, first, count, number))
     share = {name: counts[name] / max(1, counts["hits"]) for name in ("one face", "believed")}
     return {**share, "wrong": counts["wrong"] / max(1, counts["believed"]), **seconds}
 

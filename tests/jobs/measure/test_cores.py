@@ -1,4 +1,4 @@
-"""tools/benchmark_cores.py: a kept scene is scanned without Blender, in packets, to the same bytes each time."""
+"""studies/costs/cores.py: a kept scene is scanned without Blender, in packets, to the same bytes each time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.scene.motion import ScannedScene
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.scenes.scan_scenes import plane
-from tools.benchmark_cores import SETTINGS
+from studies.costs.cores import SETTINGS
 
 ROOT = Path(__file__).resolve().parents[3]
 TOOL = ROOT / "tools" / "benchmark_cores.py"

@@ -1,4 +1,4 @@
-"""tools/measure_loops.py: the share of pulses whose rays all meet one face."""
+"""studies/costs/loops.py: the share of pulses whose rays all meet one face."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 
 from tests.helpers.scenes.kernel_scenes import planned
 from tests.helpers.scenes.scan_scenes import mesh_of, plane
-from tools import measure_loops
+from studies.costs import loops as measure_loops
 
 pytestmark = pytest.mark.any_blender
 
