@@ -84,7 +84,7 @@ def faces(plan: ScanPlan) -> dict[str, float]:
     """
     blocks, scan, pattern = list(plan.blocks()), BlockScan(plan), plan.pattern
     chosen = np.unique(np.linspace(0, len(blocks) - 1, _SPREAD).astype(int)[1:-1])
-    outer = sum(plan.rings[:-1]) + 1 + np.arange(_PROBES) * plan.rings[-1] // _PROBES
+    outer = sum(plan.emission.rings[:-1]) + 1 + np.arange(_PROBES) * plan.emission.rings[-1] // _PROBES
     probes = [0, *outer.tolist()]
     counts = dict.fromkeys(("hits", "one face", "believed", "wrong"), 0)
     seconds = dict.fromkeys(("cast", "four", "axis", "pulses", "blocks"), 0.0)
@@ -93,8 +93,8 @@ def faces(plan: ScanPlan) -> dict[str, float]:
         count = min(count, PULSES)
         poses = scan.poses_between(strip, *(plan.cut.time(strip, pulse) for pulse in (first, first + count - 1)))
         pulses = scan.emit(strip, poses, None, first, count)
-        if plan.outline is not None:
-            there = ~plan.outline.passed_by(pulses.origin, pulses.direction, plan.setting.maximum_range)
+        if plan.emission.outline is not None:
+            there = ~plan.emission.outline.passed_by(pulses.origin, pulses.direction, plan.setting.maximum_range)
             pulses = pulses.select(np.flatnonzero(there))
         assert pulses.in_plane is not None
         assert pulses.across is not None
