@@ -494,7 +494,7 @@ class BlockScan:
         plan, setting, target = self.plan, self.plan.setting, self.plan.target
         number, returns, speckle = recorded
         pulse, hit = echoes.pulse, echoes.hit
-        face, along = traced.pick("face", hit), traced.pick("along", hit)
+        along = traced.pick("along", hit)
         distance = echoes.range + plan.reception.noise.range_bias
         if errors.range is not None:
             delayed = setting.receiver.range_delay or 0.0

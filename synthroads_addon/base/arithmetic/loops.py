@@ -242,9 +242,7 @@ class PointLoops(Protocol):
         """Return x, y, heading and curvature (4, N) at stations (N,) on the pieces of an alignment."""
         ...
 
-    def face_columns(
-        self, faces: Faces, grid: ColumnGrid, most: int
-    ) -> tuple[AnyArray, AnyArray]:
+    def face_columns(self, faces: Faces, grid: ColumnGrid, most: int) -> tuple[AnyArray, AnyArray]:
         """Return the faces of each cell of a grid that they may touch: where they begin (C + 1,), and their numbers.
 
         Args:
@@ -254,9 +252,7 @@ class PointLoops(Protocol):
         """
         ...
 
-    def clear_places(
-        self, places: Float, faces: Faces, grid: ColumnGrid, listed: tuple[AnyArray, AnyArray]
-    ) -> Bool:
+    def clear_places(self, places: Float, faces: Faces, grid: ColumnGrid, listed: tuple[AnyArray, AnyArray]) -> Bool:
         """Return a mask (N,) of places (3, N), m, that no face listed in their cell hides from the grid's direction.
 
         What lies in a cell without faces isn't among them.

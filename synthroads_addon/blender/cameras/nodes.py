@@ -198,18 +198,11 @@ class NodeLayers:
         for number in spans:
             for what in calculator.inputs_of(number):
                 asked.setdefault(what, []).append(number)
-        values, loops = dict[SurfaceInput, Float32](), point_loops()
+        values: dict[SurfaceInput, Float32] = {}
         together: dict[tuple[int, ...], list[SurfaceInput]] = {}
         for what, numbers in asked.items():
-            if loops is not None and what in (POSITION, TRUE_NORMAL) and points.normal.dtype == np.float64:
-                source, shift = (points.position, self._frame) if what == POSITION else (points.normal, None)
-                values[what] = loops.inputs(rows, source, shift, self._unit)
-            elif what == POSITION or what in _OF_POINT:
-                values[what] = np.zeros((len(rows), 4), np.float32)
-                if what == POSITION:
-                    values[what][:, :3] = (take_rows(points.position, rows) + self._frame) / self._unit
-                else:
-                    values[what][:, :3] = _OF_POINT[what](points, rows)
+            if what == POSITION or what in _OF_POINT:
+                values[what] = self._of_points(what, points, rows)
             else:
                 together.setdefault(tuple(numbers), []).append(what)
         for several, inputs in together.items():
@@ -223,6 +216,19 @@ class NodeLayers:
                 for start, end in places:
                     values[what][start:end] = array[first : first + end - start]
                     first += end - start
+        return values
+
+    def _of_points(self, what: SurfaceInput, points: SeenPoints, rows: Index) -> Float32:
+        """Return an input's values (N, 4) that follow from the points of `rows` alone."""
+        loops = point_loops()
+        if loops is not None and what in (POSITION, TRUE_NORMAL) and points.normal.dtype == np.float64:
+            source, shift = (points.position, self._frame) if what == POSITION else (points.normal, None)
+            return loops.inputs(rows, source, shift, self._unit)
+        values = np.zeros((len(rows), 4), np.float32)
+        if what == POSITION:
+            values[:, :3] = (take_rows(points.position, rows) + self._frame) / self._unit
+        else:
+            values[:, :3] = _OF_POINT[what](points, rows)
         return values
 
     def _sunlight(self, points: SeenPoints, channels: dict[str, Float32]) -> Float32:

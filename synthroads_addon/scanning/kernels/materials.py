@@ -124,9 +124,7 @@ class ReadyProgram:
         pointers = [
             (_POINTER * max(1, len(arrays)))(*(one.ctypes.data for one in arrays)) for arrays in (inputs, results)
         ]
-        places = _Places(
-            ctypes.addressof(pointers[0]), ctypes.addressof(pointers[1]), self._widths.ctypes.data, count
-        )
+        places = _Places(ctypes.addressof(pointers[0]), ctypes.addressof(pointers[1]), self._widths.ctypes.data, count)
         kernel.synthroads_materials(
             ctypes.byref(self._native), registers.ctypes.data, ctypes.byref(places), int(narrow)
         )

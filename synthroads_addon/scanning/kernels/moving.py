@@ -77,9 +77,7 @@ class MovingParts:
         self._casters.append(part.caster)
         track_numbers = (way.shape[1], track.begin, track.spacing, *(array.ctypes.data for array in arrays))
         numbers = (part.radius, part.radius**2, fastest)
-        self._bodies.append(
-            _Part(cast, None, scene, part.first, planes.ctypes.data, *track_numbers, *numbers)
-        )
+        self._bodies.append(_Part(cast, None, scene, part.first, planes.ctypes.data, *track_numbers, *numbers))
 
     def cast(
         self,

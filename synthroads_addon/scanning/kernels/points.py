@@ -498,9 +498,7 @@ class CompiledPoints:
                 break
         return station, along, offset
 
-    def face_columns(
-        self, faces: Faces, grid: ColumnGrid, most: int
-    ) -> tuple[AnyArray, AnyArray]:
+    def face_columns(self, faces: Faces, grid: ColumnGrid, most: int) -> tuple[AnyArray, AnyArray]:
         """Return the faces of each cell of a grid that they may touch: where they begin (C + 1,), and their numbers.
 
         Args:
@@ -522,9 +520,7 @@ class CompiledPoints:
         self._functions["sort_faces"](*head, None, *(one.ctypes.data for one in (starts, filled, numbers)))
         return starts, numbers
 
-    def clear_places(
-        self, places: Float, faces: Faces, grid: ColumnGrid, listed: tuple[AnyArray, AnyArray]
-    ) -> Bool:
+    def clear_places(self, places: Float, faces: Faces, grid: ColumnGrid, listed: tuple[AnyArray, AnyArray]) -> Bool:
         """Return a mask (N,) of places (3, N), m, that no face listed in their cell hides from the grid's direction.
 
         Args:

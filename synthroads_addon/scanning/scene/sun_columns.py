@@ -22,8 +22,8 @@ _CELL, _MOST_CELLS = 0.25, 1 << 21
 _MOST_FACES = 8
 """Faces of a cell that are looked at; of places where there are more nothing is told."""
 _MARGIN, _ABOVE, _ROUNDING = 0.01, 1e-4, 2.0**-22
-"""By how much faces are wider than they are, and how far places must lie from planes, m; besides, so much of the scene's
-size: rays and casters round to float32."""
+"""By how much faces are wider than they are, and how far places must lie from planes, m; besides, so much of the
+scene's size: rays and casters round to float32."""
 
 
 class SunColumns:

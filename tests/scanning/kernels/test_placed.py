@@ -49,7 +49,9 @@ def assert_alike(found: BlockResult, expected: BlockResult) -> None:
     pairs = [(name, mine[name], theirs[name]) for name in mine]
     assert (found.seen is None) is (expected.seen is None)
     if found.seen is not None and expected.seen is not None:
-        pairs += [(one.name, getattr(found.seen, one.name), getattr(expected.seen, one.name)) for one in fields(found.seen)]
+        pairs += [
+            (one.name, getattr(found.seen, one.name), getattr(expected.seen, one.name)) for one in fields(found.seen)
+        ]
     for name, one, other in pairs:
         assert (one is None) is (other is None), name
         if one is not None and other is not None:
@@ -93,5 +95,6 @@ def test_what_is_not_there_is_refused(loops: CompiledPoints, name: str, number: 
     assert len(loops.placed(echoes, seen=True).xyz) == 5
     with pytest.raises(IndexError, match="of 5 isn't there"):
         loops.placed(echoes._replace(**{name: np.full(5, number)}), seen=True)
+    few = dict.fromkeys(("class_id", "instance_id", "material"), np.zeros(4, np.uint8))
     with pytest.raises(ValueError, match="class_id"):
-        loops.placed(echoes._replace(**dict.fromkeys(("class_id", "instance_id", "material"), np.zeros(4, np.uint8))), seen=True)
+        loops.placed(echoes._replace(**few), seen=True)

@@ -49,7 +49,7 @@ def hills(seed: int, steep: float = 0.1) -> tuple[list[Float], list[Float]]:
     triangles = [np.column_stack([corner, beside, corner + 1]), np.column_stack([corner + 1, beside, beside + 1])]
     vertices = np.column_stack([x, y, height])
     # A strip of ground once more, a film higher.
-    line = np.flatnonzero((corner % (SIDE + 1) == 20))
+    line = np.flatnonzero(corner % (SIDE + 1) == 20)
     raised = vertices + [0.0, 0.0, FILM]
     painted = [one[line] + len(vertices) for one in triangles]
     return [vertices, raised], [*triangles, *painted]
@@ -105,7 +105,9 @@ def test_ground_that_nothing_stands_on_is_in_the_sun(loops: CompiledPoints) -> N
 
 def test_the_edge_of_paint_throws_its_shadow(loops: CompiledPoints) -> None:
     """A film of 3 mm shades what lies 2 mm beside it, which only a ray tells."""
-    corners = [(x, y, z) for z, wide in ((0.0, 9.0), (FILM, 1.0)) for x, y in ((-wide, -9), (wide, -9), (wide, 9), (-wide, 9))]
+    corners = [
+        (x, y, z) for z, wide in ((0.0, 9.0), (FILM, 1.0)) for x, y in ((-wide, -9), (wide, -9), (wide, 9), (-wide, 9))
+    ]
     mesh = mesh_of(corners, [(0, 1, 2), (0, 2, 3), (4, 5, 6), (4, 6, 7)])
     x = np.linspace(-1.02, -1.0, 4001)
     places = np.array([x, 0.0 * x, 0.0 * x + 0.001])
