@@ -26,8 +26,8 @@ from synthroads_addon.base.files import output_folder
 from synthroads_addon.base.machine import available_cores, cores_of_children, machine
 from synthroads_addon.base.progress import Progress
 from synthroads_addon.base.schema import canonical_json, read_json
-from synthroads_addon.jobs.measure.mesh_scans import measure_mesh_scans, scans_beside, write_road
 from synthroads_addon.jobs.measure.waves import CELLS, write_waves
+from synthroads_addon.jobs.mesh_scans import measure_mesh_scans, scans_beside, write_road
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 
 PARTS = ("demo", "waves", "road", "start")

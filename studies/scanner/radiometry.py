@@ -115,9 +115,9 @@ def _step(axes: Any, beam: str) -> None:
     origin = np.zeros((3, len(pattern)))
     direction = np.repeat(down, len(pattern), axis=1)
     if beam == "conical":
-        direction = conical_directions(down, east, north, pattern, divergence)
+        direction = conical_directions(down, east, north, pattern, divergence)[..., 0]
     else:
-        origin = cylindrical_offsets(east, north, pattern, divergence, np.array([height - roof]))
+        origin = cylindrical_offsets(east, north, pattern, divergence, np.array([height - roof]))[..., 0]
     edge = 0.9
     slope = direction[0] / -direction[2]
     on_roof = origin[0] + slope * (height - roof) < edge

@@ -4,10 +4,10 @@ What the extension draws is drawn by Pillow, `synthroads_addon.cloud.tools.diagr
 """
 
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Literal
 
 
-def new_figure(width: float, height: float, layout: str | None = "constrained") -> Any:
+def new_figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Any:
     """Return an empty Matplotlib figure, which no window shows and nothing keeps.
 
     Args:

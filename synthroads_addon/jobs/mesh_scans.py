@@ -4,10 +4,10 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from ...base.changes import apply_change
-from ...base.progress import StageTimer, peak_memory_mb
-from ...scenario.scenario import Scenario, load_scenario
-from .waves import write_obj
+from ..base.changes import apply_change
+from ..base.progress import StageTimer, peak_memory_mb
+from ..scenario.scenario import Scenario, load_scenario
+from .measure.waves import write_obj
 
 _PLAIN = ("scan.relief=0", "colour.source=material", 'cloud.formats=["las"]', 'outputs=["cloud"]')
 _WAVES = (*_PLAIN, "scan.device=generic-polygon", "scan.platform.height=80")
@@ -46,7 +46,7 @@ def scans_beside(parts: Collection[str], quick: bool) -> list[tuple[str, str, tu
 
 def write_road(path: Path, quick: bool) -> None:
     """Write the road's mesh as an .obj file with z up; a short one where it is only to be seen that all works."""
-    from .scenes import road_mesh  # Blender is started by what builds or scans alone
+    from .measure.scenes import road_mesh  # Blender is started by what builds or scans alone
 
     mesh = road_mesh(load_scenario("rq31-600m", [_ROAD_LENGTH, *(_QUICK_ROAD if quick else ())]))
     write_obj(path, mesh.vertices, mesh.triangles)
@@ -65,8 +65,8 @@ def measure_mesh_scans(name: str, file: Path, quick: bool) -> dict[str, Any]:
         ``scans``: million pulses per second by the clock, million rays per processor second, and the share of the
         cores' time that was used.
     """
-    from ..scan_scene import SceneScan, check_scene_scan, open_and_read, scene_site  # likewise
-    from .scenes import measure_scene
+    from .measure.scenes import measure_scene
+    from .scan_scene import SceneScan, check_scene_scan, open_and_read, scene_site  # likewise
 
     data: Any = Scenario().to_dict()
     for change in _ROAD if name == "road" else (*_WAVES, _FAST if quick else _SLOW):
