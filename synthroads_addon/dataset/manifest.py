@@ -58,7 +58,7 @@ class SceneEntry(ClosedModel):
     @classmethod
     def _check_name(cls, name: str) -> str:
         if not stays_below(name) or len(PurePosixPath(name).parts) != 1:
-            raise ValueError(f"'{name}' is not a valid name of a scene")
+            raise ValueError(f"'{name}' can't be the name of a scene")
         return name
 
     @field_validator("files")
