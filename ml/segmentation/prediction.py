@@ -45,7 +45,7 @@ TILE = 48.0
 MARGIN = 6.0
 """Width that a tile sees of the tiles around it, m: at least that of the pieces within."""
 _RECORD = np.dtype([("place", "<f4", 3), ("rgb", "<u2", 3), ("intensity", "<u2"), ("index", "<i8")])
-"""What is kept of a point in a tile's file."""
+"""Fields that are kept of a point in a tile's file."""
 
 _COPC = "copc"
 """User id of the records of cloud-optimised files."""

@@ -133,48 +133,52 @@ def refine_settings(road: RealClass, settings: Sequence[Setting], simulate: Simu
         )
     scatter = np.maximum(np.nanstd(first, axis=0) / np.sqrt(len(windows)), _LEAST_SCATTER)
 
-    def miss(x: Float) -> Float:
+    def residual(x: Float) -> Float:
         return np.asarray((np.nanmean(moments(x), axis=0) - real) / scatter)
 
     start = np.asarray((np.nanmean(first, axis=0) - real) / scatter)
-    x, missed = _search(miss, start, np.array([setting.reach() for setting in settings]).T)
+    x, end = _search(residual, start, np.array([setting.reach() for setting in settings]).T)
     values = {setting.path: setting.value(place) for setting, place in zip(settings, x, strict=True)}
-    shown = [dict(zip(names, map(float, real + scatter * part), strict=True)) for part in (0.0 * start, start, missed)]
-    return Refined(values, *shown)
+    statistics = [dict(zip(names, map(float, real + scatter * r), strict=True)) for r in (0.0 * start, start, end)]
+    return Refined(values, *statistics)
 
 
-def _search(miss: Callable[[Float], Float], start: Float, limits: Float) -> tuple[Float, Float]:
-    """Return where a miss (M,) is least, by Gauss and Newton with Broyden's updates, and the miss there.
+def _search(residual: Callable[[Float], Float], start: Float, limits: Float) -> tuple[Float, Float]:
+    """Return where residuals (M,) are least, by Gauss and Newton with Broyden's updates, and the residuals there.
 
     Args:
-        miss: over the statistics' scatter, at a place (N,) of the search.
-        start: the miss at 0.
+        residual: over the statistics' scatter, at a place (N,) of the search.
+        start: the residuals at 0.
         limits: (2, N) least and largest places.
     """
     low, high = limits
-    x, missed = np.zeros(len(low)), start
+    x, r = np.zeros(len(low)), start
     for _ in range(_ROUNDS):
         # No farther than the limits, beyond which a setting stays what it is.
         steps = np.where(high - x >= x - low, np.minimum(_STEP, high - x), -np.minimum(_STEP, x - low))
-        slope = np.column_stack([(miss(x + step) - missed) / step.sum() for step in np.diag(steps)])
+        jacobian = np.column_stack([(residual(x + step) - r) / step.sum() for step in np.diag(steps)])
         damping = 1.0
         for _ in range(_MOVES):
-            normal = slope.T @ slope + np.eye(len(x)) / _PRIOR**2
-            pull = slope.T @ missed + x / _PRIOR**2
-            move = np.linalg.solve(normal + (damping - 1.0) * np.diag(np.diag(normal)), -pull)
-            move *= min(1.0, _LARGEST_MOVE / float(np.abs(move).max()))
-            move = np.clip(x + move, low, high) - x
-            tried = miss(x + move)
-            slope += np.outer(tried - missed - slope @ move, move) / max(float(move @ move), 1e-12)
-            if _cost(tried, x + move) < _cost(missed, x):
-                x, missed, damping = x + move, tried, max(damping / 2.0, 1.0)
+            # A normal prior about 0 keeps settings that the statistics don't tell where they begin (ridge regression):
+            # (J'J + I / s^2) delta = -(J'r + x / s^2), the diagonal damped as by Marquardt.
+            normal = jacobian.T @ jacobian + np.eye(len(x)) / _PRIOR**2
+            gradient = jacobian.T @ r + x / _PRIOR**2
+            delta = np.linalg.solve(normal + (damping - 1.0) * np.diag(np.diag(normal)), -gradient)
+            delta *= min(1.0, _LARGEST_MOVE / float(np.abs(delta).max()))
+            delta = np.clip(x + delta, low, high) - x
+            trial = residual(x + delta)
+            # Broyden 1965: J += (change of r - J delta) delta' / |delta|^2; also where the step is refused, as a scan
+            # is costly, and tells the slope all the same.
+            jacobian += np.outer(trial - r - jacobian @ delta, delta) / max(float(delta @ delta), 1e-12)
+            if _cost(trial, x + delta) < _cost(r, x):
+                x, r, damping = x + delta, trial, max(damping / 2.0, 1.0)
             else:
                 damping *= 3.0
-    return x, missed
+    return x, r
 
 
-def _cost(missed: Float, x: Float) -> float:
-    return float(missed @ missed + x @ x / _PRIOR**2)
+def _cost(residual: Float, x: Float) -> float:
+    return float(residual @ residual + x @ x / _PRIOR**2)
 
 
 @dataclass(frozen=True)
@@ -195,8 +199,8 @@ class _Window:
 
     def cut(self, scan: RealClass) -> RealClass:
         """Return the simulated points that lie on the window's pavement."""
-        held = self.holds(scan.place[:, :2])
-        return replace(select_points(scan, held), beside=scan.place[~held, :2])
+        inside = self.holds(scan.place[:, :2])
+        return replace(select_points(scan, inside), beside=scan.place[~inside, :2])
 
     def holds(self, place: Float) -> Bool:
         """Return a mask (N,) of the places that are pavement."""
@@ -252,8 +256,9 @@ def _faint_share(road: RealClass) -> float:
     cell = np.unique(np.floor(road.place[:, :2]).astype(np.int64), axis=0, return_inverse=True)[1].ravel()
     count = np.bincount(cell)
     height, brightness = (values - (np.bincount(cell, values) / count)[cell] for values in (road.place[:, 2], level))
-    many = count[cell] >= _BRIGHTNESS_GROUPS
-    order = np.argsort(brightness[many])
-    spread = [float(part.std()) for part in np.array_split(height[many][order], _BRIGHTNESS_GROUPS)]
+    dense = count[cell] >= _BRIGHTNESS_GROUPS
+    order = np.argsort(brightness[dense])
+    sigma = [float(part.std()) for part in np.array_split(height[dense][order], _BRIGHTNESS_GROUPS)]
+    # Slope of a straight line from the faintest group, at -1/2, to the brightest, at 1/2.
     places = np.linspace(-0.5, 0.5, _BRIGHTNESS_GROUPS)
-    return float(np.polyfit(places, spread, 1)[0] / max(np.mean(spread), 1e-9))
+    return float(np.polyfit(places, sigma, 1)[0] / max(np.mean(sigma), 1e-9))

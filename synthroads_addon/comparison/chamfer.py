@@ -41,8 +41,9 @@ def density_aware_chamfer(one: Float, other: Float, scale: float) -> float:
 
 def _one_way(points: Float, others: Float, scale: float) -> float:
     distance, nearest = cKDTree(others).query(points)
-    shared = np.bincount(nearest, minlength=len(others))[nearest]
-    return float(np.mean(1.0 - np.exp(-distance / scale) / shared))
+    # Wu et al. 2021: mean of 1 - exp(-a d) / n over the points, n of which share their nearest one.
+    count = np.bincount(nearest, minlength=len(others))[nearest]
+    return float(np.mean(1.0 - np.exp(-distance / scale) / count))
 
 
 def mean_chamfer(one: Patches, other: Patches) -> float:

@@ -33,7 +33,7 @@ FEWEST = 60
 _MOST_OF_KERNEL = 600
 """Patches that the kernel two-sample test takes at most. Chosen: its work grows with their square."""
 _TREES = 100
-"""Trees of the forest: scikit-learn's own number."""
+"""Trees that are boosted, one after another: as many as scikit-learn takes by default."""
 
 
 @dataclass(frozen=True)
@@ -125,8 +125,9 @@ def _auc(values: Float, truth: Bool, blocks: Index, seed: int) -> float:
 
 def _auc_alone(values: Float, truth: Bool) -> float:
     """Return the AUC of a single statistic, 0.5 to 1, whichever way it points (Mann and Whitney's U)."""
-    many, few = np.count_nonzero(truth), np.count_nonzero(~truth)
-    auc = (rankdata(values)[truth].sum() - many * (many + 1) / 2.0) / (many * few)
+    n1, n2 = np.count_nonzero(truth), np.count_nonzero(~truth)
+    # U = R1 - n1 (n1 + 1) / 2 with the sum R1 of the first sample's ranks; AUC = U / (n1 n2).
+    auc = (rankdata(values)[truth].sum() - n1 * (n1 + 1) / 2.0) / (n1 * n2)
     return float(max(auc, 1.0 - auc))
 
 
@@ -141,6 +142,8 @@ def squared_discrepancy(one: Float, other: Float) -> float:
     squared = cdist(ranks, ranks, "sqeuclidean")
     kernel = np.exp(-squared / max(float(np.median(squared)), 1e-12))
     n, m = len(one), len(other)
+    # Gretton et al. 2012, unbiased: mean of k(x, x') + mean of k(y, y') - 2 mean of k(x, y), pairs of a row with itself
+    # left out; on the diagonal k is 1.
     within = [
         (block.sum() - len(block)) / (len(block) * (len(block) - 1)) for block in (kernel[:n, :n], kernel[n:, n:])
     ]
