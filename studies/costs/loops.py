@@ -14,7 +14,6 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -63,12 +62,12 @@ def times(plan: ScanPlan) -> tuple[float, float]:
     return result[0], result[1]
 
 
-def shortest(work: Callable[[], object]) -> float:
-    """Return the least processor time, s, that some runs of work take in this thread."""
+def shortest(work: Callable[..., object], *given: object) -> float:
+    """Return the least processor time, s, that some runs of a function with what it is given take in this thread."""
     spent = []
     for _ in range(RUNS):
         begin = time.thread_time()
-        work()
+        work(*given)
         spent.append(time.thread_time() - begin)
     return min(spent)
 
@@ -103,15 +102,16 @@ def faces(plan: ScanPlan) -> dict[str, float]:
         begins = np.ascontiguousarray(np.broadcast_to(pulses.origin.T[:, None], rows.shape), np.float32)
         found = {}
         for name, which in (("cast", [*range(len(pattern))]), ("four", probes), ("axis", [0])):
-            rays = [np.ascontiguousarray(part[:, which].reshape(-1, 3)) for part in (begins, rows)]
-            seconds[name] += shortest(lambda rays=rays: plan.target.caster.cast(*rays, plan.setting.maximum_range))
-            found[name] = plan.target.caster.cast(*rays, plan.setting.maximum_range).reshape(len(rows), -1)
+            origins, directions = (np.ascontiguousarray(part[:, which].reshape(-1, 3)) for part in (begins, rows))
+            rays = (origins, directions, plan.setting.maximum_range)
+            seconds[name] += shortest(plan.target.caster.cast, *rays)
+            found[name] = plan.target.caster.cast(*rays).reshape(len(rows), -1)
         hits = found["axis"][:, 0] >= 0
         one, believed = ((found[name] == found["axis"]).all(axis=1) & hits for name in ("cast", "four"))
         for name, mask in (("hits", hits), ("one face", one), ("believed", believed), ("wrong", believed & ~one)):
             counts[name] += int(mask.sum())
-        seconds["pulses"] += shortest(partial(scan.traced_echoes, strip, pulses, poses.motions, 0))
-        seconds["blocks"] += shortest(partial(scan.scan_pulses, strip, first, count, number))
+        seconds["pulses"] += shortest(scan.traced_echoes, strip, pulses, poses.motions, 0)
+        seconds["blocks"] += shortest(scan.scan_pulses, strip, first, count, number)
     share = {name: counts[name] / max(1, counts["hits"]) for name in ("one face", "believed")}
     return {**share, "wrong": counts["wrong"] / max(1, counts["believed"]), **seconds}
 

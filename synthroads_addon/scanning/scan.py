@@ -566,7 +566,9 @@ class BlockScan:
         hits = (traced.face, traced.along, traced.distance, traced.direction, traced.begin)
         asked = plan.layers.seen_points or "normal" in plan.layers.measured
         placed = loops.placed(
-            EchoPlaces(echoes.pulse, echoes.hit, distance, *hits, *of_pulses, *of_faces, target.origin, plan.reception.epoch),
+            EchoPlaces(
+                echoes.pulse, echoes.hit, distance, *hits, *of_pulses, *of_faces, target.origin, plan.reception.epoch
+            ),
             asked,
         )
         face, known = traced.pick("face", echoes.hit), {"normal": placed.narrow_normal, "material": placed.material}

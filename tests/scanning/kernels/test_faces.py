@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from studies.costs import loops as measure_loops
 from tests.helpers.scenes.kernel_scenes import planned
 from tests.helpers.scenes.scan_scenes import mesh_of, plane
-from studies.costs import loops as measure_loops
 
 pytestmark = pytest.mark.any_blender
 
