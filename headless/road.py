@@ -35,7 +35,6 @@ PICTURE = "deviation.png"
 _FIELDS = {"seed": "seed"}
 _LARGEST = 5.0
 """Largest distance from a kink that a rounding may be asked for, m."""
-_SURFACE = ("lanes", "lateral profile")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "round kinks between elements by two clothoids at most M metres off (0.05); else they are refused"
     parser.add_argument("--round-kinks", type=_distance, nargs="?", const=0.05, metavar="M", help=text)
     parser.add_argument("--only-axis", action="store_true", help="take the axis and its heights alone: no exit code 3")
-    text = "print in which fields the road of an OpenDRIVE file differs from this parameter set"
+    text = "print in which fields the road of an OpenDRIVE file, or an IFC file of ours, differs from this parameter set"
     parser.add_argument("--against", type=Path, metavar="PARAMETERS", help=text)
     names = ", ".join(scenario_names())
     text = f"what the file doesn't say: {names}, or a .json file (%(default)s)"
@@ -96,7 +95,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
         (folder / CENTRELINE).write_text(canonical_json(line), encoding="utf-8")
         report |= {"remarks": remarks_so_far()}
         (folder / REPORT).write_text(canonical_json(report), encoding="utf-8")
-    lost = [text for text in report.get("left_out", []) if text.startswith(_SURFACE)]
+    from synthroads_addon.jobs.whole_road import SURFACE
+
+    lost = [text for text in report.get("left_out", []) if text.startswith(SURFACE)]
     lost += ["surface"] if report.get("whole", {}).get("surface_lost") else []
     lines = [axis_summary(report), *report.get("summary", [])]
     lines += [f"left out: {text}" for text in report.get("left_out", [])]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from ..base.maps.places import Placement, bring
 from ..base.remarks import assume, warn
 from ..fitting.fit import AxisFit, axis_of_points
 from ..road.axes.centerline import read_declared_axis
+from ..road.given_road import GivenRoad
 from ..road.guidelines import StandardCrossSection
 from ..road.parameters import AlignmentObject
 from ..road_files.axis import utm_zone
@@ -25,10 +26,13 @@ from ..road_files.spacing import cleaned, moved_aside, tell_spacing
 from ..road_files.track import has_times
 from ..sampling.section import cross_section_of
 from ..scenario.road import RoadScenario
-from .mapped_section import with_mapped_section
+from .mapped_section import meets, side_by_side, with_mapped_section
 
 _APART = 1.0
 """Distance of the points of a vehicle's path that are fitted, m: closer ones hold noise alone."""
+
+FARTHEST_ASIDE, FARTHEST_ABOVE = 100.0, 1000.0
+"""Largest offset of an axis from a path, and height of a path above the road, to either side, m."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,7 @@ def axis_of_line(
     name: str | None,
     place: PathPlace,
     seen: Callable[[AxisFit], None] | None = None,
+    beside: Callable[[GivenRoad], None] | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis fitted to a line of points of a file, the scenario for it, and a report.
 
@@ -90,6 +95,7 @@ def axis_of_line(
         name: of the line; None takes the longest that is a road by itself.
         place: where the axis lies beside the line.
         seen: gets the fit, to draw it.
+        beside: gets the carriageways of a road whose directions lie side by side, which no limits say.
 
     Returns:
         as `jobs.axis_source.axis_from_file`; the report's ``heights`` is None where the file has none.
@@ -108,9 +114,14 @@ def axis_of_line(
         warn("%s: %s: %s", path.name, line.name, text)
     outlines = [bring(path.name, outline, declared, system) for outline in line.outlines]
     scenario, lost = with_mapped_section(f"{path.name}: {line.name}", line.section, scenario)
-    points = _prepared(path.name, points, line.driven, scenario, place)
+    section = cross_section_of(scenario)
+    if meets(line.section, scenario):
+        section = replace(section, median=0.0, inner_edge_strip=0.0)
+    points = _prepared(path.name, points, line.driven, section, place)
     sagitta = tell_spacing(path.name, outlines or [points])
     axis, limits, report = axis_of_points(path.name, points, declared, scenario, seen)
+    if beside and meets(line.section, limits):
+        beside(GivenRoad(side_by_side(limits, axis)))
     left_out = [*line.left_out, *lost]
     if left_out:
         heads = ", ".join(text.partition(":")[0] for text in left_out)
@@ -132,7 +143,7 @@ def _axis_of_text(
     if name is not None:
         raise InputError("--axis-name", name, "is for files of several roads or lines: this one has one of points")
     points, declared = read_declared_axis(path, Placement.of(MapSystem.of(scenario.epsg, scenario.height_epsg)))
-    points = _prepared(path.name, points, has_times(path), scenario, place)
+    points = _prepared(path.name, points, has_times(path), cross_section_of(scenario), place)
     sagitta = tell_spacing(path.name, [points])
     axis, limits, report = axis_of_points(path.name, points, declared, scenario, seen)
     return axis, limits, report | {"sagitta": round(sagitta, 4)}
@@ -190,10 +201,10 @@ def _in_a_system(file: str, line: PointLine, declared: MapSystem | None, scenari
     return scenario.model_copy(update={"epsg": zone.epsg})
 
 
-def _prepared(file: str, points: Float, driven: bool, scenario: RoadScenario, place: PathPlace) -> Float:
+def _prepared(file: str, points: Float, driven: bool, section: StandardCrossSection, place: PathPlace) -> Float:
     """Return the points (M, 3) of the axis: those of a line cleaned, thinned if it is a path, and moved."""
     points = cleaned(file, points, _APART if driven else 0.0)
-    offset = place.aside(cross_section_of(scenario))
+    offset = place.aside(section)
     if driven and offset is None:
         text = (
             "%s is the path of a vehicle, and is taken for the axis itself: --offset-from-path METRES (positive to the "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from ..fitting.fit import AxisFit, fit_heights
 from ..fitting.plot import axis_picture, deviation_picture
 from ..road.alignment import clip_offset, left_vectors
 from ..road.geometry import alignment_of
+from ..road.given_road import GivenRoad
 from ..road.parameters import AlignmentObject
 from ..road.terrain import road_elevation_model
 from ..road_files.axis import line_deviation, road_axis
@@ -43,6 +45,8 @@ def axis_from_file(
     place: PathPlace = NOWHERE_ELSE,
     round_kinks: float | None = None,
     picture: Path | None = None,
+    seen: Callable[[RoadLine, ExactAxis], None] | None = None,
+    beside: Callable[[GivenRoad], None] | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis of a file in local coordinates, the scenario that follows from it, and a report.
 
@@ -58,6 +62,8 @@ def axis_from_file(
         place: where the axis lies beside a line of points.
         round_kinks: distance (m) from kinks of a file's elements that roundings may keep; None refuses kinks.
         picture: file for a picture of how far the file's line or points are from the axis; none is drawn if None.
+        seen: gets a file's line of elements and the axis taken from it.
+        beside: gets what a map says of the road's carriageways and limits of a scenario can't hold, where it does.
 
     Raises:
         AxisRefusedError: no road follows the points.
@@ -67,7 +73,7 @@ def axis_from_file(
     kind = format_of(path)
     if kind not in READERS:
         fits: list[AxisFit] = []
-        axis, limits, report = axis_of_line(path, kind, scenario, name, place, fits.append)
+        axis, limits, report = axis_of_line(path, kind, scenario, name, place, fits.append, beside)
         if picture:
             axis_picture(fits[0], path.name).save(picture, "PNG")
     elif place.given:
@@ -77,6 +83,8 @@ def axis_from_file(
         axis, limits, report = road_axis(path, scenario, name, round_kinks, lambda *both: read.append(both))
         if picture:
             deviation_picture(path.name, *line_deviation(*read[0])).save(picture, "PNG")
+        if seen:
+            seen(*read[0])
     _tell_overlap(path, axis, limits.half_width)
     if report.get("heights", ()) is None:
         vertical, source = _heights(axis, limits, seed)

@@ -16,6 +16,7 @@ from ..base.progress import Progress, StageTimer, silent
 from ..base.remarks import collected_remarks, warn
 from ..fitting.plot import draw_refused_fit
 from ..road.geometry import RoadGeometry
+from ..road.given_road import GivenRoad
 from ..road.parameters import RoadParameters, read_parameters
 from ..sampling.road import sample_road
 from ..scanning.scene.classify import check_asset_classes
@@ -52,7 +53,7 @@ class Job:
         axis_name: of the road or alignment in that file; None takes the longest.
         axis_place: where the axis lies beside that file's points.
         overwrite: replace files that are already there.
-        road: take the whole road of this OpenDRIVE file.
+        road: take the whole road of this OpenDRIVE, LandXML or IFC file, as far as it is read.
         new_file: build in a new, empty Blender file instead of the open one, which is lost.
         begun: when the job began, by `time.perf_counter`, for a time budget; when `generate` is called if None.
     """
@@ -75,7 +76,7 @@ class RoadSource:
 
     Attributes:
         pictures: folder for the picture of an axis that no road follows; none is drawn if None.
-        road: OpenDRIVE file whose whole road is taken.
+        road: OpenDRIVE, LandXML or IFC file whose whole road is taken.
         round_kinks: distance (m) from an axis' kinks that roundings may keep; None refuses kinks.
         deviations: file for the picture of how far an axis' file is from it; none is drawn if None.
     """
@@ -101,8 +102,11 @@ class RoadSource:
             return parameters, {"axis": report}
         if self.axis:
             with draw_refused_fit(self.pictures):
-                axis, limits, report = axis_from_file(self.axis, scenario.road, scenario.seed, *wanted)
-            return sample_road(limits, scenario.seed, scenario.title, axis), {"axis": report}
+                given: list[GivenRoad] = []
+                axis, limits, report = axis_from_file(
+                    self.axis, scenario.road, scenario.seed, *wanted, beside=given.append
+                )
+            return sample_road(limits, scenario.seed, scenario.title, axis, *given), {"axis": report}
         return sample_road(scenario.road, scenario.seed, scenario.title), {}
 
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 import re
 import tempfile
+from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ from ..base.remarks import warn
 from .curves import Curve, transition
 from .heights import HeightPiece, circle
 from .line import SHORTEST, Equation, LineNames, PlanPiece, RoadLine
+from .beside.own_parts import own_parts
 from .xml_text import finite
 
 _SCHEMA = re.compile(rb"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'\s*\)\s*\)", re.IGNORECASE)
@@ -62,14 +65,20 @@ def _lines(path: Path, model: Any) -> list[RoadLine]:
     unit, angle = _units(model)
     system, place = _map(path, model, unit)
     names, lines = LineNames(), list[RoadLine]()
-    for number_of, alignment in enumerate(model.by_type("IfcAlignment")):
+    alignments = model.by_type("IfcAlignment")
+    for number_of, alignment in enumerate(alignments):
         unique = names.unique(alignment.Name, f"alignment {number_of + 1}")
         try:
             if line := _alignment(alignment, unique, unit, angle):
                 lines.append(_placed(line, place @ _placement(alignment.ObjectPlacement, unit), system))
         except InputError as error:
             lines.append(RoadLine(unique, "IFC alignment", (), system=system, fault=error))
-    return lines
+    # With several alignments nothing says which of them the parts of the road belong to.
+    given, taken, left_out = own_parts(model)
+    alone = given is None or len(alignments) == 1
+    if not alone:
+        given, taken, left_out = None, Counter(), [f"lanes: those of {len(alignments)} alignments"]
+    return [replace(one, given=given, taken=taken, left_out=(*one.left_out, *left_out)) for one in lines]
 
 
 def _open(path: Path) -> Any:
@@ -166,10 +175,7 @@ def _placed(line: RoadLine, matrix: np.ndarray, system: MapSystem | None) -> Roa
         pieces.append(PlanPiece(piece.kind, piece.station, piece.length, x, y, piece.heading + turn, piece.shape))
     up = float(matrix[2, 3])
     heights = tuple(HeightPiece(h.start, h.end, h.elevation + up, h.grade, h.square, h.cube) for h in line.heights)
-    return RoadLine(
-        line.name, line.source, tuple(pieces), heights, line.first_station, line.equations, system,
-        left_out=line.left_out,
-    )  # fmt: skip
+    return replace(line, pieces=tuple(pieces), heights=heights, system=system)
 
 
 def _nested(item: Any) -> list[Any]:

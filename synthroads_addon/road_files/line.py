@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,6 +14,7 @@ from ..base.arrays import Float
 from ..base.errors import InputError
 from ..base.maps.crs import MapSystem
 from ..road.alignment import Alignment, Element
+from ..road.given_road import GivenRoad
 from ..road.parameters import LONGEST_ROAD, AlignmentObject, HorizontalElement, StationEquation, VerticalPoint
 from ..road.profile import IntersectionPoint
 from .curves import Curve, as_elements
@@ -95,6 +96,9 @@ class RoadLine:
         junction: whether it belongs to a junction.
         left_out: what the file says of it and isn't read, as text with numbers.
         fault: why it can't be used, where it can't; it has no pieces then.
+        given: parts of the road beside its line, stations those of the file; None where nothing is read of them.
+        taken: numbers of those parts by kind.
+        remarks: what is to be told where they are used.
     """
 
     name: str
@@ -108,6 +112,9 @@ class RoadLine:
     junction: bool = False
     left_out: tuple[str, ...] = ()
     fault: InputError | None = None
+    given: GivenRoad | None = None
+    taken: Mapping[str, int] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
 
     @property
     def length(self) -> float:

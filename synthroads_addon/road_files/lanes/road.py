@@ -19,7 +19,7 @@ from ..heights import HeightPiece
 from ..line import LineNames, RoadLine, exact_axis
 from ..opendrive import read_opendrive
 from ..read import choose_line
-from ..xml_text import child, children, local_name, number, read_xml
+from ..xml_text import child, children, number, read_xml
 from .carriageways import Pavements, Verge, pavements
 from .loss import Loss
 from .marks import line_markings
@@ -27,6 +27,7 @@ from .objects import things
 from .places import Places
 from .records import FileRoad, read_road
 from .shape import SideShape
+from .speeds import speed_limit
 from .strips import driven_sides, side_layouts
 from .surface import FileSurface
 
@@ -44,6 +45,7 @@ class WholeRoad:
         pavements: what its carriageways are made of.
         loss: what became of what the file says.
         exact: stations of the parameter set at the plan's (file, set), (2, K), m.
+        speed: limit of most of its length, km/h; None without any.
     """
 
     line: RoadLine
@@ -52,6 +54,7 @@ class WholeRoad:
     pavements: Pavements
     loss: Loss
     exact: Float
+    speed: float | None
 
     def stations(self, station: Float) -> Float:
         """Return the stations of the set at those of the file, m."""
@@ -102,8 +105,6 @@ def whole_road(
             for _, _, why in layout.lost:
                 loss.leave_out("lanes", why, surface=True)
         loss.read["lane sections"] += len(one.sections)
-        if speeds := sum(local_name(item) == "speed" for item in one.element.iter()):
-            loss.leave_out("speed limits", "in a parameter set signs alone say them", speeds)
     found = pavements(shapes, _verge(scenario), lambda s: np.interp(s, *exact), loss)
     heights = None
     if found.heights is not None:
@@ -111,7 +112,7 @@ def whole_road(
     markings = line_markings(found, lambda s: np.interp(s, *exact), scenario, loss)
     places = [Places(FileSurface(one), axis.alignment, lambda s: np.interp(s, *exact)) for one in roads]
     given = GivenRoad(found.carriageways, found.turnouts, markings, things(places, loss))
-    return WholeRoad(line, given, heights, found, loss, exact)
+    return WholeRoad(line, given, heights, found, loss, exact, speed_limit(roads, loss))
 
 
 def _elements(root: Element) -> dict[str, Element]:

@@ -1,0 +1,1 @@
+"""What LandXML and IFC files say of a road beside its line."""
