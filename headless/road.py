@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "round kinks between elements by two clothoids at most M metres off (0.05); else they are refused"
     parser.add_argument("--round-kinks", type=_distance, nargs="?", const=0.05, metavar="M", help=text)
     parser.add_argument("--only-axis", action="store_true", help="take the axis and its heights alone: no exit code 3")
-    text = "print in which fields the road of an OpenDRIVE file, or an IFC file of ours, differs from this parameter set"
+    text = "print in which fields the road of OpenDRIVE, or of our own IFC, differs from this parameter set"
     parser.add_argument("--against", type=Path, metavar="PARAMETERS", help=text)
     names = ", ".join(scenario_names())
     text = f"what the file doesn't say: {names}, or a .json file (%(default)s)"

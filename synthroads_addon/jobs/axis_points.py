@@ -20,6 +20,7 @@ from ..road.given_road import GivenRoad
 from ..road.guidelines import StandardCrossSection
 from ..road.parameters import AlignmentObject
 from ..road_files.axis import utm_zone
+from ..road_files.line import ExactAxis, RoadLine
 from ..road_files.points import PointLine
 from ..road_files.read import named_line, read_points
 from ..road_files.spacing import cleaned, moved_aside, tell_spacing
@@ -77,6 +78,20 @@ NOWHERE_ELSE = PathPlace()
 """The axis is the line itself."""
 
 
+@dataclass
+class RoadBeside:
+    """What a file says of a road beside its axis.
+
+    Attributes:
+        line, axis: the file's line of elements and what was taken from it; None for lines of points.
+        given: carriageways that a map says and limits of a scenario can't hold; None where it says none.
+    """
+
+    line: RoadLine | None = None
+    axis: ExactAxis | None = None
+    given: GivenRoad | None = None
+
+
 def axis_of_line(
     path: Path,
     kind: str | None,
@@ -84,7 +99,7 @@ def axis_of_line(
     name: str | None,
     place: PathPlace,
     seen: Callable[[AxisFit], None] | None = None,
-    beside: Callable[[GivenRoad], None] | None = None,
+    beside: RoadBeside | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis fitted to a line of points of a file, the scenario for it, and a report.
 
@@ -121,7 +136,7 @@ def axis_of_line(
     sagitta = tell_spacing(path.name, outlines or [points])
     axis, limits, report = axis_of_points(path.name, points, declared, scenario, seen)
     if beside and meets(line.section, limits):
-        beside(GivenRoad(side_by_side(limits, axis)))
+        beside.given = GivenRoad(side_by_side(limits, axis))
     left_out = [*line.left_out, *lost]
     if left_out:
         heads = ", ".join(text.partition(":")[0] for text in left_out)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,6 @@ from ..fitting.fit import AxisFit, fit_heights
 from ..fitting.plot import axis_picture, deviation_picture
 from ..road.alignment import clip_offset, left_vectors
 from ..road.geometry import alignment_of
-from ..road.given_road import GivenRoad
 from ..road.parameters import AlignmentObject
 from ..road.terrain import road_elevation_model
 from ..road_files.axis import line_deviation, road_axis
@@ -24,7 +22,7 @@ from ..road_files.line import ExactAxis, RoadLine
 from ..road_files.read import OF_POINTS, READERS, format_of, read_lines, read_points
 from ..sampling.alignment import sample_profile
 from ..scenario.road import RoadScenario
-from .axis_points import NOWHERE_ELSE, PathPlace, axis_of_line, line_length
+from .axis_points import NOWHERE_ELSE, PathPlace, RoadBeside, axis_of_line, line_length
 
 _SPACING = 10.0
 """Distance of the heights that are taken from an elevation model, m."""
@@ -45,8 +43,7 @@ def axis_from_file(
     place: PathPlace = NOWHERE_ELSE,
     round_kinks: float | None = None,
     picture: Path | None = None,
-    seen: Callable[[RoadLine, ExactAxis], None] | None = None,
-    beside: Callable[[GivenRoad], None] | None = None,
+    beside: RoadBeside | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis of a file in local coordinates, the scenario that follows from it, and a report.
 
@@ -62,8 +59,7 @@ def axis_from_file(
         place: where the axis lies beside a line of points.
         round_kinks: distance (m) from kinks of a file's elements that roundings may keep; None refuses kinks.
         picture: file for a picture of how far the file's line or points are from the axis; none is drawn if None.
-        seen: gets a file's line of elements and the axis taken from it.
-        beside: gets what a map says of the road's carriageways and limits of a scenario can't hold, where it does.
+        beside: gets what the file says of the road beside its axis.
 
     Raises:
         AxisRefusedError: no road follows the points.
@@ -83,8 +79,8 @@ def axis_from_file(
         axis, limits, report = road_axis(path, scenario, name, round_kinks, lambda *both: read.append(both))
         if picture:
             deviation_picture(path.name, *line_deviation(*read[0])).save(picture, "PNG")
-        if seen:
-            seen(*read[0])
+        if beside:
+            beside.line, beside.axis = read[0]
     _tell_overlap(path, axis, limits.half_width)
     if report.get("heights", ()) is None:
         vertical, source = _heights(axis, limits, seed)

@@ -16,14 +16,13 @@ from ..base.progress import Progress, StageTimer, silent
 from ..base.remarks import collected_remarks, warn
 from ..fitting.plot import draw_refused_fit
 from ..road.geometry import RoadGeometry
-from ..road.given_road import GivenRoad
 from ..road.parameters import RoadParameters, read_parameters
 from ..sampling.road import sample_road
 from ..scanning.scene.classify import check_asset_classes
 from ..scenario.road import RoadScenario
 from ..scenario.scenario import OF_POINTS, Scenario
 from ..twin.formats import check_formats
-from .axis_points import NOWHERE_ELSE, PathPlace
+from .axis_points import NOWHERE_ELSE, PathPlace, RoadBeside
 from .axis_source import axis_from_file
 from .job_files import FILES, JobFiles, empty_scan_warnings
 from .scan.plan import check_scan
@@ -102,11 +101,9 @@ class RoadSource:
             return parameters, {"axis": report}
         if self.axis:
             with draw_refused_fit(self.pictures):
-                given: list[GivenRoad] = []
-                axis, limits, report = axis_from_file(
-                    self.axis, scenario.road, scenario.seed, *wanted, beside=given.append
-                )
-            return sample_road(limits, scenario.seed, scenario.title, axis, *given), {"axis": report}
+                beside = RoadBeside()
+                axis, limits, report = axis_from_file(self.axis, scenario.road, scenario.seed, *wanted, beside)
+            return sample_road(limits, scenario.seed, scenario.title, axis, beside.given), {"axis": report}
         return sample_road(scenario.road, scenario.seed, scenario.title), {}
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from ..base.errors import InputError
 from ..base.remarks import assume
@@ -28,7 +29,7 @@ from ..road_files.read import READERS, choose_line, format_of
 from ..sampling.road import sample_road
 from ..scenario.road import RoadScenario
 from ..scenario.scenario import Scenario
-from .axis_points import NOWHERE_ELSE, PathPlace
+from .axis_points import NOWHERE_ELSE, PathPlace, RoadBeside
 from .axis_source import axis_from_file
 from .mapped_section import with_speed
 
@@ -113,11 +114,12 @@ def _read_beside(
     picture: Path | None,
 ) -> tuple[RoadParameters, dict[str, Any], GivenRoad | None]:
     """Return the same of a LandXML or IFC file."""
-    read: list[tuple[RoadLine, ExactAxis]] = []
-    axis, limits, report = axis_from_file(
-        path, scenario.road, scenario.seed, name, place, round_kinks, picture, lambda *both: read.append(both)
-    )
-    line, exact = read[0]
+    beside = RoadBeside()
+    line_of = (path, scenario.road, scenario.seed, name, place, round_kinks, picture)
+    axis, limits, report = axis_from_file(*line_of, beside)
+    line, exact = beside.line, beside.axis
+    assert line is not None
+    assert exact is not None
     if line.given is None:
         return sample_road(limits, scenario.seed, scenario.title, axis), report, None
     for text in line.remarks:
@@ -125,7 +127,11 @@ def _read_beside(
     given = _along(line.given, line, exact)
     if given.carriageways:
         limits = _wide_enough(path, limits, given)
-    parameters = sample_road(limits, scenario.seed, scenario.title, axis, given)
+    try:
+        parameters = sample_road(limits, scenario.seed, scenario.title, axis, given)
+    except ValidationError as error:
+        fault = str(error.errors(include_url=False)[0]["msg"])
+        raise InputError(f"{path.name}: {line.name}", None, f"its parts must fit together ({fault})") from None
     loss = Loss(read=Counter(line.taken), surface=any(text.startswith(SURFACE) for text in line.left_out))
     return parameters, report | {"whole": loss.to_dict(), "summary": loss.lines()}, given
 

@@ -15,7 +15,8 @@ class GivenRoad:
     """The parts of a road that aren't drawn. All have the instance number 1, and ids as in a parameter set.
 
     Attributes:
-        carriageways: by side, empty where they are drawn; their ids are ``carriageway-left`` and ``carriageway-right``. Their pavement is drawn.
+        carriageways: by side, empty where they are drawn; their ids are ``carriageway-left`` and
+            ``carriageway-right``. Their pavement is drawn.
         turnouts: by id.
         markings: by id; None where they are drawn.
         things: by id; None where they are drawn.

@@ -19,10 +19,10 @@ import numpy as np
 from ..base.errors import InputError, MissingFileError, MissingPackageError
 from ..base.maps.crs import MapSystem
 from ..base.remarks import warn
+from .beside.own_parts import own_parts
 from .curves import Curve, transition
 from .heights import HeightPiece, circle
 from .line import SHORTEST, Equation, LineNames, PlanPiece, RoadLine
-from .beside.own_parts import own_parts
 from .xml_text import finite
 
 _SCHEMA = re.compile(rb"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'\s*\)\s*\)", re.IGNORECASE)

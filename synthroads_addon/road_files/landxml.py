@@ -20,10 +20,10 @@ from ..base.errors import InputError
 from ..base.maps.crs import MapSystem
 from ..base.remarks import warn
 from ..road.given_road import GivenRoad
+from .beside.superelevation import read_superelevation
 from .curves import TRANSITIONS, Curve, transition
 from .heights import HeightPiece, circle
 from .line import SHORTEST, Equation, LineNames, PlanPiece, RoadLine
-from .beside.superelevation import read_superelevation
 from .xml_text import child, children, finite, local_name, number, read_xml
 
 _UNITS = {

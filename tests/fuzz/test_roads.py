@@ -18,6 +18,7 @@ from synthroads_addon.scenario.road import RoadScenario
 from tests.helpers.files.mutations import TOKENS, accepted, damaged, for_all, fuzz
 from tests.helpers.roads.written_lines import opendrive, xodr_road
 from tests.helpers.roads.written_maps import Map, bend, beside, sbet, vector_file, well_known_binary
+from tests.road_files.beside.test_superelevation import NAMES
 from tests.road_files.test_ifc import MAP
 from tests.road_files.test_ifc import written as ifc_written
 from tests.road_files.test_landxml import KINDS, written
@@ -68,7 +69,10 @@ def files_of(kind: str, folder: Path) -> list[bytes]:
     if kind == "xml":
         for name in KINDS:
             written(folder / f"{name}.xml", name, profile=PROFILE)
-        return [(folder / f"{name}.xml").read_bytes() for name in KINDS]
+        rows = "".join(f"<{name}>{40.0 + 50.0 * n!r}</{name}>" for n, name in enumerate(NAMES))
+        tilt = f"<Superelevation>{rows}<FullSuperelev>4.5</FullSuperelev></Superelevation></Alignment>".encode()
+        files = [(folder / f"{name}.xml").read_bytes() for name in KINDS]
+        return [*files, files[0].replace(b"</Alignment>", tilt)]
     if kind == "ifc":
         for n, (schema, rest) in enumerate((("IFC4X3_ADD2", ""), ("IFC4X3_RC3", MAP.format(1.0, 0.2)))):
             ifc_written(folder / f"{n}.ifc", schema, 1.0 - 0.5 * n, rest)

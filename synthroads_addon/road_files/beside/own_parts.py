@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, cast
 
 from ...base.errors import InputError
 from ...road.given_road import GivenRoad
 from ...road.objects import RoadObject, Side
+from ...road.parameters import OBJECT_ID
 from ...road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
 from ...road.things.registry import THINGS
 from ...road.things.thing import Thing
@@ -45,8 +48,13 @@ def own_parts(model: Any) -> tuple[GivenRoad | None, Counter[str], list[str]]:
         name = str(relation.RelatedObjects[0].Name)
         fields = {key: value for key, value in values.items() if key in _KINDS[kind].model_fields}
         try:
-            found[name] = _KINDS[kind].from_dict(fields | {"instance": 1})
+            item = _KINDS[kind].from_dict(fields | {"instance": 1})
         except InputError:
+            wrong[kind] += 1
+            continue
+        if re.fullmatch(OBJECT_ID, name):
+            found[name] = item
+        else:
             wrong[kind] += 1
     carriageways = {name: item for name, item in found.items() if isinstance(item, Carriageway)}
     by_side: dict[Side, Carriageway] = {item.side: item for item in carriageways.values()}
@@ -54,15 +62,27 @@ def own_parts(model: Any) -> tuple[GivenRoad | None, Counter[str], list[str]]:
         return None, Counter(), _of_others(model)
     ids = {name: f"carriageway-{item.side}" for name, item in carriageways.items()}
     others = {name: _with_carriageway(item, ids) for name, item in found.items() if name not in ids}
-    given = GivenRoad(
-        by_side,
-        {name: item for name, item in others.items() if isinstance(item, Turnout)},
-        {name: item for name, item in others.items() if isinstance(item, tuple(_PAINT.values()))},
-        {name: cast(Thing, item) for name, item in others.items() if type(item).__name__ in THINGS},
-    )
-    taken = Counter(type(item).__name__ for item in found.values())
-    lost = [f"{_word(kind)}: {count} {kind} with other values than ours" for kind, count in sorted(wrong.items())]
-    return given, taken, lost
+    turnouts = {name: item for name, item in others.items() if isinstance(item, Turnout) and _refers(item, by_side, {})}
+    markings = {
+        name: item
+        for name, item in others.items()
+        if isinstance(item, tuple(_PAINT.values())) and _refers(item, by_side, turnouts)
+    }
+    things = {name: cast(Thing, item) for name, item in others.items() if type(item).__name__ in THINGS}
+    kept = {**by_side, **turnouts, **markings, **things}
+    wrong += Counter(type(item).__name__ for item in found.values())
+    taken = Counter(type(item).__name__ for item in kept.values())
+    lost = [f"{_word(kind)}: {n} {kind} with other values than ours" for kind, n in sorted((wrong - taken).items())]
+    return GivenRoad(by_side, turnouts, markings, things), taken, lost
+
+
+def _refers(item: RoadObject, by_side: Mapping[Side, Carriageway], turnouts: Mapping[str, Turnout]) -> bool:
+    """Return whether the carriageway, lane boundary and turnout that an object names are there."""
+    roads = {f"carriageway-{side}": road for side, road in by_side.items()}
+    named, turnout = getattr(item, "carriageway", None), getattr(item, "turnout", None)
+    if named is not None and (named not in roads or getattr(item, "boundary", 0) > len(roads[named].lanes)):
+        return False
+    return turnout is None or (turnout in turnouts and turnouts[turnout].ramp is not None)
 
 
 def _word(kind: str) -> str:
@@ -81,10 +101,8 @@ def _values(definition: Any) -> dict[str, Any]:
     for each in definition.HasProperties or ():
         value = getattr(getattr(each, "NominalValue", None), "wrappedValue", None)
         if isinstance(value, str) and value[:1] in ("[", "{"):
-            try:
+            with suppress(ValueError, RecursionError):  # a text that begins so
                 value = json.loads(value)
-            except (ValueError, RecursionError):
-                pass
         found[each.Name] = value
     return found
 
@@ -96,12 +114,18 @@ def _of_others(model: Any) -> list[str]:
     for word, mine in (("lanes", True), ("objects", False)):
         rows = [f"{count} {kind}" for kind, count in sorted(numbers.items()) if (kind in _SURFACE) == mine]
         texts += [f"{word}: {', '.join(rows)}"] if rows else []
-    kinds = Counter(
-        str(each.PredefinedType) for name in ("IfcReferent", "IfcAnnotation") for each in model.by_type(name)
-    )
+    kinds = Counter(_kind(each) for name in ("IfcReferent", "IfcAnnotation") for each in model.by_type(name))
     for kind, text in (
         ("SUPERELEVATIONEVENT", "crossfall: {} superelevation events, which don't say about which line it turns"),
         ("WIDTHEVENT", "lanes: {} width events, which say the width of the pavement alone"),
     ):
         texts += [text.format(kinds[kind])] if kinds[kind] else []
     return texts
+
+
+def _kind(each: Any) -> str:
+    """Return an object's predefined type, empty where it has none, as in files of the schema's candidates."""
+    try:
+        return str(each.PredefinedType)
+    except (AttributeError, IndexError, RuntimeError):
+        return ""

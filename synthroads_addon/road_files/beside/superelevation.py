@@ -15,6 +15,7 @@ from xml.etree.ElementTree import Element  # nosec B405 (its type alone)
 
 import numpy as np
 
+from ...base.arrays import Float
 from ...base.errors import InputError
 from ...base.schema import round_value
 from ...road.objects import Side
@@ -64,9 +65,7 @@ class Superelevation:
     remarks: tuple[str, ...] = ()
 
 
-def read_superelevation(
-    alignment: Element, pieces: Sequence[PlanPiece], unit: float, start: float
-) -> Superelevation:
+def read_superelevation(alignment: Element, pieces: Sequence[PlanPiece], unit: float, start: float) -> Superelevation:
     """Return the superelevation of an alignment.
 
     Args:
@@ -87,9 +86,10 @@ def read_superelevation(
         except _Unfit as error:
             wrong[str(error)] += 1
     curves.sort(key=lambda curve: curve.stations)
-    kept = [curve for curve in curves if not any(_overlap(curve, other) for other in curves if other is not curve)]
-    if len(kept) < len(curves):
-        wrong["it overlaps that of another curve"] += len(curves) - len(kept)
+    overlapping = _overlapping(curves)
+    kept = [curve for n, curve in enumerate(curves) if n not in overlapping]
+    if overlapping:
+        wrong["it overlaps that of another curve"] += len(overlapping)
     left_out = [f"crossfall: {count} superelevations: {why}" for why, count in sorted(wrong.items())]
     if not kept:
         return Superelevation(left_out=tuple(left_out))
@@ -132,10 +132,12 @@ def _curve(row: Element, pieces: Sequence[PlanPiece], unit: float, start: float)
     return _Curve(stations, -senses.pop() * value)
 
 
-def _curvature(pieces: Sequence[PlanPiece], stations: np.ndarray) -> list[float]:
+def _curvature(pieces: Sequence[PlanPiece], stations: Float) -> list[float]:
+    """Return the curvature, 1/m, at stations (N,), m."""
     found = []
-    for station in stations.tolist():
-        piece = next((p for p in pieces if station <= p.station + p.length), pieces[-1])
+    starts = np.array([piece.station for piece in pieces])
+    for station, number in zip(stations.tolist(), np.searchsorted(starts, stations, "right").tolist(), strict=True):
+        piece = pieces[max(number - 1, 0)]
         share = min(max((station - piece.station) / piece.length, 0.0), 1.0)
         if isinstance(piece.shape, Curve):
             found.append(float(piece.shape.curvature(np.array([share * piece.shape.length]))[0]))
@@ -144,8 +146,16 @@ def _curvature(pieces: Sequence[PlanPiece], stations: np.ndarray) -> list[float]
     return found
 
 
-def _overlap(first: _Curve, second: _Curve) -> bool:
-    return first.stations[0] < second.stations[-1] and second.stations[0] < first.stations[-1]
+def _overlapping(curves: Sequence[_Curve]) -> set[int]:
+    """Return the numbers of those that overlap another one, of curves in the order of their stations."""
+    found: set[int] = set()
+    farthest = 0
+    for number, curve in enumerate(curves[1:], 1):
+        if curve.stations[0] < curves[farthest].stations[-1]:
+            found |= {farthest, number}
+        if curve.stations[-1] > curves[farthest].stations[-1]:
+            farthest = number
+    return found
 
 
 def _usual(curves: Sequence[_Curve]) -> tuple[float, str]:
@@ -157,7 +167,7 @@ def _usual(curves: Sequence[_Curve]) -> tuple[float, str]:
         rates += [abs(curve.full) * (end - level_again) / (level_again - back)]
     low, high = min(rates), max(rates)
     unsaid = "the crossfall of straights isn't said:"
-    if high - low <= _SAME and _LEAST <= low and high <= _MOST:
+    if high - low <= _SAME and low >= _LEAST and high <= _MOST:
         usual = round(0.5 * (low + high), 2)
         return usual, f"{unsaid} {usual:g} % follow from the lengths of its run-outs"
     return _USUAL, f"{unsaid} run-outs have several rates, and {_USUAL:g} % are taken"

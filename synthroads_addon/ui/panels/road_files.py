@@ -19,7 +19,7 @@ from ...fitting.plot import axis_picture
 from ...jobs.axis_points import FARTHEST_ABOVE, FARTHEST_ASIDE, NOWHERE_ELSE, PathPlace
 from ...jobs.axis_source import axis_summary
 from ...jobs.generate import RoadSource
-from ...jobs.whole_road import has_whole_road
+from ...jobs.whole_road import SURFACE, has_whole_road
 from ...road.parameters import RoadParameters
 from ...scenario.road import RoadScenario
 from ...scenario.scenario import Scenario
@@ -120,6 +120,7 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
     axis_name: bpy.props.StringProperty(
         name="Name",
         description="Road, alignment or line of the file; the longest that is a road by itself if it is empty",
+        options={"SKIP_SAVE"},
     )
     points_are: bpy.props.EnumProperty(
         name="Points",
@@ -129,6 +130,7 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
             ("LANE", "In a Lane", "The file's points lie in the middle of a lane"),
         ],
         description="Where a line of points or a vehicle's path runs; designed roads say themselves where they lie",
+        options={"SKIP_SAVE"},
     )
     offset: bpy.props.FloatProperty(
         name="Offset",
@@ -136,9 +138,14 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
         min=-FARTHEST_ASIDE,
         max=FARTHEST_ASIDE,
         unit="LENGTH",
+        options={"SKIP_SAVE"},
     )
     lane: bpy.props.IntProperty(
-        name="Lane", description="Counted from outside, 0 the outermost; traffic keeps right", min=0, max=7
+        name="Lane",
+        description="Counted from outside, 0 the outermost; traffic keeps right",
+        min=0,
+        max=7,
+        options={"SKIP_SAVE"},
     )
     height: bpy.props.FloatProperty(
         name="Height",
@@ -146,6 +153,7 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
         min=-FARTHEST_ABOVE,
         max=FARTHEST_ABOVE,
         unit="LENGTH",
+        options={"SKIP_SAVE"},
     )
     _asked_for: tuple[str | None, PathPlace] = (None, NOWHERE_ELSE)
     """Name of the road and place of its axis: read here, as the file is read in a thread."""
@@ -178,7 +186,9 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
         source = RoadSource(scenario, axis=None if whole else path, axis_name=name, axis_place=place)
         parameters, report = replace(source, road=path if whole else None).read()
         text = f"Built {parameters.alignment.length:,.0f} m of road {'of' if whole else 'along'} {path.name}"
-        lost = "; some of its surface was left out" if report["axis"].get("whole", {}).get("surface_lost") else ""
+        surface = any(text.startswith(SURFACE) for text in report["axis"].get("left_out", ()))
+        surface |= report["axis"].get("whole", {}).get("surface_lost", False)
+        lost = "; some of its surface was left out" if surface else ""
         return parameters, f"{text}: {axis_summary(report['axis'])}{lost}"
 
     def refuse(self, error: InputError) -> set[str]:

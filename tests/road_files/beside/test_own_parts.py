@@ -1,4 +1,4 @@
-"""Our own IFC comes in again with its carriageways, turnouts, markings and things; other programs' parts are counted."""
+"""Our own IFC comes in again with carriageways, turnouts, markings and things; parts of others are counted."""
 
 from __future__ import annotations
 
@@ -119,10 +119,19 @@ def test_parts_of_other_programs_are_counted_as_lost(file: Path, tmp_path: Path)
 def test_a_part_with_impossible_values_is_counted_as_lost(file: Path, tmp_path: Path) -> None:
     text = file.read_text(encoding="utf-8")
     at = text.index("IFC", text.index("'taper_in_length'"))
-    (tmp_path / "a.ifc").write_text(
-        text[:at] + "IFCLENGTHMEASURE(-5." + text[text.index(")", at) :], encoding="utf-8"
-    )
+    (tmp_path / "a.ifc").write_text(text[:at] + "IFCLENGTHMEASURE(-5." + text[text.index(")", at) :], encoding="utf-8")
     (line,) = read_lines(tmp_path / "a.ifc")
     assert line.given is not None
-    assert line.left_out == ("lanes: 1 Turnout with other values than ours",)
+    assert line.left_out[0].startswith("lanes: 1 Turnout")
+    assert [text.partition(" ")[0] for text in line.left_out[1:]] == ["objects:"] * (len(line.left_out) - 1)
     assert main(["road", str(tmp_path / "a.ifc"), "--output", str(tmp_path / "out")]) == 3
+
+
+def test_carriageways_that_overlap_are_one_line(file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = file.read_text(encoding="utf-8")
+    at = text.index("IFC", text.index("'inner_offset'"))
+    (tmp_path / "a.ifc").write_text(text[:at] + "IFCLENGTHMEASURE(-40." + text[text.index(")", at) :], encoding="utf-8")
+    assert main(["road", str(tmp_path / "a.ifc"), "--output", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert "its parts must fit together" in said
+    assert said.count("\n") == 1

@@ -33,7 +33,9 @@ def superelevation(stations: tuple[float, ...] = STATIONS, full: float = 5.0, mo
     return f"<Superelevation>{''.join(rows)}<FullSuperelev>{full!r}</FullSuperelev>{more}</Superelevation>"
 
 
-def written(folder: Path, rest: str, left: bool = False, start: float = 0.0, unit: float = 1.0, roads: str = "") -> Path:
+def written(
+    folder: Path, rest: str, left: bool = False, start: float = 0.0, unit: float = 1.0, roads: str = ""
+) -> Path:
     """Write a road with one bend, to the right if it isn't to the left, lengths in a unit (m)."""
     bend = 1.0 / RADIUS if left else -1.0 / RADIUS
     walk = Walk([(d, linear(d, a * bend, b * bend)) for d, a, b in PLAN], 350_000.0, 5_600_000.0, 0.7)
@@ -50,7 +52,7 @@ def written(folder: Path, rest: str, left: bool = False, start: float = 0.0, uni
             radii = ["INF" if k == 0.0 else repr(RADIUS / unit) for k in (a, b)]
             words = f"length='{d / unit!r}' radiusStart='{radii[0]}' radiusEnd='{radii[1]}' rot='{rot}'"
             rows.append(f"<Spiral {words}>{xml_points(**places)}</Spiral>")
-    profile = "<PVI>{0!r} 50</PVI><PVI>{1!r} 58</PVI>".format(*((s + start) / unit for s in (0.0, LENGTH)))
+    profile = f"<PVI>{start / unit!r} 50</PVI><PVI>{(start + LENGTH) / unit!r} 58</PVI>"
     alignment = xml_alignment("".join(rows), profile, start / unit, LENGTH / unit, rest)
     units = ("Metric", "meter") if unit == 1.0 else ("Imperial", "foot")
     return landxml(folder / "bend.xml", [alignment], *units, roads)

@@ -113,7 +113,9 @@ def test_without_marks_the_usual_ones_are_drawn(tmp_path: Path) -> None:
 def test_a_road_without_marks_whose_directions_meet_gets_one_dashed_line_between_them(
     tmp_path: Path, offset: float
 ) -> None:
-    rest = lanes(cubic("laneOffset", "s", 0.0, offset), section(0.0, lane(1, width(0.0, 3.5)), lane(-1, width(0.0, 3.5))))
+    rest = lanes(
+        cubic("laneOffset", "s", 0.0, offset), section(0.0, lane(1, width(0.0, 3.5)), lane(-1, width(0.0, 3.5)))
+    )
     markings, middles, _ = lines_of(road_file(tmp_path, rest))
     assert len(markings) == 3
     place = list(markings).index("centre-line")

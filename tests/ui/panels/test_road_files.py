@@ -139,9 +139,7 @@ def road_file_of(folder: Path) -> Path:
     return opendrive(folder / "two.xodr", roads, "<geoReference>EPSG:25832</geoReference>")
 
 
-@pytest.mark.parametrize(
-    ("points", "fields"), [("AXIS", ()), ("BESIDE", ("offset",)), ("LANE", ("lane",))]
-)
+@pytest.mark.parametrize(("points", "fields"), [("AXIS", ()), ("BESIDE", ("offset",)), ("LANE", ("lane",))])
 def test_the_file_browser_shows_where_points_lie(settings: Any, points: str, fields: tuple[str, ...]) -> None:
     layout, known = FakeLayout(), bpy.ops.synthroads.load_axis.get_rna_type()
     values = {"axis_name": "", "points_are": points, "offset": 0.0, "lane": 0, "height": 0.0}
