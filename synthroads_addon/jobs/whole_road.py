@@ -140,11 +140,13 @@ def _along(given: GivenRoad, line: RoadLine, exact: ExactAxis) -> GivenRoad:
     """Return the parts of a file's road with the crossfall at stations of the axis."""
     there = np.array([*(piece.station for piece in line.pieces), line.pieces[-1].station + line.pieces[-1].length])
     here = np.array([*exact.starts, exact.alignment.length])
+
+    def place(station: float) -> float:
+        beyond = station - min(max(station, there[0]), there[-1])
+        return round_value(float(np.interp(station, there, here) + beyond))
+
     moved = {
-        side: tuple(
-            point.model_copy(update={"station": round_value(float(np.interp(point.station, there, here)))})
-            for point in points
-        )
+        side: tuple(point.model_copy(update={"station": place(point.station)}) for point in points)
         for side, points in given.crossfall.items()
     }
     return replace(given, crossfall=moved)

@@ -47,7 +47,7 @@ def browser(window: bpy.types.Window) -> Any:
     area = next(item for item in window.screen.areas if item.type == "PROPERTIES")
     area.type = "FILE_BROWSER"
     yield 1.0
-    yield from until(lambda: area.spaces.active.params is not None, "the file browser", 60.0)
+    yield from until(lambda: area.spaces.active.params is not None, "the file browser", 600.0)
     space = area.spaces.active
     space.params.directory = f"{ROADS}/".encode()
     space.show_region_toolbar = False

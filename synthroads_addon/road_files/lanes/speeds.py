@@ -27,8 +27,8 @@ def speed_limit(roads: Sequence[FileRoad], loss: Loss) -> float | None:
     records = lanes = unknown = 0
     for road in roads:
         types = sorted(children(road.element, "type"), key=lambda row: number(row, "s", 0.0))
-        ends = [*(number(row, "s", 0.0) for row in types[1:]), road.length]
-        for row, end in zip(types, ends, strict=True):
+        starts = [number(row, "s", 0.0) for row in types]
+        for row, start, end in zip(types, starts, [*starts[1:], road.length], strict=False):
             speed = child(row, "speed")
             if speed is None:
                 continue
@@ -36,7 +36,7 @@ def speed_limit(roads: Sequence[FileRoad], loss: Loss) -> float | None:
             unknown += value is None and speed.get("max", "").strip() not in _NO_LIMIT
             if value is not None:
                 records += 1
-                lengths[value] += max(end - number(row, "s", 0.0), 0.0)
+                lengths[value] += max(end - start, 0.0)
         lanes += sum(local_name(item) == "speed" for lane in road.element.iter() if local_name(lane) == "lane"
                      for item in lane)  # fmt: skip
     most = max(lengths, key=lambda value: lengths[value]) if lengths else None

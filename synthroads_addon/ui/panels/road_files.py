@@ -155,8 +155,8 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
         unit="LENGTH",
         options={"SKIP_SAVE"},
     )
-    _asked_for: tuple[str | None, PathPlace] = (None, NOWHERE_ELSE)
-    """Name of the road and place of its axis: read here, as the file is read in a thread."""
+    # The fields as they are when the job begins: the file is read in a thread.
+    _name, _place = "", NOWHERE_ELSE
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the settings beside the file browser."""
@@ -167,12 +167,12 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
 
     def job(self, context: bpy.types.Context) -> PanelJob[str]:
         """Return the job that reads the file in a thread and builds its road."""
-        place = PathPlace(
+        self._name = self.axis_name.strip()
+        self._place = PathPlace(
             exact(self.offset, None) if self.points_are == "BESIDE" else None,
             self.lane if self.points_are == "LANE" else None,
             exact(self.height, None) or None,
         )
-        self._asked_for = self.axis_name.strip() or None, place
         return super().job(context)
 
     def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
@@ -182,9 +182,14 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
             road.model_fields_set.discard("epsg")
             scenario = scenario.model_copy(update={"road": road})
         whole = has_whole_road(path)
-        name, place = self._asked_for
-        source = RoadSource(scenario, axis=None if whole else path, axis_name=name, axis_place=place)
-        parameters, report = replace(source, road=path if whole else None).read()
+        source = RoadSource(
+            scenario,
+            axis=None if whole else path,
+            road=path if whole else None,
+            axis_name=self._name or None,
+            axis_place=self._place,
+        )
+        parameters, report = source.read()
         text = f"Built {parameters.alignment.length:,.0f} m of road {'of' if whole else 'along'} {path.name}"
         surface = any(text.startswith(SURFACE) for text in report["axis"].get("left_out", ()))
         surface |= report["axis"].get("whole", {}).get("surface_lost", False)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.sampling.road import sample_road
@@ -54,15 +54,18 @@ def test_fifty_drawn_roads_come_back(tmp_path: Path, seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(63, 113))
 def test_fifty_drawn_roads_have_the_same_surface_by_another_reader(tmp_path: Path, seed: int) -> None:
-    """Of the file that a road is written to, and of the one that it is written to again after it was read."""
+    """Of the file that a road is written to, and of the one that it is written to again after it was read.
+
+    Each border of a lane of either is one of the other: only lanes without any width may be missing.
+    """
     require("libOpenDRIVE")
     road = drawn(seed)
     first, found, _ = there_and_back(road, tmp_path)
     second = tmp_path / "again.xodr"
     write_opendrive(found, second, TOLERANCE)
-    (_, before, points), (_, after, others) = libopendrive.surface(first), libopendrive.surface(second)
-    assert [row[:3] for row in before] == [row[:3] for row in after], "station, number and type of each lane"
-    apart = np.abs(points + road.transform.translate - others - found.transform.translate).max()
+    points = libopendrive.surface(first)[2] + road.transform.translate
+    others = libopendrive.surface(second)[2] + found.transform.translate
+    apart = max(float(KDTree(a).query(b)[0].max()) for a, b in ((points, others), (others, points)))
     print(f"seed {seed}: {len(points)} points, {1000.0 * apart:.4f} mm apart")  # with pytest -s
     assert apart < MILLIMETRE
     assert [row for row in changed_fields(road, found) if not row.field.endswith(".ramp")] == []
