@@ -80,7 +80,7 @@ NOWHERE_ELSE = PathPlace()
 
 @dataclass
 class RoadBeside:
-    """What a file says of a road beside its axis.
+    """Parts of a road that a file says beside its axis.
 
     Attributes:
         line, axis: the file's line of elements and what was taken from it; None for lines of points.

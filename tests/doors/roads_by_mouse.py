@@ -21,8 +21,8 @@ from scan_by_mouse import MODULE, answers, fail, finished, install, write
 ROADS = Path.home() / "roads"
 _STEPS = 12
 """Moves of the mouse on the way from a file to the view."""
-_MARGIN = 30
-"""The icon of a file lies within so many pixels of the list's left edge."""
+_ICON = 16
+"""Distance of the middle of a file's icon, which is dragged, from the list's left edge, pixels."""
 
 
 def steps() -> Steps:
@@ -68,7 +68,7 @@ def drop(files: Region, name: str, view: Region) -> Steps:
             break
     else:
         raise LookupError(f"no {name} in the file browser")
-    start = (files.region.x + _MARGIN, y)
+    start = (files.region.x + _ICON, y)
     end = (view.region.x + view.region.width // 2, view.region.y + view.region.height // 2)
     yield from files.move(start)
     yield 0.3

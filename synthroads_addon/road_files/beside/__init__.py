@@ -1,1 +1,1 @@
-"""What LandXML and IFC files say of a road beside its line."""
+"""Parts of a road beside its line that LandXML and our own IFC say."""

@@ -177,7 +177,7 @@ def _carriageway(
     if verge_width.max() <= _NONE:
         verge_width = np.full(len(at), verge.width)
     else:
-        slope = _verge_slope(side, turnouts, loss)
+        slope = _verge_slope(side, turnouts, verge.slope, loss)
     inner = corners(at, line.values[:, 0])
     rise = made.rises[side.sign]
     percent = 100.0 * rise.values[:, 0]
@@ -223,20 +223,30 @@ def _offset(points: list[tuple[float, float]], stations: Float) -> float | tuple
     return tuple(SignedWidthPoint(station=round_value(s), width=round_value(w, _DIGITS)) for s, w in points)
 
 
-def _verge_slope(side: SideShape, turnouts: dict[str, Turnout], loss: Loss) -> float:
-    """Return the fall, %, of a file's verge away from the pavement: the mean one, weighted by width."""
-    falls, widths = 0.0, 0.0
+def _verge_slope(side: SideShape, turnouts: dict[str, Turnout], usual: float, loss: Loss) -> float:
+    """Return the fall, %, of a file's verge away from the pavement: the mean one, weighted by width.
+
+    Beside turnouts, whose ramps bend it, it is looked at only where they are everywhere: the median is taken then. A
+    verge that is wide nowhere in the middle of a stretch has the usual fall.
+    """
+    rows: list[tuple[float, float, float, bool]] = []  # length, width, fall (m), whether a turnout is near
     for stretch in range(len(side.breaks) - 1):
         at = np.linspace(side.breaks[stretch], side.breaks[stretch + 1], 3)[1:2]
-        if beside(at, turnouts).any():
-            continue
         found = side.boundaries(at, stretch)
         width = float(found.distances[0, -1] - found.distances[0, -2])
-        length = float(side.breaks[stretch + 1] - side.breaks[stretch])
-        falls += length * float(found.inner_heights[0, -1] - found.heights[0, -1])
-        widths += length * width
-    percent = 100.0 * falls / max(widths, _NONE)
+        fall = float(found.inner_heights[0, -1] - found.heights[0, -1])
+        if width > _NONE:
+            length = float(side.breaks[stretch + 1] - side.breaks[stretch])
+            rows.append((length, width, fall, bool(beside(at, turnouts).any())))
     loss.read["verges"] += 1
+    if not rows:
+        return usual
+    length, width, fall, near = np.array(rows).T
+    free = near == 0.0
+    if free.any():
+        percent = 100.0 * float((length * fall)[free].sum() / (length * width)[free].sum())
+    else:
+        percent = 100.0 * float(np.median(np.repeat(fall / width, np.maximum(length, 1.0).astype(int))))
     return round_value(min(max(percent, 0.0), _STEEPEST_VERGE), 4)
 
 
