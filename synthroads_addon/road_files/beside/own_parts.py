@@ -69,9 +69,9 @@ def own_parts(model: Any) -> tuple[GivenRoad | None, Counter[str], list[str]]:
         if isinstance(item, tuple(_PAINT.values())) and _refers(item, by_side, turnouts)
     }
     things = {name: cast(Thing, item) for name, item in others.items() if type(item).__name__ in THINGS}
-    kept = {**by_side, **turnouts, **markings, **things}
     wrong += Counter(type(item).__name__ for item in found.values())
-    taken = Counter(type(item).__name__ for item in kept.values())
+    kept: list[RoadObject] = [*by_side.values(), *turnouts.values(), *markings.values(), *things.values()]
+    taken = Counter(type(item).__name__ for item in kept)
     lost = [f"{_word(kind)}: {n} {kind} with other values than ours" for kind, n in sorted((wrong - taken).items())]
     return GivenRoad(by_side, turnouts, markings, things), taken, lost
 
@@ -91,7 +91,7 @@ def _word(kind: str) -> str:
 
 def _with_carriageway(item: RoadObject, ids: Mapping[str, str]) -> RoadObject:
     """Return an object that names its carriageway as the sampled parts do."""
-    named = getattr(item, "carriageway", None)
+    named = str(getattr(item, "carriageway", ""))
     return item.model_copy(update={"carriageway": ids[named]}) if named in ids else item
 
 

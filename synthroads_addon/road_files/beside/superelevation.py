@@ -188,7 +188,8 @@ def _points(curves: Sequence[_Curve], straight: float) -> tuple[CrossfallPoint, 
             )
         corners += [*inner[0], (full, curve.full), (back, curve.full), *inner[1]]
     if min(station for station, _ in corners) < 0.0:  # a curve that begins before the road does
-        at_begin = float(np.interp(0.0, *zip(*sorted(corners[1:]), strict=True)))
+        stations, values = np.array(sorted(corners[1:])).T
+        at_begin = float(np.interp(0.0, stations, values))
         corners = [(0.0, at_begin), *((s, v) for s, v in corners[1:] if s > 0.0)]
     found: list[CrossfallPoint] = []
     for station, percent in corners:

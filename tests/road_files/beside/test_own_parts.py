@@ -69,7 +69,7 @@ def test_widths_crossfall_and_turnouts_are_the_sets(road: RoadParameters, file: 
 def test_fifty_drawn_roads_come_back(tmp_path: Path, seed: int) -> None:
     """The same axis, surface and objects."""
     design_class, section = PAIRS[seed % len(PAIRS)]
-    drawn = sample_road(scenario(design_class=design_class, cross_section=section, length=700.0, **OFTEN), seed)
+    drawn = sample_road(scenario(design_class=design_class, cross_section=section, length=500.0, **OFTEN), seed)
     write_twin(drawn, tmp_path, ("ifc",), 0.1)
     found, report = taken(tmp_path / "twin.ifc", drawn)
     across, up = roads_apart(drawn, found)
