@@ -16,10 +16,11 @@ import bpy
 sys.path.insert(0, str(Path(__file__).parent))
 
 from by_mouse import OUT, Region, Steps, shoot, until, work
-from scan_by_mouse import MODULE, answers, fail, finished, install, write
+from scan_by_mouse import MODULE, answers, fail, install, write
 
 ROADS = Path.home() / "roads"
-_STEPS = 12
+_PATIENCE = 900.0
+_STEPS = 40
 """Moves of the mouse on the way from a file to the view."""
 _ICON = 16
 """Distance of the middle of a file's icon, which is dragged, from the list's left edge, pixels."""
@@ -37,7 +38,7 @@ def steps() -> Steps:
     answers["roads"] = {}
     for path in sorted(ROADS.iterdir()):
         yield from drop(files, path.name, view)
-        yield from finished(path.name)
+        yield from until(lambda path=path: is_built(path), path.name, _PATIENCE)  # type: ignore[misc]
         answers["roads"][path.name] = read_back(path)
         yield from shoot()
 
@@ -47,7 +48,7 @@ def browser(window: bpy.types.Window) -> Any:
     area = next(item for item in window.screen.areas if item.type == "PROPERTIES")
     area.type = "FILE_BROWSER"
     yield 1.0
-    yield from until(lambda: area.spaces.active.params is not None, "the file browser", 600.0)
+    yield from until(lambda: area.spaces.active.params is not None, "the file browser", _PATIENCE)
     space = area.spaces.active
     space.params.directory = f"{ROADS}/".encode()
     space.show_region_toolbar = False
@@ -73,14 +74,21 @@ def drop(files: Region, name: str, view: Region) -> Steps:
     yield from files.move(start)
     yield 0.3
     files.window.event_simulate(type="LEFTMOUSE", value="PRESS", x=start[0], y=start[1])
-    yield 0.3
+    yield 0.5
     for n in range(1, _STEPS + 1):
         place = tuple(round(a + (b - a) * n / _STEPS) for a, b in zip(start, end, strict=True))
         yield from files.move((place[0], place[1]))
-        yield 0.1
+        yield 0.05
     yield 0.5
     files.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=end[0], y=end[1])
     yield 1.0
+
+
+def is_built(path: Path) -> bool:
+    """Return whether the scene's road is that of a file, and no job is at work."""
+    root = sys.modules[f"{MODULE}.blender.model.store"].find_road(bpy.context.scene)
+    named = root and sys.modules[f"{MODULE}.ui.panels.road_files"].source_file_name(root)
+    return named == path.name and sys.modules[f"{MODULE}.ui.work.job"].running_job() is None
 
 
 def read_back(path: Path) -> dict[str, Any]:
@@ -89,13 +97,10 @@ def read_back(path: Path) -> dict[str, Any]:
     loader = sys.modules[f"{MODULE}.ui.panels.road_files"]
     scene = bpy.context.scene
     parameters, scenario = rules.edited_parameters(scene), scene.synthroads.scenario()
-    if parameters is None:
-        return {"same": False, "built": None}
     (OUT / f"{path.name}.json").write_text(parameters.to_json(), encoding="utf-8")
     scenario.road.model_fields_set.discard("epsg")
     wanted, _ = loader.RoadSource(scenario, road=path).read()
-    root = sys.modules[f"{MODULE}.blender.model.store"].find_road(scene)
-    return {"same": parameters == wanted, "built": root.name, "from": loader.source_file_name(root)}
+    return {"same": parameters == wanted, "objects": len(parameters.objects)}
 
 
 if __name__ == "__main__":

@@ -134,8 +134,8 @@ def test_files_of_roads_are_built_where_they_are_dropped(dropped: Path) -> None:
     assert answers.get("failed") is None, answers["failed"]
     assert sorted(answers["roads"]) == ["twin.ifc", "twin.xml", "twin.xodr"]
     for name, found in answers["roads"].items():
-        assert found["from"] == name
         assert found["same"], name
+        assert found["objects"] > 20
         path = dropped / "home" / "roads" / name
         rows, _ = differences_from(path, dropped / "out" / f"{name}.json", Scenario.from_dict({}))
         assert rows == [], name
