@@ -112,10 +112,12 @@ def _without_turnouts(side: SideShape, line: Polyline, turnouts: dict[str, Turno
     """Return a carriageway's boundaries without turnouts: the shoulder gives way to them, and the verge is wider."""
     widths = np.diff(line.values, axis=1)
     kept = ~beside(line.stations, turnouts)
-    kept = kept if kept.any() else np.ones(len(kept), dtype=bool)
     shoulder, verge = paved_index(side) - 1, widths.shape[1] - 1
-    for column in (shoulder, verge):
-        widths[:, column] = np.interp(line.stations, line.stations[kept], widths[kept, column])
+    if not kept.any():  # beside turnouts a shoulder is never wider than elsewhere, and a verge never narrower
+        widths[:, shoulder], widths[:, verge] = widths[:, shoulder].max(), widths[:, verge].min()
+    else:
+        for column in (shoulder, verge):
+            widths[:, column] = np.interp(line.stations, line.stations[kept], widths[kept, column])
     widths[:, shoulder + 1 : verge] = 0.0
     inner = line.values[:, :1]
     return Polyline(line.stations, np.column_stack([inner, inner + np.cumsum(widths, axis=1)]), line.jumps)
