@@ -9,7 +9,9 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.road.section import Carriageway
 from tests.helpers.roads.lane_files import LENGTH, border, cubic, lane, lanes, road_file, section, taken, width
+from tests.helpers.roads.written_lines import opendrive, xodr_road
 
 MILLIMETRE = 1e-3
 AT = np.array([12.0, 50.0, 95.0, 104.0, 150.0, 191.0])
@@ -160,3 +162,31 @@ def test_stations_are_those_of_the_curve_where_it_is_longer_than_said(tmp_path: 
     assert geometry.length == pytest.approx(1.02 * LENGTH, abs=1e-6)
     there = geometry.sections["right"].lane_boundaries(np.array([101.9, 102.1]))
     assert there[:, 0].tolist() == pytest.approx([3.0, 3.5])
+
+
+def test_exits_and_entries_of_others_are_told_with_their_stretch(tmp_path: Path) -> None:
+    both = lane(-1, width(0.0, 3.5))
+    ramp = both + lane(-2, width(0.0, 0.0, 0.035), "exit")
+    after = both + lane(-2, width(0.0, 3.5), "offRamp")
+    path = road_file(tmp_path, lanes(section(0.0, "", both), section(50.0, "", ramp), section(150.0, "", after)))
+    parameters, _, report = taken(path)
+    (carriageway,) = parameters.of_type(Carriageway).values()
+    assert len(carriageway.lanes) == 2
+    (row,) = report["whole"]["left_out"]
+    assert (row["kind"], row["count"], row["stretches"]) == ("turnouts", 1, [[50.0, 200.0]])
+    assert "turnouts" in [line for line in report["summary"] if "50.0 to 200.0 m" in line][0]
+    assert not report["whole"]["surface_lost"]
+
+
+def test_roads_that_a_junction_joins_are_told(tmp_path: Path) -> None:
+    rest = lanes(section(0.0, "", lane(-1, width(0.0, 3.5))))
+    roads = [
+        xodr_road([(0.0, long, (0.0, 0.0, 0.3), "<line/>")], rest, name, number)
+        for number, (name, long) in enumerate((("main", 200.0), ("ramp", 80.0), ("further", 90.0)), 1)
+    ]
+    joined = '<connection id="0" incomingRoad="1" linkedRoad="2"/><connection id="1" incomingRoad="1" connectingRoad="3"/>'
+    other = '<connection id="2" incomingRoad="3" linkedRoad="1"/>'
+    path = opendrive(tmp_path / "a.xodr", [*roads, f'<junction id="7">{joined}{other}</junction>'])
+    _, _, report = taken(path)
+    (row,) = [row for row in report["whole"]["left_out"] if row["kind"] == "roads of junctions"]
+    assert (row["count"], row["why"]) == (2, "--axis-name takes one: ramp, further")
