@@ -18,6 +18,7 @@ from ..road.things.registry import THINGS
 from ..road_files.lanes.carriageways import deviations
 from ..road_files.lanes.differences import Difference, differences
 from ..road_files.lanes.road import WholeRoad, whole_road, with_heights
+from ..road_files.line import within_limits
 from ..road_files.opendrive import read_opendrive
 from ..road_files.read import choose_line, format_of
 from ..sampling.road import sample_road
@@ -76,12 +77,13 @@ def _read_road(
     if choose_line(read_opendrive(path), name, path.name).lanes is None:
         axis, limits, report = axis_from_file(*line)
         return sample_road(limits, scenario.seed, scenario.title, axis), report, None
-    found = whole_road(path, scenario.road, name, round_kinks)
-    axis, limits, report = axis_from_file(*line)
-    if found.heights is not None:
-        axis, report["heights"] = _with_profile(axis, limits, found, round_kinks)
-    limits = _wide_enough(path, limits, found)
-    parameters = sample_road(limits, scenario.seed, scenario.title, axis, found.given)
+    with within_limits(path.name):
+        found = whole_road(path, scenario.road, name, round_kinks)
+        axis, limits, report = axis_from_file(*line)
+        if found.heights is not None:
+            axis, report["heights"] = _with_profile(axis, limits, found, round_kinks)
+        limits = _wide_enough(path, limits, found)
+        parameters = sample_road(limits, scenario.seed, scenario.title, axis, found.given)
     report["surface"] = deviations(found.pavements, _lifted(parameters), found.stations, found.loss)
     report["left_out"] = [text for text in report["left_out"] if not _is_taken(text)]
     return parameters, report | {"whole": found.loss.to_dict(), "summary": found.loss.lines()}, found.given

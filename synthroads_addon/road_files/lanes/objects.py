@@ -18,7 +18,7 @@ from ...road.section import Arrow, Hatching, LineMarking
 from ...road.things.registry import THINGS
 from ...road.things.thing import LengthwiseThing
 from ..xml_text import child, children, local_name, number
-from .corners import corners
+from .corners import corners, rounded_points
 from .kinds import Maker, Size, thing_of
 from .loss import Loss
 from .places import Places
@@ -207,7 +207,7 @@ def _loose_line(item: Element, places: Places) -> LineMarking:
     gap = number(mark, "spaceLength", 0.0)
     start = float(station[0]) + (number(mark, "startOffset", 0.0) if gap else 0.0)
     place: Any = tuple(
-        SignedWidthPoint(station=round_value(s, _DIGITS), width=round_value(w, _DIGITS)) for s, w in points
+        SignedWidthPoint(station=s, width=round_value(w, _DIGITS)) for s, w in rounded_points(points, _DIGITS)
     )
     return LineMarking(
         instance=1,
