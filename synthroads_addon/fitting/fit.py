@@ -51,6 +51,7 @@ _FLATTEST = 1e7  # m: a rounding of a larger radius bends by less than 1 mm over
 REFUSED_BEYOND = 40.0
 """Times the tolerance that a point may be away from the road fitted to an axis: 2 m of the usual 5 cm. Real axes stay
 below 6, a corner of 90 degrees just passes; beyond that it is another line than the one that was measured."""
+_NO_ROAD = 3.0  # times what is refused is what dense knots are off where no fewer elements are looked for
 _PLAY = 1e-5  # of a radius: roundings that touch must not overlap once stations and elevations are rounded
 
 
@@ -328,7 +329,7 @@ def _follow_heights(station: Float, heights: Float, weights: Float, length: floa
     found: Profile | None = None
     if (np.diff(at) > 0.0).all():
         try:
-            found = heights_followed(at, level, length)
+            found = heights_followed(at, level, length, tolerance)
         except (InputError, np.linalg.LinAlgError):  # grades that no road has
             found = None
     if found is not None and worst(found) <= tolerance:
@@ -436,6 +437,8 @@ def _fit_window(
         if finer.noise > _FINER_HELPS * rich.noise:
             break
         rich = finer
+    if np.abs(rich.residuals).max() > _NO_ROAD * REFUSED_BEYOND * tolerance:
+        return rich  # fewer elements are no nearer: that it is refused needs no search for them
     room = _SCATTER if goal.is_met(rich) else _RELAXED
     goal = replace(goal, rms=max(goal.rms, room * rich.noise), p95=max(goal.p95, room * rich.p95))
     return improve_fit(min(descent(rich, goal), key=goal.rank), goal)

@@ -660,3 +660,17 @@ def test_points_that_turn_back_are_refused_with_their_distance(way: tuple[float,
     points[:, 0] = way
     with pytest.raises(AxisRefusedError, match="no road follows its points within 2 m"):
         fit_axis(points, follow=follow).check("axis.csv")
+
+
+def test_no_few_elements_are_looked_for_where_no_road_follows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A path that turns at every point, 900 m apart: such a search took a minute, to be refused all the same."""
+
+    def search(*_: object) -> None:
+        pytest.fail("elements are looked for")
+
+    monkeypatch.setattr("synthroads_addon.fitting.fit.improve_fit", search)
+    rng = np.random.default_rng(3)
+    heading = np.cumsum(1.5 * (0.3 + rng.normal(0.0, 1.0, 150)))
+    points = np.cumsum(rng.uniform(300.0, 900.0, (150, 1)) * np.column_stack([np.cos(heading), np.sin(heading)]), axis=0)
+    with pytest.raises(AxisRefusedError, match="no road follows its points within 2 m"):
+        fit_axis(points).check("a.sbet")

@@ -73,7 +73,7 @@ def of_others(folder: Path) -> list[bytes]:
 def _own() -> bytes:
     import tempfile
 
-    limits = {**EVERYTHING, "design_class": "EKA1A", "cross_section": "RQ31", "length": 600.0}
+    limits = {**EVERYTHING, "design_class": "EKA1A", "cross_section": "RQ31", "length": 900.0}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "own.xodr"
         write_opendrive(road(11, **limits), path, 0.05)
