@@ -107,13 +107,13 @@ def files_of(whose: str, folder: Path) -> list[bytes]:
     return of_others(folder) if whose == "others" else [_own()]
 
 
-@fuzz(20, 2500)
+@fuzz(4, 2500)
 @pytest.mark.parametrize("whose", ["others", "own"])
 def test_whole_roads_with_wrong_elements(tmp_path: Path, whose: str, count: int) -> None:
     run(tmp_path, wrong_xml(files_of(whose, tmp_path)), count)
 
 
-@fuzz(20, 2500)
+@fuzz(4, 2500)
 @pytest.mark.parametrize("whose", ["others", "own"])
 def test_whole_roads_with_odd_numbers(tmp_path: Path, whose: str, count: int) -> None:
     run(tmp_path, with_odd_numbers(files_of(whose, tmp_path)), count)

@@ -156,15 +156,20 @@ def _sort_lanes(layout: SideLayout, number: int, lanes: Sequence[FileLane]) -> l
 
 
 def _beside(layout: SideLayout, number: int, lanes: Sequence[FileLane]) -> list[tuple[str, FileLane]]:
-    """Return the strips outside of the lanes that traffic drives on: border, shoulder, verge, in this order."""
+    """Return the strips outside of the lanes that traffic drives on: border, shoulder, verge, in this order.
+
+    A border outside of all that is paved is the verge: others write their grass so.
+    """
     found: list[tuple[str, FileLane]] = []
     reached = 0  # 0 edge strip, 1 hard shoulder, 2 verge
     stopped = False
-    for lane in lanes:
+    last_paved = max((n for n, lane in enumerate(lanes) if lane.type in PAVED - {"border"}), default=-1)
+    for n, lane in enumerate(lanes):
         if lane.type == "border" and reached == 0 and not found:
             found.append(("outer_edge_strip", lane))
             continue
         paved = lane.type in PAVED and not (stopped and lane.type == "shoulder")
+        paved = paved and not (lane.type == "border" and n > last_paved)
         if reached < 2 and paved:
             reached, stopped = 1, stopped or lane.type == "stop"
             found.append(("hard_shoulder", lane))

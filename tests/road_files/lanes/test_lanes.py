@@ -190,3 +190,22 @@ def test_roads_that_a_junction_joins_are_told(tmp_path: Path) -> None:
     _, _, report = taken(path)
     (row,) = [row for row in report["whole"]["left_out"] if row["kind"] == "roads of junctions"]
     assert (row["count"], row["why"]) == (2, "--axis-name takes one: ramp, further")
+
+
+@pytest.mark.parametrize(
+    ("outside", "kinds"),
+    [
+        (("stop", "border"), ("lane", "hard_shoulder", "verge")),
+        (("border", "border"), ("lane", "outer_edge_strip", "verge")),
+        (("shoulder", "border", "biking"), ("lane", "hard_shoulder", "verge")),
+    ],
+)
+def test_a_border_outside_of_all_that_is_paved_is_the_verge(
+    tmp_path: Path, outside: tuple[str, ...], kinds: tuple[str, ...]
+) -> None:
+    more = "".join(lane(-2 - n, width(0.0, 2.0), kind) for n, kind in enumerate(outside))
+    _, geometry, report = taken(road_file(tmp_path, lanes(section(0.0, "", lane(-1, width(0.0, 3.5)) + more))))
+    right = geometry.sections["right"]
+    assert right.kinds == kinds
+    assert right.distances(np.array([100.0]))[0, 2] == pytest.approx(3.5 + 2.0 * (3 if "biking" in outside else 1))
+    assert not report["whole"]["surface_lost"]
