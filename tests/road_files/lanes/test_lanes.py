@@ -10,6 +10,7 @@ from numpy.polynomial import Polynomial
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.section import Carriageway
+from synthroads_addon.road_files.lanes.corners import rounded_points
 from tests.helpers.roads.lane_files import LENGTH, border, cubic, lane, lanes, road_file, section, taken, width
 from tests.helpers.roads.written_lines import opendrive, xodr_road
 
@@ -209,3 +210,31 @@ def test_a_border_outside_of_all_that_is_paved_is_the_verge(
     assert right.kinds == kinds
     assert right.distances(np.array([100.0]))[0, 2] == pytest.approx(3.5 + 2.0 * (3 if "biking" in outside else 1))
     assert not report["whole"]["surface_lost"]
+
+
+@pytest.mark.parametrize(("begin", "wide", "message"), [(0.0, 93.0, "width is 93.0"), (LENGTH, 3.5, r"width\.points")])
+def test_what_a_parameter_set_cannot_hold_is_refused_in_one_line(
+    tmp_path: Path, begin: float, wide: float, message: str
+) -> None:
+    """A lane wider than a road; a plan that begins where the lanes, which bend, end."""
+    rest = lanes(section(0.0, "", lane(-1, width(0.0, wide, 0.0, 1e-5))))
+    road = xodr_road([(begin, LENGTH, (10.0, 20.0, 0.3), "<line/>")], rest)
+    with pytest.raises(InputError, match=f"{message}.*no road may be so") as found:
+        taken(opendrive(tmp_path / "a.xodr", [road], "<geoReference>EPSG:25832</geoReference>"))
+    assert str(found.value).isprintable()
+
+
+def test_a_file_without_roads_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="the file has no road or alignment"):
+        taken(opendrive(tmp_path / "a.xodr", []))
+
+
+def test_coordinates_beyond_all_maps_are_refused(tmp_path: Path) -> None:
+    rest = lanes(section(0.0, "", lane(-1, width(0.0, 3.5))))
+    road = xodr_road([(0.0, 200.0, (3e8, 0.0, 0.3), "<line/>")], rest)
+    with pytest.raises(InputError, match=r"coordinates, m is \[.*\]: at most 1e\+08 are possible"):
+        taken(opendrive(tmp_path / "a.xodr", [road]))
+
+
+def test_points_whose_rounded_stations_are_one() -> None:
+    assert rounded_points([(1.0, 2.0), (1.0 + 1e-12, 3.0), (4.0, 5.0)]) == [(1.0, 2.0), (4.0, 5.0)]
