@@ -23,7 +23,7 @@ from ..road_files.lanes.carriageways import deviations
 from ..road_files.lanes.differences import Difference, differences
 from ..road_files.lanes.loss import Loss
 from ..road_files.lanes.road import WholeRoad, whole_road, with_heights
-from ..road_files.line import ExactAxis, RoadLine
+from ..road_files.line import ExactAxis, RoadLine, within_limits
 from ..road_files.opendrive import read_opendrive
 from ..road_files.read import READERS, choose_line, format_of
 from ..sampling.road import sample_road
@@ -92,14 +92,15 @@ def _read_road(
     if choose_line(read_opendrive(path), name, path.name).lanes is None:
         axis, limits, report = axis_from_file(*line)
         return sample_road(limits, scenario.seed, scenario.title, axis), report, None
-    found = whole_road(path, scenario.road, name, round_kinks)
-    axis, limits, report = axis_from_file(*line)
-    if found.heights is not None:
-        axis, report["heights"] = _with_profile(axis, limits, found, round_kinks)
-    limits = _wide_enough(path, limits, found.given)
-    if found.speed is not None:
-        limits = with_speed(path.name, found.speed, limits)
-    parameters = sample_road(limits, scenario.seed, scenario.title, axis, found.given)
+    with within_limits(path.name):
+        found = whole_road(path, scenario.road, name, round_kinks)
+        axis, limits, report = axis_from_file(*line)
+        if found.heights is not None:
+            axis, report["heights"] = _with_profile(axis, limits, found, round_kinks)
+        limits = _wide_enough(path, limits, found.given)
+        if found.speed is not None:
+            limits = with_speed(path.name, found.speed, limits)
+        parameters = sample_road(limits, scenario.seed, scenario.title, axis, found.given)
     report["surface"] = deviations(found.pavements, _lifted(parameters), found.stations, found.loss)
     report["left_out"] = [text for text in report["left_out"] if not _is_taken(text)]
     return parameters, report | {"whole": found.loss.to_dict(), "summary": found.loss.lines()}, found.given

@@ -28,7 +28,11 @@ from .xml_text import finite
 _SCHEMA = re.compile(rb"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'\s*\)\s*\)", re.IGNORECASE)
 _END = b"END-ISO-10303-21"
 """The end of each file of STEP (ISO 10303-21): without it something was cut off, which the library reads over."""
-_READ_AS = "IFC4X3_ADD2"
+_DATA = re.compile(rb"ENDSEC\s*;\s*DATA\s*;")
+_HEADER = b"""ISO-10303-21;
+HEADER;FILE_DESCRIPTION((''),'2;1');FILE_NAME('','',(''),(''),'','','');FILE_SCHEMA(('IFC4X3_ADD2'));
+"""
+"""Header up to its end, with the schema that the library reads."""
 _KINDS = {
     "CLOTHOID": "clothoid", "BLOSSCURVE": "bloss", "COSINECURVE": "cosine", "SINECURVE": "sine",
     "HELMERTCURVE": "helmert",
@@ -82,7 +86,10 @@ def _lines(path: Path, model: Any) -> list[RoadLine]:
 
 
 def _open(path: Path) -> Any:
-    """Return the model of a file, its schema's name changed in a copy where the library knows another one alone."""
+    """Return the model of a file, read from a copy with a header of its own.
+
+    The library knows one name of the schema alone, and a broken header can end the process.
+    """
     try:
         import ifcopenshell  # an extra, and it takes seconds
     except ImportError:
@@ -101,9 +108,11 @@ def _open(path: Path) -> Any:
         )
     if _END not in data[-4096:]:
         raise InputError(path.name, None, "the file ends too early: END-ISO-10303-21 is needed at its end")
+    begin = _DATA.search(data)
+    if begin is None:
+        raise InputError(path.name, None, "a section DATA behind the header is needed")
     try:
-        if found and schema != _READ_AS:
-            data = data[: found.start(1)] + _READ_AS.encode() + data[found.end(1) :]
+        data = _HEADER + data[begin.start() :]
         with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
             copy = Path(folder) / "model.ifc"
             copy.write_bytes(data)

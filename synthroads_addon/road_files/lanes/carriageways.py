@@ -16,7 +16,7 @@ from ...road.section import Carriageway, CrossfallPoint, Lane, Pavement, Turnout
 from ...road.section_geometry import CarriagewaySection
 from ...road.turnout_geometry import TURNOUT_STRIPS
 from ..heights import HeightPiece
-from .corners import Polyline, corners, polyline
+from .corners import Polyline, corners, polyline, rounded_points
 from .loss import Loss
 from .plane import Planes, RotationAxis, joined, planes
 from .records import merged
@@ -201,7 +201,7 @@ def _carriageway(
         verge_width=_width(at, verge_width, _SHOULDER),
         verge_slope_percent=slope,
         crossfall=tuple(
-            CrossfallPoint(station=round_value(s), crossfall_percent=round_value(v, _DIGITS)) for s, v in falls
+            CrossfallPoint(station=s, crossfall_percent=round_value(v, _DIGITS)) for s, v in rounded_points(falls)
         ),
         rotation_axis=made.axis,
         pavement=Pavement(),
@@ -216,13 +216,13 @@ def _width(stations: Float, widths: Float, limits: tuple[float, float]) -> float
         if limits[0] <= value <= limits[1]:
             return value
         points = [(float(stations[0]), value), (float(stations[-1]), value)]
-    return tuple(WidthPoint(station=round_value(s), width=round_value(w, _DIGITS)) for s, w in points)
+    return tuple(WidthPoint(station=s, width=round_value(w, _DIGITS)) for s, w in rounded_points(points))
 
 
 def _offset(points: list[tuple[float, float]], stations: Float) -> float | tuple[SignedWidthPoint, ...]:
     if len(points) == 1:
         return round_value(points[0][1], _DIGITS)
-    return tuple(SignedWidthPoint(station=round_value(s), width=round_value(w, _DIGITS)) for s, w in points)
+    return tuple(SignedWidthPoint(station=s, width=round_value(w, _DIGITS)) for s, w in rounded_points(points))
 
 
 def _verge_slope(side: SideShape, turnouts: dict[str, Turnout], usual: float, loss: Loss) -> float:

@@ -28,10 +28,11 @@ from .places import Places
 from .records import FileRoad, read_road
 from .shape import SideShape
 from .speeds import speed_limit
-from .strips import driven_sides, side_layouts
+from .strips import driven_sides, foreign_turnouts, side_layouts
 from .surface import FileSurface
 
 _SAME_PLAN = 1e-6
+_SHOWN = 5
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,11 @@ def whole_road(
         for layout in layouts.values():
             for _, _, why in layout.lost:
                 loss.leave_out("lanes", why, surface=True)
+            for low, high in foreign_turnouts(layout, one.sections):
+                stretch = float(np.interp(low, *exact)), float(np.interp(high, *exact))
+                loss.leave_out("turnouts", "their lanes are lanes of the carriageway, without a ramp", stretch=stretch)
         loss.read["lane sections"] += len(one.sections)
+    _tell_junctions(root, elements, roads, loss)
     found = pavements(shapes, _verge(scenario), lambda s: np.interp(s, *exact), loss)
     heights = None
     if found.heights is not None:
@@ -121,6 +126,20 @@ def _elements(root: Element) -> dict[str, Element]:
     for number_of, road in enumerate(children(root, "road")):
         found[names.unique(road.get("name"), f"road {road.get('id', number_of)}")] = road
     return found
+
+
+def _tell_junctions(root: Element, elements: dict[str, Element], roads: list[FileRoad], loss: Loss) -> None:
+    """Tell the roads that a junction joins to these ones: each is a road of its own."""
+    mine = {road.element.get("id") for road in roads}
+    names = {element.get("id"): name for name, element in elements.items()}
+    others: list[str] = []
+    for connection in (one for junction in children(root, "junction") for one in children(junction, "connection")):
+        if connection.get("incomingRoad") in mine:
+            other = connection.get("connectingRoad", connection.get("linkedRoad"))
+            others += [names[other]] if other in names and names[other] not in others else []
+    if others:
+        named = ", ".join(others[:_SHOWN]) + (", ..." if len(others) > _SHOWN else "")
+        loss.leave_out("roads of junctions", f"--axis-name takes one: {named}", len(others))
 
 
 def _up(root: Element) -> float:
