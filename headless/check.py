@@ -16,6 +16,7 @@ from synthroads_addon.base.text.table import text_table
 
 if TYPE_CHECKING:
     from synthroads_addon.checking.checker import Violation
+    from synthroads_addon.road.parameters import AlignmentObject
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,21 +29,31 @@ def run(arguments: argparse.Namespace) -> tuple[int, dict[str, Any], str]:
     from synthroads_addon.checking.checker import check
     from synthroads_addon.road.parameters import read_parameters
 
-    violations = check(read_parameters(arguments.file))
-    return 3 if violations else 0, {"violations": [asdict(item) for item in violations]}, table(violations)
+    parameters = read_parameters(arguments.file)
+    violations = check(parameters)
+    text = table(violations, parameters.alignment)
+    return 3 if violations else 0, {"violations": [asdict(item) for item in violations]}, text
 
 
-def table(violations: list[Violation]) -> str:
-    """Return violations as a text table, one row with a sentence each, or a line that says there are none."""
+def table(violations: list[Violation], axis: AlignmentObject) -> str:
+    """Return violations as a text table, one row with a sentence each, or a line that says there are none.
+
+    Where the road's kilometres count otherwise than its stations, a column says what they count.
+    """
     if not violations:
         return "no violations"
-    head = ("rule", "object", "station", "value", "limit", "")
+    counts_otherwise = bool(axis.first_station or axis.equations)
+    head = ("rule", "object", "station", *(["counted"] if counts_otherwise else []), "value", "limit", "")
     rows = [
-        (v.rule, v.object, f"{v.station:.1f} m", _number(v.value, v.unit), _number(v.limit, v.unit), v.text)
+        (
+            *(v.rule, v.object, f"{v.station:.1f} m"),
+            *([f"{axis.counted(v.station):,.1f} m"] if counts_otherwise else []),
+            *(_number(v.value, v.unit), _number(v.limit, v.unit), v.text),
+        )
         for v in violations
     ]
     count = len(violations)
-    return "\n".join([*text_table(head, rows, (2, 3, 4)), f"{count} violation{'s' if count > 1 else ''}"])
+    return "\n".join([*text_table(head, rows, range(2, len(head) - 1)), f"{count} violation{'s' if count > 1 else ''}"])
 
 
 def _number(value: float, unit: str) -> str:

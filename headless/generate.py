@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help=text)
     parser.add_argument("--parameters", type=Path, metavar="FILE", help="take this parameter set, and sample none")
     parser.add_argument("--axis", type=Path, metavar="FILE", help=AXIS_FILES)
-    text = "OpenDRIVE file whose road is taken whole: lanes, surface, markings, objects, signals"
+    text = "file whose whole road is taken: all of OpenDRIVE and of our own IFC, of LandXML the superelevation as well"
     parser.add_argument("--road", type=Path, metavar="FILE", help=text)
     add_axis_name_argument(parser)
     add_choice_arguments(parser)
@@ -91,9 +91,11 @@ def _check_road_changes(arguments: argparse.Namespace) -> None:
     if not (arguments.parameters or arguments.axis or arguments.road):
         return
     from synthroads_addon.jobs.generate import FROM_AXIS, FROM_ROAD
+    from synthroads_addon.road_files.read import format_of
 
     option = "--parameters" if arguments.parameters else "--axis" if arguments.axis else "--road"
-    fields = FROM_ROAD if arguments.road else FROM_AXIS
+    # LandXML has no lanes.
+    fields = FROM_ROAD if arguments.road and format_of(arguments.road) != "LandXML" else FROM_AXIS
     for change in arguments.changes:
         for name in _road_fields(change):
             if arguments.parameters or name in fields:

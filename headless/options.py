@@ -132,10 +132,14 @@ def add_axis_name_argument(parser: argparse.ArgumentParser) -> None:
 
 def axis_place(arguments: argparse.Namespace) -> "PathPlace":
     """Return where the axis lies beside a file's points, by the arguments that `add_axis_name_argument` declares."""
-    from synthroads_addon.jobs.axis_points import PathPlace
+    from synthroads_addon.jobs.axis_points import FARTHEST_ABOVE, FARTHEST_ASIDE, PathPlace
 
     place = PathPlace(arguments.offset_from_path, arguments.path_lane, arguments.height_above_road)
-    for option, value, most in (("offset-from-path", place.offset, 100.0), ("height-above-road", place.height, 1000.0)):
+    limits = (
+        ("offset-from-path", place.offset, FARTHEST_ASIDE),
+        ("height-above-road", place.height, FARTHEST_ABOVE),
+    )
+    for option, value, most in limits:
         if value is not None and not abs(value) <= most:
             raise InputError(f"--{option}", value, f"a length of at most {most:g} m to either side is needed")
     return place

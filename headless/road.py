@@ -28,7 +28,6 @@ PICTURE = "deviation.png"
 _FIELDS = {"seed": "seed"}
 _LARGEST = 5.0
 """Largest distance from a kink that a rounding may be asked for, m."""
-_SURFACE = ("lanes", "lateral profile")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "round kinks between elements by two clothoids, at most M metres away (0.05); by default kinks are refused"
     parser.add_argument("--round-kinks", type=_distance, nargs="?", const=0.05, metavar="M", help=text)
     parser.add_argument("--only-axis", action="store_true", help="take only the axis and its heights; no exit code 3")
-    text = "print the fields in which the road of an OpenDRIVE file differs from this parameter set"
+    text = "print the fields in which the road of OpenDRIVE, or of our own IFC, differs from this parameter set"
     parser.add_argument("--against", type=Path, metavar="PARAMETERS", help=text)
     names = ", ".join(scenario_names())
     text = f"scenario for what the file doesn't say: {names}, or a .json file (%(default)s)"
@@ -89,7 +88,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
         (folder / CENTRELINE).write_text(canonical_json(line), encoding="utf-8")
         report |= {"remarks": remarks_so_far()}
         (folder / REPORT).write_text(canonical_json(report), encoding="utf-8")
-    losses = [text for text in report.get("left_out", []) if text.startswith(_SURFACE)]
+    from synthroads_addon.jobs.whole_road import SURFACE
+
+    losses = [text for text in report.get("left_out", []) if text.startswith(SURFACE)]
     losses += ["surface"] if report.get("whole", {}).get("surface_lost") else []
     lines = [axis_summary(report), *report.get("summary", [])]
     lines += [f"left out: {text}" for text in report.get("left_out", [])]

@@ -72,6 +72,10 @@ kink."""
 REFUSED_BEYOND = 40.0
 """Times the tolerance that a point may be away from the road fitted to an axis: 2 m of the usual 5 cm. Real axes stay
 below 6, a corner of 90 degrees just passes; beyond that it is another line than the one that was measured."""
+_KNOTS = 2.5
+"""Points that a knot needs between it and the next one. Chosen: heights between sparse points don't swing."""
+_NO_ROAD = 3.0
+"""Times what is refused that dense knots are off where fewer elements aren't looked for. Chosen: no road does so."""
 _PLAY = 1e-5
 """Share of a radius that is left out. Chosen: roundings that touch must not overlap once stations and elevations are
 rounded."""
@@ -367,7 +371,7 @@ def _follow_heights(station: Float, heights: Float, weights: Float, length: floa
     design: Profile | None = None
     if (np.diff(at) > 0.0).all():
         try:
-            design = heights_followed(at, level, length)
+            design = heights_followed(at, level, length, tolerance)
         except (InputError, np.linalg.LinAlgError):  # grades that no road has
             design = None
     if design is not None and worst(design) <= tolerance:
@@ -433,7 +437,7 @@ def _fit_windows(data: AxisData, run: Float, tolerance: float, design_ends: bool
     window, tail = max(_WINDOW, 60.0 * step), max(_TAIL, 15.0 * step)
     pieces: list[Chain] = []
     start: Start | None = None
-    first, origin = 0, 0.0
+    first, origin, lost = 0, 0.0, False
     station = np.empty(len(run))
     while True:
         whole = run[-1] - run[first] <= window + tail
@@ -441,7 +445,12 @@ def _fit_windows(data: AxisData, run: Float, tolerance: float, design_ends: bool
         end = max(end, min(first + 8, len(run)))
         every = -(-(end - first) // _MOST_POINTS)
         chosen = np.unique(np.append(np.arange(first, end, every), end - 1))
-        fit = _fit_window(data, chosen, start, origin, float(run[end - 1] - run[first]), tolerance)
+        length = float(run[end - 1] - run[first])
+        if lost:  # that it is refused needs no search for few elements
+            fit = data.fit_window(chosen, max(data.spacings.first, _KNOTS * length / len(chosen)), start, origin)
+        else:
+            fit = _fit_window(data, chosen, start, origin, length, tolerance)
+            lost = _is_lost(fit, tolerance)
         if design_ends:
             ends = (["first"] if start is None else []) + (["last"] if end == len(run) else [])
             fit = _end_on_design(fit, ends, tolerance)
@@ -458,7 +467,7 @@ def _fit_window(
     data: AxisData, chosen: Int, start: Start | None, origin: float, length: float, tolerance: float
 ) -> ChainFit:
     """Return the fit of one window: as exact data if they are, else with knots as dense as the tolerance needs."""
-    scale = 2.5 * length / len(chosen)  # knots need data between them
+    scale = _KNOTS * length / len(chosen)
     count = independent_count(length, len(chosen))
     exact = Goal(tolerance, 2.0 * tolerance, _EXACT, count, int(length / 15.0) + 5)
     rich = data.fit_window(chosen, max(data.spacings.exact, scale), start, origin)
@@ -475,9 +484,16 @@ def _fit_window(
         if finer.noise > _FINER_HELPS * rich.noise:
             break
         rich = finer
+    if _is_lost(rich, tolerance):
+        return rich  # fewer elements are no nearer
     room = _SCATTER if goal.is_met(rich) else _RELAXED
     goal = replace(goal, rms=max(goal.rms, room * rich.noise), p95=max(goal.p95, room * rich.p95))
     return improve_fit(min(descent(rich, goal), key=goal.rank), goal)
+
+
+def _is_lost(fit: ChainFit, tolerance: float) -> bool:
+    """Return whether a fit leaves a point so far off that the axis is refused, whatever its elements are."""
+    return bool(np.abs(fit.residuals).max() > _NO_ROAD * REFUSED_BEYOND * tolerance)
 
 
 def _end_on_design(fit: ChainFit, ends: Iterable[str], tolerance: float) -> ChainFit:

@@ -13,6 +13,7 @@ import numpy as np
 from ..base.arrays import Float
 from ..road.alignment import Alignment, Element
 from ..road.profile import IntersectionPoint, Profile
+from .between import without_swings
 from .chain import EQUAL, FREE, NEAR, Chain, quadrature_grid, ramp_integrals
 from .design import Match, Model, joined, match, repaired, simplified
 from .pieces import Piece, cut_into_pieces, noise_of, unrolled
@@ -394,14 +395,18 @@ def _jacobian(model: Model, pose: Float, station: Float) -> Float:
     return np.hstack((across[:, None], lever[:, None], both @ model.tie, knots))
 
 
-def heights_followed(station: Float, heights: Float, length: float) -> Profile | None:
-    """Return the profile that heights (N,) at stations (N,) of a design lie on, m, over a road of a length.
+def heights_followed(station: Float, heights: Float, length: float, tolerance: float = np.inf) -> Profile | None:
+    """Return the profile that heights of a design lie on, over a road of a length; None for heights with noise.
 
-    None for heights with noise.
+    Args:
+        station, heights: (N,) of the points, m.
+        length: of the road, m.
+        tolerance: distance (m) from which the heights between two points may not swing (`fitting.between`).
     """
     if len(station) > 2 * _SPARSE and noise_of(station, heights, 2) > _NOISY:
         return None
-    return profile_of(match(elements_of(station, heights, 1), station, heights).model, length)
+    found = match(elements_of(station, heights, 1), station, heights).model
+    return profile_of(without_swings(found, station, heights, tolerance), length)
 
 
 def profile_of(model: Model, length: float) -> Profile:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,19 +16,24 @@ from ..base.maps.places import Placement, bring
 from ..base.remarks import assume, warn
 from ..fitting.fit import AxisFit, axis_of_points
 from ..road.axes.centerline import read_declared_axis
+from ..road.given_road import GivenRoad
 from ..road.guidelines import StandardCrossSection
 from ..road.parameters import AlignmentObject
 from ..road_files.axis import utm_zone
+from ..road_files.line import ExactAxis, RoadLine
 from ..road_files.points import PointLine
 from ..road_files.read import named_line, read_points
 from ..road_files.spacing import cleaned, moved_aside, tell_spacing
 from ..road_files.track import has_times
 from ..sampling.section import cross_section_of
 from ..scenario.road import RoadScenario
-from .mapped_section import with_mapped_section
+from .mapped_section import meets, side_by_side, with_mapped_section
 
 _APART = 1.0
 """Distance of the points of a vehicle's path that are fitted, m: closer ones hold noise alone."""
+
+FARTHEST_ASIDE, FARTHEST_ABOVE = 100.0, 1000.0
+"""Largest offset of an axis from a path, and height of a path above the road, to either side, m."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +78,20 @@ NOWHERE_ELSE = PathPlace()
 """The axis is the line itself."""
 
 
+@dataclass
+class RoadBeside:
+    """Parts of a road that a file says beside its axis.
+
+    Attributes:
+        line, axis: the file's line of elements and what was taken from it; None for lines of points.
+        given: carriageways that a map says and limits of a scenario can't hold; None where it says none.
+    """
+
+    line: RoadLine | None = None
+    axis: ExactAxis | None = None
+    given: GivenRoad | None = None
+
+
 def axis_of_line(
     path: Path,
     kind: str | None,
@@ -80,6 +99,7 @@ def axis_of_line(
     name: str | None,
     place: PathPlace,
     seen: Callable[[AxisFit], None] | None = None,
+    beside: RoadBeside | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis fitted to a line of points of a file, the scenario for it, and a report.
 
@@ -90,6 +110,7 @@ def axis_of_line(
         name: of the line; None takes the longest that is a road by itself.
         place: where the axis lies beside the line.
         seen: gets the fit, to draw it.
+        beside: gets the carriageways of a road whose directions lie side by side, which no limits say.
 
     Returns:
         as `jobs.axis_source.axis_from_file`; the report's ``heights`` is None where the file has none.
@@ -108,9 +129,14 @@ def axis_of_line(
         warn("%s: %s: %s", path.name, line.name, text)
     outlines = [bring(path.name, outline, declared, system) for outline in line.outlines]
     scenario, losses = with_mapped_section(f"{path.name}: {line.name}", line.section, scenario)
-    points = _prepared(path.name, points, line.driven, scenario, place)
+    section = cross_section_of(scenario)
+    if meets(line.section, scenario):
+        section = replace(section, median=0.0, inner_edge_strip=0.0)
+    points = _prepared(path.name, points, line.driven, section, place)
     sagitta = tell_spacing(path.name, outlines or [points])
     axis, limits, report = axis_of_points(path.name, points, declared, scenario, seen)
+    if beside and meets(line.section, limits):
+        beside.given = GivenRoad(side_by_side(limits, axis))
     left_out = [*line.left_out, *losses]
     if left_out:
         heads = ", ".join(text.partition(":")[0] for text in left_out)
@@ -134,7 +160,7 @@ def _axis_of_text(
             "--axis-name", name, "is for files with several roads or lines; this file has one line of points"
         )
     points, declared = read_declared_axis(path, Placement.of(MapSystem.of(scenario.epsg, scenario.height_epsg)))
-    points = _prepared(path.name, points, has_times(path), scenario, place)
+    points = _prepared(path.name, points, has_times(path), cross_section_of(scenario), place)
     sagitta = tell_spacing(path.name, [points])
     axis, limits, report = axis_of_points(path.name, points, declared, scenario, seen)
     return axis, limits, report | {"sagitta": round(sagitta, 4)}
@@ -192,10 +218,10 @@ def _in_a_system(file: str, line: PointLine, declared: MapSystem | None, scenari
     return scenario.model_copy(update={"epsg": zone.epsg})
 
 
-def _prepared(file: str, points: Float, driven: bool, scenario: RoadScenario, place: PathPlace) -> Float:
+def _prepared(file: str, points: Float, driven: bool, section: StandardCrossSection, place: PathPlace) -> Float:
     """Return the points (M, 3) of the axis: those of a line cleaned, thinned if it is a path, and moved."""
     points = cleaned(file, points, _APART if driven else 0.0)
-    offset = place.aside(cross_section_of(scenario))
+    offset = place.aside(section)
     if driven and offset is None:
         text = (
             "%s is the path of a vehicle, and is used as the axis itself: --offset-from-path METRES (positive to the "

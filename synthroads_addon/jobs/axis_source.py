@@ -22,7 +22,7 @@ from ..road_files.line import ExactAxis, RoadLine
 from ..road_files.read import OF_POINTS, READERS, format_of, read_lines, read_points
 from ..sampling.alignment import sample_profile
 from ..scenario.road import RoadScenario
-from .axis_points import NOWHERE_ELSE, PathPlace, axis_of_line, line_length
+from .axis_points import NOWHERE_ELSE, PathPlace, RoadBeside, axis_of_line, line_length
 
 _SPACING = 10.0
 """Distance of the heights that are taken from an elevation model, m."""
@@ -43,6 +43,7 @@ def axis_from_file(
     place: PathPlace = NOWHERE_ELSE,
     round_kinks: float | None = None,
     picture: Path | None = None,
+    beside: RoadBeside | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis of a file in local coordinates, the scenario that follows from it, and a report.
 
@@ -58,6 +59,7 @@ def axis_from_file(
         place: where the axis lies beside a line of points.
         round_kinks: distance (m) from kinks of a file's elements that roundings may keep; None refuses kinks.
         picture: file for a picture of how far the file's line or points are from the axis; none is drawn if None.
+        beside: gets what the file says of the road beside its axis.
 
     Raises:
         AxisRefusedError: no road follows the points.
@@ -67,7 +69,7 @@ def axis_from_file(
     kind = format_of(path)
     if kind not in READERS:
         fits: list[AxisFit] = []
-        axis, limits, report = axis_of_line(path, kind, scenario, name, place, fits.append)
+        axis, limits, report = axis_of_line(path, kind, scenario, name, place, fits.append, beside)
         if picture:
             axis_picture(fits[0], path.name).save(picture, "PNG")
     elif place.given:
@@ -77,6 +79,8 @@ def axis_from_file(
         axis, limits, report = road_axis(path, scenario, name, round_kinks, lambda *both: lines.append(both))
         if picture:
             deviation_picture(path.name, *line_deviation(*lines[0])).save(picture, "PNG")
+        if beside:
+            beside.line, beside.axis = lines[0]
     _tell_overlap(path, axis, limits.half_width)
     if report.get("heights", ()) is None:
         vertical, source = _heights(axis, limits, seed)

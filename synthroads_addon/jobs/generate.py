@@ -23,7 +23,7 @@ from ..scenario.inputs import ScenarioInputs
 from ..scenario.road import RoadScenario
 from ..scenario.scenario import OF_POINTS, Scenario
 from ..twin.formats import check_formats
-from .axis_points import NOWHERE_ELSE, PathPlace
+from .axis_points import NOWHERE_ELSE, PathPlace, RoadBeside
 from .axis_source import axis_from_file
 from .job_files import FILES, JobFiles, empty_scan_warnings
 from .scan.plan import check_scan
@@ -53,7 +53,7 @@ class Job:
         axis_name: of the road or alignment in that file; None takes the longest.
         axis_place: where the axis lies beside that file's points.
         overwrite: replace files that are already there.
-        road: take the whole road of this OpenDRIVE file.
+        road: take the whole road of this OpenDRIVE, LandXML or IFC file, as far as it is read.
         new_file: build in a new, empty Blender file instead of the open one, which is lost.
         begun: when the job began, by `time.perf_counter`, for a time budget; when `generate` is called if None.
     """
@@ -76,7 +76,7 @@ class RoadSource:
 
     Attributes:
         pictures: folder for the picture of an axis that no road follows; none is drawn if None.
-        road: OpenDRIVE file whose whole road is taken.
+        road: OpenDRIVE, LandXML or IFC file whose whole road is taken.
         round_kinks: distance (m) from an axis' kinks that roundings may keep; None refuses kinks.
         deviations: file for the picture of how far an axis' file is from it; none is drawn if None.
     """
@@ -102,8 +102,9 @@ class RoadSource:
             return parameters, {"axis": report}
         if self.axis:
             with draw_refused_fit(self.pictures):
-                axis, limits, report = axis_from_file(self.axis, scenario.road, scenario.seed, *options)
-            return sample_road(limits, scenario.seed, scenario.title, axis), {"axis": report}
+                beside = RoadBeside()
+                axis, limits, report = axis_from_file(self.axis, scenario.road, scenario.seed, *options, beside)
+            return sample_road(limits, scenario.seed, scenario.title, axis, beside.given), {"axis": report}
         return sample_road(scenario.road, scenario.seed, scenario.title), {}
 
 

@@ -7,16 +7,20 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..base.remarks import assume
+from ..road.crossfall import crossfall_points
 from ..road.guidelines import (
     SECTIONS_OF_CLASS,
     STANDARD_CROSS_SECTIONS,
     StandardCrossSection,
     design_class_of,
 )
+from ..road.objects import Side
+from ..road.parameters import AlignmentObject
+from ..road.section import Carriageway, Lane
 from ..road.things.limits import Interval
 from ..road_files.points import MappedSection
 from ..sampling.conflicts import conflicts
-from ..sampling.section import cross_section_of
+from ..sampling.section import SIDES, cross_section_of
 from ..scenario.road import FreeCrossSection, RoadScenario
 
 _MOST_LANES = 8
@@ -54,10 +58,12 @@ def with_mapped_section(
             losses.append(f"lanes: {mapped.lanes} each way, road.lanes={scenario.lanes} is taken instead")
     else:
         scenario, losses = _with_lanes(name, mapped, mapped.lanes, scenario)
-    if mapped.spread is None:
-        losses.append(_of_one_line(mapped.one_way, cross_section_of(scenario)))
+    if mapped.spread is None and mapped.one_way:
+        losses.append(_of_one_line(cross_section_of(scenario)))
+    elif mapped.side_by_side and not meets(mapped, scenario):
+        losses.append(f"lanes side by side: road.median_width={scenario.median_width:g} m parts them instead")
     if mapped.speed is not None:
-        scenario = _with_speed(name, mapped.speed, scenario)
+        scenario = with_speed(name, mapped.speed, scenario)
     if mapped.pavement is not None:
         share = 1.0 if mapped.pavement == "concrete" else 0.0
         pavement = scenario.pavement.model_copy(update={"concrete": share})
@@ -65,10 +71,34 @@ def with_mapped_section(
     return scenario, losses
 
 
-def _of_one_line(one_way: bool, section: StandardCrossSection) -> str:
-    """Return what becomes of a road that a map has as one line: a parameter set has two carriageways."""
-    if not one_way:
-        return f"lanes side by side: the road gets a median of {section.median:g} m between its directions"
+def meets(mapped: MappedSection | None, scenario: RoadScenario) -> bool:
+    """Return whether a map's road has both directions side by side, and the scenario asks for no median."""
+    return mapped is not None and mapped.side_by_side and scenario.median_width is None
+
+
+def side_by_side(scenario: RoadScenario, axis: AlignmentObject) -> dict[Side, Carriageway]:
+    """Return the carriageways of a road whose directions lie side by side: they meet at its axis, without turnouts."""
+    section = cross_section_of(scenario)
+    paved = section.paved_width - section.inner_edge_strip
+    return {
+        side: Carriageway(
+            instance=1,
+            side=side,
+            inner_offset=0.0,
+            inner_edge_strip_width=0.0,
+            lanes=tuple(Lane(width=width) for width in section.lanes),
+            outer_edge_strip_width=section.outer_edge_strip,
+            hard_shoulder_width=section.hard_shoulder,
+            verge_width=section.verge,
+            crossfall=crossfall_points(scenario.design_class, side, paved, axis.horizontal),
+            rotation_axis="centreline",
+        )
+        for side in SIDES
+    }
+
+
+def _of_one_line(section: StandardCrossSection) -> str:
+    """Return what becomes of a road that a map has as one carriageway: a parameter set has two."""
     offset = 0.5 * (section.median + math.fsum(section.lanes)) + section.inner_edge_strip
     text = "lanes of one carriageway: the road gets two about this line, as their axis; --offset-from-path"
     return f"{text} {offset:g} leaves the right one where the map has it"
@@ -85,10 +115,9 @@ def _with_lanes(name: str, mapped: MappedSection, lanes: int, scenario: RoadScen
             section = cross_section_of(changed)
             widths = ", ".join(f"{width:g}" for width in section.lanes)
             section_name = changed.cross_section if isinstance(changed.cross_section, str) else "by hand"
-            text = (
-                "%s: %d lanes each way: cross-section %s, lanes of %s m, median of %g m; road.lanes=N asks for others"
-            )
-            assume(text, name, lanes, section_name, widths, section.median)
+            median = "no median" if meets(mapped, changed) else f"median of {section.median:g} m"
+            text = "%s: %d lanes each way: cross-section %s, lanes of %s m, %s; road.lanes=N asks for others"
+            assume(text, name, lanes, section_name, widths, median)
             return changed, losses
     return scenario, [f"lanes: {lanes} each way, which no cross-section of {scenario.design_class} holds"]
 
@@ -171,12 +200,12 @@ def _median(mapped: MappedSection, section: StandardCrossSection, lanes: tuple[f
     return median, []
 
 
-def _with_speed(name: str, speed: float, scenario: RoadScenario) -> RoadScenario:
+def with_speed(name: str, speed: float, scenario: RoadScenario) -> RoadScenario:
     """Return the scenario whose cars drive at most at a speed, km/h."""
     most = max(speed, _SLOWEST) / 3.6
     drawn = scenario.vehicles.speed
     if drawn.maximum <= most:
         return scenario
     limits = Interval(minimum=round(min(drawn.minimum, most), 3), maximum=round(most, 3))
-    assume("%s: cars drive at most %.0f km/h, as the map says", name, 3.6 * most)
+    assume("%s: cars drive at most %.0f km/h, as the file says", name, 3.6 * most)
     return scenario.model_copy(update={"vehicles": scenario.vehicles.model_copy(update={"speed": limits})})

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from ..base.errors import InputError
 from ..base.remarks import assume
+from ..base.schema import round_value
 from ..road.geometry import RoadGeometry
 from ..road.given_road import GivenRoad
 from ..road.objects import nominal_width
@@ -17,23 +21,28 @@ from ..road.section import Carriageway
 from ..road.things.registry import THINGS
 from ..road_files.lanes.carriageways import deviations
 from ..road_files.lanes.differences import Difference, differences
+from ..road_files.lanes.loss import Loss
 from ..road_files.lanes.road import WholeRoad, whole_road, with_heights
+from ..road_files.line import ExactAxis, RoadLine, within_limits
 from ..road_files.opendrive import read_opendrive
-from ..road_files.read import choose_line, format_of
+from ..road_files.read import READERS, choose_line, format_of
 from ..sampling.road import sample_road
 from ..scenario.road import RoadScenario
 from ..scenario.scenario import Scenario
-from .axis_points import NOWHERE_ELSE, PathPlace
+from .axis_points import NOWHERE_ELSE, PathPlace, RoadBeside
 from .axis_source import axis_from_file
+from .mapped_section import with_speed
 
 _BESIDE = 10.0
 """Ground, m, beside the edge of a given road."""
+SURFACE = ("lanes", "lateral profile", "crossfall")
+"""First words of what is left out and is surface."""
 _OF_WHOLE = ("lanes of", "lateral profile", "objects", "signals")
 
 
 def has_whole_road(path: Path) -> bool:
-    """Return whether a file says more of a road than its line: whether it is OpenDRIVE."""
-    return format_of(path) == "OpenDRIVE"
+    """Return whether a file is of a format that says more of a road than its line."""
+    return format_of(path) in READERS
 
 
 def road_from_file(
@@ -44,7 +53,10 @@ def road_from_file(
     round_kinks: float | None = None,
     picture: Path | None = None,
 ) -> tuple[RoadParameters, dict[str, Any]]:
-    """Return the road of an OpenDRIVE file as a parameter set, and a report of its axis and of what became of the rest.
+    """Return the road of a file as a parameter set, and a report of its axis and of what became of the rest.
+
+    Of OpenDRIVE all is taken over, of LandXML the superelevation, of an IFC file of ours carriageways, turnouts,
+    markings and things.
 
     Args:
         path: the file.
@@ -55,7 +67,7 @@ def road_from_file(
         picture: file for a picture of how far the file's line is from the axis; none is drawn if None.
 
     Raises:
-        MissingFileError, InputError: it can't be read, isn't OpenDRIVE, or a parameter set can't hold it.
+        MissingFileError, InputError: it can't be read, is of another format, or a parameter set can't hold it.
     """
     parameters, report, _ = _read_road(path, scenario, name, place, round_kinks, picture)
     return parameters, report
@@ -71,26 +83,79 @@ def _read_road(
 ) -> tuple[RoadParameters, dict[str, Any], GivenRoad | None]:
     """Return what `road_from_file` does, and what of the road the file gives; None where it has no lanes."""
     if not has_whole_road(path):
-        raise InputError(path.name, format_of(path), "must be OpenDRIVE; for other files use --axis")
+        text = f"must be one of {', '.join(READERS)} for a whole road; for other files use --axis"
+        raise InputError(path.name, format_of(path), text)
+    if format_of(path) != "OpenDRIVE":
+        return _read_beside(path, scenario, name, place, round_kinks, picture)
     line = (path, scenario.road, scenario.seed, name, place, round_kinks, picture)
     if choose_line(read_opendrive(path), name, path.name).lanes is None:
         axis, limits, report = axis_from_file(*line)
         return sample_road(limits, scenario.seed, scenario.title, axis), report, None
-    road = whole_road(path, scenario.road, name, round_kinks)
-    axis, limits, report = axis_from_file(*line)
-    if road.heights is not None:
-        axis, report["heights"] = _with_profile(axis, limits, road, round_kinks)
-    limits = _wide_enough(path, limits, road)
-    parameters = sample_road(limits, scenario.seed, scenario.title, axis, road.given)
+    with within_limits(path.name):
+        road = whole_road(path, scenario.road, name, round_kinks)
+        axis, limits, report = axis_from_file(*line)
+        if road.heights is not None:
+            axis, report["heights"] = _with_profile(axis, limits, road, round_kinks)
+        limits = _wide_enough(path, limits, road.given)
+        if road.speed is not None:
+            limits = with_speed(path.name, road.speed, limits)
+        parameters = sample_road(limits, scenario.seed, scenario.title, axis, road.given)
     report["surface"] = deviations(road.pavements, _lifted(parameters), road.stations, road.loss)
     report["left_out"] = [text for text in report["left_out"] if not _is_taken(text)]
     return parameters, report | {"whole": road.loss.to_dict(), "summary": road.loss.lines()}, road.given
 
 
+def _read_beside(
+    path: Path,
+    scenario: Scenario,
+    name: str | None,
+    place: PathPlace,
+    round_kinks: float | None,
+    picture: Path | None,
+) -> tuple[RoadParameters, dict[str, Any], GivenRoad | None]:
+    """Return the same of a LandXML or IFC file."""
+    beside = RoadBeside()
+    line_of = (path, scenario.road, scenario.seed, name, place, round_kinks, picture)
+    axis, limits, report = axis_from_file(*line_of, beside)
+    line, exact = beside.line, beside.axis
+    assert line is not None
+    assert exact is not None
+    if line.given is None:
+        return sample_road(limits, scenario.seed, scenario.title, axis), report, None
+    for text in line.remarks:
+        assume("%s: %s: %s", path.name, line.name, text)
+    given = _along(line.given, line, exact)
+    if given.carriageways:
+        limits = _wide_enough(path, limits, given)
+    try:
+        parameters = sample_road(limits, scenario.seed, scenario.title, axis, given)
+    except ValidationError as error:
+        fault = str(error.errors(include_url=False)[0]["msg"])
+        raise InputError(f"{path.name}: {line.name}", None, f"its parts must fit together ({fault})") from None
+    loss = Loss(read=Counter(line.taken), surface=any(text.startswith(SURFACE) for text in line.left_out))
+    return parameters, report | {"whole": loss.to_dict(), "summary": loss.lines()}, given
+
+
+def _along(given: GivenRoad, line: RoadLine, exact: ExactAxis) -> GivenRoad:
+    """Return the parts of a file's road with the crossfall at stations of the axis."""
+    there = np.array([*(piece.station for piece in line.pieces), line.pieces[-1].station + line.pieces[-1].length])
+    here = np.array([*exact.starts, exact.alignment.length])
+
+    def place(station: float) -> float:
+        beyond = station - min(max(station, there[0]), there[-1])
+        return round_value(float(np.interp(station, there, here) + beyond))
+
+    moved = {
+        side: tuple(point.model_copy(update={"station": place(point.station)}) for point in points)
+        for side, points in given.crossfall.items()
+    }
+    return replace(given, crossfall=moved)
+
+
 def differences_from(
     path: Path, against: Path, scenario: Scenario, name: str | None = None
 ) -> tuple[list[Difference], dict[str, Any]]:
-    """Return in which fields the road of an OpenDRIVE file differs from a parameter set, and a report of the file.
+    """Return in which fields the road of a file differs from a parameter set, and a report of the file.
 
     Line, heights, carriageways and turnouts are compared, and markings and things if the file has any.
 
@@ -99,7 +164,7 @@ def differences_from(
     """
     old = read_parameters(against)
     new, report, given = _read_road(path, scenario, name)
-    types = {"Alignment", "Carriageway", "Turnout"} if given else {"Alignment"}
+    types = {"Alignment", "Carriageway", "Turnout"} if given and given.carriageways else {"Alignment"}
     types |= {"LineMarking"} if given and given.markings is not None else set()
     types |= {*THINGS, "Arrow", "Hatching"} if given and given.things is not None else set()
     return differences(old, new, types), report
@@ -133,9 +198,9 @@ def _lifted(parameters: RoadParameters) -> RoadGeometry:
     return RoadGeometry(parameters.model_copy(update={"objects": objects}))
 
 
-def _wide_enough(path: Path, limits: RoadScenario, road: WholeRoad) -> RoadScenario:
+def _wide_enough(path: Path, limits: RoadScenario, given: GivenRoad) -> RoadScenario:
     """Return the scenario with ground that reaches beyond the road's edges."""
-    edge = max(_farthest(carriageway) for carriageway in road.given.carriageways.values()) + _BESIDE
+    edge = max(_farthest(carriageway) for carriageway in given.carriageways.values()) + _BESIDE
     if limits.half_width >= edge:
         return limits
     wider = float(np.ceil(edge))

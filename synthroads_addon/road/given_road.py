@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from .objects import RoadObject, Side
-from .section import Carriageway, LineMarking, Turnout
+from .section import Carriageway, CrossfallPoint, LineMarking, Turnout
 from .things.thing import Thing
 
 
@@ -15,13 +15,16 @@ class GivenRoad:
     """The parts of a road that aren't drawn. All have the instance number 1, and ids as in a parameter set.
 
     Attributes:
-        carriageways: by side; their ids are ``carriageway-left`` and ``carriageway-right``. Their pavement is drawn.
+        carriageways: by side, empty where they are drawn; their ids are ``carriageway-left`` and
+            ``carriageway-right``. Their pavement is drawn.
         turnouts: by id.
         markings: by id; None where they are drawn.
         things: by id; None where they are drawn.
+        crossfall: by side, of carriageways that are drawn; used where ``carriageways`` is empty.
     """
 
-    carriageways: Mapping[Side, Carriageway]
+    carriageways: Mapping[Side, Carriageway] = field(default_factory=dict)
     turnouts: Mapping[str, Turnout] = field(default_factory=dict)
     markings: Mapping[str, LineMarking | RoadObject] | None = None
     things: Mapping[str, Thing] | None = None
+    crossfall: Mapping[Side, tuple[CrossfallPoint, ...]] = field(default_factory=dict)

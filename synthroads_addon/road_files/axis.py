@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from ..base.arrays import Float
 from ..base.errors import InputError
@@ -17,10 +16,11 @@ from ..base.maps.crs import LONGITUDE_LATITUDE, MapSystem, moved
 from ..base.maps.places import check_heights
 from ..base.remarks import assume, warn
 from ..road.alignment import Alignment
+from ..road.axes.centerline import FARTHEST
 from ..road.parameters import AlignmentObject
 from ..road.profile import Profile
 from ..scenario.road import RoadScenario
-from .line import ExactAxis, RoadLine, alignment_object, exact_axis, heights_at, sampled
+from .line import ExactAxis, RoadLine, alignment_object, exact_axis, heights_at, sampled, within_limits
 from .read import choose_line, read_lines
 
 _ARM = 50.0
@@ -67,6 +67,9 @@ def road_axis(
     system, axis, placing = _placed(path, line, axis, scenario)
     middle = axis.alignment.position(0.5 * axis.alignment.length)
     height = axis.heights.points[0].elevation if axis.heights else 0.0
+    if not np.abs(middle).max() <= FARTHEST:
+        allowed = f"at most {FARTHEST:g} are possible: is it in metres?"
+        raise InputError(f"{path.name}: coordinates, m", np.round(middle, 3).tolist(), allowed)
     origin = np.round([*middle, height])
     check_heights(path.name, np.array([[*middle, height]]))
     alignment = _checked_object(path, axis, origin, line)
@@ -95,13 +98,8 @@ def line_deviation(line: RoadLine, axis: ExactAxis) -> tuple[float, Float, Float
 
 def _checked_object(path: Path, axis: ExactAxis, origin: Float, line: RoadLine) -> AlignmentObject:
     """Return an axis as the alignment of a parameter set; raise `InputError` for one beyond the limits of roads."""
-    try:
+    with within_limits(path.name):
         return alignment_object(axis, origin, line)
-    except ValidationError as error:
-        fault = error.errors(include_url=False)[0]
-        field = ".".join(str(part) for part in fault["loc"]) or "axis"
-        wrong = str(fault["msg"]).lower()
-        raise InputError(f"{path.name}: {field}", fault.get("input"), f"no road may run so ({wrong})") from None
 
 
 def report_of(path: Path, line: RoadLine, axis: ExactAxis) -> dict[str, Any]:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 import re
 import tempfile
+from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ import numpy as np
 from ..base.errors import InputError, MissingFileError, MissingPackageError
 from ..base.maps.crs import MapSystem
 from ..base.remarks import warn
+from .beside.own_parts import own_parts
 from .curves import Curve, transition
 from .heights import HeightPiece, circle
 from .line import SHORTEST, Equation, LineNames, PlanPiece, RoadLine
@@ -25,7 +28,11 @@ from .xml_text import finite
 _SCHEMA = re.compile(rb"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'\s*\)\s*\)", re.IGNORECASE)
 _END = b"END-ISO-10303-21"
 """The end of each file of STEP (ISO 10303-21): without it something was cut off, which the library reads over."""
-_READ_AS = "IFC4X3_ADD2"
+_DATA = re.compile(rb"ENDSEC\s*;\s*DATA\s*;")
+_HEADER = b"""ISO-10303-21;
+HEADER;FILE_DESCRIPTION((''),'2;1');FILE_NAME('','',(''),(''),'','','');FILE_SCHEMA(('IFC4X3_ADD2'));
+"""
+"""Header up to its end, with the schema that the library reads."""
 _KINDS = {
     "CLOTHOID": "clothoid", "BLOSSCURVE": "bloss", "COSINECURVE": "cosine", "SINECURVE": "sine",
     "HELMERTCURVE": "helmert",
@@ -62,18 +69,27 @@ def _lines(path: Path, model: Any) -> list[RoadLine]:
     unit, angle = _units(model)
     system, place = _map(path, model, unit)
     names, lines = LineNames(), list[RoadLine]()
-    for number_of, alignment in enumerate(model.by_type("IfcAlignment")):
+    alignments = model.by_type("IfcAlignment")
+    for number_of, alignment in enumerate(alignments):
         unique = names.unique(alignment.Name, f"alignment {number_of + 1}")
         try:
             if line := _alignment(alignment, unique, unit, angle):
                 lines.append(_placed(line, place @ _placement(alignment.ObjectPlacement, unit), system))
         except InputError as error:
             lines.append(RoadLine(unique, "IFC alignment", (), system=system, fault=error))
-    return lines
+    # With several alignments nothing says which of them the parts of the road belong to.
+    given, taken, left_out = own_parts(model)
+    alone = given is None or len(alignments) == 1
+    if not alone:
+        given, taken, left_out = None, Counter(), [f"lanes: those of {len(alignments)} alignments"]
+    return [replace(one, given=given, taken=taken, left_out=(*one.left_out, *left_out)) for one in lines]
 
 
 def _open(path: Path) -> Any:
-    """Return the model of a file, its schema's name changed in a copy where the library knows another one alone."""
+    """Return the model of a file, read from a copy with a header of its own.
+
+    The library knows one name of the schema alone, and a broken header can end the process.
+    """
     try:
         import ifcopenshell  # an extra, and it takes seconds
     except ImportError:
@@ -92,9 +108,11 @@ def _open(path: Path) -> Any:
         )
     if _END not in data[-4096:]:
         raise InputError(path.name, None, "the file ends too early: END-ISO-10303-21 is needed at its end")
+    begin = _DATA.search(data)
+    if begin is None:
+        raise InputError(path.name, None, "a section DATA behind the header is needed")
     try:
-        if found and schema != _READ_AS:
-            data = data[: found.start(1)] + _READ_AS.encode() + data[found.end(1) :]
+        data = _HEADER + data[begin.start() :]
         with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
             copy = Path(folder) / "model.ifc"
             copy.write_bytes(data)
@@ -166,10 +184,7 @@ def _placed(line: RoadLine, matrix: np.ndarray, system: MapSystem | None) -> Roa
         pieces.append(PlanPiece(piece.kind, piece.station, piece.length, x, y, piece.heading + turn, piece.shape))
     up = float(matrix[2, 3])
     heights = tuple(HeightPiece(h.start, h.end, h.elevation + up, h.grade, h.square, h.cube) for h in line.heights)
-    return RoadLine(
-        line.name, line.source, tuple(pieces), heights, line.first_station, line.equations, system,
-        left_out=line.left_out,
-    )  # fmt: skip
+    return replace(line, pieces=tuple(pieces), heights=heights, system=system)
 
 
 def _nested(item: Any) -> list[Any]:

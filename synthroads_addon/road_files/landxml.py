@@ -1,7 +1,8 @@
 """Alignments of LandXML 1.0 to 1.2, and of national dialects of it.
 
 Plan and heights come from points, centres, lengths and senses of rotation alone: directions are written in degrees,
-gon, radians or mirrored, and aren't read. LandXML 1.2 schema: `Alignment`, `CoordGeom`, `ProfAlign`, `StaEquation`.
+gon, radians or mirrored, and aren't read. LandXML 1.2 schema: `Alignment`, `CoordGeom`, `ProfAlign`, `StaEquation`; of
+`Superelevation` see `beside.superelevation`.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element  # nosec B405 (its type alone)
 
@@ -17,6 +19,8 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.maps.crs import MapSystem
 from ..base.remarks import warn
+from ..road.given_road import GivenRoad
+from .beside.superelevation import read_superelevation
 from .curves import TRANSITIONS, Curve, transition
 from .heights import HeightPiece, circle
 from .line import SHORTEST, Equation, LineNames, PlanPiece, RoadLine
@@ -42,13 +46,14 @@ def read_landxml(path: Path) -> list[RoadLine]:
     root = read_xml(path)
     unit = _unit(root)
     system = _system(root)
-    names, lines = LineNames(), list[RoadLine]()
+    names, lines, roadways = LineNames(), list[RoadLine](), _roadways(root)
     for group in children(root, "Alignments"):
         for number_of, alignment in enumerate(children(group, "Alignment")):
             unique = names.unique(alignment.get("name"), f"alignment {number_of + 1}")
             try:
                 if line := _alignment(alignment, unique, unit, system):
-                    lines.append(line)
+                    more = roadways.get(alignment.get("name", ""), ())
+                    lines.append(replace(line, left_out=(*line.left_out, *more)))
             except InputError as error:
                 lines.append(RoadLine(unique, "LandXML alignment", (), system=system, fault=error))
     return lines
@@ -103,6 +108,7 @@ def _alignment(alignment: Element, name: str, unit: float, system: MapSystem | N
         return None
     equations = tuple(_equations(alignment, unit, start))
     heights, left_out = _profile(alignment, unit, start, equations)
+    tilt = read_superelevation(alignment, pieces, unit, start)
     return RoadLine(
         name=name,
         source="LandXML alignment",
@@ -111,7 +117,10 @@ def _alignment(alignment: Element, name: str, unit: float, system: MapSystem | N
         first_station=start,
         equations=equations,
         system=system,
-        left_out=tuple(left_out + _others(alignment)),
+        left_out=(*left_out, *tilt.left_out, *_others(alignment)),
+        given=GivenRoad(crossfall=tilt.crossfall) if tilt.curves else None,
+        taken={"superelevations": tilt.curves} if tilt.curves else {},
+        remarks=tilt.remarks,
     )
 
 
@@ -362,5 +371,20 @@ def _rounding(
 
 def _others(alignment: Element) -> list[str]:
     counts = Counter(local_name(row) for row in alignment)
-    known = ("CoordGeom", "Profile", "StaEquation", "Feature", "")
-    return [f"{count} {name}" for name, count in sorted(counts.items()) if name not in known]
+    known = ("CoordGeom", "Profile", "StaEquation", "Feature", "Superelevation", "CrossSects", "")
+    sections = sum(len(children(row, "CrossSect")) for row in children(alignment, "CrossSects"))
+    lost = [f"crossfall: {sections} cross-sections, which don't say what of them is paved"] if sections else []
+    return lost + [f"{count} {name}" for name, count in sorted(counts.items()) if name not in known]
+
+
+def _roadways(root: Element) -> dict[str, list[str]]:
+    """Return what roadways say of lanes and speeds and isn't read, as text with numbers, by names of alignments."""
+    found: dict[str, list[str]] = {}
+    for roadway in (each for group in children(root, "Roadways") for each in children(group, "Roadway")):
+        counts = Counter(local_name(each) for group in children(roadway, "Lanes") for each in group)
+        speeds = sum(len(group) for group in children(roadway, "Speeds"))
+        texts = [f"lanes: {', '.join(f'{n} {kind}' for kind, n in sorted(counts.items()))}"] if counts else []
+        texts += [f"speed limits: {speeds} of the roadway"] if speeds else []
+        for name in roadway.get("alignmentRefs", "").split():
+            found.setdefault(name, []).extend(texts)
+    return found

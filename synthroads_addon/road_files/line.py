@@ -5,20 +5,24 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
+from pydantic import ValidationError
 
 from ..base.arrays import Float
 from ..base.errors import InputError
 from ..base.maps.crs import MapSystem
 from ..road.alignment import Alignment, Element
+from ..road.given_road import GivenRoad
 from ..road.parameters import LONGEST_ROAD, AlignmentObject, HorizontalElement, StationEquation, VerticalPoint
 from ..road.profile import IntersectionPoint
 from .curves import Curve, as_elements
 from .heights import HeightPiece, Heights, as_parabolas
 from .kinks import Rounding, rounded
+from .xml_text import on_one_line
 
 GAP, KINK = 1e-3, 1e-4
 """Gaps (m) and changes of direction (rad) between elements up to which they are joined without a word."""
@@ -29,6 +33,18 @@ _SAMPLES = 1025
 _LONGEST_NAME = 200
 SHORTEST = 1e-6
 """Elements shorter than this, m, are none."""
+
+
+@contextmanager
+def within_limits(place: str) -> Iterator[None]:
+    """Context that turns a parameter set's refusal of a value of a file into one line that begins with its place."""
+    try:
+        yield
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        field = ".".join(str(part) for part in fault["loc"]) or "axis"
+        wrong = on_one_line(str(fault["msg"]).lower())
+        raise InputError(f"{place}: {field}", fault.get("input"), f"no road may be so ({wrong})") from None
 
 
 class LineNames:
@@ -95,6 +111,9 @@ class RoadLine:
         junction: whether it belongs to a junction.
         left_out: what the file says of it and isn't read, as text with numbers.
         fault: why it can't be used, where it can't; it has no pieces then.
+        given: parts of the road beside its line, stations those of the file; None where nothing is read of them.
+        taken: numbers of those parts by kind.
+        remarks: what is to be told where they are used.
     """
 
     name: str
@@ -108,6 +127,9 @@ class RoadLine:
     junction: bool = False
     left_out: tuple[str, ...] = ()
     fault: InputError | None = None
+    given: GivenRoad | None = None
+    taken: Mapping[str, int] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
 
     @property
     def length(self) -> float:

@@ -40,6 +40,11 @@ class MappedSection:
     speed: float | None = None
     pavement: str | None = None
 
+    @property
+    def side_by_side(self) -> bool:
+        """Return whether both directions lie side by side, without a median."""
+        return self.spread is None and not self.one_way
+
 
 @dataclass(frozen=True)
 class PointLine:

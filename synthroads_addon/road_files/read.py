@@ -20,6 +20,7 @@ from .vector import DRIVERS, read_vector, vector_format
 
 Named = TypeVar("Named", RoadLine, PointLine)
 _HEAD = 1 << 16
+_NO_LINE = "the file has no road or alignment with elements in plan"
 _MARKS: tuple[tuple[bytes, str], ...] = (
     (b"<OpenDRIVE", "OpenDRIVE"),
     (b"<LandXML", "LandXML"),
@@ -88,7 +89,7 @@ def read_lines(path: Path) -> list[RoadLine]:
         raise InputError(path.name, name, f"one of {', '.join(READERS)} is needed")
     lines = READERS[name](path)
     if not lines:
-        raise InputError(path.name, None, "the file has no road or alignment with elements in plan")
+        raise InputError(path.name, None, _NO_LINE)
     return lines
 
 
@@ -111,13 +112,15 @@ def choose_line(lines: Sequence[RoadLine], wanted: str | None, file: str) -> Roa
     """Return the line of a name, or without one the longest that belongs to no junction.
 
     Args:
-        lines: of the file, at least one.
+        lines: of the file.
         wanted: name of the line, None for the longest.
         file: name for messages.
 
     Raises:
-        InputError: there is none of that name; or it, or each of the lines, can't be used.
+        InputError: there is none, or none of that name; or it, or each of the lines, can't be used.
     """
+    if not lines:
+        raise InputError(file, None, _NO_LINE)
     if wanted is not None:
         found = named_line(lines, wanted, file)
     else:

@@ -1,13 +1,13 @@
 """Line markings, hatching and arrows as the cross-section and the turnouts ask for them (RMS)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from ..base.schema import round_value
 from ..road.guidelines import LIMITS
-from ..road.objects import AnyWidth, Side, WidthPoint
+from ..road.objects import AnyWidth, Side, WidthPoint, nominal_width
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
 from ..road.turnout_geometry import TurnoutShape
 from .placing.ranges import Range, Reservations, free_ranges
@@ -22,6 +22,8 @@ LANE_THERE = 1.0
 """Where a lane is as wide as this (m) or wider, a line parts it from its neighbour."""
 ARROW_SPACING = 60.0
 _ARROWS_AT_LEAST = 3
+_MEETING = 1e-3
+"""Distance, m, up to which two inner edges are one."""
 _FIRST_MERGE_ARROW = 20.0  # from the beginning of the taper, m
 
 
@@ -29,9 +31,12 @@ def place_markings(site: PlacementSite) -> Iterator[tuple[str, LineMarking | Hat
     """Yield (id, marking) of everything painted on a road, all with instance 1 and films of one thickness."""
     limits = site.scenario.markings.film_thickness
     film = round_value(site.stream("film").uniform(limits.minimum, limits.maximum))
+    meeting = _meet(site.carriageways)
     for side, carriageway in site.carriageways.items():
         sampler = _Painter(site, side, carriageway, film)
-        yield from sampler.lines()
+        yield from sampler.lines(inner_edge=not meeting)
+        if meeting and side == "right":
+            yield sampler.centre_line()
         for name, turnout in site.turnouts_of(side).items():
             if turnout.ramp:
                 yield from sampler.turnout(name, turnout)
@@ -48,10 +53,24 @@ class _Painter:
         self.length = round_value(site.length)
         self.arrow_length = 7.5 if LIMITS[site.design_class].speed > 80.0 else 5.0
 
-    def lines(self) -> Iterator[tuple[str, LineMarking]]:
-        """Yield (id, marking) of the lines along lane boundaries: solid at the edges, dashed between lanes."""
-        lanes, limits = self.carriageway.lanes, self.site.scenario.markings
-        dash, gap = limits.lane_dash or LANE_DASH, limits.lane_gap or LANE_GAP
+    def centre_line(self) -> tuple[str, LineMarking]:
+        """Return (id, marking) of the dashed line at the inner edge, where both directions meet."""
+        dash, gap = self._dashes()
+        fields = {"offset": self.carriageway.inner_offset, "dash_length": dash, "gap_length": gap}
+        return "centre-line", self._line("free", (0.0, self.length), **fields)
+
+    def _dashes(self) -> tuple[float, float]:
+        limits = self.site.scenario.markings
+        return limits.lane_dash or LANE_DASH, limits.lane_gap or LANE_GAP
+
+    def lines(self, inner_edge: bool = True) -> Iterator[tuple[str, LineMarking]]:
+        """Yield (id, marking) of the lines along lane boundaries: solid at the edges, dashed between lanes.
+
+        Args:
+            inner_edge: whether there is one at the inner edge.
+        """
+        lanes = self.carriageway.lanes
+        dash, gap = self._dashes()
         blocks = Reservations(_block_span(shape) for shape in self.section.turnouts if shape.turnout.ramp)
         for number, span in enumerate(free_ranges(0.0, self.length, blocks)):
             name = f"{self.name}-line-0" + (f"-{number + 1}" if number else "")
@@ -64,6 +83,8 @@ class _Painter:
                 continue  # one of both is nowhere
             line = self._line("lane", span, boundary=boundary, dash_length=dash, gap_length=gap)
             yield f"{self.name}-line-{boundary}", line
+        if not inner_edge:
+            return
         span = (0.0, self.length)
         yield f"{self.name}-line-{len(lanes)}", self._line("inner_edge", span, boundary=len(lanes))
 
@@ -123,6 +144,17 @@ class _Painter:
                 film_thickness=self.film,
             )
             yield f"{name}-{number}", arrow
+
+
+def _meet(carriageways: Mapping[Side, Carriageway]) -> bool:
+    """Return whether the innermost lanes of both directions meet all along at one offset."""
+    edges: list[float] = []
+    for carriageway in carriageways.values():
+        inner, strip = carriageway.inner_offset, carriageway.inner_edge_strip_width
+        if isinstance(inner, tuple) or nominal_width(strip) > 0.0:
+            return False
+        edges.append(carriageway.sign * inner)
+    return len(edges) == 2 and abs(edges[0] - edges[1]) < _MEETING
 
 
 def _stations(shape: TurnoutShape, begin: float, end: float) -> Range:

@@ -141,11 +141,12 @@ def _sample_site(scenario: RoadScenario, seed: int, axis: AlignmentObject, given
     sampler = CarriagewaySampler(scenario, seed, axis)
     carriageways: dict[Side, Carriageway] = {}
     turnouts: dict[str, Turnout] = {}
-    if given is not None:
+    if given is not None and given.carriageways:
         carriageways = {side: sampler.pave(given.carriageways[side]) for side in SIDES if side in given.carriageways}
         return PlacementSite(scenario, seed, axis, carriageways, dict(given.turnouts), sample_terrain(scenario, seed))
     for side in SIDES:
-        carriageways[side], of_side = sampler.draw(side)
+        crossfall = None if given is None else given.crossfall.get(side)
+        carriageways[side], of_side = sampler.draw(side, crossfall)
         turnouts |= of_side
     return PlacementSite(scenario, seed, axis, carriageways, turnouts, sample_terrain(scenario, seed))
 

@@ -30,7 +30,7 @@ from ..road.guidelines import (
 )
 from ..road.objects import Side, WidthPoint, nominal_width, width_at
 from ..road.parameters import AlignmentObject
-from ..road.section import Carriageway, Lane, Pavement, Pothole, Ramp, Rut, Turnout
+from ..road.section import Carriageway, CrossfallPoint, Lane, Pavement, Pothole, Ramp, Rut, Turnout
 from ..road.things.limits import Interval
 from ..road.turnout_geometry import BLEND, NOSE_BEFORE_END, NOSE_WIDTH, STEP, TurnoutShape
 from ..scenario.road import FreeCrossSection, RoadScenario, TurnoutLimits
@@ -309,8 +309,10 @@ class CarriagewaySampler:
         self.features = features_of(scenario, self.section, self.ramps)
         self._courses = SurfaceCourses(scenario, seed, axis.length)
 
-    def draw(self, side: Side) -> tuple[Carriageway, dict[str, Turnout]]:
-        """Return a drawn carriageway and its turnouts by id, all with instance 1."""
+    def draw(
+        self, side: Side, crossfall: tuple[CrossfallPoint, ...] | None = None
+    ) -> tuple[Carriageway, dict[str, Turnout]]:
+        """Return a drawn carriageway and its turnouts by id, all with instance 1; with its crossfall if it is given."""
         rng = stream(self.seed, "section", side)
         turnouts: dict[str, Turnout] = {}
         lanes = tuple(Lane(width=width) for width in self.section.lanes)
@@ -323,6 +325,8 @@ class CarriagewaySampler:
             turnout = sample_turnout(self.scenario, self.ramps, place, side, self.length, rng)
             turnouts[name if number == 1 else f"{name}-{number}"] = turnout
         road = self._carriageway(side, lanes, rng)
+        if crossfall is not None:
+            road = road.model_copy(update={"crossfall": crossfall})
         return road, {name: self._lay_ramp(name, turnout, road) for name, turnout in turnouts.items()}
 
     def pave(self, carriageway: Carriageway) -> Carriageway:

@@ -190,6 +190,18 @@ def test_command_lists_violations(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert capsys.readouterr().out.splitlines() == lines, "they are what was asked for"
 
 
+def test_a_column_says_what_kilometres_count(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Only where they count otherwise than stations do."""
+    data = changed(("left-post-5", None))
+    axis = next(item for item in data["objects"].values() if item["type"] == "Alignment")
+    axis |= {"first_station": 12_340.0, "equations": [{"station": 200.0, "ahead": 900.0}]}
+    (tmp_path / "bad.json").write_text(json.dumps(data), encoding="utf-8")
+    assert run(tmp_path / "bad.json") == 3
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split() == ["rule", "object", "station", "counted", "value", "limit"]
+    assert lines[1].split()[:8] == ["delineator-spacing", "left", "225.0", "m", "925.0", "m", "100", "m"]
+
+
 @pytest.mark.parametrize("text", [None, "{", "[]", '{"type": "Scenario"}', '{"type": "RoadParameters"}'])
 def test_command_on_a_bad_file(text: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "file.json"

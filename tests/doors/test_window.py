@@ -1,4 +1,4 @@
-"""By mouse in the window of a real Blender: from Preferences > Install from Disk to a scanned cloud that is shown.
+"""By mouse in the window of a real Blender: from Install from Disk to a scanned cloud, and roads dropped as files.
 
 SYNTHROADS_BLENDER_ROOT names a folder that holds a whole Linux with a Blender 5.2 of its own, and
 SYNTHROADS_BLENDER_SCRIPTS one with two programs: ``enter.sh ROOT FOLDER COMMAND...`` runs a command within the first,
@@ -22,7 +22,13 @@ import laspy
 import numpy as np
 import pytest
 
+from synthroads_addon.jobs.whole_road import differences_from
+from synthroads_addon.sampling.road import sample_alignment, sample_road
+from synthroads_addon.scenario.road import RoadScenario
+from synthroads_addon.scenario.scenario import Scenario
+from synthroads_addon.twin.formats import write_twin
 from tests.doors.documented import ROOT
+from tests.road_files.test_round_trip import landxml
 
 HERE = Path(__file__).parent
 BLENDER_ROOT, SCRIPTS = (os.environ.get(f"SYNTHROADS_BLENDER_{name}", "") for name in ("ROOT", "SCRIPTS"))
@@ -40,22 +46,52 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def worked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the extensions' zips."""
+    folder = tmp_path_factory.mktemp("dist")
+    build = ["tools/build_extension.py", "--platform", "linux-x64", "--blender", "5.2-debian"]
+    _run([sys.executable, *build, "--output-dir", folder], 1200.0)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def worked(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder in which `scan_by_mouse` was run: with ``home`` and ``out``."""
     folder = tmp_path_factory.mktemp("window")
-    build = ["tools/build_extension.py", "--platform", "linux-x64", "--blender", "5.2-debian"]
-    _run([sys.executable, *build, "--output-dir", folder / "dist"], 1200.0)
     (folder / "home").mkdir()
-    (archive,) = (folder / "dist").glob("synthroads-*.zip")
-    archive.rename(folder / "home" / archive.name)
-    for file in (Path(SCRIPTS, "window.sh"), HERE / "by_mouse.py", HERE / "scan_by_mouse.py"):
+    return _work(built, folder, "scan_by_mouse.py")
+
+
+@pytest.fixture(scope="module")
+def dropped(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder in which `roads_by_mouse` was run, with roads of three formats in ``home/roads``."""
+    folder = tmp_path_factory.mktemp("roads")
+    roads = folder / "home" / "roads"
+    roads.mkdir(parents=True)
+    limits = RoadScenario(length=120.0)
+    write_twin(sample_road(limits, 3), roads, ("opendrive", "ifc"), 0.02)
+    landxml(roads / "twin.xml", sample_alignment(limits, 4))
+    for report in roads.glob("*.json"):
+        report.unlink()
+    (folder / "home" / "ifc").mkdir()
+    for archive in built.glob("synthroads_ifc-*.zip"):
+        shutil.copyfile(archive, folder / "home" / "ifc" / archive.name)
+    return _work(built, folder, "roads_by_mouse.py")
+
+
+def _work(built: Path, folder: Path, script: str) -> Path:
+    """Run a script in the window of a Blender whose home folder is the folder's ``home``; return the folder."""
+    (archive,) = built.glob("synthroads-*.zip")
+    shutil.copyfile(archive, folder / "home" / archive.name)
+    for file in (Path(SCRIPTS, "window.sh"), *(HERE / f"{name}_by_mouse.py" for name in ("scan", "roads"))):
         shutil.copyfile(file, folder / file.name)
+    shutil.copyfile(HERE / "by_mouse.py", folder / "by_mouse.py")
     inside = [
         "env",
         f"HOME={INSIDE}/home",
         "bash",
         f"{INSIDE}/window.sh",
-        f"{INSIDE}/scan_by_mouse.py",
+        f"{INSIDE}/{script}",
         f"{INSIDE}/out",
     ]
     said = _run(["bash", Path(SCRIPTS, "enter.sh"), BLENDER_ROOT, folder, *inside], 3600.0, may_fail=True)
@@ -92,5 +128,20 @@ def test_a_user_gets_from_the_zip_to_a_shown_cloud_by_mouse(worked: Path) -> Non
     assert answers["shown"] == [len(cloud), len(cloud)]
 
 
-def test_blender_writes_no_traceback(worked: Path) -> None:
-    assert "Traceback" not in (worked / "out" / "blender.log").read_text(encoding="utf-8", errors="replace")
+def test_files_of_roads_are_built_where_they_are_dropped(dropped: Path) -> None:
+    """Dragged from Blender's file browser into the view: the road in the scene is the file's, read back exactly."""
+    answers: dict[str, Any] = json.loads((dropped / "out" / "answers.json").read_text(encoding="utf-8"))
+    assert answers.get("failed") is None, answers["failed"]
+    assert sorted(answers["roads"]) == ["twin.ifc", "twin.xml", "twin.xodr"]
+    for name, found in answers["roads"].items():
+        assert found["same"], name
+        assert found["objects"] > 20
+        path = dropped / "home" / "roads" / name
+        rows, _ = differences_from(path, dropped / "out" / f"{name}.json", Scenario.from_dict({}))
+        assert rows == [], name
+
+
+@pytest.mark.parametrize("run", ["worked", "dropped"])
+def test_blender_writes_no_traceback(run: str, request: pytest.FixtureRequest) -> None:
+    log = request.getfixturevalue(run) / "out" / "blender.log"
+    assert "Traceback" not in log.read_text(encoding="utf-8", errors="replace")

@@ -6,11 +6,13 @@ import functools
 import itertools
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError, MissingFileError
+from synthroads_addon.fitting import fit as fit_module
 from synthroads_addon.fitting.chain import FREE, ZERO, Chain, ChainFit, Heights, Plan
 from synthroads_addon.fitting.fit import (
     REFUSED_BEYOND,
@@ -660,3 +662,37 @@ def test_points_that_turn_back_are_refused_with_their_distance(way: tuple[float,
     points[:, 0] = way
     with pytest.raises(AxisRefusedError, match="no road follows its points within 2 m"):
         fit_axis(points, follow=follow).check("axis.csv")
+
+
+def test_no_few_elements_are_looked_for_where_no_road_follows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A path that turns at every point, 900 m apart: such a search took a minute, to be refused all the same."""
+
+    def search(*_: object) -> None:
+        pytest.fail("elements are looked for")
+
+    monkeypatch.setattr("synthroads_addon.fitting.fit.improve_fit", search)
+    rng = np.random.default_rng(3)
+    heading = np.cumsum(1.5 * (0.3 + rng.normal(0.0, 1.0, 150)))
+    points = np.cumsum(
+        rng.uniform(300.0, 900.0, (150, 1)) * np.column_stack([np.cos(heading), np.sin(heading)]), axis=0
+    )
+    with pytest.raises(AxisRefusedError, match="no road follows its points within 2 m"):
+        fit_axis(points).check("a.sbet")
+
+
+def test_nor_behind_a_place_that_no_road_follows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A straight of several windows, in the first of which points are 100 m off."""
+    searched: list[Plan] = []
+    search = fit_module._fit_window
+
+    def off(data: Plan | Heights, *more: Any) -> ChainFit:
+        found = search(data, *more)
+        if isinstance(data, Plan):
+            searched.append(data)
+            found.residuals = found.residuals + 100.0
+        return found
+
+    monkeypatch.setattr(fit_module, "_fit_window", off)
+    found = fit_axis(np.column_stack([np.arange(0.0, 5000.0, 20.0), np.zeros(250)]))
+    assert found.alignment.length == pytest.approx(4980.0)
+    assert len(searched) == 1

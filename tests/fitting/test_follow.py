@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.remarks import collected_remarks
+from synthroads_addon.fitting.between import swings, without_swings
+from synthroads_addon.fitting.chain import EQUAL
+from synthroads_addon.fitting.design import Model
 from synthroads_addon.fitting.fit import axis_of_points, fit_axis
 from synthroads_addon.fitting.follow import followed, heights_followed
 from synthroads_addon.fitting.pieces import cut_into_pieces, noise_of, unrolled
@@ -52,6 +55,42 @@ def test_heights_of_grades_and_a_parabola_come_back() -> None:
     assert len(found.points) == 3
     assert found.points[1].station == pytest.approx(120.0, abs=0.05)
     assert found.points[1].radius == pytest.approx(2500.0, rel=1e-3)
+
+
+def test_heights_between_sparse_points_do_not_swing() -> None:
+    """A dip that ends in a rise of 34 m: points every 10 m say how the heights run between them."""
+    station = np.arange(0.0, 201.0, 10.0)
+
+    def heights(at: np.ndarray) -> np.ndarray:
+        share = np.clip((at - 116.0) / 34.0, 0.0, 1.0)
+        return 5e-5 * np.minimum(at - 116.0, 0.0) ** 2 + 0.4 * share**3 * (4.0 - 3.0 * share)
+
+    found = fit_axis(np.column_stack([station, 0.0 * station, np.round(heights(station), 4)]), follow=True)
+    assert found.height.worst < 1e-3
+    between = np.arange(0.0, 200.0, 0.5)
+    assert np.abs(found.profile.elevation(between) - heights(between)).max() < 0.02
+
+
+def test_a_swing_between_points_is_calmed_and_the_rest_stays() -> None:
+    """Two grades that pass through the points, but leave the middle of a chord by 8 cm."""
+    knots = np.array([0.0, 30.0, 32.5, 37.5, 40.0, 90.0])
+    grades = np.array([0.0, 0.032, 0.0, -0.032, 0.0])
+    model = Model(np.zeros(1), knots, np.column_stack([grades, grades]), np.full(5, EQUAL), np.zeros(4, dtype=bool))
+    station = np.arange(0.0, 91.0, 10.0)
+    heights = model.evaluate(station)
+    assert swings(model, station, heights)[3] == pytest.approx(0.08)
+    calm = without_swings(model, station, heights, 0.03)
+    assert calm.evaluate(station) == pytest.approx(heights)
+    assert np.abs(calm.evaluate(np.linspace(0.0, 90.0, 181))).max() < 1e-9
+    assert without_swings(model, station, heights, 0.09) is model
+
+
+def test_a_road_of_two_points_has_no_swings() -> None:
+    model = Model(
+        np.zeros(1), np.array([0.0, 10.0]), np.array([[0.1, 0.1]]), np.array([EQUAL]), np.zeros(0, dtype=bool)
+    )
+    station = np.array([0.0, 10.0])
+    assert without_swings(model, station, model.evaluate(station), 0.03) is model
 
 
 def test_points_with_noise_are_fitted_as_without_it() -> None:

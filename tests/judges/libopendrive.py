@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from synthroads_addon.base.arrays import Float
 from synthroads_addon.road.geometry import RoadGeometry
 from tests.judges import bringing
 from tests.judges.samples import Samples
@@ -46,14 +47,22 @@ def verdict(samples: Samples) -> list[str]:
     return surface_faults(samples.file("twin.xodr"), samples.geometry)
 
 
+def surface(path: Path) -> tuple[list[str], list[list[str]], Float]:
+    """Return what it complains of in a file, its rows (station and number of a lane first), and points (N, 3), m.
+
+    The points lie on the outer borders of all lanes, every 5 m, in the file's coordinates.
+    """
+    done = subprocess.run([str(_FOLDER / "surface"), str(path)], capture_output=True, text=True, check=True)
+    faults = sorted(set(re.findall(r"\[(?:ERROR|WARN\w*)\] (.*)", done.stdout + done.stderr)))
+    rows = [line.split() for line in done.stdout.splitlines() if not line.startswith("[")]
+    return faults, rows, np.array([[float(value) for value in row[4:7]] for row in rows])
+
+
 def surface_faults(path: Path, geometry: RoadGeometry) -> list[str]:
     """Return in what the surface that it makes of a file differs from a road's, at the borders of all lanes."""
-    done = subprocess.run([str(_FOLDER / "surface"), str(path)], capture_output=True, text=True, check=True)
-    found = sorted(set(re.findall(r"\[(?:ERROR|WARN\w*)\] (.*)", done.stdout + done.stderr)))
-    rows = [line.split() for line in done.stdout.splitlines() if not line.startswith("[")]
+    found, rows, points = surface(path)
     if len(rows) < geometry.length:
         return [*found, f"{len(rows)} points only"]
-    points = np.array([[float(value) for value in row[4:7]] for row in rows])
     s, t = geometry.alignment.project(points[:, :2])
     s = np.clip(s, 0.0, geometry.length)
     # At a ramp's end the road changes within 5 cm.

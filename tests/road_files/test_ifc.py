@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import sys
 from pathlib import Path
@@ -167,3 +168,22 @@ def test_a_file_that_ends_too_early_is_one_line(tmp_path: Path, cut: int) -> Non
     (tmp_path / "a.ifc").write_text((tmp_path / "a.ifc").read_text()[:cut])
     with pytest.raises(InputError):
         only(tmp_path / "a.ifc")
+
+
+def test_a_broken_header_never_reaches_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It could end the process."""
+    ifcopenshell = importlib.import_module("ifcopenshell")
+    written(path := tmp_path / "a.ifc")
+    name = b"FILE_SCHEMA(('IFC4X3_ADD2'))"
+    path.write_bytes(path.read_bytes().replace(name, b"FILE_SCHEMA(('IFC4XE_NAME('a','',(''),(''),'','','');" + name))
+    seen, opened = [], ifcopenshell.open
+    monkeypatch.setattr(ifcopenshell, "open", lambda file: (seen.append(Path(file).read_bytes()), opened(file))[1])
+    assert len(read_lines(path)[0].pieces) == len(PLAN)
+    assert b"IFC4XE" not in seen[0]
+
+
+def test_a_file_without_data_is_refused(tmp_path: Path) -> None:
+    written(path := tmp_path / "a.ifc")
+    path.write_bytes(path.read_bytes().replace(b"DATA;", b"DATE;"))
+    with pytest.raises(InputError, match="a section DATA behind the header is needed"):
+        read_lines(path)

@@ -13,13 +13,15 @@ from headless.cli import main
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.remarks import collected_remarks
 from synthroads_addon.jobs.axis_source import axis_from_file
-from synthroads_addon.road.geometry import alignment_of, profile_of
+from synthroads_addon.jobs.generate import RoadSource
+from synthroads_addon.road.geometry import RoadGeometry, alignment_of, profile_of
+from synthroads_addon.road.section import LineMarking
 from synthroads_addon.road_files.carriageway_pairs import Pair, paired
 from synthroads_addon.road_files.osm import read_osm, read_pbf
 from synthroads_addon.road_files.osm_tags import driving_direction, kilometres_per_hour, lanes_each_way, metres
 from synthroads_addon.road_files.way_chains import Chain
 from synthroads_addon.scenario.road import FreeCrossSection, RoadScenario
-from synthroads_addon.scenario.scenario import load_scenario
+from synthroads_addon.scenario.scenario import Scenario, load_scenario
 from synthroads_addon.scenario.without import scenario_without
 from tests.helpers.roads.written_lines import Walk
 from tests.helpers.roads.written_maps import Map, beside, motorway
@@ -112,7 +114,38 @@ def test_ways_are_chained_by_their_name_and_direction(tmp_path: Path) -> None:
     assert ends == {written.nodes[nodes[0]], written.nodes[nodes[-1]]}
     assert long.section is not None
     assert long.section.lanes == 2, "lanes are counted over both directions"
-    assert "lanes side by side: the road gets a median of" in told(tmp_path / "a.osm")[2]
+
+
+def test_both_directions_of_one_line_lie_side_by_side(tmp_path: Path) -> None:
+    """They meet at the map's line, without a median, where the scenario asks for none."""
+    written, walk = Map(), motorway()[1]
+    nodes = written.line(beside(walk, np.linspace(0.0, 900.0, 31).tolist()))
+    written.way(nodes, {"highway": "primary", "name": "Long Street", "lanes": "4"})
+    path, scenario = written.xml(tmp_path / "a.osm"), Scenario.from_dict({})
+    with collected_remarks() as remarks:
+        road, told_of = RoadSource(scenario, axis=path).read()
+    assert told_of["axis"]["left_out"] == []
+    assert any("2 lanes each way" in text and "no median" in text for text in remarks)
+    geometry = RoadGeometry(road)
+    station = np.linspace(0.0, geometry.length, 50)
+    for side in ("left", "right"):
+        distances = geometry.sections[side].distances(station)
+        assert np.abs(distances[:, 0]).max() == 0.0
+        assert len(road.carriageway(side).lanes) == 2
+        heights = geometry.sections[side].elevations(station, geometry.crossfall(road.carriageway(side), station))
+        assert np.abs(heights[:, 0]).max() < 1e-12, "the line keeps its heights"
+    centre = [item for item in road.of_type(LineMarking).values() if item.kind in ("free", "inner_edge")]
+    (line,) = centre
+    left, right = geometry.marking_edges(line, station)
+    assert np.abs(left + right).max() < 1e-9
+    assert line.dash_length > 0.0
+    assert not [name for name in road.objects if name.startswith(("guardrail-median", "concrete-barrier-median"))]
+
+    parted = Scenario.from_dict({"road": {"median_width": 3.0}})
+    with collected_remarks():
+        road, told_of = RoadSource(parted, axis=path).read()
+    assert road.carriageway("right").inner_offset == 1.5
+    assert told_of["axis"]["left_out"] == ["lanes side by side: road.median_width=3 m parts them instead"]
 
 
 def test_one_way_roads_are_chained_in_their_direction_alone(tmp_path: Path) -> None:

@@ -64,7 +64,10 @@ def landxml(path: Path, axis: AlignmentObject, first: float = 0.0, equations: st
     return path
 
 
-@pytest.mark.parametrize("seed", range(20))
+SEEDS = [*range(20), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(20, 50))]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_drawn_axes_come_back_from_landxml_within_a_millimetre(tmp_path: Path, seed: int) -> None:
     truth = drawn(seed)
     axis, scenario, report = road_axis(landxml(tmp_path / "a.xml", truth, 1200.0), RoadScenario())

@@ -16,7 +16,7 @@ from ...road.section import Carriageway, CrossfallPoint, Lane, Pavement, Turnout
 from ...road.section_geometry import CarriagewaySection
 from ...road.turnout_geometry import TURNOUT_STRIPS
 from ..heights import HeightPiece
-from .corners import Polyline, corners, polyline
+from .corners import Polyline, corners, polyline, rounded_points
 from .loss import Loss
 from .plane import Planes, RotationAxis, joined, planes
 from .records import merged
@@ -112,10 +112,12 @@ def _without_turnouts(side: SideShape, line: Polyline, turnouts: dict[str, Turno
     """Return a carriageway's boundaries without turnouts: the shoulder gives way to them, and the verge is wider."""
     widths = np.diff(line.values, axis=1)
     kept = ~beside(line.stations, turnouts)
-    kept = kept if kept.any() else np.ones(len(kept), dtype=bool)
     shoulder, verge = paved_index(side) - 1, widths.shape[1] - 1
-    for column in (shoulder, verge):
-        widths[:, column] = np.interp(line.stations, line.stations[kept], widths[kept, column])
+    if not kept.any():  # beside turnouts a shoulder is never wider than elsewhere, and a verge never narrower
+        widths[:, shoulder], widths[:, verge] = widths[:, shoulder].max(), widths[:, verge].min()
+    else:
+        for column in (shoulder, verge):
+            widths[:, column] = np.interp(line.stations, line.stations[kept], widths[kept, column])
     widths[:, shoulder + 1 : verge] = 0.0
     inner = line.values[:, :1]
     return Polyline(line.stations, np.column_stack([inner, inner + np.cumsum(widths, axis=1)]), line.jumps)
@@ -177,7 +179,7 @@ def _carriageway(
     if verge_width.max() <= _NONE:
         verge_width = np.full(len(at), verge.width)
     else:
-        slope = _verge_slope(side, turnouts, loss)
+        slope = _verge_slope(side, turnouts, verge.slope, loss)
     inner = corners(at, line.values[:, 0])
     rise = made.rises[side.sign]
     percent = 100.0 * rise.values[:, 0]
@@ -199,7 +201,7 @@ def _carriageway(
         verge_width=_width(at, verge_width, _SHOULDER),
         verge_slope_percent=slope,
         crossfall=tuple(
-            CrossfallPoint(station=round_value(s), crossfall_percent=round_value(v, _DIGITS)) for s, v in falls
+            CrossfallPoint(station=s, crossfall_percent=round_value(v, _DIGITS)) for s, v in rounded_points(falls)
         ),
         rotation_axis=made.axis,
         pavement=Pavement(),
@@ -214,29 +216,39 @@ def _width(stations: Float, widths: Float, limits: tuple[float, float]) -> float
         if limits[0] <= value <= limits[1]:
             return value
         points = [(float(stations[0]), value), (float(stations[-1]), value)]
-    return tuple(WidthPoint(station=round_value(s), width=round_value(w, _DIGITS)) for s, w in points)
+    return tuple(WidthPoint(station=s, width=round_value(w, _DIGITS)) for s, w in rounded_points(points))
 
 
 def _offset(points: list[tuple[float, float]], stations: Float) -> float | tuple[SignedWidthPoint, ...]:
     if len(points) == 1:
         return round_value(points[0][1], _DIGITS)
-    return tuple(SignedWidthPoint(station=round_value(s), width=round_value(w, _DIGITS)) for s, w in points)
+    return tuple(SignedWidthPoint(station=s, width=round_value(w, _DIGITS)) for s, w in rounded_points(points))
 
 
-def _verge_slope(side: SideShape, turnouts: dict[str, Turnout], loss: Loss) -> float:
-    """Return the fall, %, of a file's verge away from the pavement: the mean one, weighted by width."""
-    falls, widths = 0.0, 0.0
+def _verge_slope(side: SideShape, turnouts: dict[str, Turnout], usual: float, loss: Loss) -> float:
+    """Return the fall, %, of a file's verge away from the pavement: the mean one, weighted by width.
+
+    Beside turnouts, whose ramps bend it, it is looked at only where they are everywhere: the median is taken then. A
+    verge that is wide nowhere in the middle of a stretch has the usual fall.
+    """
+    rows: list[tuple[float, float, float, bool]] = []  # length, width, fall (m), whether a turnout is near
     for stretch in range(len(side.breaks) - 1):
         at = np.linspace(side.breaks[stretch], side.breaks[stretch + 1], 3)[1:2]
-        if beside(at, turnouts).any():
-            continue
         found = side.boundaries(at, stretch)
         width = float(found.distances[0, -1] - found.distances[0, -2])
-        length = float(side.breaks[stretch + 1] - side.breaks[stretch])
-        falls += length * float(found.inner_heights[0, -1] - found.heights[0, -1])
-        widths += length * width
-    percent = 100.0 * falls / max(widths, _NONE)
+        fall = float(found.inner_heights[0, -1] - found.heights[0, -1])
+        if width > _NONE:
+            length = float(side.breaks[stretch + 1] - side.breaks[stretch])
+            rows.append((length, width, fall, bool(beside(at, turnouts).any())))
     loss.read["verges"] += 1
+    if not rows:
+        return usual
+    length, width, fall, near = np.array(rows).T
+    free = near == 0.0
+    if free.any():
+        percent = 100.0 * float((length * fall)[free].sum() / (length * width)[free].sum())
+    else:
+        percent = 100.0 * float(np.median(np.repeat(fall / width, np.maximum(length, 1.0).astype(int))))
     return round_value(min(max(percent, 0.0), _STEEPEST_VERGE), 4)
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.arrays import Float
+from ...base.schema import round_value
 from ...road.turnout_geometry import STEP
 from ..heights import HeightPiece
 
@@ -99,6 +100,16 @@ def corners(stations: Float, values: Float, straight: float = STRAIGHT) -> list[
             kept.append(n)
     kept.append(len(stations) - 1)
     return [(float(stations[n]), float(values[n])) for n in kept]
+
+
+def rounded_points(points: Sequence[tuple[float, float]], digits: int = 9) -> list[tuple[float, float]]:
+    """Return (station, value) with rounded stations, without those that fall on the one before so."""
+    found: list[tuple[float, float]] = []
+    for station, value in points:
+        at = round_value(station, digits)
+        if not found or at > found[-1][0]:
+            found.append((at, value))
+    return found
 
 
 def height_pieces(function: Callable[[Float, int], Float], breaks: Float, tolerance: float) -> list[HeightPiece]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from ...road.objects import RoadObject
 from ...road.things.beacon import ConstructionBeacon
@@ -25,7 +25,38 @@ from ...road.things.wall import Wall
 if TYPE_CHECKING:
     from .objects import Stretch
 
-Size = Mapping[str, float]
+_TOLD = 1e-3
+"""Distance, m, from which a size that is limited is told."""
+
+
+class Size:
+    """Sizes that a file gives an object, and how far the thing's own are from them where it can't have them.
+
+    Attributes:
+        limited: the largest distance of a size that was limited, m, by its name.
+    """
+
+    def __init__(self, given: Mapping[str, float]) -> None:
+        self._given = given
+        self.limited: dict[str, float] = {}
+
+    def __getitem__(self, name: str) -> float:
+        return self._given[name]
+
+    def within(self, name: str, low: float, high: float, otherwise: float) -> float:
+        """Return a size (m) within limits, which is noted; of one that isn't given (0) the usual."""
+        return self.fit(name, self._given[name], low, high, otherwise)
+
+    def fit(self, name: str, value: float, low: float, high: float, otherwise: float) -> float:
+        """Return a value (m) within limits, which is noted under a name; of one that isn't given (0) the usual."""
+        if not value > 0.0:
+            return otherwise
+        used = min(max(value, low), high)
+        if abs(used - value) > _TOLD:
+            self.limited[name] = max(abs(used - value), self.limited.get(name, 0.0))
+        return used
+
+
 Along = Callable[["Stretch", Size], RoadObject]
 Standing = Callable[[dict[str, Any], Size], RoadObject]
 
@@ -47,11 +78,6 @@ class Maker(NamedTuple):
     approximated: str = ""
 
 
-def _within(value: float, low: float, high: float, otherwise: float) -> float:
-    """Return a size (m) within limits; of one that isn't given (0) the usual."""
-    return min(max(value, low), high) if value > 0.0 else otherwise
-
-
 def _stretch(stretch: Stretch) -> dict[str, Any]:
     return {
         "instance": 1,
@@ -62,77 +88,86 @@ def _stretch(stretch: Stretch) -> dict[str, Any]:
 
 
 def _guardrail(stretch: Stretch, size: Size) -> RoadObject:
-    height = _within(size["height"], 0.3, 1.5, 0.75)
+    height = size.within("height", 0.3, 1.5, 0.75)
     return Guardrail(**_stretch(stretch), faces="left" if stretch.offset < 0.0 else "right", height=height)
 
 
 def _concrete_barrier(stretch: Stretch, size: Size) -> RoadObject:
-    foot = _within(size["width"], 0.3, 1.2, 0.54)
-    return ConcreteBarrier(**_stretch(stretch), height=_within(size["height"], 0.4, 2.0, 0.9), base_width=foot)
+    foot = size.within("width", 0.3, 1.2, 0.54)
+    return ConcreteBarrier(**_stretch(stretch), height=size.within("height", 0.4, 2.0, 0.9), base_width=foot)
 
 
 def _noise_barrier(stretch: Stretch, size: Size) -> RoadObject:
-    return NoiseBarrier(**_stretch(stretch), height=_within(size["height"], 1.0, 12.0, 4.0))
+    return NoiseBarrier(**_stretch(stretch), height=size.within("height", 1.0, 12.0, 4.0))
 
 
 def _fence(stretch: Stretch, size: Size) -> RoadObject:
-    return Fence(**_stretch(stretch), height=_within(size["height"], 0.5, 4.0, 1.8))
+    return Fence(**_stretch(stretch), height=size.within("height", 0.5, 4.0, 1.8))
 
 
 def _wall(stretch: Stretch, size: Size) -> RoadObject:
-    thick = _within(size["width"], 0.08, 1.0, 0.24)
-    return Wall(**_stretch(stretch), height=_within(size["height"], 0.3, 6.0, 1.8), thickness=thick)
+    thick = size.within("width", 0.08, 1.0, 0.24)
+    return Wall(**_stretch(stretch), height=size.within("height", 0.3, 6.0, 1.8), thickness=thick)
 
 
 def _hedge(stretch: Stretch, size: Size) -> RoadObject:
-    wide = _within(size["width"], 0.3, 5.0, 1.2)
-    return Hedge(**_stretch(stretch), height=_within(size["height"], 0.3, 8.0, 1.8), width=wide)
+    wide = size.within("width", 0.3, 5.0, 1.2)
+    return Hedge(**_stretch(stretch), height=size.within("height", 0.3, 8.0, 1.8), width=wide)
 
 
 def _delineator(place: dict[str, Any], size: Size) -> RoadObject:
-    return Delineator(**place, height=_within(size["height"], 0.3, 1.5, 1.0))
+    return Delineator(**place, height=size.within("height", 0.3, 1.5, 1.0))
 
 
 def _lamp(place: dict[str, Any], size: Size) -> RoadObject:
-    return Pole(**place, kind="lighting", height=_within(size["height"], 2.0, 30.0, 12.0))
+    return Pole(**place, kind="lighting", height=size.within("height", 2.0, 30.0, 12.0))
 
 
 def _pole(place: dict[str, Any], size: Size) -> RoadObject:
-    thick = _within(2.0 * size["radius"] or size["width"], 0.05, 0.6, 0.2)
-    return Pole(**place, height=_within(size["height"], 2.0, 30.0, 6.0), diameter=thick, arm_length=0.0)
+    thick = size.fit("width", 2.0 * size["radius"] or size["width"], 0.05, 0.6, 0.2)
+    return Pole(**place, height=size.within("height", 2.0, 30.0, 6.0), diameter=thick, arm_length=0.0)
 
 
 def _beacon(place: dict[str, Any], size: Size) -> RoadObject:
-    wide, high = _within(size["width"], 0.1, 0.6, 0.25), _within(size["height"], 0.5, 2.0, 1.0)
+    wide = size.fit("width", size["width"] or 2.0 * size["radius"], 0.1, 0.6, 0.25)
+    high = size.within("height", 0.5, 2.0, 1.0)
     return ConstructionBeacon(**place, pass_side="left" if place["offset"] < 0.0 else "right", width=wide, height=high)
 
 
 def _building(place: dict[str, Any], size: Size) -> RoadObject:
-    wide, deep = _within(size["length"], 2.0, 80.0, 11.0), _within(size["width"], 2.0, 60.0, 9.0)
-    tall = _within(size["height"], 2.0, 30.0, 5.6)
+    wide, deep = size.within("length", 2.0, 80.0, 11.0), size.within("width", 2.0, 60.0, 9.0)
+    tall = size.within("height", 2.0, 30.0, 5.6)
     return Building(**place, kind="hall", width=wide, depth=deep, height=tall, roof_height=0.0)
 
 
 def _gantry(place: dict[str, Any], size: Size) -> RoadObject:
-    half, middle = 0.5 * _within(size["width"], 4.0, 80.0, 20.0), place["offset"]
+    half, middle = 0.5 * size.within("width", 4.0, 80.0, 20.0), place["offset"]
     return Gantry(**place, kind="two_sided", left_offset=middle + half, right_offset=middle - half)
 
 
 def _cabinet(place: dict[str, Any], size: Size) -> RoadObject:
-    wide, deep = _within(size["length"], 0.1, 3.0, 0.8), _within(size["width"], 0.1, 3.0, 0.4)
-    return Cabinet(**place, kind="utility", width=wide, depth=deep)
+    return Cabinet(**place, kind="utility", **_box(size, 0.8, 0.4))
 
 
-def _phone(place: dict[str, Any], _: Size) -> RoadObject:
-    return Cabinet(**place, kind="emergency_phone")
+def _phone(place: dict[str, Any], size: Size) -> RoadObject:
+    return Cabinet(**place, kind="emergency_phone", **_box(size, 0.3, 0.3))
 
 
-def _shaft(place: dict[str, Any], _: Size) -> RoadObject:
-    return Shaft(**place)
+def _box(size: Size, width: float, depth: float) -> dict[str, float]:
+    """Return width, depth and height of a cabinet, m: the first two of a file without them as given."""
+    wide, deep = size.within("length", 0.1, 3.0, width), size.within("width", 0.1, 3.0, depth)
+    usual = float(Cabinet.model_fields["height"].default)
+    return {"width": wide, "depth": deep, "height": size.within("height", 0.4, 3.0, usual)}
+
+
+def _shaft(place: dict[str, Any], size: Size) -> RoadObject:
+    """Return a shaft: a round one is a manhole."""
+    kind: Literal["inlet", "manhole"] = "manhole" if size["radius"] > 0.0 else "inlet"
+    return Shaft(**place, kind=kind, size=size.fit("width", 2.0 * size["radius"] or size["width"], 0.3, 1.5, 0.6))
 
 
 def _light(place: dict[str, Any], size: Size) -> RoadObject:
-    return TrafficLight(**place, height=_within(size["height"], 1.5, 8.0, 3.2))
+    return TrafficLight(**place, height=size.within("height", 1.5, 8.0, 3.2))
 
 
 _TABLE: tuple[tuple[str, Maker], ...] = (

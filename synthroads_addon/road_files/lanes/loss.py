@@ -6,6 +6,13 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..xml_text import on_one_line
+
+_SHOWN = 5
+"""Stretches that a line for people names."""
+_LONGEST = 300
+"""Characters of a kind, and of a reason, which may hold words of the file."""
+
 
 @dataclass
 class Loss:
@@ -15,16 +22,19 @@ class Loss:
         read: numbers of what was taken over, by kind.
         approximated: rows of kind, reason, largest deviation (m) and its station (m).
         left_out: numbers of what was left out, by kind and reason.
+        stretches: stations (m) from and to which something of that kind and reason was left out.
         surface: whether some of the road's surface was left out, or is more than 1 mm off.
     """
 
     read: Counter[str] = field(default_factory=Counter)
     approximated: list[dict[str, Any]] = field(default_factory=list)
     left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
+    stretches: dict[tuple[str, str], list[tuple[float, float]]] = field(default_factory=dict)
     surface: bool = False
 
     def approximate(self, kind: str, why: str, deviation: float = 0.0, station: float | None = None) -> None:
         """Add what was approximated, by how much (m) and where (m); of one kind and reason the worst is kept."""
+        kind, why = _shown(kind), _shown(why)
         row: dict[str, Any] = {"kind": kind, "why": why, "deviation": round(deviation, 6)}
         if station is not None:
             row["station"] = round(station, 3)
@@ -37,9 +47,19 @@ class Loss:
                 return
         self.approximated.append(row)
 
-    def leave_out(self, kind: str, why: str, count: int = 1, surface: bool = False) -> None:
-        """Add what was left out, and whether it was surface."""
-        self.left_out[kind, why] += count
+    def leave_out(
+        self,
+        kind: str,
+        why: str,
+        count: int = 1,
+        surface: bool = False,
+        stretch: tuple[float, float] | None = None,
+    ) -> None:
+        """Add what was left out, whether it was surface, and along which stretch of the set it was, stations in m."""
+        key = _shown(kind), _shown(why)
+        self.left_out[key] += count
+        if stretch is not None:
+            self.stretches.setdefault(key, []).append((round(stretch[0], 3), round(stretch[1], 3)))
         self.surface |= surface
 
     def to_dict(self) -> dict[str, Any]:
@@ -48,7 +68,9 @@ class Loss:
             "read": dict(sorted(self.read.items())),
             "approximated": self.approximated,
             "left_out": [
-                {"kind": kind, "count": count, "why": why} for (kind, why), count in sorted(self.left_out.items())
+                {"kind": key[0], "count": count, "why": key[1]}
+                | ({"stretches": [list(one) for one in self.stretches[key]]} if key in self.stretches else {})
+                for key, count in sorted(self.left_out.items())
             ],
             "surface_lost": self.surface,
         }
@@ -60,5 +82,14 @@ class Loss:
             off = f", within {1000.0 * row['deviation']:.2f} mm" if row["deviation"] else ""
             where = f" (worst at station {row['station']:.1f} m)" if "station" in row else ""
             found.append(f"approximated: {row['kind']}: {row['why']}{off}{where}")
-        found += [f"left out: {count} {kind}: {why}" for (kind, why), count in sorted(self.left_out.items())]
+        for (kind, why), count in sorted(self.left_out.items()):
+            stretches = self.stretches.get((kind, why), [])
+            named = ", ".join(f"{low:.1f} to {high:.1f} m" for low, high in stretches[:_SHOWN])
+            more = f" and {len(stretches) - _SHOWN} more" if len(stretches) > _SHOWN else ""
+            found.append(f"left out: {count} {kind}: {why}" + (f" (stations {named}{more})" if named else ""))
         return found
+
+
+def _shown(text: str) -> str:
+    """Return a text of which a file may have written a part as one line."""
+    return on_one_line(text)[:_LONGEST]

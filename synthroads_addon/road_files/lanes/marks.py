@@ -17,7 +17,7 @@ from ...road.section import SHORTEST_DASH, LineMarking
 from ...scenario.road import RoadScenario
 from ..xml_text import child, children, number
 from .carriageways import SIDE_OF, Pavements, Stations
-from .corners import corners, polyline
+from .corners import corners, polyline, rounded_points
 from .loss import Loss
 from .records import SHORTEST, FileLane
 from .shape import SideShape
@@ -377,4 +377,4 @@ def _offset(line: _Line, stations: Stations) -> float | tuple[SignedWidthPoint, 
     points = corners(stations(found.stations), found.values[:, 0])
     if len(points) == 1:
         return round_value(points[0][1], 6)
-    return tuple(SignedWidthPoint(station=round_value(s, 6), width=round_value(w, 6)) for s, w in points)
+    return tuple(SignedWidthPoint(station=s, width=round_value(w, 6)) for s, w in rounded_points(points, 6))

@@ -18,8 +18,8 @@ from ...road.section import Arrow, Hatching, LineMarking
 from ...road.things.registry import THINGS
 from ...road.things.thing import LengthwiseThing
 from ..xml_text import child, children, local_name, number
-from .corners import corners
-from .kinds import thing_of
+from .corners import corners, rounded_points
+from .kinds import Maker, Size, thing_of
 from .loss import Loss
 from .places import Places
 from .signals import sign_of
@@ -33,6 +33,12 @@ _STRAIGHT = 2e-4
 _CHANGED = 0.002
 """Distance, m, from which an element of our own file is elsewhere than what it says of itself: it was edited."""
 _DIGITS = 6
+_MOST_COPIES = 10_000
+"""Copies that one repeat of an object may ask for."""
+
+
+class _UnreadableError(Exception):
+    """What our own file says of an object can't be read: why."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +100,7 @@ def _notes(item: Element) -> dict[str, str]:
 def _things_of(item: Element, places: Places, loss: Loss) -> Iterator[tuple[str, RoadObject]]:
     kind = item.get("type", "none").strip()
     if local_name(item) != "object":
-        loss.leave_out(f"{local_name(item)}s", "the set has none of their shape")
+        _tell_structure(item, places, loss)
         return
     notes = _notes(item)
     name = notes.get("id") or item.get("name") or kind
@@ -114,9 +120,26 @@ def _things_of(item: Element, places: Places, loss: Loss) -> Iterator[tuple[str,
             return
         for number_of, made in enumerate(_foreign(item, places, loss), 1):
             yield name if number_of == 1 else f"{name}-{number_of}", made
+    except _UnreadableError as error:
+        loss.leave_out(f"{kind} objects", str(error))
     except ValidationError as error:
-        fault = error.errors(include_url=False)[0]
-        loss.leave_out(f"{kind} objects", f"{'.'.join(map(str, fault['loc'])) or 'one'}: {fault['msg'].lower()}")
+        _tell_fault(kind, error, loss)
+
+
+def _tell_fault(kind: str, error: ValidationError, loss: Loss) -> None:
+    """Tell an object that is no thing of the set, by the first field that is wrong."""
+    fault = error.errors(include_url=False)[0]
+    loss.leave_out(f"{kind} objects", f"{'.'.join(map(str, fault['loc'])) or 'one'}: {fault['msg'].lower()}")
+
+
+def _tell_structure(item: Element, places: Places, loss: Loss) -> None:
+    """Tell a bridge, a tunnel or what else is no object, with its stretch if it has one."""
+    stretch = None
+    if item.get("s") is not None and item.get("length") is not None:
+        start = number(item, "s")
+        low, high = places.along(np.array([start, start + number(item, "length")])).tolist()
+        stretch = (low, high)
+    loss.leave_out(f"{local_name(item)}s", "the set has none of their shape", stretch=stretch)
 
 
 def _own_thing(model: type[RoadObject], item: Element, notes: dict[str, str], places: Places) -> RoadObject:
@@ -127,9 +150,11 @@ def _own_thing(model: type[RoadObject], item: Element, notes: dict[str, str], pl
             continue
         text = notes[code]
         is_text = about.annotation is str or any(isinstance(value, str) for value in get_args(about.annotation))
-        values[field] = text if is_text else json.loads(text)
+        values[field] = text if is_text else _said(code, text)
     if issubclass(model, LengthwiseThing):
         repeats = children(item, "repeat")
+        if not repeats:
+            raise _UnreadableError("one that runs along the road needs a repeat")
         ends = (repeats[0], 0.0, "Start"), (repeats[-1], number(repeats[-1], "length"), "End")
         (start, offset), (end, _) = (
             places.at(
@@ -152,6 +177,14 @@ def _own_thing(model: type[RoadObject], item: Element, notes: dict[str, str], pl
     return _moved(model.from_dict(values), float(offset[0]))
 
 
+def _said(code: str, text: str) -> Any:
+    """Return the value of a note of our own file."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        raise _UnreadableError(f"the value of their {code} must be JSON") from None
+
+
 def _moved(made: Any, offset: float) -> RoadObject:
     """Return an object at the offset (m) at which its element is, where another program has moved that."""
     if abs(offset - made.offset) <= _CHANGED:
@@ -164,15 +197,17 @@ def _loose_line(item: Element, places: Places) -> LineMarking:
     rows = [
         (number(c, "s"), number(c, "t"), number(c, "dz", 0.0)) for c in item.iter() if local_name(c) == "cornerRoad"
     ]
+    mark = next((one for one in item.iter() if local_name(one) == "marking"), None)
+    if mark is None or len(rows) < 2:
+        raise _UnreadableError("a line needs two corners along the road and a marking")
     station, offset = places.at(*np.array(rows).T)
-    mark = next(one for one in item.iter() if local_name(one) == "marking")
     sides = driven_sides(places.surface.road.sections)
     sign = sides[0] if len(sides) == 1 else 1 if offset.mean() > 0.0 else -1
     points = corners(station, sign * offset, _STRAIGHT)
     gap = number(mark, "spaceLength", 0.0)
     start = float(station[0]) + (number(mark, "startOffset", 0.0) if gap else 0.0)
     place: Any = tuple(
-        SignedWidthPoint(station=round_value(s, _DIGITS), width=round_value(w, _DIGITS)) for s, w in points
+        SignedWidthPoint(station=s, width=round_value(w, _DIGITS)) for s, w in rounded_points(points, _DIGITS)
     )
     return LineMarking(
         instance=1,
@@ -210,11 +245,21 @@ def _foreign(item: Element, places: Places, loss: Loss) -> Iterator[RoadObject]:
         return
     if maker.approximated:
         loss.approximate(f"{item.get('type', 'none')} objects", maker.approximated)
-    size = {name: number(item, name, 0.0) for name in ("width", "length", "height", "radius")}
+    given = {name: number(item, name, 0.0) for name in ("width", "length", "height", "radius")}
     repeats = children(item, "repeat")
     for row in repeats:
-        size["height"] = size["height"] or number(row, "heightStart", 0.0)
-        size["width"] = size["width"] or number(row, "widthStart", 0.0)
+        given["height"] = given["height"] or number(row, "heightStart", 0.0)
+        given["width"] = given["width"] or number(row, "widthStart", 0.0)
+    size = Size(given)
+    yield from _made(item, maker, size, repeats, places, loss)
+    for name, off in size.limited.items():
+        loss.approximate(f"{maker.name}s", f"their {name} is limited", off)
+
+
+def _made(
+    item: Element, maker: Maker, size: Size, repeats: Sequence[Element], places: Places, loss: Loss
+) -> Iterator[RoadObject]:
+    """Yield the things that an object is, by what makes them."""
     if maker.along:
         for stretch in _stretches(item, repeats, places, size["length"]):
             if stretch.bow > _TELL:
@@ -224,23 +269,36 @@ def _foreign(item: Element, places: Places, loss: Loss) -> Iterator[RoadObject]:
         return
     assert maker.standing is not None
     turn = _degrees(number(item, "hdg", 0.0))
-    for s, t, z in _repeated(item, repeats):
+    for s, t, z in _repeated(item, repeats, places.surface.road.length, loss):
         station, offset = places.at(np.array([s]), np.array([t]), np.array([z]))
         about = {"instance": 1, "station": _one(station), "offset": round_value(float(offset[0]), _DIGITS)}
-        yield maker.standing(about | {"rotation_deg": turn}, size)
+        try:
+            yield maker.standing(about | {"rotation_deg": turn}, size)
+        except ValidationError as error:  # each copy stands elsewhere
+            _tell_fault(item.get("type", "none"), error, loss)
 
 
-def _repeated(item: Element, repeats: Sequence[Element]) -> Iterator[tuple[float, float, float]]:
-    """Yield s, t and height of each copy of an object; of one without repeats its own place."""
+def _repeated(
+    item: Element, repeats: Sequence[Element], end: float, loss: Loss
+) -> Iterator[tuple[float, float, float]]:
+    """Yield s, t and height of each copy of an object up to a road's end (m); of one without repeats its own place."""
     if not repeats:
         yield number(item, "s"), number(item, "t"), number(item, "zOffset", 0.0)
         return
+    kind = f"{item.get('type', 'none')} objects"
     for row in repeats:
         start, length = number(row, "s"), number(row, "length", 0.0)
-        step = number(row, "distance", 0.0) or length or 1.0
+        run = min(length, end - start)
+        step = number(row, "distance", 0.0) or run or 1.0
+        if run < 0.0 or step < 0.0:
+            loss.leave_out(kind, "a repeat begins behind the road's end, or runs back")
+            continue
+        if run > _MOST_COPIES * step:
+            loss.leave_out(kind, f"a repeat asks for more than {_MOST_COPIES:,} copies")
+            continue
         first, last = number(row, "tStart", number(item, "t", 0.0)), number(row, "tEnd", number(item, "t", 0.0))
         low, high = number(row, "zOffsetStart", 0.0), number(row, "zOffsetEnd", 0.0)
-        for n in range(int(length / step + 1e-6) + 1):
+        for n in range(int(run / step + 1e-6) + 1):
             share = n * step / length if length else 0.0
             yield start + n * step, first + share * (last - first), low + share * (high - low)
 

@@ -29,6 +29,10 @@ class Places:
     alignment: Alignment
     stations: Callable[[Float], Float]
 
+    def along(self, s: Float) -> Float:
+        """Return stations (N,) of the line at those of the file, m, within the road."""
+        return self.stations(np.clip(s, 0.0, self.surface.road.length))
+
     def at(self, s: Float, t: Float, height: Float) -> tuple[Float, Float]:
         """Return stations and offsets (N,), m, of points at s, t and heights (N,) normal to the road's plane.
 

@@ -19,7 +19,7 @@ from ..heights import HeightPiece
 from ..line import LineNames, RoadLine, exact_axis
 from ..opendrive import read_opendrive
 from ..read import choose_line
-from ..xml_text import child, children, local_name, number, read_xml
+from ..xml_text import child, children, number, read_xml
 from .carriageways import Pavements, Verge, pavements
 from .loss import Loss
 from .marks import line_markings
@@ -27,10 +27,12 @@ from .objects import things
 from .places import Places
 from .records import FileRoad, read_road
 from .shape import SideShape
-from .strips import driven_sides, side_layouts
+from .speeds import speed_limit
+from .strips import driven_sides, foreign_turnouts, side_layouts
 from .surface import FileSurface
 
 _SAME_PLAN = 1e-6
+_SHOWN = 5
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,7 @@ class WholeRoad:
         pavements: what its carriageways are made of.
         loss: what became of what the file says.
         exact: stations of the parameter set at the plan's (file, set), (2, K), m.
+        speed: limit of most of its length, km/h; None without any.
     """
 
     line: RoadLine
@@ -52,6 +55,7 @@ class WholeRoad:
     pavements: Pavements
     loss: Loss
     exact: Float
+    speed: float | None
 
     def stations(self, station: Float) -> Float:
         """Return the stations of the set at those of the file, m."""
@@ -101,9 +105,11 @@ def whole_road(
         for layout in layouts.values():
             for _, _, why in layout.lost:
                 loss.leave_out("lanes", why, surface=True)
+            for low, high in foreign_turnouts(layout, one.sections):
+                stretch = float(np.interp(low, *exact)), float(np.interp(high, *exact))
+                loss.leave_out("turnouts", "their lanes are lanes of the carriageway, without a ramp", stretch=stretch)
         loss.read["lane sections"] += len(one.sections)
-        if speeds := sum(local_name(item) == "speed" for item in one.element.iter()):
-            loss.leave_out("speed limits", "in a parameter set signs alone say them", speeds)
+    _tell_junctions(root, elements, roads, loss)
     found = pavements(shapes, _verge(scenario), lambda s: np.interp(s, *exact), loss)
     heights = None
     if found.heights is not None:
@@ -111,7 +117,7 @@ def whole_road(
     markings = line_markings(found, lambda s: np.interp(s, *exact), scenario, loss)
     places = [Places(FileSurface(one), axis.alignment, lambda s: np.interp(s, *exact)) for one in roads]
     given = GivenRoad(found.carriageways, found.turnouts, markings, things(places, loss))
-    return WholeRoad(line, given, heights, found, loss, exact)
+    return WholeRoad(line, given, heights, found, loss, exact, speed_limit(roads, loss))
 
 
 def _elements(root: Element) -> dict[str, Element]:
@@ -120,6 +126,20 @@ def _elements(root: Element) -> dict[str, Element]:
     for number_of, road in enumerate(children(root, "road")):
         found[names.unique(road.get("name"), f"road {road.get('id', number_of)}")] = road
     return found
+
+
+def _tell_junctions(root: Element, elements: dict[str, Element], roads: list[FileRoad], loss: Loss) -> None:
+    """Tell the roads that a junction joins to these ones: each is a road of its own."""
+    mine = {road.element.get("id") for road in roads}
+    names = {element.get("id"): name for name, element in elements.items()}
+    others: list[str] = []
+    for connection in (one for junction in children(root, "junction") for one in children(junction, "connection")):
+        if connection.get("incomingRoad") in mine:
+            other = connection.get("connectingRoad", connection.get("linkedRoad"))
+            others += [names[other]] if other in names and names[other] not in others else []
+    if others:
+        named = ", ".join(others[:_SHOWN]) + (", ..." if len(others) > _SHOWN else "")
+        loss.leave_out("roads of junctions", f"--axis-name takes one: {named}", len(others))
 
 
 def _up(root: Element) -> float:

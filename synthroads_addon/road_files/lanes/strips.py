@@ -19,6 +19,8 @@ DRIVEN = frozenset(
     }
 )  # fmt: skip
 """Types of lanes that traffic drives on."""
+_TURNING = frozenset({"entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "mwyEntry", "mwyExit"})
+"""Those of them that lead off a road or onto it."""
 PAVED = frozenset({"shoulder", "border", "stop", "parking", "biking", "restricted", "shared"})
 """Types of lanes beside them that are paved."""
 _OWN = frozenset({"median", "inner_edge_strip", "lane", "outer_edge_strip", "hard_shoulder", "verge", *TURNOUT_STRIPS})
@@ -76,6 +78,19 @@ def is_driven(lane: FileLane) -> bool:
 def driven_sides(sections: Sequence[FileSection]) -> list[int]:
     """Return the signs of the sides with lanes that traffic drives on, left first."""
     return [sign for sign in SIDES if any(is_driven(lane) for section in sections for lane in section.lanes[sign])]
+
+
+def foreign_turnouts(layout: SideLayout, sections: Sequence[FileSection]) -> list[tuple[float, float]]:
+    """Return the stretches, stations of the file in m, along which lanes of a carriageway lead off or onto it."""
+    found: list[tuple[float, float]] = []
+    for number, section in enumerate(sections):
+        lanes = [slot.lanes[number] for slot in layout.slots if number in slot.lanes]
+        if any(lane.type in _TURNING and "strip" not in lane.notes for lane in lanes):
+            if found and section.start - found[-1][1] <= SHORTEST:
+                found[-1] = (found[-1][0], section.end)
+            else:
+                found.append((section.start, section.end))
+    return found
 
 
 def side_layouts(surface: FileSurface, with_median: bool = False) -> dict[int, SideLayout]:
@@ -139,15 +154,20 @@ def _sort_lanes(layout: SideLayout, number: int, lanes: Sequence[FileLane]) -> l
 
 
 def _beside(layout: SideLayout, number: int, lanes: Sequence[FileLane]) -> list[tuple[str, FileLane]]:
-    """Return the strips outside of the lanes that traffic drives on: border, shoulder, verge, in this order."""
+    """Return the strips outside of the lanes that traffic drives on: border, shoulder, verge, in this order.
+
+    A border outside of all that is paved is the verge: others write their grass so.
+    """
     found: list[tuple[str, FileLane]] = []
     reached = 0  # 0 edge strip, 1 hard shoulder, 2 verge
     stopped = False
-    for lane in lanes:
+    last_paved = max((n for n, lane in enumerate(lanes) if lane.type in PAVED - {"border"}), default=-1)
+    for n, lane in enumerate(lanes):
         if lane.type == "border" and reached == 0 and not found:
             found.append(("outer_edge_strip", lane))
             continue
         paved = lane.type in PAVED and not (stopped and lane.type == "shoulder")
+        paved = paved and not (lane.type == "border" and n > last_paved)
         if reached < 2 and paved:
             reached, stopped = 1, stopped or lane.type == "stop"
             found.append(("hard_shoulder", lane))

@@ -294,9 +294,15 @@ def _rounded(value: float, digits: int = _DIGITS) -> float:
 
 
 def influence(turnout: Turnout) -> tuple[float, float]:
-    """Return the lowest and the highest station, m, at which a turnout may change a width."""
-    beyond = STEP + BLEND + 1.0
-    return turnout.start_station - beyond, turnout.end_station + beyond
+    """Return the lowest and the highest station, m, at which a turnout may change a width.
+
+    Tapers begin with the full width; behind a ramp the verge comes back over a length of its own.
+    """
+    behind = STEP + BLEND + 1.0 if turnout.ramp else 0.0
+    # An exit's ramp lies ahead in the direction of traffic, which is that of the stations on the right.
+    ahead = (turnout.kind == "exit") == (turnout.carriageway == "carriageway-right")
+    before, after = (0.0, behind) if ahead else (behind, 0.0)
+    return turnout.start_station - before, turnout.end_station + after
 
 
 def beside(stations: Float, turnouts: dict[str, Turnout]) -> Any:

@@ -6,6 +6,7 @@ Annotations are not postponed here: Blender reads the properties from them.
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import bpy
 
@@ -15,15 +16,17 @@ from ...blender.model.build import BuildTarget
 from ...blender.model.store import BUILT_FROM, find_road, recall_parameters
 from ...fitting.fit import AxisRefusedError
 from ...fitting.plot import axis_picture
+from ...jobs.axis_points import FARTHEST_ABOVE, FARTHEST_ASIDE, NOWHERE_ELSE, PathPlace
 from ...jobs.axis_source import axis_summary
 from ...jobs.generate import RoadSource
-from ...jobs.whole_road import has_whole_road
+from ...jobs.whole_road import SURFACE, has_whole_road
 from ...road.parameters import RoadParameters
 from ...scenario.road import RoadScenario
 from ...scenario.scenario import Scenario
+from ..fields.numbers import exact
 from ..fields.room import buttons_row
 from ..work.build import road_work, shown_place
-from ..work.common import has_road, refusing
+from ..work.common import column, has_road, refusing
 from ..work.job import Aside, PanelJob, Work
 from ..work.long_operator import FileOperator
 from ..work.pictures import ShowPicture, keep_picture
@@ -108,6 +111,69 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
         default="*.xodr;*.xml;*.ifc;*.osm;*.pbf;*.gpkg;*.shp;*.fgb;*.kml;*.gpx;*.sbet;*.out;*.csv;*.txt;*.geojson;*.json",
         options={"HIDDEN"},
     )
+    option_labels: ClassVar = {
+        "--axis-name": "Name",
+        "--offset-from-path": "Offset",
+        "--path-lane": "Lane",
+        "--height-above-road": "Height",
+    }
+    axis_name: bpy.props.StringProperty(
+        name="Name",
+        description="Road, alignment or line of the file; the longest that is a road by itself if it is empty",
+        options={"SKIP_SAVE"},
+    )
+    points_are: bpy.props.EnumProperty(
+        name="Points",
+        items=[
+            ("AXIS", "The Axis", "The file's points are those of the axis"),
+            ("BESIDE", "Beside the Axis", "The axis lies at an offset from the file's points"),
+            ("LANE", "In a Lane", "The file's points lie in the middle of a lane"),
+        ],
+        description="Where a line of points or a vehicle's path runs; designed roads say themselves where they lie",
+        options={"SKIP_SAVE"},
+    )
+    offset: bpy.props.FloatProperty(
+        name="Offset",
+        description="From the points to the axis, positive to the left in their direction",
+        min=-FARTHEST_ASIDE,
+        max=FARTHEST_ASIDE,
+        unit="LENGTH",
+        options={"SKIP_SAVE"},
+    )
+    lane: bpy.props.IntProperty(
+        name="Lane",
+        description="Counted from outside, 0 the outermost; traffic keeps right",
+        min=0,
+        max=7,
+        options={"SKIP_SAVE"},
+    )
+    height: bpy.props.FloatProperty(
+        name="Height",
+        description="Of the points above the road. 0 leaves their heights as they are",
+        min=-FARTHEST_ABOVE,
+        max=FARTHEST_ABOVE,
+        unit="LENGTH",
+        options={"SKIP_SAVE"},
+    )
+    # The fields as they are when the job begins: the file is read in a thread.
+    _name, _place = "", NOWHERE_ELSE
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the settings beside the file browser."""
+        layout = column(self)
+        aside = {"AXIS": (), "BESIDE": ("offset",), "LANE": ("lane",)}[self.points_are]
+        for name in ("axis_name", "points_are", *aside, "height"):
+            layout.prop(self, name)
+
+    def job(self, context: bpy.types.Context) -> PanelJob[str]:
+        """Return the job that reads the file in a thread and builds its road."""
+        self._name = self.axis_name.strip()
+        self._place = PathPlace(
+            exact(self.offset, None) if self.points_are == "BESIDE" else None,
+            self.lane if self.points_are == "LANE" else None,
+            exact(self.height, None) or None,
+        )
+        return super().job(context)
 
     def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
         """Take the file's whole road, or fit an alignment to its centreline; return the road, and the message."""
@@ -116,11 +182,18 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
             road.model_fields_set.discard("epsg")
             scenario = scenario.model_copy(update={"road": road})
         whole = has_whole_road(path)
-        parameters, report = (RoadSource(scenario, road=path) if whole else RoadSource(scenario, axis=path)).read()
-        text = f"Built {parameters.alignment.length:,.0f} m of road {'of' if whole else 'along'} {path.name}"
-        loss_text = (
-            "; parts of its surface were left out" if report["axis"].get("whole", {}).get("surface_lost") else ""
+        source = RoadSource(
+            scenario,
+            axis=None if whole else path,
+            road=path if whole else None,
+            axis_name=self._name or None,
+            axis_place=self._place,
         )
+        parameters, report = source.read()
+        text = f"Built {parameters.alignment.length:,.0f} m of road {'of' if whole else 'along'} {path.name}"
+        surface = any(text.startswith(SURFACE) for text in report["axis"].get("left_out", ()))
+        surface |= report["axis"].get("whole", {}).get("surface_lost", False)
+        loss_text = "; parts of its surface were left out" if surface else ""
         return parameters, f"{text}: {axis_summary(report['axis'])}{loss_text}"
 
     def refuse(self, error: InputError) -> set[str]:

@@ -9,7 +9,10 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.road.section import Carriageway
+from synthroads_addon.road_files.lanes.corners import rounded_points
 from tests.helpers.roads.lane_files import LENGTH, border, cubic, lane, lanes, road_file, section, taken, width
+from tests.helpers.roads.written_lines import opendrive, xodr_road
 
 MILLIMETRE = 1e-3
 AT = np.array([12.0, 50.0, 95.0, 104.0, 150.0, 191.0])
@@ -160,3 +163,80 @@ def test_stations_are_those_of_the_curve_where_it_is_longer_than_said(tmp_path: 
     assert geometry.length == pytest.approx(1.02 * LENGTH, abs=1e-6)
     there = geometry.sections["right"].lane_boundaries(np.array([101.9, 102.1]))
     assert there[:, 0].tolist() == pytest.approx([3.0, 3.5])
+
+
+def test_exits_and_entries_of_others_are_told_with_their_stretch(tmp_path: Path) -> None:
+    both = lane(-1, width(0.0, 3.5))
+    ramp = both + lane(-2, width(0.0, 0.0, 0.035), "exit")
+    after = both + lane(-2, width(0.0, 3.5), "offRamp")
+    path = road_file(tmp_path, lanes(section(0.0, "", both), section(50.0, "", ramp), section(150.0, "", after)))
+    parameters, _, report = taken(path)
+    (carriageway,) = parameters.of_type(Carriageway).values()
+    assert len(carriageway.lanes) == 2
+    (row,) = report["whole"]["left_out"]
+    assert (row["kind"], row["count"], row["stretches"]) == ("turnouts", 1, [[50.0, 200.0]])
+    assert "turnouts" in [line for line in report["summary"] if "50.0 to 200.0 m" in line][0]
+    assert not report["whole"]["surface_lost"]
+
+
+def test_roads_that_a_junction_joins_are_told(tmp_path: Path) -> None:
+    rest = lanes(section(0.0, "", lane(-1, width(0.0, 3.5))))
+    roads = [
+        xodr_road([(0.0, long, (0.0, 0.0, 0.3), "<line/>")], rest, name, number)
+        for number, (name, long) in enumerate((("main", 200.0), ("ramp", 80.0), ("further", 90.0)), 1)
+    ]
+    joined = (
+        '<connection id="0" incomingRoad="1" linkedRoad="2"/><connection id="1" incomingRoad="1" connectingRoad="3"/>'
+    )
+    other = '<connection id="2" incomingRoad="3" linkedRoad="1"/>'
+    path = opendrive(tmp_path / "a.xodr", [*roads, f'<junction id="7">{joined}{other}</junction>'])
+    _, _, report = taken(path)
+    (row,) = [row for row in report["whole"]["left_out"] if row["kind"] == "roads of junctions"]
+    assert (row["count"], row["why"]) == (2, "--axis-name takes one: ramp, further")
+
+
+@pytest.mark.parametrize(
+    ("outside", "kinds"),
+    [
+        (("stop", "border"), ("lane", "hard_shoulder", "verge")),
+        (("border", "border"), ("lane", "outer_edge_strip", "verge")),
+        (("shoulder", "border", "biking"), ("lane", "hard_shoulder", "verge")),
+    ],
+)
+def test_a_border_outside_of_all_that_is_paved_is_the_verge(
+    tmp_path: Path, outside: tuple[str, ...], kinds: tuple[str, ...]
+) -> None:
+    more = "".join(lane(-2 - n, width(0.0, 2.0), kind) for n, kind in enumerate(outside))
+    _, geometry, report = taken(road_file(tmp_path, lanes(section(0.0, "", lane(-1, width(0.0, 3.5)) + more))))
+    right = geometry.sections["right"]
+    assert right.kinds == kinds
+    assert right.distances(np.array([100.0]))[0, 2] == pytest.approx(3.5 + 2.0 * (3 if "biking" in outside else 1))
+    assert not report["whole"]["surface_lost"]
+
+
+@pytest.mark.parametrize(("begin", "wide", "message"), [(0.0, 93.0, "width is 93.0"), (LENGTH, 3.5, r"width\.points")])
+def test_what_a_parameter_set_cannot_hold_is_refused_in_one_line(
+    tmp_path: Path, begin: float, wide: float, message: str
+) -> None:
+    """A lane wider than a road; a plan that begins where the lanes, which bend, end."""
+    rest = lanes(section(0.0, "", lane(-1, width(0.0, wide, 0.0, 1e-5))))
+    road = xodr_road([(begin, LENGTH, (10.0, 20.0, 0.3), "<line/>")], rest)
+    with pytest.raises(InputError, match=f"{message}.*no road may be so") as found:
+        taken(opendrive(tmp_path / "a.xodr", [road], "<geoReference>EPSG:25832</geoReference>"))
+    assert str(found.value).isprintable()
+
+
+def test_a_file_without_roads_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="the file has no road or alignment"):
+        taken(opendrive(tmp_path / "a.xodr", []))
+
+
+def test_coordinates_beyond_all_maps_are_refused(tmp_path: Path) -> None:
+    rest = lanes(section(0.0, "", lane(-1, width(0.0, 3.5))))
+    road = xodr_road([(0.0, 200.0, (3e8, 0.0, 0.3), "<line/>")], rest)
+    with pytest.raises(InputError, match=r"coordinates, m is \[.*\]: at most 1e\+08 are possible"):
+        taken(opendrive(tmp_path / "a.xodr", [road]))
+
+
+def test_points_whose_rounded_stations_are_one() -> None:
+    assert rounded_points([(1.0, 2.0), (1.0 + 1e-12, 3.0), (4.0, 5.0)]) == [(1.0, 2.0), (4.0, 5.0)]

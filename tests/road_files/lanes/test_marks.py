@@ -107,3 +107,18 @@ def test_without_marks_the_usual_ones_are_drawn(tmp_path: Path) -> None:
     markings, _, report = lines_of(road_file(tmp_path, marked("")))
     assert {line.kind for line in markings.values()} == {"outer_edge", "lane", "inner_edge"}
     assert "road marks" not in report["read"]
+
+
+@pytest.mark.parametrize("offset", [0.0, 1.5])
+def test_a_road_without_marks_whose_directions_meet_gets_one_dashed_line_between_them(
+    tmp_path: Path, offset: float
+) -> None:
+    rest = lanes(
+        cubic("laneOffset", "s", 0.0, offset), section(0.0, lane(1, width(0.0, 3.5)), lane(-1, width(0.0, 3.5)))
+    )
+    markings, middles, _ = lines_of(road_file(tmp_path, rest))
+    assert len(markings) == 3
+    place = list(markings).index("centre-line")
+    assert np.abs(middles[place] - offset).max() < 1e-6
+    assert markings["centre-line"].dash_length > 0.0
+    assert sorted(line.kind for line in markings.values()) == ["free", "outer_edge", "outer_edge"]

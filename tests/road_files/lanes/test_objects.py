@@ -11,7 +11,7 @@ from synthroads_addon.road.things.delineator import Delineator
 from synthroads_addon.road.things.guardrail import Guardrail
 from synthroads_addon.road.things.sign import TrafficSign
 from synthroads_addon.road.things.thing import Thing
-from tests.helpers.roads.lane_files import cubic, lane, lanes, road_file, section, taken, width
+from tests.helpers.roads.lane_files import LENGTH, cubic, lane, lanes, road_file, section, taken, width
 
 LANES = lanes(section(0.0, lane(1, width(0.0, 3.5)), lane(-1, width(0.0, 3.5))))
 
@@ -107,6 +107,74 @@ def test_what_has_no_thing_is_counted(tmp_path: Path) -> None:
     lost = {row["kind"]: row["count"] for row in report["left_out"]}
     assert lost == {"plants": 2, "-1 objects": 1, "bridges": 1, "signals": 1}
     assert not report["surface_lost"]
+
+
+def test_bridges_and_tunnels_are_told_with_their_stretch(tmp_path: Path) -> None:
+    objects = '<tunnel id="1" s="50" length="30" type="standard"/><tunnel id="2" s="180" length="90" type="standard"/>'
+    _, report = things_of(tmp_path, objects)
+    (row,) = report["left_out"]
+    assert (row["kind"], row["count"], row["stretches"]) == ("tunnels", 2, [[50.0, 80.0], [180.0, LENGTH]])
+
+
+def test_sizes_are_those_of_the_file(tmp_path: Path) -> None:
+    objects = '<object id="1" s="50" t="-9" type="obstacle" name="cabinet" length="1.2" width="0.5" height="1.4"/>'
+    objects += '<object id="2" s="60" t="-9" type="obstacle" name="manhole" radius="0.4"/>'
+    objects += '<object id="3" s="70" t="-9" type="obstacle" name="barrel" radius="0.2" height="1.1"/>'
+    objects += '<object id="4" s="80" t="-9" type="pole" radius="0.1" height="9"/>'
+    found, report = things_of(tmp_path, objects)
+    cabinet, shaft, barrel, pole = found.values()
+    assert (cabinet.width, cabinet.depth, cabinet.height) == (1.2, 0.5, 1.4)
+    assert (shaft.kind, shaft.size) == ("manhole", 0.8)
+    assert (barrel.width, barrel.height) == (0.4, 1.1)
+    assert (pole.diameter, pole.height) == (0.2, 9.0)
+    assert not [row for row in report["approximated"] if row["deviation"]]
+
+
+def test_sizes_beyond_a_things_limits_are_told(tmp_path: Path) -> None:
+    row = '<repeat s="20" length="100" distance="0" tStart="-6" tEnd="-6"/>'
+    found, report = things_of(
+        tmp_path, f'<object id="1" s="20" t="-6" type="barrier" name="wall" height="9">{row}</object>'
+    )
+    (wall,) = found.values()
+    (told,) = [row for row in report["approximated"] if row["kind"] == "walls"]
+    assert told["deviation"] == pytest.approx(9.0 - wall.height)
+
+
+@pytest.mark.parametrize(
+    ("repeat", "why"),
+    [
+        ('<repeat s="10" length="150" distance="1e-9" tStart="-5" tEnd="-5"/>', "more than 10,000 copies"),
+        ('<repeat s="900" length="150" distance="50" tStart="-5" tEnd="-5"/>', "behind the road's end"),
+    ],
+)
+def test_repeats_that_no_road_has(tmp_path: Path, repeat: str, why: str) -> None:
+    found, report = things_of(tmp_path, f'<object id="1" s="0" t="0" type="guide-post">{repeat}</object>')
+    assert found == {}
+    (row,) = report["left_out"]
+    assert why in row["why"]
+
+
+def test_copies_end_with_the_road_and_each_is_judged_alone(tmp_path: Path) -> None:
+    repeat = '<repeat s="100" length="1e6" distance="50" tStart="-5" tEnd="-5"/>'
+    repeat += '<repeat s="10" length="20" distance="10" tStart="-150" tEnd="-5"/>'
+    found, report = things_of(tmp_path, f'<object id="1" s="0" t="0" type="guide-post">{repeat}</object>')
+    assert [post.station for post in found.values()] == [100.0, 150.0, 200.0, 20.0, 30.0]
+    (row,) = report["left_out"]
+    assert row["count"] == 1
+
+
+@pytest.mark.parametrize(
+    "inner",
+    [
+        '<userData code="object_type" value="Guardrail"/>',
+        '<userData code="object_type" value="Delineator"/><userData code="height" value="{"/>',
+        '<userData code="object_type" value="LineMarking"/>',
+    ],
+)
+def test_what_our_own_files_say_of_an_object_may_be_broken(tmp_path: Path, inner: str) -> None:
+    found, report = things_of(tmp_path, f'<object id="1" s="50" t="-6" type="barrier">{inner}</object>')
+    assert found == {}
+    assert len(report["left_out"]) == 1
 
 
 def test_furniture_is_drawn_where_the_file_has_no_objects(tmp_path: Path) -> None:

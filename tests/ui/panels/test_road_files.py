@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import bpy
@@ -11,13 +12,17 @@ import pytest
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.model.store import find_road, recall
+from synthroads_addon.jobs.axis_points import PathPlace
 from synthroads_addon.jobs.generate import Job, RoadSource, generate
 from synthroads_addon.road.parameters import RoadParameters, read_parameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
-from synthroads_addon.ui.panels.road_files import source_file_name
+from synthroads_addon.ui.fields.room import text_width
+from synthroads_addon.ui.panels.road_files import SYNTHROADS_OT_load_axis, source_file_name
 from synthroads_addon.ui.work.long_operator import LongOperator
+from tests.helpers.roads.written_lines import opendrive, xodr_road
 from tests.helpers.roads.written_maps import motorway
+from tests.helpers.scenes.fake_layout import FakeLayout
 from tests.helpers.scenes.panel_road import SAME, cheap, road, road_file, settings, small_pictures
 
 __all__ = ["cheap", "road", "road_file", "settings", "small_pictures"]
@@ -94,6 +99,58 @@ def test_a_map_is_a_road_where_it_lies(cheap: Any, tmp_path: Path) -> None:
     origin = np.array(parameters.transform.translate[:2])
     assert np.hypot(*(origin - walk.at(75.0)[:2])) < 3.0
     assert source_file_name(find_road(bpy.context.scene)) == "map.osm"
+
+
+def test_the_axis_lies_where_the_panel_says_beside_the_points(cheap: Any, tmp_path: Path) -> None:
+    path = axis_file(tmp_path)
+    cheap.road.epsg = 25833
+    for options, place in (
+        ({"points_are": "BESIDE", "offset": 4.5}, PathPlace(4.5)),
+        ({"points_are": "LANE", "lane": 1, "height": 1.5}, PathPlace(None, 1, 1.5)),
+        ({"height": 1.5, "offset": 4.5, "lane": 1}, PathPlace(None, None, 1.5)),
+    ):
+        assert bpy.ops.synthroads.load_axis(filepath=str(path), **options) == {"FINISHED"}
+        parameters, _ = RoadSource(cheap.scenario(), axis=path, axis_place=place).read()
+        assert built()[0] == parameters
+    with pytest.raises(RuntimeError, match=r"Lane is 7: the road has 2 lanes each way"):
+        bpy.ops.synthroads.load_axis(filepath=str(path), points_are="LANE", lane=7)
+    designed = road_file_of(tmp_path)
+    with pytest.raises(RuntimeError, match=r"Offset is .*OpenDRIVE says where its axis lies"):
+        bpy.ops.synthroads.load_axis(filepath=str(designed), points_are="BESIDE", offset=1.0)
+
+
+def test_the_panel_takes_the_road_of_a_name(cheap: Any, tmp_path: Path) -> None:
+    path = road_file_of(tmp_path)
+    assert bpy.ops.synthroads.load_axis(filepath=str(path), axis_name="side") == {"FINISHED"}
+    assert built()[0].alignment.length == pytest.approx(150.0)
+    assert bpy.ops.synthroads.load_axis(filepath=str(path)) == {"FINISHED"}
+    assert built()[0].alignment.length == pytest.approx(200.0)
+    with pytest.raises(RuntimeError, match=r"'none': it has 'main', 'side'"):
+        bpy.ops.synthroads.load_axis(filepath=str(path), axis_name="none")
+
+
+def road_file_of(folder: Path) -> Path:
+    """Write two roads without lanes: ``main``, 200 m long, and ``side``, 150 m."""
+    rows = [("main", 200.0, 20.0), ("side", 150.0, 220.0)]
+    roads = [
+        xodr_road([(0.0, length, (10.0, y, 0.3), "<line/>")], name=name, number=n)
+        for n, (name, length, y) in enumerate(rows, 1)
+    ]
+    return opendrive(folder / "two.xodr", roads, "<geoReference>EPSG:25832</geoReference>")
+
+
+@pytest.mark.parametrize(("points", "fields"), [("AXIS", ()), ("BESIDE", ("offset",)), ("LANE", ("lane",))])
+def test_the_file_browser_shows_where_points_lie(settings: Any, points: str, fields: tuple[str, ...]) -> None:
+    layout, known = FakeLayout(), bpy.ops.synthroads.load_axis.get_rna_type()
+    values = {"axis_name": "", "points_are": points, "offset": 0.0, "lane": 0, "height": 0.0}
+    stand_in = SimpleNamespace(layout=layout, bl_rna=known, **values)
+    SYNTHROADS_OT_load_axis.draw(stand_in, bpy.context)  # type: ignore[arg-type]
+    assert [name for _, name in layout.used] == ["axis_name", "points_are", *fields, "height"]
+    shown = known.properties
+    for name in ("axis_name", "points_are", "offset", "lane", "height"):
+        assert text_width(shown[name].name) <= 200.0
+        assert len(shown[name].description) > 20
+    assert all(text_width(item.name) <= 200.0 for item in shown["points_are"].enum_items)
 
 
 @pytest.mark.slow
