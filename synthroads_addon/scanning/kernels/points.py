@@ -128,10 +128,12 @@ class _Columns(ctypes.Structure):
     def of(cls, grid: ColumnGrid) -> _Columns:
         """Return a grid for C."""
         axes, low, direction = (np.ravel(one).tolist() for one in (grid.axes, grid.low, grid.direction))
-        types = [kind for _, kind in cls._fields_]
-        return cls(
-            types[0](*axes), types[1](*low), types[2](*grid.count), grid.margin, types[4](*direction), grid.above
+        names, types = zip(*cls._fields_, strict=True)
+        values = (
+            *(types[0](*axes), types[1](*low), types[2](*grid.cells), grid.margin),
+            *(types[4](*direction), grid.above),
         )
+        return cls(**dict(zip(names, values, strict=True)))
 
 
 def _as(kind: Any, shape: tuple[int, ...], **arrays: AnyArray) -> list[AnyArray]:
@@ -509,7 +511,7 @@ class CompiledPoints:
         vertices, triangles, _ = _faces(faces)
         if most > np.iinfo(np.uint8).max:
             raise ValueError(f"most {most}: must be 255 or less")
-        told, cells = _Columns.of(grid), grid.count[0] * grid.count[1]
+        told, cells = _Columns.of(grid), grid.cells[0] * grid.cells[1]
         head = (ctypes.byref(told), len(triangles), vertices.ctypes.data, triangles.ctypes.data)
         starts = np.zeros(cells + 1, np.uint32)
         counts = starts[1:]
@@ -530,7 +532,7 @@ class CompiledPoints:
         """
         count = places.shape[1]
         (places,) = _as(np.float64, (3, count), places=places)
-        (starts,) = _as(np.uint32, (grid.count[0] * grid.count[1] + 1,), starts=listed[0])
+        (starts,) = _as(np.uint32, (grid.cells[0] * grid.cells[1] + 1,), starts=listed[0])
         (numbers,) = _as(np.int32, (int(starts[-1]),), numbers=listed[1])
         told, result = _Columns.of(grid), np.empty(count, np.bool_)
         arrays = (places, *_faces(faces), starts, numbers, result)
