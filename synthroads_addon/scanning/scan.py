@@ -380,18 +380,19 @@ class BlockScan:
             beams = beams.select(rows)
             angle = None if angle is None else np.take(angle, rows, axis=1)
         time, origin, direction = beams.time, beams.origin, beams.direction
-        in_plane = across = None
+        axes: list[Float | None] = [None, None]
         if several:
             frame = [axis for axis in (shot.table.in_plane, shot.table.across) if axis is not None]
-            _, (in_plane, across) = self._turned(poses.true, time, frame, Columns(shot.first, rows))
+            axes[:] = self._turned(poses.true, time, frame, Columns(shot.first, rows))[1]
         measured_origin, measured_direction = origin, direction
         if poses.measured is not poses.true or angle is not None:
-            believed, *axes = (shot.column(name, rows) for name in ("direction", "in_plane", "across"))
+            believed = shot.column("direction", rows)
             if angle is not None:
-                believed = tilt_vectors(believed, *axes, angle)
+                frame = [shot.column(name, rows) for name in ("in_plane", "across")]
+                believed = tilt_vectors(believed, *frame, angle)
             measured_origin, (measured_direction,) = self._turned(poses.measured, time, [believed])
-        scan_angle, channel = (shot.column(name, rows) for name in ("scan_angle", "beam"))
-        channel = np.asarray(channel, np.uint8)
+        scan_angle, channel = shot.column("scan_angle", rows), np.asarray(shot.column("beam", rows), np.uint8)
+        in_plane, across = axes
         return Pulses(
             time, scan_angle, channel, origin, direction, in_plane, across, measured_origin, measured_direction
         )

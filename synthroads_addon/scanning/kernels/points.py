@@ -128,9 +128,9 @@ class _Columns(ctypes.Structure):
     def of(cls, grid: ColumnGrid) -> _Columns:
         """Return a grid for C."""
         axes, low, direction = (np.ravel(one).tolist() for one in (grid.axes, grid.low, grid.direction))
-        types = [kind for _, kind in cls._fields_]
         return cls(
-            types[0](*axes), types[1](*low), types[2](*grid.count), grid.margin, types[4](*direction), grid.above
+            *((ctypes.c_double * 6)(*axes), (ctypes.c_double * 2)(*low), (_INT64 * 2)(*grid.count), grid.margin),
+            *((ctypes.c_double * 3)(*direction), grid.above),
         )
 
 
