@@ -200,8 +200,7 @@ class BlockScan:
         """Return a mask (P,) of pulses that surely meet nothing, by the outline of the static scene and what moves."""
         setting, target = self.plan.setting, self.plan.target
         missing = outline.passed_by(beams.origin, beams.direction, setting.maximum_range)
-        rows = np.flatnonzero(missing) if target.moving else ()
-        if len(rows):
+        if target.moving and len(rows := np.flatnonzero(missing)):
             radius = max(outer_radii(self.plan.rings, setting.divergence)) * setting.maximum_range
             few, reach = beams.select(rows), np.full(len(rows), setting.maximum_range)
             missing[rows] = ~target.near_moving(few.origin, few.direction, reach, few.time, motions, radius)
@@ -388,8 +387,7 @@ class BlockScan:
         if poses.measured is not poses.true or angle is not None:
             believed = shot.column("direction", rows)
             if angle is not None:
-                frame = [shot.column(name, rows) for name in ("in_plane", "across")]
-                believed = tilt_vectors(believed, *frame, angle)
+                believed = tilt_vectors(believed, shot.column("in_plane", rows), shot.column("across", rows), angle)
             measured_origin, (measured_direction,) = self._turned(poses.measured, time, [believed])
         scan_angle, channel = shot.column("scan_angle", rows), np.asarray(shot.column("beam", rows), np.uint8)
         in_plane, across = axes
@@ -557,7 +555,8 @@ class BlockScan:
             EchoPlaces(echoes.pulse, echoes.hit, distance, *hits, *of_pulses, *of_faces, target.origin, plan.epoch),
             asked,
         )
-        face, known = traced.pick("face", echoes.hit), {"normal": placed.narrow_normal, "material": placed.material}
+        face = traced.pick("face", echoes.hit)
+        known: dict[str, AnyArray] = {"normal": placed.narrow_normal, "material": placed.material}
         measured = MeasuredPoints(
             plan.setting, target, pulses, echoes.pulse, echoes.range, echoes.intensity, face, None
         )

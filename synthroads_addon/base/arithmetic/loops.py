@@ -109,7 +109,7 @@ class ColumnGrid(NamedTuple):
     Attributes:
         axes: (2, 3) vectors across the direction, over the width of the cells.
         low: (2,) where the grid begins along these, in cells.
-        count: of the cells along each.
+        cells: how many along each.
         margin: by which faces are wider than they are, in cells.
         direction: (3,) unit vector.
         above: how far from a face's plane a place must be to be surely on one of its sides, m.
@@ -117,7 +117,7 @@ class ColumnGrid(NamedTuple):
 
     axes: Float
     low: Float
-    count: tuple[int, int]
+    cells: tuple[int, int]
     margin: float
     direction: Float
     above: float

@@ -129,7 +129,7 @@ class _Columns(ctypes.Structure):
         """Return a grid for C."""
         axes, low, direction = (np.ravel(one).tolist() for one in (grid.axes, grid.low, grid.direction))
         return cls(
-            *((ctypes.c_double * 6)(*axes), (ctypes.c_double * 2)(*low), (_INT64 * 2)(*grid.count), grid.margin),
+            *((ctypes.c_double * 6)(*axes), (ctypes.c_double * 2)(*low), (_INT64 * 2)(*grid.cells), grid.margin),
             *((ctypes.c_double * 3)(*direction), grid.above),
         )
 
@@ -509,7 +509,7 @@ class CompiledPoints:
         vertices, triangles, _ = _faces(faces)
         if most > np.iinfo(np.uint8).max:
             raise ValueError(f"most {most}: must be 255 or less")
-        told, cells = _Columns.of(grid), grid.count[0] * grid.count[1]
+        told, cells = _Columns.of(grid), grid.cells[0] * grid.cells[1]
         head = (ctypes.byref(told), len(triangles), vertices.ctypes.data, triangles.ctypes.data)
         starts = np.zeros(cells + 1, np.uint32)
         counts = starts[1:]
@@ -530,7 +530,7 @@ class CompiledPoints:
         """
         count = places.shape[1]
         (places,) = _as(np.float64, (3, count), places=places)
-        (starts,) = _as(np.uint32, (grid.count[0] * grid.count[1] + 1,), starts=listed[0])
+        (starts,) = _as(np.uint32, (grid.cells[0] * grid.cells[1] + 1,), starts=listed[0])
         (numbers,) = _as(np.int32, (int(starts[-1]),), numbers=listed[1])
         told, result = _Columns.of(grid), np.empty(count, np.bool_)
         arrays = (places, *_faces(faces), starts, numbers, result)
