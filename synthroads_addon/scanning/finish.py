@@ -143,7 +143,8 @@ def read_echoes(result: BlockResult, plan: ScanPlan) -> BlockResult:
     """
     points, readout, setting = result.points, result.readout or Readout(), plan.setting
     strong = np.flatnonzero(readout.detected(points.intensity, setting.threshold))
-    time, strip, nth = (np.take(one, strong) for one in (points.gps_time, points.strip, points.return_number))
+    time, strip = np.take(points.gps_time, strong), np.take(points.strip, strong)
+    nth = np.take(points.return_number, strong)
     begins = np.ones(len(strong), dtype=bool)
     # Some heads fire several lasers at once: pulses of one time are told apart by their numbers, which begin anew.
     begins[1:] = (time[1:] != time[:-1]) | (strip[1:] != strip[:-1]) | (nth[1:] <= nth[:-1])

@@ -207,8 +207,7 @@ class BlockScan:
         """Return a mask (P,) of pulses that surely meet nothing, by the outline of the static scene and what moves."""
         setting, target = self.plan.setting, self.plan.target
         missing = outline.passed_by(beams.origin, beams.direction, setting.maximum_range)
-        rows = np.flatnonzero(missing) if target.moving else ()
-        if len(rows):
+        if target.moving and len(rows := np.flatnonzero(missing)):
             radius = max(outer_radii(self.plan.emission.rings, setting.divergence)) * setting.maximum_range
             few, reach = beams.select(rows), np.full(len(rows), setting.maximum_range)
             missing[rows] = ~target.near_moving(few.origin, few.direction, reach, few.time, motions, radius)
@@ -391,18 +390,18 @@ class BlockScan:
             beams = beams.select(rows)
             angle = None if angle is None else np.take(angle, rows, axis=1)
         time, origin, direction = beams.time, beams.origin, beams.direction
-        in_plane = across = None
+        axes: list[Float | None] = [None, None]
         if several:
             frame = [axis for axis in (shot.table.in_plane, shot.table.across) if axis is not None]
-            _, (in_plane, across) = self._turned(poses.true, time, frame, Columns(shot.first, rows))
+            axes[:] = self._turned(poses.true, time, frame, Columns(shot.first, rows))[1]
         measured_origin, measured_direction = origin, direction
         if poses.measured is not poses.true or angle is not None:
-            believed, *axes = (shot.column(name, rows) for name in ("direction", "in_plane", "across"))
+            believed = shot.column("direction", rows)
             if angle is not None:
-                believed = tilt_vectors(believed, *axes, angle)
+                believed = tilt_vectors(believed, shot.column("in_plane", rows), shot.column("across", rows), angle)
             measured_origin, (measured_direction,) = self._turned(poses.measured, time, [believed])
-        scan_angle, channel = (shot.column(name, rows) for name in ("scan_angle", "beam"))
-        channel = np.asarray(channel, np.uint8)
+        scan_angle, channel = shot.column("scan_angle", rows), np.asarray(shot.column("beam", rows), np.uint8)
+        in_plane, across = axes
         return Pulses(
             time, scan_angle, channel, origin, direction, in_plane, across, measured_origin, measured_direction
         )
@@ -571,7 +570,8 @@ class BlockScan:
             ),
             asked,
         )
-        face, known = traced.pick("face", echoes.hit), {"normal": placed.narrow_normal, "material": placed.material}
+        face = traced.pick("face", echoes.hit)
+        known: dict[str, AnyArray] = {"normal": placed.narrow_normal, "material": placed.material}
         measured = MeasuredPoints(
             plan.setting, target, pulses, echoes.pulse, echoes.range, echoes.intensity, face, None
         )

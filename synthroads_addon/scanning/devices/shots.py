@@ -83,7 +83,7 @@ class ShotRun:
     first: int
     time: Float
 
-    def column(self, name: str, rows: Index | None = None) -> AnyArray | None:
+    def column(self, name: str, rows: Index | None = None) -> Any:
         """Return an array (..., N) of the shots, or of rows (N,) of these, ascending; None if the table has none."""
         values: AnyArray | None = getattr(self.table, name)
         count = len(self.time) if rows is None else len(rows)
@@ -92,8 +92,7 @@ class ShotRun:
     def shots(self) -> PulseRays:
         """Return all of them."""
         names = ("scan_angle", "direction", "in_plane", "across", "beam")
-        others: list[Any] = [self.column(name) for name in names]
-        return PulseRays(self.time, *others)
+        return PulseRays(self.time, *(self.column(name) for name in names))
 
 
 def shot_run(setting: ScannerSetting, first: int, count: int, with_frame: bool = False) -> ShotRun:

@@ -128,12 +128,10 @@ class _Columns(ctypes.Structure):
     def of(cls, grid: ColumnGrid) -> _Columns:
         """Return a grid for C."""
         axes, low, direction = (np.ravel(one).tolist() for one in (grid.axes, grid.low, grid.direction))
-        names, types = zip(*cls._fields_, strict=True)
-        values = (
-            *(types[0](*axes), types[1](*low), types[2](*grid.cells), grid.margin),
-            *(types[4](*direction), grid.above),
+        return cls(
+            *((ctypes.c_double * 6)(*axes), (ctypes.c_double * 2)(*low), (_INT64 * 2)(*grid.cells), grid.margin),
+            *((ctypes.c_double * 3)(*direction), grid.above),
         )
-        return cls(**dict(zip(names, values, strict=True)))
 
 
 def _as(kind: Any, shape: tuple[int, ...], **arrays: AnyArray) -> list[AnyArray]:

@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from ...base.arrays import Float
+from ...base.arrays import Float, Index
 from ..devices.shots import Columns
 from ..knots import Track
 from .library import NoKernelError, load_kernel
@@ -49,7 +49,8 @@ class CompiledPoses:
         times, rotation, position = (
             np.ascontiguousarray(array, np.float64) for array in (times, track.rotation, track.position)
         )
-        knots, first, rows, width = position.shape[1], 0, None, count
+        knots, first, width = position.shape[1], 0, count
+        rows: Index | None = None
         if columns is not None and sets:
             first, width = columns.first, sets[0].shape[1]
             rows = None if columns.rows is None else np.ascontiguousarray(columns.rows, np.int64)
