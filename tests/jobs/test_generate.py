@@ -78,7 +78,7 @@ def test_clouds_name_what_heights_are_counted_in(change: str, codes: tuple[int, 
     ("change", "said"),
     [
         ("road.height_epsg=25833", "road.height_epsg is 25833: must be the EPSG code of a vertical"),
-        ("road.epsg=4326", "road.epsg is 4326: must be a projected system, whose coordinates are metres"),
+        ("road.epsg=4326", "road.epsg is 4326: must be a projected system with coordinates in metres"),
         ("road.epsg=2225", "road.epsg is 2225: must have coordinates in metres, as EPSG:26941 has"),
         ("road.epsg=7837", "road.epsg is 7837: .*has heights only"),
     ],
