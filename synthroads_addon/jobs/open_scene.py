@@ -115,7 +115,7 @@ class RoadScene:
         return self.scene
 
     def with_settings(self, scenario: Scenario, stands: bool) -> RoadScene:
-        """Return the road under another scenario; model and scene are kept only if ``stands`` says they fit it."""
+        """Return the road under another scenario that names the same files; model and scene stay if ``stands``."""
         return RoadScene(scenario, self.road, self.inputs, *((self.model, self.scene) if stands else ()))
 
     def plan(self) -> ScanPlan:
