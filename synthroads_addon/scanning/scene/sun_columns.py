@@ -17,7 +17,7 @@ from ...base.arrays import Bool, Float
 from .caster import FacePlanes
 from .mesh import SceneMesh
 
-_CELL, _MOST_CELLS = 0.25, 1 << 21
+_CELL, _MOST_CELLS = 0.25, 1 << 20
 """Width of the cells, m, and how many there may be; of a larger scene they are wider."""
 _MOST_FACES = 8
 """Faces of a cell that are looked at; of places where there are more nothing is told."""
