@@ -81,7 +81,7 @@ def faces(plan: ScanPlan) -> dict[str, float]:
         all rays (``cast``), those four (``four``) and the axis (``axis``), of all that is done for pulses
         (``pulses``), and of blocks as a whole (``blocks``).
     """
-    blocks, scan, pattern = list(plan.blocks()), BlockScan(plan), plan.pattern
+    blocks, scan, pattern = list(plan.blocks()), BlockScan(plan), plan.emission.pattern
     chosen = np.unique(np.linspace(0, len(blocks) - 1, _SPREAD).astype(int)[1:-1])
     outer = sum(plan.emission.rings[:-1]) + 1 + np.arange(_PROBES) * plan.emission.rings[-1] // _PROBES
     probes = [0, *outer.tolist()]
