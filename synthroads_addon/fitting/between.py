@@ -38,7 +38,7 @@ def without_swings(model: Model, station: Float, heights: Float, allowed: float)
 
 
 def swings(model: Model, station: Float, heights: Float) -> Float:
-    """Return how much farther (N - 1,) a model is from the middles of the points' chords than the bends around allow, m.
+    """Return how much farther (N - 1,) a model is from the middles of chords than the bends around allow, m.
 
     Of a bend of the curvature k a chord of the length h has a sagitta of k h^2 / 8.
     """

@@ -673,7 +673,9 @@ def test_no_few_elements_are_looked_for_where_no_road_follows(monkeypatch: pytes
     monkeypatch.setattr("synthroads_addon.fitting.fit.improve_fit", search)
     rng = np.random.default_rng(3)
     heading = np.cumsum(1.5 * (0.3 + rng.normal(0.0, 1.0, 150)))
-    points = np.cumsum(rng.uniform(300.0, 900.0, (150, 1)) * np.column_stack([np.cos(heading), np.sin(heading)]), axis=0)
+    points = np.cumsum(
+        rng.uniform(300.0, 900.0, (150, 1)) * np.column_stack([np.cos(heading), np.sin(heading)]), axis=0
+    )
     with pytest.raises(AxisRefusedError, match="no road follows its points within 2 m"):
         fit_axis(points).check("a.sbet")
 

@@ -86,7 +86,9 @@ def test_a_swing_between_points_is_calmed_and_the_rest_stays() -> None:
 
 
 def test_a_road_of_two_points_has_no_swings() -> None:
-    model = Model(np.zeros(1), np.array([0.0, 10.0]), np.array([[0.1, 0.1]]), np.array([EQUAL]), np.zeros(0, dtype=bool))
+    model = Model(
+        np.zeros(1), np.array([0.0, 10.0]), np.array([[0.1, 0.1]]), np.array([EQUAL]), np.zeros(0, dtype=bool)
+    )
     station = np.array([0.0, 10.0])
     assert without_swings(model, station, model.evaluate(station), 0.03) is model
 

@@ -123,7 +123,12 @@ def test_roads_with_wrong_elements(tmp_path: Path, kind: str, count: int) -> Non
 # --- maps, vector files and tracks ----------------------------------------------------------------------------------
 
 MAPS = {
-    **{"osm": None, "pbf": "osmium", "gpkg": "pyogrio", "shp": "pyogrio", "fgb": "pyogrio", "sbet": None},
+    "osm": None,
+    "pbf": "osmium",
+    "gpkg": "pyogrio",
+    "shp": "pyogrio",
+    "fgb": "pyogrio",
+    "sbet": None,
     **dict.fromkeys(("kml", "gpx", "csv", "geojson")),
 }
 """Kinds of files, and the library that each needs."""
@@ -152,7 +157,9 @@ def map_files(kind: str, folder: Path) -> list[bytes]:
 def text_of(points: np.ndarray, kind: str) -> bytes:
     """Return points (N, 3) as CSV or GeoJSON."""
     if kind == "csv":
-        return ("# crs: EPSG:25832\nx,y,z\n" + "".join("{:.3f},{:.3f},{:.3f}\n".format(*row) for row in points)).encode()
+        return (
+            "# crs: EPSG:25832\nx,y,z\n" + "".join("{:.3f},{:.3f},{:.3f}\n".format(*row) for row in points)
+        ).encode()
     system = {"type": "name", "properties": {"name": "EPSG:25832"}}
     return json.dumps({"type": "LineString", "crs": system, "coordinates": points.round(3).tolist()}).encode()
 
@@ -165,7 +172,8 @@ def degrees_of(points: np.ndarray, kind: str) -> bytes:
         inner = f"<Placemark><name>A</name><LineString><coordinates>{text}</coordinates></LineString></Placemark>"
         return f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{inner}</Document></kml>'.encode()
     track, route = (
-        "".join(f'<{name} lat="{y}" lon="{x}"><ele>{z}</ele></{name}>' for x, y, z in rows) for name in ("trkpt", "rtept")
+        "".join(f'<{name} lat="{y}" lon="{x}"><ele>{z}</ele></{name}>' for x, y, z in rows)
+        for name in ("trkpt", "rtept")
     )
     inner = f"<trk><name>A</name><trkseg>{track}</trkseg></trk><rte><name>B</name>{route}</rte>"
     return f'<gpx xmlns="http://www.topografix.com/GPX/1/1">{inner}</gpx>'.encode()

@@ -19,9 +19,7 @@ DRIVEN = frozenset(
     }
 )  # fmt: skip
 """Types of lanes that traffic drives on."""
-_TURNING = frozenset(
-    {"entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "mwyEntry", "mwyExit"}
-)
+_TURNING = frozenset({"entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "mwyEntry", "mwyExit"})
 """Those of them that lead off a road or onto it."""
 PAVED = frozenset({"shoulder", "border", "stop", "parking", "biking", "restricted", "shared"})
 """Types of lanes beside them that are paved."""

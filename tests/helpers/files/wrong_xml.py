@@ -10,7 +10,24 @@ from xml.etree.ElementTree import Element
 from hypothesis import strategies as st
 
 VALUES = (
-    *("", " ", "0", "-0.0", "-1", "1e-300", "1e-9", "1e-6", "0.1", "1e5", "1e6", "-1e5", "1e12", "-1e12", "1e300", "nan"),
+    *(
+        "",
+        " ",
+        "0",
+        "-0.0",
+        "-1",
+        "1e-300",
+        "1e-9",
+        "1e-6",
+        "0.1",
+        "1e5",
+        "1e6",
+        "-1e5",
+        "1e12",
+        "-1e12",
+        "1e300",
+        "nan",
+    ),
     *("inf", "x", "3.14159", "400", "9" * 400, "true", "none", "both", "{}", "[1, 2]", "null", "\u2028", "\u202e", "é"),
 )
 """Values that an attribute is given."""

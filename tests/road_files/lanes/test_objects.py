@@ -132,7 +132,9 @@ def test_sizes_are_those_of_the_file(tmp_path: Path) -> None:
 
 def test_sizes_beyond_a_things_limits_are_told(tmp_path: Path) -> None:
     row = '<repeat s="20" length="100" distance="0" tStart="-6" tEnd="-6"/>'
-    found, report = things_of(tmp_path, f'<object id="1" s="20" t="-6" type="barrier" name="wall" height="9">{row}</object>')
+    found, report = things_of(
+        tmp_path, f'<object id="1" s="20" t="-6" type="barrier" name="wall" height="9">{row}</object>'
+    )
     (wall,) = found.values()
     (told,) = [row for row in report["approximated"] if row["kind"] == "walls"]
     assert told["deviation"] == pytest.approx(9.0 - wall.height)
