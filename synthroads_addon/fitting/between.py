@@ -85,7 +85,7 @@ def _with_parabolas(model: Model, station: Float, heights: Float, grade: Float) 
 
 def _part(model: Model, low: float, high: float) -> tuple[Float, Float]:
     """Return knots (K + 1,) and values (K, 2) of a model's elements within two stations, m, the outer ones cut."""
-    knots, values = [], []
+    knots, values = list[float](), list[list[float]]()
     for e, (first, last) in enumerate(model.values.tolist()):
         a, b = float(model.knots[e]), float(model.knots[e + 1])
         begin, end = max(a, low), min(b, high)
