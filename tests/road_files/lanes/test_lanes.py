@@ -239,3 +239,14 @@ def test_coordinates_beyond_all_maps_are_refused(tmp_path: Path) -> None:
 
 def test_points_whose_rounded_stations_are_one() -> None:
     assert rounded_points([(1.0, 2.0), (1.0 + 1e-12, 3.0), (4.0, 5.0)]) == [(1.0, 2.0), (4.0, 5.0)]
+
+
+def test_a_turnout_of_our_own_that_has_lost_its_ramp_is_told(tmp_path: Path) -> None:
+    def noted(strip: str) -> str:
+        return f'<userData code="strip" value="{strip}"/><userData code="instance" value="7"/>'
+
+    right = lane(-1, width(0.0, 3.5) + noted("lane")) + lane(-2, width(0.0, 3.5) + noted("turnout_lane"), "exit")
+    _, _, report = taken(road_file(tmp_path, lanes(section(0.0, "", right))))
+    (row,) = report["whole"]["left_out"]
+    assert row["kind"] == "turnouts"
+    assert report["whole"]["surface_lost"]
