@@ -38,7 +38,7 @@ def without_swings(model: Model, station: Float, heights: Float, allowed: float)
 
 
 def swings(model: Model, station: Float, heights: Float) -> Float:
-    """Return how much farther (N - 1,), m, a model is from the chords' middles than the bends around the points allow.
+    """Return how much farther (N - 1,) a model is from the middles of chords than the bends around allow, m.
 
     Of a bend of the curvature k a chord of the length h has a sagitta of k h^2 / 8.
     """
@@ -85,7 +85,7 @@ def _with_parabolas(model: Model, station: Float, heights: Float, grade: Float) 
 
 def _part(model: Model, low: float, high: float) -> tuple[Float, Float]:
     """Return knots (K + 1,) and values (K, 2) of a model's elements within two stations, m, the outer ones cut."""
-    knots, values = [], []
+    knots, values = list[float](), list[list[float]]()
     for e, (first, last) in enumerate(model.values.tolist()):
         a, b = float(model.knots[e]), float(model.knots[e + 1])
         begin, end = max(a, low), min(b, high)

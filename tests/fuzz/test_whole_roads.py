@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from functools import cache
 from pathlib import Path
 
@@ -71,8 +72,6 @@ def of_others(folder: Path) -> list[bytes]:
 
 @cache
 def _own() -> bytes:
-    import tempfile
-
     limits = {**EVERYTHING, "design_class": "EKA1A", "cross_section": "RQ31", "length": 900.0}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "own.xodr"
@@ -107,13 +106,13 @@ def files_of(whose: str, folder: Path) -> list[bytes]:
     return of_others(folder) if whose == "others" else [_own()]
 
 
-@fuzz(4, 2500)
+@fuzz(4, 1000)
 @pytest.mark.parametrize("whose", ["others", "own"])
 def test_whole_roads_with_wrong_elements(tmp_path: Path, whose: str, count: int) -> None:
     run(tmp_path, wrong_xml(files_of(whose, tmp_path)), count)
 
 
-@fuzz(4, 2500)
+@fuzz(4, 1000)
 @pytest.mark.parametrize("whose", ["others", "own"])
 def test_whole_roads_with_odd_numbers(tmp_path: Path, whose: str, count: int) -> None:
     run(tmp_path, with_odd_numbers(files_of(whose, tmp_path)), count)

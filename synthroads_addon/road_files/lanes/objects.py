@@ -38,7 +38,7 @@ _MOST_COPIES = 10_000
 
 
 class _UnreadableError(Exception):
-    """What our own file says of an object can't be read: why."""
+    """Raised where notes of our own file on an object can't be read; its text says why."""
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ def read_turnouts(side: SideShape, carriageway: str, loss: Loss) -> tuple[dict[s
     for part in _parts(side):
         try:
             turnout = _Reader(side, part).read(carriageway)
-        except (ValidationError, ValueError, ZeroDivisionError, StopIteration):
+        except (ValidationError, ValueError, ZeroDivisionError, StopIteration, LookupError):
             loss.leave_out("turnouts", "their strips have another shape than an exit, entry or bay", surface=True)
             continue
         name = f"{turnout.kind.replace('_', '-')}-{'left' if side.sign > 0 else 'right'}"

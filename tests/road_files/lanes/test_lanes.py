@@ -175,7 +175,7 @@ def test_exits_and_entries_of_others_are_told_with_their_stretch(tmp_path: Path)
     assert len(carriageway.lanes) == 2
     (row,) = report["whole"]["left_out"]
     assert (row["kind"], row["count"], row["stretches"]) == ("turnouts", 1, [[50.0, 200.0]])
-    assert "turnouts" in [line for line in report["summary"] if "50.0 to 200.0 m" in line][0]
+    assert "turnouts" in next(line for line in report["summary"] if "50.0 to 200.0 m" in line)
     assert not report["whole"]["surface_lost"]
 
 
@@ -185,9 +185,8 @@ def test_roads_that_a_junction_joins_are_told(tmp_path: Path) -> None:
         xodr_road([(0.0, long, (0.0, 0.0, 0.3), "<line/>")], rest, name, number)
         for number, (name, long) in enumerate((("main", 200.0), ("ramp", 80.0), ("further", 90.0)), 1)
     ]
-    joined = (
-        '<connection id="0" incomingRoad="1" linkedRoad="2"/><connection id="1" incomingRoad="1" connectingRoad="3"/>'
-    )
+    joined = '<connection id="0" incomingRoad="1" linkedRoad="2"/>'
+    joined += '<connection id="1" incomingRoad="1" connectingRoad="3"/>'
     other = '<connection id="2" incomingRoad="3" linkedRoad="1"/>'
     path = opendrive(tmp_path / "a.xodr", [*roads, f'<junction id="7">{joined}{other}</junction>'])
     _, _, report = taken(path)
@@ -240,3 +239,14 @@ def test_coordinates_beyond_all_maps_are_refused(tmp_path: Path) -> None:
 
 def test_points_whose_rounded_stations_are_one() -> None:
     assert rounded_points([(1.0, 2.0), (1.0 + 1e-12, 3.0), (4.0, 5.0)]) == [(1.0, 2.0), (4.0, 5.0)]
+
+
+def test_a_turnout_of_our_own_that_has_lost_its_ramp_is_told(tmp_path: Path) -> None:
+    def noted(strip: str) -> str:
+        return f'<userData code="strip" value="{strip}"/><userData code="instance" value="7"/>'
+
+    right = lane(-1, width(0.0, 3.5) + noted("lane")) + lane(-2, width(0.0, 3.5) + noted("turnout_lane"), "exit")
+    _, _, report = taken(road_file(tmp_path, lanes(section(0.0, "", right))))
+    (row,) = report["whole"]["left_out"]
+    assert row["kind"] == "turnouts"
+    assert report["whole"]["surface_lost"]
