@@ -66,7 +66,7 @@ def test_points_of_echoes(
     monkeypatch: pytest.MonkeyPatch, loops: CompiledPoints, rays: int, noise: Noise, layers: frozenset[str], seen: bool
 ) -> None:
     monkeypatch.setattr(ScanPlan, "sun", property(lambda _: SUN))
-    changes = {"noise": noise, "measured_layers": layers, "records_seen_points": seen, "epoch": 1234.5}
+    changes = {"noise": noise, "measured": layers, "seen_points": seen, "epoch": 1234.5}
     plan = planned(soup(3000), rays, **changes)
     found, expected = (scanned(plan, one) for one in (loops, None))
     assert len(found.points) > 1000
@@ -78,7 +78,7 @@ def test_points_of_echoes(
 
 
 def test_echoes_of_beams_side_by_side(loops: CompiledPoints) -> None:
-    plan = planned(soup(3000), 7, beam="cylindrical", measured_layers=LAYERS, records_seen_points=True)
+    plan = planned(soup(3000), 7, beam="cylindrical", measured=LAYERS, seen_points=True)
     found, expected = (scanned(plan, one) for one in (loops, None))
     assert len(found.points) > 1000
     assert_alike(found, expected)
