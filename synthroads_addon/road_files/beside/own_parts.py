@@ -78,11 +78,15 @@ def own_parts(model: Any) -> tuple[GivenRoad | None, Counter[str], list[str]]:
 
 def _refers(item: RoadObject, by_side: Mapping[Side, Carriageway], turnouts: Mapping[str, Turnout]) -> bool:
     """Return whether the carriageway, lane boundary and turnout that an object names are there."""
-    roads = {f"carriageway-{side}": road for side, road in by_side.items()}
-    named, turnout = getattr(item, "carriageway", None), getattr(item, "turnout", None)
-    if named is not None and (named not in roads or getattr(item, "boundary", 0) > len(roads[named].lanes)):
+    carriageways = {f"carriageway-{side}": carriageway for side, carriageway in by_side.items()}
+    # Not every kind of object has each of the three: what it hasn't it needn't find.
+    carriageway_id, turnout_id = getattr(item, "carriageway", None), getattr(item, "turnout", None)
+    boundary = getattr(item, "boundary", 0)
+    if carriageway_id is not None and (
+        carriageway_id not in carriageways or boundary > len(carriageways[carriageway_id].lanes)
+    ):
         return False
-    return turnout is None or (turnout in turnouts and turnouts[turnout].ramp is not None)
+    return turnout_id is None or (turnout_id in turnouts and turnouts[turnout_id].ramp is not None)
 
 
 def _word(kind: str) -> str:

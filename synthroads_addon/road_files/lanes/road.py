@@ -16,7 +16,7 @@ from ...road.given_road import GivenRoad
 from ...road.guidelines import STANDARD_CROSS_SECTIONS
 from ...scenario.road import RoadScenario
 from ..heights import HeightPiece
-from ..line import LineNames, RoadLine, exact_axis
+from ..line import LineNames, PlanPiece, RoadLine, exact_axis
 from ..opendrive import read_opendrive
 from ..read import choose_line
 from ..xml_text import child, children, number, read_xml
@@ -32,6 +32,7 @@ from .strips import driven_sides, foreign_turnouts, side_layouts
 from .surface import FileSurface
 
 _SAME_PLAN = 1e-6
+"""Difference below which values of two plans (m, rad and 1/m) are the same."""
 _SHOWN = 5
 
 
@@ -165,16 +166,22 @@ def _partner(
 
 
 def _same_plan(first: RoadLine, second: RoadLine) -> bool:
+    """Return whether two lines have the same pieces in plan: start, length, heading and curvatures at the ends.
+
+    A piece that is no clothoid has no such curvatures: of it the start, the length and the heading are compared.
+    """
     if len(first.pieces) != len(second.pieces):
         return False
-    rows = [
-        [
-            (p.station, p.length, p.x, p.y, p.heading, *(p.shape if isinstance(p.shape, tuple) else (0.0, 0.0)))
-            for p in q
-        ]
-        for q in (first.pieces, second.pieces)
-    ]
-    return bool(np.abs(np.array(rows[0]) - np.array(rows[1])).max() < _SAME_PLAN)
+
+    def table(line: RoadLine) -> Float:
+        return np.array([(p.station, p.length, p.x, p.y, p.heading, *_end_curvatures(p)) for p in line.pieces])
+
+    return bool(np.abs(table(first) - table(second)).max() < _SAME_PLAN)
+
+
+def _end_curvatures(piece: PlanPiece) -> tuple[float, float]:
+    """Return the curvatures at a piece's ends, 1/m; zeros for one that is no clothoid."""
+    return piece.shape if isinstance(piece.shape, tuple) else (0.0, 0.0)
 
 
 def _verge(scenario: RoadScenario) -> Verge:
