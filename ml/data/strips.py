@@ -104,15 +104,15 @@ def strips(
     """
     with tempfile.TemporaryDirectory(prefix="synthroads-strips-") as folder, TileFiles(Path(folder)) as files:
         _sort_points(files, cloud, ground, path, progress)
-        own = np.floor(frames.station / LENGTH).astype(np.int64)
+        strip_numbers = np.floor(frames.station / LENGTH).astype(np.int64)
         for (number, _), block in files.by_tile():
             first, last = number * LENGTH - MARGIN, (number + 1) * LENGTH + MARGIN
             seen = (frames.station >= first) & (frames.station < last)
-            if number in own:
+            if number in strip_numbers:
                 points = points_of(ground.header, [block], ground.colored)
                 line = _part(path, first - REACH, last + REACH).translate(-points.origin)
                 local = Frames(frames.position - points.origin[:2], frames.direction, frames.station).select(seen)
-                yield LearningRoad.of_points(cloud.stem, points, line), local, own[seen] == number
+                yield LearningRoad.of_points(cloud.stem, points, line), local, strip_numbers[seen] == number
 
 
 def _sort_points(files: TileFiles, cloud: Path, ground: GroundReading, path: MeasuredAxis, progress: Progress) -> None:

@@ -120,7 +120,7 @@ class Profile:
         self._curvatures = interleaved(0.0, curvature, np.zeros_like(curvature))
 
     def _evaluate(self, station: ArrayLike) -> tuple[Float, Float, Float]:
-        """Return elevation (m), grade and curvature (1/m) at stations, of their shape; at a border of the side after."""
+        """Return elevation (m), grade and curvature (1/m) at stations of any shape; at a border those after it."""
         stations = finite_array("station", station)
         piece = np.searchsorted(self._borders, stations, side="right")
         u, grade, curvature = stations - self._bases[piece], self._grades[piece], self._curvatures[piece]

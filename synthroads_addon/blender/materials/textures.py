@@ -113,12 +113,12 @@ def _ratio(value: float, mean: float) -> float:
 def _kept_images(folder: str) -> dict[str, bpy.types.Image]:
     """Return the file's images that were read from a folder, by layer."""
     place = Path(folder).absolute()
-    found = {
+    images = {
         Path(image[SOURCE]).stem.lower(): image
         for image in bpy.data.images
         if SOURCE in image and Path(image[SOURCE]).parent == place and image.library is None
     }
-    return dict(sorted(found.items()))
+    return dict(sorted(images.items()))
 
 
 def _image(path: Path, name: str, layer: str) -> bpy.types.Image:

@@ -111,22 +111,22 @@ def whole_road(
                 loss.leave_out("turnouts", "their lanes are lanes of the carriageway, without a ramp", stretch=stretch)
         loss.read["lane sections"] += len(one.sections)
     _tell_junctions(root, elements, roads, loss)
-    found = pavements(shapes, _verge(scenario), lambda s: np.interp(s, *exact), loss)
+    pavement_parts = pavements(shapes, _verge(scenario), lambda s: np.interp(s, *exact), loss)
     heights = None
-    if found.heights is not None:
-        heights = tuple(found.heights)
-    markings = line_markings(found, lambda s: np.interp(s, *exact), scenario, loss)
+    if pavement_parts.heights is not None:
+        heights = tuple(pavement_parts.heights)
+    markings = line_markings(pavement_parts, lambda s: np.interp(s, *exact), scenario, loss)
     places = [Places(FileSurface(one), axis.alignment, lambda s: np.interp(s, *exact)) for one in roads]
-    given = GivenRoad(found.carriageways, found.turnouts, markings, things(places, loss))
-    return WholeRoad(line, given, heights, found, loss, exact, speed_limit(roads, loss))
+    given = GivenRoad(pavement_parts.carriageways, pavement_parts.turnouts, markings, things(places, loss))
+    return WholeRoad(line, given, heights, pavement_parts, loss, exact, speed_limit(roads, loss))
 
 
 def _elements(root: Element) -> dict[str, Element]:
     """Return the roads of a file by the names that its lines have."""
-    names, found = LineNames(), dict[str, Element]()
+    names, elements = LineNames(), dict[str, Element]()
     for number_of, road in enumerate(children(root, "road")):
-        found[names.unique(road.get("name"), f"road {road.get('id', number_of)}")] = road
-    return found
+        elements[names.unique(road.get("name"), f"road {road.get('id', number_of)}")] = road
+    return elements
 
 
 def _tell_junctions(root: Element, elements: dict[str, Element], roads: list[FileRoad], loss: Loss) -> None:
@@ -159,9 +159,9 @@ def _partner(
     for other in lines:
         if other is line or other.fault or other.junction != line.junction or not _same_plan(other, line):
             continue
-        found = read_road(elements[other.name], other.name, other.length, up)
-        if driven_sides(found.sections) == [-sides[0]]:
-            return [found]
+        partner = read_road(elements[other.name], other.name, other.length, up)
+        if driven_sides(partner.sections) == [-sides[0]]:
+            return [partner]
     return []
 
 

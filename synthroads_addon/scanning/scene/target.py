@@ -329,8 +329,8 @@ def _clear_scanner(track: Track, part: TargetPart, scanner: Float) -> Track:
 def _cast(part: TargetPart, origins: Float, directions: Float, maximum_range: float) -> FirstHits:
     """Return rays' first hits on one part, in its body frame; faces are numbered among those of all parts."""
     shape = directions.shape[1:]
-    found = part.caster.cast(*_as_rays(origins, directions), maximum_range)
-    face = np.array(found.reshape(shape[::-1]).T, np.intp, order="C")
+    hits = part.caster.cast(*_as_rays(origins, directions), maximum_range)
+    face = np.array(hits.reshape(shape[::-1]).T, np.intp, order="C")
     if not part.count:
         return FirstHits(face, np.full(shape, np.inf), np.zeros(shape))
     # A miss is worked out with some face and then forgotten: that is less work than to sort them out before.
