@@ -166,12 +166,13 @@ def _stages(result: dict[str, Any]) -> list[str]:
 
 
 def _floors(result: dict[str, Any]) -> list[str]:
+    """Return the table of rates beside their floors: the rates of bare libraries at the same work."""
     rows = []
     for run in result["runs"]:
-        for floor in run["floors"]:
-            share = 100.0 * floor["ours"] / floor["floor"]
-            values = [_number(floor[side], 2) for side in ("ours", "floor")]
-            rows.append([floor["name"], str(run["cores"]), floor["unit"], *values, f"{share:.0f}"])
+        for measurement in run["floors"]:
+            percent = 100.0 * measurement["ours"] / measurement["floor"]
+            values = [_number(measurement[side], 2) for side in ("ours", "floor")]
+            rows.append([measurement["name"], str(run["cores"]), measurement["unit"], *values, f"{percent:.0f}"])
     titles = ["beside its floor", "cores", "unit", "ours", "floor", "ours of the floor (%)"]
     return markdown_table(titles, rows) if rows else []
 

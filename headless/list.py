@@ -67,11 +67,12 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 
 def _kinds() -> Outcome:
-    about = {name: (len(kind.names()), kind.title, kind.use) for name, kind in KINDS.items()}
-    paths = sum(1 for _ in fields_of(Scenario))
-    about[_FIELDS] = (paths, "Fields of a scenario; of trainings with --of", "--set PATH=VALUE")
-    rows = [(name, str(count), *texts) for name, (count, *texts) in about.items()]
-    data = {name: {"count": count, "title": title, "use": use} for name, (count, title, use) in about.items()}
+    """Return the outcome of `list` without a kind: number, title and use of every kind, the fields of --set last."""
+    summaries = {name: (len(kind.names()), kind.title, kind.use) for name, kind in KINDS.items()}
+    field_count = sum(1 for _ in fields_of(Scenario))
+    summaries[_FIELDS] = (field_count, "Fields of a scenario; of trainings with --of", "--set PATH=VALUE")
+    rows = [(name, str(count), title, use) for name, (count, title, use) in summaries.items()]
+    data = {name: {"count": count, "title": title, "use": use} for name, (count, title, use) in summaries.items()}
     return 0, {"kinds": data}, "\n".join(text_table(("kind", "number", "what it is", "use"), rows))
 
 

@@ -18,34 +18,35 @@ _YAML = (".yaml", ".yml", ".json")
 
 
 def _training(name: str) -> Entry:
+    """Return the entry of a shipped training: its task, epochs and the data that it learns from."""
     file = shipped_file("configuration", SHIPPED, name)
     data = _object(file)
-    own = data.get("data")
-    learned = own if isinstance(own, dict) else {}
-    told = {
+    section = data.get("data")
+    sources = section if isinstance(section, dict) else {}
+    key_figures = {
         "task": data.get("task"),
         "epochs": Schedule.from_dict(data.get("schedule", {}), f"{name}: schedule").epochs,
-        "data": _paths([learned.get(key, ()) for key in ("data_sets", "measured", "synthetic", "real")]),
+        "data": _paths([sources.get(key, ()) for key in ("data_sets", "measured", "synthetic", "real")]),
     }
-    return Entry(name, str(data.get("title", "")), file, told)
+    return Entry(name, str(data.get("title", "")), file, key_figures)
 
 
 def _experiment(name: str) -> Entry:
     file = shipped_file("experiment", EXPERIMENTS, name)
     data = _object(file)
     variants = data.get("variants")
-    told = {
+    key_figures = {
         "configuration": data.get("configuration"),
         "variants": list(variants) if isinstance(variants, dict) else [],
     }
-    return Entry(name, str(data.get("title", "")), file, told)
+    return Entry(name, str(data.get("title", "")), file, key_figures)
 
 
 def _model(name: str) -> Entry:
     card = read_card(name)
     low, high = card.domain.density
     megabytes = round(card.weights.stat().st_size / 1e6, 2) if card.weights.is_file() else None
-    told = {
+    key_figures = {
         "task": card.task,
         "density": f"{low:g} to {high:g}",
         "platforms": list(card.domain.platforms),
@@ -53,23 +54,23 @@ def _model(name: str) -> Entry:
         "figures": [one.to_dict() for one in card.figures],
         "limits": list(card.limits),
     }
-    return Entry(name, card.title, card.weights.with_suffix(".json"), told, " ".join(card.limits))
+    return Entry(name, card.title, card.weights.with_suffix(".json"), key_figures, " ".join(card.limits))
 
 
 def _mapping(name: str) -> Entry:
     made = load_mapping(name)
-    told = {"field": made.field, "classes": list(dict.fromkeys(made.classes.values()))}
-    return Entry(name, made.title, shipped_file("mapping", MAPPINGS, name, [".json"]), told)
+    key_figures = {"field": made.field, "classes": list(dict.fromkeys(made.classes.values()))}
+    return Entry(name, made.title, shipped_file("mapping", MAPPINGS, name, [".json"]), key_figures)
 
 
 def _yardstick(name: str) -> Entry:
     made = load_yardstick(name)
-    told = {
+    key_figures = {
         "form": made.form,
         "splits": list(made.splits),
         "classes": list(dict.fromkeys(made.mapping.classes.values())),
     }
-    return Entry(name, made.title, shipped_file("yardstick", YARDSTICKS, name, [".json"]), told, made.source)
+    return Entry(name, made.title, shipped_file("yardstick", YARDSTICKS, name, [".json"]), key_figures, made.source)
 
 
 def _object(file: Path) -> Mapping[str, Any]:

@@ -166,8 +166,8 @@ def cached_scores(
     Raises:
         InputError: the file is damaged.
     """
-    wanted = lasting_data(run.configuration.to_dict())
-    made_from = {"configuration": wanted, "checkpoint_sha256": checksum(run.folder / CHECKPOINT), **more}
+    configuration = lasting_data(run.configuration.to_dict())
+    made_from = {"configuration": configuration, "checkpoint_sha256": checksum(run.folder / CHECKPOINT), **more}
     if (kept := kept_figures(file, "tests", made_from, is_sound)) is not None:
         return kept
     scores = score()

@@ -113,10 +113,10 @@ def largest_difference(network: Exportable, content: bytes) -> float | None:
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-    found = session.run(list(network.outputs), {name: value.numpy() for name, value in network.inputs.items()})
+    outputs = session.run(list(network.outputs), {name: value.numpy() for name, value in network.inputs.items()})
     with torch.no_grad():
-        wanted = network.model(*network.inputs.values())
-    return max(float(np.abs(one - other.numpy()).max()) for one, other in zip(found, wanted, strict=True))
+        references = network.model(*network.inputs.values())
+    return max(float(np.abs(one - other.numpy()).max()) for one, other in zip(outputs, references, strict=True))
 
 
 def described(**told: Any) -> dict[str, str]:

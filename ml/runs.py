@@ -227,8 +227,8 @@ class Run(Generic[C]):
         now = self.configuration.to_dict()
         with suppress(InputError):  # fields may be called otherwise by now, or be new
             before = self.configuration.from_dict(before).to_dict()
-        begun, wanted = lasting_data(before), lasting_data(now)
-        different = [name for name in {**begun, **wanted} if begun.get(name) != wanted.get(name)]
+        begun, configuration = lasting_data(before), lasting_data(now)
+        different = [name for name in {**begun, **configuration} if begun.get(name) != configuration.get(name)]
         if different:
             name = different[0]
             raise InputError(f"--resume: {name}", now.get(name), f"the run was begun with {before.get(name)!r}")

@@ -47,17 +47,21 @@ def views_predictor(network: Predictor | None = None) -> Predictor:
     """Return a predictor of centres with deviations and intervals, m, by all views that learn nothing, and a network's.
 
     Where no road can be made out nothing is predicted.
+
+    Args:
+        network: the predictor whose centres are one more view; None without.
     """
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
+        """Return the values (M, columns) of `CORRIDOR_COLUMNS` in the frames; all NaN without a road."""
         view = None if network is None else _network_view(network, road, frames)
         options = Options(path=frames.position, predictor=view)
         try:
             cloud = road_cloud(road)
             if len(cloud.xyz) < _FEWEST:
                 raise InputError("road", len(cloud.xyz), f"at least {_FEWEST} points are needed")
-            path, half = straighten_path(cloud, options)
-            road_axis = find_axis(cloud, path, half, options)
+            path, half_width_seen = straighten_path(cloud, options)
+            road_axis = find_axis(cloud, path, half_width_seen, options)
         except InputError:
             return np.full((len(frames), len(CORRIDOR_COLUMNS)), np.nan)
         return _in_frames(road_axis, frames)

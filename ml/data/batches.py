@@ -62,14 +62,14 @@ class MeasuredRoad(Part):
             return [(path, Path(self.axis) if self.axis else axis_beside(path))]
         if self.axis:
             raise InputError("axis", self.axis, f"{self.cloud} is a folder, whose clouds have their axes beside them")
-        found = {cloud.stem: cloud for cloud in clouds_with_axes(path)}
+        clouds_by_name = {cloud.stem: cloud for cloud in clouds_with_axes(path)}
         for which, names in (("roads", self.roads), ("left_out", self.left_out)):
-            if unknown := sorted(set(names) - set(found)):
-                raise InputError(which, unknown[0], f"must be of the roads of {path}: {', '.join(found)}")
-        kept = [name for name in found if name in (self.roads or found) and name not in self.left_out]
+            if unknown := sorted(set(names) - set(clouds_by_name)):
+                raise InputError(which, unknown[0], f"must be of the roads of {path}: {', '.join(clouds_by_name)}")
+        kept = [name for name in clouds_by_name if name in (self.roads or clouds_by_name) and name not in self.left_out]
         if not kept:
             raise InputError("left_out", list(self.left_out), f"leaves no road of {path}")
-        return [(found[name], axis_beside(found[name])) for name in kept]
+        return [(clouds_by_name[name], axis_beside(clouds_by_name[name])) for name in kept]
 
 
 class DataOptions(Part):
@@ -163,8 +163,8 @@ def read_roads(data: DataOptions, truth: Learned, progress: Progress = silent) -
         raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to learn from")
     if not validation and not measured_validation:
         raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to validate with")
-    apart = data.calibration_split
-    held_out = _read_scenes(data.data_sets, apart, truth, cache, progress) if apart else []
+    calibration = data.calibration_split
+    held_out = _read_scenes(data.data_sets, calibration, truth, cache, progress) if calibration else []
     return Roads(train, measured, validation, measured_validation, held_out)
 
 
@@ -215,8 +215,8 @@ class Batches:
         new = _first_occurrences([numbers for _, numbers in plan])
         kept: dict[int, Sample] = {}
         draws = load_batches(_Draws(self.datasets, kind, epoch), new, _as_arrays, self.workers)
-        for (turn, numbers), wanted, drawn in zip(plan, new, draws, strict=True):
-            kept |= zip(wanted, map(_as_tensors, drawn), strict=True)
+        for (turn, numbers), indices, drawn in zip(plan, new, draws, strict=True):
+            kept |= zip(indices, map(_as_tensors, drawn), strict=True)
             batch = collate([kept[n] for n in numbers])
             if self.options.passes == 1:
                 kept.clear()
@@ -332,11 +332,11 @@ def _read_scenes(
 def _read_measured(roads: Sequence[MeasuredRoad], truth: Learned, progress: Progress) -> list[LearningRoad]:
     """Read measured roads, the true axis of each clipped to the stations `first` to `last`."""
     files = [(road, *paths) for road in roads for paths in road.files()]
-    found = []
+    learning_roads = []
     for number, (road, cloud, axis) in enumerate(files):
         progress(f"reading {cloud.name}", number / len(files))
-        found.append(_clip(read_measured(cloud, axis, truth), road.first, road.last, f"{axis}: first"))
-    return found
+        learning_roads.append(_clip(read_measured(cloud, axis, truth), road.first, road.last, f"{axis}: first"))
+    return learning_roads
 
 
 def _clip(road: LearningRoad, first: float, last: float, field: str) -> LearningRoad:

@@ -61,8 +61,8 @@ class LabelMapping(Model):
         places = {name: place for place, name in enumerate(self.targets(names))}
         table = {int(number): places[name] for number, name in self.classes.items()}
         known, inverse = np.unique(numbers, return_inverse=True)
-        found = np.array([table.get(int(number), IGNORED) for number in known], dtype=np.int16)
-        return found[inverse.reshape(-1)] if len(known) else np.zeros(0, dtype=np.int16)
+        indices = np.array([table.get(int(number), IGNORED) for number in known], dtype=np.int16)
+        return indices[inverse.reshape(-1)] if len(known) else np.zeros(0, dtype=np.int16)
 
     def group_of(self, names: tuple[str, ...]) -> NDArray[np.int16]:
         """Return the index in `targets(names)` of each predicted class (C,); `IGNORED` (-1) where no group has it."""
@@ -116,9 +116,9 @@ def table_between(source: Mapping[int, str], scheme: ClassScheme, where: str) ->
     for number, name in source.items():
         if number == UNLABELLED or name == "unlabelled":
             continue
-        found = names.index(name) if name in names else members.get(name)
-        if found is None:
+        index = names.index(name) if name in names else members.get(name)
+        if index is None:
             known = ", ".join(names)
             raise InputError(f"{where}: classes", name, f"has no place in the scheme {scheme.name} ({known})")
-        table[number] = found
+        table[number] = index
     return table

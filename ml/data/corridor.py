@@ -174,8 +174,8 @@ def truths(parameters: RoadParameters, kind: Learned, origin: ArrayLike = (0.0, 
     by: Float = np.array(parameters.transform.translate) - np.asarray(origin, dtype=np.float64)
     if kind == "road":
         return [_whole_road(geometry).translate(by)]
-    found = (_carriageway(geometry, section) for section in geometry.sections.values())
-    return [truth.translate(by) for truth in found if truth is not None]
+    carriageways = (_carriageway(geometry, section) for section in geometry.sections.values())
+    return [truth.translate(by) for truth in carriageways if truth is not None]
 
 
 def _whole_road(geometry: RoadGeometry) -> Truth:

@@ -39,8 +39,8 @@ class ExchangedCrops:
     def __getitem__(self, place: int) -> list[Item]:
         """Return the pair at a place as two items."""
         given, random = self.synthetic.crop(place)
-        wanted, _ = self.target.crop(place)
-        pair = exchanged(given, wanted, stream(self.seed, "exchange", self.epoch, place))
+        target_crop, _ = self.target.crop(place)
+        pair = exchanged(given, target_crop, stream(self.seed, "exchange", self.epoch, place))
         return [make_item(crop, self.synthetic.settings, random) for crop in pair]
 
 
@@ -63,6 +63,6 @@ def _joined(crop: Crop, other: Crop, keep: Bool) -> Crop:
     """Return a crop with some of another's points behind its own; what either lacks is missing in all."""
     parts: dict[str, Any] = {}
     for name in crop.per_point:
-        own, more = getattr(crop, name), getattr(other, name)
-        parts[name] = None if own is None or more is None else np.concatenate([own, more[keep]])
+        values, more = getattr(crop, name), getattr(other, name)
+        parts[name] = None if values is None or more is None else np.concatenate([values, more[keep]])
     return replace(crop, **parts)

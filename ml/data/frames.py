@@ -234,10 +234,10 @@ def _bridge_cells(cells: Float, pairs: Index) -> Index:
         count, part = connected_components(_graph(len(cells), pairs, np.ones(len(pairs))), directed=False)
         if count == 1:
             return pairs
-        own, others = np.flatnonzero(part == part[0]), np.flatnonzero(part != part[0])
-        distance, nearest = cKDTree(cells[own]).query(cells[others])
+        component, others = np.flatnonzero(part == part[0]), np.flatnonzero(part != part[0])
+        distance, nearest = cKDTree(cells[component]).query(cells[others])
         closest = int(np.argmin(distance))
-        pairs = np.concatenate([pairs, [[own[nearest[closest]], others[closest]]]])
+        pairs = np.concatenate([pairs, [[component[nearest[closest]], others[closest]]]])
 
 
 def _graph(count: int, pairs: Index, weights: Float) -> Any:

@@ -80,8 +80,8 @@ def read_points(path: Path, classes: Collection[str] | None = None) -> Points:
     with open_cloud(path) as cloud:
         header = cloud.header
         names = header.scheme.names()
-        wanted = np.array([classes is None or names.get(number) in classes for number in range(256)])
-        kept = [block.select(wanted[block.class_id]) for block in cloud.usable_blocks()]
+        class_mask = np.array([classes is None or names.get(number) in classes for number in range(256)])
+        kept = [block.select(class_mask[block.class_id]) for block in cloud.usable_blocks()]
     kept = [block for block in kept if len(block)]
     if not kept:
         what = "no point at all" if classes is None else f"no point of the classes {', '.join(sorted(classes))}"

@@ -161,11 +161,11 @@ def scene_folders(data_set: Path, split: str | None) -> list[Path]:
         InputError: no scene of the split is done.
     """
     done = [scene for scene in read_manifest(data_set).scenes if scene.status == "done"]
-    found = [data_set / "scenes" / scene.name for scene in done if split in (None, scene.split)]
-    if not found:
+    folders = [data_set / "scenes" / scene.name for scene in done if split in (None, scene.split)]
+    if not folders:
         known = ", ".join(sorted({scene.split for scene in done}))
         raise InputError(f"{data_set}: split", split, f"has no scene that is done; there is {known or 'none at all'}")
-    return found
+    return folders
 
 
 def read_scene(folder: Path, kind: Learned, cache: Path | None = None, keep: bool = True) -> list[LearningRoad]:
@@ -193,9 +193,13 @@ def read_scene(folder: Path, kind: Learned, cache: Path | None = None, keep: boo
         whole = LearningRoad.of_points(folder.name, points, reference)
         if cache and keep:
             _write_cache(whole, folder, cache)
-    found = truths(parameters, kind, whole.origin)
-    names = [folder.name] if len(found) == 1 else [f"{folder.name}-{number + 1}" for number in range(len(found))]
-    return [replace(whole, name=name, truth=truth) for name, truth in zip(names, found, strict=True)]
+    road_truths = truths(parameters, kind, whole.origin)
+    names = (
+        [folder.name]
+        if len(road_truths) == 1
+        else [f"{folder.name}-{number + 1}" for number in range(len(road_truths))]
+    )
+    return [replace(whole, name=name, truth=truth) for name, truth in zip(names, road_truths, strict=True)]
 
 
 def axis_beside(cloud: Path) -> Path:
@@ -206,10 +210,10 @@ def axis_beside(cloud: Path) -> Path:
     """
     if not cloud.exists():
         raise MissingFileError(str(cloud), None, "no such cloud, nor a data set's folder")
-    found = [cloud.with_name(cloud.stem + ending) for ending in AXIS_ENDINGS]
-    there = next((path for path in found if path.is_file()), None)
+    candidates = [cloud.with_name(cloud.stem + ending) for ending in AXIS_ENDINGS]
+    there = next((path for path in candidates if path.is_file()), None)
     if there is None:
-        names = " or ".join(path.name for path in found)
+        names = " or ".join(path.name for path in candidates)
         raise MissingFileError(str(cloud), None, f"has no axis beside it, {names}")
     return there
 
@@ -221,11 +225,13 @@ def clouds_with_axes(folder: Path) -> list[Path]:
         MissingFileError: there is none.
     """
     clouds = sorted(path for path in folder.iterdir() if path.suffix.lower() in ENDINGS and path.is_file())
-    found = [path for path in clouds if any(path.with_name(path.stem + end).is_file() for end in AXIS_ENDINGS)]
-    if not found:
+    clouds_with_axis = [
+        path for path in clouds if any(path.with_name(path.stem + end).is_file() for end in AXIS_ENDINGS)
+    ]
+    if not clouds_with_axis:
         allowed = f"holds no cloud with its axis beside it, NAME{' or NAME'.join(AXIS_ENDINGS)}"
         raise MissingFileError(str(folder), None, allowed)
-    return found
+    return clouds_with_axis
 
 
 def read_measured(cloud: Path, axis: Path, kind: Learned, gap: float | None = None) -> LearningRoad:

@@ -253,4 +253,4 @@ class EpochScenes:
                 failed = read_entry(self._stream.folder, number).status == "failed"
                 self._kept[number] = [] if failed else self._read(number, folder)
         self._kept = {number: self._kept[number] for number in folders}
-        return [one for found in self._kept.values() for one in found]
+        return [one for crops in self._kept.values() for one in crops]

@@ -192,8 +192,8 @@ def cut_stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> 
 
     Where the truth is a carriageway's, points beyond the middle of the median are left out, see `Truth.room`.
     """
-    found = road.slices(frames, settings.half_width, settings.thickness)
-    labels = road.class_id[found.index]
+    slices = road.slices(frames, settings.half_width, settings.thickness)
+    labels = road.class_id[slices.index]
     if road.truth is None:
         unknown = np.full((len(frames), len(CORRIDOR)), np.nan)
         center, corridor, lines, room = unknown[:, 0], unknown, unknown[:, :2], unknown[:, :2]
@@ -201,10 +201,10 @@ def cut_stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> 
         there = road.truth.at(frames)
         center, corridor, lines, room = there.center, there.corridor, there.lines, there.room
     cut = Stretch(
-        coord=np.column_stack([found.xy, road.xyz[found.index, 2].astype(np.float64)]),
-        strength=road.intensity[found.index].astype(np.float64),
-        color=road.rgb[found.index] / 255.0 if road.has_color else None,
-        number=found.number,
+        coord=np.column_stack([slices.xy, road.xyz[slices.index, 2].astype(np.float64)]),
+        strength=road.intensity[slices.index].astype(np.float64),
+        color=road.rgb[slices.index] / 255.0 if road.has_color else None,
+        number=slices.number,
         paved=road.class_table(ROAD_CLASSES)[labels],
         marked=road.class_table(("road_marking",))[labels],
         frames=frames,

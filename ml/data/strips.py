@@ -53,25 +53,29 @@ def find_ground(cloud: Path, progress: Progress = silent) -> GroundReading:
     with open_cloud(cloud) as reader:
         header = reader.header
         names = header.scheme.names()
-        ground = np.array([names.get(number) in GROUND_CLASSES for number in range(256)])
-        counts, colored, done = np.zeros(256, dtype=np.int64), False, 0
-        cells: dict[bool, dict[tuple[int, int], None]] = {True: {}, False: {}}
+        ground_classes = np.array([names.get(number) in GROUND_CLASSES for number in range(256)])
+        counts, colored, points = np.zeros(256, dtype=np.int64), False, 0
+        # Dictionaries as sets that keep the order of their cells.
+        ground_cells: dict[tuple[int, int], None] = {}
+        other_cells: dict[tuple[int, int], None] = {}
         for block in reader.usable_blocks():
             counts += np.bincount(block.class_id, minlength=256)
             colored = colored or bool(block.rgb.any())
-            own = ground[block.class_id]
-            for kind, some in ((True, own), (False, ~own)):
-                places = np.unique(np.floor(block.xyz[some, :2] / _CELL).astype(np.int64), axis=0)
-                cells[kind].update(dict.fromkeys(map(tuple, places.tolist())))
-            done += len(block)
-            progress("looking for the road", done / max(header.count, 1))
-    if counts[ground].any():
-        chosen, found = ground, cells[True]
+            ground = ground_classes[block.class_id]
+            for cells, mask in ((ground_cells, ground), (other_cells, ~ground)):
+                indices = np.unique(np.floor(block.xyz[mask, :2] / _CELL).astype(np.int64), axis=0)
+                cells.update(dict.fromkeys(map(tuple, indices.tolist())))
+            points += len(block)
+            progress("looking for the road", points / max(header.count, 1))
+    if counts[ground_classes].any():
+        classes, cells = ground_classes, ground_cells
     elif all(names.get(int(number)) in UNSORTED_CLASSES for number in np.flatnonzero(counts)) and counts.any():
-        chosen, found = np.ones(256, dtype=bool), cells[False]
+        # Nobody has sorted the cloud: all of it counts as ground.
+        classes, cells = np.ones(256, dtype=bool), other_cells
     else:
         raise InputError(str(cloud), None, f"holds no point of the classes {', '.join(GROUND_CLASSES)}")
-    return GroundReading(header, chosen, colored, _CELL * (np.array(list(found), dtype=np.float64) + 0.5))
+    centres = _CELL * (np.array(list(cells), dtype=np.float64) + 0.5)
+    return GroundReading(header, classes, colored, centres)
 
 
 def path_through(ground: GroundReading) -> MeasuredAxis:
@@ -100,15 +104,15 @@ def strips(
     """
     with tempfile.TemporaryDirectory(prefix="synthroads-strips-") as folder, TileFiles(Path(folder)) as files:
         _sort_points(files, cloud, ground, path, progress)
-        own = np.floor(frames.station / LENGTH).astype(np.int64)
+        strip_numbers = np.floor(frames.station / LENGTH).astype(np.int64)
         for (number, _), block in files.by_tile():
             first, last = number * LENGTH - MARGIN, (number + 1) * LENGTH + MARGIN
             seen = (frames.station >= first) & (frames.station < last)
-            if number in own:
+            if number in strip_numbers:
                 points = points_of(ground.header, [block], ground.colored)
                 line = _part(path, first - REACH, last + REACH).translate(-points.origin)
                 local = Frames(frames.position - points.origin[:2], frames.direction, frames.station).select(seen)
-                yield LearningRoad.of_points(cloud.stem, points, line), local, own[seen] == number
+                yield LearningRoad.of_points(cloud.stem, points, line), local, strip_numbers[seen] == number
 
 
 def _sort_points(files: TileFiles, cloud: Path, ground: GroundReading, path: MeasuredAxis, progress: Progress) -> None:

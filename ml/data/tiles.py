@@ -95,7 +95,7 @@ def scalings(tiles: Sequence[CloudTile], kind: str, voxel: float | None = None) 
         return dict.fromkeys((tile.scene for tile in tiles), Scaling())
     parts: dict[str, list[Float32]] = {}
     for tile in tiles:
-        found = parts.setdefault(tile.scene, [])
+        strengths = parts.setdefault(tile.scene, [])
         if tile.strength is not None:
-            found.append(tile.strength if voxel is None else tile.strength[voxel_sample(tile.coord, voxel)])
-    return {scene: robust_scaling(found) for scene, found in parts.items()}
+            strengths.append(tile.strength if voxel is None else tile.strength[voxel_sample(tile.coord, voxel)])
+    return {scene: robust_scaling(strengths) for scene, strengths in parts.items()}

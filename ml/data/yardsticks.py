@@ -65,10 +65,10 @@ class Yardstick(Part):
             raise InputError("split", split, f"must be one of {', '.join(self.splits)}")
         patterns = [one for name, some in self.splits.items() if split in (None, name) for one in some]
         readable = (".bin", ".ply", ".las", ".laz", ".npy")
-        found = {path for one in patterns for path in folder.glob(one) if path.suffix.lower() in readable}
-        if not found:
+        paths = {path for one in patterns for path in folder.glob(one) if path.suffix.lower() in readable}
+        if not paths:
             raise MissingFileError(str(folder), None, f"holds no file like {' or '.join(patterns[:4])}")
-        return sorted(found)
+        return sorted(paths)
 
     def mapping_in(self, folder: Path) -> LabelMapping:
         """Return the mapping of numbers, made from names by the file in the folder where classes have names.
@@ -84,9 +84,9 @@ class Yardstick(Part):
             assume(f"{folder.name} has no {self.names}: the numbers of its classes are read as {listed}")
             return self.mapping.model_copy(update={"classes": self._named(self.numbers)})
         if not path.is_file():
-            wanted = ", ".join(self.mapping.classes)
+            class_names = ", ".join(self.mapping.classes)
             raise MissingFileError(
-                str(path), None, f'must say which number is which class: {{"1": "NAME", ...}}, of {wanted}'
+                str(path), None, f'must say which number is which class: {{"1": "NAME", ...}}, of {class_names}'
             )
         told = read_json(path)
         if not isinstance(told, dict) or not all(isinstance(name, str) for name in told.values()):

@@ -97,9 +97,9 @@ def slice_centers(rule: Rule, number: Index, y: Float, intensity: Float, count: 
     result = np.full(count, np.nan)
     order = np.argsort(number, kind="stable")
     ends = np.cumsum(np.bincount(number, minlength=count))
-    for index, own in enumerate(np.split(order, ends[:-1])):
-        if len(own) >= FEWEST:
-            result[index] = rule(y[own], intensity[own])
+    for index, indices in enumerate(np.split(order, ends[:-1])):
+        if len(indices) >= FEWEST:
+            result[index] = rule(y[indices], intensity[indices])
     return result
 
 
@@ -155,10 +155,10 @@ def skeletons(xy: Float, intensity: Float | None, origin: Float, settings: Skele
     for first in range(0, len(origin), WINDOW):
         last = min(first + WINDOW, len(origin))
         begin, end = np.searchsorted(sorted_slices, [first - MARGIN, last + MARGIN])
-        own = order[begin:end]
+        indices = order[begin:end]
         line = np.empty((0, 2))
-        if len(own):
-            line = skeleton_points(xy[own], None if intensity is None else intensity[own], settings)
+        if len(indices):
+            line = skeleton_points(xy[indices], None if intensity is None else intensity[indices], settings)
         belongs = place.query(line)[1] if len(line) else np.empty(0, dtype=np.intp)
         result.append(line[(belongs >= first) & (belongs < last)])
     return result
@@ -225,9 +225,9 @@ def _branches(skeleton: Bool) -> tuple[NDArray[np.int32], list[int]]:
     junction = np.zeros_like(skeleton)
     for knot, part in enumerate(ndimage.find_objects(knots), 1):
         box = tuple(slice(max(0, side.start - 1), side.stop + 1) for side in part)
-        own = knots[box] == knot
-        touching = np.unique(number[box][ndimage.binary_dilation(own, _AROUND)])
-        junction[box] |= own & (np.count_nonzero(touching) > 2)
+        knot_mask = knots[box] == knot
+        touching = np.unique(number[box][ndimage.binary_dilation(knot_mask, _AROUND)])
+        junction[box] |= knot_mask & (np.count_nonzero(touching) > 2)
     number, _ = ndimage.label(skeleton & ~junction, structure=_AROUND)
     ends = skeleton & ~junction & (neighbours <= 1)
     return number, [int(label) for label in np.unique(number[ends])]
@@ -237,9 +237,9 @@ def _lengths(number: NDArray[np.int32], chosen: list[int]) -> Iterator[tuple[int
     """Yield label and length in pixels of each of the chosen lines, a diagonal step counting the root of two."""
     boxes = ndimage.find_objects(number)
     for label in chosen:
-        own = number[boxes[label - 1]] == label
-        diagonal = np.count_nonzero(own[1:, 1:] & own[:-1, :-1]) + np.count_nonzero(own[1:, :-1] & own[:-1, 1:])
-        yield label, np.count_nonzero(own) + (2.0**0.5 - 1.0) * diagonal
+        mask = number[boxes[label - 1]] == label
+        diagonal = np.count_nonzero(mask[1:, 1:] & mask[:-1, :-1]) + np.count_nonzero(mask[1:, :-1] & mask[:-1, 1:])
+        yield label, np.count_nonzero(mask) + (2.0**0.5 - 1.0) * diagonal
 
 
 def average_along(points: Float, width: float, direction: Float) -> Float:
@@ -268,7 +268,7 @@ def crossings(chain: Float, origin: Float, direction: Float, reach: float = REAC
 
     Points farther than ``reach`` (m) apart are not joined; of several crossings the one nearest to the frame counts.
     """
-    apart = np.hypot(*np.diff(chain, axis=0).T)
-    if not (apart > 0.0).any():
+    spacing = np.hypot(*np.diff(chain, axis=0).T)
+    if not (spacing > 0.0).any():
         return np.full(len(origin), np.nan)
-    return MeasuredAxis(chain, apart <= reach).crossing(origin, direction)[0]
+    return MeasuredAxis(chain, spacing <= reach).crossing(origin, direction)[0]

@@ -128,11 +128,11 @@ def measure(
         names = [one.road.name for one in shown]
         if twice := {name for name in names if names.count(name) > 1}:
             raise InputError("road", sorted(twice)[0], "is the name of several roads; give data sets of other names")
-        found: dict[str, dict[str, dict[str, float]]] = {name: {} for name in predictors}
+        metrics_by_road: dict[str, dict[str, dict[str, float]]] = {name: {} for name in predictors}
         for one in shown:  # road by road: predictors share what they cut out of it
             for name, versions in predictors.items():
-                found[name][one.road.name] = evaluate(versions[0 if len(versions) == 1 else index], one)
-        for name, by_name in found.items():
+                metrics_by_road[name][one.road.name] = evaluate(versions[0 if len(versions) == 1 else index], one)
+        for name, by_name in metrics_by_road.items():
             for road, row in (*by_name.items(), ("all", over_roads(by_name.values()))):
                 rows[name].setdefault(road, []).append(row)
     return {name: {road: over_seeds(values) for road, values in by_road.items()} for name, by_road in rows.items()}
@@ -144,10 +144,10 @@ def trivial_predictor(name: str, cut: SliceCache | None = None) -> Predictor:
     cut = cut or SliceCache()
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
-        found = cut(road, frames, length)
-        own = road.belonging[found.index]
-        y, intensity = found.xy[own, 1], road.intensity[found.index[own]].astype(np.float64)
-        return baselines.slice_centers(rule, found.number[own], y, intensity, len(frames))[:, None]
+        slices = cut(road, frames, length)
+        belonging = road.belonging[slices.index]
+        y, intensity = slices.xy[belonging, 1], road.intensity[slices.index[belonging]].astype(np.float64)
+        return baselines.slice_centers(rule, slices.number[belonging], y, intensity, len(frames))[:, None]
 
     return predict
 
@@ -186,8 +186,8 @@ def skeleton_predictor(settings: baselines.SkeletonSettings) -> Predictor:
 def mask_points(road: LearningRoad, mask: str) -> tuple[Float, Float]:
     """Return xy (N, 2), m, and intensities (N,) of the skeleton's points: the road classes' for "classes", else all."""
     paved = road.of_class(ROAD_CLASSES)
-    own = road.belonging & paved if mask == "classes" and paved.any() else road.belonging
-    return road.xyz[own, :2].astype(np.float64), road.intensity[own].astype(np.float64)
+    rows = road.belonging & paved if mask == "classes" and paved.any() else road.belonging
+    return road.xyz[rows, :2].astype(np.float64), road.intensity[rows].astype(np.float64)
 
 
 def predict_path(road: LearningRoad, frames: Frames) -> Float:
@@ -197,13 +197,13 @@ def predict_path(road: LearningRoad, frames: Frames) -> Float:
 
 def trivial_predictors(half_width: float = HALF_WIDTH) -> dict[str, list[Predictor]]:
     """Return all untrained baseline predictors by name, one each, for `measure`; they share the slices cut out."""
-    found: dict[str, list[Predictor]] = {"the displaced path": [predict_path]}
+    predictors: dict[str, list[Predictor]] = {"the displaced path": [predict_path]}
     cut = SliceCache(half_width)
-    found |= {name: [trivial_predictor(name, cut)] for name in baselines.RULES}
+    predictors |= {name: [trivial_predictor(name, cut)] for name in baselines.RULES}
     for name in baselines.SPANNED:
         rule = trivial_predictor(name, cut)
-        found[f"{name}, parabola of {baselines.SPAN:.0f} m"] = [along_parabolas(rule, baselines.SPAN)]
-    return found
+        predictors[f"{name}, parabola of {baselines.SPAN:.0f} m"] = [along_parabolas(rule, baselines.SPAN)]
+    return predictors
 
 
 def along_parabolas(predictor: Predictor, length: float) -> Predictor:
@@ -214,12 +214,12 @@ def along_parabolas(predictor: Predictor, length: float) -> Predictor:
         place, result = frames.at(y), np.full(len(y), np.nan)
         for part in stretches(frames):
             known = part[np.isfinite(y[part])]
-            for own in part:
-                near = known[np.abs(frames.station[known] - frames.station[own]) <= 0.5 * length]
+            for index in part:
+                near = known[np.abs(frames.station[known] - frames.station[index]) <= 0.5 * length]
                 if len(near) >= baselines.FEWEST:
-                    cos, sin = np.cos(frames.direction[own]), np.sin(frames.direction[own])
-                    x, aside = ((place[near] - frames.position[own]) @ np.array([[cos, -sin], [sin, cos]])).T
-                    result[own] = np.polyfit(x, aside, 2)[2]
+                    cos, sin = np.cos(frames.direction[index]), np.sin(frames.direction[index])
+                    x, aside = ((place[near] - frames.position[index]) @ np.array([[cos, -sin], [sin, cos]])).T
+                    result[index] = np.polyfit(x, aside, 2)[2]
         return result[:, None]
 
     return predict

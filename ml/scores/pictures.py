@@ -135,10 +135,10 @@ def _cloud(axes: Axes, shown: Case, view: PictureView, height: float) -> None:
 
     Where only an axis is known, as of real scans that may not be passed on, means of cells are drawn and no points.
     """
-    own = np.flatnonzero(shown.road.belonging)
-    station, offset = shown.road.known_truth.axis.project(shown.road.xyz[own])
+    indices = np.flatnonzero(shown.road.belonging)
+    station, offset = shown.road.known_truth.axis.project(shown.road.xyz[indices])
     near = np.flatnonzero((station >= view.first) & (station <= view.last) & (np.abs(offset) <= height))
-    intensity = shown.road.intensity[own[near]]
+    intensity = shown.road.intensity[indices[near]]
     # By their ranks: a scanner beside the road sees its near side a hundred times as bright as the far one.
     intensity = rankdata(intensity) / max(1, len(near))
     look: dict[str, Any] = {"cmap": "gray", "vmin": -0.5, "vmax": 1.0, "rasterized": True}

@@ -102,11 +102,13 @@ def label_tile(
     """
     keep = voxel_sample(tile.coord, settings.voxel)
     small = tile.select(keep)
-    own = _needed_points(small.coord, tile.coord, core, settings.voxel)
+    needed_rows = _needed_points(small.coord, tile.coord, core, settings.voxel)
     labels = np.zeros(len(small), dtype=np.int16)
-    for inside, scores in piece_scores(small, scaling, classifier, settings, own, seed):
+    for inside, scores in piece_scores(small, scaling, classifier, settings, needed_rows, seed):
         labels[inside] = scores.argmax(dim=1).cpu().numpy()
-    return nearest_labels(small.coord[own], labels[own], tile.coord if core is None else tile.coord[core])
+    return nearest_labels(
+        small.coord[needed_rows], labels[needed_rows], tile.coord if core is None else tile.coord[core]
+    )
 
 
 def piece_scores(

@@ -269,9 +269,9 @@ def _begin_with(model: nn.Module, configuration: SegmentationConfiguration) -> N
     """
     before = open_run(Path(configuration.start))
     for name in ("task", "classes", "features", "intensity", "network"):
-        told, wanted = getattr(before.configuration, name, None), getattr(configuration, name)
-        if told != wanted:
-            raise InputError("start", configuration.start, f"must have the same {name}: it has {told}, not {wanted}")
+        told, value = getattr(before.configuration, name, None), getattr(configuration, name)
+        if told != value:
+            raise InputError("start", configuration.start, f"must have the same {name}: it has {told}, not {value}")
     load_weights(model, before)
 
 

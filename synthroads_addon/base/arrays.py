@@ -69,6 +69,6 @@ def otsu_threshold(values: Float) -> float:
     below, moment = np.cumsum(count)[:-1], np.cumsum(count * middle)[:-1]
     above = count.sum() - below
     with np.errstate(divide="ignore", invalid="ignore"):
-        apart = (float((count * middle).sum()) - moment) / above - moment / below
-        between = np.where((below > 0) & (above > 0), below * above * apart**2, 0.0)
+        mean_difference = (float((count * middle).sum()) - moment) / above - moment / below
+        between = np.where((below > 0) & (above > 0), below * above * mean_difference**2, 0.0)
     return float(edges[1:-1][np.argmax(between)])

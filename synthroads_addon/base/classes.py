@@ -309,23 +309,30 @@ def _fine_classes(rows: Sequence[ClassRow]) -> dict[int, PointClass]:
 
 
 def _merging_table(rows: Sequence[ClassRow], fine: Mapping[int, PointClass], source: str) -> NDArray[np.uint8]:
-    """Return the (256,) table from ``class_id`` as handed in to the scheme's; InputError for a wrong member."""
+    """Return the (256,) table from a point's source ``class_id`` to its id in the scheme; InputError for a bad member.
+
+    Args:
+        rows: classes of the scheme, each with its members: classes of the full table, by name or id.
+        fine: classes of the scheme that the full table doesn't have, by the source id that stands for each.
+        source: of the rows, for messages.
+    """
     ids = {row.name: row.id for row in classes()}
     table = np.full(256, UNLABELLED, dtype=np.uint8)
     for row in rows:
+        # A class without members is the full table's of its name, or one of the fine ones.
         for member in row.of or ((row.name,) if row.name in ids else ()):
-            if isinstance(member, ClassSelector):
+            if isinstance(member, ClassSelector):  # picks faces, whose class is one of the fine ones
                 _known_class(member.class_name, ids, f"{source}: {row.name}.of.class")
                 continue
             _known_class(member, ids, f"{source}: {row.name}")
-            number = ids[member] if isinstance(member, str) else member
-            if not 0 <= number < UNLABELLED:
+            source_id = ids[member] if isinstance(member, str) else member
+            if not 0 <= source_id < UNLABELLED:
                 raise InputError(f"{source}: {row.name}", member, "must be a class's name or an id from 0 to 254")
-            if table[number] != UNLABELLED:
+            if table[source_id] != UNLABELLED:
                 raise InputError(f"{source}: {row.name}", member, "belongs to another class already")
-            table[number] = row.id
-    for number, made in fine.items():
-        table[number] = made.id
+            table[source_id] = row.id
+    for source_id, point_class in fine.items():
+        table[source_id] = point_class.id
     return table
 
 

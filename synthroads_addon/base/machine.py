@@ -39,10 +39,10 @@ def available_cores() -> int:
 
 def share_of_core(seconds: float = 0.1) -> float:
     """Return the share of a core, 0 to 1, that one thread gets now beside what else runs, by working for some time."""
-    wall, own = time.perf_counter(), time.thread_time()
+    wall, thread_start = time.perf_counter(), time.thread_time()
     while (spent := time.perf_counter() - wall) < seconds:
         pass
-    return min(1.0, max(0.01, (time.thread_time() - own) / spent))
+    return min(1.0, max(0.01, (time.thread_time() - thread_start) / spent))
 
 
 def free_cores(threads: int, share: float) -> float:

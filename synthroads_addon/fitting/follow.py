@@ -405,8 +405,8 @@ def heights_followed(station: Float, heights: Float, length: float, tolerance: f
     """
     if len(station) > 2 * _SPARSE and noise_of(station, heights, 2) > _NOISY:
         return None
-    found = match(elements_of(station, heights, 1), station, heights).model
-    return profile_of(without_swings(found, station, heights, tolerance), length)
+    model = match(elements_of(station, heights, 1), station, heights).model
+    return profile_of(without_swings(model, station, heights, tolerance), length)
 
 
 def profile_of(model: Model, length: float) -> Profile:

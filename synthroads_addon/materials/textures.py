@@ -49,10 +49,10 @@ def texture_sets(folder: str) -> dict[str, tuple[MaterialTexture, ...]]:
         InputError: a folder in it is named after no material, a set has no image of a layer, an image is named after
             no layer or isn't one, or there are no materials at all.
     """
-    found = {path.name: tuple(_sets_of(path)) for path in _folders(Path(folder))}
-    if not found:
+    sets = {path.name: tuple(_sets_of(path)) for path in _folders(Path(folder))}
+    if not sets:
         raise InputError(folder, None, "must hold a folder named after a material of the table, such as asphalt")
-    return found
+    return sets
 
 
 def texture_files(folder: str) -> dict[str, Path]:

@@ -38,6 +38,11 @@ _TERMINAL = 12.0
 _END = 5.0
 """Distance from the road's end within which a barrier goes on beyond it, m. Chosen: a stretch."""
 
+_SHORTEST_BARRIER = 1.0
+"""Length up to which a barrier's rest on the road is left out, m."""
+_DELINEATOR_HEIGHTS = (0.3, 1.5)
+"""Limits of a delineator's height in a parameter set, m."""
+
 
 @dataclass(frozen=True)
 class RoadMeasurements:
@@ -236,11 +241,12 @@ def _dashes(line: Line | None, length: float, edge: bool = False) -> dict[str, f
 
 
 def _furniture(measured: RoadMeasurements) -> Iterator[tuple[str, RoadObject]]:
+    """Yield (id, object) of the barriers, and of a delineator for each post beside the road."""
     length = round_value(measured.fit.alignment.length)
     for number, barrier in enumerate(measured.barriers, 1):
         start = 0.0 if barrier.start < _END else _length(barrier.start)
         end = length if barrier.end > length - _END else _length(barrier.end)
-        if end - start > 1.0:
+        if end - start > _SHORTEST_BARRIER:
             yield f"barrier-{number}", barrier_object(barrier, start, end, length)
     posts = [post for post in measured.posts if 0.0 <= post.station <= length]
     for number, post in enumerate(posts, 1):
@@ -248,8 +254,8 @@ def _furniture(measured: RoadMeasurements) -> Iterator[tuple[str, RoadObject]]:
             instance=1,
             station=_length(post.station),
             offset=_length(post.offset),
-            rotation_deg=0.0 if post.offset < 0.0 else 180.0,
-            height=_length(post.height, 0.3, 1.5),
+            rotation_deg=0.0 if post.offset < 0.0 else 180.0,  # its front towards the traffic of its side
+            height=_length(post.height, *_DELINEATOR_HEIGHTS),
         )
         yield f"delineator-{number:04d}", delineator
 

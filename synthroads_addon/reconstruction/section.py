@@ -30,6 +30,8 @@ width."""
 _WIDEST_STRIP = 1.25
 """Width of an edge strip at most, m: pavement outside of the lanes that is wider has a hard shoulder. Chosen: the
 standard cross-sections have strips of 0.75 m at most, and shoulders of 2 m at least."""
+_STRIP_LIMIT = 2.0
+"""Width of an edge strip at most in a parameter set, m."""
 _USUAL_STRIP = 0.5
 """Width of a strip that isn't seen, m. Chosen: that of most standard cross-sections."""
 _PAINT_STD, _EDGE_STD = 0.04, 0.08
@@ -428,16 +430,25 @@ def _summarise_side(
 
 
 def _inner_widths(
-    line: Estimate, inner: Edge, mask: Bool, edge_std: float, axis_std: float
+    lane_boundary: Estimate, inner: Edge, mask: Bool, edge_std: float, axis_std: float
 ) -> tuple[Estimate, Estimate]:
-    """Return the distance of the pavement's inner edge from the axis, and the inner edge strip's width, m."""
+    """Return the distance of the pavement's inner edge from the axis, and the inner edge strip's width, m.
+
+    Args:
+        lane_boundary: distance of the innermost lane's inner boundary from the axis.
+        inner: the pavement's inner edge.
+        mask: (K,) the stretches that count.
+        edge_std, axis_std: standard deviations of any edge and of the axis, m.
+    """
     if _is_visible(inner):
-        offset = Estimate.of(np.where(mask, inner.offsets, np.nan), inner.spacing, axis_std).widened(edge_std)
-        strip = line - offset
+        edge = Estimate.of(np.where(mask, inner.offsets, np.nan), inner.spacing, axis_std).widened(edge_std)
+        strip = lane_boundary - edge
     else:
-        offset = Estimate(line.value - _USUAL_STRIP, np.inf)
+        # Assumed, not measured: an infinite standard deviation says so.
+        edge = Estimate(lane_boundary.value - _USUAL_STRIP, np.inf)
         strip = Estimate(_USUAL_STRIP, np.inf)
-    return (Estimate(max(0.0, offset.value), offset.std), Estimate(float(np.clip(strip.value, 0.0, 2.0)), strip.std))
+    width = float(np.clip(strip.value, 0.0, _STRIP_LIMIT))
+    return Estimate(max(0.0, edge.value), edge.std), Estimate(width, strip.std)
 
 
 def _usual_stretches(width: Float, line: Line | None) -> Bool:

@@ -153,11 +153,11 @@ class InstanceNumbers:
 
     def belong(self, name: str, numbers: NDArray[np.integer]) -> Bool:
         """Return a mask (N,) of the instance numbers that are an object's or its parts', not those of later passes."""
-        found: Bool = numbers == self._parameters.objects[name].instance
+        mask: Bool = numbers == self._parameters.objects[name].instance
         if name in self.parts:
             parts = self.parts[name]
-            found |= (numbers >= parts.first) & (numbers < parts.first + parts.room)
-        return found
+            mask |= (numbers >= parts.first) & (numbers < parts.first + parts.room)
+        return mask
 
     def to_dict(self) -> dict[str, object]:
         """Return the instance numbers of parts and passes as JSON data, as a job's report has them."""

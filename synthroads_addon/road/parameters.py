@@ -164,14 +164,14 @@ class AlignmentObject(RoadObject):
     def counts(self, spacing: float) -> list[tuple[float, int]]:
         """Return the stations (m) at which the count is a multiple of a spacing (m), and which multiple."""
         borders = [0.0, *(equation.station for equation in self.equations), self.length]
-        found = []
+        multiples = []
         for first, last in itertools.pairwise(borders):
             at = self.counted(first)
             for multiple in range(math.ceil(at / spacing - 1e-9), math.floor((at + last - first) / spacing + 1e-9) + 1):
                 place = first + multiple * spacing - at
                 if place < last or last == self.length:
-                    found.append((min(max(place, 0.0), self.length), multiple))
-        return found
+                    multiples.append((min(max(place, 0.0), self.length), multiple))
+        return multiples
 
     @model_validator(mode="after")
     def _no_longer_than_any_road(self) -> AlignmentObject:

@@ -120,11 +120,15 @@ class Profile:
         self._curvatures = interleaved(0.0, curvature, np.zeros_like(curvature))
 
     def _evaluate(self, station: ArrayLike) -> tuple[Float, Float, Float]:
+        """Return elevation (m), grade and curvature (1/m) at stations of any shape; at a border those after it."""
         stations = finite_array("station", station)
         piece = np.searchsorted(self._borders, stations, side="right")
         u, grade, curvature = stations - self._bases[piece], self._grades[piece], self._curvatures[piece]
+        # The pieces' parabola z = z0 + u (g + c u / 2) and its slope dz/du = g + c u.
         elevation = self._elevations[piece] + u * (grade + 0.5 * curvature * u)
-        return elevation[()], (grade + curvature * u)[()], curvature[()]
+        slope = grade + curvature * u
+        # [()] makes the array of a single station a number.
+        return elevation[()], slope[()], curvature[()]
 
     def elevation(self, station: ArrayLike) -> Float:
         """Return the elevation, m, at stations of any shape; InputError for stations that aren't finite."""

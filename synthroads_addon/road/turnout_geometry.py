@@ -161,8 +161,8 @@ class TurnoutShape:
         curve = np.minimum(behind, _curve_length(ramp))
         rounded = np.copysign(curve**2 / (2.0 * ramp.rounding_radius), ramp.grade_percent)
         lift = rounded + ramp.grade_percent / 100.0 * (behind - curve)
-        own = np.zeros(x.shape) if ramp.crossfall_percent is None else np.minimum(behind / ramp.run_off_length, 1.0)
-        return RampSurface(there, (1.0 - there) * blend, lift, own)
+        run_off = np.zeros(x.shape) if ramp.crossfall_percent is None else np.minimum(behind / ramp.run_off_length, 1.0)
+        return RampSurface(there, (1.0 - there) * blend, lift, run_off)
 
     @staticmethod
     def _surface_marks(ramp: Ramp) -> list[float]:

@@ -146,8 +146,8 @@ def report_of(path: Path, line: RoadLine, axis: ExactAxis) -> dict[str, Any]:
 
 def _worst(heights: Any) -> dict[str, Any]:
     steps = [{"station": round(station, 3), "step": round(step, 6)} for station, step in heights.jumps]
-    found: dict[str, Any] = {"deviation": round(heights.deviation, 6), "deviation_station": round(heights.station, 3)}
-    return found | ({"steps_left_out": steps} if steps else {})
+    figures: dict[str, Any] = {"deviation": round(heights.deviation, 6), "deviation_station": round(heights.station, 3)}
+    return figures | ({"steps_left_out": steps} if steps else {})
 
 
 def _placed(
@@ -155,7 +155,7 @@ def _placed(
 ) -> tuple[MapSystem | None, ExactAxis, str]:
     """Return the system that the axis lies in, the axis there, and how it came there."""
     given = "epsg" in scenario.model_fields_set
-    wanted = MapSystem.of(scenario.epsg, scenario.height_epsg) if given else None
+    system = MapSystem.of(scenario.epsg, scenario.height_epsg) if given else None
     declared = line.system
     if declared is not None and declared.local:
         declared = None
@@ -171,11 +171,11 @@ def _placed(
     middle = axis.alignment.position(np.array([0.5 * axis.alignment.length]))
     if declared.outside(middle).max() > 0.0:
         warn("%s lies outside of the area that %s is meant for (%s)", path.name, declared.label, declared.area)
-    if wanted is not None and declared.same_as(wanted):
-        return wanted, axis, "as the file has it"
-    if wanted is None and declared.epsg:
+    if system is not None and declared.same_as(system):
+        return system, axis, "as the file has it"
+    if system is None and declared.epsg:
         return declared, axis, f"as the file has it, in {declared.label}"
-    target = wanted or _utm(declared, middle)
+    target = system or _utm(declared, middle)
     return target, *_moved_rigidly(path, axis, declared, target)
 
 

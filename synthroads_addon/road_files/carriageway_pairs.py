@@ -133,18 +133,18 @@ def _midway(first: _Dense, second: _Dense, here: Float, there: Float, stretch: t
     tree = cKDTree(first.points)
     ends = np.array([np.searchsorted(first.stations, low), np.searchsorted(first.stations, high)])
     for nodes, line in ((np.concatenate([here, first.points[ends]]), second), (there, first)):
-        own = first if line is second else second
-        _, at = cKDTree(own.points).query(nodes)
-        feet, beside = line.feet(nodes, own.directions[at])
+        node_line = first if line is second else second
+        _, at = cKDTree(node_line.points).query(nodes)
+        feet, beside = line.feet(nodes, node_line.directions[at])
         middle = 0.5 * (nodes + feet)[beside]
         _, near = tree.query(middle)
         station = first.stations[near] + ((middle - first.points[near]) * first.directions[near]).sum(axis=1)
         keep = (station >= low - _STEP) & (station <= high + _STEP)
         rows.append(np.column_stack([station[keep], middle[keep]]))
-    found = np.concatenate(rows)
-    found = found[np.argsort(found[:, 0], kind="stable")]
-    apart = np.concatenate([[True], np.diff(found[:, 0]) > 1.0])
-    return found[apart, 1:]
+    places = np.concatenate(rows)
+    places = places[np.argsort(places[:, 0], kind="stable")]
+    gap_mask = np.concatenate([[True], np.diff(places[:, 0]) > 1.0])
+    return places[gap_mask, 1:]
 
 
 def _cross(first: Float, second: Float) -> Float:
@@ -171,7 +171,7 @@ def pairs_of(chains: Sequence[Chain]) -> tuple[list[Pair], dict[int, tuple[int, 
     low = np.array([chains[n].points.min(axis=0) for n in order]).reshape(-1, 2)
     high = np.array([chains[n].points.max(axis=0) for n in order]).reshape(-1, 2)
     reach = np.column_stack([1.0 / np.maximum(np.cos(np.radians(low[:, 1])), 0.01), np.ones(len(low))]) * _REACH
-    found, taken, why = list[Pair](), set[int](), dict[int, tuple[int, str]]()
+    pairs, taken, why = list[Pair](), set[int](), dict[int, tuple[int, str]]()
     for row, first in enumerate(order):
         near = (low[row] - reach[row] <= high[row + 1 :]).all(axis=1) & (high[row] + reach[row] >= low[row + 1 :]).all(
             axis=1
@@ -181,9 +181,9 @@ def pairs_of(chains: Sequence[Chain]) -> tuple[list[Pair], dict[int, tuple[int, 
                 continue
             pair = paired(chains[first], chains[second])
             if isinstance(pair, Pair):
-                found.append(pair)
+                pairs.append(pair)
                 taken |= {first, second}
             elif pair:
                 why.setdefault(first, (second, pair))
                 why.setdefault(second, (first, pair))
-    return found, {n: reason for n, reason in why.items() if n not in taken}
+    return pairs, {n: reason for n, reason in why.items() if n not in taken}

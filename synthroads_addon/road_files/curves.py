@@ -182,7 +182,7 @@ def as_elements(curve: Curve, tolerance: float = TOLERANCE) -> tuple[list[Elemen
     within the tolerance (m).
     """
     station = np.linspace(0.0, curve.length, int(np.clip(curve.length, 16, 2048)) + 1)
-    wanted = curve.positions(station)
+    positions = curve.positions(station)
     count = 1
     while True:
         knots = np.linspace(0.0, curve.length, count + 1)
@@ -190,7 +190,7 @@ def as_elements(curve: Curve, tolerance: float = TOLERANCE) -> tuple[list[Elemen
         mean = np.diff(curve.heading(knots)) / step
         half = 0.5 * np.diff(curve.curvature(knots))
         elements = [Element(step, m - h, m + h) for m, h in zip(mean.tolist(), half.tolist(), strict=True)]
-        worst = float(np.hypot(*(Alignment(elements).position(station) - wanted).T).max())
+        worst = float(np.hypot(*(Alignment(elements).position(station) - positions).T).max())
         if worst <= tolerance or 2 * count > _MOST_PIECES:
             return elements, worst
         count *= 2

@@ -123,7 +123,7 @@ def _parabolas(piece: HeightPiece, tolerance: float) -> list[tuple[float, float,
     # Of a pair of parabolas with a cubic's ends the middle is off by |d| L^3 / 32 at most.
     count = int(np.clip(np.ceil((abs(piece.cube) * length**3 / (32.0 * tolerance)) ** (1.0 / 3.0)), 1, _MOST_PIECES))
     edges = np.linspace(piece.start, piece.end, count + 1).tolist()
-    found = []
+    parabolas = []
     for first, last in itertools.pairwise(edges):
         half = 0.5 * (last - first)
         if half < _SHORTEST:
@@ -131,9 +131,9 @@ def _parabolas(piece: HeightPiece, tolerance: float) -> list[tuple[float, float,
         low, high = piece.elevation_at(first), piece.elevation_at(last)
         rise, fall = piece.grade_at(first), piece.grade_at(last)
         inner = (high - low) / half - 0.5 * (rise + fall)  # so that both parabolas end where the cubic does
-        found.append((first, first + half, low, rise, inner))
-        found.append((first + half, last, low + 0.5 * half * (rise + inner), inner, fall))
-    return found or [(piece.start, piece.end, piece.elevation, piece.grade, piece.grade_at(piece.end))]
+        parabolas.append((first, first + half, low, rise, inner))
+        parabolas.append((first + half, last, low + 0.5 * half * (rise + inner), inner, fall))
+    return parabolas or [(piece.start, piece.end, piece.elevation, piece.grade, piece.grade_at(piece.end))]
 
 
 def _deviation(
@@ -147,8 +147,8 @@ def _deviation(
         if first >= piece.start - 1e-9 and last <= piece.end + 1e-9:
             for share in (0.25, 0.5, 0.75):
                 u = share * (last - first)
-                found = height + u * (rise + 0.5 * (fall - rise) * share)
-                off = abs(found - shift - piece.elevation_at(first + u))
+                elevation = height + u * (rise + 0.5 * (fall - rise) * share)
+                off = abs(elevation - shift - piece.elevation_at(first + u))
                 if off > worst:
                     worst, where = off, first + u
     return worst, where

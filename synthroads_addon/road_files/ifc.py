@@ -100,8 +100,8 @@ def _open(path: Path) -> Any:
         data = path.read_bytes()
     except OSError as error:
         raise MissingFileError(str(path), None, f"cannot be read ({error.strerror})") from None
-    found = _SCHEMA.search(data[: 1 << 20])
-    schema = found[1].decode("ascii", "replace").upper() if found else ""
+    match = _SCHEMA.search(data[: 1 << 20])
+    schema = match[1].decode("ascii", "replace").upper() if match else ""
     if not schema.startswith("IFC4X3"):
         raise InputError(
             path.name, schema or None, "IFC 4.3 (IFC4X3 and its candidates) is needed: others have no roads"
@@ -189,8 +189,8 @@ def _placed(line: RoadLine, matrix: np.ndarray, system: MapSystem | None) -> Roa
 
 def _nested(item: Any) -> list[Any]:
     """Return what is nested below an object, in order; what is aggregated as well, as older files have it."""
-    found = [each for relation in (item.IsNestedBy or ()) for each in relation.RelatedObjects]
-    return found + [
+    parts = [each for relation in (item.IsNestedBy or ()) for each in relation.RelatedObjects]
+    return parts + [
         each for relation in (getattr(item, "IsDecomposedBy", None) or ()) for each in relation.RelatedObjects
     ]
 
@@ -286,8 +286,8 @@ def _plan_piece(row: Any, run: float, unit: float, angle: float) -> PlanPiece | 
     elif kind in _KINDS:
         shape = transition(_KINDS[kind], length, first, last)
     else:
-        wanted = f"one of LINE, CIRCULARARC, {', '.join(_KINDS)} is understood"
-        raise InputError(f"segment at station {run:.3f} m: PredefinedType", kind, wanted)
+        allowance = f"one of LINE, CIRCULARARC, {', '.join(_KINDS)} is understood"
+        raise InputError(f"segment at station {run:.3f} m: PredefinedType", kind, allowance)
     return PlanPiece(_KINDS.get(kind, kind.lower()), run, length, x, y, heading, shape)
 
 
@@ -310,6 +310,6 @@ def _heights(profile: Any, unit: float) -> list[HeightPiece]:
         elif kind == "CIRCULARARC":
             pieces += circle(start, start + length, height, first, last)
         else:
-            wanted = "one of CONSTANTGRADIENT, PARABOLICARC, CIRCULARARC is understood"
-            raise InputError(f"vertical segment at {start:.3f} m: PredefinedType", kind, wanted)
+            allowance = "one of CONSTANTGRADIENT, PARABOLICARC, CIRCULARARC is understood"
+            raise InputError(f"vertical segment at {start:.3f} m: PredefinedType", kind, allowance)
     return pieces

@@ -57,7 +57,7 @@ def rounded(
         sharpest: largest curvature of a road, 1/m.
     """
     pieces: list[PlanPiece] = [line.pieces[0]]
-    found: list[Rounding] = []
+    roundings: list[Rounding] = []
     for piece, turn in zip(line.pieces[1:], joints[1:], strict=True):
         made, aim = None, tolerance
         for _ in range(_TRIALS if abs(turn) > least else 0):
@@ -69,8 +69,8 @@ def rounded(
             pieces.append(piece)
             continue
         pieces[-1:] = made[0]
-        found.append(made[1])
-    return replace(line, pieces=tuple(pieces)), found
+        roundings.append(made[1])
+    return replace(line, pieces=tuple(pieces)), roundings
 
 
 def _round(before: PlanPiece, after: PlanPiece, tolerance: float) -> tuple[list[PlanPiece], Rounding] | None:

@@ -126,11 +126,11 @@ def _alignment(alignment: Element, name: str, unit: float, system: MapSystem | N
 
 def _point(element: Element, name: str, unit: float) -> complex:
     """Return a point x + iy, m, of a child that says north before east, perhaps a height behind."""
-    found = child(element, name)
-    words = (found.text or "").split() if found is not None else []
+    point = child(element, name)
+    words = (point.text or "").split() if point is not None else []
     place = f"{local_name(element)} {name}"
-    if found is not None and not words and found.get("pntRef"):
-        raise InputError(place, found.get("pntRef"), "a point of its own is needed, not a reference to another")
+    if point is not None and not words and point.get("pntRef"):
+        raise InputError(place, point.get("pntRef"), "a point of its own is needed, not a reference to another")
     if len(words) < 2:
         raise InputError(place, " ".join(words) or None, "northing and easting are needed")
     north, east = (finite(place, word) * unit for word in words[:2])
@@ -215,8 +215,8 @@ def _spiral(element: Element, run: float, unit: float) -> list[PlanPiece]:
     chord = complex(*curve.positions(np.array([length]))[0].tolist())
     away = abs(abs(end - start) - abs(chord))
     if away > max(2e-3, 1e-5 * length):
-        wanted = f"its ends must lie {abs(chord):.6f} m apart as its length and radii have it"
-        raise InputError(place, round(abs(end - start), 6), wanted)
+        condition = f"its ends must lie {abs(chord):.6f} m apart as its length and radii have it"
+        raise InputError(place, round(abs(end - start), 6), condition)
     heading = math.atan2((end - start).imag, (end - start).real) - math.atan2(chord.imag, chord.real)
     return [PlanPiece(name.lower(), run, length, start.real, start.imag, heading, shape)]
 
@@ -226,13 +226,13 @@ assert set(_SPIRALS.values()) <= set(TRANSITIONS)
 
 
 def _equations(alignment: Element, unit: float, start: float) -> list[Equation]:
-    found = []
+    equations = []
     for row in children(alignment, "StaEquation"):
         internal = number(row, "staInternal") * unit - start
         ahead = number(row, "staAhead") * unit
         back = number(row, "staBack", number(row, "staInternal")) * unit
-        found.append(Equation(internal, back, ahead))
-    return sorted(found, key=lambda each: each.station)
+        equations.append(Equation(internal, back, ahead))
+    return sorted(equations, key=lambda each: each.station)
 
 
 def _profile(
@@ -379,12 +379,12 @@ def _others(alignment: Element) -> list[str]:
 
 def _roadways(root: Element) -> dict[str, list[str]]:
     """Return what roadways say of lanes and speeds and isn't read, as text with numbers, by names of alignments."""
-    found: dict[str, list[str]] = {}
+    texts_by_name: dict[str, list[str]] = {}
     for roadway in (each for group in children(root, "Roadways") for each in children(group, "Roadway")):
         counts = Counter(local_name(each) for group in children(roadway, "Lanes") for each in group)
         speeds = sum(len(group) for group in children(roadway, "Speeds"))
         texts = [f"lanes: {', '.join(f'{n} {kind}' for kind, n in sorted(counts.items()))}"] if counts else []
         texts += [f"speed limits: {speeds} of the roadway"] if speeds else []
         for name in roadway.get("alignmentRefs", "").split():
-            found.setdefault(name, []).extend(texts)
-    return found
+            texts_by_name.setdefault(name, []).extend(texts)
+    return texts_by_name

@@ -285,8 +285,8 @@ def heights_at(line: RoadLine, station: Float) -> Float:
 def _drift(alignment: Alignment, pieces: Sequence[PlanPiece], starts: Sequence[float]) -> list[float]:
     """Return how far (m) the chained elements are from the start of each piece."""
     given = np.array([(piece.x, piece.y) for piece in pieces])
-    found: list[float] = np.hypot(*(alignment.position(np.array(starts)) - given).T).tolist()
-    return found
+    distances: list[float] = np.hypot(*(alignment.position(np.array(starts)) - given).T).tolist()
+    return distances
 
 
 def _moved(line: RoadLine, starts: Sequence[float], length: float) -> list[HeightPiece]:

@@ -194,16 +194,16 @@ def _lane_count(road: Element, station: float) -> int | None:
 
 def _left_out(road: Element) -> list[str]:
     """Return what is on a road beside its line, as texts with numbers."""
-    found = []
+    texts = []
     lanes = child(road, "lanes")
     if lanes is not None and (sections := children(lanes, "laneSection")):
-        found.append(f"lanes of {len(sections)} lane sections")
+        texts.append(f"lanes of {len(sections)} lane sections")
     lateral = child(road, "lateralProfile")
     if lateral is not None and len(lateral):
         counts = Counter(local_name(row) for row in lateral)
-        found.append("lateral profile: " + ", ".join(f"{count} {name}" for name, count in sorted(counts.items())))
+        texts.append("lateral profile: " + ", ".join(f"{count} {name}" for name, count in sorted(counts.items())))
     for group, text in _OBJECTS.items():
         things = child(road, group)
         if things is not None and len(things):
-            found.append(f"{len(things)} {text}")
-    return found
+            texts.append(f"{len(things)} {text}")
+    return texts

@@ -54,10 +54,10 @@ def read_pbf(path: Path) -> list[PointLine]:
         for way in osmium.FileProcessor(source, osmium.osm.WAY).with_filter(osmium.filter.KeyFilter("highway")):
             data.take(way.id, {tag.k: tag.v for tag in way.tags}, [node.ref for node in way.nodes])
         source = osmium.io.File(str(path.resolve()), "pbf")
-        wanted = data.wanted
+        node_ids = data.wanted
         node: Any
         for node in osmium.FileProcessor(source, osmium.osm.NODE):
-            if node.id in wanted and node.location.valid():
+            if node.id in node_ids and node.location.valid():
                 data.nodes[node.id] = (node.location.lon, node.location.lat)
     except OSError as error:
         raise MissingFileError(str(path), None, f"cannot be read ({error.strerror})") from None

@@ -40,21 +40,21 @@ def roads_of_ways(ways: Iterable[OsmWay]) -> list[PointLine]:
     them is there as well, named with the direction that it leads to. Ways without reference and name stand alone.
     """
     groups: dict[str | None, list[Chain]] = defaultdict(list)
-    found: list[tuple[str, PointLine]] = []
+    lines: list[tuple[str, PointLine]] = []
     for chain in chained(ways):
         may_pair = chain.directed and chain.label and not chain.link and not chain.roundabout
         groups[chain.label if may_pair else None].append(chain)
     for label, chains in groups.items():
         pairs, why = pairs_of(chains) if label is not None else ([], {})
-        found += [(label or "", _of_pair(pair)) for pair in pairs]
+        lines += [(label or "", _of_pair(pair)) for pair in pairs]
         for n, chain in enumerate(chains):
             other, reason = why.get(n, (n, ""))
             lonely = f"{label} {_heading(chains[other])} isn't paired with it: {reason}" if reason else None
             line = replace(_of_chain(chain, lonely), carriageway=any(chain in (p.one, p.other) for p in pairs))
-            found.append(_named(line, chain))
-    found.sort(key=lambda row: -_length(row[1].points))
+            lines.append(_named(line, chain))
+    lines.sort(key=lambda row: -_length(row[1].points))
     names = LineNames()
-    return [replace(line, name=names.unique(name, "road")) for name, line in found]
+    return [replace(line, name=names.unique(name, "road")) for name, line in lines]
 
 
 def _named(line: PointLine, chain: Chain) -> tuple[str, PointLine]:
@@ -180,7 +180,7 @@ def _told(carriageways: _Carriageways) -> tuple[MappedSection, tuple[str, ...], 
 
 
 def _values(spans: Sequence[_Span], value: Callable[[Mapping[str, str]], T | None]) -> set[T]:
-    return {found for _, _, tags in spans if (found := value(tags)) is not None}
+    return {tag_value for _, _, tags in spans if (tag_value := value(tags)) is not None}
 
 
 def _there(value: str | None) -> str | None:
@@ -207,9 +207,9 @@ def _most(spans: Sequence[_Span], value: Callable[[Mapping[str, str]], T | None]
     """Return the value that most of the length has, None where none has any."""
     lengths: dict[T, float] = defaultdict(float)
     for begin, end, tags in spans:
-        found = value(tags)
-        if found is not None:
-            lengths[found] += end - begin
+        tag_value = value(tags)
+        if tag_value is not None:
+            lengths[tag_value] += end - begin
     return max(lengths, key=lambda key: lengths[key]) if lengths else None
 
 
@@ -221,10 +221,10 @@ def _stretches(
     for name, spans in carriageways.items():
         rows: list[tuple[str, float, float]] = []
         for begin, end, tags in sorted(spans, key=lambda span: span[:2]):
-            found = value(tags)
-            if found is None:
+            tag_value = value(tags)
+            if tag_value is None:
                 continue
-            shown = text.format(str(found)[:40])
+            shown = text.format(str(tag_value)[:40])
             if also and also in tags:
                 shown += f" {also}={tags[also][:10]}"
             if rows and rows[-1][0] == shown and begin <= rows[-1][2] + 1.0:

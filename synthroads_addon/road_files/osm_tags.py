@@ -70,10 +70,10 @@ def _whole(text: str | None) -> int | None:
 def metres(text: str | None) -> float | None:
     """Return a length in metres: ``3.5``, ``3.5 m``, ``12 ft``, ``12'6"``; None for any other text."""
     word = (text or "").strip().lower()
-    if found := _FEET_INCHES.fullmatch(word):
-        return _number(found[1]) * FOOT + _number(found[2]) * INCH
-    found = _METRES.fullmatch(word)
-    return _number(found[1]) * _UNITS[found[2]] if found else None
+    if match := _FEET_INCHES.fullmatch(word):
+        return _number(match[1]) * FOOT + _number(match[2]) * INCH
+    match = _METRES.fullmatch(word)
+    return _number(match[1]) * _UNITS[match[2]] if match else None
 
 
 def kilometres_per_hour(text: str | None) -> tuple[float | None, str | None]:
@@ -82,8 +82,8 @@ def kilometres_per_hour(text: str | None) -> tuple[float | None, str | None]:
     ``100``, ``65 mph``, ``DE:urban``, ``none`` (no limit), ``signals``, ``variable``.
     """
     word = (text or "").strip().lower()
-    if found := _SPEED.fullmatch(word):
-        return _number(found[1]) * _PER_HOUR[found[2]], None
+    if match := _SPEED.fullmatch(word):
+        return _number(match[1]) * _PER_HOUR[match[2]], None
     if (speed := _SPEED_WORDS.get(word.rpartition(":")[2])) is not None:
         return speed, f"maxspeed={word[:40]!r} is read as {speed:g} km/h"
     return None, None

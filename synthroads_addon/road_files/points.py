@@ -97,8 +97,8 @@ def read_point_lines(path: Path) -> list[PointLine]:
             continue
         if np.abs(points[:, 0]).max() > 360.0 or np.abs(points[:, 1]).max() > 90.0:
             at = int(np.argmax(np.maximum(np.abs(points[:, 0]) / 360.0, np.abs(points[:, 1]) / 90.0)))
-            wanted = "a longitude and a latitude in degrees are needed"
-            raise InputError(f"{path.name}: {name}: point {at + 1}", points[at, :2].tolist(), wanted)
+            need = "a longitude and a latitude in degrees are needed"
+            raise InputError(f"{path.name}: {name}: point {at + 1}", points[at, :2].tolist(), need)
         source = "GPX line" if local_name(root) == "gpx" else "KML line"
         lines.append(PointLine(names.unique(name, "line"), points, bool(points[:, 2].any()), source))
     return lines

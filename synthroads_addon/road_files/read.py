@@ -122,11 +122,11 @@ def choose_line(lines: Sequence[RoadLine], wanted: str | None, file: str) -> Roa
     if not lines:
         raise InputError(file, None, _NO_LINE)
     if wanted is not None:
-        found = named_line(lines, wanted, file)
+        choice = named_line(lines, wanted, file)
     else:
         usable = [line for line in lines if line.fault is None] or list(lines)
-        found = max([line for line in usable if not line.junction] or usable, key=lambda line: line.length)
-    if found.fault is not None:
-        fault = found.fault
-        raise InputError(f"{file}: {found.name}: {fault.field}", fault.value, fault.allowed)
-    return found
+        choice = max([line for line in usable if not line.junction] or usable, key=lambda line: line.length)
+    if choice.fault is not None:
+        fault = choice.fault
+        raise InputError(f"{file}: {choice.name}: {fault.field}", fault.value, fault.allowed)
+    return choice

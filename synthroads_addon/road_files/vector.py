@@ -88,10 +88,10 @@ def _told_in_one_line(path: Path, kind: str) -> Iterator[None]:
     from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError, GeometryError
 
     try:
-        with warnings.catch_warnings(record=True) as found:
+        with warnings.catch_warnings(record=True) as records:
             warnings.simplefilter("always")
             yield
-        for text in sorted({_one_line(warning.message) for warning in found}):
+        for text in sorted({_one_line(warning.message) for warning in records}):
             if _ENDING not in text:
                 warn("%s: %s", path.name, text)
     except OSError as error:
@@ -142,9 +142,9 @@ def _lines_of(path: Path, source: Any, layer: str, kind: str) -> Iterator[tuple[
         number = row + 1 if numbers is None else int(numbers[row])
         known = given is not None and str(given).strip() not in ("", "nan")
         name = on_one_line(str(given)) if known else f"line {number}"
-        for found, fault in _line_of(f"{path.name}: {name}", shape):
-            flat = not (found.shape[1] > 2 and found[:, 2].any())
-            points = np.column_stack([found[:, :2], np.zeros(len(found)) if flat else found[:, 2]])
+        for coordinates, fault in _line_of(f"{path.name}: {name}", shape):
+            flat = not (coordinates.shape[1] > 2 and coordinates[:, 2].any())
+            points = np.column_stack([coordinates[:, :2], np.zeros(len(coordinates)) if flat else coordinates[:, 2]])
             yield name, PointLine("", points, not flat, f"{kind} line", system=system, fault=fault)
 
 

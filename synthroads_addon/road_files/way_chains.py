@@ -174,8 +174,8 @@ def _joined(ways: Sequence[OsmWay], directed: bool) -> Iterator[list[OsmWay]]:
 
 def _mostly_ahead(chain: Sequence[OsmWay], ways: Sequence[OsmWay]) -> bool:
     """Return whether most of a chain runs in the direction of its ways' nodes."""
-    own = {id(way) for way in ways}
-    return math.fsum(float(steps(way.points).sum()) * (1 if id(way) in own else -1) for way in chain) >= 0.0
+    ids = {id(way) for way in ways}
+    return math.fsum(float(steps(way.points).sum()) * (1 if id(way) in ids else -1) for way in chain) >= 0.0
 
 
 def _partners(ways: Sequence[OsmWay], directed: bool) -> dict[_End, _End]:

@@ -26,8 +26,8 @@ class _Builder(TreeBuilder):
 
 def read_xml(path: Path) -> Element:
     """Return the root of an XML file; raises what `parse_xml` does."""
-    found: Element = parse_xml(path, _Builder())
-    return found
+    root: Element = parse_xml(path, _Builder())
+    return root
 
 
 def parse_xml(path: Path, target: Any) -> Any:

@@ -39,13 +39,13 @@ def sample_landscape(site: PlacementSite) -> Landscape:
 
 
 def _villages(site: PlacementSite, rng: np.random.Generator) -> tuple[Village, ...]:
-    found = []
+    villages = []
     for _ in range(int(draw(rng, site.scenario.landscape.villages) + rng.random())):
         houses = int(draw_between(rng, _HOUSES))
         radius = round_value(0.5 * draw_between(rng, _ROOM) * math.sqrt(houses))
         x, y = _beside(site, rng, _VILLAGE_DISTANCE, radius)
-        found.append(Village(x=x, y=y, houses=houses, radius=radius))
-    return tuple(found)
+        villages.append(Village(x=x, y=y, houses=houses, radius=radius))
+    return tuple(villages)
 
 
 def _turbines(site: PlacementSite, rng: np.random.Generator) -> tuple[WindTurbine, ...]:
@@ -53,7 +53,7 @@ def _turbines(site: PlacementSite, rng: np.random.Generator) -> tuple[WindTurbin
     hub, wind = draw_between(rng, _HUBS), draw_between(rng, (200.0, 300.0))
     rotor, along = round_value(hub * draw_between(rng, _ROTORS)), draw_between(rng, (0.0, math.pi))
     x, y = _beside(site, rng, _TURBINE_DISTANCE, 0.0)
-    found = []
+    turbines = []
     for number in range(int(draw(rng, site.scenario.landscape.turbines) + rng.random())):
         aside = draw_between(rng, (-60.0, 60.0))
         place = (
@@ -68,8 +68,8 @@ def _turbines(site: PlacementSite, rng: np.random.Generator) -> tuple[WindTurbin
             azimuth_deg=wind,
             rotor_deg=draw_between(rng, (0.0, 120.0)),
         )
-        found.append(turbine)
-    return tuple(found)
+        turbines.append(turbine)
+    return tuple(turbines)
 
 
 def _beside(

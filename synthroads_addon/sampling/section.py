@@ -149,11 +149,11 @@ def features_of(scenario: RoadScenario, section: StandardCrossSection, ramps: Ra
     limits, design_class = scenario.turnouts, scenario.design_class
     taper, lane = limits.taper_length, limits.lane_length
     with_ramp = (bounds(taper, TURNOUT_TAPER), bounds(lane, TURNOUT_LANE_LENGTH[design_class]), ramps.lengths)
-    apart = INTERCHANGE_SPACING[design_class]
-    every = apart or _INTERCHANGE_EVERY
+    spacing = INTERCHANGE_SPACING[design_class]
+    every = spacing or _INTERCHANGE_EVERY
     features = [
-        Feature("exit", limits.exits, with_ramp, BLEND + STEP, apart, every),
-        Feature("entry", limits.entries, with_ramp, BLEND + STEP, apart, every),
+        Feature("exit", limits.exits, with_ramp, BLEND + STEP, spacing, every),
+        Feature("entry", limits.entries, with_ramp, BLEND + STEP, spacing, every),
     ]
     if ramps.room_for_bay:
         bay_tapers = bounds(limits.bay_taper_length, EMERGENCY_BAY_TAPER)
@@ -270,9 +270,9 @@ def lay_ramp(limits: TurnoutLimits, turnout: Turnout, road: Carriageway, rng: np
     fall, grade = (draw_between(rng, bounds(limit)) for limit in (limits.ramp_crossfall, limits.ramp_grade))
     station, percent = zip(*((point.station, point.crossfall_percent) for point in road.crossfall), strict=True)
     there = float(np.interp(TurnoutShape(turnout, road).nose_station(), station, percent))
-    wanted = -road.sign * fall
-    own = round_value(min(max(wanted, there - SHARPEST_RIDGE), there + SHARPEST_RIDGE))
-    ramp = turnout.ramp.model_copy(update={"crossfall_percent": own, "grade_percent": grade})
+    target = -road.sign * fall
+    crossfall = round_value(min(max(target, there - SHARPEST_RIDGE), there + SHARPEST_RIDGE))
+    ramp = turnout.ramp.model_copy(update={"crossfall_percent": crossfall, "grade_percent": grade})
     return turnout.model_copy(update={"ramp": ramp})
 
 

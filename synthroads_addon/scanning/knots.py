@@ -57,14 +57,14 @@ class Track:
         low, cells = first // every, last // every - first // every + 1
         before = NODES // 2 - 1
         nodes = cls._at_knots(pose, low - before, low + cells + before, spacing * every)
-        wanted = slice(first - low * every, last + 1 - low * every)
+        window = slice(first - low * every, last + 1 - low * every)
         present = np.repeat(nodes.present[before : before + cells] & nodes.present[before + 1 :][:cells], every)
         return cls(
             first * spacing,
             spacing,
-            _refine(nodes.rotation, every)[:, wanted],
-            _refine(nodes.position, every)[:, wanted],
-            present[wanted],
+            _refine(nodes.rotation, every)[:, window],
+            _refine(nodes.position, every)[:, window],
+            present[window],
         )
 
     @classmethod

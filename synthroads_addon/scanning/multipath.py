@@ -65,10 +65,10 @@ def mirrors_of(rows: Sequence[Material], films: Sequence[float]) -> Mirrors:
         films: share of each, 0 to 1, that a film of water covers.
     """
     slope = np.array([row.slope for row in rows])
-    own = np.array([row.metallic * row.reflectivity + (1.0 - row.metallic) * COATED for row in rows])
+    bare_reflectance = np.array([row.metallic * row.reflectivity + (1.0 - row.metallic) * COATED for row in rows])
     film = np.asarray(films, dtype=np.float64)
     wet = film > 0.0
-    reflectance = np.where(wet, film * WATER, np.where(slope < MATT, own, 0.0))
+    reflectance = np.where(wet, film * WATER, np.where(slope < MATT, bare_reflectance, 0.0))
     return Mirrors(reflectance, np.where(wet, FILM_SLOPE, slope))
 
 
@@ -151,8 +151,8 @@ class Multipath:
         reflectance = np.take(self.mirrors.reflectance, material)
         ray = np.flatnonzero((reflectance > 0.0) & (first.face.ravel() >= 0) & np.isfinite(first.distance.ravel()))
         cosine = np.minimum(np.abs(np.take(first.along, ray)), 1.0)
-        own = np.take(np.broadcast_to(traced.rays.share, first.face.shape), ray)
-        share = own * self.strength * mirrored_share(reflectance[ray], cosine) ** 2
+        ray_share = np.take(np.broadcast_to(traced.rays.share, first.face.shape), ray)
+        share = ray_share * self.strength * mirrored_share(reflectance[ray], cosine) ** 2
         brightest = BRIGHTEST if surfaces.retroreflective else 1.0
         faintest = PROVISIONAL_THRESHOLD * setting.threshold * np.take(first.distance, ray) ** 2
         seen = np.flatnonzero(share * brightest > faintest)

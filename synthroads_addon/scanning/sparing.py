@@ -111,11 +111,11 @@ class Sparing:
         place = np.take(pulses.origin, rows, axis=1) + distance * direction
         whole, alone = ground.check_footprints(face, place, (spans[0], spans[1]), -direction)
         material = np.take(plan.target.material, face).astype(np.intp)
-        found = SparedPulses(rows, face, material, distance, along, steepness, alone & whole)
-        found = found.select(np.flatnonzero(whole & inside))
+        candidates = SparedPulses(rows, face, material, distance, along, steepness, alone & whole)
+        candidates = candidates.select(np.flatnonzero(whole & inside))
         if plan.target.moving:
-            found = found.select(np.flatnonzero(~self._near_traffic(found, pulses, motions)))
-        return self._unblocked(found, pulses)
+            candidates = candidates.select(np.flatnonzero(~self._near_traffic(candidates, pulses, motions)))
+        return self._unblocked(candidates, pulses)
 
     def find_missing(self, pulses: Pulses, met: FirstHits, motions: list[Track]) -> Index:
         """Return the pulses whose whole beam passes by everything, of those whose axis meets nothing."""

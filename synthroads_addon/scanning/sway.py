@@ -116,8 +116,8 @@ def _calmness(motion: Motion, order: int) -> float:
 
     if exponent == 0.0 or low == high:
         return 1.0
-    own = mean_power(2.0 * (exponent - order)) / mean_power(2.0 * exponent)
-    return min(1.0, math.sqrt(own * mean_power(0.0) / mean_power(-2.0 * order)))
+    power_ratio = mean_power(2.0 * (exponent - order)) / mean_power(2.0 * exponent)
+    return min(1.0, math.sqrt(power_ratio * mean_power(0.0) / mean_power(-2.0 * order)))
 
 
 def sway_offsets(motion: Motion, seed: int, strip: int, time: Float) -> tuple[Float, Float]:

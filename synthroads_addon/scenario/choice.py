@@ -7,8 +7,8 @@ from .scenario import OF_POINTS, Scenario
 
 def has_kind(scenario: Scenario, kind: str) -> bool:
     """Return whether a job's points have what an error is of: colours ("colour") or material layers ("layers")."""
-    wanted = scenario.coloured_layers
-    return "rgb" in wanted if kind == "colour" else bool(set(MATERIAL_LAYERS) & wanted)
+    layers = scenario.coloured_layers
+    return "rgb" in layers if kind == "colour" else bool(set(MATERIAL_LAYERS) & layers)
 
 
 def check_choice(scenario: Scenario, foreign: bool = False) -> None:

@@ -127,8 +127,8 @@ class Scenario(ClosedModel):
     @property
     def beam_rings(self) -> tuple[int, ...]:
         """Return the number of rays on each ring around the beam's axis: the scenario's, else the fidelity's."""
-        own = self.scan.beam_rings
-        return RINGS[self.settings().rays_per_pulse] if own is None else own
+        rings = self.scan.beam_rings
+        return RINGS[self.settings().rays_per_pulse] if rings is None else rings
 
     @property
     def kept_layers(self) -> frozenset[str]:

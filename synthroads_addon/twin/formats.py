@@ -195,14 +195,19 @@ def write_twin(
         ['twin-geojson-report.json', 'twin-opendrive-report.json', 'twin.geojson', 'twin.xodr']
     """
     check_formats(formats)
-    total, done = sum(FORMATS[name].seconds for name in formats), 0.0
+    # Progress is the share of the seconds that the formats usually take.
+    total = sum(FORMATS[name].seconds for name in formats)
+    start = 0.0
     for name in formats:
-        progress(FORMATS[name].label, done / total)
-        part = part_of(progress, done / total, (done := done + FORMATS[name].seconds) / total)
-        file_name = FORMATS[name].file
-        writer: _Writer = getattr(import_module(FORMATS[name].module, __package__), f"write_{name}")
-        further: dict[str, Any] = (ifc or IfcSettings()).to_dict() | {"progress": part} if name == "ifc" else {}
-        if name == "opendrive":
-            further = {"local_projection": local_projection}
-        trace = writer(parameters, folder / file_name, tolerance, **further)
-        trace.write(folder / report_file_name(name), name, file_name)
+        entry = FORMATS[name]
+        end = start + entry.seconds
+        progress(entry.label, start / total)
+        settings: dict[str, Any] = {}
+        if name == "ifc":
+            settings = (ifc or IfcSettings()).to_dict() | {"progress": part_of(progress, start / total, end / total)}
+        elif name == "opendrive":
+            settings = {"local_projection": local_projection}
+        writer: _Writer = getattr(import_module(entry.module, __package__), f"write_{name}")
+        trace = writer(parameters, folder / entry.file, tolerance, **settings)
+        trace.write(folder / report_file_name(name), name, entry.file)
+        start = end

@@ -45,7 +45,7 @@ class Refinement(nn.Module):
         self.register_buffer("places", self.spacing * (torch.arange(cells) + 0.5) - reach, persistent=False)
         self.first = nn.Linear(inputs + 2, width)
         along = 5 if slices > 1 else 1
-        self.grid = nn.ModuleList(GridConvolution(width, along, 5, apart) for apart in _APART)
+        self.grid = nn.ModuleList(GridConvolution(width, along, 5, dilation) for dilation in _APART)
         self.local = nn.Linear(width, width)
         self.context = nn.Linear(context, width)
         self.where = nn.Sequential(nn.GELU(), nn.Linear(width, 2))

@@ -354,8 +354,8 @@ def _code(part: CRS) -> int | None:
     """Return the EPSG code of one part of a system: the one it names if that means the same, else one that does."""
     named = part.to_json_dict().get("id", {})
     codes = [int(named["code"])] if named.get("authority") == "EPSG" else []
-    found = part.to_epsg()
-    codes += [found] if found else []
+    epsg = part.to_epsg()
+    codes += [epsg] if epsg else []
     return next((code for code in codes if _means(part, code)), None)
 
 
@@ -370,8 +370,8 @@ def _means(part: CRS, code: int) -> bool:
         return False
     if part.equals(known, ignore_axis_order=True):
         return True
-    own, its = ([axis.unit_conversion_factor for axis in crs.axis_info] for crs in (part, known))
-    if part.type_name != known.type_name or not np.allclose(own, its, rtol=_SAME_UNIT, atol=0.0):
+    factors, its = ([axis.unit_conversion_factor for axis in crs.axis_info] for crs in (part, known))
+    if part.type_name != known.type_name or not np.allclose(factors, its, rtol=_SAME_UNIT, atol=0.0):
         return False
     if part.is_vertical:
         return bool(part.name == known.name or part.to_epsg() == code)
@@ -425,8 +425,12 @@ def _with_units(system: MapSystem, unit: float | None, height_unit: float | None
         units = (unit, height_unit)
         parts = [part if new is None else _with_unit(part, new) for part, new in zip(parts, units, strict=False)]
     if len(parts) == 1:
-        found = _read(_json(parts[0]))
-        return found if height_unit in (None, 1.0) or found.height_unit else replace(found, height_unit=height_unit)
+        base_system = _read(_json(parts[0]))
+        return (
+            base_system
+            if height_unit in (None, 1.0) or base_system.height_unit
+            else replace(base_system, height_unit=height_unit)
+        )
     from pyproj.crs import CompoundCRS  # takes a fifth of a second, and few commands need it
 
     return _read(_json(CompoundCRS(" + ".join(part.name for part in parts), parts)))

@@ -124,11 +124,11 @@ def geojson_system(name: str, document: Any) -> MapSystem | None:
     Raises:
         InputError: a member names no system that is known, or two name different ones.
     """
-    found = [_system_of_member(name, member) for member in _members(document)]
-    for other in found[1:]:
-        if other.label != found[0].label:
-            raise InputError(f"{name} crs", other.label, f"one system is needed, {found[0].label} is named as well")
-    return found[0] if found else None
+    systems = [_system_of_member(name, member) for member in _members(document)]
+    for other in systems[1:]:
+        if other.label != systems[0].label:
+            raise InputError(f"{name} crs", other.label, f"one system is needed, {systems[0].label} is named as well")
+    return systems[0] if systems else None
 
 
 def _members(node: Any) -> Iterator[Any]:
@@ -171,13 +171,17 @@ def _metres_without_target(name: str, points: Float, source: MapSystem) -> Float
 
 def _check_heights_alike(name: str, source: MapSystem, system: MapSystem) -> None:
     """Raise `InputError` if heights are counted from two different surfaces; log it where only one is known."""
-    own = "the ellipsoid" if source.ellipsoidal else f"EPSG:{source.height_epsg}" if source.height_epsg else None
-    if own is None:
+    height_surface = (
+        "the ellipsoid" if source.ellipsoidal else f"EPSG:{source.height_epsg}" if source.height_epsg else None
+    )
+    if height_surface is None:
         return
     known = source if source.unit is None else source.metric()
     if system.height_epsg and (source.ellipsoidal or known.height_epsg != system.height_epsg):
         allowed = f"EPSG:{system.height_epsg} is needed: heights can't be converted from one to the other"
-        raise InputError(f"{name}: heights", f"counted from {own}" if source.ellipsoidal else own, allowed)
+        raise InputError(
+            f"{name}: heights", f"counted from {height_surface}" if source.ellipsoidal else height_surface, allowed
+        )
     if source.ellipsoidal:
         warn("%s has ellipsoidal heights: they are kept as they are", name)
 

@@ -92,6 +92,8 @@ def _refuse_contradiction(text: str, kept: dict[str, str]) -> None:
     meridian = _ZONE_WIDTH * float(kept["zone"]) - 183.0
     away = abs((float(kept["lon_0"]) - meridian + 180.0) % 360.0 - 180.0)
     if away > 0.5 * _ZONE_WIDTH:
-        wanted = f"contradicts itself: the meridian of zone {kept['zone']} is {meridian:g}, {away:.0f} degrees away"
-        raise UnknownSystemError("coordinate system", text[:80], wanted)
+        contradiction = (
+            f"contradicts itself: the meridian of zone {kept['zone']} is {meridian:g}, {away:.0f} degrees away"
+        )
+        raise UnknownSystemError("coordinate system", text[:80], contradiction)
     warn("lon_0 and lat_0 beside a zone of UTM mean nothing and are ignored")

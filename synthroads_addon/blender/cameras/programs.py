@@ -133,11 +133,11 @@ def material_work(
     compiled, copies = CompiledMaterials.of(kernels), dict[int, ReadingCopy]()
     with ExitStack() as stack:
         for index, item in items.items():
-            with ExitStack() as own:
-                copy = own.enter_context(reading_copy(item, layers))
+            with ExitStack() as copy_stack:
+                copy = copy_stack.enter_context(reading_copy(item, layers))
                 if not compiled.compile(index, copy, layers):
                     copies[index] = copy
-                    stack.push(own.pop_all())
+                    stack.push(copy_stack.pop_all())
         calculators: list[LayerCalculator] = []
         if (programs := compiled.calculator(sorted(items), layers)) is not None:
             calculators.append(programs)

@@ -58,11 +58,11 @@ class MaterialSnapshot:
             for index, item in items.items():
                 if index in self.obstacles:
                     continue
-                with ExitStack() as own:
-                    copy = own.enter_context(reading_copy(item, tuple(MATERIAL_LAYERS)))
+                with ExitStack() as copy_stack:
+                    copy = copy_stack.enter_context(reading_copy(item, tuple(MATERIAL_LAYERS)))
                     if not self.compiled.compile(index, copy, tuple(MATERIAL_LAYERS)):
                         copies[index] = copy
-                        stack.push(own.pop_all())
+                        stack.push(copy_stack.pop_all())
             for index, copy in copies.items():
                 self._names[index] = copy.item.name
                 self._inputs[index] = frozenset(what for what, _ in copy.readers)
@@ -87,9 +87,9 @@ class MaterialSnapshot:
     def loaded(self, materials: Sequence[int]) -> Iterator[dict[int, ReadingCopy]]:
         """Yield the copies of materials, by index; afterwards they are gone again. In Blender's main thread."""
         # Not linked: what is linked can't show images of this file.
-        with bpy.data.libraries.load(str(self._path), link=False) as (_, wanted):
-            wanted.materials = [self._names[index] for index in materials]
-        items = list(wanted.materials)
+        with bpy.data.libraries.load(str(self._path), link=False) as (_, target):
+            target.materials = [self._names[index] for index in materials]
+        items = list(target.materials)
         trees = [tree for item in items for tree in _groups_below(item.node_tree)]
         try:
             yield {index: _loaded_copy(item) for index, item in zip(materials, items, strict=True)}

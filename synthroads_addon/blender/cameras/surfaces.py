@@ -39,21 +39,21 @@ def varying_materials_by_layer(names: Sequence[str]) -> dict[str, Bool]:
 
 def normal_images(names: Sequence[str]) -> dict[int, NormalImage]:
     """Return the normal images of a road's textures on the named materials, by the material's index."""
-    found = {}
+    normals = {}
     for index, item in numbered_materials(names):
         if NORMAL_IMAGE in item:
             tile, along = item[NORMAL_IMAGE]
             nodes = item.node_tree.nodes if item.node_tree else ()
             images = [node.image for node in nodes if node.type == "TEX_IMAGE" and is_normal_image(node.image)]
             if images:
-                found[index] = NormalImage.of(linear_pixels(images[0]), tile, bool(along))
-    return found
+                normals[index] = NormalImage.of(linear_pixels(images[0]), tile, bool(along))
+    return normals
 
 
 def transparencies(names: Sequence[str]) -> dict[int, Transparency]:
     """Return the light that the named materials let through at each place, by the material's index."""
     read = {index: read_transparency(item).transparency for index, item in numbered_materials(names)}
-    return {index: found for index, found in read.items() if found is not None}
+    return {index: transparency for index, transparency in read.items() if transparency is not None}
 
 
 @contextmanager
@@ -93,9 +93,9 @@ def prepared_materials(names: Sequence[str], layers: Sequence[str], numbers: boo
 def add_layer_outputs(item: bpy.types.Material, layers: Sequence[str], nodes: LayerNodes) -> None:
     """Add AOV outputs to a material for the layers that vary on it and lack one; `nodes` keeps what was added."""
     expressions = layer_expressions(item)
-    own = {node.aov_name for node in item.node_tree.nodes if node.type == "OUTPUT_AOV"}
+    outputs = {node.aov_name for node in item.node_tree.nodes if node.type == "OUTPUT_AOV"}
     for layer in layers:
-        if layer in expressions and layer not in own and varies(expressions[layer]):
+        if layer in expressions and layer not in outputs and varies(expressions[layer]):
             nodes.add_output(layer, expressions[layer])
 
 

@@ -198,7 +198,7 @@ def _principled(name: str) -> Material:
     item = bpy.data.materials.get(name)
     if item is None:
         return materials()[UNKNOWN]
-    means = {layer: mean_value(found) for layer, found in layer_expressions(item).items()}
+    means = {layer: mean_value(expression) for layer, expression in layer_expressions(item).items()}
     nodes = item.node_tree.nodes if item.node_tree else ()
     node = next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)
     red, green, blue = (share(part) for part in means.get("base_color", item.diffuse_color[:3]))
@@ -208,7 +208,8 @@ def _principled(name: str) -> Material:
     if glass:  # what a pane reflects is not its colour, which tints what passes
         pane = materials()["glass"]
         red, green, blue = (
-            part + glass * (own - part) for part, own in zip((red, green, blue), pane.base_color, strict=True)
+            part + glass * (pane_color - part)
+            for part, pane_color in zip((red, green, blue), pane.base_color, strict=True)
         )
         specular += glass * (pane.specular - specular)
     return Material(

@@ -68,8 +68,8 @@ class FieldReader:
         value = getattr(source.entry, "default_value", None)
         if value is None or isinstance(value, str):
             raise UnevaluatedError(f"{source.entry.node.bl_rna.name}: {source.entry.name}")
-        own = constant(*map(float, value)) if hasattr(value, "__len__") else constant(float(value))
-        return _converted(own, source.entry.type, socket.type)
+        constant_field = constant(*map(float, value)) if hasattr(value, "__len__") else constant(float(value))
+        return _converted(constant_field, source.entry.type, socket.type)
 
     def number(self, node: bpy.types.Node, name: str | int, path: Path) -> Callable[[Values], Float]:
         """Return an input of a node, by its name or number, as numbers (N,)."""
@@ -211,9 +211,11 @@ def _image(reader: FieldReader, node: Any, socket: Any, path: Path) -> Field:
 def _lookup(planes: PixelPlane, place: Field, interpolation: str, extension: str) -> Field:
     def read(values: Values) -> Float:
         at = place(values)
-        found = functions.sample_image(planes, at[:, 0], at[:, 1], interpolation, extension)
+        pixels = functions.sample_image(planes, at[:, 0], at[:, 1], interpolation, extension)
         return (
-            functions.grey(found[:, 0]) if found.shape[1] == 1 else np.pad(found, ((0, 0), (0, 1)), constant_values=1)
+            functions.grey(pixels[:, 0])
+            if pixels.shape[1] == 1
+            else np.pad(pixels, ((0, 0), (0, 1)), constant_values=1)
         )
 
     return read
@@ -303,8 +305,8 @@ def _curve(reader: FieldReader, node: Any, socket: Any, path: Path) -> Field:
     factor, value = reader.number(node, "Factor", path), reader.number(node, "Value", path)
 
     def read(values: Values) -> Float:
-        own = value(values)
-        return functions.grey(own + factor(values) * (np.interp(own, at, table) - own))
+        base = value(values)
+        return functions.grey(base + factor(values) * (np.interp(base, at, table) - base))
 
     return read
 
@@ -314,8 +316,8 @@ def _invert(reader: FieldReader, node: Any, socket: Any, path: Path) -> Field:
     factor, color = reader.entry(node.inputs[0], path), reader.entry(node.inputs[1], path)
 
     def read(values: Values) -> Float:
-        share, own = factor(values), color(values)
-        return np.asarray(own + share * (1.0 - 2.0 * own))
+        share, base = factor(values), color(values)
+        return np.asarray(base + share * (1.0 - 2.0 * base))
 
     return read
 
@@ -380,9 +382,9 @@ def _gamma(reader: FieldReader, node: Any, socket: Any, path: Path) -> Field:
     color, gamma = reader.entry(node.inputs[0], path), reader.entry(node.inputs[1], path)
 
     def read(values: Values) -> Float:
-        own = color(values)
+        base = color(values)
         with np.errstate(all="ignore"):
-            return np.asarray(np.where(own > 0.0, np.maximum(own, 0.0) ** gamma(values), own))
+            return np.asarray(np.where(base > 0.0, np.maximum(base, 0.0) ** gamma(values), base))
 
     return read
 
@@ -408,8 +410,8 @@ def _mapping(reader: FieldReader, node: Any, socket: Any, path: Path) -> Field:
 
     def read(values: Values) -> Float:
         move = shift[0](values)[:, :3] if shift else 0.0
-        own = (vector(values)[:, :3], rotation(values)[:, :3], scale(values)[:, :3])
-        return np.pad(functions.mapped(kind == "TEXTURE", *own, move), ((0, 0), (0, 1)))
+        vectors = (vector(values)[:, :3], rotation(values)[:, :3], scale(values)[:, :3])
+        return np.pad(functions.mapped(kind == "TEXTURE", *vectors, move), ((0, 0), (0, 1)))
 
     return read
 

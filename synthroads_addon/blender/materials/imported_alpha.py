@@ -53,7 +53,7 @@ def _transparencies(path: Path) -> Iterator[tuple[str, float]]:
             lines = (path.parent / name.replace("\\", "/")).read_text(encoding="utf-8", errors="replace").splitlines()
         except OSError:
             continue
-        material, found, solid = "", dict[str, float](), set[str]()
+        material, shares, solid = "", dict[str, float](), set[str]()
         for words in (line.split() for line in lines):
             if len(words) < 2:
                 continue
@@ -63,7 +63,7 @@ def _transparencies(path: Path) -> Iterator[tuple[str, float]]:
                 solid.add(material)
             elif words[0] == "Tr":
                 try:
-                    found[material] = min(1.0, max(0.0, float(words[1])))
+                    shares[material] = min(1.0, max(0.0, float(words[1])))
                 except ValueError:
                     continue
-        yield from ((name, share) for name, share in found.items() if name not in solid)
+        yield from ((name, share) for name, share in shares.items() if name not in solid)

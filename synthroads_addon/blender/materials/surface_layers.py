@@ -87,9 +87,9 @@ def layer_expressions(item: bpy.types.Material) -> dict[str, Expression]:
         return layers
     surface = entry.links[0].from_socket
     for name in ("base_color", "roughness", "metallic"):
-        found = _of_shader(surface, (), name)
-        if found is not None:
-            layers.setdefault(name, found)
+        expression = _of_shader(surface, (), name)
+        if expression is not None:
+            layers.setdefault(name, expression)
     return layers
 
 

@@ -53,12 +53,17 @@ class Texture:
         return table.model_copy(update=update | ({"base_color": means["base_color"]} if "base_color" in means else {}))
 
     def factors(self, table: Material, varied: Material) -> dict[str, float | tuple[float, float, float]]:
-        """Return by what each layer's image is multiplied so that its mean is that of the road's varied material."""
-        entry = self.entry(table)
+        """Return by what each layer's image is multiplied so that its mean is that of the road's varied material.
+
+        Args:
+            table: the material as the table has it.
+            varied: the material with the road's age and wetness.
+        """
+        image_means = self.entry(table)
         factors: dict[str, float | tuple[float, float, float]] = {
-            name: _ratio(getattr(varied, name), getattr(entry, name)) for name in _NUMBERS
+            name: _ratio(getattr(varied, name), getattr(image_means, name)) for name in _NUMBERS
         }
-        red, green, blue = map(_ratio, varied.base_color, entry.base_color)
+        red, green, blue = map(_ratio, varied.base_color, image_means.base_color)
         return factors | {"base_color": (red, green, blue)}
 
 
@@ -108,12 +113,12 @@ def _ratio(value: float, mean: float) -> float:
 def _kept_images(folder: str) -> dict[str, bpy.types.Image]:
     """Return the file's images that were read from a folder, by layer."""
     place = Path(folder).absolute()
-    found = {
+    images = {
         Path(image[SOURCE]).stem.lower(): image
         for image in bpy.data.images
         if SOURCE in image and Path(image[SOURCE]).parent == place and image.library is None
     }
-    return dict(sorted(found.items()))
+    return dict(sorted(images.items()))
 
 
 def _image(path: Path, name: str, layer: str) -> bpy.types.Image:

@@ -100,10 +100,10 @@ def _added(reader: FieldReader, node: bpy.types.Node, path: Path) -> Share | Non
         glows = output is None or output.node.type == "EMISSION"
         parts.append((glows, None if glows else _of_entry(reader, entry, path)))
     shares = [share for glows, share in parts if not glows]
-    found = [share for share in shares if share is not None]
-    if not found:
+    terms = [share for share in shares if share is not None]
+    if not terms:
         return None
-    return lambda values: np.asarray(sum(share(values) for share in found) / len(shares))
+    return lambda values: np.asarray(sum(share(values) for share in terms) / len(shares))
 
 
 def _principled(reader: FieldReader, node: bpy.types.Node, path: Path) -> Share | None:

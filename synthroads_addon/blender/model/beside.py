@@ -29,14 +29,14 @@ def move_beside(root: bpy.types.Object, layer: bpy.types.ViewLayer) -> None:
     """
     layer.update()
     visible = [item for item in layer.objects if item.type in _SOLID and item.visible_get(view_layer=layer)]
-    own = [item for item in visible if root_above(item) == root]
+    parts = [item for item in visible if root_above(item) == root]
     others = [item for item in visible if root_above(item) != root]
-    if not own or not others:
+    if not parts or not others:
         return
     angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
     graph = layer.depsgraph
-    reach = _reach(own, directions, graph)
+    reach = _reach(parts, directions, graph)
     opposite = np.roll(reach, _DIRECTIONS // 2)  # of the road, against each direction
     there = _reach(others, directions, graph)
     overlap = there + opposite

@@ -157,8 +157,8 @@ def line_update(axes: RoadAxes, item: LineObject, part: bpy.types.Object, place:
     end = min(item.end_station, axes.now.length)
     middle, offset = (item.start_station + end) / 2.0, item.offset
     there = axes.now.alignment.place(np.array([middle]), np.array([offset]))[0]
-    found = axes.now.alignment.project((there + shift)[None])
-    along, across = float(found[0][0]) - middle, float(found[1][0]) - offset
+    projection = axes.now.alignment.project((there + shift)[None])
+    along, across = float(projection[0][0]) - middle, float(projection[1][0]) - offset
     if abs(offset + across) > 100.0:
         raise Lost(f"it stands {abs(offset + across):.0f} m beside the axis")
     along = float(np.clip(along, -item.start_station, max(axes.now.length - end, 0.0)))

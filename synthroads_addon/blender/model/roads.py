@@ -58,8 +58,8 @@ def is_root(item: bpy.types.Object) -> bool:
 
 def roots(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """Return the root objects of a scene's completely built roads, sorted by name."""
-    found = [item for item in scene.objects if is_root(item) and FRAME in item]
-    return sorted(found, key=lambda item: item.name_full)
+    items = [item for item in scene.objects if is_root(item) and FRAME in item]
+    return sorted(items, key=lambda item: item.name_full)
 
 
 def library_of(root: bpy.types.Object) -> str:
@@ -103,8 +103,8 @@ def parts_and_copies(
 
 def has_parts(root: bpy.types.Object, scene: bpy.types.Scene) -> bool:
     """Return whether a road still has any part in a scene; stops at the first, as panels ask at each drawing."""
-    found = roots(scene)
-    return any(ROLE in item and OF_ROAD in item and _belongs(item, root, found) for item in scene.objects)
+    road_roots = roots(scene)
+    return any(ROLE in item and OF_ROAD in item and _belongs(item, root, road_roots) for item in scene.objects)
 
 
 def _belongs(item: bpy.types.Object, root: bpy.types.Object, scene_roots: list[bpy.types.Object]) -> bool:
@@ -124,14 +124,14 @@ def road_meant(scene: bpy.types.Scene) -> bpy.types.Object | None:
 
     It is the active object's; else the only one; else the chosen one, see `choose_road`; else the first by name.
     """
-    found = roots(scene)
-    if len(found) < 2:
-        return found[0] if found else None
+    road_roots = roots(scene)
+    if len(road_roots) < 2:
+        return road_roots[0] if road_roots else None
     layer = bpy.context.view_layer if scene == bpy.context.scene else scene.view_layers[0]
     active = layer.objects.active
     meant = root_of(active, scene) if active is not None else None
     chosen = scene.get(CHOSEN)
-    return next((root for root in (meant, chosen) if root in found), found[0])
+    return next((root for root in (meant, chosen) if root in road_roots), road_roots[0])
 
 
 def road_of_id(scene: bpy.types.Scene, road: str) -> bpy.types.Object | None:
@@ -187,9 +187,9 @@ def place_root(root: bpy.types.Object, frame: NDArray[np.float64], scene: bpy.ty
     root[ORIGIN], root[FRAME] = [float(value) for value in origin], [float(value) for value in frame]
     place = np.eye(4)
     place[:3, 3] = frame - origin
-    wanted = moved @ place if keep else place
-    if not np.array_equal(wanted, np.array(root.matrix_world)):
-        root.matrix_world = Matrix(wanted.tolist())  # of plain lists Blender takes rows for columns
+    matrix = moved @ place if keep else place
+    if not np.array_equal(matrix, np.array(root.matrix_world)):
+        root.matrix_world = Matrix(matrix.tolist())  # of plain lists Blender takes rows for columns
 
 
 def displacement(root: bpy.types.Object) -> NDArray[np.float64]:
@@ -207,7 +207,7 @@ def world_matrix(item: bpy.types.Object) -> NDArray[np.float64]:
     deltas = (*item.delta_location, *item.delta_rotation_euler, *(factor - 1.0 for factor in item.delta_scale))
     if item.constraints or any(deltas) or (item.parent is not None and item.parent_type != "OBJECT"):
         return np.array(item.matrix_world, dtype=np.float64)
-    own = np.array(item.matrix_basis, dtype=np.float64)
+    basis = np.array(item.matrix_basis, dtype=np.float64)
     if item.parent is None:
-        return own
-    return world_matrix(item.parent) @ np.array(item.matrix_parent_inverse, dtype=np.float64) @ own
+        return basis
+    return world_matrix(item.parent) @ np.array(item.matrix_parent_inverse, dtype=np.float64) @ basis

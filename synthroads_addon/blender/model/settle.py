@@ -42,7 +42,7 @@ def settle_steps(road: str, edited: EditedRoad) -> Generator[float | None, None,
     root = road_of_id(scene, road)
     assert root is not None
     _, scenario = recall(root)
-    built_from, found, settings = str(root.get(BUILT_FROM, "")), str(root.get(FOUND, "")), scenario.settings()
+    built_from, reconstruction, settings = str(root.get(BUILT_FROM, "")), str(root.get(FOUND, "")), scenario.settings()
     parts, copies = parts_and_copies(root, scene)
     names = {item.name for item in (*parts.values(), *copies)}
     kept = {edit.name: edit for edit in edited.by_hand if edit.name in names}
@@ -51,7 +51,7 @@ def settle_steps(road: str, edited: EditedRoad) -> Generator[float | None, None,
     model = yield from build_steps(BuildRequest(parameters, settings.tolerance, settings.vegetation_detail), place)
     for name, edit in kept.items():
         _hand_over(bpy.data.objects[name], edit.part, edit.reason)
-    remember(model.root, parameters, scenario, built_from, found)
+    remember(model.root, parameters, scenario, built_from, reconstruction)
     return model
 
 

@@ -271,14 +271,14 @@ class _Reading:
 
     def _without_face(self, fine: dict[str, bpy.types.Object], gone: set[str]) -> set[str]:
         """Return the ids of gantries with a deleted or edited sign face, adding each to `by_hand`."""
-        found: set[str] = set()
+        ids: set[str] = set()
         for role in [*self._built_roles(), *self._parts]:
             owner = role.partition("/")[0]
-            if "/" in role and role not in fine and owner in fine and owner not in gone | found:
-                found.add(owner)
+            if "/" in role and role not in fine and owner in fine and owner not in gone | ids:
+                ids.add(owner)
                 done = "edited" if role in self._parts else "deleted"
                 self.by_hand.append(HandEdit(owner, fine[owner].name, f"{role} was {done}"))
-        return found
+        return ids
 
     def _updated(
         self, item: RoadObject, before: RoadObject, part: bpy.types.Object, axes: RoadAxes
@@ -319,7 +319,7 @@ class _Reading:
         self, parameters: RoadParameters, objects: dict[str, RoadObject], axes: RoadAxes
     ) -> dict[str, RoadObject]:
         """Return the user's copies of parts as new road objects by new ids, with new instance numbers."""
-        found: dict[str, RoadObject] = {}
+        copies: dict[str, RoadObject] = {}
         largest = max(item.instance for item in self._base.objects.values())
         for copy in sorted(self._copies, key=lambda item: item.name_full):
             role = role_of(copy)
@@ -336,10 +336,10 @@ class _Reading:
             updated = self._updated(item, before, copy, axes)
             if updated is None:
                 continue
-            name = _free_name(role, {*self._base.objects, *found})
-            found[name] = updated.model_copy(update={"instance": largest + 1 + len(found)})
+            name = _free_name(role, {*self._base.objects, *copies})
+            copies[name] = updated.model_copy(update={"instance": largest + 1 + len(copies)})
             self.stale.append(f"{copy.name} is a copy")
-        return found
+        return copies
 
     def _placed(self, parameters: RoadParameters) -> RoadParameters:
         """Return the parameter set with the transform and alignment moved and turned as the user moved its root."""

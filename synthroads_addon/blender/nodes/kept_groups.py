@@ -91,9 +91,9 @@ def keep_groups() -> None:
     _read(file, {key: name for kept in roads[1:] for key, name in kept.items()})
     groups = {group[KEY]: group for group in bpy.data.node_groups if KEY in group}
     roads = [{key: groups[key].name for key in kept} for kept in roads if kept.keys() <= groups.keys()]
-    wanted = {groups[key] for kept in roads for key in kept}
+    contents = {groups[key] for kept in roads for key in kept}
     with suppress(OSError, RuntimeError):
-        _write(file, wanted, roads)
+        _write(file, contents, roads)
 
 
 def _write(file: Path, groups: set[bpy.types.NodeTree], roads: list[dict[str, str]]) -> None:

@@ -58,15 +58,15 @@ class LeftOut:
 
     def warnings(self, layer: bpy.types.ViewLayer) -> tuple[str, ...]:
         """Return all that was found as sentences, and what the materials in use declare in vain."""
-        found = [
+        sentences = [
             f"{names_of(names)}: {kind} can't be scanned, as there are no faces"
             for kind, names in sorted(self._without_faces.items())
         ]
         if self._holdouts:
-            found.append(f"{names_of(self._holdouts)}: is a holdout, and is scanned as the solid that it is")
+            sentences.append(f"{names_of(self._holdouts)}: is a holdout, and is scanned as the solid that it is")
         if layer.material_override is not None:
-            found.append(f"the view layer's material override {layer.material_override.name!r} isn't looked at")
-        return (*found, *material_warnings(self.users))
+            sentences.append(f"the view layer's material override {layer.material_override.name!r} isn't looked at")
+        return (*sentences, *material_warnings(self.users))
 
 
 def material_warnings(users: Mapping[str, Collection[str]]) -> list[str]:

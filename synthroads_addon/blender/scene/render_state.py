@@ -113,13 +113,13 @@ class _Hidden:
 
     def hide(self) -> None:
         """Hide it again."""
-        found = self.layer.objects.get(self.name)
-        if found is not None and found.library != self.library:
-            found = next(
+        item = self.layer.objects.get(self.name)
+        if item is not None and item.library != self.library:
+            item = next(
                 (one for one in self.layer.objects if (one.name, one.library) == (self.name, self.library)), None
             )
-        if found is not None:
-            found.hide_set(True, view_layer=self.layer)
+        if item is not None:
+            item.hide_set(True, view_layer=self.layer)
 
 
 def _settings(scene: bpy.types.Scene) -> Iterator[_Setting]:

@@ -55,7 +55,7 @@ def unlabelled_things(mapping: ClassMapping | None, class_ids: Mapping[str, int]
     """
     depsgraph = bpy.context.evaluated_depsgraph_get()
     labels = Labels(depsgraph.scene, mapping, class_ids)
-    found: dict[str, set[str]] = {kind: set() for kind in KINDS}
+    patterns: dict[str, set[str]] = {kind: set() for kind in KINDS}
     bare: set[bpy.types.Object] = set()
     uses = ((use.object, use.parent if use.is_instance else use.object) for use in depsgraph.object_instances)
     seen: set[tuple[bpy.types.Object, bpy.types.Object]] = set()
@@ -69,11 +69,13 @@ def unlabelled_things(mapping: ClassMapping | None, class_ids: Mapping[str, int]
         if label.strong >= 0 or label.weak != UNLABELLED or "class_id" in shown.data.attributes or not slots:
             continue
         bare.add(item)
-        found["objects"].add(_pattern(item.name))
-        found["materials"] |= {_pattern(name) for name in slots if bpy.data.materials.get(name)}
+        patterns["objects"].add(_pattern(item.name))
+        patterns["materials"] |= {_pattern(name) for name in slots if bpy.data.materials.get(name)}
         inside = [part.name for part in item.users_collection]
-        found["collections"] |= {escape(name) for name in inside if name in bpy.data.collections}
-    return Unlabelled({kind: tuple(sorted(found[kind])) for kind in KINDS}, len(bare), len({item for item, _ in seen}))
+        patterns["collections"] |= {escape(name) for name in inside if name in bpy.data.collections}
+    return Unlabelled(
+        {kind: tuple(sorted(patterns[kind])) for kind in KINDS}, len(bare), len({item for item, _ in seen})
+    )
 
 
 def _pattern(name: str) -> str:

@@ -62,9 +62,9 @@ def _say(line: str) -> None:
 
 def try_file(path: str, importer: str, folders: list[str]) -> None:
     """Import a file, or print what it names outside of some folders."""
-    found = address_outside(path, folders)
-    if found is not None:
-        _say(OUTSIDE + json.dumps(found))
+    address = address_outside(path, folders)
+    if address is not None:
+        _say(OUTSIDE + json.dumps(address))
         return
     _say(INSIDE)
     module, name = importer.split(".")

@@ -54,9 +54,9 @@ def mesh_values(
     """
     values = {}
     for what in sorted(asked):
-        found = _mesh_value(mesh, what, undeformed)
-        if found is not None:
-            values[what] = found
+        value = _mesh_value(mesh, what, undeformed)
+        if value is not None:
+            values[what] = value
     return values
 
 

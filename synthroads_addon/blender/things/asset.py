@@ -126,18 +126,18 @@ def _shown_in(path: Path) -> tuple[dict[str, bool], float]:
     libraries, scenes = set(bpy.data.libraries), set(bpy.data.scenes)
     with being_opened(path), bpy.data.libraries.load(str(path), link=True) as (there, here):
         here.scenes = list(there.scenes)
-    found = [scene for scene in here.scenes if scene is not None]
+    file_scenes = [scene for scene in here.scenes if scene is not None]
     try:
         shown: dict[str, bool] = {}
-        for scene in found:
+        for scene in file_scenes:
             rendered = {item.name for layer in scene.view_layers for item in rendered_objects(layer.layer_collection)}
             for item in scene.objects:
                 shown[item.name] = shown.get(item.name, False) or item.name in rendered
-        settings = [scene.unit_settings for scene in found if scene.unit_settings.system != "NONE"]
+        settings = [scene.unit_settings for scene in file_scenes if scene.unit_settings.system != "NONE"]
         return shown, float(settings[0].scale_length) if settings else 1.0
     finally:
         new = [library for library in bpy.data.libraries if library not in libraries]
-        bpy.data.batch_remove([scene for scene in found if scene not in scenes])
+        bpy.data.batch_remove([scene for scene in file_scenes if scene not in scenes])
         bpy.data.batch_remove(new)
 
 

@@ -38,8 +38,8 @@ def fence_group(tree: Tree) -> None:
         station = op.named_attribute(tree, "station")
         end = last_station(fence.axis())
         number, last = op.index(tree), op.point_count(line) - 1
-        wanted = op.minimum(fence.start_station + number * fence.post_spacing, fence.end_station)
-        beyond = (wanted - station > 1e-3) | (station - wanted > 1e-3)
+        target = op.minimum(fence.start_station + number * fence.post_spacing, fence.end_station)
+        beyond = (target - station > 1e-3) | (station - target > 1e-3)
         passed = (station > end - 1e-3) & (fence.end_station > end + 1e-3) & (number < last)
         posts = op.delete_points(line, beyond | passed)
         body = tube(tree, 1.0, 1.0, sizes.SIDES)

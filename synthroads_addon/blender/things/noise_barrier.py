@@ -219,27 +219,28 @@ def _slatted_wall(tree: Tree, panel: _Panel, kind: str) -> Value:
 
 
 def _glass_pane(tree: Tree, panel: _Panel) -> Value:
-    """Add nodes for a glass pane in a frame."""
-    deep, tall = panel.thickness, panel.height
-    level = box(tree, op.vector(tree, panel.length, deep, sizes.FRAME))
-    upright = box(tree, op.vector(tree, sizes.FRAME, deep, tall - 2.0 * sizes.FRAME))
-    side = panel.length * 0.5 - sizes.FRAME / 2
+    """Add nodes for a glass pane in a frame of two rails (along the panel) and two stiles (upright)."""
+    depth, height = panel.thickness, panel.height
+    rail = box(tree, op.vector(tree, panel.length, depth, sizes.FRAME))
+    stile = box(tree, op.vector(tree, sizes.FRAME, depth, height - 2.0 * sizes.FRAME))
+    stile_x = panel.length * 0.5 - sizes.FRAME / 2
     frame = [
         op.transform(part, translation=op.vector(tree, x, 0.0, z))
         for part, x, z in (
-            (level, 0.0, sizes.FRAME / 2),
-            (level, 0.0, tall - sizes.FRAME / 2),
-            (upright, side, tall * 0.5),
-            (upright, -side, tall * 0.5),
+            (rail, 0.0, sizes.FRAME / 2),
+            (rail, 0.0, height - sizes.FRAME / 2),
+            (stile, stile_x, height * 0.5),
+            (stile, -stile_x, height * 0.5),
         )
     ]
-    inside = op.vector(
+    # Less than two widths of the frame: the pane reaches 5 % of one into it at each edge, so that no gap is seen.
+    pane_size = op.vector(
         tree,
         panel.length - 1.9 * sizes.FRAME,
-        op.minimum(deep * 0.6, sizes.PANE),
-        tall - 1.9 * sizes.FRAME,
+        op.minimum(depth * 0.6, sizes.PANE),
+        height - 1.9 * sizes.FRAME,
     )
-    pane = box(tree, inside, op.vector(tree, 0.0, 0.0, tall * 0.5))
+    pane = box(tree, pane_size, op.vector(tree, 0.0, 0.0, height * 0.5))
     return op.join(paint_faces(op.join(*frame), panel.frame_material), paint_faces(pane, panel.panel_material))
 
 

@@ -184,7 +184,7 @@ def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
     # Of the whole road, as an area may reach over the end of the stretch.
     for name, carriageway in geometry.parameters.of_type(Carriageway).items():
         pavement = carriageway.pavement
-        first, own = len(pavement.ruts) + len(pavement.potholes), _COURSES.index(pavement.kind)
+        first, course = len(pavement.ruts) + len(pavement.potholes), _COURSES.index(pavement.kind)
         for part, patch in _near(builder, pavement.patches, first, lambda patch: patch.outline):
             instance, code = geometry.numbers.part(name, part)[1], damage_code(PATCH, patch.age)
             for piece in _pieces(patch_outline(patch), *builder.stretch):
@@ -204,7 +204,7 @@ def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
             instance, code = geometry.numbers.part(name, part)[1], damage_code(REMOVED_MARKING)
             for outline in removed_outlines(marking, pavement, geometry.length):
                 for piece in _pieces(outline, *builder.stretch):
-                    yield _Area(piece, REMOVED_FILM, instance, code, own)
+                    yield _Area(piece, REMOVED_FILM, instance, code, course)
 
 
 def _near(

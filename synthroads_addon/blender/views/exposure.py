@@ -31,5 +31,5 @@ def level_irradiance(environment: Environment) -> Float:
 def stops_for(irradiance: Float) -> float:
     """Return the exposure (stops) at which level ground under an irradiance (3,) is as bright as usual."""
     usual = float(level_irradiance(_REFERENCE).mean())
-    wanted = _FOLLOWS * math.log2(usual / max(float(np.mean(irradiance)), 1e-6))
-    return min(max(wanted, _STOPS[0]), _STOPS[1])
+    stops = _FOLLOWS * math.log2(usual / max(float(np.mean(irradiance)), 1e-6))
+    return min(max(stops, _STOPS[0]), _STOPS[1])

@@ -159,16 +159,18 @@ class CloudWriter(ABC):
         if values.dtype == np.dtype(kind) and scale is None:
             return values
         limits = np.iinfo(kind)
-        steps = np.asarray(values * (1.0 / scale)) if scale else np.array(values)
-        if steps.dtype.kind == "f":
-            np.rint(steps, out=steps)
-        low, high = steps.min(), steps.max()
-        if not (low >= limits.min and high <= limits.max):
-            worst = low if not low >= limits.min else high
-            step = scale or 1
-            allowed = f"{name} must lie from {limits.min * step:g} to {limits.max * step:g}"
-            raise OutputError(str(self.path), float(worst * step), allowed)
-        return steps.astype(kind)
+        # Both are copies: they are rounded in place.
+        quotients = np.asarray(values * (1.0 / scale)) if scale else np.array(values)
+        if quotients.dtype.kind == "f":
+            np.rint(quotients, out=quotients)
+        minimum, maximum = quotients.min(), quotients.max()
+        # Negated, since no comparison with NaN holds: a NaN is refused too.
+        if not (minimum >= limits.min and maximum <= limits.max):
+            culprit = minimum if not minimum >= limits.min else maximum
+            unit = scale or 1
+            allowed = f"{name} must lie from {limits.min * unit:g} to {limits.max * unit:g}"
+            raise OutputError(str(self.path), float(culprit * unit), allowed)
+        return quotients.astype(kind)
 
     def check_finite(self, values: AnyArray, name: str, kind: str = "f8") -> AnyArray:
         """Return the values unchanged; raise `OutputError` if one isn't finite, or wouldn't be as a float of a kind."""

@@ -95,15 +95,16 @@ class SceneMaterials:
         images = services.normal_images(names) if survey.scenario.scan.relief_normals else {}
         means = services.materials(names)
         variation, environment = survey.conditions.variation, survey.conditions.environment
+        # Age and wetness change the table's entries alone. A textured material keeps its images' means, in which they
+        # are already: the images are multiplied so when it is made.
         scanned = [
-            # A textured one has the images' means, and was made with the table.
-            vary_material(name, variation, environment, table)
-            if name in table and variation.texture(name) is None
+            vary_material(entry, variation, environment, table)
+            if entry in table and variation.texture(entry) is None
             else mean
-            for name, mean in zip(map(entry_of, names), means, strict=True)
+            for entry, mean in zip(map(entry_of, names), means, strict=True)
         ]
-        by_layers = _intensity_from_layers(survey, scanned, names)
-        return cls(names, means, scanned, services.transparencies(names), images, by_layers)
+        give_intensities = _intensity_from_layers(survey, scanned, names)
+        return cls(names, means, scanned, services.transparencies(names), images, give_intensities)
 
 
 def _intensity_from_layers(survey: Survey, scanned: list[Material], names: tuple[str, ...]) -> bool:

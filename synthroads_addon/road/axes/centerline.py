@@ -167,7 +167,7 @@ def csv_system(name: str, text: str | None = None) -> MapSystem | None:
     """Return the system that a line of comment names (``# crs: EPSG:25832``), or a .prj file beside; None without."""
     text = read_text(name, "CSV is needed", encoding="utf-8-sig") if text is None else text
     comments = (line.strip() for line in text.splitlines() if line.lstrip().startswith("#"))
-    named = next((found[1] for line in comments if (found := _NAMED.fullmatch(line))), None)
+    named = next((match[1] for line in comments if (match := _NAMED.fullmatch(line))), None)
     beside = Path(name).with_suffix(".prj")
     if named is None and beside != Path(name) and beside.is_file():
         name, named = str(beside), read_text(str(beside), "WKT is needed", encoding="utf-8-sig")

@@ -84,13 +84,13 @@ class MeasuredAxis:
         steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
         if gap is None:
             gap = np.inf if path.suffix.lower() in (".geojson", ".json") else usual_gap(steps)
-        apart = steps > gap
-        if apart.any():
-            count, most = np.count_nonzero(apart), float(steps[apart].max())
+        gap_mask = steps > gap
+        if gap_mask.any():
+            count, most = np.count_nonzero(gap_mask), float(steps[gap_mask].max())
             steps_text = "1 step" if count == 1 else f"{count:,} steps"
             text = f"{steps_text} of more than {gap:.3g} m between its points, {most:.1f} m at most, count as gaps"
             assume(f"{path.name}: {text}")
-        return cls(points, ~apart)
+        return cls(points, ~gap_mask)
 
     @classmethod
     def of_road(cls, geometry: RoadGeometry, step: float = 0.5) -> MeasuredAxis:
@@ -134,9 +134,9 @@ class MeasuredAxis:
     def position(self, station: ArrayLike) -> Float:
         """Return the points (M, 2) in plan at stations (M,), m; NaN in gaps and beyond the ends."""
         at = np.asarray(station, dtype=np.float64)
-        found = np.column_stack([np.interp(at, self.station, self.points[:, column]) for column in (0, 1)])
-        found[~self.inside(at)] = np.nan
-        return found
+        points = np.column_stack([np.interp(at, self.station, self.points[:, column]) for column in (0, 1)])
+        points[~self.inside(at)] = np.nan
+        return points
 
     def elevation(self, station: ArrayLike) -> Float:
         """Return the line's elevations (M,) at stations (M,), m; NaN in gaps and beyond the ends."""
@@ -225,11 +225,11 @@ class MeasuredAxis:
         across = y[row, at] + share * (y[row, at + 1] - y[row, at])
         order = np.argsort(-np.abs(across), kind="stable")  # the nearest is written last
         order = order[np.abs(across[order]) <= reach]
-        found, station = np.full(len(origin), np.nan), np.full(len(origin), np.nan)
-        found[row[order]] = across[order]
+        offset, station = np.full(len(origin), np.nan), np.full(len(origin), np.nan)
+        offset[row[order]] = across[order]
         along = self.station[at] + share * (self.station[at + 1] - self.station[at])
         station[row[order]] = along[order]
-        return found, station
+        return offset, station
 
     def _part_around(self, at: Float) -> tuple[Float, Float]:
         """Return the first and the last station of the gapless stretch that each station lies on, m."""

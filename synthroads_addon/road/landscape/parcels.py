@@ -54,7 +54,7 @@ class Parcels:
 
     def of_points(self, plan: Float) -> Int:
         """Return the parcel (N,) that each of local points (N, 2) lies in; -1 outside of all."""
-        found = np.full(len(plan), -1)
+        parcel = np.full(len(plan), -1)
         low, high = self.corners.min(axis=1), self.corners.max(axis=1)
         order = np.argsort(plan[:, 0])
         sorted_x = plan[order, 0]
@@ -66,8 +66,8 @@ class Parcels:
             for corner, after in zip(ring, np.roll(ring, -1, axis=0), strict=True):
                 along, away = after - corner, plan[near] - corner
                 inside &= along[0] * away[:, 1] - along[1] * away[:, 0] >= 0.0
-            found[near[inside]] = number
-        return found
+            parcel[near[inside]] = number
+        return parcel
 
 
 def parcels_of(geometry: RoadGeometry, landscape: Landscape) -> Parcels:

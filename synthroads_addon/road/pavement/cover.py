@@ -74,18 +74,22 @@ class MarkingFilms:
         return near
 
     def _cut_by_areas(self, outline: Float) -> Iterator[tuple[Float, float]]:
-        left = [outline]
+        """Yield the pieces of an outline on arrows and hatched areas, with the film's thickness, m; then the rest, 0.
+
+        Where areas overlap the first one gives the thickness: only what it leaves is cut by the next.
+        """
+        remainder = [outline]
         for number in self._areas_near(outline.min(axis=0), outline.max(axis=0)):
             area, _, film = self._areas[number]
-            parts, left = left, []
+            parts, remainder = remainder, []
             for part in parts:
-                inside, outside = split_outline(part, area)
-                if inside is not None:
-                    yield inside, film
-                    left += outside
+                piece, pieces_beside = split_outline(part, area)
+                if piece is None:
+                    remainder.append(part)  # whole: the pieces beside it would only be more of them
                 else:
-                    left.append(part)
-        yield from ((part, 0.0) for part in left)
+                    yield piece, film
+                    remainder += pieces_beside
+        yield from ((part, 0.0) for part in remainder)
 
     def _cut_by_lines(self, outlines: Sequence[Float]) -> Iterator[tuple[Float, float]]:
         if not outlines:

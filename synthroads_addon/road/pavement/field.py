@@ -257,13 +257,13 @@ def asphalt_look(m: Calculus, place: PavementPlace, wear: Wear) -> Look:
         wear: parameters.
     """
     strip = _decode(m, place)
-    own = _signed_hash(m, strip.owner, m.floor(place.station / DAY), wear.seed)
+    deviation = _signed_hash(m, strip.owner, m.floor(place.station / DAY), wear.seed)
     slow = _slow(m, place, strip.owner, wear.seed)
     polished = strip.wear * strip.track * wear.polish
     joint = _asphalt_joint(m, place, strip)
     used = 1.0 + 0.55 * polished - 0.14 * strip.wear * strip.oil
-    brightness = (1.0 + 0.09 * own + 0.04 * slow) * used * (1.0 - 0.35 * joint) * (1.0 + place.age)
-    roughness = 0.05 * own + 0.02 * slow - 0.3 * polished - 0.1 * joint
+    brightness = (1.0 + 0.09 * deviation + 0.04 * slow) * used * (1.0 - 0.35 * joint) * (1.0 + place.age)
+    roughness = 0.05 * deviation + 0.02 * slow - 0.3 * polished - 0.1 * joint
     return _repaired(m, strip, Look(brightness, roughness))
 
 
@@ -279,12 +279,12 @@ def concrete_look(m: Calculus, place: PavementPlace, wear: Wear, slab_length: An
     strip = _decode(m, place)
     slab = m.floor(place.station / slab_length)
     joint = _slab_joint(m, place, strip, slab_length)
-    own = _signed_hash(m, strip.owner, slab, wear.seed)
+    deviation = _signed_hash(m, strip.owner, slab, wear.seed)
     slow = _slow(m, place, strip.owner, wear.seed)
     polished = strip.wear * strip.track * wear.polish
     used = 1.0 - 0.4 * polished - 0.1 * strip.wear * strip.oil
-    brightness = (1.0 + 0.06 * own + 0.03 * slow) * used * (1.0 - 0.6 * joint) * (1.0 + place.age)
-    roughness = 0.05 * own + 0.02 * slow - 0.25 * polished - 0.25 * joint
+    brightness = (1.0 + 0.06 * deviation + 0.03 * slow) * used * (1.0 - 0.6 * joint) * (1.0 + place.age)
+    roughness = 0.05 * deviation + 0.02 * slow - 0.25 * polished - 0.25 * joint
     return _repaired(m, strip, Look(brightness, roughness))
 
 

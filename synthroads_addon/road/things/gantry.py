@@ -54,6 +54,9 @@ CATWALK_TOE = (0.01, 0.12, 0.1)
 """Thickness and height of the toe boards, and the height of their middle above the supports, m."""
 CATWALK_POST, CATWALK_SPACING = 0.8, 2.0
 """Thickness of a railing's posts as a share of its rails', and their spacing at most, m."""
+CATWALK_SUPPORT_SHARE, CATWALK_SUPPORT_EXCESS = 0.96, 0.02
+"""Length of a support as a share of the catwalk's width, and by how much it is higher than its place, m: half of that
+reaches into the beam below, half into the grating above."""
 LADDER_FOOT, LADDER_RAIL, LADDER_HALF, LADDER_AWAY = 2.3, 0.05, 0.2, 0.2
 """Foot of a ladder above the surface, thickness of its rails, half their distance, and from the beam to it, m."""
 LADDER_RUNG = (0.4, 0.03, 0.3)
@@ -267,25 +270,31 @@ class Gantry(StandingThing):
 
     def _catwalk(self, place: Place, ends: tuple[float, float], level: float) -> list[Body]:
         """Return the solids of the catwalk on the beam and of the ladder at the right post, else at the left one."""
-        clear = self.post_width / 2.0 + CATWALK_CLEAR
-        length, width = max(ends[1] - ends[0] - 2.0 * clear, 1.0), max(self.beam_depth, NARROWEST_CATWALK)
-        start, middle, edge = ends[0] + clear, ends[0] + clear + length / 2.0, (width - CATWALK_BAR) / 2.0
-        thin, tall, toe = CATWALK_TOE
-        floor = CATWALK_SUPPORT + CATWALK_GRATING
-        top = floor + CATWALK_RAIL
-        shapes = [box((length, width, CATWALK_GRATING), (middle, 0.0, floor - CATWALK_GRATING / 2.0))]
+        # Heights z are above the beam's top, which lies at `level`.
+        gap = self.post_width / 2.0 + CATWALK_CLEAR  # from a post's axis to the catwalk
+        length, width = max(ends[1] - ends[0] - 2.0 * gap, 1.0), max(self.beam_depth, NARROWEST_CATWALK)
+        start, middle, railing_y = ends[0] + gap, ends[0] + gap + length / 2.0, (width - CATWALK_BAR) / 2.0
+        toe_thickness, toe_height, toe_z = CATWALK_TOE
+        floor_z = CATWALK_SUPPORT + CATWALK_GRATING
+        rail_top = floor_z + CATWALK_RAIL
+        shapes = [box((length, width, CATWALK_GRATING), (middle, 0.0, floor_z - CATWALK_GRATING / 2.0))]
         bays = int(np.ceil(length / CATWALK_SPACING))
-        along = start + CATWALK_BAR / 2.0 + np.arange(bays + 1) * (length - CATWALK_BAR) / bays
-        upright = top - CATWALK_BAR - CATWALK_SUPPORT
-        for y in (-edge, edge):
-            shapes.append(box((length, thin, tall), (middle, y, CATWALK_SUPPORT + toe)))
+        post_x = start + CATWALK_BAR / 2.0 + np.arange(bays + 1) * (length - CATWALK_BAR) / bays
+        post_height = rail_top - CATWALK_BAR - CATWALK_SUPPORT
+        for y in (-railing_y, railing_y):
+            shapes.append(box((length, toe_thickness, toe_height), (middle, y, CATWALK_SUPPORT + toe_z)))
             shapes += [
                 box((length, CATWALK_BAR, CATWALK_BAR), (middle, y, z))
-                for z in (top - CATWALK_BAR / 2.0, top - CATWALK_RAIL / 2.0)
+                for z in (rail_top - CATWALK_BAR / 2.0, rail_top - CATWALK_RAIL / 2.0)
             ]
-            size = (CATWALK_BAR * CATWALK_POST, CATWALK_BAR * CATWALK_POST, upright)
-            shapes += [box(size, (x, y, CATWALK_SUPPORT + upright / 2.0)) for x in along.tolist()]
-        size = (length + CATWALK_SUPPORT - CATWALK_BAR, width * 0.96, CATWALK_SUPPORT + 0.02)
+            size = (CATWALK_BAR * CATWALK_POST, CATWALK_BAR * CATWALK_POST, post_height)
+            shapes += [box(size, (x, y, CATWALK_SUPPORT + post_height / 2.0)) for x in post_x.tolist()]
+        # One box around all supports, from that at the first post to that at the last: they are fittings.
+        size = (
+            length + CATWALK_SUPPORT - CATWALK_BAR,
+            width * CATWALK_SUPPORT_SHARE,
+            CATWALK_SUPPORT + CATWALK_SUPPORT_EXCESS,
+        )
         supports = box(size, (middle, 0.0, CATWALK_SUPPORT / 2.0))
         walk = [shift(shape, (0.0, 0.0, level)) for shape in shapes]
         ladder, rungs = self._ladder(place, ends, level)

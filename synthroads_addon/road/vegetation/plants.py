@@ -138,13 +138,13 @@ def plant_places(
 
 def _in_clearings(geometry: RoadGeometry, station: Float, offset: Float) -> Bool:
     """Return whether places (N,) lie on or so near things that no shrubs and trees grow there."""
-    found = np.zeros(len(station), dtype=np.bool_)
+    mask = np.zeros(len(station), dtype=np.bool_)
     for item in geometry.parameters.of_type(Thing).values():
         for block in item.footprint() if item.clearing is not None else ():
             near = item.clearing or 0.0
             inside = (station > block.start - near) & (station < block.end + near)
-            found |= inside & (offset > block.low - near) & (offset < block.high + near)
-    return found
+            mask |= inside & (offset > block.low - near) & (offset < block.high + near)
+    return mask
 
 
 def _steepness(geometry: RoadGeometry, station: Float, offset: Float, curvature: Float) -> Float:

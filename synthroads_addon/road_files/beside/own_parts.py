@@ -35,7 +35,7 @@ def own_parts(model: Any) -> tuple[GivenRoad | None, Counter[str], list[str]]:
         None where no carriageway is among them, as in files of other programs; what is left out is then all of the
         road's surface and objects, by class.
     """
-    found: dict[str, RoadObject] = {}
+    items: dict[str, RoadObject] = {}
     wrong: Counter[str] = Counter()
     for relation in model.by_type("IfcRelDefinesByProperties"):
         definition = relation.RelatingPropertyDefinition
@@ -53,15 +53,15 @@ def own_parts(model: Any) -> tuple[GivenRoad | None, Counter[str], list[str]]:
             wrong[kind] += 1
             continue
         if re.fullmatch(OBJECT_ID, name):
-            found[name] = item
+            items[name] = item
         else:
             wrong[kind] += 1
-    carriageways = {name: item for name, item in found.items() if isinstance(item, Carriageway)}
+    carriageways = {name: item for name, item in items.items() if isinstance(item, Carriageway)}
     by_side: dict[Side, Carriageway] = {item.side: item for item in carriageways.values()}
     if not by_side or len(by_side) < len(carriageways):
         return None, Counter(), _of_others(model)
     ids = {name: f"carriageway-{item.side}" for name, item in carriageways.items()}
-    others = {name: _with_carriageway(item, ids) for name, item in found.items() if name not in ids}
+    others = {name: _with_carriageway(item, ids) for name, item in items.items() if name not in ids}
     turnouts = {name: item for name, item in others.items() if isinstance(item, Turnout) and _refers(item, by_side, {})}
     markings = {
         name: item
@@ -69,7 +69,7 @@ def own_parts(model: Any) -> tuple[GivenRoad | None, Counter[str], list[str]]:
         if isinstance(item, tuple(_PAINT.values())) and _refers(item, by_side, turnouts)
     }
     things = {name: cast(Thing, item) for name, item in others.items() if type(item).__name__ in THINGS}
-    wrong += Counter(type(item).__name__ for item in found.values())
+    wrong += Counter(type(item).__name__ for item in items.values())
     kept: list[RoadObject] = [*by_side.values(), *turnouts.values(), *markings.values(), *things.values()]
     taken = Counter(type(item).__name__ for item in kept)
     lost = [f"{_word(kind)}: {n} {kind} with other values than ours" for kind, n in sorted((wrong - taken).items())]
@@ -78,11 +78,15 @@ def own_parts(model: Any) -> tuple[GivenRoad | None, Counter[str], list[str]]:
 
 def _refers(item: RoadObject, by_side: Mapping[Side, Carriageway], turnouts: Mapping[str, Turnout]) -> bool:
     """Return whether the carriageway, lane boundary and turnout that an object names are there."""
-    roads = {f"carriageway-{side}": road for side, road in by_side.items()}
-    named, turnout = getattr(item, "carriageway", None), getattr(item, "turnout", None)
-    if named is not None and (named not in roads or getattr(item, "boundary", 0) > len(roads[named].lanes)):
+    carriageways = {f"carriageway-{side}": carriageway for side, carriageway in by_side.items()}
+    # Not every kind of object has each of the three: what it hasn't it needn't find.
+    carriageway_id, turnout_id = getattr(item, "carriageway", None), getattr(item, "turnout", None)
+    boundary = getattr(item, "boundary", 0)
+    if carriageway_id is not None and (
+        carriageway_id not in carriageways or boundary > len(carriageways[carriageway_id].lanes)
+    ):
         return False
-    return turnout is None or (turnout in turnouts and turnouts[turnout].ramp is not None)
+    return turnout_id is None or (turnout_id in turnouts and turnouts[turnout_id].ramp is not None)
 
 
 def _word(kind: str) -> str:
@@ -97,14 +101,14 @@ def _with_carriageway(item: RoadObject, ids: Mapping[str, str]) -> RoadObject:
 
 def _values(definition: Any) -> dict[str, Any]:
     """Return the values of a property set by name, structures read from their JSON text."""
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for each in definition.HasProperties or ():
         value = getattr(getattr(each, "NominalValue", None), "wrappedValue", None)
         if isinstance(value, str) and value[:1] in ("[", "{"):
             with suppress(ValueError, RecursionError):  # a text that begins so
                 value = json.loads(value)
-        found[each.Name] = value
-    return found
+        values[each.Name] = value
+    return values
 
 
 def _of_others(model: Any) -> list[str]:

@@ -104,16 +104,16 @@ def read_superelevation(alignment: Element, pieces: Sequence[PlanPiece], unit: f
 
 
 def _curve(row: Element, pieces: Sequence[PlanPiece], unit: float, start: float) -> _Curve:
-    found = {local_name(each): (each.text or "").strip() for each in row}
-    if found.get("AdverseSE", "non-adverse") == "adverse":
+    texts = {local_name(each): (each.text or "").strip() for each in row}
+    if texts.get("AdverseSE", "non-adverse") == "adverse":
         raise _Unfit("it is adverse")
-    missing = [each for each in (*_STATIONS, "FullSuperelev") if not found.get(each)]
+    missing = [each for each in (*_STATIONS, "FullSuperelev") if not texts.get(each)]
     repeated = len([each for each in row if local_name(each) in _STATIONS]) > len(_STATIONS)
     if missing or repeated:
         raise _Unfit(f"{missing[0]} is missing" if missing else "a station comes twice")
     try:
-        stations = tuple(finite(each, found[each]) * unit - start for each in _STATIONS)
-        value = abs(finite("FullSuperelev", found["FullSuperelev"]))
+        stations = tuple(finite(each, texts[each]) * unit - start for each in _STATIONS)
+        value = abs(finite("FullSuperelev", texts["FullSuperelev"]))
     except InputError:
         raise _Unfit("a number is none") from None
     end = pieces[-1].station + pieces[-1].length
@@ -134,28 +134,28 @@ def _curve(row: Element, pieces: Sequence[PlanPiece], unit: float, start: float)
 
 def _curvature(pieces: Sequence[PlanPiece], stations: Float) -> list[float]:
     """Return the curvature, 1/m, at stations (N,), m."""
-    found = []
+    curvatures = []
     starts = np.array([piece.station for piece in pieces])
     for station, number in zip(stations.tolist(), np.searchsorted(starts, stations, "right").tolist(), strict=True):
         piece = pieces[max(number - 1, 0)]
         share = min(max((station - piece.station) / piece.length, 0.0), 1.0)
         if isinstance(piece.shape, Curve):
-            found.append(float(piece.shape.curvature(np.array([share * piece.shape.length]))[0]))
+            curvatures.append(float(piece.shape.curvature(np.array([share * piece.shape.length]))[0]))
         else:
-            found.append(piece.shape[0] + share * (piece.shape[1] - piece.shape[0]))
-    return found
+            curvatures.append(piece.shape[0] + share * (piece.shape[1] - piece.shape[0]))
+    return curvatures
 
 
 def _overlapping(curves: Sequence[_Curve]) -> set[int]:
     """Return the numbers of those that overlap another one, of curves in the order of their stations."""
-    found: set[int] = set()
+    numbers: set[int] = set()
     farthest = 0
     for number, curve in enumerate(curves[1:], 1):
         if curve.stations[0] < curves[farthest].stations[-1]:
-            found |= {farthest, number}
+            numbers |= {farthest, number}
         if curve.stations[-1] > curves[farthest].stations[-1]:
             farthest = number
-    return found
+    return numbers
 
 
 def _usual(curves: Sequence[_Curve]) -> tuple[float, str]:
@@ -191,8 +191,8 @@ def _points(curves: Sequence[_Curve], straight: float) -> tuple[CrossfallPoint, 
         stations, values = np.array(sorted(corners[1:])).T
         at_begin = float(np.interp(0.0, stations, values))
         corners = [(0.0, at_begin), *((s, v) for s, v in corners[1:] if s > 0.0)]
-    found: list[CrossfallPoint] = []
+    points: list[CrossfallPoint] = []
     for station, percent in corners:
-        if not found or round_value(station) > found[-1].station:
-            found.append(CrossfallPoint(station=round_value(station), crossfall_percent=round_value(percent, 6)))
-    return tuple(found)
+        if not points or round_value(station) > points[-1].station:
+            points.append(CrossfallPoint(station=round_value(station), crossfall_percent=round_value(percent, 6)))
+    return tuple(points)

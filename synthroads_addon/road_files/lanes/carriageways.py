@@ -80,26 +80,26 @@ def pavements(sides: Sequence[SideShape], verge: Verge, stations: Stations, loss
     """
     lines = {side.sign: _boundary_lines(side, loss) for side in sides}
     read = {side.sign: read_turnouts(side, f"carriageway-{SIDE_OF[side.sign]}", loss) for side in sides}
-    mine = {sign: found for sign, (found, _) in read.items()}
+    mine = {sign: carriageways for sign, (carriageways, _) in read.items()}
     names = {(sign, instance): name for sign, (_, ids) in read.items() for instance, name in ids.items()}
     main = {side.sign: _without_turnouts(side, lines[side.sign], mine[side.sign]) for side in sides}
     made = _planes(sides, main)
-    found: dict[Side, Carriageway] = {}
+    carriageways: dict[Side, Carriageway] = {}
     turnouts: dict[str, Turnout] = {}
     for side in sides:
-        found[SIDE_OF[side.sign]] = _carriageway(
+        carriageways[SIDE_OF[side.sign]] = _carriageway(
             side, main[side.sign], (made, mine[side.sign]), (verge, stations), loss
         )
         turnouts |= {key: _placed(item, stations) for key, item in mine[side.sign].items()}
     if len(sides) == 2 and _touch(*(main[side.sign] for side in sides)):
-        inner = found["right"].inner_offset
+        inner = carriageways["right"].inner_offset
         mirrored = (
             tuple(point.model_copy(update={"width": -point.width}) for point in inner)
             if isinstance(inner, tuple)
             else -inner
         )
-        found["left"] = found["left"].model_copy(update={"inner_offset": mirrored})
-    return Pavements(found, turnouts, made.heights, lines, {side.sign: side for side in sides}, names)
+        carriageways["left"] = carriageways["left"].model_copy(update={"inner_offset": mirrored})
+    return Pavements(carriageways, turnouts, made.heights, lines, {side.sign: side for side in sides}, names)
 
 
 def _touch(first: Polyline, second: Polyline) -> bool:
@@ -234,9 +234,9 @@ def _verge_slope(side: SideShape, turnouts: dict[str, Turnout], usual: float, lo
     rows: list[tuple[float, float, float, bool]] = []  # length, width, fall (m), whether a turnout is near
     for stretch in range(len(side.breaks) - 1):
         at = np.linspace(side.breaks[stretch], side.breaks[stretch + 1], 3)[1:2]
-        found = side.boundaries(at, stretch)
-        width = float(found.distances[0, -1] - found.distances[0, -2])
-        fall = float(found.inner_heights[0, -1] - found.heights[0, -1])
+        boundaries = side.boundaries(at, stretch)
+        width = float(boundaries.distances[0, -1] - boundaries.distances[0, -2])
+        fall = float(boundaries.inner_heights[0, -1] - boundaries.heights[0, -1])
         if width > _NONE:
             length = float(side.breaks[stretch + 1] - side.breaks[stretch])
             rows.append((length, width, fall, bool(beside(at, turnouts).any())))
@@ -270,12 +270,12 @@ def deviations(found: Pavements, road: RoadGeometry, stations: Stations, loss: L
                 at = at[~((behind >= 0.0) & (behind < 0.06)).any(axis=1)]
             if not len(at):
                 continue
-            wanted, there = side.boundaries(at, stretch), stations(at)
+            boundaries, there = side.boundaries(at, stretch), stations(at)
             ours = section.distances(there)
             crossfall = road.crossfall(section.carriageway, there)
             heights = levels.elevation(there)[:, None] + section.elevations(there, crossfall, ours)
             base = side.surface.road.elevation.at(at, side.inside(at, stretch))[:, None]
-            rows.append((at, wanted, ours, heights - base))
+            rows.append((at, boundaries, ours, heights - base))
         report[SIDE_OF[sign]] = _worst(side, section, rows, stations, loss)
     return report
 
@@ -292,19 +292,21 @@ def _worst(
     names = ["inner_edge_strip", *["lane"] * len(side.layout.slots), *OUTSIDE]
     station = np.concatenate([row[0] for row in rows])
     near = beside(stations(station), turnouts)
-    wanted = np.concatenate([row[1].distances for row in rows])
+    distances = np.concatenate([row[1].distances for row in rows])
     heights = np.concatenate([row[1].heights for row in rows])
     begins = np.concatenate([row[1].inner_heights for row in rows])
     ours, levels = np.concatenate([row[2] for row in rows]), np.concatenate([row[3] for row in rows])
     # Strips that are nowhere wider than 0 aren't among the set's.
-    present = [n for n in range(len(names)) if (wanted[:, n + 1] - wanted[:, n]).max() > _NONE and names[n] in kinds]
+    present = [
+        n for n in range(len(names)) if (distances[:, n + 1] - distances[:, n]).max() > _NONE and names[n] in kinds
+    ]
     begin = [kinds.index(names[n]) + _lanes_before(names, present, n) for n in present]
     index = [0, *(n + 1 for n in begin)]
     verge = bool(present) and names[present[-1]] == "verge"
     columns = [0, *(n + 1 for n in present)]
-    across = np.abs(ours[:, index] - wanted[:, columns])
+    across = np.abs(ours[:, index] - distances[:, columns])
     up = np.maximum(np.abs(levels[:, index] - heights[:, columns]), 0.0)
-    there = np.diff(wanted, axis=1)[:, present] > _NONE
+    there = np.diff(distances, axis=1)[:, present] > _NONE
     up[:, 1:] = np.where(there, np.maximum(up[:, 1:], np.abs(levels[:, begin] - begins[:, columns[1:]])), up[:, 1:])
     shown: dict[str, Any] = {}
     for kind, values in (("offset", across), ("height", up)):

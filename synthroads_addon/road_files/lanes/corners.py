@@ -49,26 +49,26 @@ def polyline(function: Between, breaks: Float, tolerance: float) -> Polyline:
     stations, values, jumps = list[float](), list[Float](), list[tuple[float, float]]()
     for number, (start, end) in enumerate(itertools.pairwise(breaks.tolist())):
         at = _corner_stations(function, number, (start, end), tolerance)
-        found = function(at, number)
+        samples = function(at, number)
         if stations:
-            jump = float(np.abs(found[0] - values[-1]).max())
+            jump = float(np.abs(samples[0] - values[-1]).max())
             if jump > JUMP:
                 jumps.append((start, jump))
                 begin = start + min(STEP, 0.5 * (end - start))
                 kept = at > begin + 1e-9
                 at = np.concatenate([[begin], at[kept]])
-                found = np.concatenate([function(np.array([begin]), number), found[kept]])
+                samples = np.concatenate([function(np.array([begin]), number), samples[kept]])
             else:
-                values[-1] = 0.5 * (values[-1] + found[0])
-                at, found = at[1:], found[1:]
+                values[-1] = 0.5 * (values[-1] + samples[0])
+                at, samples = at[1:], samples[1:]
         stations += at.tolist()
-        values += list(found)
+        values += list(samples)
     return Polyline(np.array(stations), np.array(values), np.array(jumps).reshape(-1, 2))
 
 
 def _corner_stations(function: Between, number: int, stretch: tuple[float, float], tolerance: float) -> Float:
     start, end = stretch
-    begin, length, found = np.array([start]), np.array([end - start]), [np.array([start, end])]
+    begin, length, stations = np.array([start]), np.array([end - start]), [np.array([start, end])]
     while len(begin):
         at = begin[:, None] + length[:, None] * _SHARES
         values = function(at.ravel(), number).reshape(len(begin), len(_SHARES), -1)
@@ -76,9 +76,9 @@ def _corner_stations(function: Between, number: int, stretch: tuple[float, float
         wrong = (np.abs(values - chord).max(axis=(1, 2)) > tolerance) & (length > 2.0 * _SHORTEST)
         half = 0.5 * length[wrong]
         middle = begin[wrong] + half
-        found.append(middle)
+        stations.append(middle)
         begin, length = np.concatenate([begin[wrong], middle]), np.concatenate([half, half])
-    return np.unique(np.concatenate(found))
+    return np.unique(np.concatenate(stations))
 
 
 def corners(stations: Float, values: Float, straight: float = STRAIGHT) -> list[tuple[float, float]]:
@@ -104,12 +104,12 @@ def corners(stations: Float, values: Float, straight: float = STRAIGHT) -> list[
 
 def rounded_points(points: Sequence[tuple[float, float]], digits: int = 9) -> list[tuple[float, float]]:
     """Return (station, value) with rounded stations, without those that fall on the one before so."""
-    found: list[tuple[float, float]] = []
+    rows: list[tuple[float, float]] = []
     for station, value in points:
         at = round_value(station, digits)
-        if not found or at > found[-1][0]:
-            found.append((at, value))
-    return found
+        if not rows or at > rows[-1][0]:
+            rows.append((at, value))
+    return rows
 
 
 def height_pieces(function: Callable[[Float, int], Float], breaks: Float, tolerance: float) -> list[HeightPiece]:

@@ -43,16 +43,16 @@ def differences(old: RoadParameters, new: RoadParameters, types: Collection[str]
     """
     before = {name: item for name, item in old.objects.items() if type(item).__name__ in types}
     after = {name: item for name, item in new.objects.items() if type(item).__name__ in types}
-    found = list(_of_alignment(old, new))
+    result = list(_of_alignment(old, new))
     for name in sorted({*before, *after}, key=lambda name: (name not in before, list({**before, **after}).index(name))):
         if isinstance(before.get(name, after.get(name)), AlignmentObject):
             continue
         if name not in before or name not in after:
             shown = [type(items[name]).__name__ if name in items else None for items in (before, after)]
-            found.append(Difference(f"objects.{name}", shown[0], shown[1]))
+            result.append(Difference(f"objects.{name}", shown[0], shown[1]))
             continue
-        found += _of_object(f"objects.{name}", before[name], after[name], new.alignment.length)
-    return found
+        result += _of_object(f"objects.{name}", before[name], after[name], new.alignment.length)
+    return result
 
 
 def _of_alignment(old: RoadParameters, new: RoadParameters) -> Iterator[Difference]:
@@ -126,8 +126,8 @@ def _is_width(item: RoadObject, name: str, value: Any) -> bool:
 
 def _same(a: Any, b: Any, turns: bool = False) -> bool:
     if isinstance(a, int | float) and isinstance(b, int | float) and not isinstance(a, bool):
-        apart = abs((b - a + 180.0) % 360.0 - 180.0) if turns else abs(b - a)
-        return apart <= TOLERANCE
+        difference = abs((b - a + 180.0) % 360.0 - 180.0) if turns else abs(b - a)
+        return difference <= TOLERANCE
     if isinstance(a, tuple) and isinstance(b, tuple):
         return len(a) == len(b) and all(_same(x, y) for x, y in zip(a, b, strict=True))
     if hasattr(a, "to_dict") and type(a) is type(b):

@@ -77,17 +77,17 @@ class Loss:
 
     def lines(self) -> list[str]:
         """Return it as lines for people."""
-        found = [f"read: {', '.join(f'{count} {kind}' for kind, count in sorted(self.read.items()))}"]
+        sentences = [f"read: {', '.join(f'{count} {kind}' for kind, count in sorted(self.read.items()))}"]
         for row in self.approximated:
             off = f", within {1000.0 * row['deviation']:.2f} mm" if row["deviation"] else ""
             where = f" (worst at station {row['station']:.1f} m)" if "station" in row else ""
-            found.append(f"approximated: {row['kind']}: {row['why']}{off}{where}")
+            sentences.append(f"approximated: {row['kind']}: {row['why']}{off}{where}")
         for (kind, why), count in sorted(self.left_out.items()):
             stretches = self.stretches.get((kind, why), [])
             named = ", ".join(f"{low:.1f} to {high:.1f} m" for low, high in stretches[:_SHOWN])
             more = f" and {len(stretches) - _SHOWN} more" if len(stretches) > _SHOWN else ""
-            found.append(f"left out: {count} {kind}: {why}" + (f" (stations {named}{more})" if named else ""))
-        return found
+            sentences.append(f"left out: {count} {kind}: {why}" + (f" (stations {named}{more})" if named else ""))
+        return sentences
 
 
 def _shown(text: str) -> str:

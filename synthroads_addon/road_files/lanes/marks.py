@@ -91,10 +91,10 @@ def line_markings(
             for lane_number, lane, element in lanes:
                 side, border, turnout = _border(mine, pavements, section_number, lane)
                 about = (side, border, turnout, (lane_number, section_number))
-                for found in _lines_of(element, about, (section.start, section.end), scenario, loss):
+                for group in _lines_of(element, about, (section.start, section.end), scenario, loss):
                     marked = True
-                    if found is not None:
-                        lines.append(found)
+                    if group is not None:
+                        lines.append(group)
     if not marked:
         return None
     return _markings(lines, stations, loss)
@@ -206,21 +206,21 @@ def _lines_of_mark(
 
 
 def _colour(name: str, loss: Loss) -> str:
-    found = _COLOURS.get(name.strip())
-    if found is None:
-        found = "yellow" if name.strip() == "orange" else "white"
-        loss.approximate("road marks", f"{name.strip()} paint is {found}")
-    return found
+    colour = _COLOURS.get(name.strip())
+    if colour is None:
+        colour = "yellow" if name.strip() == "orange" else "white"
+        loss.approximate("road marks", f"{name.strip()} paint is {colour}")
+    return colour
 
 
 def _markings(lines: Sequence[_Line], stations: Stations, loss: Loss) -> dict[str, LineMarking]:
-    found: dict[str, LineMarking] = {}
+    markings: dict[str, LineMarking] = {}
     for line in _joined(lines):
         name = line.name
-        if not name or name in found:
+        if not name or name in markings:
             stem = name or f"line-{SIDE_OF[line.side.sign]}"
             count = 1
-            while f"{stem}-{count}" in found:
+            while f"{stem}-{count}" in markings:
                 count += 1
             name = f"{stem}-{count}"
         try:
@@ -230,9 +230,9 @@ def _markings(lines: Sequence[_Line], stations: Stations, loss: Loss) -> dict[st
             loss.leave_out("road marks", f"{'.'.join(map(str, fault['loc'])) or 'line'}: {fault['msg'].lower()}")
             continue
         if marking.end_station - marking.start_station > SHORTEST:
-            found[name] = marking
+            markings[name] = marking
             loss.read["road marks"] += 1
-    return found
+    return markings
 
 
 def _joined(lines: Sequence[_Line]) -> list[_Line]:
@@ -240,15 +240,15 @@ def _joined(lines: Sequence[_Line]) -> list[_Line]:
 
     A dash that a section cuts is a solid line in our own files: what has one id is one line.
     """
-    own: dict[str, list[_Line]] = {}
+    parts_by_name: dict[str, list[_Line]] = {}
     others: list[_Line] = []
     for line in sorted(lines, key=lambda one: one.start):
         if line.name and line.kind in _KINDS:
-            own.setdefault(line.name, []).append(line)
+            parts_by_name.setdefault(line.name, []).append(line)
         else:
             others.append(line)
     joined: list[_Line] = []
-    for parts in own.values():
+    for parts in parts_by_name.values():
         runs: list[list[_Line]] = []
         for part in parts:
             last = runs[-1][-1] if runs else None
@@ -373,8 +373,8 @@ def _offset(line: _Line, stations: Stations) -> float | tuple[SignedWidthPoint, 
     inner = (side.breaks > line.start + SHORTEST) & (side.breaks < line.end - SHORTEST)
     marks = np.array([line.start, *side.breaks[inner], line.end])
     numbers = np.clip(np.searchsorted(side.breaks, 0.5 * (marks[:-1] + marks[1:]), side="right") - 1, 0, None)
-    found = polyline(lambda s, n: border(s, int(numbers[n])), marks, _SAME * 0.3)
-    points = corners(stations(found.stations), found.values[:, 0])
+    distances = polyline(lambda s, n: border(s, int(numbers[n])), marks, _SAME * 0.3)
+    points = corners(stations(distances.stations), distances.values[:, 0])
     if len(points) == 1:
         return round_value(points[0][1], 6)
     return tuple(SignedWidthPoint(station=s, width=round_value(w, 6)) for s, w in rounded_points(points, 6))

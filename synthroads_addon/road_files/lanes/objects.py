@@ -62,7 +62,7 @@ def things(roads: Sequence[Places], loss: Loss) -> dict[str, Any] | None:
 
     Objects of our own files are read from what these say of each; others by a table of types and names.
     """
-    found: dict[str, Any] = {}
+    things_by_id: dict[str, Any] = {}
     anything = False
     for places in roads:
         road = places.surface.road.element
@@ -71,15 +71,15 @@ def things(roads: Sequence[Places], loss: Loss) -> dict[str, Any] | None:
         for item in items:
             anything = True
             for name, made in _things_of(item, places, loss):
-                _add(found, name, made, loss)
+                _add(things_by_id, name, made, loss)
         for item in [] if signals is None else list(signals):
             anything = True
             if local_name(item) != "signal":
                 loss.leave_out("signals", f"{local_name(item)} elements")
             elif "object_type" not in _notes(item):  # ours are faces of things that are objects as well
                 for name, made in sign_of(item, places, loss):
-                    _add(found, name, made, loss)
-    return found if anything else None
+                    _add(things_by_id, name, made, loss)
+    return things_by_id if anything else None
 
 
 def _add(found: dict[str, Any], name: str, made: RoadObject, loss: Loss) -> None:
@@ -104,10 +104,10 @@ def _things_of(item: Element, places: Places, loss: Loss) -> Iterator[tuple[str,
         return
     notes = _notes(item)
     name = notes.get("id") or item.get("name") or kind
-    own = THINGS.get(notes.get("object_type", "")) or _PAINTED.get(notes.get("object_type", ""))
+    thing_class = THINGS.get(notes.get("object_type", "")) or _PAINTED.get(notes.get("object_type", ""))
     try:
-        if own is not None:
-            yield name, _own_thing(own, item, notes, places)
+        if thing_class is not None:
+            yield name, _own_thing(thing_class, item, notes, places)
             return
         if kind in _PLANTS and "hedge" not in f"{item.get('subtype')} {name}".lower():
             loss.leave_out("plants", "no single plant is a thing of the set: its vegetation is drawn")
@@ -319,7 +319,7 @@ def _stretches(item: Element, repeats: Sequence[Element], places: Places, length
     if not rows and length > 0.0:
         s, t = number(item, "s"), number(item, "t")
         rows.append((s - 0.5 * length, s + 0.5 * length, t, t))
-    found: list[Stretch] = []
+    stretches: list[Stretch] = []
     end = places.surface.road.length
     for start, last, first, second in rows:
         span = np.clip(np.array([start, last]), 0.0, end)
@@ -328,9 +328,9 @@ def _stretches(item: Element, repeats: Sequence[Element], places: Places, length
             continue
         bow = 0.5 * abs(float(offset[1] - offset[0]))
         new = Stretch(_one(station[:1]), _one(station[1:]), round_value(float(offset.mean()), _DIGITS), bow)
-        if found and abs(found[-1].end - new.start) < _TELL and abs(found[-1].offset - new.offset) < _TELL:
-            last_one = found.pop()
+        if stretches and abs(stretches[-1].end - new.start) < _TELL and abs(stretches[-1].offset - new.offset) < _TELL:
+            last_one = stretches.pop()
             off = max(last_one.bow, abs(last_one.offset - new.offset) + new.bow)
             new = Stretch(last_one.start, new.end, last_one.offset, off)
-        found.append(new)
-    yield from found
+        stretches.append(new)
+    yield from stretches

@@ -47,8 +47,8 @@ def planes(sides: Sequence[SideShape]) -> Planes:
         def rise(station: Float, stretch: int) -> Float:
             return _REACH * surface.rise(station, sides[0].inside(station, stretch))[:, None]
 
-        found = _scaled(polyline(rise, breaks, TOLERANCE))
-        return Planes({side.sign: found for side in sides}, None, "centreline")
+        plane = _scaled(polyline(rise, breaks, TOLERANCE))
+        return Planes({side.sign: plane for side in sides}, None, "centreline")
 
     def fitted(station: Float, stretch: int) -> Float:
         return _best_planes(sides, station, stretch) * np.array([1.0, *(_REACH for _ in sides)])
@@ -83,13 +83,13 @@ def _best_planes(sides: Sequence[SideShape], station: Float, stretch: int) -> Fl
         columns.append(row)
         values.append(height)
         weights.append(width)
-    matrix, wanted = np.concatenate(columns, axis=1), np.concatenate(values, axis=1)
+    matrix, heights = np.concatenate(columns, axis=1), np.concatenate(values, axis=1)
     weight = np.sqrt(np.concatenate(weights, axis=1) + 1e-9)
     if not matrix.shape[1]:
         return np.zeros((len(station), 1 + len(sides)))
-    matrix, wanted = matrix * weight[..., None], wanted * weight
+    matrix, heights = matrix * weight[..., None], heights * weight
     inverse = np.linalg.pinv(matrix, rcond=1e-9)
-    return np.asarray(np.einsum("nij,nj->ni", inverse, wanted))
+    return np.asarray(np.einsum("nij,nj->ni", inverse, heights))
 
 
 def joined(right: SideShape, left: SideShape, breaks: Float, pivots: dict[RotationAxis, dict[int, Polyline]]) -> Planes:

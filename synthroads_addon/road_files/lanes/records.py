@@ -39,9 +39,9 @@ class Cubics:
     @classmethod
     def read(cls, items: Sequence[Element], place: str = "s", shift: float = 0.0, begins: bool = True) -> Cubics:
         """Return the cubics of elements, whose stations are counted from `shift` (m); of equal ones the last."""
-        found = {number(item, place, 0.0) + shift: [number(item, name, 0.0) for name in "abcd"] for item in items}
-        starts = sorted(found)
-        return cls(np.array(starts), np.array([found[s] for s in starts]).reshape(-1, 4), begins)
+        cubics = {number(item, place, 0.0) + shift: [number(item, name, 0.0) for name in "abcd"] for item in items}
+        starts = sorted(cubics)
+        return cls(np.array(starts), np.array([cubics[s] for s in starts]).reshape(-1, 4), begins)
 
     def __bool__(self) -> bool:
         return len(self.starts) > 0
@@ -63,8 +63,8 @@ class Cubics:
         piece = np.maximum(piece, 0)
         a, b, c, d = self.rows[piece].T
         u = station - self.starts[piece]
-        found = b + u * (2.0 * c + 3.0 * d * u) if slope else a + u * (b + u * (c + u * d))
-        return np.where(before, 0.0, found) if not self.begins else found
+        values = b + u * (2.0 * c + 3.0 * d * u) if slope else a + u * (b + u * (c + u * d))
+        return np.where(before, 0.0, values) if not self.begins else values
 
 
 @dataclass(frozen=True)
@@ -112,13 +112,13 @@ class FileSection:
         Borders hold from the reference line, which no lane offset moves. On the right some programs write them as
         positive distances: where they would be wider to the other side so, they are turned over.
         """
-        found: dict[int, list[Float]] = {}
+        borders: dict[int, list[Float]] = {}
         for sign, lanes in self.lanes.items():
             edges = self._edges(lanes, sign, (station, inside, offset), 1.0)
             if any(lane.borders for lane in lanes) and sign * float((edges[-1] - edges[0]).mean()) < 0.0:
                 edges = self._edges(lanes, sign, (station, inside, offset), -1.0)
-            found[sign] = edges
-        return found
+            borders[sign] = edges
+        return borders
 
     @staticmethod
     def _edges(lanes: Sequence[FileLane], sign: int, where: tuple[Float, Float, Float], turn: float) -> list[Float]:
@@ -238,7 +238,7 @@ def _sections(items: Sequence[Element], length: float) -> tuple[FileSection, ...
     A section that is of one side only leaves the other side's lanes as the section before has them.
     """
     rows = sorted(((number(item, "s"), n) for n, item in enumerate(items)))
-    found: list[FileSection] = []
+    sections: list[FileSection] = []
     last: dict[int, Element] = {}
     edges = [*(s for s, _ in rows[1:]), length]
     for (start, n), end in zip(rows, edges, strict=True):
@@ -246,19 +246,19 @@ def _sections(items: Sequence[Element], length: float) -> tuple[FileSection, ...
         sides = {sign: child(item, name) for sign, name in zip(SIDES, ("left", "right"), strict=True)}
         single = item.get("singleSide", "false").strip().lower() in ("true", "1")
         lanes = {sign: _lanes(side, sign, start) for sign, side in sides.items()}
-        if single and found:
-            lanes = {s: lanes[s] if sides[s] is not None else found[-1].lanes[s] for s in SIDES}
+        if single and sections:
+            lanes = {s: lanes[s] if sides[s] is not None else sections[-1].lanes[s] for s in SIDES}
         last = {sign: side for sign, side in sides.items() if side is not None} or last
         if min(end, length) - start <= SHORTEST:
             continue
         centre = child(item, "center")
-        found.append(FileSection(start, min(end, length), lanes, None if centre is None else child(centre, "lane")))
-    if not found:
+        sections.append(FileSection(start, min(end, length), lanes, None if centre is None else child(centre, "lane")))
+    if not sections:
         raise InputError("laneSection", None, "must begin before the road's end")
-    first = found[0]
+    first = sections[0]
     if first.start > 0.0:
-        found[0] = FileSection(0.0, first.end, first.lanes, first.centre)
-    return tuple(found)
+        sections[0] = FileSection(0.0, first.end, first.lanes, first.centre)
+    return tuple(sections)
 
 
 def _lanes(side: Element | None, sign: int, start: float) -> tuple[FileLane, ...]:

@@ -16,7 +16,7 @@ from ...road.given_road import GivenRoad
 from ...road.guidelines import STANDARD_CROSS_SECTIONS
 from ...scenario.road import RoadScenario
 from ..heights import HeightPiece
-from ..line import LineNames, RoadLine, exact_axis
+from ..line import LineNames, PlanPiece, RoadLine, exact_axis
 from ..opendrive import read_opendrive
 from ..read import choose_line
 from ..xml_text import child, children, number, read_xml
@@ -32,6 +32,7 @@ from .strips import driven_sides, foreign_turnouts, side_layouts
 from .surface import FileSurface
 
 _SAME_PLAN = 1e-6
+"""Difference below which values of two plans (m, rad and 1/m) are the same."""
 _SHOWN = 5
 
 
@@ -110,22 +111,22 @@ def whole_road(
                 loss.leave_out("turnouts", "their lanes are lanes of the carriageway, without a ramp", stretch=stretch)
         loss.read["lane sections"] += len(one.sections)
     _tell_junctions(root, elements, roads, loss)
-    found = pavements(shapes, _verge(scenario), lambda s: np.interp(s, *exact), loss)
+    pavement_parts = pavements(shapes, _verge(scenario), lambda s: np.interp(s, *exact), loss)
     heights = None
-    if found.heights is not None:
-        heights = tuple(found.heights)
-    markings = line_markings(found, lambda s: np.interp(s, *exact), scenario, loss)
+    if pavement_parts.heights is not None:
+        heights = tuple(pavement_parts.heights)
+    markings = line_markings(pavement_parts, lambda s: np.interp(s, *exact), scenario, loss)
     places = [Places(FileSurface(one), axis.alignment, lambda s: np.interp(s, *exact)) for one in roads]
-    given = GivenRoad(found.carriageways, found.turnouts, markings, things(places, loss))
-    return WholeRoad(line, given, heights, found, loss, exact, speed_limit(roads, loss))
+    given = GivenRoad(pavement_parts.carriageways, pavement_parts.turnouts, markings, things(places, loss))
+    return WholeRoad(line, given, heights, pavement_parts, loss, exact, speed_limit(roads, loss))
 
 
 def _elements(root: Element) -> dict[str, Element]:
     """Return the roads of a file by the names that its lines have."""
-    names, found = LineNames(), dict[str, Element]()
+    names, elements = LineNames(), dict[str, Element]()
     for number_of, road in enumerate(children(root, "road")):
-        found[names.unique(road.get("name"), f"road {road.get('id', number_of)}")] = road
-    return found
+        elements[names.unique(road.get("name"), f"road {road.get('id', number_of)}")] = road
+    return elements
 
 
 def _tell_junctions(root: Element, elements: dict[str, Element], roads: list[FileRoad], loss: Loss) -> None:
@@ -158,23 +159,29 @@ def _partner(
     for other in lines:
         if other is line or other.fault or other.junction != line.junction or not _same_plan(other, line):
             continue
-        found = read_road(elements[other.name], other.name, other.length, up)
-        if driven_sides(found.sections) == [-sides[0]]:
-            return [found]
+        partner = read_road(elements[other.name], other.name, other.length, up)
+        if driven_sides(partner.sections) == [-sides[0]]:
+            return [partner]
     return []
 
 
 def _same_plan(first: RoadLine, second: RoadLine) -> bool:
+    """Return whether two lines have the same pieces in plan: start, length, heading and curvatures at the ends.
+
+    A piece that is no clothoid has no such curvatures: of it the start, the length and the heading are compared.
+    """
     if len(first.pieces) != len(second.pieces):
         return False
-    rows = [
-        [
-            (p.station, p.length, p.x, p.y, p.heading, *(p.shape if isinstance(p.shape, tuple) else (0.0, 0.0)))
-            for p in q
-        ]
-        for q in (first.pieces, second.pieces)
-    ]
-    return bool(np.abs(np.array(rows[0]) - np.array(rows[1])).max() < _SAME_PLAN)
+
+    def table(line: RoadLine) -> Float:
+        return np.array([(p.station, p.length, p.x, p.y, p.heading, *_end_curvatures(p)) for p in line.pieces])
+
+    return bool(np.abs(table(first) - table(second)).max() < _SAME_PLAN)
+
+
+def _end_curvatures(piece: PlanPiece) -> tuple[float, float]:
+    """Return the curvatures at a piece's ends, 1/m; zeros for one that is no clothoid."""
+    return piece.shape if isinstance(piece.shape, tuple) else (0.0, 0.0)
 
 
 def _verge(scenario: RoadScenario) -> Verge:

@@ -82,15 +82,15 @@ def driven_sides(sections: Sequence[FileSection]) -> list[int]:
 
 def foreign_turnouts(layout: SideLayout, sections: Sequence[FileSection]) -> list[tuple[float, float]]:
     """Return the stretches, stations of the file in m, along which lanes of a carriageway lead off or onto it."""
-    found: list[tuple[float, float]] = []
+    stretches: list[tuple[float, float]] = []
     for number, section in enumerate(sections):
         lanes = [slot.lanes[number] for slot in layout.slots if number in slot.lanes]
         if any(lane.type in _TURNING and "strip" not in lane.notes for lane in lanes):
-            if found and section.start - found[-1][1] <= SHORTEST:
-                found[-1] = (found[-1][0], section.end)
+            if stretches and section.start - stretches[-1][1] <= SHORTEST:
+                stretches[-1] = (stretches[-1][0], section.end)
             else:
-                found.append((section.start, section.end))
-    return found
+                stretches.append((section.start, section.end))
+    return stretches
 
 
 def side_layouts(surface: FileSurface, with_median: bool = False) -> dict[int, SideLayout]:
@@ -158,26 +158,26 @@ def _beside(layout: SideLayout, number: int, lanes: Sequence[FileLane]) -> list[
 
     A border outside of all that is paved is the verge: others write their grass so.
     """
-    found: list[tuple[str, FileLane]] = []
+    strips: list[tuple[str, FileLane]] = []
     reached = 0  # 0 edge strip, 1 hard shoulder, 2 verge
     stopped = False
     last_paved = max((n for n, lane in enumerate(lanes) if lane.type in PAVED - {"border"}), default=-1)
     for n, lane in enumerate(lanes):
-        if lane.type == "border" and reached == 0 and not found:
-            found.append(("outer_edge_strip", lane))
+        if lane.type == "border" and reached == 0 and not strips:
+            strips.append(("outer_edge_strip", lane))
             continue
         paved = lane.type in PAVED and not (stopped and lane.type == "shoulder")
         paved = paved and not (lane.type == "border" and n > last_paved)
         if reached < 2 and paved:
             reached, stopped = 1, stopped or lane.type == "stop"
-            found.append(("hard_shoulder", lane))
+            strips.append(("hard_shoulder", lane))
             continue
         if paved:
             layout.lost.append((number, lane, f"a {lane.type} lane outside of the verge"))
             continue
         reached = 2
-        found.append(("verge", lane))
-    return found
+        strips.append(("verge", lane))
+    return strips
 
 
 def _take_across(layout: SideLayout, number: int, lanes: Sequence[FileLane]) -> None:

@@ -81,9 +81,9 @@ class FileSurface:
         """Return a section's lanes by the sign of their ids, from the inside out, at stations (N,)."""
         borders = section.borders(station, inside, self.road.offset.at(station, inside))
         frame = self._frame(station, inside)
-        found: dict[int, list[LaneEdges]] = {}
+        lane_edges: dict[int, list[LaneEdges]] = {}
         for sign, lanes in section.lanes.items():
-            found[sign] = []
+            lane_edges[sign] = []
             flat_from: Edge | None = None
             for lane, inner, outer in zip(lanes, borders[sign][:-1], borders[sign][1:], strict=True):
                 low, high = _lane_heights(lane, station)
@@ -95,8 +95,8 @@ class FileSurface:
                     edges = [
                         Edge(edge.offset, beyond.height + rise) for edge, rise in zip(edges, (low, high), strict=True)
                     ]
-                found[sign].append(LaneEdges(lane, *edges))
-        return found
+                lane_edges[sign].append(LaneEdges(lane, *edges))
+        return lane_edges
 
     def profile_points(self, edges: LaneEdges, share: float, station: Float, inside: Float) -> Edge:
         """Return points at a share of a lane's width, on its true surface where that is no straight line."""

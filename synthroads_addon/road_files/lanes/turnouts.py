@@ -45,7 +45,7 @@ def read_turnouts(side: SideShape, carriageway: str, loss: Loss) -> tuple[dict[s
 
     Those that aren't understood are told.
     """
-    found: dict[str, Turnout] = {}
+    turnouts: dict[str, Turnout] = {}
     ids: dict[str, str] = {}
     for part in _parts(side):
         try:
@@ -54,11 +54,11 @@ def read_turnouts(side: SideShape, carriageway: str, loss: Loss) -> tuple[dict[s
             loss.leave_out("turnouts", "their strips have another shape than an exit, entry or bay", surface=True)
             continue
         name = f"{turnout.kind.replace('_', '-')}-{'left' if side.sign > 0 else 'right'}"
-        count = sum(other.startswith(name) for other in found) + 1
+        count = sum(other.startswith(name) for other in turnouts) + 1
         ids[part.instance] = part.id or (name if count == 1 else f"{name}-{count}")
-        found[ids[part.instance]] = turnout
+        turnouts[ids[part.instance]] = turnout
         loss.read["turnouts"] += 1
-    return found, ids
+    return turnouts, ids
 
 
 def has_turnouts(side: SideShape) -> bool:
@@ -201,8 +201,8 @@ class _Reader:
         if not lanes:
             return None
         all_of = self.side.lanes(np.array([station]), stretch)[self.side.sign]
-        found = {edges.lane.number: edges for edges in all_of}
-        first, last = found[lanes[0].number], found[lanes[-1].number]
+        edges_by_number = {edges.lane.number: edges for edges in all_of}
+        first, last = edges_by_number[lanes[0].number], edges_by_number[lanes[-1].number]
         return LaneEdges(lanes[0], first.inner, last.outer)
 
     def _width(self, kind: str, station: float, stretch: int | None = None) -> float:
@@ -215,8 +215,10 @@ class _Reader:
         number = int(self.side.sections[self._stretch(station)])
         lanes = self.side.layout.of_strip(number, "outer_edge_strip")
         lanes = lanes or [slot.lanes[number] for slot in self.side.layout.slots if number in slot.lanes]
-        found = {e.lane.number: e for e in self.side.lanes(np.array([station]), self._stretch(station))[self.side.sign]}
-        return abs(float((ramp.inner.offset - found[lanes[-1].number].outer.offset)[0]))
+        edges_by_number = {
+            e.lane.number: e for e in self.side.lanes(np.array([station]), self._stretch(station))[self.side.sign]
+        }
+        return abs(float((ramp.inner.offset - edges_by_number[lanes[-1].number].outer.offset)[0]))
 
     def _full_shoulder(self) -> float:
         """Return the hard shoulder's width where no turnout is beside it, m; 0 without any."""
@@ -254,9 +256,9 @@ def _run_off(behind: Float, tilt: Float, rise: Float) -> tuple[float, float]:
     if np.abs(share * (fall - rise) - tilt).max() < _SAME_TILT:
         return fall, usual
     fall = float(tilt[-1] + rise[-1])
-    own = tilt / (fall - rise)
-    part = (own > 0.02) & (own < 0.98)
-    return fall, float(np.median(behind[part] / own[part])) if part.any() else usual
+    tilt_share = tilt / (fall - rise)
+    part = (tilt_share > 0.02) & (tilt_share < 0.98)
+    return fall, float(np.median(behind[part] / tilt_share[part])) if part.any() else usual
 
 
 def _grade(behind: Float, lift: Float) -> tuple[float, float]:

@@ -34,8 +34,8 @@ def plan_shafts(layout: Layout, rng: np.random.Generator) -> None:
     swale = terrain.swale_width if terrain.embankment_height <= _DEEP else 0.0
     for roadside in layout.sides.values():
         spacing, size = draw(rng, furniture.shaft_spacing), draw(rng, furniture.shaft_size)
-        for wanted in np.arange(spacing * rng.random(), layout.length, spacing).tolist():
-            station = nearest_free(wanted, _HALF, _ROOM, layout.length, roadside.near, roadside.turnouts)
+        for multiple in np.arange(spacing * rng.random(), layout.length, spacing).tolist():
+            station = nearest_free(multiple, _HALF, _ROOM, layout.length, roadside.near, roadside.turnouts)
             if station is not None:
                 roadside.put(_shaft(layout, roadside, round_value(station), size, swale))
 
@@ -82,7 +82,7 @@ def inward_stretches(carriageway: Carriageway, length: float) -> list[Range]:
     """Return the stretches (m) of a road of a length (m) on which a carriageway falls towards the median."""
     points = [(point.station, carriageway.sign * point.crossfall_percent) for point in carriageway.crossfall]
     points = [(min(0.0, points[0][0]), points[0][1]), *points, (max(length, points[-1][0]), points[-1][1])]
-    found: list[Range] = []
+    stretches: list[Range] = []
     for (s0, a), (s1, b) in pairwise(points):
         if max(a, b) <= 0.0 or s1 <= s0:
             continue
@@ -90,8 +90,8 @@ def inward_stretches(carriageway: Carriageway, length: float) -> list[Range]:
         low = s0 if a > 0.0 else s0 + (s1 - s0) * -a / (b - a)
         high = s1 if b > 0.0 else s0 + (s1 - s0) * a / (a - b)
         low, high = round_value(max(low, 0.0)), round_value(min(high, length))
-        if found and low <= found[-1][1]:
-            found[-1] = found[-1][0], high
+        if stretches and low <= stretches[-1][1]:
+            stretches[-1] = stretches[-1][0], high
         elif high > low:
-            found.append((low, high))
-    return found
+            stretches.append((low, high))
+    return stretches

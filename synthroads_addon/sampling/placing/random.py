@@ -65,12 +65,16 @@ def plan_random_equipment(layout: Layout, rng: np.random.Generator) -> None:
 def random_median_barrier(layout: Layout, rng: np.random.Generator) -> Iterator[tuple[str, LineObject]]:
     """Yield (id, barrier) of at most one guardrail somewhere in the median, where that is wide enough."""
     limits, median = layout.site.scenario.barriers, layout.median
+    # The order of the draws decides which barrier a seed gives: system, stretch, offset.
     system = BarrierSystem.draw(rng, limits, limits.concrete_median)
-    room = median.half_width - BARRIER_AXIS
-    span = draw_stretch(rng, free_ranges(0.0, layout.length, median.taken), *BARRIER_LENGTHS)
-    if limits.median and len(median.inner) > 1 and room >= 0.0 and span:
-        offset, terminal = room * pick(rng, (-1.0, -0.5, 0.0, 0.5, 1.0)), min(TERMINAL, (span[1] - span[0]) / 4.0)
-        yield "guardrail-median", system.rail(span, offset, "both", terminal)
+    stretch = draw_stretch(rng, free_ranges(0.0, layout.length, median.taken), *BARRIER_LENGTHS)
+    largest_offset = median.half_width - BARRIER_AXIS
+    if limits.median and len(median.inner) > 1 and largest_offset >= 0.0 and stretch:
+        start, end = stretch
+        offset = largest_offset * pick(rng, (-1.0, -0.5, 0.0, 0.5, 1.0))
+        # Half of a short rail at least stands at its full height.
+        terminal = min(TERMINAL, (end - start) / 4.0)
+        yield "guardrail-median", system.rail(stretch, offset, "both", terminal)
 
 
 def random_front(

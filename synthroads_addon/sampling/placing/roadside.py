@@ -133,7 +133,7 @@ def _power_line(site: PlacementSite, objects: Mapping[str, RoadObject]) -> Power
     limits, rng = site.scenario.roadside, site.stream("roadside", "power line")
     height = draw(rng, limits.pylon_height)
     left, right = draw_between(rng, _PYLON_DISTANCES), draw_between(rng, _PYLON_DISTANCES)
-    turn, sag, wanted = draw_between(rng, (-25.0, 25.0)), draw_between(rng, (3.0, 7.0)), rng.random()
+    turn, sag, chance = draw_between(rng, (-25.0, 25.0)), draw_between(rng, (3.0, 7.0)), rng.random()
     line = PowerLine(
         instance=1,
         station=0.0,
@@ -149,7 +149,7 @@ def _power_line(site: PlacementSite, objects: Mapping[str, RoadObject]) -> Power
         for low, high in _crossings(site, objects, _PYLON_DISTANCES[1]):
             taken.add(low - pylon.end, high - pylon.start)
     start = draw_start(rng, free_ranges(0.0, site.length, taken), 10.0)
-    if wanted >= limits.power_line or start is None:
+    if chance >= limits.power_line or start is None:
         return None
     return line.model_copy(update={"station": round_value(start + 5.0)})
 
@@ -185,8 +185,8 @@ def _fences(zones: _Zones, rng: np.random.Generator) -> Iterator[tuple[str, Fenc
     height, distance = draw(rng, limits.fence_height), zones.edge + draw_between(rng, FENCE_ZONE)
     # Behind hedges, however wide they are.
     distance += limits.hedge_width.maximum if limits.hedges_per_km.maximum > 0.0 else 0.0
-    spacing, kind, wanted = pick(rng, (4.0, 5.0, 6.0)), pick(rng, _FENCES), rng.random() < limits.fences
-    if not wanted or distance + 1.0 > zones.reach:
+    spacing, kind, presence = pick(rng, (4.0, 5.0, 6.0)), pick(rng, _FENCES), rng.random() < limits.fences
+    if not presence or distance + 1.0 > zones.reach:
         return
     number = 0
     for start, end in zones.free(distance - 0.5, distance + 0.5):

@@ -76,7 +76,7 @@ class HitRows:
     def of(cls, count: int, fades: bool, along: bool, share: bool) -> HitRows:
         """Return room for so many hits."""
         distance, intensity, weight = (np.empty(count) for _ in range(3))
-        others = (np.empty(count) if wanted else None for wanted in (fades, along, share))
+        others = (np.empty(count) if flag else None for flag in (fades, along, share))
         return cls(np.empty(count, np.int32), distance, intensity, weight, *others)
 
     @property

@@ -159,12 +159,12 @@ def _load() -> Packets:
         raise NoKernelError(f"{paths[0].name} can't be used ({error})") from error
     device = embree.rtcNewDevice(None)
     try:
-        found = int(embree.rtcGetDeviceProperty(device, _VERSION))
+        embree_version = int(embree.rtcGetDeviceProperty(device, _VERSION))
         native = [width for width, number in _NATIVE if embree.rtcGetDeviceProperty(device, number)]
     finally:
         embree.rtcReleaseDevice(device)
-    if found // 100 != _EMBREE:
-        raise NoKernelError(f"Embree is {found}, and not {_EMBREE}xx")
+    if embree_version // 100 != _EMBREE:
+        raise NoKernelError(f"Embree is {embree_version}, and not {_EMBREE}xx")
     if not native:
         raise NoKernelError("Embree has no packets for this processor")
     return Packets(embree, kernel, native[0])
@@ -242,18 +242,18 @@ class PacketScene:
     def _cast(
         self, origins: Float32, directions: Float32, maximum_range: float | Float32, occluded: bool
     ) -> NDArray[np.int32]:
-        found = np.full(len(origins), -1, np.int32)
+        faces = np.full(len(origins), -1, np.int32)
         if not self._triangles or not len(origins):
-            return found
+            return faces
         origins, directions = (np.ascontiguousarray(array, np.float32) for array in (origins, directions))
         limits = np.ascontiguousarray(maximum_range, np.float32)
-        if origins.shape != (len(found), 3) or directions.shape != origins.shape or limits.size not in (1, len(found)):
+        if origins.shape != (len(faces), 3) or directions.shape != origins.shape or limits.size not in (1, len(faces)):
             raise ValueError(f"rays {origins.shape}, {directions.shape}, ranges {limits.shape}: (N, 3), (N, 3), 1 or N")
         rays = _Rays(origins.ctypes.data, directions.ctypes.data, limits.ctypes.data, int(limits.size > 1))
         self._packets.kernel.synthroads_cast(
-            ctypes.byref(self.casting(occluded)), self._scene, len(found), ctypes.byref(rays), found.ctypes.data
+            ctypes.byref(self.casting(occluded)), self._scene, len(faces), ctypes.byref(rays), faces.ctypes.data
         )
-        return found
+        return faces
 
     def casting(self, occluded: bool = False) -> ctypes.Structure:
         """Return how rays are cast, `Casts` of packets.c, from the first of them on."""

@@ -196,12 +196,11 @@ class CompiledPoints:
         (varies,), (material,) = _as(np.bool_, (kinds,), varies=varies), _as(np.uint16, material.shape, all=material)
         rows = None if rows is None else np.ascontiguousarray(rows, np.int64)
         means = np.ascontiguousarray(means, np.float32)
-        if own is not None:
-            (own,) = _as(np.float32, (len(material), width), own=own)
+        values = None if own is None else _as(np.float32, (len(material), width), own=own)[0]
         result = np.empty((chosen, *means.shape[1:]), np.float32)
-        rows_at, own_at = (None if array is None else array.ctypes.data for array in (rows, own))
+        rows_at, values_at = (None if array is None else array.ctypes.data for array in (rows, values))
         self._functions["layer"](
-            *(chosen, rows_at, width, own_at),
+            *(chosen, rows_at, width, values_at),
             *(array.ctypes.data for array in (material, varies, means, result)),
         )
         return result
@@ -461,10 +460,10 @@ class CompiledPoints:
         middle, square = np.array([node_x.mean(), node_y.mean()]), np.empty(len(node_x))
         owner, column = np.empty((2, len(x) * ((len(node_x) + 1) // 2)), np.int64)
         addresses = [one.ctypes.data for one in (x, y, node_x, node_y, middle, square, owner, column)]
-        found = self._functions["candidates"](
+        count = self._functions["candidates"](
             *(len(x), *addresses[:2], len(node_x), *addresses[2:5], spacing, *addresses[5:])
         )
-        return owner[:found], column[:found]
+        return owner[:count], column[:count]
 
     def find_feet(
         self,

@@ -275,12 +275,21 @@ class _Allocation:
     def _varying_rows(
         self, first: int, uses: Counter[int], targets: dict[int, list[tuple[int, int]]]
     ) -> list[tuple[int, ...]]:
-        """Return the instructions of an operation and of what of it is written; frees what nothing needs any more."""
-        step, rows = self._builder._steps[first], [self._row(first)]
-        results = range(first, first + step.results)
+        """Return the instructions of an operation that differs between places: its own, and stores of its outputs.
+
+        Registers of values that no later operation reads are free afterwards.
+
+        Args:
+            first: the operation's first result.
+            uses: how many operations still read each value; this one's reads are taken off.
+            targets: (output, component) that each value is stored to.
+        """
+        operation, rows = self._builder._steps[first], [self._row(first)]
+        results = range(first, first + operation.results)
         rows += self._stores([value for value in results if value in targets], targets)
-        uses.subtract(step.operands)
-        for value in {*results, *step.operands}:
+        uses.subtract(operation.operands)
+        # Only now: so no result of the operation is given the register of one of its operands.
+        for value in {*results, *operation.operands}:
             if not uses[value] and not self._builder._is_uniform(value):
                 self._free.append(self._register[value])
         return rows

@@ -205,19 +205,19 @@ class PulseKernel:
             shares: hits have shares of the energy.
         """
         # What is asked before rays are weighed is asked of all rays at once.
-        apart = bool(block.moving) or self._clear is not None or axis is not None or self._shape.parallel or shares
+        two_passes = bool(block.moving) or self._clear is not None or axis is not None or self._shape.parallel or shares
         count = len(block.rays.time)
         size, lot = self._rays * count, max(_LEAST_LOT, _LOT // self._rays // _LEAST_LOT * _LEAST_LOT)
-        first = HitRows.of(size, self._fades, along=apart, share=shares)
+        first = HitRows.of(size, self._fades, along=two_passes, share=shares)
         light = OnwardLight.of(size if self._surfaces.permeable else 0, self._clear is not None)
         shining = ShiningHits(size if self._surfaces.retroreflective else 0)
         rows = np.empty((2, max(lot * self._rays, _BUFFER) * 3), np.float32)
-        turned, found = np.empty(3 * lot * self._rays), np.empty(lot * self._rays, np.int32)
+        turned, face_buffer = np.empty(3 * lot * self._rays), np.empty(lot * self._rays, np.int32)
         counts, length, casts = np.zeros(2, np.int64), np.empty(self._rays, np.int64), self._caster.casting()
-        work = [lot, *(array.ctypes.data for array in (*rows, turned, found))]
+        work = [lot, *(array.ctypes.data for array in (*rows, turned, face_buffer))]
         scene, pulses = ctypes.byref(self._scene), ctypes.byref(block.beams)
         head, met = (scene, ctypes.byref(casts), pulses), ctypes.byref(first.native)
-        if apart:
+        if two_passes:
             assert first.along is not None
             known, begin = (first.face, first.distance, first.along), int(axis is not None)
             for mine, theirs in zip(known, axis or (), strict=False):

@@ -51,27 +51,26 @@ class PolylineGuide(Guide):
     """
 
     def __init__(self, points: ArrayLike, origin: Sequence[float] = (0.0, 0.0, 0.0), tolerance: float = 0.0) -> None:
-        given = finite_array("points", points)
-        if given.ndim != 2 or given.shape[1] not in (2, 3):
-            raise InputError("points", given.shape, "an array of shape (N, 2) or (N, 3) is needed")
-        kept = _thin_points(given, tolerance)
-        line = given[kept]
-        step = np.diff(line[:, :2], axis=0)
-        span, heading = np.hypot(*step.T), np.arctan2(step[:, 1], step[:, 0])
+        coordinates = finite_array("points", points)
+        if coordinates.ndim != 2 or coordinates.shape[1] not in (2, 3):
+            raise InputError("points", coordinates.shape, "an array of shape (N, 2) or (N, 3) is needed")
+        indices = _thin_points(coordinates, tolerance)
+        vertices = coordinates[indices]
+        step = np.diff(vertices[:, :2], axis=0)
+        chord, heading = np.hypot(*step.T), np.arctan2(step[:, 1], step[:, 0])
         turn = wrap_angle(np.diff(heading))
-        reach = np.minimum(CORNER, 0.49 * np.minimum(span[:-1], span[1:]))
-        lengths = _clothoid_lengths(turn, reach)
-        _refuse_sharp(given, kept, turn, lengths)
-        x, y = line[0, :2].tolist()
-        alignment = Alignment(_elements(span, reach, turn, lengths), x, y, float(heading[0]))
-        straight = span - np.concatenate(([0.0], reach)) - np.concatenate((reach, [0.0]))
-        station = np.cumsum(straight) + np.concatenate(([0.0], np.cumsum(2.0 * lengths)))
-        station[:-1] += lengths
-        station = np.concatenate(([0.0], station))
-        height = line[:, 2] if line.shape[1] == 3 else np.zeros(len(line))
+        # Not half of a chord: a straight is left between two corners, however near they are.
+        tangent = np.minimum(CORNER, 0.49 * np.minimum(chord[:-1], chord[1:]))
+        clothoids = _clothoid_lengths(turn, tangent)
+        _refuse_sharp(coordinates, indices, turn, clothoids)
+        straights = _straight_lengths(chord, tangent)
+        x, y = vertices[0, :2].tolist()
+        alignment = Alignment(_elements(straights, turn, clothoids), x, y, float(heading[0]))
+        station = _vertex_stations(straights, clothoids)
+        height = vertices[:, 2] if vertices.shape[1] == 3 else np.zeros(len(vertices))
         profile = Profile([IntersectionPoint(float(s), float(z)) for s, z in zip(station, height, strict=True)])
         super().__init__(alignment, profile, origin)
-        self.deviation = float(np.abs(alignment.project(given[:, :2])[1]).max())
+        self.deviation = float(np.abs(alignment.project(coordinates[:, :2])[1]).max())
 
     @classmethod
     def along(
@@ -148,13 +147,26 @@ def _refuse_sharp(points: Float, kept: Index, turn: Float, lengths: Float) -> No
     raise InputError(f"points[{index}]", [float(value) for value in points[index]], allowed)
 
 
-def _elements(span: Float, reach: Float, turn: Float, lengths: Float) -> list[Element]:
+def _straight_lengths(chord: Float, tangent: Float) -> Float:
+    """Return the lengths (C + 1,), m, of the straights: what the corners' tangents at both ends leave of the chords."""
+    return chord - np.concatenate(([0.0], tangent)) - np.concatenate((tangent, [0.0]))
+
+
+def _vertex_stations(straights: Float, clothoids: Float) -> Float:
+    """Return the stations (C + 2,), m, of the line's ends, and of the corners between: each between its clothoids."""
+    # Of each straight's end: all straights up to it, and two clothoids at each corner before.
+    ends = np.cumsum(straights) + np.concatenate(([0.0], np.cumsum(2.0 * clothoids)))
+    ends[:-1] += clothoids
+    return np.concatenate(([0.0], ends))
+
+
+def _elements(straights: Float, turn: Float, clothoids: Float) -> list[Element]:
     """Return the alignment's elements: straights, and two clothoids at each corner between them."""
-    straight = span - np.concatenate(([0.0], reach)) - np.concatenate((reach, [0.0]))
-    elements = [Element(float(straight[0]), 0.0, 0.0)]
-    for angle, length, after in zip(turn, lengths, straight[1:], strict=True):
-        sharpest = float(angle / length)
-        elements.append(Element(float(length), 0.0, sharpest))
-        elements.append(Element(float(length), sharpest, 0.0))
-        elements.append(Element(float(after), 0.0, 0.0))
+    elements = [Element(float(straights[0]), 0.0, 0.0)]
+    for angle, length, straight in zip(turn, clothoids, straights[1:], strict=True):
+        # Either clothoid turns by half the angle: k length / 2 = angle / 2.
+        curvature = float(angle / length)
+        elements.append(Element(float(length), 0.0, curvature))
+        elements.append(Element(float(length), curvature, 0.0))
+        elements.append(Element(float(straight), 0.0, 0.0))
     return elements

@@ -57,8 +57,8 @@ def _unparted(echoes: Echoes, length: float) -> Index:
     """Return the first of each two neighbours that have one peak together; no echo is in two of the pairs."""
     pulse, power = echoes.pulse, np.maximum(echoes.intensity, 1e-300)
     near = np.flatnonzero((pulse[1:] == pulse[:-1]) & (np.diff(echoes.range) < 40.0 * length))
-    apart = (echoes.range[near + 1] - echoes.range[near]) / length
-    together = have_one_peak(np.log(power[near] / power[near + 1]), apart)
+    distance = (echoes.range[near + 1] - echoes.range[near]) / length
+    together = have_one_peak(np.log(power[near] / power[near + 1]), distance)
     first = near[together]
     # Of a chain of pairs every second one, beginning with its first.
     begins = np.ones(len(first), dtype=bool)

@@ -89,17 +89,17 @@ class _Rule:
 
     def fits(self, mesh: SceneMesh) -> NDArray[np.bool_]:
         """Return a mask (T,) of the mesh's faces that the selector matches."""
-        found = np.ones(len(mesh), dtype=bool)
+        mask = np.ones(len(mesh), dtype=bool)
         if self.selector.class_name is not None:
-            found &= mesh.class_id == class_id(self.selector.class_name)
+            mask &= mesh.class_id == class_id(self.selector.class_name)
         if self.selector.material is not None:
             materials = [fits_pattern(entry_of(name), self.selector.material) for name in mesh.materials]
-            found &= np.array(materials, dtype=bool)[mesh.material]
+            mask &= np.array(materials, dtype=bool)[mesh.material]
         if self.names is not None:
             present, faces = np.unique(mesh.instance_id, return_inverse=True)
             owners = [self.numbers.owner(number) if self.numbers else None for number in present.tolist()]
-            found &= np.array([owner in self.names for owner in owners], dtype=bool)[faces]
-        return found
+            mask &= np.array([owner in self.names for owner in owners], dtype=bool)[faces]
+        return mask
 
 
 def _classify(mesh: SceneMesh, rules: Iterable[_Rule]) -> SceneMesh:

@@ -96,8 +96,8 @@ class PlanGrids:
         i, k = (x * scale).astype(np.intp), (y * scale).astype(np.intp)
         lines = [first + np.clip(i + shift, 0, rows - 1) * columns for shift in (0, 2)]
         places = [np.clip(k + shift, 0, columns - 1) for shift in (0, 2)]
-        found = [np.take(self._values, line + place) for line in lines for place in places]
-        return np.asarray(np.maximum(np.maximum(found[0], found[1]), np.maximum(found[2], found[3])))
+        maxima = [np.take(self._values, line + place) for line in lines for place in places]
+        return np.asarray(np.maximum(np.maximum(maxima[0], maxima[1]), np.maximum(maxima[2], maxima[3])))
 
 
 def _quarters(fine: AnyArray, coarse: AnyArray) -> Iterator[tuple[AnyArray, AnyArray]]:

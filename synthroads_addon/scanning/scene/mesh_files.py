@@ -226,8 +226,8 @@ def material_libraries(path: Path) -> Iterator[str]:
 
 def _libraries_in(text: bytes) -> Iterator[str]:
     """Yield the names of material libraries in whole lines of an .obj, each with the line's end before it."""
-    for found in _LIBRARY.finditer(text):
-        line = text[found.end() : found.end() + _LONGEST_LINE].split(b"\n", 1)[0]
+    for match in _LIBRARY.finditer(text):
+        line = text[match.end() : match.end() + _LONGEST_LINE].split(b"\n", 1)[0]
         yield line.decode("utf-8", errors="replace").strip().strip('"')
 
 

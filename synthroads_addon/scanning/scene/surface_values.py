@@ -131,21 +131,21 @@ class SurfaceValues:
             place: (N, 3) on the triangles, in the mesh's frame, m.
             normal: (N, 3) unit normals there; None if the input is none.
         """
-        result, found = np.zeros((len(place), 4), np.float32), np.zeros(len(place), bool)
+        result, mask = np.zeros((len(place), 4), np.float32), np.zeros(len(place), bool)
         for part, mine, use, triangle in located:
             if what.kind == "object":
                 values = _in_frame(part, use, place[mine])
             else:
                 if _interpolate_into(result, part, what, (mine, use, triangle), shares):
-                    found[mine] = True
+                    mask[mine] = True
                     continue
                 values = _interpolate(part, what, use, triangle, take_rows(shares, mine))
                 if values is not None and what.kind in NORMALS:
                     assert normal is not None
                     values[:, :3] = _oriented_normals(part, use, values[:, :3], normal[mine], what.kind == "normal")
             if values is not None:
-                result[mine], found[mine] = values, True
-        return result, found
+                result[mine], mask[mine] = values, True
+        return result, mask
 
 
 def _in_frame(part: PartValues, use: Index, place: Float) -> Float32 | None:

@@ -230,15 +230,17 @@ class Target:
         if not self.moving or not len(times):
             return near
         rays = Bundles.gather(origins, directions, times, reach)
-        for part, track in zip(self._parts[1:], motions, strict=True):
+        for part, track in zip(self.moving_parts, motions, strict=True):
             if not track.present.any():
                 continue
-            some = rays.rays_near(track, part.centre, part.radius + radius)
-            rotation, place, present = track.at(times[some])
-            some, rotation, place = some[present], rotation[:, present], place[:, present]
-            begin = _unrotate(rotation, origins[:, some] - place) - part.centre[:, None]
-            towards = _unrotate(rotation, directions[:, some])
-            near[some[_crosses_box(begin, towards, reach[some], part.half + radius)]] = True
+            # A sphere around the part's whole way first: few rays are left for the box.
+            indices = rays.rays_near(track, part.centre, part.radius + radius)
+            rotation, position, presence = track.at(times[indices])
+            indices, rotation, position = indices[presence], rotation[:, presence], position[:, presence]
+            # Rays in the part's frame at their times, p' = R^T (p - t), from the box's centre.
+            start = _unrotate(rotation, origins[:, indices] - position) - part.centre[:, None]
+            direction = _unrotate(rotation, directions[:, indices])
+            near[indices[_crosses_box(start, direction, reach[indices], part.half + radius)]] = True
         return near
 
     def at_time_zero(
@@ -327,8 +329,8 @@ def _clear_scanner(track: Track, part: TargetPart, scanner: Float) -> Track:
 def _cast(part: TargetPart, origins: Float, directions: Float, maximum_range: float) -> FirstHits:
     """Return rays' first hits on one part, in its body frame; faces are numbered among those of all parts."""
     shape = directions.shape[1:]
-    found = part.caster.cast(*_as_rays(origins, directions), maximum_range)
-    face = np.array(found.reshape(shape[::-1]).T, np.intp, order="C")
+    hits = part.caster.cast(*_as_rays(origins, directions), maximum_range)
+    face = np.array(hits.reshape(shape[::-1]).T, np.intp, order="C")
     if not part.count:
         return FirstHits(face, np.full(shape, np.inf), np.zeros(shape))
     # A miss is worked out with some face and then forgotten: that is less work than to sort them out before.

@@ -130,8 +130,8 @@ _BLENDS: dict[str, Callable[[Number, Number, Number], Number]] = {
 
 
 def _blend_hsv(kind: str, t: Number, a: Vector, b: Vector) -> Vector:
-    own, other = _as(Op.TO_HSV, a), _as(Op.TO_HSV, b)
-    h, s, v = own
+    base, other = _as(Op.TO_HSV, a), _as(Op.TO_HSV, b)
+    h, s, v = base
     if kind == "SATURATION":
         mixed = _as(Op.FROM_HSV, (h, (1.0 - t) * s + t * other[1], v))
         return each(lambda old, new: s.equals(0.0).choose(old, new), a, mixed)
@@ -214,10 +214,10 @@ def _float_curve(node: NodeReader) -> Value:
     mapping = node.node.mapping
     mapping.initialize()
     low, high = _curve_range(mapping, 1)
-    share, own = node.number(0), node.number(1)
+    share, base = node.number(0), node.number(1)
     table = _sampled(mapping, 0, _places(low, high))
-    new = _look_up(node, (own - low) / (high - low), table, True, mapping.extend == "EXTRAPOLATED")
-    return (1.0 - share) * own + share * new
+    new = _look_up(node, (base - low) / (high - low), table, True, mapping.extend == "EXTRAPOLATED")
+    return (1.0 - share) * base + share * new
 
 
 @reads("RGBCurve", "VectorCurve")

@@ -18,9 +18,9 @@ _LINEAR = ("Linear Rec.709", "Linear", "Non-Color", "Raw")
 
 @reads("TexImage")
 def _image(node: NodeReader) -> Value:
-    own, image = node.node, node.node.image
-    if own.projection != "FLAT":
-        raise node.refuse(own.projection)
+    item, image = node.node, node.node.image
+    if item.projection != "FLAT":
+        raise node.refuse(item.projection)
     if image is None or is_missing(image):
         raise node.refuse("no image")
     if image.source not in ("FILE", "GENERATED") or image.is_multiview or image.type not in ("IMAGE", "UV_TEST"):
@@ -30,7 +30,7 @@ def _image(node: NodeReader) -> Value:
     opaque = 255 if pixels.dtype == np.uint8 else 1.0
     if image.alpha_mode not in ("NONE", "CHANNEL_PACKED") and (pixels[:, :, 3] != opaque).any():
         raise node.refuse("transparent image")
-    number = node.builder.picture(Picture(pixels, _INTERPOLATIONS[own.interpolation], _EXTENSIONS[own.extension]))
+    number = node.builder.picture(Picture(pixels, _INTERPOLATIONS[item.interpolation], _EXTENSIONS[item.extension]))
     u, v, _ = node.place()
     first = node.builder.add(Op.IMAGE, u.value, v.value, settings=(number,), results=4)
     red, green, blue, alpha = (Number(node.builder, first + part) for part in range(4))
@@ -62,14 +62,14 @@ def _pixels(image: bpy.types.Image) -> Pixels:
         raise UnknownNodeError(f"Image Texture: {count} channels")
     flat = np.empty(width * height * count, np.float32)
     image.pixels.foreach_get(flat)
-    own = flat.reshape(height, width, count)
+    values = flat.reshape(height, width, count)
     kept = count if image.alpha_mode != "NONE" else min(count, 3)
     if image.is_float:
         result: Pixels = np.ones((height, width, 4), np.float32)
     else:  # a quarter of the memory
         result = np.full((height, width, 4), 255, np.uint8)
-        np.rint(np.multiply(own, np.float32(255.0), out=own), out=own)
-    result[:, :, :3] = own[:, :, : min(count, 3)]
+        np.rint(np.multiply(values, np.float32(255.0), out=values), out=values)
+    result[:, :, :3] = values[:, :, : min(count, 3)]
     if kept == 4:
-        result[:, :, 3] = own[:, :, 3]
+        result[:, :, 3] = values[:, :, 3]
     return result

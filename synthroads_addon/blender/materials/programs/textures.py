@@ -91,8 +91,8 @@ def fractal(node: NodeReader, place: _Place, kind: str, normalized: bool, parts:
 
 @reads("TexNoise")
 def _noise(node: NodeReader) -> Value:
-    own = node.node
-    dimensions = _DIMENSIONS[own.noise_dimensions]
+    item = node.node
+    dimensions = _DIMENSIONS[item.noise_dimensions]
     place = _texture_place(node, dimensions, node.number("Scale"))
     detail, roughness = clamp(node.number("Detail"), 0.0, 15.0), larger(node.number("Roughness"), 0.0)
     rest = [node.number(name) for name in ("Lacunarity", "Offset", "Gain")]
@@ -100,7 +100,7 @@ def _noise(node: NodeReader) -> Value:
         raise node.refuse("Distortion")  # it makes more of the last digits of a place than results may differ by
 
     def at(place: _Place) -> Number:
-        return fractal(node, place, own.noise_type, own.normalize, [detail, roughness, *rest])
+        return fractal(node, place, item.noise_type, item.normalize, [detail, roughness, *rest])
 
     if node.socket.identifier in _FACTORS:
         return at(place)
@@ -131,8 +131,8 @@ _OF_FLOATS = 8
 
 @reads("TexVoronoi")
 def _voronoi(node: NodeReader) -> Value:
-    own = node.node
-    dimensions = _DIMENSIONS[own.voronoi_dimensions]
+    item = node.node
+    dimensions = _DIMENSIONS[item.voronoi_dimensions]
     scale = node.number("Scale")
     place = _texture_place(node, dimensions, scale)
     detail, roughness = clamp(node.number("Detail"), 0.0, 15.0), saturate(node.number("Roughness"))
@@ -141,7 +141,7 @@ def _voronoi(node: NodeReader) -> Value:
     randomness = saturate(node.number("Randomness"))
     parts = (detail, roughness, lacunarity, smoothness, exponent, randomness)
     # Until 5.0 cells' points came from floats.
-    kinds = _FEATURES.index(own.feature), _METRICS.index(own.distance), int(own.normalize)
+    kinds = _FEATURES.index(item.feature), _METRICS.index(item.distance), int(item.normalize)
     settings = (dimensions + (_OF_FLOATS if VECTORS_FUSED else 0), *kinds)
     values = [*place.values(), *(part.value for part in parts)]
     first = node.builder.add(Op.VORONOI, *values, settings=settings, results=8)
@@ -159,21 +159,21 @@ def _voronoi(node: NodeReader) -> Value:
 
 @reads("TexWave")
 def _wave(node: NodeReader) -> Value:
-    own = node.node
+    item = node.node
     place = scaled(node.place(), node.number("Scale"))
     place = each(lambda part: (part + 0.000001) * 0.999999, place)
     phase = node.number("Phase Offset")
     if node.number("Distortion").known != 0.0 or VECTORS_FUSED:
         raise node.refuse("Distortion")  # as of noise; before 5.0 the last digits are others without it, too
-    if own.wave_type == "BANDS":
+    if item.wave_type == "BANDS":
         x, y, z = place
-        along = {"X": x, "Y": y, "Z": z, "DIAGONAL": x + y + z}[own.bands_direction]
-        number = along * (10.0 if own.bands_direction == "DIAGONAL" else 20.0) + phase
+        along = {"X": x, "Y": y, "Z": z, "DIAGONAL": x + y + z}[item.bands_direction]
+        number = along * (10.0 if item.bands_direction == "DIAGONAL" else 20.0) + phase
     else:
         zero = node.constant(0.0)
-        left = [zero if axis == own.rings_direction else part for axis, part in zip("XYZ", place, strict=True)]
+        left = [zero if axis == item.rings_direction else part for axis, part in zip("XYZ", place, strict=True)]
         number = length((left[0], left[1], left[2])) * 20.0 + phase
-    result = _profile(own.wave_profile, number)
+    result = _profile(item.wave_profile, number)
     return result if node.socket.identifier in _FACTORS else (result, result, result)
 
 
@@ -236,12 +236,12 @@ def _checker(node: NodeReader) -> Value:
 
 @reads("TexBrick")
 def _brick(node: NodeReader) -> Value:
-    own: Any = node.node
+    item: Any = node.node
     x, y, _ = scaled(node.place(), node.number("Scale"))
     names = ("Mortar Size", "Mortar Smooth", "Bias", "Brick Width", "Row Height")
     parts = [x, y, *(node.number(name) for name in names)]
-    parts += [node.constant(float(own.offset)), node.constant(float(own.squash))]
-    settings = (int(own.offset_frequency), int(own.squash_frequency), int(not VECTORS_FUSED))
+    parts += [node.constant(float(item.offset)), node.constant(float(item.squash))]
+    settings = (int(item.offset_frequency), int(item.squash_frequency), int(not VECTORS_FUSED))
     first = node.builder.add(Op.BRICK, *(part.value for part in parts), settings=settings, results=2)
     tint, mortar = Number(node.builder, first), Number(node.builder, first + 1)
     if node.socket.identifier in _FACTORS:

@@ -214,10 +214,10 @@ class NodeReader:
     def _entry(self, entry: int | str) -> bpy.types.NodeSocket:
         if isinstance(entry, int):
             return self.node.inputs[entry]
-        found = _of(self.node.inputs, entry)
-        if found is None:
+        socket = _of(self.node.inputs, entry)
+        if socket is None:
             raise UnknownNodeError(f"{self.node.bl_rna.name}: {entry}")
-        return found
+        return socket
 
     def place(self) -> Vector:
         """Return where a texture is looked up."""

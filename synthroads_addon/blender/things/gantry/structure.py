@@ -133,7 +133,7 @@ def gantry_catwalk_group(tree: Tree) -> None:
         thick = bar * sizes.CATWALK_POST
         post = box(tree, (thick, thick, tall), (0.0, 0.0, support + tall / 2))
         frame = [move_geometry(post, op.vector(tree, 0.0, edge * side)) for side in (-1.0, 1.0)]
-        size = op.vector(tree, support, width * 0.96, support + 0.02)
+        size = op.vector(tree, support, width * sizes.CATWALK_SUPPORT_SHARE, support + sizes.CATWALK_SUPPORT_EXCESS)
         feet = box(tree, size, (0.0, 0.0, support / 2))
         parts.append(put_on_points(points, op.join(feet, *frame), op.vector(tree, x)))
     with tree.frame("All"):
