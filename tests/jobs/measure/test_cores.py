@@ -19,7 +19,7 @@ from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.scenes.scan_scenes import plane
 
 ROOT = Path(__file__).resolve().parents[3]
-TOOL = ROOT / "tools" / "benchmark_cores.py"
+TOOL = ROOT / "studies" / "costs" / "cores.py"
 WITHOUT_BLENDER = f"""
 import runpy, sys
 sys.modules["bpy"] = None

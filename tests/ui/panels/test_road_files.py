@@ -115,7 +115,7 @@ def test_the_axis_lies_where_the_panel_says_beside_the_points(cheap: Any, tmp_pa
     with pytest.raises(RuntimeError, match=r"Lane is 7: the road has 2 lanes each way"):
         bpy.ops.synthroads.load_axis(filepath=str(path), points_are="LANE", lane=7)
     designed = road_file_of(tmp_path)
-    with pytest.raises(RuntimeError, match=r"Offset is .*OpenDRIVE says where its axis lies"):
+    with pytest.raises(RuntimeError, match=r"Offset is .*OpenDRIVE gives the axis itself"):
         bpy.ops.synthroads.load_axis(filepath=str(designed), points_are="BESIDE", offset=1.0)
 
 

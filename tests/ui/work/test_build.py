@@ -281,7 +281,7 @@ def test_an_undo_step_of_a_half_built_road_holds_none_of_it(cheap: Any, users_ow
 def test_buttons_wait_for_object_mode(settings: Any, users_own: bpy.types.Object) -> None:  # noqa: F811
     bpy.context.view_layer.objects.active = users_own
     bpy.ops.object.mode_set(mode="EDIT")
-    with pytest.raises(RuntimeError, match="object mode"):
+    with pytest.raises(RuntimeError, match="Object Mode"):
         bpy.ops.synthroads.build()
     bpy.ops.object.mode_set(mode="OBJECT")
 
