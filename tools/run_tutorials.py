@@ -99,9 +99,9 @@ def broken_rules(when: int) -> Callable[[Path], str]:
 
 FIGURES = (
     Figure("README.md", r"`cloud\.laz` \| about ([\d.]+) million points", demo_points),
-    Figure("docs/start.md", r"`cloud\.laz` with some ([\d.]+) million labelled points", demo_points),
-    Figure("docs/tutorials/modeller.md", r"breaks of the guidelines: (\w+) places", broken_rules(1)),
-    Figure("docs/tutorials/modeller.md", r"before the change there are (\w+) such places", broken_rules(0)),
+    Figure("docs/start.md", r"`cloud\.laz` with about ([\d.]+) million labelled\s+points", demo_points),
+    Figure("docs/tutorials/modeller.md", r"that the road breaks: at (\w+) places", broken_rules(1)),
+    Figure("docs/tutorials/modeller.md", r"Before the change, (\w+) rules? (?:was|were) broken", broken_rules(0)),
 )
 
 
