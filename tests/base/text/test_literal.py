@@ -47,6 +47,7 @@ def test_every_module_that_draws_with_matplotlib_draws_texts_literally() -> None
     """Names of files, classes, recipes and runs get into all of their figures."""
     sources = [path for folder in ("synthroads_addon", "headless", "ml") for path in (ROOT / folder).rglob("*.py")]
     drawing = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in sources}
-    drawing = {name: text for name, text in drawing.items() if " save_figure(" in text and "def save_" not in text}
+    helper = "synthroads_addon/base/figure.py"
+    drawing = {name: text for name, text in drawing.items() if "save_figure(" in text and name != helper}
     assert len(drawing) >= 5
     assert [name for name, text in drawing.items() if "@literal_texts()" not in text] == []
