@@ -36,5 +36,7 @@ def main(output: Path, cloud: Path | None = None) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("output", type=Path, help="folder for the files")
-    parser.add_argument("cloud", type=Path, nargs="?", help="LAZ, LAS, PLY or NPZ; a small one is made if it is left out")
+    parser.add_argument(
+        "cloud", type=Path, nargs="?", help="LAZ, LAS, PLY or NPZ; a small one is made if it is left out"
+    )
     main(**vars(parser.parse_args()))

@@ -54,8 +54,8 @@ class Job:
         axis_place: where the axis lies beside that file's points.
         overwrite: replace files that are already there.
         road: take the whole road of this OpenDRIVE, LandXML or IFC file, as far as it is read.
-        new_file: build in a new, empty Blender file instead of the open one, which is lost. In the open one, all visible
-            objects are scanned too, except the cube of a bpy that has just been imported.
+        new_file: build in a new, empty Blender file instead of the open one, which is lost. In the open one, all
+            visible objects are scanned too, except the cube of a bpy that has just been imported.
         begun: when the job began, by `time.perf_counter`, for a time budget; when `generate` is called if None.
     """
 
@@ -161,7 +161,8 @@ def open_job_scene(
         timer: of its stages.
         report: gets the choice.
     """
-    from ..blender.files import empty_file, remove_startup_objects  # Blender takes a second to start: other outputs need none
+    # Blender takes a second to start: other outputs need none
+    from ..blender.files import empty_file, remove_startup_objects
     from .open_scene import RoadScene
 
     if job.new_file:
