@@ -36,7 +36,5 @@ def main(output: Path, cloud: Path | None = None) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("output", type=Path, help="folder for the files")
-    parser.add_argument(
-        "cloud", type=Path, nargs="?", help="LAZ, LAS, PLY or NPZ; a small one is made if it is left out"
-    )
+    parser.add_argument("cloud", type=Path, nargs="?", help="LAZ, LAS, PLY or NPZ; if left out, a small one is made")
     main(**vars(parser.parse_args()))
