@@ -23,12 +23,12 @@ def table(figures: dict[str, Any]) -> str:
     named = figures["coordinate_system"]
     lines.append(f"coordinate system {named or 'not named: coordinates are read as metres'}")
     if named and figures["height_epsg"] is None:
-        lines.append("what heights are counted from isn't named")
+        lines.append("vertical coordinate system not named")
     if figures["bounds"]:
         low, high = figures["bounds"]["low"], figures["bounds"]["high"]
         spans = " x ".join(f"{b - a:.1f}" for a, b in zip(low, high, strict=True))
         lines.append(f"from {low} to {high}: {spans} m")
-    lines.append(f"attributes: {', '.join(figures['attributes']) or 'none beyond the usual ones'}")
+    lines.append(f"further attributes: {', '.join(figures['attributes']) or 'none'}")
     if figures["left_out"]:
         lines.append(f"not read: {', '.join(figures['left_out'])}")
     rows = [("", *(title for _, title, _ in _COLUMNS))]

@@ -1,17 +1,13 @@
-"""Read a labelled cloud into NumPy arrays, count its classes, and hand it to Open3D where that is installed.
-
-python examples/cloud_to_numpy/cloud_to_numpy.py out/numpy [CLOUD]
-"""
+"""Read a labelled cloud into NumPy arrays, count its classes, and hand it to Open3D where that is installed."""
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
 
 from synthroads_addon import Job, generate, load_scenario, open_cloud
-from synthroads_addon.base.classes import class_scheme
 
 try:
     import open3d
@@ -43,11 +39,12 @@ def main(output: Path, cloud: Path | None = None) -> None:
         generate(Job(load_scenario("rq31-600m", SMALL), output / "road"))
         cloud = output / "road" / "cloud.laz"
     arrays = read_arrays(cloud)
-    names = {row.id: row.name for row in class_scheme("17").rows}
+    with open_cloud(cloud) as reader:
+        names = reader.header.scheme.names()
     for number, count in zip(*np.unique(arrays["class_id"], return_counts=True), strict=True):
-        chosen = arrays["class_id"] == number
-        height = arrays["xyz"][chosen, 2].mean()
+        height = arrays["xyz"][arrays["class_id"] == number, 2].mean()
         print(f"{names.get(int(number), 'unlabelled'):14} {count:9,} points, mean height {height:7.2f} m")
+    output.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(output / "arrays.npz", **arrays)
     if open3d is None:
         print("Open3D isn't installed: no open3d.ply is written")
@@ -56,4 +53,7 @@ def main(output: Path, cloud: Path | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(Path, sys.argv[1:]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("output", type=Path, help="folder for the files")
+    parser.add_argument("cloud", type=Path, nargs="?", help="LAZ, LAS, PLY or NPZ; if left out, a small one is made")
+    main(**vars(parser.parse_args()))

@@ -1,11 +1,8 @@
-"""Scan a road by a scanner of one's own, which is a JSON file, and measure that it does what the file says.
-
-python examples/own_device/own_device.py out/own-device
-"""
+"""Scan a road by a scanner of one's own, which is a JSON file, and measure that it does what the file says."""
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -33,4 +30,6 @@ def main(output: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("output", type=Path, help="folder for the files")
+    main(**vars(parser.parse_args()))

@@ -1,11 +1,8 @@
-"""Build a scene in Blender by Python, say what its objects are, and scan it from a tripod.
-
-python examples/own_scene/own_scene.py out/own-scene
-"""
+"""Build a scene in Blender by Python, say what its objects are, and scan it from a tripod."""
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import bpy
@@ -47,4 +44,6 @@ def main(output: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("output", type=Path, help="folder for the files")
+    main(**vars(parser.parse_args()))

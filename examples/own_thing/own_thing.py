@@ -1,12 +1,9 @@
-"""Add a thing of one's own, a bench, to roads: their model, scan, parameters and CityJSON have it.
-
-python examples/own_thing/own_thing.py out/own-thing
-"""
+"""Add a thing of one's own, a bench, to roads: their model, scan, parameters and CityJSON have it."""
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -47,4 +44,6 @@ def main(output: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("output", type=Path, help="folder for the files")
+    main(**vars(parser.parse_args()))

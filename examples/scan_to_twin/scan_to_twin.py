@@ -1,12 +1,9 @@
-"""Turn a scan into the parameters of its road, and these into CityJSON and OpenDRIVE; say how near it comes.
-
-python examples/scan_to_twin/scan_to_twin.py out/scan-to-twin [CLOUD]
-"""
+"""Turn a scan into the parameters of its road, and these into CityJSON and OpenDRIVE; say how near it comes."""
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
 from pathlib import Path
 
 from synthroads_addon import Job, generate, load_scenario, read_parameters
@@ -37,4 +34,7 @@ def main(output: Path, cloud: Path | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(Path, sys.argv[1:]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("output", type=Path, help="folder for the files")
+    parser.add_argument("cloud", type=Path, nargs="?", help="LAZ, LAS, PLY or NPZ; if left out, a small one is made")
+    main(**vars(parser.parse_args()))

@@ -1,10 +1,8 @@
-"""Make a data set of two roads, load it by PyTorch, and train a network of two layers that looks at single points.
-
-python examples/torch_dataset/torch_dataset.py out/torch [EPOCHS]
-"""
+"""Make a data set of two roads, load it by PyTorch, and train a network of two layers that looks at single points."""
 
 from __future__ import annotations
 
+import argparse
 import subprocess
 import sys
 from pathlib import Path
@@ -53,4 +51,7 @@ def main(output: Path, epochs: int = 10) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), *map(int, sys.argv[2:]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("output", type=Path, help="folder for the files")
+    parser.add_argument("epochs", type=int, nargs="?", default=10, help="of the training (10)")
+    main(**vars(parser.parse_args()))

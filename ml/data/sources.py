@@ -85,7 +85,8 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None, *, labe
     elif path.is_dir():
         tiles = _folder_tiles(path, scheme, source, labels=labels)
     else:
-        raise MissingFileError(str(path), None, "no such file or folder of labelled points")
+        hint = "" if path.suffix else f"; synthroads dataset RECIPE --output {path} makes one"
+        raise MissingFileError(str(path), None, f"no such file or folder of labelled points{hint}")
     for tile in tiles:
         try:
             kept = slice(None) if voxel is None else voxel_sample(tile.coord, voxel)

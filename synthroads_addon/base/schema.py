@@ -325,10 +325,10 @@ def _input_error(error: ValidationError, data: object, source: str, kind_of_data
         message += nearest_name(value, re.findall(r"'([^']*)'", context["expected"]))
     elif kind in ("missing", "value_error"):
         value = None
-    field = ".".join(part if part.isprintable() else repr(part) for part in path) or (
-        "the file" if source else kind_of_data
-    )
-    return InputError(f"{source}: {field}" if source else field, value, " ".join(message.split()))
+    field = ".".join(part if part.isprintable() else repr(part) for part in path)
+    if not field:
+        field = kind_of_data if not source else "the file" if value is not None else ""
+    return InputError(": ".join(filter(None, (source, field))), value, " ".join(message.split()))
 
 
 def _in_our_words(message: str) -> str:

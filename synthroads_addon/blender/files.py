@@ -8,9 +8,11 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, suppress
+from itertools import product
 from pathlib import Path
 
 import bpy
+from mathutils import Matrix
 
 from ..base.errors import OutputError
 
@@ -21,6 +23,22 @@ def empty_file() -> None:
     Not `read_factory_settings`: that would also disable the extension that this code may belong to.
     """
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
+def remove_startup_objects() -> None:
+    """Remove the cube, the camera and the light that Blender begins with, where it is a Python package.
+
+    A program has no window that shows the cube, which stands in the middle of a road. They stay where there is anything
+    else, where the cube was changed, and in a file that was opened.
+    """
+    objects = bpy.data.objects
+    if not bpy.app.module or bpy.data.is_saved or {item.name for item in objects} != {"Cube", "Camera", "Light"}:
+        return
+    cube = objects["Cube"]
+    corners = {tuple(vertex.co) for vertex in cube.data.vertices}
+    changed = cube.modifiers or "synthroads_class" in cube or cube.matrix_basis != Matrix()
+    if corners == set(product((-1.0, 1.0), repeat=3)) and not changed:
+        bpy.data.batch_remove(list(objects))
 
 
 def save_scene(path: Path, compress: bool = True) -> None:

@@ -54,7 +54,8 @@ class Job:
         axis_place: where the axis lies beside that file's points.
         overwrite: replace files that are already there.
         road: take the whole road of this OpenDRIVE, LandXML or IFC file, as far as it is read.
-        new_file: build in a new, empty Blender file instead of the open one, which is lost.
+        new_file: build in a new, empty Blender file instead of the open one, which is lost. In the open one, all
+            visible objects are scanned too, except the cube of a bpy that has just been imported.
         begun: when the job began, by `time.perf_counter`, for a time budget; when `generate` is called if None.
     """
 
@@ -160,11 +161,14 @@ def open_job_scene(
         timer: of its stages.
         report: gets the choice.
     """
-    from ..blender.files import empty_file  # Blender takes a second to start: other outputs need none
+    # Blender takes a second to start: other outputs need none
+    from ..blender.files import empty_file, remove_startup_objects
     from .open_scene import RoadScene
 
     if job.new_file:
         empty_file()
+    else:
+        remove_startup_objects()
     scene = RoadScene(job.scenario, road, inputs)
     if job.scenario.chooses:
         from .choose.search import choose_settings  # loads Blender as well

@@ -98,6 +98,7 @@ ROWS = (
         ("scene.glb",),
     ),
     Small("synthroads cloud info out/mine/cloud.laz"),
+    Small("python examples/cloud_to_numpy/cloud_to_numpy.py out/numpy out/mine/cloud.laz", "", _EXAMPLES),
     Small("synthroads parameters --seed 7 --count 100", "", {"100": "3"}),
     Small("synthroads check out/mine/parameters.json"),
     Small("synthroads twin out/mine/parameters.json --output out/twin", needs=_TWIN),
@@ -143,6 +144,7 @@ ROWS = (
     Small("pip install -e '.[e57]'", reason=_PIP),
     Small("pip install -e '.[maps]'", reason=_PIP),
     Small("synthroads --help"),
+    Small("python -m venv .venv", reason=_PIP),
     Small("pip install '.[blender,ml]'", reason=_PIP),
     Small("pip install torch==2.13.0 --index-url https://download.pytorch.org/whl/cpu", reason=_PIP),
     Small("PIP_EXTRA_INDEX_URL=https://download.pytorch.org/whl/cpu make test", reason="it runs the tests"),
@@ -196,6 +198,13 @@ ROWS = (
         "synthroads train segmentation-small --output out/longer --set schedule.epochs=30 --set seed=2",
         _TINY,
         {"=30": "=2"},
+        needs=_ML,
+    ),
+    Small(
+        "synthroads train segmentation-small --output out/of-two "
+        """--set 'data.synthetic=[{"path": "out/two-scanners", "split": "train"}]' """
+        """--set 'data.tests={"unseen road": [{"path": "out/two-scanners", "split": "test"}]}'""",
+        _TINY,
         needs=_ML,
     ),
     Small("synthroads evaluate out/segmentation out/small-roads --split test --output out/scores", needs=_ML),

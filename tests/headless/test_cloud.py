@@ -49,6 +49,8 @@ def test_info(capsys, cloud: Path) -> None:
     assert command("cloud", ["info", str(cloud)]) == 0
     text = capsys.readouterr().out
     assert text.startswith("cloud.laz: LAS 1.4, point format 7, LAZ, 3,000 points\ncoordinate system EPSG:25832\n")
+    assert "\nvertical coordinate system not named\n" in text
+    assert "\nfurther attributes: range, incidence\n" in text
     assert command("cloud", ["info", str(cloud), "--json", "--samples", "0"]) == 0
     figures = json.loads(capsys.readouterr().out)
     assert (figures["points"], figures["epsg"], figures["class_scheme"]) == (3_000, 25832, "17")

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from synthroads_addon.base.classes import class_id
-from synthroads_addon.cloud.formats.registry import open_cloud
+from synthroads_addon.base.classes import class_id, class_scheme
+from synthroads_addon.cloud.formats.registry import open_cloud, open_writer
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.road.parameters import read_parameters
+from tests.helpers.clouds.random_points import make_points
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NAMES = ("cloud_to_numpy", "own_device", "own_scene", "own_thing", "scan_to_twin", "torch_dataset")
@@ -31,13 +32,13 @@ os._exit(0) # Blender's own teardown can hang
 pytestmark = pytest.mark.any_blender
 
 
-def run(name: str, output: Path, *more: str | Path) -> str:
-    """Run an example into a folder; return what it prints."""
-    words = [sys.executable, "-c", RUN, EXAMPLES / name / f"{name}.py", output, *more]
+def run(name: str, *words: str | Path, cwd: Path) -> str:
+    """Run an example with these words behind it, in a folder; return what it prints."""
+    words = (sys.executable, "-c", RUN, EXAMPLES / name / f"{name}.py", *words)
     environment = os.environ | {"PYTHONPATH": str(EXAMPLES.parent)}
     done = subprocess.run(
         [*map(str, words)],
-        cwd=output,
+        cwd=cwd,
         env=environment,
         capture_output=True,
         text=True,
@@ -55,7 +56,7 @@ def points_of(file: Path) -> PointBlock:
 
 @pytest.mark.slow
 def test_a_cloud_becomes_numpy_arrays(tmp_path: Path) -> None:
-    told = run("cloud_to_numpy", tmp_path)
+    told = run("cloud_to_numpy", tmp_path, cwd=tmp_path)
     points, arrays = points_of(tmp_path / "road" / "cloud.laz"), np.load(tmp_path / "arrays.npz")
     np.testing.assert_array_equal(arrays["xyz"], points.xyz)
     np.testing.assert_array_equal(arrays["class_id"], points.class_id)
@@ -64,8 +65,17 @@ def test_a_cloud_becomes_numpy_arrays(tmp_path: Path) -> None:
     assert sum(counts.values()) == len(points)
 
 
+def test_a_cloud_of_five_classes_becomes_numpy_arrays_in_a_new_folder(tmp_path: Path) -> None:
+    points = make_points(3).with_arrays({"class_id": np.array([0, 4, 4], dtype=np.uint8)})
+    with open_writer(tmp_path / "five.npz", 25832, points.xyz[0], 5e8, scheme=class_scheme("5").as_stored()) as writer:
+        writer.write(points)
+    told = run("cloud_to_numpy", "new/folder", "five.npz", cwd=tmp_path)
+    assert re.findall(r"(?m)^(\w+) +([\d,]+) points", told) == [("ground", "1"), ("road_furniture", "2")]
+    np.testing.assert_array_equal(np.load(tmp_path / "new" / "folder" / "arrays.npz")["class_id"], [0, 4, 4])
+
+
 def test_a_scene_of_ones_own_is_scanned_with_its_classes(tmp_path: Path) -> None:
-    told = run("own_scene", tmp_path)
+    told = run("own_scene", tmp_path, cwd=tmp_path)
     points = points_of(tmp_path / "cloud.laz")
     assert told.strip().endswith(f"{len(points):,} points of 6 objects")
     assert set(points.class_id) == {class_id(name) for name in ("road", "noise_barrier", "pole", "vehicle")}
@@ -75,7 +85,7 @@ def test_a_scene_of_ones_own_is_scanned_with_its_classes(tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_a_scanner_of_ones_own_does_what_its_file_says(tmp_path: Path) -> None:
-    run("own_device", tmp_path)
+    run("own_device", tmp_path, cwd=tmp_path)
     device = json.loads((EXAMPLES / "own_device" / "robot.json").read_text(encoding="utf-8"))
     points = points_of(tmp_path / "cloud.laz")
     assert points.number_of_returns.max() == device["maximum_returns"]
@@ -87,7 +97,7 @@ def test_a_scanner_of_ones_own_does_what_its_file_says(tmp_path: Path) -> None:
 @pytest.mark.first_python
 def test_a_data_set_is_learned_from(tmp_path: Path) -> None:
     pytest.importorskip("torch")
-    told = run("torch_dataset", tmp_path)
+    told = run("torch_dataset", tmp_path, cwd=tmp_path)
     right = float(re.search(r"([\d.]+)% of the unseen", told)[1])
     labels = np.concatenate([np.load(file) for file in (tmp_path / "roads").rglob("test/*/segment.npy")])
     assert 100.0 >= right > 100.0 * np.bincount(labels[labels >= 0]).max() / (labels >= 0).sum(), "a guess is as good"
@@ -95,7 +105,7 @@ def test_a_data_set_is_learned_from(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_scan_becomes_a_twin(tmp_path: Path) -> None:
-    told = run("scan_to_twin", tmp_path)
+    told = run("scan_to_twin", tmp_path, cwd=tmp_path)
     off = json.loads(re.search(r"true centreline: (.*)", told)[1].replace("'", '"'))
     assert off["largest"] < 0.1
     found = read_parameters(tmp_path / "parameters.json")
@@ -106,7 +116,7 @@ def test_a_scan_becomes_a_twin(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_thing_of_ones_own_is_in_cloud_and_twin(tmp_path: Path) -> None:
-    told = run("own_thing", tmp_path)
+    told = run("own_thing", tmp_path, cwd=tmp_path)
     benches = re.findall(r"(?m)^(bench-\S+): instance (\d+), ([\d,]+) points, (in|not in) CityJSON", told)
     points = points_of(tmp_path / "cloud.laz")
     assert len(benches) >= 2
@@ -115,6 +125,12 @@ def test_a_thing_of_ones_own_is_in_cloud_and_twin(tmp_path: Path) -> None:
         assert int(chosen.sum()) == int(count.replace(",", "")) > 20
         assert set(points.class_id[chosen]) == {class_id("utility")}
         assert there == "in"
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "torch_dataset"])
+def test_help_says_what_to_give_and_makes_nothing(name: str, tmp_path: Path) -> None:
+    assert re.search(rf"usage: {name}\.py \[-h\] output( \[\w+\])?\n", run(name, "--help", cwd=tmp_path))
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("name", NAMES)

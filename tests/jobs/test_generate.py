@@ -7,6 +7,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import bpy
 import laspy
 import numpy as np
 import pytest
@@ -58,6 +59,15 @@ def test_a_road_that_no_pulse_comes_back_from_is_told(tmp_path: Path) -> None:
     assert report["counts"]["points"] == 0
     assert "no pulse came back" in json.loads((tmp_path / "report.json").read_text())["warnings"][0]
     assert summary(report, tmp_path).startswith("warning: no pulse came back")
+
+
+@pytest.mark.any_blender
+def test_the_cube_that_blender_begins_with_is_not_scanned(tmp_path: Path) -> None:
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    report = generate(job(tmp_path, "road.length=20", 'outputs=["cloud"]'))
+    assert "Cube" not in bpy.data.objects
+    assert "unlabelled" not in report["counts"]["points_by_class"]
+    assert report["counts"]["points"] > 1000
 
 
 @pytest.mark.parametrize(

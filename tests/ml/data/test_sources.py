@@ -147,3 +147,12 @@ def test_robust_scaling_takes_gain_and_shift_out() -> None:
     tiles: list[CloudTile] = [road_tile(500, 1, "a"), replace(road_tile(500, 2, "b"), strength=None)]
     assert scalings(tiles, "share")["a"].apply(strength) == pytest.approx(strength)
     assert scalings(tiles, "robust")["b"].span == 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("set", r"labelled points; synthroads dataset RECIPE --output \S+set makes one$"), ("scan.laz", "points$")],
+)
+def test_a_data_set_that_is_missing_is_told_with_what_makes_it(name: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(MissingFileError, match=said):
+        list(read_tiles(Source(path=str(tmp_path / name), split="train"), class_scheme("5"), 0.3))

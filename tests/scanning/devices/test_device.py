@@ -227,6 +227,13 @@ def test_own_device_from_a_file(tmp_path: Path) -> None:
         load_device(str(tmp_path / "none.json"))
 
 
+def test_a_key_too_many_is_told_by_the_name_of_its_file(tmp_path: Path) -> None:
+    file = tmp_path / "mine.json"
+    file.write_text(json.dumps(load_device("velodyne-vlp-16").to_dict() | {"reach": 100}), encoding="utf-8")
+    with pytest.raises(InputError, match=r"mine\.json: unknown key 'reach'"):
+        load_device(str(file))
+
+
 @pytest.mark.parametrize("name", device_names())
 def test_presets_are_documented(name: str) -> None:
     """The documentation's table has the preset's own numbers."""
