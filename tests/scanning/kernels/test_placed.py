@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import platform
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from synthroads_addon.base.arithmetic.loops import EchoPlaces, loops_by
-from synthroads_addon.scanning.kernels.points import CompiledPoints, usable_points
+from synthroads_addon.scanning.kernels.points import CompiledPoints
 from synthroads_addon.scanning.noise import Noise
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.scan import BlockResult, BlockScan
@@ -20,18 +19,6 @@ pytestmark = pytest.mark.any_blender
 SUN = np.array([0.48, -0.36, 0.8])
 LAYERS = frozenset({"normal", "material", "true_range", "true_xyz", "scanner", "damage", "power_db"})
 NOISY = Noise(range_bias=0.02, range_sigma=0.01, angle_sigma_mrad=1.0, position_sigma=0.02, heading_sigma_deg=0.05)
-
-
-@pytest.fixture(params=["usual", "narrow"])
-def loops(request: pytest.FixtureRequest) -> CompiledPoints:
-    """Return the loops, and their versions for processors without wide instructions."""
-    found = usable_points()
-    assert isinstance(found, CompiledPoints), f"{found}: python tools/build_kernels.py"
-    if request.param == "usual":
-        return found
-    if platform.machine().lower() not in ("x86_64", "amd64"):
-        pytest.skip("one version for all processors")
-    return CompiledPoints("_narrow")
 
 
 def scanned(plan: ScanPlan, loops: CompiledPoints | None) -> BlockResult:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,7 +24,7 @@ from synthroads_addon.scanning.colour.colour import (
 )
 from synthroads_addon.scanning.colour.reflection import reflected_sunlight
 from synthroads_addon.scanning.colour.surfaces import SceneSurfaces
-from synthroads_addon.scanning.kernels.points import CompiledPoints, usable_points
+from synthroads_addon.scanning.kernels.points import CompiledPoints
 from synthroads_addon.scanning.relief.micro_relief import BeamEnds, micro_relief, shift_by_relief
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.surface_values import (
@@ -43,16 +42,10 @@ NAMES = ("asphalt", "paint_white", "verge", "car_paint", "galvanised_steel")
 COUNTS = [0, 1, 3, 5000]
 
 
-@pytest.fixture(params=["usual", "narrow"])
-def kernel(request: pytest.FixtureRequest) -> CompiledPoints:
-    """Return the loops, and their versions for processors without wide instructions."""
-    found = usable_points()
-    assert isinstance(found, CompiledPoints), f"{found}: python tools/build_kernels.py"
-    if request.param == "usual":
-        return found
-    if platform.machine().lower() not in ("x86_64", "amd64"):
-        pytest.skip("one version for all processors")
-    return CompiledPoints("_narrow")
+@pytest.fixture
+def kernel(loops: CompiledPoints) -> CompiledPoints:
+    """Return the loops, both versions."""
+    return loops
 
 
 def same(mine: object, theirs: object) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 from synthroads_addon.base.arithmetic.loops import ColumnGrid, Faces, loops_by
 from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.random_streams import stream
-from synthroads_addon.scanning.kernels.points import CompiledPoints, usable_points
+from synthroads_addon.scanning.kernels.points import CompiledPoints
 from synthroads_addon.scanning.scene.caster import FacePlanes
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import ScannedScene
@@ -26,18 +25,6 @@ SUN = np.array([0.48, -0.36, 0.8])
 SIDE = 60
 FILM = 0.003
 """Thickness of a line of paint, m."""
-
-
-@pytest.fixture(params=["usual", "narrow"])
-def loops(request: pytest.FixtureRequest) -> CompiledPoints:
-    """Return the loops, and their versions for processors without wide instructions."""
-    found = usable_points()
-    assert isinstance(found, CompiledPoints), f"{found}: python tools/build_kernels.py"
-    if request.param == "usual":
-        return found
-    if platform.machine().lower() not in ("x86_64", "amd64"):
-        pytest.skip("one version for all processors")
-    return CompiledPoints("_narrow")
 
 
 def hills(seed: int, steep: float = 0.1) -> tuple[list[Float], list[Float]]:
