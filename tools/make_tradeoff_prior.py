@@ -85,7 +85,7 @@ def measure_platform(platform: str) -> dict[str, Any]:
     assert few is not None
     truth = trial.points()
     seconds = {rays: trial.time_scan(rings)[0] for rays, rings in RINGS.items()}
-    colours = colour_choices(scenario, shown.site.path.typical_range, returns=False)
+    colours = colour_choices(scenario, shown.site.path.typical_range, has_return_camera=False)
     sources = {key: _expected(pair) for key, pair in trial.colour_errors(colours, WANTED).items()}
     relief = {str(octaves): _short(found["relief"][0]) for octaves, found in trial.relief_errors(OCTAVES).items()}
     first, each, pixel = image_seconds(trial, colours["standard"])

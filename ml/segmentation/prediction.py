@@ -97,7 +97,7 @@ def predict_file(
     """
     _check(source, target, overwrite, labelling.scheme, classification)
     begin = time.perf_counter()
-    with writable_folder(target.parent, shown=target), scratch_folder(target.parent) as folder:
+    with writable_folder(target.parent, shown_path=target), scratch_folder(target.parent) as folder:
         store = TileStore(folder)
         count = store.fill(source, progress)
         if not store.count:

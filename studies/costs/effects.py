@@ -85,7 +85,7 @@ def measure(rows: Sequence[ScanCost], repeats: int) -> None:
                 here = Path(folder) / f"{number} {row.name}"
                 here.mkdir()
                 begun = time.process_time()
-                counts = scene.with_settings(row.scenario, stands=True).scan(here, timer)
+                counts = scene.with_settings(row.scenario, model_stays=True).scan(here, timer)
                 if number:
                     row.seconds.append(time.process_time() - begun)
                 row.points = int(counts["points"])

@@ -127,7 +127,7 @@ def study(scenario: Scenario, real: Path | None, output: Path, repeats: int = 1)
         for number in range(repeats):
             folder = new_folder(output / (f"{name} {number}" if number else name))
             begun = time.process_time()
-            scene.with_settings(changed, stands=True).scan(folder, timer)
+            scene.with_settings(changed, model_stays=True).scan(folder, timer)
             spent.append(time.process_time() - begun)
         yield outcome(effect, output / name / "cloud.laz", others, asked, min(spent))
 

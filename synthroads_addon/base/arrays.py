@@ -31,6 +31,7 @@ class ArrayRows:
         """Return one record with the rows of several records of this class, in order; at least one is needed."""
 
         def joined(arrays: list[Any]) -> AnyArray | None:
+            """Return arrays of one field end to end; None where the field has none."""
             return None if arrays[0] is None else np.concatenate(arrays)
 
         return cls(*(joined([getattr(part, field.name) for part in parts]) for field in fields(cls)))
@@ -44,9 +45,11 @@ def take_rows(array: AnyArray, rows: Bool | NDArray[np.integer] | slice) -> AnyA
     return np.take(array, np.flatnonzero(rows) if rows.dtype == np.bool_ else rows, axis=0)
 
 
-def dot_rows(one: Float32, other: Float32) -> Float32:
+def dot_rows(vectors: Float32, other_vectors: Float32) -> Float32:
     """Return the dot products (N,) of vectors (N, 3), added one after the other: einsum's order is the processor's."""
-    return np.asarray(one[:, 0] * other[:, 0] + one[:, 1] * other[:, 1] + one[:, 2] * other[:, 2])
+    return np.asarray(
+        vectors[:, 0] * other_vectors[:, 0] + vectors[:, 1] * other_vectors[:, 1] + vectors[:, 2] * other_vectors[:, 2]
+    )
 
 
 def without_repeats(values: Float) -> tuple[Float, Index]:
@@ -55,20 +58,22 @@ def without_repeats(values: Float) -> tuple[Float, Index]:
     Values that hardly repeat are returned all. So a function of few values that many things share is calculated once
     for each.
     """
-    first = np.ones(len(values), np.bool_)
-    np.not_equal(values[1:], values[:-1], out=first[1:])
-    if 2 * np.count_nonzero(first) > len(values):
+    is_new = np.ones(len(values), np.bool_)
+    np.not_equal(values[1:], values[:-1], out=is_new[1:])
+    if 2 * np.count_nonzero(is_new) > len(values):
         return values, np.arange(len(values))
-    return values[first], np.cumsum(first) - 1
+    return values[is_new], np.cumsum(is_new) - 1
 
 
 def otsu_threshold(values: Float) -> float:
     """Return Otsu's threshold (1979) of values (N,): the one with the largest variance between the two sides."""
     count, edges = np.histogram(values, bins=256)
-    middle = (edges[:-1] + edges[1:]) / 2.0
-    below, moment = np.cumsum(count)[:-1], np.cumsum(count * middle)[:-1]
-    above = count.sum() - below
+    bin_middles = (edges[:-1] + edges[1:]) / 2.0
+    count_below, moment_below = np.cumsum(count)[:-1], np.cumsum(count * bin_middles)[:-1]
+    count_above = count.sum() - count_below
     with np.errstate(divide="ignore", invalid="ignore"):
-        mean_difference = (float((count * middle).sum()) - moment) / above - moment / below
-        between = np.where((below > 0) & (above > 0), below * above * mean_difference**2, 0.0)
-    return float(edges[1:-1][np.argmax(between)])
+        mean_difference = (float((count * bin_middles).sum()) - moment_below) / count_above - moment_below / count_below
+        between_variance = np.where(
+            (count_below > 0) & (count_above > 0), count_below * count_above * mean_difference**2, 0.0
+        )
+    return float(edges[1:-1][np.argmax(between_variance)])

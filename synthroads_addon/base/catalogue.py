@@ -43,8 +43,8 @@ def figure_text(value: Any) -> str:
 
 def range_text(values: Sequence[float]) -> str:
     """Return the smallest and the largest of some numbers as text, "2 to 5", or the one that all are."""
-    low, high = min(values), max(values)
-    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
+    least, largest = min(values), max(values)
+    return f"{least:g}" if least == largest else f"{least:g} to {largest:g}"
 
 
 Rows = Callable[[Entry], Sequence[Sequence[str]]]
@@ -74,29 +74,29 @@ class Kind:
     rows: Rows
 
 
-def figures(*names: str, **shown: Callable[[Any], str]) -> Rows:
+def figures(*names: str, **writers: Callable[[Any], str]) -> Rows:
     """Return a function that makes one table row of an entry: its title, then some of its figures.
 
     Args:
         names: of the figures, in the order of the columns.
-        shown: by the name of a figure, how it is written where not plainly.
+        writers: by the name of a figure, how it is written where not plainly.
     """
-    return lambda one: [[one.title, *(shown.get(name, figure_text)(one.figures[name]) for name in names)]]
+    return lambda entry: [[entry.title, *(writers.get(name, figure_text)(entry.figures[name]) for name in names)]]
 
 
-def entries(kind: Kind, wanted: Sequence[str] = ()) -> list[Entry]:
+def entries(kind: Kind, requests: Sequence[str] = ()) -> list[Entry]:
     """Return the shipped entries of a kind, or those that are wanted.
 
     Args:
         kind: of the things.
-        wanted: beginnings of names, files of one's own, and folders of such files; empty for all that is shipped.
+        requests: beginnings of names, files of one's own, and folders of such files; empty for all that is shipped.
 
     Raises:
         InputError: no name begins so, or a file is wrong.
     """
-    if not wanted:
+    if not requests:
         return [kind.read(name) for name in kind.names()]
-    names = (name for text in wanted for name in _find_names(kind, text))
+    names = (name for text in requests for name in _find_names(kind, text))
     return [kind.read(name) for name in dict.fromkeys(names)]
 
 

@@ -43,12 +43,14 @@ def parse_change(change: str, model: type[Model]) -> tuple[str, Any]:
 
 
 def _is_path(text: str) -> bool:
+    """Return whether a text may be the dotted path of a field, by its length and its number of dots."""
     return bool(text) and text.count(".") <= _DEEPEST
 
 
-def _with_value(data: Any, path: str, value: Any, above: str = "") -> Any:
-    head, dot, rest = path.partition(".")
+def _with_value(data: Any, path: str, value: Any, parent_path: str = "") -> Any:
+    """Return a copy of JSON data with a value at a dotted path; `parent_path` is the path of the data, for messages."""
+    key, dot, rest = path.partition(".")
     if not isinstance(data, dict):
-        raise InputError(above or "set", data, f"must be a JSON object before its field {head} can be set")
-    here = f"{above}.{head}" if above else head
-    return {**data, head: _with_value(data.get(head, {}), rest, value, here) if dot else value}
+        raise InputError(parent_path or "set", data, f"must be a JSON object before its field {key} can be set")
+    key_path = f"{parent_path}.{key}" if parent_path else key
+    return {**data, key: _with_value(data.get(key, {}), rest, value, key_path) if dot else value}

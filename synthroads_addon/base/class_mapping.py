@@ -35,22 +35,24 @@ class ClassMapping(Model):
     materials: dict[str, str] = Field({}, description="Pattern of materials' names -> class.")
     collections: dict[str, str] = Field({}, description="Pattern of collections' names -> class.")
 
-    def check(self, known: Iterable[str], source: str) -> None:
+    def check(self, class_names: Iterable[str], source: str) -> None:
         """Raise InputError if the mapping names a class that a scheme doesn't have.
 
         Args:
-            known: names of the scheme's classes.
+            class_names: names of the scheme's classes.
             source: file of the mapping.
 
         Raises:
             InputError: there is no such class; names the pattern.
         """
-        known = tuple(known)
+        class_names = tuple(class_names)
         for kind in KINDS:
             for pattern, name in getattr(self, kind).items():
-                if name and name not in known:
-                    hint = nearest_name(name, known)
-                    raise InputError(f"{source}: {kind}.{pattern}", name, f"must be one of {', '.join(known)}{hint}")
+                if name and name not in class_names:
+                    hint = nearest_name(name, class_names)
+                    raise InputError(
+                        f"{source}: {kind}.{pattern}", name, f"must be one of {', '.join(class_names)}{hint}"
+                    )
 
 
 def fits_pattern(name: str, pattern: str) -> bool:
@@ -89,6 +91,7 @@ class NameClasses:
         return tuple(f"{kind}: {pattern}" for kind, pattern in rows if (kind, pattern) not in self._used)
 
     def _find(self, kind: str, name: str) -> int | None:
+        """Return the ``class_id`` that the first fitting pattern gives a name; None without; remembered by name."""
         if not self._rows[kind]:
             return None
         if (kind, name) not in self._found:

@@ -41,6 +41,7 @@ class ClassSelector(Model):
 
     @model_validator(mode="after")
     def _check_selection(self) -> ClassSelector:
+        """Return the selector unchanged; ValueError if it selects nothing, or has fields but no thing."""
         if not any((self.class_name, self.material, self.thing, self.asset)):
             raise ValueError("must have at least one of class, material, thing, asset")
         if self.where and not self.thing:
@@ -118,9 +119,10 @@ class ClassTable(Model):
 
     @model_validator(mode="after")
     def _refuse_repetitions(self) -> ClassTable:
-        for what in ("id", "name"):
-            if (twice := first_repeated([getattr(row, what) for row in self.classes])) is not None:
-                raise ValueError(f"two classes have the {what} {twice!r}")
+        """Return the table unchanged; ValueError if two classes have the same id or name."""
+        for column in ("id", "name"):
+            if (repeated := first_repeated([getattr(row, column) for row in self.classes])) is not None:
+                raise ValueError(f"two classes have the {column} {repeated!r}")
         return self
 
 
@@ -146,9 +148,9 @@ class ClassScheme:
 
     def sources(self) -> ClassScheme:
         """Return the class scheme of points as they are scanned: the full table and the fine classes, none merged."""
-        full = classes()
+        full_table = classes()
         fine = (replace(row, id=number, of=()) for number, row in sorted(self.fine.items()))
-        return ClassScheme("17", (*full, *fine), np.arange(256, dtype=np.uint8))
+        return ClassScheme("17", (*full_table, *fine), np.arange(256, dtype=np.uint8))
 
     def selectors(self) -> Iterator[tuple[int, ClassSelector]]:
         """Yield (``class_id``, selector) of the fine classes; of several that fit the first counts."""
@@ -227,8 +229,8 @@ def class_scheme(name_or_file: str) -> ClassScheme:
         return ClassScheme("17", classes(), np.arange(256, dtype=np.uint8))
     path = scheme_file(name_or_file)
     if path.suffix.lower() != ".json":
-        known = ", ".join(scheme_names())
-        raise InputError("classes", name_or_file, f"must be one of {known}, or a .json file of classes")
+        known_names = ", ".join(scheme_names())
+        raise InputError("classes", name_or_file, f"must be one of {known_names}, or a .json file of classes")
     table = _read_table(path)
     name = name_or_file if name_or_file in scheme_names() else path.stem
     fine = _fine_classes(table.classes)
@@ -245,9 +247,11 @@ def stored_scheme(data: object, source: str) -> ClassScheme:
 
 def asprs_scheme(codes: Iterable[int] = ()) -> ClassScheme:
     """Return the class scheme whose ids are LAS codes, for clouds of others, any given codes included."""
-    named = {row.id: row for row in _asprs_classes()}
-    every = sorted({*named, *(int(code) for code in codes)})
-    rows = (named.get(code) or PointClass(code, f"class_{code}", code, _distinct_color(code)) for code in every)
+    named_rows = {row.id: row for row in _asprs_classes()}
+    all_codes = sorted({*named_rows, *(int(code) for code in codes)})
+    rows = (
+        named_rows.get(code) or PointClass(code, f"class_{code}", code, _distinct_color(code)) for code in all_codes
+    )
     return ClassScheme("asprs", tuple(rows), np.arange(256, dtype=np.uint8))
 
 
@@ -275,6 +279,7 @@ def las_codes() -> NDArray[np.uint8]:
 
 
 def _read_rows(path: Path) -> tuple[PointClass, ...]:
+    """Return the classes of a table's file, ordered by id."""
     return _rows(_read_table(path).classes)
 
 
@@ -294,18 +299,19 @@ def _read_table(path: Path) -> ClassTable:
 
 
 def _rows(rows: Iterable[ClassRow]) -> tuple[PointClass, ...]:
-    made = [PointClass(r.id, r.name, r.las, r.color, r.of) for r in rows]
-    return tuple(sorted(made, key=lambda row: row.id))
+    """Return the rows of a table as classes, ordered by id."""
+    point_classes = [PointClass(r.id, r.name, r.las, r.color, r.of) for r in rows]
+    return tuple(sorted(point_classes, key=lambda row: row.id))
 
 
 def _fine_classes(rows: Sequence[ClassRow]) -> dict[int, PointClass]:
     """Return number -> class for the classes that the full table doesn't have; numbers from 254 downwards."""
-    known = {row.name for row in classes()}
-    named = {member for row in rows for member in row.of if isinstance(member, int)}
-    free = (number for number in range(UNLABELLED - 1, -1, -1) if number not in named)
-    made = [PointClass(r.id, r.name, r.las, r.color, r.of) for r in rows]
-    fine = [row for row in made if any(row.selectors()) or (not row.of and row.name not in known)]
-    return dict(zip(free, fine, strict=False))
+    known_names = {row.name for row in classes()}
+    named_numbers = {member for row in rows for member in row.of if isinstance(member, int)}
+    free_numbers = (number for number in range(UNLABELLED - 1, -1, -1) if number not in named_numbers)
+    point_classes = [PointClass(r.id, r.name, r.las, r.color, r.of) for r in rows]
+    fine = [row for row in point_classes if any(row.selectors()) or (not row.of and row.name not in known_names)]
+    return dict(zip(free_numbers, fine, strict=False))
 
 
 def _merging_table(rows: Sequence[ClassRow], fine: Mapping[int, PointClass], source: str) -> NDArray[np.uint8]:
@@ -337,5 +343,6 @@ def _merging_table(rows: Sequence[ClassRow], fine: Mapping[int, PointClass], sou
 
 
 def _known_class(name: Member | None, ids: Mapping[str, int], where: str) -> None:
+    """Raise InputError if a member is the name of a class that the full table doesn't have."""
     if isinstance(name, str) and name not in ids:
         raise InputError(where, name, f"must be a class of {', '.join(ids)}{nearest_name(name, ids)}")

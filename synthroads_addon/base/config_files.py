@@ -25,7 +25,7 @@ class Loader(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         """Return the next node of a YAML document; ComposerError past `MOST_NODES`, aliases counted in full."""
         event = self.peek_event()
-        before = self._nodes
+        nodes_before = self._nodes
         if isinstance(event, yaml.AliasEvent):
             self._nodes += self._sizes.get(event.anchor or "", 0)
         self._nodes += 1
@@ -33,19 +33,19 @@ class Loader(yaml.SafeLoader):
         if self._nodes > MOST_NODES:
             raise ComposerError(None, None, f"more than {MOST_NODES:,} values, with aliases", event.start_mark)
         if not isinstance(event, yaml.AliasEvent) and event.anchor is not None:
-            self._sizes[event.anchor] = self._nodes - before
+            self._sizes[event.anchor] = self._nodes - nodes_before
         return node
 
     def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
         """Return the next mapping of a YAML document; ComposerError where it has a key twice."""
         node = super().compose_mapping_node(anchor)
-        seen = set()
+        keys = set()
         for key, _ in node.value:
             if not isinstance(key, yaml.ScalarNode) or key.tag == "tag:yaml.org,2002:merge":
                 continue
-            if (key.tag, key.value) in seen:
+            if (key.tag, key.value) in keys:
                 raise ComposerError(None, None, f"the key {key.value!r} is there twice", key.start_mark)
-            seen.add((key.tag, key.value))
+            keys.add((key.tag, key.value))
         return node
 
 

@@ -44,6 +44,7 @@ def discriminated_union(models: Mapping[str, type[BaseModel]], tag: str) -> Any:
     """
 
     def prepare(data: Any) -> Any:
+        """Return a field's data with the tag filled in; ValueError for a field that only other models have."""
         if not isinstance(data, dict):
             return data
         if data.get(tag) is None:
@@ -64,6 +65,7 @@ def _place(pair: tuple[str, type[BaseModel]]) -> tuple[int, str]:
 
 
 def _tagged_models(package: str, base: type[M], tag: str) -> Iterator[tuple[str, type[M]]]:
+    """Yield (tag's value, model) of the models that are defined in a package's modules."""
     for file in iter_modules(import_module(package).__path__):
         module = import_module(f"{package}.{file.name}")
         for model in vars(module).values():

@@ -29,8 +29,8 @@ class InputError(SynthRoadsError):
         self.field = field
         self.value = value
         self.allowed = allowed
-        shown = "" if value is None else f" is {_short(repr(_plain(value)), _LONGEST_VALUE)}"
-        super().__init__(f"{_short(field, _LONGEST_FIELD)}{shown}: {_short(allowed, _LONGEST_ALLOWED)}")
+        value_text = "" if value is None else f" is {_short(repr(_plain(value)), _LONGEST_VALUE)}"
+        super().__init__(f"{_short(field, _LONGEST_FIELD)}{value_text}: {_short(allowed, _LONGEST_ALLOWED)}")
 
 
 class MissingFileError(InputError):
@@ -65,10 +65,10 @@ def _plain(value: object) -> object:
     return item() if type(value).__module__ == "numpy" and item and not hasattr(value, "__len__") else value
 
 
-def nearest_name(name: str, known: Iterable[str]) -> str:
+def nearest_name(name: str, known_names: Iterable[str]) -> str:
     """Return `` (did you mean 'x'?)`` for the known name most like `name`, or an empty string."""
-    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
-    return f" (did you mean '{close[0]}'?)" if close else ""
+    close_names = difflib.get_close_matches(name, list(known_names), n=1, cutoff=0.6)
+    return f" (did you mean '{close_names[0]}'?)" if close_names else ""
 
 
 _LONGEST_FIELD, _LONGEST_VALUE, _LONGEST_ALLOWED = 300, 160, 1000

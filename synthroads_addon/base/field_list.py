@@ -78,25 +78,26 @@ class Wording:
             return self.constant(json.dumps(rule["const"]))
         if "enum" in rule:
             return ", ".join(self.constant(json.dumps(value)) for value in rule["enum"])
-        for several in ("anyOf", "oneOf"):
-            if several in rule:
-                choices = (choice for choice in rule[several] if choice != {"type": "null"})
+        for union_key in ("anyOf", "oneOf"):
+            if union_key in rule:
+                choices = (choice for choice in rule[union_key] if choice != {"type": "null"})
                 return " or ".join(dict.fromkeys(self.value(choice) for choice in choices))
         if rule.get("type") == "array":
             return self._list(rule)
         if rule.get("type") == "object":
-            inner = rule.get("additionalProperties")
-            return f"object of {self.value(inner)}" if isinstance(inner, dict) and inner else "object"
+            inner_rule = rule.get("additionalProperties")
+            return f"object of {self.value(inner_rule)}" if isinstance(inner_rule, dict) and inner_rule else "object"
         if rule.get("type") == "boolean":
             return f"{self.constant('true')} or {self.constant('false')}"
         return f"{_TYPES.get(rule.get('type', ''), 'any value')}{_limits_in_words(rule)}"
 
     def _list(self, rule: Rule) -> str:
+        """Return in words what a list may hold, and how many values."""
         if "prefixItems" in rule:
-            inner = "; ".join(dict.fromkeys(map(self.value, rule["prefixItems"])))
-            return f"list of {len(rule['prefixItems'])}: {inner}"
-        low, high = rule.get("minItems", 0), rule.get("maxItems")
-        count = f" ({low} to {high})" if high else f" (at least {low})" if low else ""
+            item_texts = "; ".join(dict.fromkeys(map(self.value, rule["prefixItems"])))
+            return f"list of {len(rule['prefixItems'])}: {item_texts}"
+        least, most = rule.get("minItems", 0), rule.get("maxItems")
+        count = f" ({least} to {most})" if most else f" (at least {least})" if least else ""
         return f"list{count} of {self.value(rule.get('items', {}))}"
 
 
@@ -118,16 +119,16 @@ def fields_of(model: type[BaseModel]) -> Iterator[FieldEntry]:
     yield from _fields(schema, schema.get("$defs", {}), None)
 
 
-def _fields(schema: Rule, parts: Mapping[str, Rule], outer: FieldEntry | None) -> Iterator[FieldEntry]:
-    """Yield the entries of a class's fields by its JSON Schema; the class lies in ``outer``, or in nothing."""
+def _fields(schema: Rule, parts: Mapping[str, Rule], outer_entry: FieldEntry | None) -> Iterator[FieldEntry]:
+    """Yield the entries of a class's fields by its JSON Schema; the class lies in ``outer_entry``, or in nothing."""
     for name, rule in schema["properties"].items():
         if "const" in rule or rule.get("deprecated"):
             continue
-        inner = [parts[class_of(choice)] for choice in _choices(rule) if "$ref" in choice]
-        made = _field(name, rule, schema, inner, outer)
-        yield made
-        for part in _kinds_as_one(inner):
-            yield from _fields(part, parts, made)
+        inner_classes = [parts[class_of(choice)] for choice in _choices(rule) if "$ref" in choice]
+        entry = _field(name, rule, schema, inner_classes, outer_entry)
+        yield entry
+        for part in _kinds_as_one(inner_classes):
+            yield from _fields(part, parts, entry)
 
 
 def _kinds_as_one(classes: Sequence[Rule]) -> Sequence[Rule]:
@@ -135,34 +136,38 @@ def _kinds_as_one(classes: Sequence[Rule]) -> Sequence[Rule]:
     if len(classes) < 2:
         return classes
     properties: dict[str, Rule] = {}
-    for name, rule in ((name, rule) for one in classes for name, rule in one["properties"].items()):
-        known = properties.setdefault(name, rule)
+    for name, rule in ((name, rule) for class_rule in classes for name, rule in class_rule["properties"].items()):
+        merged_rule = properties.setdefault(name, rule)
         if "const" in rule:
-            values = [*known.get("enum", []), rule["const"]]
-            properties[name] = {key: value for key, value in known.items() if key != "const"} | {"enum": values}
-    required = set.intersection(*(set(one.get("required", ())) for one in classes))
+            values = [*merged_rule.get("enum", []), rule["const"]]
+            properties[name] = {key: value for key, value in merged_rule.items() if key != "const"} | {"enum": values}
+    required = set.intersection(*(set(class_rule.get("required", ())) for class_rule in classes))
     return [{"properties": properties, "required": required}]
 
 
-def _field(name: str, rule: Rule, schema: Rule, inner: Sequence[Rule], outer: FieldEntry | None) -> FieldEntry:
+def _field(
+    name: str, rule: Rule, schema: Rule, inner_classes: Sequence[Rule], outer_entry: FieldEntry | None
+) -> FieldEntry:
     """Return the entry of one field of a class; what lies in an interval has its unit and its meaning.
 
     Args:
         name: of the field.
         rule: what the schema says of it.
         schema: of its class.
-        inner: classes whose fields lie in it.
-        outer: field that it lies in.
+        inner_classes: classes whose fields lie in it.
+        outer_entry: field that it lies in.
     """
     default, unit = rule.get("default"), rule.get("unit", "")
-    description = rule.get("description") or (inner[0].get("description", "").partition("\n")[0] if inner else "")
-    if outer and isinstance(outer.default, dict):
-        default = outer.default.get(name, default)
-    if outer and outer.interval:
-        unit, description = outer.unit, f"{outer.description} {description}"
+    description = rule.get("description") or (
+        inner_classes[0].get("description", "").partition("\n")[0] if inner_classes else ""
+    )
+    if outer_entry and isinstance(outer_entry.default, dict):
+        default = outer_entry.default.get(name, default)
+    if outer_entry and outer_entry.interval:
+        unit, description = outer_entry.unit, f"{outer_entry.description} {description}"
     choice = next((choice for choice in _choices(rule) if choice.get("type") != "null"), rule)
     return FieldEntry(
-        path=f"{outer.path}.{name}" if outer else name,
+        path=f"{outer_entry.path}.{name}" if outer_entry else name,
         value=PLAIN.value(rule),
         unit="" if unit == "1" else unit,
         required=default is None and name in schema.get("required", ()),
@@ -170,14 +175,14 @@ def _field(name: str, rule: Rule, schema: Rule, inner: Sequence[Rule], outer: Fi
         description=description,
         allowed=tuple(choice.get("enum", ())),
         limits=_limits(choice),
-        interval=any(set(part["properties"]) == {"minimum", "maximum"} for part in inner),
+        interval=any(set(part["properties"]) == {"minimum", "maximum"} for part in inner_classes),
     )
 
 
 def _choices(rule: Rule) -> Sequence[Rule]:
     """Return the rules of which a field follows one, those of nested unions included; itself if it is no union."""
-    several = rule.get("anyOf") or rule.get("oneOf")
-    return [inner for choice in several for inner in _choices(choice)] if several else [rule]
+    alternatives = rule.get("anyOf") or rule.get("oneOf")
+    return [inner_choice for choice in alternatives for inner_choice in _choices(choice)] if alternatives else [rule]
 
 
 def _limits(rule: Rule) -> dict[str, float]:

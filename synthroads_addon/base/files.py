@@ -16,13 +16,13 @@ PRESETS = Path(__file__).parents[1] / "presets"
 """Folder of the shipped data: classes, materials, signs, devices, scenarios, recipes, assets."""
 
 
-def read_text(path: str | os.PathLike[str], kind: str, wanted: str = "", encoding: str = "utf-8") -> str:
+def read_text(path: str | os.PathLike[str], kind: str, need: str = "", encoding: str = "utf-8") -> str:
     """Return the content of a text file.
 
     Args:
         path: of the file.
         kind: what is said where it is no text, e.g. ``must be JSON in UTF-8``.
-        wanted: what is said before the system's own words where it can't be read, e.g. ``an axis file is needed here``.
+        need: what is said before the system's own words where it can't be read, e.g. ``an axis file is needed here``.
         encoding: ``utf-8-sig`` takes a byte order mark as well.
 
     Raises:
@@ -30,13 +30,13 @@ def read_text(path: str | os.PathLike[str], kind: str, wanted: str = "", encodin
         InputError: it is no text.
     """
     name = os.fspath(path)
-    with _told_faults(name, wanted, kind):
+    with _told_faults(name, need, kind):
         return Path(name).read_text(encoding=encoding)
 
 
-def read_bytes(path: str | os.PathLike[str], wanted: str = "") -> bytes:
-    """Return the content of any file; MissingFileError and ``wanted`` as in `read_text`."""
-    with _told_faults(os.fspath(path), wanted):
+def read_bytes(path: str | os.PathLike[str], need: str = "") -> bytes:
+    """Return the content of any file; MissingFileError and ``need`` as in `read_text`."""
+    with _told_faults(os.fspath(path), need):
         return Path(path).read_bytes()
 
 
@@ -47,20 +47,20 @@ def decoded(content: bytes, path: str | os.PathLike[str], kind: str, encoding: s
 
 
 @contextmanager
-def _told_faults(name: str, wanted: str = "", kind: str = "") -> Iterator[None]:
+def _told_faults(name: str, need: str = "", kind: str = "") -> Iterator[None]:
     """Context in which a file is read: what goes wrong is told as `read_text` tells it."""
     try:
         yield
         return
     except OSError as error:
-        if isinstance(error, FileNotFoundError) and not wanted:
+        if isinstance(error, FileNotFoundError) and not need:
             raise MissingFileError(name, None, "no such file") from None
         reason = os.strerror(error.errno or 0)
     except UnicodeDecodeError:
         raise InputError(name, None, kind) from None
     except ValueError as error:  # no name of a file: it holds a null byte
         reason = str(error)
-    raise MissingFileError(name, None, f"{wanted or 'cannot be read'} ({reason})")
+    raise MissingFileError(name, None, f"{need or 'cannot be read'} ({reason})")
 
 
 def preset_names(folder: Path, ending: str = ".json") -> list[str]:
@@ -90,16 +90,16 @@ def preset_path(folder: Path, name_or_file: str, field: str, endings: Sequence[s
     return Path(name_or_file)
 
 
-def change_stamp(path: str, wanted: str) -> tuple[int, int]:
+def change_stamp(path: str, need: str) -> tuple[int, int]:
     """Return when a file was last changed (ns) and its size (bytes), by which its change is noticed.
 
     Raises:
-        MissingFileError: it doesn't exist; ``wanted`` is said before the system's own words.
+        MissingFileError: it doesn't exist; ``need`` is said before the system's own words.
     """
     try:
         status = Path(path).stat()
     except (OSError, ValueError) as error:  # ValueError: its name holds a null byte
-        raise MissingFileError(path, None, f"{wanted} ({getattr(error, 'strerror', None) or error})") from None
+        raise MissingFileError(path, None, f"{need} ({getattr(error, 'strerror', None) or error})") from None
     return status.st_mtime_ns, status.st_size
 
 
@@ -108,18 +108,18 @@ def files_below(folder: Path) -> Iterator[Path]:
 
     A link to a folder that is entered already, such as one above it, leads nowhere new and is left out.
     """
-    entered: set[str] = set()
-    waiting = [folder]
-    while waiting:
-        for here, folders, files in os.walk(waiting.pop(0)):
-            real = os.path.realpath(here)
-            if real in entered:
+    entered_folders: set[str] = set()
+    folders_to_enter = [folder]
+    while folders_to_enter:
+        for current, folders, files in os.walk(folders_to_enter.pop(0)):
+            real_path = os.path.realpath(current)
+            if real_path in entered_folders:
                 folders.clear()
                 continue
-            entered.add(real)
+            entered_folders.add(real_path)
             folders.sort()
-            waiting += [path for path in (Path(here, name) for name in folders) if path.is_symlink()]
-            yield from (Path(here, name) for name in sorted(files))
+            folders_to_enter += [path for path in (Path(current, name) for name in folders) if path.is_symlink()]
+            yield from (Path(current, name) for name in sorted(files))
 
 
 @contextmanager
@@ -138,9 +138,9 @@ def output_folder(target: Path, names: Iterable[str], overwrite: bool) -> Iterat
     Raises:
         OutputError: a file is already there, or the folder can't be made or written, or the disk is full.
     """
-    present = [name for name in names if (target / name).exists()]
-    if present and not overwrite:
-        raise OutputError("--output", str(target), f"already holds {present[0]}; --overwrite replaces it")
+    existing_names = [name for name in names if (target / name).exists()]
+    if existing_names and not overwrite:
+        raise OutputError("--output", str(target), f"already holds {existing_names[0]}; --overwrite replaces it")
     with ExitStack() as stack:
         try:
             stack.enter_context(made_folder(target))
@@ -172,26 +172,26 @@ def made_folder(folder: Path) -> Iterator[None]:
     Raises:
         OSError: it can't be made.
     """
-    missing = list(takewhile(lambda path: not _is_there(path), (folder, *folder.parents)))
-    for path in reversed(missing):
+    missing_folders = list(takewhile(lambda path: not _is_there(path), (folder, *folder.parents)))
+    for path in reversed(missing_folders):
         record_folder(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         yield
     finally:
-        for path in missing:
+        for path in missing_folders:
             with suppress(OSError):
                 path.rmdir()
 
 
 @contextmanager
-def writable_folder(folder: Path, field: str = "--output", shown: Path | None = None) -> Iterator[None]:
+def writable_folder(folder: Path, field: str = "--output", shown_path: Path | None = None) -> Iterator[None]:
     """Context of `made_folder` in which the folder can be written to.
 
     Args:
         folder: for files.
         field: what the caller calls the path, for the message.
-        shown: the path that the message names; the folder if None.
+        shown_path: the path that the message names; the folder if None.
 
     Raises:
         OutputError: it can't be made or written to.
@@ -202,7 +202,7 @@ def writable_folder(folder: Path, field: str = "--output", shown: Path | None = 
             with scratch_folder(folder):
                 pass
         except OSError as error:
-            raise OutputError(field, str(shown or folder), f"cannot be written ({error.strerror})") from None
+            raise OutputError(field, str(shown_path or folder), f"cannot be written ({error.strerror})") from None
         yield
 
 
@@ -230,10 +230,10 @@ def folder_at_work(folder: Path, lock: str, *, keep: bool = True) -> Iterator[No
         yield
 
 
-def _lock_text(taken: LockHeldError, lock: Path) -> str:
+def _lock_text(held_lock: LockHeldError, lock: Path) -> str:
     """Return the error text for a folder whose lock another run holds, or may hold."""
-    owner = f": process {taken.owner.pid} of {taken.owner.host}" if taken.owner else ""
-    if taken.certain:
+    owner = f": process {held_lock.owner.pid} of {held_lock.owner.host}" if held_lock.owner else ""
+    if held_lock.certain:
         return f"another run is at work in it{owner}"
     return f"another run may be at work in it{owner} (its disk knows no locks); if that has ended, remove {lock}"
 
@@ -281,21 +281,23 @@ def _is_there(path: Path) -> bool:
         return False
 
 
-def check_folder_target(folder: Path, field: str = "--output", shown: Path | None = None) -> None:
+def check_folder_target(folder: Path, field: str = "--output", shown_path: Path | None = None) -> None:
     """Raise an `OutputError` if nothing can be written to a folder, or to the nearest one above it that is there.
 
     Args:
         folder: for files; it needn't be there, and isn't made.
         field: what the caller calls the path, for the message; empty where nobody gave it.
-        shown: the path that the message names; the folder if None.
+        shown_path: the path that the message names; the folder if None.
     """
-    there = next(path for path in (folder, *folder.absolute().parents) if _is_there(path))
+    existing_folder = next(path for path in (folder, *folder.absolute().parents) if _is_there(path))
     try:
-        with scratch_folder(there):
+        with scratch_folder(existing_folder):
             pass
     except OSError as error:
         remedy = "" if field else "; --output names another place"
-        raise OutputError(*_named(field, shown or folder), f"cannot be written ({error.strerror}){remedy}") from None
+        raise OutputError(
+            *_named(field, shown_path or folder), f"cannot be written ({error.strerror}){remedy}"
+        ) from None
 
 
 def _named(field: str, path: Path) -> tuple[str, str | None]:
@@ -303,7 +305,7 @@ def _named(field: str, path: Path) -> tuple[str, str | None]:
     return (field, str(path)) if field else (str(path), None)
 
 
-def _move_all(source: Path, target: Path, aside: Path) -> None:
+def _move_all(source: Path, target: Path, aside_folder: Path) -> None:
     """Move a folder's files to their places, all or none.
 
     Where the user stops the work meanwhile all are moved all the same, as a part of them fits nothing; where one can't
@@ -313,26 +315,26 @@ def _move_all(source: Path, target: Path, aside: Path) -> None:
         if path.is_file():
             sync_file(path)
     names = names_to_move(source)
-    aside.mkdir()  # from now on the move is finished by the next process if this one is killed
-    stopped: KeyboardInterrupt | None = None
+    aside_folder.mkdir()  # from now on the move is finished by the next process if this one is killed
+    interrupt: KeyboardInterrupt | None = None
     while True:
         try:
-            _move_once(names, source, target, aside)
+            _move_once(names, source, target, aside_folder)
             break
         except KeyboardInterrupt as signal:
-            stopped = signal
+            interrupt = signal
         except OSError:
-            _put_back(names, source, target, aside)
+            _put_back(names, source, target, aside_folder)
             raise
-    if stopped is not None:
-        raise stopped
+    if interrupt is not None:
+        raise interrupt
 
 
-def _move_once(names: list[str], source: Path, target: Path, aside: Path) -> None:
+def _move_once(names: list[str], source: Path, target: Path, aside_folder: Path) -> None:
     """Move what isn't moved yet: old reports away first, new ones in last."""
     for name in reversed(names):
         if (source / name).exists() and (target / name).exists():
-            (target / name).replace(aside / name)
+            (target / name).replace(aside_folder / name)
     sync_folder(target)
     for name in names:
         if (source / name).exists():
@@ -342,15 +344,15 @@ def _move_once(names: list[str], source: Path, target: Path, aside: Path) -> Non
     sync_folder(target)
 
 
-def _put_back(names: list[str], source: Path, target: Path, aside: Path) -> None:
+def _put_back(names: list[str], source: Path, target: Path, aside_folder: Path) -> None:
     """Undo what `_move_once` did, as far as that is possible."""
     for name in names:
         with suppress(OSError):
             if not (source / name).exists():
                 (target / name).replace(source / name)
         with suppress(OSError):
-            if (aside / name).exists():
-                (aside / name).replace(target / name)
+            if (aside_folder / name).exists():
+                (aside_folder / name).replace(target / name)
     shutil.rmtree(source, ignore_errors=True)  # what is still aside is put back by whoever removes the folder
 
 
@@ -372,6 +374,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def _sync(descriptor: int) -> None:
+    """Write an open file's buffers to the disk, where the file system can."""
     try:
         os.fsync(descriptor)
     except OSError as error:

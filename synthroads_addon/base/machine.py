@@ -39,10 +39,10 @@ def available_cores() -> int:
 
 def share_of_core(seconds: float = 0.1) -> float:
     """Return the share of a core, 0 to 1, that one thread gets now beside what else runs, by working for some time."""
-    wall, thread_start = time.perf_counter(), time.thread_time()
-    while (spent := time.perf_counter() - wall) < seconds:
+    wall_start, thread_start = time.perf_counter(), time.thread_time()
+    while (elapsed := time.perf_counter() - wall_start) < seconds:
         pass
-    return min(1.0, max(0.01, (time.thread_time() - thread_start) / spent))
+    return min(1.0, max(0.01, (time.thread_time() - thread_start) / elapsed))
 
 
 def free_cores(threads: int, share: float) -> float:
@@ -53,8 +53,8 @@ def free_cores(threads: int, share: float) -> float:
         share: of a core that one of them got by itself, see `share_of_core`; from 0.95 on nothing else is assumed.
     """
     cores = available_cores()
-    others = cores / share - 1.0 if share < 0.95 else 0.0  # threads that want as much
-    return min(float(min(threads, cores)), cores * threads / (threads + others))
+    other_threads = cores / share - 1.0 if share < 0.95 else 0.0  # threads that want as much
+    return min(float(min(threads, cores)), cores * threads / (threads + other_threads))
 
 
 @contextmanager
@@ -63,12 +63,12 @@ def cores_of_children(count: int) -> Iterator[None]:
     if not hasattr(os, "sched_setaffinity"):
         yield
         return
-    before = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, sorted(before)[:count])
+    allowed_cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, sorted(allowed_cores)[:count])
     try:
         yield
     finally:
-        os.sched_setaffinity(0, before)
+        os.sched_setaffinity(0, allowed_cores)
 
 
 def physical_memory() -> int | None:
@@ -144,21 +144,22 @@ def _limit_linear_algebra() -> Callable[[], None]:
 def _keep_freed_memory() -> Callable[[], None]:
     """Have the C library keep freed memory, where it can; return what has it given back, now and from now on."""
     _set_malloc(_KEEPING)
-    before = _set_huge_pages(False)
+    used_huge_pages = _set_huge_pages(False)
 
     def give_back() -> None:
-        _set_huge_pages(before)
+        """Restore the C library's usual settings, and give what is free back to the system."""
+        _set_huge_pages(used_huge_pages)
         _set_malloc(_USUAL)
         release_memory()
 
     return give_back
 
 
-def _set_huge_pages(wanted: bool) -> bool:
+def _set_huge_pages(enabled: bool) -> bool:
     """Have NumPy ask the system for huge pages for large arrays, or not, where it can; return whether it did before."""
     with suppress(ImportError, AttributeError):  # NumPy's own switch, which is also NUMPY_MADVISE_HUGEPAGE
-        return bool(import_module("numpy._core.multiarray")._set_madvise_hugepage(wanted))
-    return wanted
+        return bool(import_module("numpy._core.multiarray")._set_madvise_hugepage(enabled))
+    return enabled
 
 
 def _set_malloc(values: Mapping[int, int]) -> None:
@@ -210,6 +211,7 @@ def freed_memory_kept() -> Iterator[None]:
 
 
 def _processor() -> str:
+    """Return the name of the processor, as the system tells it."""
     path = Path("/proc/cpuinfo")
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines() if path.is_file() else []
     names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))

@@ -36,8 +36,8 @@ def is_inside(folder: Path, name: str | PurePath, *, follow: bool = False) -> bo
         place, root = folder / name, Path(os.path.realpath(folder))
         if ".." in place.relative_to(folder).parts:
             return False
-        real = Path(os.path.realpath(place)) if follow else Path(os.path.realpath(place.parent), place.name)
-        return real != root and real.is_relative_to(root)
+        real_path = Path(os.path.realpath(place)) if follow else Path(os.path.realpath(place.parent), place.name)
+        return real_path != root and real_path.is_relative_to(root)
     except (OSError, ValueError, TypeError):  # a null byte, no text, another drive, an absolute path
         return False
 
@@ -48,22 +48,22 @@ def stays_below(name: str) -> bool:
     return bool(parts) and ".." not in parts and not any(sign in name for sign in "\\:\0") and parts[0] != "/"
 
 
-def file_in_one_of(folders: Iterable[Path], address: str, beside: Path) -> bool:
+def file_in_one_of(folders: Iterable[Path], address: str, base_folder: Path) -> bool:
     """Return whether nothing is at an address, or a file or folder in one of some folders, links resolved.
 
     Args:
         folders: that may be read from.
         address: as a file has it, with / or \\; an absolute one counts as such.
-        beside: folder that relative addresses count from.
+        base_folder: folder that relative addresses count from.
     """
     name = address.replace("\\", "/")
     if name.startswith("//"):  # another machine's: looking whether it is there would call it
         return False
     try:
-        real = Path(os.path.realpath(beside / name))
-        if not os.path.lexists(real):
+        real_path = Path(os.path.realpath(base_folder / name))
+        if not os.path.lexists(real_path):
             return True
-        usual = real.is_file() or real.is_dir()  # no pipe or device
-        return usual and any(real.is_relative_to(os.path.realpath(one)) for one in folders)
+        is_usual = real_path.is_file() or real_path.is_dir()  # no pipe or device
+        return is_usual and any(real_path.is_relative_to(os.path.realpath(folder)) for folder in folders)
     except (OSError, ValueError):  # no name of a file
         return True

@@ -39,12 +39,17 @@ def picture_kind(path: Path) -> str | None:
         OSError: it can't be read.
     """
     with path.open("rb") as file:
-        head = file.read(_LONGEST)
-    for sign, kind in _SIGNATURES:
-        if head.startswith(sign):
+        first_bytes = file.read(_LONGEST)
+    for signature, kind in _SIGNATURES:
+        if first_bytes.startswith(signature):
             return kind
-    if head[:4] == b"RIFF" and head[8:12] == b"WEBP":
+    if first_bytes[:4] == b"RIFF" and first_bytes[8:12] == b"WEBP":
         return "WebP"
-    if path.suffix.lower() == ".tga" and len(head) == _LONGEST and head[1] in (0, 1) and head[2] in _TARGA:
+    if (
+        path.suffix.lower() == ".tga"
+        and len(first_bytes) == _LONGEST
+        and first_bytes[1] in (0, 1)
+        and first_bytes[2] in _TARGA
+    ):
         return "Targa"
     return None

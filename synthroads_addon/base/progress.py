@@ -28,20 +28,20 @@ class Stage(str):
 
     def __new__(cls, name: str, detail: str) -> Self:
         """Return a stage's name with a detail."""
-        made = super().__new__(cls, name)
-        made.detail = detail
-        return made
+        stage = super().__new__(cls, name)
+        stage.detail = detail
+        return stage
 
 
 def silent(stage: str, share: float) -> None:
     """Ignore a report of progress."""
 
 
-def part_of(progress: Progress, first: float, last: float) -> Progress:
-    """Return a callback for a part of some work, whose shares 0 to 1 are those from `first` to `last` of the whole."""
+def part_of(progress: Progress, first_share: float, last_share: float) -> Progress:
+    """Return a callback for a part of some work: its shares 0 to 1 are `first_share` to `last_share` of the whole."""
 
     def report(stage: str, share: float) -> None:
-        progress(stage, first + share * (last - first))
+        progress(stage, first_share + share * (last_share - first_share))
 
     return report
 

@@ -45,32 +45,34 @@ def quantile_bound(parts: Sequence[Float], quantile: float, key: str = "") -> tu
         quantile: 0 to 1.
         key: of the random numbers.
     """
-    every = np.concatenate([*parts, np.empty(0)])
-    if not len(every):
+    all_values = np.concatenate([*parts, np.empty(0)])
+    if not len(all_values):
         return 0.0, 0.0
-    estimate = float(np.quantile(every, quantile))
-    places = np.unique(np.quantile(every, np.linspace(0.0, 1.0, _STEPS)))
-    below = np.stack([np.searchsorted(np.sort(part), places, side="right") for part in parts]).astype(np.float64)
-    total = np.array([len(part) for part in parts], dtype=np.float64)
+    estimate = float(np.quantile(all_values, quantile))
+    places = np.unique(np.quantile(all_values, np.linspace(0.0, 1.0, _STEPS)))
+    counts_below = np.stack([np.searchsorted(np.sort(part), places, side="right") for part in parts]).astype(np.float64)
+    part_sizes = np.array([len(part) for part in parts], dtype=np.float64)
+    # In each draw of the bootstrap: the share of all drawn values up to each place, and the first place at which that
+    # share reaches the quantile.
     weights = _draw_parts(len(parts), key)
-    share = (weights @ below) / np.maximum(weights @ total, 1.0)[:, None]
-    first = np.minimum((share < quantile).sum(axis=1), len(places) - 1)
-    return estimate, max(estimate, float(np.quantile(places[first], LEVEL)))
+    shares = (weights @ counts_below) / np.maximum(weights @ part_sizes, 1.0)[:, None]
+    first_place = np.minimum((shares < quantile).sum(axis=1), len(places) - 1)
+    return estimate, max(estimate, float(np.quantile(places[first_place], LEVEL)))
 
 
-def ratio_bound(above: Float, below: Float, key: str = "") -> tuple[float, float]:
+def ratio_bound(numerators: Float, denominators: Float, key: str = "") -> tuple[float, float]:
     """Return the ratio of two sums over parts, and its upper 95 % confidence bound; see `quantile_bound`.
 
     Args:
-        above, below: (S,) of each part.
+        numerators, denominators: (S,) of each part.
         key: of the random numbers.
     """
-    if not below.sum() > 0.0:
+    if not denominators.sum() > 0.0:
         return 0.0, 0.0
-    estimate = float(above.sum() / below.sum())
-    weights = _draw_parts(len(below), key)
-    ratios = (weights @ above) / np.maximum(weights @ below, _LEAST)
-    ratios = ratios[weights @ below > 0.0]
+    estimate = float(numerators.sum() / denominators.sum())
+    weights = _draw_parts(len(denominators), key)
+    ratios = (weights @ numerators) / np.maximum(weights @ denominators, _LEAST)
+    ratios = ratios[weights @ denominators > 0.0]
     return estimate, max(estimate, float(np.quantile(ratios, LEVEL)))
 
 

@@ -34,14 +34,16 @@ def collected_remarks(remarks: list[str] | None = None) -> Iterator[list[str]]:
 
     It does so whatever the logger shows.
     """
-    collected = [] if remarks is None else remarks
+    collection = [] if remarks is None else remarks
     with _lock:
-        _collecting.append(collected)
+        _collecting.append(collection)
     try:
-        yield collected
+        yield collection
     finally:
         with _lock:
-            place = next(at for at in reversed(range(len(_collecting))) if _collecting[at] is collected)
+            place = next(
+                position for position in reversed(range(len(_collecting))) if _collecting[position] is collection
+            )
             del _collecting[place]
 
 
@@ -52,8 +54,9 @@ def remarks_so_far() -> list[str]:
 
 
 def _collect(text: str, values: tuple[object, ...]) -> None:
-    told = text % values if values else text
+    """Add a remark, its values filled in, to the list of every context that collects and hasn't got it."""
+    remark = text % values if values else text
     with _lock:
         for remarks in _collecting:
-            if told not in remarks:
-                remarks.append(told)
+            if remark not in remarks:
+                remarks.append(remark)

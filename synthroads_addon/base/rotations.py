@@ -66,21 +66,21 @@ def quaternion_matrices(quaternion: Float) -> Float:
     return np.moveaxis(np.array(rows), 2, 0)
 
 
-def angle_between(first: Float, second: Float) -> Float:
+def angle_between(from_quaternions: Float, to_quaternions: Float) -> Float:
     """Return the angles (N,), rad, of the shortest turns between unit quaternions (N, 4)."""
-    nearer = second * np.where((first * second).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
+    nearer_sign = to_quaternions * np.where((from_quaternions * to_quaternions).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
     # By the chord, which is exact for small angles, where the arc cosine is not.
-    return np.asarray(4.0 * np.arcsin(np.minimum(np.linalg.norm(nearer - first, axis=1) / 2.0, 1.0)))
+    return np.asarray(4.0 * np.arcsin(np.minimum(np.linalg.norm(nearer_sign - from_quaternions, axis=1) / 2.0, 1.0)))
 
 
-def slerp(first: Float, second: Float, share: Float) -> Float:
+def slerp(from_quaternions: Float, to_quaternions: Float, share: Float) -> Float:
     """Return unit quaternions (N, 4) at shares (N,) of the shortest turns from the first to the second ones (N, 4)."""
-    half = angle_between(first, second)[:, None] / 2.0
-    nearer = second * np.where((first * second).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
+    half_angle = angle_between(from_quaternions, to_quaternions)[:, None] / 2.0
+    nearer_sign = to_quaternions * np.where((from_quaternions * to_quaternions).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
     share = share[:, None]
-    small = half < 1e-9
-    sine = np.where(small, 1.0, np.sin(half))
-    before = np.where(small, 1.0 - share, np.sin((1.0 - share) * half) / sine)
-    after = np.where(small, share, np.sin(share * half) / sine)
-    blend = before * first + after * nearer
+    is_small = half_angle < 1e-9
+    sine = np.where(is_small, 1.0, np.sin(half_angle))
+    from_weight = np.where(is_small, 1.0 - share, np.sin((1.0 - share) * half_angle) / sine)
+    to_weight = np.where(is_small, share, np.sin(share * half_angle) / sine)
+    blend = from_weight * from_quaternions + to_weight * nearer_sign
     return np.asarray(blend / np.linalg.norm(blend, axis=1, keepdims=True))

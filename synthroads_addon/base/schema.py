@@ -45,8 +45,8 @@ def notes(
         unset: the same in two or three words, where it is no number.
         labels: values of a choice, and what people call them.
     """
-    given = {"unit": unit, "only_with": only_with, "inherits": inherits, "unset": unset, "labels": labels}
-    return {name: value for name, value in given.items() if value}
+    entries = {"unit": unit, "only_with": only_with, "inherits": inherits, "unset": unset, "labels": labels}
+    return {name: value for name, value in entries.items() if value}
 
 
 def quantity(
@@ -59,7 +59,7 @@ def quantity(
     gt: float | None = None,
     le: float | None = None,
     lt: float | None = None,
-    **further: Any,
+    **further_notes: Any,
 ) -> Any:
     """Return a pydantic field for a strict number with a unit and limits.
 
@@ -69,19 +69,19 @@ def quantity(
         description: what it means.
         limits: smallest and largest value, which are allowed themselves; `LARGEST` to either side if not given.
         ge, gt, le, lt: the same as pydantic has them, for limits that aren't allowed themselves.
-        further: ``title``, the name in the panel where the field's own won't do, and `notes`.
+        further_notes: ``title``, the name in the panel where the field's own won't do, and `notes`.
     """
-    least, most = limits
+    smallest, largest = limits
     return Field(
         default,
-        title=further.pop("title", None),
+        title=further_notes.pop("title", None),
         description=description,
-        ge=-LARGEST if ge is None and gt is None and least is None else least if ge is None else ge,
+        ge=-LARGEST if ge is None and gt is None and smallest is None else smallest if ge is None else ge,
         gt=gt,
-        le=LARGEST if le is None and lt is None and most is None else most if le is None else le,
+        le=LARGEST if le is None and lt is None and largest is None else largest if le is None else le,
         lt=lt,
         strict=True,
-        json_schema_extra=notes(unit=unit, **further),
+        json_schema_extra=notes(unit=unit, **further_notes),
     )
 
 
@@ -95,8 +95,9 @@ def when(test: dict[str, Any], then: dict[str, Any], otherwise: dict[str, Any] |
 
 
 def _fields_fit(fields: dict[str, Any]) -> dict[str, Any]:
-    needed = [name for name, rule in fields.items() if rule.get("type") != "null" and "const" not in rule]
-    return {"properties": fields, "required": needed}
+    """Return the JSON Schema of fields that must fit rules; those that may be null or a constant may be missing."""
+    required_names = [name for name, rule in fields.items() if rule.get("type") != "null" and "const" not in rule]
+    return {"properties": fields, "required": required_names}
 
 
 _FORMER = {"deprecated": True, "description": "Field of earlier versions, without effect. It is read and dropped."}
@@ -117,8 +118,8 @@ def _complete_schema(schema: dict[str, Any], model: type[Any]) -> None:
 def _keys(model: type[Model]) -> tuple[frozenset[str], frozenset[str]]:
     """Return the keys of a class's fields, and those of its fields of whole numbers; cached."""
     fields = {field.alias or name: field.annotation for name, field in model.model_fields.items()}
-    whole = [name for name, kind in fields.items() if kind is int or int in get_args(kind)]
-    return frozenset(fields), frozenset(whole)
+    whole_number_names = [name for name, kind in fields.items() if kind is int or int in get_args(kind)]
+    return frozenset(fields), frozenset(whole_number_names)
 
 
 class Model(BaseModel):
@@ -143,15 +144,19 @@ class Model(BaseModel):
         """
         if not isinstance(data, dict):
             return data
-        known, whole = _keys(cls)
+        known_keys, whole_number_keys = _keys(cls)
         data = {key: value for key, value in data.items() if key not in cls.former_fields}
         for key in data:
-            if key in known or (cls.vendor_keys_allowed and str(key).startswith(VENDOR_PREFIX)):
+            if key in known_keys or (cls.vendor_keys_allowed and str(key).startswith(VENDOR_PREFIX)):
                 continue
             raise ValueError(f"unknown key {str(key)!r}{nearest_path(cls, str(key))}")
-        data = {key: _unsigned_zeros(value) if key in known else value for key, value in data.items()}
-        changed = {key: int(data[key]) for key in whole if isinstance(data.get(key), float) and data[key].is_integer()}
-        return data | changed
+        data = {key: _unsigned_zeros(value) if key in known_keys else value for key, value in data.items()}
+        whole_numbers = {
+            key: int(data[key])
+            for key in whole_number_keys
+            if isinstance(data.get(key), float) and data[key].is_integer()
+        }
+        return data | whole_numbers
 
     @classmethod
     def from_dict(cls: type[T], data: object, source: str = "") -> T:
@@ -251,8 +256,8 @@ def read_yaml(path: Path) -> Any:
 
     text = read_text(path, "must be YAML in UTF-8")
     try:
-        plain = yaml.load(text, Loader=Loader)  # nosec B506 # it is a SafeLoader
-        data = json.loads(json.dumps(plain, allow_nan=False))
+        yaml_data = yaml.load(text, Loader=Loader)  # nosec B506 # it is a SafeLoader
+        data = json.loads(json.dumps(yaml_data, allow_nan=False))
         if "\\" in text:
             json.dumps(data, ensure_ascii=False).encode()  # refuses half a surrogate pair, which no file could hold
         return data
@@ -274,10 +279,12 @@ def unit_of(field: FieldInfo) -> str:
 
 
 def _refuse_constant(name: str) -> float:
+    """Raise ValueError for NaN and infinity, which Python's JSON takes and the standard doesn't have."""
     raise ValueError(f"{name} is not a number")
 
 
 def _finite(text: str) -> float:
+    """Return the number that a JSON text stands for; ValueError if it is too large for a float."""
     value = float(text)
     if value in (float("inf"), float("-inf")):
         raise ValueError(f"{text} is too large a number")
@@ -313,14 +320,14 @@ def _input_error(error: ValidationError, data: object, source: str, kind_of_data
         source: where it comes from; empty: from no file.
         kind_of_data: what the whole of it is called where it comes from none.
     """
-    first = error.errors(include_url=False)[0]
-    kind, value, context = first["type"], first.get("input"), first.get("ctx", {})
-    path = _real_path(first["loc"], data, missing=kind == "missing")
-    message = _WORDING.get(kind) or _in_our_words(str(first["msg"]))
+    complaint = error.errors(include_url=False)[0]
+    kind, value, context = complaint["type"], complaint.get("input"), complaint.get("ctx", {})
+    path = _real_path(complaint["loc"], data, missing=kind == "missing")
+    message = _WORDING.get(kind) or _in_our_words(str(complaint["msg"]))
     if kind == "union_tag_invalid":
         path, value = [*path, str(context["discriminator"]).strip("'")], context["tag"]
-        known = re.findall(r"\w+", context["expected_tags"])
-        message = f"must be one of {', '.join(known)}{nearest_name(str(value), known)}"
+        known_tags = re.findall(r"\w+", context["expected_tags"])
+        message = f"must be one of {', '.join(known_tags)}{nearest_name(str(value), known_tags)}"
     elif kind == "literal_error" and isinstance(value, str):
         message += nearest_name(value, re.findall(r"'([^']*)'", context["expected"]))
     elif kind in ("missing", "value_error"):
@@ -332,9 +339,14 @@ def _input_error(error: ValidationError, data: object, source: str, kind_of_data
 
 
 def _in_our_words(message: str) -> str:
+    """Return pydantic's complaint without Python's words, beginning with a small letter."""
     message = re.sub(r"^(Input|Tuple|List|String|Dictionary) should ", "must ", message.removeprefix("Value error, "))
-    for theirs, ours in (("a valid integer", "a whole number"), ("a valid ", "a "), (" after validation", "")):
-        message = message.replace(theirs, ours)
+    for pydantic_words, own_words in (
+        ("a valid integer", "a whole number"),
+        ("a valid ", "a "),
+        (" after validation", ""),
+    ):
+        message = message.replace(pydantic_words, own_words)
     return message[0].lower() + message[1:]
 
 

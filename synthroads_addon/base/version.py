@@ -10,8 +10,8 @@ def version() -> str:
     import tomllib  # hardly anything asks for the version
     from importlib import metadata
 
-    here = Path(__file__).parents[1]
-    for folder in (here, here.parent):
+    package_folder = Path(__file__).parents[1]
+    for folder in (package_folder, package_folder.parent):
         manifest = folder / "blender_manifest.toml"
         if manifest.is_file():
             return str(tomllib.loads(manifest.read_text(encoding="utf-8"))["version"])

@@ -20,10 +20,12 @@ def change_recipe(recipe: Recipe, changes: Sequence[str]) -> Recipe:
     values = dict(scenario_changes(list(changes)))
     groups = []
     for group in recipe.groups:
-        draw = {
-            path: drawn for path, drawn in group.draw.items() if not any(path_within(path, set_) for set_ in values)
+        draws = {
+            path: drawn_value
+            for path, drawn_value in group.draw.items()
+            if not any(path_within(path, changed_path) for changed_path in values)
         }
         variants = tuple(each | values for each in group.variants)
-        update = {"set": group.set | values, "draw": draw, "variants": variants}
+        update = {"set": group.set | values, "draw": draws, "variants": variants}
         groups.append(group.model_copy(update=update))
     return Recipe.from_dict(recipe.model_copy(update={"groups": tuple(groups)}).to_dict(), "recipe")

@@ -21,6 +21,7 @@ def data_card(recipe: Recipe, manifest: Manifest, jobs: Sequence[SceneJob]) -> s
 
 
 def _head(recipe: Recipe, manifest: Manifest) -> list[str]:
+    """Return the card's first lines: title, content, licence and what failed."""
     scenes = [scene for scene in manifest.scenes if scene.status == "done"]
     points = sum(scene.points or 0 for scene in scenes)
     length = math.fsum(scene.length or 0.0 for scene in scenes)
@@ -33,11 +34,12 @@ def _head(recipe: Recipe, manifest: Manifest) -> list[str]:
         f"- **Made by:** {manifest.generator} from `recipe.json` (seed {recipe.seed}): both give the same bytes",
         "- **Not real:** no measured data is in it, and no person",
     ]
-    failed = [scene for scene in manifest.scenes if scene.status == "failed"]
-    return lines + [f"- **Failed:** {scene.name}: {scene.error}" for scene in failed] + [""]
+    failed_scenes = [scene for scene in manifest.scenes if scene.status == "failed"]
+    return lines + [f"- **Failed:** {scene.name}: {scene.error}" for scene in failed_scenes] + [""]
 
 
 def _how(recipe: Recipe, jobs: Sequence[SceneJob]) -> list[str]:
+    """Return the lines about how the set was made: fidelity, scanner, platform and what is drawn."""
 
     def count_names(values: Iterable[str]) -> str:
         return ", ".join(f"{name} ({count})" for name, count in sorted(Counter(values).items()))
@@ -59,11 +61,16 @@ def _how(recipe: Recipe, jobs: Sequence[SceneJob]) -> list[str]:
 def _drawn_fields(recipe: Recipe) -> list[str]:
     """Return a list of the fields of which each scene has its own value; empty if the recipe draws none."""
     parts = [("", recipe.draw), *((f" ({group.name})", group.draw) for group in recipe.groups)]
-    rows = [f"  - `{path}`{where}: {drawn.text()}" for where, draws in parts for path, drawn in draws.items()]
+    rows = [
+        f"  - `{path}`{group_text}: {drawn_value.text()}"
+        for group_text, draws in parts
+        for path, drawn_value in draws.items()
+    ]
     return ["- Drawn for each scene, evenly unless said:", *rows] if rows else []
 
 
 def _content(manifest: Manifest) -> list[str]:
+    """Return the tables of the scenes, and of the points by class and split."""
     scenes = [scene for scene in manifest.scenes if scene.status == "done"]
     lines = ["## Scenes", "", "| scene | split | length (m) | points |", "|---|---|---|---|"]
     lines += [
@@ -81,6 +88,7 @@ def _content(manifest: Manifest) -> list[str]:
 
 
 def _files(recipe: Recipe) -> list[str]:
+    """Return the lines about the set's files."""
     lines = [
         "## Files",
         "",

@@ -115,10 +115,10 @@ class SemanticKittiWriter(LayoutWriter):
         values[:, :3] = points.xyz - tile.corner
         values[:, 3] = self.strength(points)
         values.tofile(self._sequence / "velodyne" / f"{frame:06d}.bin")
-        known, inverse = np.unique(points.instance_id, return_inverse=True)
-        compact = np.array([self._number(int(value)) for value in known], dtype=np.uint32)[inverse]
-        semantic = np.where(points.class_id == UNLABELLED, 0, points.class_id.astype(np.uint32) + 1)
-        labels = semantic.astype("<u4") | (compact.astype("<u4") << 16)
+        instances, inverse = np.unique(points.instance_id, return_inverse=True)
+        short_numbers = np.array([self._number(int(value)) for value in instances], dtype=np.uint32)[inverse]
+        class_numbers = np.where(points.class_id == UNLABELLED, 0, points.class_id.astype(np.uint32) + 1)
+        labels = class_numbers.astype("<u4") | (short_numbers.astype("<u4") << 16)
         labels.tofile(self._sequence / "labels" / f"{frame:06d}.label")
         self._corners.append(tile.corner)
 
@@ -176,6 +176,7 @@ def write_layouts(cloud: Path, folder: Path, recipe: Recipe, job: SceneJob, orig
 
 
 def _thin_out(blocks: Iterator[PointBlock], spacing: float | None, folder: Path) -> Iterator[PointBlock]:
+    """Yield the points of blocks, of which each cell of a grid of ``spacing`` (m) keeps one; all if it is None."""
     if spacing is None:
         yield from blocks
         return
@@ -186,6 +187,7 @@ def _thin_out(blocks: Iterator[PointBlock], spacing: float | None, folder: Path)
 
 
 def _tile_text(job: SceneJob, tile: Tile) -> str:
+    """Return the JSON text that says where a tile lies, of which scene it is, and how many points it has."""
     data = {"scene": job.name, "origin": [float(value) for value in tile.corner], "points": len(tile.points)}
     return canonical_json(data)
 
@@ -194,8 +196,10 @@ def layout_descriptions(recipe: Recipe, jobs: Sequence[SceneJob]) -> dict[str, s
     """Return path -> text of the files that describe whole layouts: classes, and the scenes of each split."""
     texts: dict[str, str] = {}
     clouds = {job.scenario.cloud.classes: job.scenario.cloud for job in jobs}
-    read = {classes: cloud.scheme() for classes, cloud in clouds.items()}  # each file once, of however many scenes
-    schemes = {scheme.name: scheme for scheme in (read[job.scenario.cloud.classes] for job in jobs)}
+    scheme_of_classes = {
+        classes: cloud.scheme() for classes, cloud in clouds.items()
+    }  # each file once, of however many scenes
+    schemes = {scheme.name: scheme for scheme in (scheme_of_classes[job.scenario.cloud.classes] for job in jobs)}
     for layout, scheme in product(recipe.layouts, schemes.values()):
         root = layout_root(Path(), layout, scheme)
         if layout == "pointcept":
@@ -203,8 +207,10 @@ def layout_descriptions(recipe: Recipe, jobs: Sequence[SceneJob]) -> dict[str, s
             table = {"classes": names, "ids": ids, "ignore_index": -1}
             texts[f"{root.as_posix()}/classes.json"] = canonical_json(table)
         else:
-            with_scheme = [job for job in jobs if read[job.scenario.cloud.classes].name == scheme.name]
-            texts[f"{root.as_posix()}/synthroads.yaml"] = _kitti_configuration(scheme, with_scheme)
+            jobs_with_scheme = [
+                job for job in jobs if scheme_of_classes[job.scenario.cloud.classes].name == scheme.name
+            ]
+            texts[f"{root.as_posix()}/synthroads.yaml"] = _kitti_configuration(scheme, jobs_with_scheme)
     return texts
 
 
@@ -213,15 +219,15 @@ def _kitti_configuration(scheme: ClassScheme, jobs: Sequence[SceneJob]) -> str:
     import yaml  # Blender's Python has none
 
     ids = {row.id + 1: row for row in scheme.rows}
-    order = {raw: place for place, raw in enumerate(sorted(ids), 1)}
+    order = {file_label: place for place, file_label in enumerate(sorted(ids), 1)}
     splits: dict[str, list[int]] = {"train": [], "valid": [], "test": []}
     for job in jobs:
         splits.setdefault({"validation": "valid", "val": "valid"}.get(job.split, job.split), []).append(job.number)
     data = {
-        "labels": {0: "unlabeled", **{raw: row.name for raw, row in ids.items()}},
-        "color_map": {0: [0, 0, 0], **{raw: list(reversed(row.color)) for raw, row in ids.items()}},
+        "labels": {0: "unlabeled", **{file_label: row.name for file_label, row in ids.items()}},
+        "color_map": {0: [0, 0, 0], **{file_label: list(reversed(row.color)) for file_label, row in ids.items()}},
         "learning_map": {0: 0, **order},
-        "learning_map_inv": {0: 0, **{place: raw for raw, place in order.items()}},
+        "learning_map_inv": {0: 0, **{place: file_label for file_label, place in order.items()}},
         "learning_ignore": {0: True, **dict.fromkeys(order.values(), False)},
         "split": splits,
     }

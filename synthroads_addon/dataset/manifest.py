@@ -57,6 +57,7 @@ class SceneEntry(ClosedModel):
     @field_validator("name")
     @classmethod
     def _check_name(cls, name: str) -> str:
+        """Refuse a name that leads out of the folder of scenes."""
         if not stays_below(name) or len(PurePosixPath(name).parts) != 1:
             raise ValueError(f"'{name}' can't be the name of a scene")
         return name
@@ -64,13 +65,17 @@ class SceneEntry(ClosedModel):
     @field_validator("files")
     @classmethod
     def _check_files(cls, files: dict[str, FileEntry] | None) -> dict[str, FileEntry] | None:
-        if outside := next((name for name in files or () if not stays_below(name)), None):
-            raise ValueError(f"'{outside}' is no file in the data set: a relative path with / and without .. is needed")
+        """Refuse a file outside of the data set."""
+        if outside_name := next((name for name in files or () if not stays_below(name)), None):
+            raise ValueError(
+                f"'{outside_name}' is no file in the data set: a relative path with / and without .. is needed"
+            )
         return files
 
     @field_validator("folders")
     @classmethod
     def _check_folders(cls, folders: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        """Refuse folders that no scene of a data set has."""
         return None if folders is None else tuple(map(published_name, folders))
 
 
@@ -93,10 +98,10 @@ def read_manifest(folder: Path) -> Manifest:
         InputError: there is none, or it is damaged.
     """
     manifest = Manifest.from_dict(read_json(folder / MANIFEST), source=str(folder / MANIFEST))
-    recorded = {entry.name: entry for entry in _read_records(folder)}
-    if not recorded:
+    recorded_entries = {entry.name: entry for entry in _read_records(folder)}
+    if not recorded_entries:
         return manifest
-    entries = {entry.name: entry for entry in manifest.scenes} | recorded
+    entries = {entry.name: entry for entry in manifest.scenes} | recorded_entries
     return manifest.model_copy(update={"scenes": tuple(entries.values())})
 
 
@@ -138,17 +143,17 @@ def published_name(name: object) -> str:
 
 def write_atomically(path: Path, text: str) -> None:
     """Write a text file so that it is there wholly or not at all, even after a power cut; never through a link."""
-    temporary = path.with_name(f".{path.name}.part")
+    partial_file = path.with_name(f".{path.name}.part")
     try:
-        temporary.unlink(missing_ok=True)  # a link would be written through
-        with temporary.open("x", encoding="utf-8", newline="\n") as file:
+        partial_file.unlink(missing_ok=True)  # a link would be written through
+        with partial_file.open("x", encoding="utf-8", newline="\n") as file:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
-        temporary.replace(path)
+        partial_file.replace(path)
     except BaseException:
         with suppress(OSError):
-            temporary.unlink(missing_ok=True)
+            partial_file.unlink(missing_ok=True)
         raise
 
 
@@ -196,7 +201,7 @@ def check_same_recipe(folder: Path, recipe_text: str, generator: str) -> Manifes
 
 
 def make_manifest(
-    title: str, generator: str, recipe_text: str, scenes: Iterable[SceneEntry], expected: int
+    title: str, generator: str, recipe_text: str, scenes: Iterable[SceneEntry], scene_count: int
 ) -> Manifest:
     """Return the manifest of some scenes; it is complete if there are as many as expected and all are done."""
     entries = tuple(scenes)
@@ -204,7 +209,7 @@ def make_manifest(
         title=title,
         generator=generator,
         recipe_sha256=hashlib.sha256(recipe_text.encode()).hexdigest(),
-        complete=len(entries) == expected and all(entry.status == "done" for entry in entries),
+        complete=len(entries) == scene_count and all(entry.status == "done" for entry in entries),
         scenes=entries,
     )
 
@@ -240,9 +245,11 @@ def paths_of_set(folder: Path, manifest: Manifest) -> list[str]:
 def _folders(folder: Path, scene: SceneEntry) -> Iterator[str]:
     """Yield the folders of a scene; OutputError where one holds a file that isn't the scene's."""
     for name in scene.folders or ():
-        whole = path_inside(folder, name, folder / MANIFEST)
-        inside = () if whole.is_symlink() else sorted(whole.rglob("*"))  # of a link the link alone goes
-        for path in inside:
+        scene_folder = path_inside(folder, name, folder / MANIFEST)
+        paths_inside = (
+            () if scene_folder.is_symlink() else sorted(scene_folder.rglob("*"))
+        )  # of a link the link alone goes
+        for path in paths_inside:
             file = path.relative_to(folder).as_posix()
             if (path.is_symlink() or not path.is_dir()) and file not in (scene.files or {}):
                 raise OutputError("--output", str(folder), f"holds {file}, not a part of the data set; move it away")
@@ -250,6 +257,7 @@ def _folders(folder: Path, scene: SceneEntry) -> Iterator[str]:
 
 
 def _fits(place: PurePosixPath, pattern: str) -> bool:
+    """Return whether a path has as many parts as a pattern and matches it."""
     return len(place.parts) == len(PurePosixPath(pattern).parts) and place.match(pattern)
 
 
@@ -266,14 +274,14 @@ def finish_removal(folder: Path) -> None:
     """
     if not (folder / REPLACED).is_file():
         return
-    named = {name for scene in read_manifest(folder).scenes for name in scene.folders or ()}
-    names = read_json(folder / REPLACED)
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+    names_in_manifest = {name for scene in read_manifest(folder).scenes for name in scene.folders or ()}
+    names_to_remove = read_json(folder / REPLACED)
+    if not isinstance(names_to_remove, list) or not all(isinstance(name, str) for name in names_to_remove):
         raise InputError(str(folder / REPLACED), None, "must be a list of paths to remove; delete this file")
-    for name in names:
+    for name in names_to_remove:
         path_inside(folder, name, folder / REPLACED)
-    if named.isdisjoint(names):
-        for name in names:
+    if names_in_manifest.isdisjoint(names_to_remove):
+        for name in names_to_remove:
             remove(folder, name, folder / REPLACED)
             for parent in list(PurePosixPath(name).parents)[:-1]:
                 with suppress(OSError):  # it isn't empty, or a link

@@ -41,6 +41,7 @@ class DrawnValue(ClosedModel):
 
     @model_validator(mode="after")
     def _check_range(self) -> Self:
+        """Refuse neither or both of a range and values, an empty range, and ratios of numbers up to 0."""
         limits = (self.minimum, self.maximum)
         if self.one_of:
             if limits != (None, None):
@@ -88,15 +89,15 @@ class DrawnValue(ClosedModel):
 Draws = dict[str, DrawnValue]
 
 
-def path_within(path: str, whole: str) -> bool:
+def path_within(path: str, other_path: str) -> bool:
     """Return whether a field, by its dotted path, is another one or a part of it."""
-    return path == whole or path.startswith(f"{whole}.")
+    return path == other_path or path.startswith(f"{other_path}.")
 
 
-def _check_draws(changed: Iterable[str], draws: Iterable[str]) -> None:
+def _check_draws(set_paths: Iterable[str], drawn_paths: Iterable[str]) -> None:
     """Refuse a field that is drawn and also set, as a whole or in part, in the same place."""
-    for path, drawn in product(changed, draws):
-        if path_within(path, drawn):
+    for path, drawn_path in product(set_paths, drawn_paths):
+        if path_within(path, drawn_path):
             raise ValueError(f"set and draw both name {path}")
 
 
@@ -119,6 +120,7 @@ class SceneGroup(ClosedModel):
 
     @model_validator(mode="after")
     def _check_split(self) -> Self:
+        """Refuse fields both set and drawn, and splits whose counts don't add up to the scenes."""
         _check_draws(self.set, self.draw)
         if isinstance(self.split, dict) and (sum(self.split.values()) != self.scenes or min(self.split.values()) < 0):
             raise ValueError(f"split counts {dict(self.split)} must add up to scenes, {self.scenes}")
@@ -156,12 +158,14 @@ class Recipe(ClosedModel):
     @field_validator("groups")
     @classmethod
     def _refuse_repetitions(cls, groups: tuple[SceneGroup, ...]) -> tuple[SceneGroup, ...]:
-        if (twice := first_repeated([group.name for group in groups])) is not None:
-            raise ValueError(f"two groups are named {twice}")
+        """Refuse two groups of one name."""
+        if (repeated_name := first_repeated([group.name for group in groups])) is not None:
+            raise ValueError(f"two groups are named {repeated_name}")
         return groups
 
     @model_validator(mode="after")
     def _check_fields(self) -> Self:
+        """Refuse fields both set and drawn."""
         _check_draws(self.set, self.draw)
         return self
 
@@ -218,8 +222,8 @@ def scene_jobs(recipe: Recipe) -> list[SceneJob]:
         >>> len(jobs), jobs[0].name, jobs[0].split
         (8, 'roads-01', 'train')
     """
-    read: dict[str, Any] = {}
-    return [_job(recipe, read, number, *place) for number, place in enumerate(scene_places(recipe))]
+    scenario_data: dict[str, Any] = {}
+    return [_job(recipe, scenario_data, number, *place) for number, place in enumerate(scene_places(recipe))]
 
 
 def scene_places(recipe: Recipe) -> list[tuple[SceneGroup, int, str]]:
@@ -232,20 +236,23 @@ def scene_job(recipe: Recipe, number: int) -> SceneJob:
     return _job(recipe, {}, number, *scene_places(recipe)[number])
 
 
-def _job(recipe: Recipe, read: dict[str, Any], number: int, group: SceneGroup, place: int, split: str) -> SceneJob:
-    """Return a scene; the data of scenarios read so far are in `read`, by name, to which its own is added."""
+def _job(
+    recipe: Recipe, scenario_data: dict[str, Any], number: int, group: SceneGroup, place: int, split: str
+) -> SceneJob:
+    """Return a scene; the data of scenarios read so far are in `scenario_data`, by name, to which its own is added."""
     name = f"{group.name}-{place + 1:0{max(2, len(str(group.scenes)))}d}"
     try:
-        scenario = _scenario(recipe, read, group, name, place)
+        scenario = _scenario(recipe, scenario_data, group, name, place)
     except InputError as error:
         raise InputError(f"groups.{group.name}: {error.field}", error.value, error.allowed) from None
     return SceneJob(name, number, split, scenario)
 
 
-def _scenario(recipe: Recipe, read: dict[str, Any], group: SceneGroup, name: str, place: int) -> Scenario:
-    base = group.scenario or recipe.scenario
-    if base not in read:
-        read[base] = load_scenario(base).to_dict()
+def _scenario(recipe: Recipe, scenario_data: dict[str, Any], group: SceneGroup, name: str, place: int) -> Scenario:
+    """Return the scenario of a scene: its group's, with seed, changes, drawn values and variant."""
+    scenario_name = group.scenario or recipe.scenario
+    if scenario_name not in scenario_data:
+        scenario_data[scenario_name] = load_scenario(scenario_name).to_dict()
     seed = int(stream(recipe.seed, "scene", name).integers(LARGEST_SEED))
     draws = [_drawn_values(recipe.seed, name, part.draw) for part in (recipe, group)]
     changes = [{"seed": seed}, recipe.set, draws[0], group.set, draws[1]]
@@ -254,7 +261,7 @@ def _scenario(recipe: Recipe, read: dict[str, Any], group: SceneGroup, name: str
         order = stream(recipe.seed, "variants", group.name, turn).permutation(len(group.variants))
         changes.append(group.variants[order[place_in_turn]])
     pairs = (pair for values in changes for pair in values.items())
-    scenario = Scenario.from_dict(with_changes(read[base], pairs))
+    scenario = Scenario.from_dict(with_changes(scenario_data[scenario_name], pairs))
     if _UNSTABLE in group_outputs(group, recipe):
         raise InputError("outputs", list(scenario.outputs), f"a data set can't hold {_UNSTABLE}: it differs each time")
     outputs = dict.fromkeys((*NEEDED_OUTPUTS, *(name for name in scenario.outputs if name != _UNSTABLE)))

@@ -98,10 +98,10 @@ def publish(folder: Path, number: int, files: Path, entry: SceneEntry, plan: Str
 
 def remove_scene(folder: Path, number: int) -> None:
     """Remove a scene from a stream, in one step as far as others see."""
-    removed = folder / f"{_REMOVED}{number:06d}"
-    shutil.rmtree(removed, ignore_errors=True)
-    scene_folder(folder, number).rename(removed)
-    shutil.rmtree(removed, ignore_errors=True)
+    folder_to_delete = folder / f"{_REMOVED}{number:06d}"
+    shutil.rmtree(folder_to_delete, ignore_errors=True)
+    scene_folder(folder, number).rename(folder_to_delete)
+    shutil.rmtree(folder_to_delete, ignore_errors=True)
 
 
 def scene_numbers(folder: Path) -> list[int]:
@@ -115,10 +115,10 @@ def remove_remains(folder: Path) -> None:
         shutil.rmtree(path, ignore_errors=True)
     for number in scene_numbers(folder):
         try:
-            sound = not faults(scene_folder(folder, number), [read_entry(folder, number)], checksums=False)
+            is_intact = not faults(scene_folder(folder, number), [read_entry(folder, number)], checksums=False)
         except InputError:
-            sound = False
-        if not sound:
+            is_intact = False
+        if not is_intact:
             remove_scene(folder, number)
 
 

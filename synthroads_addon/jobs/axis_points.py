@@ -54,8 +54,12 @@ class PathPlace:
     @property
     def given(self) -> str | None:
         """Return the option that is given, None without any."""
-        named = (("--offset-from-path", self.offset), ("--path-lane", self.lane), ("--height-above-road", self.height))
-        return next((name for name, value in named if value is not None), None)
+        options = (
+            ("--offset-from-path", self.offset),
+            ("--path-lane", self.lane),
+            ("--height-above-road", self.height),
+        )
+        return next((name for name, value in options if value is not None), None)
 
     def aside(self, section: StandardCrossSection) -> float | None:
         """Return the offset of the axis, m, with the cross-section that a lane is counted in; None if none is given.
@@ -70,8 +74,8 @@ class PathPlace:
         if not 0 <= self.lane < len(section.lanes):
             allowed = f"the road has {len(section.lanes)} lanes each way: 0, the outermost, to {len(section.lanes) - 1}"
             raise InputError("--path-lane", self.lane, allowed)
-        inner = sum(section.lanes[self.lane + 1 :]) + 0.5 * section.lanes[self.lane]
-        return 0.5 * section.median + section.inner_edge_strip + inner
+        distance_in_lanes = sum(section.lanes[self.lane + 1 :]) + 0.5 * section.lanes[self.lane]
+        return 0.5 * section.median + section.inner_edge_strip + distance_in_lanes
 
 
 NOWHERE_ELSE = PathPlace()
@@ -98,8 +102,8 @@ def axis_of_line(
     scenario: RoadScenario,
     name: str | None,
     place: PathPlace,
-    seen: Callable[[AxisFit], None] | None = None,
-    beside: RoadBeside | None = None,
+    receive_fit: Callable[[AxisFit], None] | None = None,
+    road_beside: RoadBeside | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis fitted to a line of points of a file, the scenario for it, and a report.
 
@@ -109,8 +113,8 @@ def axis_of_line(
         scenario: limits of the road.
         name: of the line; None takes the longest that is a road by itself.
         place: where the axis lies beside the line.
-        seen: gets the fit, to draw it.
-        beside: gets the carriageways of a road whose directions lie side by side, which no limits say.
+        receive_fit: gets the fit, to draw it.
+        road_beside: gets the carriageways of a road whose directions lie side by side, which no limits say.
 
     Returns:
         as `jobs.axis_source.axis_from_file`; the report's ``heights`` is None where the file has none.
@@ -119,7 +123,7 @@ def axis_of_line(
         AxisRefusedError, MissingFileError, InputError: see there.
     """
     if kind is None:
-        return _axis_of_text(path, scenario, name, place, seen)
+        return _axis_of_text(path, scenario, name, place, receive_fit)
     line = chosen_line(path.name, read_points(path, kind), name)
     declared = None if line.system is None else MapSystem.read(line.system)
     scenario = _in_a_system(path.name, line, declared, scenario)
@@ -134,13 +138,13 @@ def axis_of_line(
         section = replace(section, median=0.0, inner_edge_strip=0.0)
     points = _prepared(path.name, points, line.driven, section, place)
     sagitta = tell_spacing(path.name, outlines or [points])
-    axis, limits, report = axis_of_points(path.name, points, declared, scenario, seen)
-    if beside and meets(line.section, limits):
-        beside.given = GivenRoad(side_by_side(limits, axis))
+    axis, limits, report = axis_of_points(path.name, points, declared, scenario, receive_fit)
+    if road_beside and meets(line.section, limits):
+        road_beside.given = GivenRoad(side_by_side(limits, axis))
     left_out = [*line.left_out, *losses]
     if left_out:
-        heads = ", ".join(text.partition(":")[0] for text in left_out)
-        warn("%s: of %r is left out: %s; the report says where", path.name, line.name, heads)
+        subjects = ", ".join(text.partition(":")[0] for text in left_out)
+        warn("%s: of %r is left out: %s; the report says where", path.name, line.name, subjects)
     report |= {"source": line.source, "name": line.name, "sagitta": round(sagitta, 4), "left_out": left_out}
     if not line.has_heights:
         del report["height"]
@@ -153,8 +157,9 @@ def _axis_of_text(
     scenario: RoadScenario,
     name: str | None,
     place: PathPlace,
-    seen: Callable[[AxisFit], None] | None,
+    receive_fit: Callable[[AxisFit], None] | None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
+    """Return the axis fitted to the one line of a CSV or GeoJSON file, as `axis_of_line` does."""
     if name is not None:
         raise InputError(
             "--axis-name", name, "is for files with several roads or lines; this file has one line of points"
@@ -162,7 +167,7 @@ def _axis_of_text(
     points, declared = read_declared_axis(path, Placement.of(MapSystem.of(scenario.epsg, scenario.height_epsg)))
     points = _prepared(path.name, points, has_times(path), cross_section_of(scenario), place)
     sagitta = tell_spacing(path.name, [points])
-    axis, limits, report = axis_of_points(path.name, points, declared, scenario, seen)
+    axis, limits, report = axis_of_points(path.name, points, declared, scenario, receive_fit)
     return axis, limits, report | {"sagitta": round(sagitta, 4)}
 
 
@@ -177,8 +182,10 @@ def chosen_line(file: str, lines: Sequence[PointLine], name: str | None) -> Poin
     if name is not None:
         line = named_line(lines, name, file)
     else:
-        usable = [one for one in lines if one.fault is None] or list(lines)
-        candidates = [one for one in usable if not (one.junction or one.carriageway)] or usable
+        usable_lines = [candidate for candidate in lines if candidate.fault is None] or list(lines)
+        candidates = [
+            candidate for candidate in usable_lines if not (candidate.junction or candidate.carriageway)
+        ] or usable_lines
         line = max(candidates, key=line_length)
     if line.fault is not None:
         raise InputError(f"{file}: {line.name}: {line.fault.field}", line.fault.value, line.fault.allowed)
@@ -209,25 +216,25 @@ def _in_a_system(file: str, line: PointLine, declared: MapSystem | None, scenari
         return scenario
     if declared.unit is not None and declared.epsg and declared.in_metres and not declared.local:
         return scenario.model_copy(update={"epsg": declared.epsg})
-    middle = line.points[len(line.points) // 2 : len(line.points) // 2 + 1]
+    middle_point = line.points[len(line.points) // 2 : len(line.points) // 2 + 1]
     if declared.unit is not None:
-        middle, _ = moved(middle, declared, MapSystem.read(LONGITUDE_LATITUDE))
-    zone = utm_zone(*middle[0, :2].tolist())
-    what = "in degrees" if declared.unit is None else f"in {declared.label}"
-    assume("%s is %s: the road lies in %s; --set road.epsg=CODE names another", file, what, zone.label)
+        middle_point, _ = moved(middle_point, declared, MapSystem.read(LONGITUDE_LATITUDE))
+    zone = utm_zone(*middle_point[0, :2].tolist())
+    system_text = "in degrees" if declared.unit is None else f"in {declared.label}"
+    assume("%s is %s: the road lies in %s; --set road.epsg=CODE names another", file, system_text, zone.label)
     return scenario.model_copy(update={"epsg": zone.epsg})
 
 
-def _prepared(file: str, points: Float, driven: bool, section: StandardCrossSection, place: PathPlace) -> Float:
+def _prepared(file: str, points: Float, is_path: bool, section: StandardCrossSection, place: PathPlace) -> Float:
     """Return the points (M, 3) of the axis: those of a line cleaned, thinned if it is a path, and moved."""
-    points = cleaned(file, points, _APART if driven else 0.0)
+    points = cleaned(file, points, _APART if is_path else 0.0)
     offset = place.aside(section)
-    if driven and offset is None:
+    if is_path and offset is None:
         text = (
             "%s is the path of a vehicle, and is used as the axis itself: --offset-from-path METRES (positive to the "
         )
         warn(text + "left) or --path-lane N says where the axis lies beside it", file)
-    if driven and place.height is None:
+    if is_path and place.height is None:
         warn("%s: heights are those of the path: --height-above-road METRES takes them down to the road", file)
     if offset is None and place.height is None:
         return points

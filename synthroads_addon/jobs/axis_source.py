@@ -43,7 +43,7 @@ def axis_from_file(
     place: PathPlace = NOWHERE_ELSE,
     round_kinks: float | None = None,
     picture: Path | None = None,
-    beside: RoadBeside | None = None,
+    road_beside: RoadBeside | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis of a file in local coordinates, the scenario that follows from it, and a report.
 
@@ -59,7 +59,7 @@ def axis_from_file(
         place: where the axis lies beside a line of points.
         round_kinks: distance (m) from kinks of a file's elements that roundings may keep; None refuses kinks.
         picture: file for a picture of how far the file's line or points are from the axis; none is drawn if None.
-        beside: gets what the file says of the road beside its axis.
+        road_beside: gets what the file says of the road beside its axis.
 
     Raises:
         AxisRefusedError: no road follows the points.
@@ -69,18 +69,20 @@ def axis_from_file(
     kind = format_of(path)
     if kind not in READERS:
         fits: list[AxisFit] = []
-        axis, limits, report = axis_of_line(path, kind, scenario, name, place, fits.append, beside)
+        axis, limits, report = axis_of_line(path, kind, scenario, name, place, fits.append, road_beside)
         if picture:
             axis_picture(fits[0], path.name).save(picture, "PNG")
     elif place.given:
         raise InputError(place.given, path.name, f"is for lines of points and paths; {kind} gives the axis itself")
     else:
         lines: list[tuple[RoadLine, ExactAxis]] = []
-        axis, limits, report = road_axis(path, scenario, name, round_kinks, lambda *both: lines.append(both))
+        axis, limits, report = road_axis(
+            path, scenario, name, round_kinks, lambda *line_and_axis: lines.append(line_and_axis)
+        )
         if picture:
             deviation_picture(path.name, *line_deviation(*lines[0])).save(picture, "PNG")
-        if beside:
-            beside.line, beside.axis = lines[0]
+        if road_beside:
+            road_beside.line, road_beside.axis = lines[0]
     _tell_overlap(path, axis, limits.half_width)
     if report.get("heights", ()) is None:
         vertical, source = _heights(axis, limits, seed)
@@ -110,25 +112,28 @@ def _tell_overlap(path: Path, axis: AlignmentObject, half_width: float) -> None:
     alignment = alignment_of(axis)
     station = np.linspace(0.0, axis.length, max(2, int(np.ceil(axis.length / _SPACING)) + 1))
     position, heading, curvature = alignment.frame(station)
-    worst, where = 0.0, (0.0, 0.0)
+    largest_overlap, stations_there = 0.0, (0.0, 0.0)
     for side in (-1.0, 1.0):
         offset = clip_offset(side * half_width, curvature)
-        there, away = alignment.project(position + offset[:, None] * left_vectors(heading))
-        inside = np.abs(offset) - np.abs(away)
-        inside[np.abs(there - station) < 2.0 * half_width] = 0.0
-        at = int(inside.argmax())
-        if inside[at] > worst:
-            worst, where = float(inside[at]), (float(station[at]), float(there[at]))
-    if worst > _OVERLAP:
-        first, second = sorted(where)
+        projected_station, projected_offset = alignment.project(position + offset[:, None] * left_vectors(heading))
+        overlap = np.abs(offset) - np.abs(projected_offset)
+        overlap[np.abs(projected_station - station) < 2.0 * half_width] = 0.0
+        index = int(overlap.argmax())
+        if overlap[index] > largest_overlap:
+            largest_overlap, stations_there = (
+                float(overlap[index]),
+                (float(station[index]), float(projected_station[index])),
+            )
+    if largest_overlap > _OVERLAP:
+        lower_station, higher_station = sorted(stations_there)
         text = "%s: the road at station %.0f m comes back so near to that at %.0f m that one's ground lies %.1f m deep"
         warn(
             f"{text} over the other's: try road.half_width=%.0f",
             path.name,
-            first,
-            second,
-            worst,
-            _narrower(half_width, worst),
+            lower_station,
+            higher_station,
+            largest_overlap,
+            _narrower(half_width, largest_overlap),
         )
 
 
@@ -141,12 +146,12 @@ def _heights(axis: AlignmentObject, scenario: RoadScenario, seed: int) -> tuple[
     """Return points of vertical intersection for an axis without heights, and where they come from."""
     if scenario.elevation_model is None:
         return sample_profile(scenario, stream(seed, "profile")), "they are drawn within the limits of the scenario"
-    east, north, up = scenario.map_origin
+    east, north, origin_height = scenario.map_origin
     model = road_elevation_model(scenario.elevation_model, scenario.epsg, axis, (east, north), 0.0)
     alignment = alignment_of(axis)
     station = np.linspace(0.0, axis.length, max(2, int(np.ceil(axis.length / _SPACING)) + 1))
-    place = alignment.position(station)
-    ground = model.elevation(place[:, 0] + east, place[:, 1] + north) - up
+    xy = alignment.position(station)
+    ground = model.elevation(xy[:, 0] + east, xy[:, 1] + north) - origin_height
     points = fit_heights(station, ground, axis.length, _GROUND_TOLERANCE)
     return points, f"they follow {Path(scenario.elevation_model).name} within {_GROUND_TOLERANCE:g} m"
 
@@ -160,10 +165,14 @@ def axis_summary(report: dict[str, Any]) -> str:
             f" cm, worst {fit['worst'] * 100:.1f} cm at station {fit['worst_station']:.0f} m"
         )
     kinds = ", ".join(f"{count} {kind}" for kind, count in report["kinds"].items())
-    worst = max((row["deviation"] for row in report["approximated"]), default=0.0)
-    rest = f"; {len(report['approximated'])} of them within {1000.0 * worst:.2f} mm" if report["approximated"] else ""
+    largest_deviation = max((row["deviation"] for row in report["approximated"]), default=0.0)
+    deviation_text = (
+        f"; {len(report['approximated'])} of them within {1000.0 * largest_deviation:.2f} mm"
+        if report["approximated"]
+        else ""
+    )
     name = f"{report['source']} {report['name']!r}"
-    return f"axis: {name}, {report['length']:,.1f} m: {kinds}, as in the file{rest}"
+    return f"axis: {name}, {report['length']:,.1f} m: {kinds}, as in the file{deviation_text}"
 
 
 def listed_lines(path: Path) -> list[dict[str, Any]]:
@@ -172,11 +181,11 @@ def listed_lines(path: Path) -> list[dict[str, Any]]:
     Raises:
         MissingFileError, InputError: the file can't be read, or is of a format with one line alone.
     """
-    nothing: dict[str, Any] = {"elements": 0, "points": 0, "lanes": None, "junction": False, "fault": None}
-    nothing |= {"carriageway": False, "kind": ""}
+    defaults: dict[str, Any] = {"elements": 0, "points": 0, "lanes": None, "junction": False, "fault": None}
+    defaults |= {"carriageway": False, "kind": ""}
     if (kind := format_of(path)) in OF_POINTS:
         return [
-            nothing
+            defaults
             | {
                 "name": line.name,
                 "length": round(line_length(line), 3),
@@ -192,7 +201,7 @@ def listed_lines(path: Path) -> list[dict[str, Any]]:
             for line in read_points(path, kind)
         ]
     return [
-        nothing
+        defaults
         | {
             "name": line.name,
             "length": round(line.length, 3),
@@ -208,4 +217,5 @@ def listed_lines(path: Path) -> list[dict[str, Any]]:
 
 
 def _shown_system(text: str) -> str:
+    """Return a coordinate system's name for people: longitude and latitude as they are, others by their label."""
     return text if text == LONGITUDE_LATITUDE else MapSystem.read(text).label

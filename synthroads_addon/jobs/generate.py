@@ -103,9 +103,9 @@ class RoadSource:
             return parameters, {"axis": report}
         if self.axis:
             with draw_refused_fit(self.pictures):
-                beside = RoadBeside()
-                axis, limits, report = axis_from_file(self.axis, scenario.road, scenario.seed, *options, beside)
-            return sample_road(limits, scenario.seed, scenario.title, axis, beside.given), {"axis": report}
+                road_beside = RoadBeside()
+                axis, limits, report = axis_from_file(self.axis, scenario.road, scenario.seed, *options, road_beside)
+            return sample_road(limits, scenario.seed, scenario.title, axis, road_beside.given), {"axis": report}
         return sample_road(scenario.road, scenario.seed, scenario.title), {}
 
 

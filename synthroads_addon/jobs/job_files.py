@@ -65,20 +65,22 @@ class JobFiles:
             (folder / "centerline.geojson").write_text(text, encoding="utf-8")
         if self.scenario.twin:
             with timer.stage("twin"):
-                follow = in_stage(timer.progress, "twin")
-                write_twin(road.parameters, folder, self.scenario.twin, tolerance, self.scenario.ifc, progress=follow)
+                stage_progress = in_stage(timer.progress, "twin")
+                write_twin(
+                    road.parameters, folder, self.scenario.twin, tolerance, self.scenario.ifc, progress=stage_progress
+                )
 
-    def write_report(self, folder: Path, told: dict[str, Any], timer: StageTimer) -> dict[str, Any]:
+    def write_report(self, folder: Path, content: dict[str, Any], timer: StageTimer) -> dict[str, Any]:
         """Write ``report.json`` into a folder and return its content; the other arguments are those of `report`."""
-        report = self.report(told, timer)
+        report = self.report(content, timer)
         (folder / "report.json").write_text(canonical_json(report), encoding="utf-8")
         return report
 
-    def report(self, told: dict[str, Any], timer: StageTimer) -> dict[str, Any]:
+    def report(self, content: dict[str, Any], timer: StageTimer) -> dict[str, Any]:
         """Return the content of ``report.json``; warnings and assumptions that are being collected are in it.
 
         Args:
-            told: what is to be said of this job besides what every report has: seed, settings, scenario, stages,
+            content: what is to be said of this job besides what every report has: seed, settings, scenario, stages,
                 versions.
             timer: of the job's stages.
         """
@@ -86,7 +88,7 @@ class JobFiles:
         scenario = self.scenario.to_dict()
         return (
             {"type": "Report", "generator": generator()}
-            | told
+            | content
             | {
                 "remarks": remarks_so_far(),
                 "seed": self.scenario.seed,

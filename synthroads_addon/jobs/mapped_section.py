@@ -34,7 +34,7 @@ _SLOWEST = 5.0
 
 
 def with_mapped_section(
-    name: str, mapped: MappedSection | None, scenario: RoadScenario
+    name: str, mapped_section: MappedSection | None, scenario: RoadScenario
 ) -> tuple[RoadScenario, list[str]]:
     """Return a scenario with what a map says of a road, and what of it is left out, as texts.
 
@@ -44,42 +44,42 @@ def with_mapped_section(
 
     Args:
         name: of file and road, for remarks.
-        mapped: what the map says; None for other files.
+        mapped_section: what the map says; None for other files.
         scenario: limits of the road.
     """
-    if mapped is None:
+    if mapped_section is None:
         return scenario, []
     losses = list[str]()
-    if mapped.lanes is None:
+    if mapped_section.lanes is None:
         text = "%s: the map gives no number of lanes: the scenario's cross-section is used"
         assume(text, name)
     elif scenario.lanes is not None:
-        if scenario.lanes != mapped.lanes:
-            losses.append(f"lanes: {mapped.lanes} each way, road.lanes={scenario.lanes} is taken instead")
+        if scenario.lanes != mapped_section.lanes:
+            losses.append(f"lanes: {mapped_section.lanes} each way, road.lanes={scenario.lanes} is taken instead")
     else:
-        scenario, losses = _with_lanes(name, mapped, mapped.lanes, scenario)
-    if mapped.spread is None and mapped.one_way:
+        scenario, losses = _with_lanes(name, mapped_section, mapped_section.lanes, scenario)
+    if mapped_section.spread is None and mapped_section.one_way:
         losses.append(_of_one_line(cross_section_of(scenario)))
-    elif mapped.side_by_side and not meets(mapped, scenario):
+    elif mapped_section.side_by_side and not meets(mapped_section, scenario):
         losses.append(f"lanes side by side: road.median_width={scenario.median_width:g} m parts them instead")
-    if mapped.speed is not None:
-        scenario = with_speed(name, mapped.speed, scenario)
-    if mapped.pavement is not None:
-        share = 1.0 if mapped.pavement == "concrete" else 0.0
+    if mapped_section.speed is not None:
+        scenario = with_speed(name, mapped_section.speed, scenario)
+    if mapped_section.pavement is not None:
+        share = 1.0 if mapped_section.pavement == "concrete" else 0.0
         pavement = scenario.pavement.model_copy(update={"concrete": share})
         scenario = scenario.model_copy(update={"pavement": pavement})
     return scenario, losses
 
 
-def meets(mapped: MappedSection | None, scenario: RoadScenario) -> bool:
+def meets(mapped_section: MappedSection | None, scenario: RoadScenario) -> bool:
     """Return whether a map's road has both directions side by side, and the scenario asks for no median."""
-    return mapped is not None and mapped.side_by_side and scenario.median_width is None
+    return mapped_section is not None and mapped_section.side_by_side and scenario.median_width is None
 
 
 def side_by_side(scenario: RoadScenario, axis: AlignmentObject) -> dict[Side, Carriageway]:
     """Return the carriageways of a road whose directions lie side by side: they meet at its axis, without turnouts."""
     section = cross_section_of(scenario)
-    paved = section.paved_width - section.inner_edge_strip
+    paved_width = section.paved_width - section.inner_edge_strip
     return {
         side: Carriageway(
             instance=1,
@@ -90,7 +90,7 @@ def side_by_side(scenario: RoadScenario, axis: AlignmentObject) -> dict[Side, Ca
             outer_edge_strip_width=section.outer_edge_strip,
             hard_shoulder_width=section.hard_shoulder,
             verge_width=section.verge,
-            crossfall=crossfall_points(scenario.design_class, side, paved, axis.horizontal),
+            crossfall=crossfall_points(scenario.design_class, side, paved_width, axis.horizontal),
             rotation_axis="centreline",
         )
         for side in SIDES
@@ -104,43 +104,55 @@ def _of_one_line(section: StandardCrossSection) -> str:
     return f"{text} {offset:g} leaves the right one where the map has it"
 
 
-def _with_lanes(name: str, mapped: MappedSection, lanes: int, scenario: RoadScenario) -> tuple[RoadScenario, list[str]]:
+def _with_lanes(
+    name: str, mapped_section: MappedSection, lanes: int, scenario: RoadScenario
+) -> tuple[RoadScenario, list[str]]:
     """Return the scenario with the first cross-section for a map's lanes that meets no conflict."""
     if lanes > _MOST_LANES:
         return scenario, [f"lanes: {lanes} each way, at most {_MOST_LANES} are possible"]
     conflicts_before = set(conflicts(scenario, True))
-    for update, losses in _candidates(mapped, lanes, scenario):
-        changed = scenario.model_copy(update=update)
-        if set(conflicts(changed, True)) <= conflicts_before:
-            section = cross_section_of(changed)
+    for update, losses in _candidates(mapped_section, lanes, scenario):
+        candidate = scenario.model_copy(update=update)
+        if set(conflicts(candidate, True)) <= conflicts_before:
+            section = cross_section_of(candidate)
             widths = ", ".join(f"{width:g}" for width in section.lanes)
-            section_name = changed.cross_section if isinstance(changed.cross_section, str) else "by hand"
-            median = "no median" if meets(mapped, changed) else f"median of {section.median:g} m"
+            section_name = candidate.cross_section if isinstance(candidate.cross_section, str) else "by hand"
+            median = "no median" if meets(mapped_section, candidate) else f"median of {section.median:g} m"
             text = "%s: %d lanes each way: cross-section %s, lanes of %s m, %s; road.lanes=N asks for others"
             assume(text, name, lanes, section_name, widths, median)
-            return changed, losses
+            return candidate, losses
     return scenario, [f"lanes: {lanes} each way, which no cross-section of {scenario.design_class} holds"]
 
 
 def _candidates(
-    mapped: MappedSection, lanes: int, scenario: RoadScenario
+    mapped_section: MappedSection, lanes: int, scenario: RoadScenario
 ) -> Iterator[tuple[dict[str, Any], list[str]]]:
     """Yield changes of a scenario that hold a map's lanes, the nearest first, and what each leaves out."""
-    bases = list(_bases(lanes, mapped.lane_width, scenario))
+    bases = list(_bases(lanes, mapped_section.lane_width, scenario))
     for update, section in bases:
         widths = section.lanes
-        if mapped.lane_width is not None and abs(math.fsum(widths) / lanes - mapped.lane_width) > _LANE_TOLERANCE:
-            widths = (mapped.lane_width,) * lanes
-        median, losses = _median(mapped, section, widths)
+        if (
+            mapped_section.lane_width is not None
+            and abs(math.fsum(widths) / lanes - mapped_section.lane_width) > _LANE_TOLERANCE
+        ):
+            widths = (mapped_section.lane_width,) * lanes
+        median, losses = _median(mapped_section, section, widths)
         if widths == section.lanes and median == section.median:
             yield update, losses
         else:
             yield {**update, "cross_section": _by_hand(section, widths, median)}, losses
     for update, _ in bases:  # without the map's widths, where they meet limits
-        losses = [f"lane width: {mapped.lane_width:g} m"] if mapped.lane_width is not None else []
+        losses = [f"lane width: {mapped_section.lane_width:g} m"] if mapped_section.lane_width is not None else []
         yield (
             update,
-            [*losses, *([f"median: by {mapped.spread:.1f} m between the carriageways"] if mapped.spread else [])],
+            [
+                *losses,
+                *(
+                    [f"median: by {mapped_section.spread:.1f} m between the carriageways"]
+                    if mapped_section.spread
+                    else []
+                ),
+            ],
         )
 
 
@@ -152,15 +164,15 @@ def _bases(
     if len(usual_section.lanes) == lanes:
         yield {}, usual_section
     section_names = SECTIONS_OF_CLASS[scenario.design_class]
-    standard = [name for name in STANDARD_CROSS_SECTIONS if len(STANDARD_CROSS_SECTIONS[name].lanes) == lanes]
+    standard_names = [name for name in STANDARD_CROSS_SECTIONS if len(STANDARD_CROSS_SECTIONS[name].lanes) == lanes]
     lane_width = 3.75 if width is None else width
-    standard.sort(
+    standard_names.sort(
         key=lambda name: (
             name not in section_names,
             abs(math.fsum(STANDARD_CROSS_SECTIONS[name].lanes) / lanes - lane_width),
         )
     )
-    for name in standard:
+    for name in standard_names:
         section = STANDARD_CROSS_SECTIONS[name]
         yield {"cross_section": name, "design_class": design_class_of(name, scenario.design_class)}, section
     widths = (usual_section.lanes + usual_section.lanes[-1:] * lanes)[:lanes]
@@ -176,6 +188,7 @@ def _bases(
 
 
 def _by_hand(section: StandardCrossSection, lanes: tuple[float, ...], median: float) -> FreeCrossSection:
+    """Return a cross-section by hand: another one's with other lanes and another median, m."""
     return FreeCrossSection(
         lanes=lanes,
         hard_shoulder=section.hard_shoulder,
@@ -186,26 +199,28 @@ def _by_hand(section: StandardCrossSection, lanes: tuple[float, ...], median: fl
     )
 
 
-def _median(mapped: MappedSection, section: StandardCrossSection, lanes: tuple[float, ...]) -> tuple[float, list[str]]:
+def _median(
+    mapped_section: MappedSection, section: StandardCrossSection, lanes: tuple[float, ...]
+) -> tuple[float, list[str]]:
     """Return the median (m) by the distance of the carriageways' middles, or the section's, and what is left out."""
-    if mapped.spread is None:
+    if mapped_section.spread is None:
         return section.median, []
-    median = round(mapped.spread - 2.0 * section.inner_edge_strip - math.fsum(lanes), 1)
+    median = round(mapped_section.spread - 2.0 * section.inner_edge_strip - math.fsum(lanes), 1)
     if abs(median - section.median) <= _MEDIAN_TOLERANCE:
         return section.median, []
     if not 0.5 <= median <= _WIDEST_MEDIAN:
         return section.median, [
-            f"median: {mapped.spread:.1f} m between the middles of the lanes would leave {median:g} m"
+            f"median: {mapped_section.spread:.1f} m between the middles of the lanes would leave {median:g} m"
         ]
     return median, []
 
 
 def with_speed(name: str, speed: float, scenario: RoadScenario) -> RoadScenario:
     """Return the scenario whose cars drive at most at a speed, km/h."""
-    most = max(speed, _SLOWEST) / 3.6
-    drawn = scenario.vehicles.speed
-    if drawn.maximum <= most:
+    highest_speed = max(speed, _SLOWEST) / 3.6
+    speed_limits = scenario.vehicles.speed
+    if speed_limits.maximum <= highest_speed:
         return scenario
-    limits = Interval(minimum=round(min(drawn.minimum, most), 3), maximum=round(most, 3))
-    assume("%s: cars drive at most %.0f km/h, as the file says", name, 3.6 * most)
+    limits = Interval(minimum=round(min(speed_limits.minimum, highest_speed), 3), maximum=round(highest_speed, 3))
+    assume("%s: cars drive at most %.0f km/h, as the file says", name, 3.6 * highest_speed)
     return scenario.model_copy(update={"vehicles": scenario.vehicles.model_copy(update={"speed": limits})})

@@ -44,8 +44,8 @@ class ForeignScene:
         """Return the scene unchanged: settings of the model don't apply to it."""
         return self.scene
 
-    def with_settings(self, scenario: Scenario, stands: bool) -> ForeignScene:
-        """Return a copy with another scenario; `stands` has no effect, see `RoadScene.with_settings`."""
+    def with_settings(self, scenario: Scenario, model_stays: bool) -> ForeignScene:
+        """Return a copy with another scenario; `model_stays` has no effect, see `RoadScene.with_settings`."""
         return replace(self, site=replace(self.site, scenario=scenario))
 
     def scan(self, to: Path | ArraySink, timer: StageTimer) -> dict[str, Any]:
@@ -102,21 +102,21 @@ class RoadScene:
     def read(self) -> ScannedScene:
         """Return the open file's evaluated scene for scanning, cached until the model is rebuilt."""
         if self.scene is None:
-            factor, class_ids = self.scenario.scan.traffic_speed_factor, self.inputs.scheme.source_ids()
+            speed_factor, class_ids = self.scenario.scan.traffic_speed_factor, self.inputs.scheme.source_ids()
             road = self.model.road_id if self.model else self.road_id
-            self.scene = scanned_scene(geometry=self.road, speed_factor=factor, class_ids=class_ids, road=road)
+            self.scene = scanned_scene(geometry=self.road, speed_factor=speed_factor, class_ids=class_ids, road=road)
         self.warnings = self.scene.warnings
         return self.scene
 
     def rebuild(self, changes: Mapping[str, Any]) -> ScannedScene:
         """Build the model with fields of the scenario changed, and return its scene; the scenario stays as it is."""
-        changed = RoadScene(self.scenario.model_copy(update=changes), self.road, self.inputs)
-        self.model, self.scene = changed.build(), changed.read()
+        changed_scene = RoadScene(self.scenario.model_copy(update=changes), self.road, self.inputs)
+        self.model, self.scene = changed_scene.build(), changed_scene.read()
         return self.scene
 
-    def with_settings(self, scenario: Scenario, stands: bool) -> RoadScene:
-        """Return the road under another scenario that names the same files; model and scene stay if ``stands``."""
-        return RoadScene(scenario, self.road, self.inputs, *((self.model, self.scene) if stands else ()))
+    def with_settings(self, scenario: Scenario, model_stays: bool) -> RoadScene:
+        """Return the road under another scenario that names the same files; model and scene stay if ``model_stays``."""
+        return RoadScene(scenario, self.road, self.inputs, *((self.model, self.scene) if model_stays else ()))
 
     def plan(self) -> ScanPlan:
         """Return the plan of the scan with every default resolved; builds the ray casters."""

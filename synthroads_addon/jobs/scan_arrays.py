@@ -46,6 +46,7 @@ def _without_files(job: J) -> J:
 
 
 def _scan_road(job: Job, progress: Progress) -> ScanArrays:
+    """Make a job's road, scan it, and return the points' arrays."""
     timer = StageTimer(progress)
     inputs = check(job)
     road, report = make_job_road(job, inputs, timer)
@@ -59,6 +60,7 @@ def _scan_road(job: Job, progress: Progress) -> ScanArrays:
 
 
 def _scan_scene(job: SceneScan, progress: Progress) -> ScanArrays:
+    """Scan a scene that is there, and return the points' arrays."""
     timer = StageTimer(progress)
     scene, report = open_foreign_scene(job, check_scene_scan(job), timer)
     sink, road = scene.site.arrays(), scene.site.conditions.road

@@ -135,9 +135,9 @@ def open_foreign_scene(job: SceneScan, inputs: SceneInputs, timer: StageTimer) -
     from .open_scene import ForeignScene
 
     report: dict[str, Any] = {"scene": job.scene.name if job.scene else None}
-    read, road, report["warnings"] = open_and_read(job, inputs, timer, report)
-    scene = ForeignScene(scene_site(job, inputs, read.static, road), read)
-    if hint := _say_unlabelled(job, inputs, read):
+    scene_read, road, report["warnings"] = open_and_read(job, inputs, timer, report)
+    scene = ForeignScene(scene_site(job, inputs, scene_read.static, road), scene_read)
+    if hint := _say_unlabelled(job, inputs, scene_read):
         report["classes_to_fill_in"] = hint
     if job.scenario.chooses:
         scene, report["choice"] = choose_settings(scene, job.begun or time.perf_counter(), timer)
@@ -157,7 +157,7 @@ def check_scene_scan(job: SceneScan) -> SceneInputs:
     platform = job.scenario.scan.platform
     if not set(job.scenario.outputs) & set(OF_POINTS):
         raise InputError("outputs", list(job.scenario.outputs), f"must name at least one of {', '.join(OF_POINTS)}")
-    named = check_scan(job.scenario, foreign=True)
+    scenario_inputs = check_scan(job.scenario, is_foreign=True)
     if job.scene is not None:
         check_scene_file(job.scene, job.up)
     if job.tripods:
@@ -170,10 +170,10 @@ def check_scene_scan(job: SceneScan) -> SceneInputs:
         metric_system(job.epsg, field="--epsg")
     line = AxisContent.read(job.path) if job.path else None
     if job.classes is None:
-        return SceneInputs(named, line=line)
+        return SceneInputs(scenario_inputs, line=line)
     mapping = ClassMapping.from_dict(read_json(job.classes), source=str(job.classes))
-    mapping.check(named.scheme.source_ids(), str(job.classes))
-    return SceneInputs(named, mapping, line)
+    mapping.check(scenario_inputs.scheme.source_ids(), str(job.classes))
+    return SceneInputs(scenario_inputs, mapping, line)
 
 
 def open_and_read(
@@ -195,33 +195,36 @@ def open_and_read(
         if job.scene is not None:
             shift = open_scene(job.scene, job.up, to_origin=job.origin == "auto", also_from=job.also_from)
     with timer.stage("scene mesh"):
-        opened = open_road(job.road)
-        edited = opened.edited if opened else None
-        parameters = edited.parameters if edited and not edited.lost else None
-        if opened and edited:
-            report |= {"road": opened.name} | edited.to_dict()
-            if edited.stale and not edited.lost:
-                settle(opened.road_id, edited)
-        if opened and job.origin is not None:
+        road_in_file = open_road(job.road)
+        road_edits = road_in_file.edited if road_in_file else None
+        parameters = road_edits.parameters if road_edits and not road_edits.lost else None
+        if road_in_file and road_edits:
+            report |= {"road": road_in_file.name} | road_edits.to_dict()
+            if road_edits.stale and not road_edits.lost:
+                settle(road_in_file.road_id, road_edits)
+        if road_in_file and job.origin is not None:
             raise InputError("--origin", job.origin, "can't be given: the road in the scene has one of its own")
         factor, class_ids = job.scenario.scan.traffic_speed_factor, inputs.named.scheme.source_ids()
-        further: dict[str, Any] = {"class_ids": class_ids, "road": opened.road_id if opened else ""}
+        scene_options: dict[str, Any] = {"class_ids": class_ids, "road": road_in_file.road_id if road_in_file else ""}
         road = RoadGeometry(parameters) if parameters else None
-        if opened and (unit := scene_unit()) != 1.0:
+        if road_in_file and (unit := scene_unit()) != 1.0:
             warn("the scene's unit scale is %g: roads are built in metres, so one unit is read as one metre", unit)
 
         def read() -> ScannedScene:
+            """Return the open scene as it is now, evaluated for the scan."""
             return scanned_scene(
-                None, inputs.mapping, road, factor, number_objects=True, visible=job.visible, **further
+                None, inputs.mapping, road, factor, number_objects=True, visible=job.visible, **scene_options
             )
 
         scene = read()
         if not len(scene.static) and not scene.moving:
-            what = "holds nothing visible with faces that could be scanned"
-            raise InputError(str(job.scene or "open scene"), None, what)
+            fault = "holds nothing visible with faces that could be scanned"
+            raise InputError(str(job.scene or "open scene"), None, fault)
         scene, warnings = _placed(job, scene, shift, read)
         warnings += [*open_scene_warnings(), *scene.warnings]
-        warnings += [f"{edit.name} was edited by hand: {edit.reason}" for edit in edited.by_hand] if edited else []
+        warnings += (
+            [f"{edit.name} was edited by hand: {edit.reason}" for edit in road_edits.by_hand] if road_edits else []
+        )
         warnings += [f"{job.classes}: nothing in the scene is named as in {entry}" for entry in scene.unmatched]
         if strays := strays_of(scene.static) if len(scene.static) else None:
             warnings += [f"{strays.count():,} vertices are far from all others: the path and the previews ignore them"]
@@ -247,14 +250,14 @@ def _placed(
         warnings += rounding_warnings(scene.static, name)
         origin = scene.static.origin if job.origin is None else np.array(job.origin, dtype=np.float64)
         return replace(scene, static=replace(scene.static, origin=origin)), warnings
-    if len(scene.static) and (further := shift_of(body_bounds(scene.static))).any():
+    if len(scene.static) and (further_shift := shift_of(body_bounds(scene.static))).any():
         from ..blender.scene.foreign import move_scene  # needs Blender, which is loaded late
 
         unit = scene.static.unit
         step = unit * step_at(float(np.abs(body_bounds(scene.static)).max()) / unit)
         warnings.append(f"{name} was read in single precision: its coordinates are rounded to steps of {step:g} m")
-        move_scene(-further / unit)
-        scene, shift = read(), shift + further
+        move_scene(-further_shift / unit)
+        scene, shift = read(), shift + further_shift
     assume("%s is scanned about the map coordinates %s", name, ", ".join(f"{value:,.0f}" for value in shift.tolist()))
     return replace(scene, static=replace(scene.static, origin=shift)), warnings
 
@@ -283,8 +286,8 @@ def _view_over(
     """Return the raster of the previews, over the road or else the mesh's box; None if no previews are wanted."""
     if "previews" not in scenario.outputs:
         return None
-    scheme, (low, high) = inputs.scheme.sources(), body_bounds(mesh) + mesh.origin
-    return TopView.over_road(road, scheme) if road else TopView.over_box(low, high, scheme)
+    scheme, (lower, upper) = inputs.scheme.sources(), body_bounds(mesh) + mesh.origin
+    return TopView.over_road(road, scheme) if road else TopView.over_box(lower, upper, scheme)
 
 
 def _say_unlabelled(job: SceneScan, inputs: SceneInputs, scene: ScannedScene) -> str:

@@ -87,13 +87,13 @@ def _read_road(
         raise InputError(path.name, format_of(path), text)
     if format_of(path) != "OpenDRIVE":
         return _read_beside(path, scenario, name, place, round_kinks, picture)
-    line = (path, scenario.road, scenario.seed, name, place, round_kinks, picture)
+    axis_arguments = (path, scenario.road, scenario.seed, name, place, round_kinks, picture)
     if choose_line(read_opendrive(path), name, path.name).lanes is None:
-        axis, limits, report = axis_from_file(*line)
+        axis, limits, report = axis_from_file(*axis_arguments)
         return sample_road(limits, scenario.seed, scenario.title, axis), report, None
     with within_limits(path.name):
         road = whole_road(path, scenario.road, name, round_kinks)
-        axis, limits, report = axis_from_file(*line)
+        axis, limits, report = axis_from_file(*axis_arguments)
         if road.heights is not None:
             axis, report["heights"] = _with_profile(axis, limits, road, round_kinks)
         limits = _wide_enough(path, limits, road.given)
@@ -114,42 +114,45 @@ def _read_beside(
     picture: Path | None,
 ) -> tuple[RoadParameters, dict[str, Any], GivenRoad | None]:
     """Return the same of a LandXML or IFC file."""
-    beside = RoadBeside()
-    line_of = (path, scenario.road, scenario.seed, name, place, round_kinks, picture)
-    axis, limits, report = axis_from_file(*line_of, beside)
-    line, exact = beside.line, beside.axis
+    road_beside = RoadBeside()
+    axis_arguments = (path, scenario.road, scenario.seed, name, place, round_kinks, picture)
+    axis, limits, report = axis_from_file(*axis_arguments, road_beside)
+    line, exact_axis = road_beside.line, road_beside.axis
     assert line is not None
-    assert exact is not None
+    assert exact_axis is not None
     if line.given is None:
         return sample_road(limits, scenario.seed, scenario.title, axis), report, None
     for text in line.remarks:
         assume("%s: %s: %s", path.name, line.name, text)
-    given = _along(line.given, line, exact)
-    if given.carriageways:
-        limits = _wide_enough(path, limits, given)
+    file_parts = _along(line.given, line, exact_axis)
+    if file_parts.carriageways:
+        limits = _wide_enough(path, limits, file_parts)
     try:
-        parameters = sample_road(limits, scenario.seed, scenario.title, axis, given)
+        parameters = sample_road(limits, scenario.seed, scenario.title, axis, file_parts)
     except ValidationError as error:
         fault = str(error.errors(include_url=False)[0]["msg"])
         raise InputError(f"{path.name}: {line.name}", None, f"its parts must fit together ({fault})") from None
     loss = Loss(read=Counter(line.taken), surface=any(text.startswith(SURFACE) for text in line.left_out))
-    return parameters, report | {"whole": loss.to_dict(), "summary": loss.lines()}, given
+    return parameters, report | {"whole": loss.to_dict(), "summary": loss.lines()}, file_parts
 
 
-def _along(given: GivenRoad, line: RoadLine, exact: ExactAxis) -> GivenRoad:
+def _along(file_parts: GivenRoad, line: RoadLine, exact_axis: ExactAxis) -> GivenRoad:
     """Return the parts of a file's road with the crossfall at stations of the axis."""
-    there = np.array([*(piece.station for piece in line.pieces), line.pieces[-1].station + line.pieces[-1].length])
-    here = np.array([*exact.starts, exact.alignment.length])
+    file_stations = np.array(
+        [*(piece.station for piece in line.pieces), line.pieces[-1].station + line.pieces[-1].length]
+    )
+    axis_stations = np.array([*exact_axis.starts, exact_axis.alignment.length])
 
     def place(station: float) -> float:
-        beyond = station - min(max(station, there[0]), there[-1])
-        return round_value(float(np.interp(station, there, here) + beyond))
+        """Return the axis's station of a station in the file; beyond the ends it goes on at the same rate."""
+        distance_beyond = station - min(max(station, file_stations[0]), file_stations[-1])
+        return round_value(float(np.interp(station, file_stations, axis_stations) + distance_beyond))
 
-    moved = {
+    moved_crossfall = {
         side: tuple(point.model_copy(update={"station": place(point.station)}) for point in points)
-        for side, points in given.crossfall.items()
+        for side, points in file_parts.crossfall.items()
     }
-    return replace(given, crossfall=moved)
+    return replace(file_parts, crossfall=moved_crossfall)
 
 
 def differences_from(
@@ -162,15 +165,16 @@ def differences_from(
     Raises:
         MissingFileError, InputError: a file can't be read, or a parameter set can't hold the road.
     """
-    old = read_parameters(against)
-    new, report, given = _read_road(path, scenario, name)
-    types = {"Alignment", "Carriageway", "Turnout"} if given and given.carriageways else {"Alignment"}
-    types |= {"LineMarking"} if given and given.markings is not None else set()
-    types |= {*THINGS, "Arrow", "Hatching"} if given and given.things is not None else set()
-    return differences(old, new, types), report
+    old_parameters = read_parameters(against)
+    new_parameters, report, file_parts = _read_road(path, scenario, name)
+    types = {"Alignment", "Carriageway", "Turnout"} if file_parts and file_parts.carriageways else {"Alignment"}
+    types |= {"LineMarking"} if file_parts and file_parts.markings is not None else set()
+    types |= {*THINGS, "Arrow", "Hatching"} if file_parts and file_parts.things is not None else set()
+    return differences(old_parameters, new_parameters, types), report
 
 
 def _is_taken(text: str) -> bool:
+    """Return whether what the axis's reader left out is taken over with the whole road."""
     return text.startswith(_OF_WHOLE[:2]) or text.endswith(_OF_WHOLE[2:])
 
 
@@ -180,9 +184,9 @@ def _with_profile(
     """Return an axis with the heights that the road's planes give it, and what the report says of them."""
     assert road.heights is not None
     heights = with_heights(road.line, road.heights, round_kinks)
-    up = limits.map_origin[2]
+    origin_height = limits.map_origin[2]
     points = tuple(
-        VerticalPoint(station=p.station, elevation=p.elevation - up, radius=p.radius) for p in heights.points
+        VerticalPoint(station=p.station, elevation=p.elevation - origin_height, radius=p.radius) for p in heights.points
     )
     report = {"points": len(points), "deviation": heights.deviation, "deviation_station": heights.station}
     return axis.model_copy(update={"vertical": points}), report
@@ -190,25 +194,28 @@ def _with_profile(
 
 def _lifted(parameters: RoadParameters) -> RoadGeometry:
     """Return a set's geometry with heights of the map."""
-    up = parameters.transform.translate[2]
+    origin_height = parameters.transform.translate[2]
     axis = parameters.alignment
-    vertical = tuple(p.model_copy(update={"elevation": p.elevation + up}) for p in axis.vertical)
+    vertical = tuple(p.model_copy(update={"elevation": p.elevation + origin_height}) for p in axis.vertical)
     name = next(key for key, item in parameters.objects.items() if item is axis)
     objects = parameters.objects | {name: axis.model_copy(update={"vertical": vertical})}
     return RoadGeometry(parameters.model_copy(update={"objects": objects}))
 
 
-def _wide_enough(path: Path, limits: RoadScenario, given: GivenRoad) -> RoadScenario:
+def _wide_enough(path: Path, limits: RoadScenario, file_parts: GivenRoad) -> RoadScenario:
     """Return the scenario with ground that reaches beyond the road's edges."""
-    edge = max(_farthest(carriageway) for carriageway in given.carriageways.values()) + _BESIDE
+    edge = max(_farthest(carriageway) for carriageway in file_parts.carriageways.values()) + _BESIDE
     if limits.half_width >= edge:
         return limits
-    wider = float(np.ceil(edge))
-    assume("%s: the road is wide: road.half_width is %.0f m instead of %.0f m", path.name, wider, limits.half_width)
-    return limits.model_copy(update={"half_width": wider})
+    half_width = float(np.ceil(edge))
+    assume(
+        "%s: the road is wide: road.half_width is %.0f m instead of %.0f m", path.name, half_width, limits.half_width
+    )
+    return limits.model_copy(update={"half_width": half_width})
 
 
 def _farthest(carriageway: Carriageway) -> float:
+    """Return the largest distance (m) of a carriageway's edges from the centreline, verge included."""
     widths = (
         carriageway.inner_offset,
         carriageway.inner_edge_strip_width,

@@ -95,33 +95,34 @@ def returned_share(
         >>> returned_share(np.cos(incidence), 0.2, *facet_terms(0.3)).round(3).tolist()  # rough: Oren and Nayar
         [0.179, 0.123]
     """
-    lit: Float = np.atleast_1d(np.asarray(cosine, dtype=np.float64))
-    result: Float = lit * facet_a
+    lit_cosine: Float = np.atleast_1d(np.asarray(cosine, dtype=np.float64))
+    result: Float = lit_cosine * facet_a
     if not _is_zero(facet_b):
-        flat = np.square(lit)
-        np.subtract(1.0, flat, out=flat)
-        flat *= facet_b
-        result += flat
+        sine_squared = np.square(lit_cosine)
+        np.subtract(1.0, sine_squared, out=sine_squared)
+        sine_squared *= facet_b
+        result += sine_squared
     result *= reflectance
     if not _is_zero(retro):
-        _add_retroreflection(result, lit, retro, inverse_lobe_squared)
-    if len(lit) and not lit.min() > EDGE_ON:
-        result[~(lit > EDGE_ON)] = 0.0
+        _add_retroreflection(result, lit_cosine, retro, inverse_lobe_squared)
+    if len(lit_cosine) and not lit_cosine.min() > EDGE_ON:
+        result[~(lit_cosine > EDGE_ON)] = 0.0
     return result
 
 
 def _is_zero(value: Number) -> bool:
+    """Return whether a value is the one number 0, not an array."""
     return np.ndim(value) == 0 and bool(value == 0.0)
 
 
 def _add_retroreflection(result: Float, cosine: Float, retro: Number, inverse_lobe_squared: Number) -> None:
     """Add, in place, the retro-reflective term to brightnesses (N,), where the material has one."""
     strength = np.broadcast_to(np.asarray(retro, dtype=np.float64), result.shape)
-    which = np.flatnonzero(strength)
-    if not len(which):
+    shining_rows = np.flatnonzero(strength)
+    if not len(shining_rows):
         return
-    lobe = np.broadcast_to(np.asarray(inverse_lobe_squared, dtype=np.float64), result.shape)[which]
-    result[which] += retroreflection(cosine[which], strength[which], lobe)
+    lobe = np.broadcast_to(np.asarray(inverse_lobe_squared, dtype=np.float64), result.shape)[shining_rows]
+    result[shining_rows] += retroreflection(cosine[shining_rows], strength[shining_rows], lobe)
 
 
 def retroreflection(cosine: Float, retro: Float, inverse_lobe_squared: Float) -> Float:

@@ -125,11 +125,11 @@ def brightness_of(surfaces: Surfaces, material: NDArray[np.integer], cosine: Flo
     facets = (np.take(surfaces.facet_a, material), np.take(surfaces.facet_b, material)) if surfaces.rough else ()
     result = returned_share(cosine, reflectance, *facets)
     if surfaces.retroreflective:
-        shining = np.flatnonzero(np.take(surfaces.shining, material))
-        indices = material[shining]
-        result[shining] = returned_share(
-            cosine[shining],
-            reflectance[shining],
+        shining_rows = np.flatnonzero(np.take(surfaces.shining, material))
+        indices = material[shining_rows]
+        result[shining_rows] = returned_share(
+            cosine[shining_rows],
+            reflectance[shining_rows],
             surfaces.facet_a[indices],
             surfaces.facet_b[indices],
             surfaces.retro[indices],
@@ -138,10 +138,12 @@ def brightness_of(surfaces: Surfaces, material: NDArray[np.integer], cosine: Flo
     return result
 
 
-def mean_over_median(below: Float | float, above: Float | float) -> Float:
+def mean_over_median(sigma_below: Float | float, sigma_above: Float | float) -> Float:
     """Return exp(b^2 / 2) P(-b) + exp(a^2 / 2) P(a), mean over median of a two-piece lognormal distribution."""
-    low, high = np.asarray(below, dtype=np.float64), np.asarray(above, dtype=np.float64)
-    return np.exp(0.5 * low * low) * _normal_cdf(-low) + np.exp(0.5 * high * high) * _normal_cdf(high)
+    sigmas_below, sigmas_above = np.asarray(sigma_below, dtype=np.float64), np.asarray(sigma_above, dtype=np.float64)
+    return np.exp(0.5 * sigmas_below * sigmas_below) * _normal_cdf(-sigmas_below) + np.exp(
+        0.5 * sigmas_above * sigmas_above
+    ) * _normal_cdf(sigmas_above)
 
 
 def spread_factors(surfaces: Surfaces, material: NDArray[np.integer], position: Float, seed: int) -> Float:
@@ -153,11 +155,12 @@ def spread_factors(surfaces: Surfaces, material: NDArray[np.integer], position: 
         position: (N, 3) local, in the scene as it stands at the time 0, m.
         seed: the scene's.
     """
-    normal = noise_field(position, surfaces.spread_wavelength[material], seed ^ _PURPOSE, OCTAVES)
+    field = noise_field(position, surfaces.spread_wavelength[material], seed ^ _PURPOSE, OCTAVES)
     scale = surfaces.spread_scale[material]
-    sigma = np.where(normal < 0.0, surfaces.spread_below[material], surfaces.spread_above[material])
-    return np.asarray(np.exp(normal * sigma) * scale)
+    sigma = np.where(field < 0.0, surfaces.spread_below[material], surfaces.spread_above[material])
+    return np.asarray(np.exp(field * sigma) * scale)
 
 
 def _normal_cdf(value: Float) -> Float:
+    """Return the cumulative distribution of the standard normal one at values."""
     return np.array([0.5 * math.erfc(-x / math.sqrt(2.0)) for x in np.ravel(value)]).reshape(np.shape(value))

@@ -150,9 +150,9 @@ def write_material_table(path: Path, rows: Mapping[str, Material], overwrite: bo
 
 def _json_line(row: Material) -> str:
     """Return a material as a line of JSON: its required fields and those that differ from the defaults."""
-    given = {
+    row_data = {
         name: value
         for name, value in row.to_dict().items()
         if name not in Material.model_fields or value != Material.model_fields[name].default
     }
-    return json.dumps(given)
+    return json.dumps(row_data)

@@ -68,8 +68,8 @@ def texture_files(folder: str) -> dict[str, Path]:
             continue
         layer = path.stem.lower()
         if layer not in TEXTURE_LAYERS:
-            allowed = f"an image must be named after a layer: {_LAYERS_NAMED}{nearest_name(layer, TEXTURE_LAYERS)}"
-            raise InputError(str(path), None, allowed)
+            allowed_text = f"an image must be named after a layer: {_LAYERS_NAMED}{nearest_name(layer, TEXTURE_LAYERS)}"
+            raise InputError(str(path), None, allowed_text)
         if layer in images:
             raise InputError(str(path), None, f"{images[layer].name} gives the same layer: leave one of them out")
         _check_image(path)
@@ -83,24 +83,26 @@ def texture_files(folder: str) -> dict[str, Path]:
 def _sets_of(folder: Path) -> Iterator[MaterialTexture]:
     """Yield the sets of a material: each folder in its own, or that itself."""
     if folder.name not in materials():
-        allowed = f"no material of the table has this name{nearest_name(folder.name, materials())}"
-        raise InputError(str(folder), None, allowed)
-    usual = _tile_of(folder, TextureSettings().tile)
+        allowed_text = f"no material of the table has this name{nearest_name(folder.name, materials())}"
+        raise InputError(str(folder), None, allowed_text)
+    usual_tile = _tile_of(folder, TextureSettings().tile)
     for path in _folders(folder) or [folder]:
         texture_files(str(path))
-        yield MaterialTexture(material=folder.name, folder=str(path), tile=_tile_of(path, usual))
+        yield MaterialTexture(material=folder.name, folder=str(path), tile=_tile_of(path, usual_tile))
 
 
-def _tile_of(folder: Path, usual: float) -> float:
+def _tile_of(folder: Path, usual_tile: float) -> float:
+    """Return the length (m) that an image's width covers by a folder's ``texture.json``; the usual one without any."""
     path = folder / SETTINGS
     if not path.is_file():
-        return usual
+        return usual_tile
     data = read_json(path)
     settings = TextureSettings.from_dict(data, source=str(path))
-    return settings.tile if "tile" in data else usual
+    return settings.tile if "tile" in data else usual_tile
 
 
 def _folders(folder: Path) -> list[Path]:
+    """Return the folders in a folder, sorted by name."""
     return [path for path in _entries(folder) if path.is_dir()]
 
 

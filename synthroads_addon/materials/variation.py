@@ -32,19 +32,22 @@ _DEFAULT = MaterialVariation()
 
 
 def vary_material(
-    name: str, variation: MaterialVariation, environment: Environment, own: Mapping[str, Material] | None = None
+    name: str,
+    variation: MaterialVariation,
+    environment: Environment,
+    own_materials: Mapping[str, Material] | None = None,
 ) -> Material:
     """Return a table's material as a road's variation (age, wear, dryness) and wetness change it; KeyError if unknown.
 
     Args:
         name: of the material.
         variation, environment: the road's.
-        own: materials that take the place of the shipped table's, or stand beside them.
+        own_materials: materials that take the place of the shipped table's, or stand beside them.
     """
-    result = _age_material(name, {**materials(), **(own or {})}, variation)
+    result = _age_material(name, {**materials(), **(own_materials or {})}, variation)
     if environment.wetness > 0.0 and name in _POROUS:
-        drained = _DRAINED if name == "porous_asphalt" else 1.0
-        result = _wet_material(result, environment.wetness * drained)
+        wet_share = _DRAINED if name == "porous_asphalt" else 1.0
+        result = _wet_material(result, environment.wetness * wet_share)
     return result
 
 
@@ -53,29 +56,30 @@ def water_film(name: str, environment: Environment) -> float:
     return environment.wetness if name in _POROUS else 0.0
 
 
-def _wet_material(dry: Material, wet: float) -> Material:
-    """Return a porous material under a film of water, ``wet`` 0 to 1: darker, smoother, less retro-reflective."""
-    smoother = 1.0 - WET_ROUGHNESS * wet
-    result = _scale_color(dry, 1.0 - WET_BASE * wet, 1.0 - WET_SPECULAR * wet)
+def _wet_material(dry_material: Material, wet_share: float) -> Material:
+    """Return a porous material under a film of water, ``wet_share`` 0 to 1: darker, smoother, less retro-reflective."""
+    roughness_factor = 1.0 - WET_ROUGHNESS * wet_share
+    result = _scale_color(dry_material, 1.0 - WET_BASE * wet_share, 1.0 - WET_SPECULAR * wet_share)
     return result.model_copy(
         update={
-            "roughness": dry.roughness * smoother,
-            "facet_slope": None if dry.facet_slope is None else dry.facet_slope * smoother**2,
-            "retroreflection": dry.retroreflection * (1.0 - WET_RETROREFLECTION * wet),
+            "roughness": dry_material.roughness * roughness_factor,
+            "facet_slope": None if dry_material.facet_slope is None else dry_material.facet_slope * roughness_factor**2,
+            "retroreflection": dry_material.retroreflection * (1.0 - WET_RETROREFLECTION * wet_share),
         }
     )
 
 
 def _age_material(name: str, table: Mapping[str, Material], variation: MaterialVariation) -> Material:
+    """Return one of a table's materials as age, wear and dryness change it."""
     mean = table[name]
     if name in ASPHALTS:
-        aged = asphalt_brightness(variation.asphalt_age) / asphalt_brightness(_DEFAULT.asphalt_age)
-        return _scale_color(mean, variation.asphalt_brightness * aged)
+        age_factor = asphalt_brightness(variation.asphalt_age) / asphalt_brightness(_DEFAULT.asphalt_age)
+        return _scale_color(mean, variation.asphalt_brightness * age_factor)
     if name in CONCRETES:
         return _scale_color(mean, variation.concrete_brightness)
     if name in _PAINTS:
-        worn = (variation.paint_wear - _DEFAULT.paint_wear) / (1.0 - _DEFAULT.paint_wear)
-        return _mix_materials(mean, table["asphalt"], worn)
+        worn_share = (variation.paint_wear - _DEFAULT.paint_wear) / (1.0 - _DEFAULT.paint_wear)
+        return _mix_materials(mean, table["asphalt"], worn_share)
     if name in _GRASSES:
         return _dry_grass(mean, variation.grass_dryness)
     return mean
@@ -83,18 +87,22 @@ def _age_material(name: str, table: Mapping[str, Material], variation: MaterialV
 
 def _dry_grass(mean: Material, dryness: float) -> Material:
     """Return grass between lush, as the table has it, and dry."""
-    usual = _DEFAULT.grass_dryness
-    if dryness < usual:
-        color, share = tuple((np.array(mean.base_color) * GREEN_GRASS).tolist()), (usual - dryness) / usual
+    usual_dryness = _DEFAULT.grass_dryness
+    if dryness < usual_dryness:
+        color, share = (
+            tuple((np.array(mean.base_color) * GREEN_GRASS).tolist()),
+            (usual_dryness - dryness) / usual_dryness,
+        )
     else:
-        color, share = DRY_GRASS, (dryness - usual) / (1.0 - usual)
+        color, share = DRY_GRASS, (dryness - usual_dryness) / (1.0 - usual_dryness)
     return _mix_materials(mean, mean.model_copy(update={"base_color": color}), share)
 
 
 def _scale_color(mean: Material, factor: float, specular: float | None = None) -> Material:
+    """Return a material with its base colour and specular times a factor; ``specular`` is the latter's own one."""
     color = np.clip(np.array(mean.base_color) * factor, 0.0, 1.0)
-    reflected = float(np.clip(mean.specular * (factor if specular is None else specular), 0.0, 1.0))
-    return mean.model_copy(update={"base_color": tuple(color.tolist()), "specular": reflected})
+    scaled_specular = float(np.clip(mean.specular * (factor if specular is None else specular), 0.0, 1.0))
+    return mean.model_copy(update={"base_color": tuple(color.tolist()), "specular": scaled_specular})
 
 
 def _mix_materials(mean: Material, other: Material, share: float) -> Material:

@@ -139,37 +139,53 @@ class Alignment:
         self._nodes = self._build_nodes()
 
     def _build_pieces(self, lengths: Float, headings: Float) -> None:
-        """Store the power series of all pieces of the elements, first and last the tangents beyond the ends."""
+        """Store the power series of all pieces of the elements, first and last the tangents beyond the ends.
+
+        Args:
+            lengths: (E,) of the elements, m.
+            headings: (E + 1,) at the elements' borders, rad.
+        """
         k_start = np.array([element.curvature_start for element in self.elements])
         k_change = np.array([element.curvature_end for element in self.elements]) - k_start
-        sharpest = np.maximum(np.abs(k_start), np.abs(k_start + k_change))
-        count = np.maximum(1, np.ceil(sharpest * lengths / _PIECE_TURN)).astype(np.int64)
-        owner = np.repeat(np.arange(len(count)), count)
-        first = np.cumsum(count) - count
-        nth = np.arange(len(owner)) - first[owner]
-        middle = (nth + 0.5) / count[owner]  # as a share of the element
-        half = 0.5 * lengths[owner] / count[owner]
-        heading = headings[owner] + lengths[owner] * middle * (k_start[owner] + 0.5 * middle * k_change[owner])
-        bend = k_start[owner] + middle * k_change[owner]
-        slope = k_change[owner] / lengths[owner]
-        series = _position_series(bend * half, slope * half**2) * (half * np.exp(1j * heading))
-        odd = 2.0 * series[1::2].sum(axis=0)  # from one end of the piece to the other
-        start = np.concatenate(([0.0], np.cumsum(odd)))
-        series[0] = start[:-1] - (series[2::2].sum(axis=0) - series[1::2].sum(axis=0))
-        tangents = np.zeros((_TERMS + 1, 2), complex)
-        tangents[0] = 0.0, start[-1]
-        tangents[1] = np.exp(1j * headings[[0, -1]])
+        largest_curvature = np.maximum(np.abs(k_start), np.abs(k_start + k_change))
+        count = np.maximum(1, np.ceil(largest_curvature * lengths / _PIECE_TURN)).astype(np.int64)
+        element_of_piece = np.repeat(np.arange(len(count)), count)
+        first_piece = np.cumsum(count) - count
+        number_in_element = np.arange(len(element_of_piece)) - first_piece[element_of_piece]
+        middle_share = (number_in_element + 0.5) / count[element_of_piece]  # as a share of the element
+        half_length = 0.5 * lengths[element_of_piece] / count[element_of_piece]
+        heading = headings[element_of_piece] + lengths[element_of_piece] * middle_share * (
+            k_start[element_of_piece] + 0.5 * middle_share * k_change[element_of_piece]
+        )
+        curvature = k_start[element_of_piece] + middle_share * k_change[element_of_piece]
+        curvature_rate = k_change[element_of_piece] / lengths[element_of_piece]
+        series = _position_series(curvature * half_length, curvature_rate * half_length**2) * (
+            half_length * np.exp(1j * heading)
+        )
+        # A piece runs over v from -1 to 1: z(1) - z(-1) is twice the sum of the odd terms, and z(-1) is the even terms'
+        # sum less that of the odd ones. The constant term is chosen so that each piece starts where the last one ended.
+        piece_vectors = 2.0 * series[1::2].sum(axis=0)
+        piece_starts = np.concatenate(([0.0], np.cumsum(piece_vectors)))
+        series[0] = piece_starts[:-1] - (series[2::2].sum(axis=0) - series[1::2].sum(axis=0))
+        tangent_series = np.zeros((_TERMS + 1, 2), complex)
+        tangent_series[0] = 0.0, piece_starts[-1]
+        tangent_series[1] = np.exp(1j * headings[[0, -1]])
 
-        def framed(before: float, inner: Float, after: float) -> Float:
-            return np.concatenate(([before], inner, [after]))
+        def framed(first_value: float, piece_values: Float, last_value: float) -> Float:
+            return np.concatenate(([first_value], piece_values, [last_value]))
 
-        series = np.concatenate((tangents[:, :1], series, tangents[:, 1:]), axis=1)
+        series = np.concatenate((tangent_series[:, :1], series, tangent_series[:, 1:]), axis=1)
         self._series_x, self._series_y = np.ascontiguousarray(series.real), np.ascontiguousarray(series.imag)
-        self._middles = framed(0.0, self.element_starts[:-1][owner] + middle * lengths[owner], self.length)
-        self._halves = framed(1.0, half, 1.0)
+        self._middles = framed(
+            0.0, self.element_starts[:-1][element_of_piece] + middle_share * lengths[element_of_piece], self.length
+        )
+        self._halves = framed(1.0, half_length, 1.0)
         self._headings = framed(headings[0], heading, headings[-1])
-        self._bends, self._slopes = framed(0.0, bend, 0.0), framed(0.0, slope, 0.0)
-        borders = self.element_starts[:-1][owner] + lengths[owner] * nth / count[owner]
+        self._bends, self._slopes = framed(0.0, curvature, 0.0), framed(0.0, curvature_rate, 0.0)
+        borders = (
+            self.element_starts[:-1][element_of_piece]
+            + lengths[element_of_piece] * number_in_element / count[element_of_piece]
+        )
         # The end itself belongs to the last element.
         self._borders = np.concatenate((borders, [np.nextafter(self.length, np.inf)]))
 
@@ -177,9 +193,12 @@ class Alignment:
         """Return station, x, y (M, 3) of coarse nodes along the axis, ends included, at most `_NODE_SPACING` apart."""
         borders = np.concatenate((self._borders[:-1], [self.length]))
         count = np.maximum(1, np.ceil(np.diff(borders) / _NODE_SPACING)).astype(np.int64)
-        owner = np.repeat(np.arange(len(count)), count)
-        nth = np.arange(len(owner)) - (np.cumsum(count) - count)[owner]
-        station = np.append(borders[owner] + np.diff(borders)[owner] * nth / count[owner], self.length)
+        piece_of_node = np.repeat(np.arange(len(count)), count)
+        number_in_piece = np.arange(len(piece_of_node)) - (np.cumsum(count) - count)[piece_of_node]
+        station = np.append(
+            borders[piece_of_node] + np.diff(borders)[piece_of_node] * number_in_piece / count[piece_of_node],
+            self.length,
+        )
         x, y, _, _ = self._evaluate(station)
         return np.column_stack((station, x, y))
 
@@ -187,10 +206,10 @@ class Alignment:
         """Return x and y less the start's (m), heading (rad) and curvature (1/m), each (N,), at stations (N,)."""
         if (loops := point_loops()) is not None:
             columns = (self._middles, self._halves, self._bends, self._slopes, self._headings)
-            x, y, heading, bend = loops.evaluate_pieces(
+            x, y, heading, curvature = loops.evaluate_pieces(
                 station, (self._borders, *columns, self._series_x, self._series_y)
             )
-            return x, y, heading, bend
+            return x, y, heading, curvature
         piece = np.searchsorted(self._borders, station, side="right")
         u = station - self._middles[piece]
         v = u / self._halves[piece]
@@ -200,8 +219,8 @@ class Alignment:
             x += self._series_x[n][piece]
             y *= v
             y += self._series_y[n][piece]
-        bend, slope = self._bends[piece], self._slopes[piece] * u
-        return x, y, self._headings[piece] + u * (bend + 0.5 * slope), bend + slope
+        curvature, curvature_change = self._bends[piece], self._slopes[piece] * u
+        return x, y, self._headings[piece] + u * (curvature + 0.5 * curvature_change), curvature + curvature_change
 
     def frame(self, station: ArrayLike) -> tuple[Float, Float, Float]:
         """Return position (..., 2) m, heading (...) rad and curvature (...) 1/m at stations of any shape.
@@ -209,13 +228,13 @@ class Alignment:
         The heading is not wrapped: it goes on counting through full turns. InputError for stations that aren't finite.
         """
         stations = finite_array("station", station)
-        flat = stations.ravel()
-        out = np.empty((4, flat.size))
-        for start in range(0, flat.size, _BLOCK):
+        flat_stations = stations.ravel()
+        columns = np.empty((4, flat_stations.size))
+        for start in range(0, flat_stations.size, _BLOCK):
             block = slice(start, start + _BLOCK)
-            out[:, block] = self._evaluate(flat[block])
-        position = np.stack((out[0] + self.x, out[1] + self.y), axis=-1).reshape(*stations.shape, 2)
-        return position, out[2].reshape(stations.shape)[()], out[3].reshape(stations.shape)[()]
+            columns[:, block] = self._evaluate(flat_stations[block])
+        position = np.stack((columns[0] + self.x, columns[1] + self.y), axis=-1).reshape(*stations.shape, 2)
+        return position, columns[2].reshape(stations.shape)[()], columns[3].reshape(stations.shape)[()]
 
     def position(self, station: ArrayLike) -> Float:
         """Return the axis' map positions (..., 2), m, at stations (...)."""
@@ -242,12 +261,12 @@ class Alignment:
         prolongation is measured on the road.
         Memory beyond the result is bounded. InputError for a wrong shape or points that aren't finite.
         """
-        places = finite_array("points", points)
-        if places.ndim != 2 or places.shape[1] != 2:
-            raise InputError("points", places.shape, "an array of shape (N, 2) is needed")
-        station, offset = np.empty(len(places)), np.empty(len(places))
-        for chosen, x, y, nodes in self._point_groups(places[:, 0] - self.x, places[:, 1] - self.y):
-            station[chosen], offset[chosen] = self._project_leaf(x, y, nodes)
+        xy = finite_array("points", points)
+        if xy.ndim != 2 or xy.shape[1] != 2:
+            raise InputError("points", xy.shape, "an array of shape (N, 2) is needed")
+        station, offset = np.empty(len(xy)), np.empty(len(xy))
+        for indices, x, y, nodes in self._point_groups(xy[:, 0] - self.x, xy[:, 1] - self.y):
+            station[indices], offset[indices] = self._project_leaf(x, y, nodes)
         return station, offset
 
     def project_near(self, points: ArrayLike, station: ArrayLike, reach: float) -> tuple[Float, Float]:
@@ -256,11 +275,13 @@ class Alignment:
         Faster than `project`, it cannot stray to another branch of a road that crosses itself, and it takes the
         tangents beyond the ends like the road. A foot farther away is replaced by the end of the reach.
         """
-        guess, places = finite_array("station", station), finite_array("points", points)
-        if places.shape != (*guess.shape, 2) or guess.ndim != 1:
-            raise InputError("points", places.shape, f"the shape ({guess.size}, 2) is needed, one point per station")
-        x, y = places[:, 0] - self.x, places[:, 1] - self.y
-        foot, _, offset = self._find_feet(x, y, guess, guess - reach, guess + reach)
+        known_station, xy = finite_array("station", station), finite_array("points", points)
+        if xy.shape != (*known_station.shape, 2) or known_station.ndim != 1:
+            raise InputError(
+                "points", xy.shape, f"the shape ({known_station.size}, 2) is needed, one point per station"
+            )
+        x, y = xy[:, 0] - self.x, xy[:, 1] - self.y
+        foot, _, offset = self._find_feet(x, y, known_station, known_station - reach, known_station + reach)
         return foot, offset
 
     def _point_groups(self, x: Float, y: Float) -> Iterator[tuple[Int, Float, Float, Int]]:
@@ -270,57 +291,67 @@ class Alignment:
         """
         stack = [(np.arange(len(x)), x, y)] if len(x) else []
         while stack:
-            chosen, x, y = stack.pop()
-            low, high = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
-            if len(chosen) <= _LEAF:
-                nodes = self._nodes_near(low, high)
-                if len(chosen) * len(nodes) <= _PAIRS or len(chosen) <= 16:
-                    yield chosen, x, y, nodes
+            indices, x, y = stack.pop()
+            lower, upper = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
+            if len(indices) <= _LEAF:
+                nodes = self._nodes_near(lower, upper)
+                if len(indices) * len(nodes) <= _PAIRS or len(indices) <= 16:
+                    yield indices, x, y, nodes
                     continue
-            half = len(chosen) // 2
-            order = np.argpartition(x if high[0] - low[0] > high[1] - low[1] else y, half)
-            stack += [(chosen[part], x[part], y[part]) for part in (order[:half], order[half:])]
+            half_count = len(indices) // 2
+            order = np.argpartition(x if upper[0] - lower[0] > upper[1] - lower[1] else y, half_count)
+            stack += [(indices[part], x[part], y[part]) for part in (order[:half_count], order[half_count:])]
 
-    def _nodes_near(self, low: Float, high: Float) -> Int:
+    def _nodes_near(self, lower: Float, upper: Float) -> Int:
         """Return the indices of all nodes that may lie next to the foot of a point in the box from low to high (2,).
 
         The nearest node of a point is at most half a spacing farther than its foot, hence the margin.
         """
         nodes = self._nodes[:, 1:]
-        nearest = np.hypot(*np.maximum(np.maximum(low - nodes, nodes - high), 0.0).T)
-        farthest = np.hypot(*np.maximum(nodes - low, high - nodes).T)
-        return np.flatnonzero(nearest <= farthest.min() + _NODE_SPACING)
+        least_distances = np.hypot(*np.maximum(np.maximum(lower - nodes, nodes - upper), 0.0).T)
+        largest_distances = np.hypot(*np.maximum(nodes - lower, upper - nodes).T)
+        return np.flatnonzero(least_distances <= largest_distances.min() + _NODE_SPACING)
 
     def _project_leaf(self, x: Float, y: Float, nodes: Int) -> tuple[Float, Float]:
         """Return station and offset (K,) of points: of the feet found from each locally nearest node the nearest."""
-        owner, column = _candidate_nodes(x, y, self._nodes[nodes, 1], self._nodes[nodes, 2])
-        start = nodes[column]
+        point_index, column = _candidate_nodes(x, y, self._nodes[nodes, 1], self._nodes[nodes, 2])
+        node_index = nodes[column]
         stations = self._nodes[:, 0]
-        low = stations[np.maximum(start - 1, 0)]
-        high = stations[np.minimum(start + 1, len(stations) - 1)]
-        station, along, offset = self._find_feet(x[owner], y[owner], stations[start], low, high)
-        if len(owner) > len(x):
-            order = np.lexsort((np.hypot(along, offset), owner))
-            best = order[np.searchsorted(owner, np.arange(len(x)))]  # owner is sorted, so its first is the best
-            station, along, offset = station[best], along[best], offset[best]
-        beyond = ((station <= 0.0) & (along < 0.0)) | ((station >= self.length) & (along > 0.0))
-        if beyond.any():
-            station[beyond], offset[beyond] = self._project_on_tangents(x[beyond], y[beyond])
+        lower_station = stations[np.maximum(node_index - 1, 0)]
+        upper_station = stations[np.minimum(node_index + 1, len(stations) - 1)]
+        station, rest, offset = self._find_feet(
+            x[point_index], y[point_index], stations[node_index], lower_station, upper_station
+        )
+        if len(point_index) > len(x):
+            order = np.lexsort((np.hypot(rest, offset), point_index))
+            best_foot = order[
+                np.searchsorted(point_index, np.arange(len(x)))
+            ]  # owner is sorted, so its first is the best
+            station, rest, offset = station[best_foot], rest[best_foot], offset[best_foot]
+        is_beyond_end = ((station <= 0.0) & (rest < 0.0)) | ((station >= self.length) & (rest > 0.0))
+        if is_beyond_end.any():
+            station[is_beyond_end], offset[is_beyond_end] = self._project_on_tangents(
+                x[is_beyond_end], y[is_beyond_end]
+            )
         return station, offset
 
     def _project_on_tangents(self, x: Float, y: Float) -> tuple[Float, Float]:
         """Return station and offset (K,), m, of points beyond an end, on the nearer of both end tangents."""
-        feet = []
-        for end, side in ((0.0, -1.0), (self.length, 1.0)):
-            px, py, heading, _ = (float(value[0]) for value in self._evaluate(np.array([end])))
-            along = (x - px) * np.cos(heading) + (y - py) * np.sin(heading)
+        projections = []
+        for end_station, outward in ((0.0, -1.0), (self.length, 1.0)):
+            px, py, heading, _ = (float(value[0]) for value in self._evaluate(np.array([end_station])))
+            distance_along = (x - px) * np.cos(heading) + (y - py) * np.sin(heading)
             offset = (y - py) * np.cos(heading) - (x - px) * np.sin(heading)
-            feet.append((end + along, offset, np.where(along * side > 0.0, np.abs(offset), np.inf)))
-        (station_0, offset_0, distance_0), (station_1, offset_1, distance_1) = feet
-        later = distance_1 < distance_0
-        return np.where(later, station_1, station_0), np.where(later, offset_1, offset_0)
+            projections.append(
+                (end_station + distance_along, offset, np.where(distance_along * outward > 0.0, np.abs(offset), np.inf))
+            )
+        (station_0, offset_0, distance_0), (station_1, offset_1, distance_1) = projections
+        end_is_nearer = distance_1 < distance_0
+        return np.where(end_is_nearer, station_1, station_0), np.where(end_is_nearer, offset_1, offset_0)
 
-    def _find_feet(self, x: Float, y: Float, station: Float, low: Float, high: Float) -> tuple[Float, Float, Float]:
+    def _find_feet(
+        self, x: Float, y: Float, station: Float, lower_station: Float, upper_station: Float
+    ) -> tuple[Float, Float, Float]:
         """Return the points' feet, found by iteration within brackets of stations, and their distances from there, m.
 
         The step is exact on a circle: with g along and d across, the angle at its centre is atan2(k g, 1 - k d). A
@@ -328,46 +359,50 @@ class Alignment:
         Returns station, the rest g along the tangent (0 but at the road's ends) and the offset d.
         """
         if (loops := point_loops()) is not None:
-            return loops.find_feet(self._evaluate, (x, y), (station, low, high), _ITERATIONS)
-        station, low, high = station.copy(), low.copy(), high.copy()
-        along, offset = np.empty_like(station), np.empty_like(station)
-        active = np.arange(len(station))
+            return loops.find_feet(self._evaluate, (x, y), (station, lower_station, upper_station), _ITERATIONS)
+        station, lower_station, upper_station = station.copy(), lower_station.copy(), upper_station.copy()
+        rest, offset = np.empty_like(station), np.empty_like(station)
+        unfinished = np.arange(len(station))
         for _ in range(_ITERATIONS):
-            s = station[active]
-            px, py, heading, bend = self._evaluate(s)
-            dx, dy, cos, sin = x[active] - px, y[active] - py, np.cos(heading), np.sin(heading)
+            s = station[unfinished]
+            px, py, heading, curvature = self._evaluate(s)
+            dx, dy, cos, sin = x[unfinished] - px, y[unfinished] - py, np.cos(heading), np.sin(heading)
             g, d = dx * cos + dy * sin, dy * cos - dx * sin
-            along[active], offset[active] = g, d
-            low[active] = left = np.where(g > 0, s, low[active])
-            high[active] = right = np.where(g < 0, s, high[active])
-            target = s + _arc_to_foot(g, d, bend)
-            outside = ~((target >= left) & (target <= right))
+            rest[unfinished], offset[unfinished] = g, d
+            lower_station[unfinished] = lower_bracket = np.where(g > 0, s, lower_station[unfinished])
+            upper_station[unfinished] = upper_bracket = np.where(g < 0, s, upper_station[unfinished])
+            next_station = s + _arc_to_foot(g, d, curvature)
+            is_outside = ~((next_station >= lower_bracket) & (next_station <= upper_bracket))
             # At the road's end the bracket closes at once; elsewhere its middle is a safe guess.
-            target[outside] = 0.5 * (left + right)[outside]
-            station[active] = target
-            active = active[np.abs(target - s) > 1e-7]
-            if not len(active):
+            next_station[is_outside] = 0.5 * (lower_bracket + upper_bracket)[is_outside]
+            station[unfinished] = next_station
+            unfinished = unfinished[np.abs(next_station - s) > 1e-7]
+            if not len(unfinished):
                 break
-        return station, along, offset
+        return station, rest, offset
 
 
-def _position_series(bend: Float, slope: Float) -> NDArray[np.complex128]:
+def _position_series(curvature: Float, curvature_rate: Float) -> NDArray[np.complex128]:
     """Return the position's complex coefficients (terms + 1, P) for unit half length; the constant is left 0."""
-    w = np.zeros((_TERMS + 1, len(bend)), complex)
+    w = np.zeros((_TERMS + 1, len(curvature)), complex)
     z = np.zeros_like(w)
     w[0] = 1.0
     for n in range(_TERMS):
         z[n + 1] = w[n] / (n + 1)
-        w[n + 1] = 1j * (bend * w[n] + (slope * w[n - 1] if n else 0.0)) / (n + 1)
+        w[n + 1] = 1j * (curvature * w[n] + (curvature_rate * w[n - 1] if n else 0.0)) / (n + 1)
     return z
 
 
-def _arc_to_foot(along: Float, offset: Float, bend: Float) -> Float:
+def _arc_to_foot(along: Float, offset: Float, curvature: Float) -> Float:
     """Return the arc length (m) along the circle of curvature to a point's foot, on a straight the distance along."""
-    turn, lever = bend * along, 1.0 - bend * offset
-    curved = np.abs(turn) > 1e-9
+    curvature_times_along, distance_ratio = curvature * along, 1.0 - curvature * offset
+    is_curved = np.abs(curvature_times_along) > 1e-9
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(curved, np.arctan2(turn, lever) / np.where(curved, bend, 1.0), along / lever)
+        return np.where(
+            is_curved,
+            np.arctan2(curvature_times_along, distance_ratio) / np.where(is_curved, curvature, 1.0),
+            along / distance_ratio,
+        )
 
 
 def _candidate_nodes(x: Float, y: Float, node_x: Float, node_y: Float) -> tuple[Int, Int]:
@@ -378,15 +413,17 @@ def _candidate_nodes(x: Float, y: Float, node_x: Float, node_y: Float) -> tuple[
     p = np.column_stack((x - centre_x, y - centre_y))
     q = np.stack((node_x - centre_x, node_y - centre_y))
     # Squared distance less the point's own part, which is the same for all nodes.
-    square = p @ (-2.0 * q) + (q**2).sum(axis=0)
+    relative_square = p @ (-2.0 * q) + (q**2).sum(axis=0)
     squared_length = p[:, 0] ** 2 + p[:, 1] ** 2
-    bound = (np.sqrt(np.maximum(square.min(axis=1) + squared_length, 0.0)) + _NODE_SPACING) ** 2 - squared_length
-    least = square <= bound[:, None]
-    falls = square[:, 1:] < square[:, :-1]
-    least[:, 1:] &= falls
-    least[:, :-1] &= ~falls
-    owner, column = np.divmod(np.flatnonzero(least), least.shape[1])
-    return owner, column
+    bound = (
+        np.sqrt(np.maximum(relative_square.min(axis=1) + squared_length, 0.0)) + _NODE_SPACING
+    ) ** 2 - squared_length
+    is_candidate = relative_square <= bound[:, None]
+    is_falling = relative_square[:, 1:] < relative_square[:, :-1]
+    is_candidate[:, 1:] &= is_falling
+    is_candidate[:, :-1] &= ~is_falling
+    point_index, node_index = np.divmod(np.flatnonzero(is_candidate), is_candidate.shape[1])
+    return point_index, node_index
 
 
 def left_vectors(heading: Float) -> Float:
@@ -408,19 +445,19 @@ def clip_offset(offset: ArrayLike, curvature: ArrayLike) -> Float:
         >>> clip_offset([5.0, 20.0], curvature=1 / 10).round(2).tolist()
         [5.0, 9.8]
     """
-    offsets, bend = np.broadcast_arrays(finite_array("offset", offset), finite_array("curvature", curvature))
-    folds = offsets * bend > _REACH
-    return np.where(folds, _REACH / np.where(folds, bend, 1.0), offsets)[()]
+    offsets, curvatures = np.broadcast_arrays(finite_array("offset", offset), finite_array("curvature", curvature))
+    is_folding = offsets * curvatures > _REACH
+    return np.where(is_folding, _REACH / np.where(is_folding, curvatures, 1.0), offsets)[()]
 
 
 def running_sum(values: Sequence[float]) -> Float:
     """Return (N + 1,) sums of the first 0, 1, ... N values, compensated (Neumaier), so that they don't drift."""
-    total, lost, sums = 0.0, 0.0, [0.0]
+    total, compensation, sums = 0.0, 0.0, [0.0]
     for value in values:
-        new = total + value
-        lost += (total - new) + value if abs(total) >= abs(value) else (value - new) + total
-        total = new
-        sums.append(total + lost)
+        next_total = total + value
+        compensation += (total - next_total) + value if abs(total) >= abs(value) else (value - next_total) + total
+        total = next_total
+        sums.append(total + compensation)
     return np.array(sums)
 
 

@@ -21,14 +21,14 @@ def run_off_length(design_class: str, half_width: float, start: float, end: floa
         96.7
     """
     lengths = []
-    slowest = steepest_percent(design_class, half_width)
+    largest_rate = steepest_percent(design_class, half_width)
     for side in ("left", "right"):
-        a, b = wanted_percent(design_class, side, start), wanted_percent(design_class, side, end)
-        if a * b >= 0.0:
-            lengths.append(half_width * abs(b - a) / slowest)
+        start_percent, end_percent = wanted_percent(design_class, side, start), wanted_percent(design_class, side, end)
+        if start_percent * end_percent >= 0.0:
+            lengths.append(half_width * abs(end_percent - start_percent) / largest_rate)
         else:
-            outside = abs(a) + abs(b) - 2.0 * LEAST_CROSSFALL_PERCENT
-            lengths.append(crossing_length(design_class, half_width) + half_width * outside / slowest)
+            percent_outside = abs(start_percent) + abs(end_percent) - 2.0 * LEAST_CROSSFALL_PERCENT
+            lengths.append(crossing_length(design_class, half_width) + half_width * percent_outside / largest_rate)
     return max(lengths)
 
 
@@ -44,8 +44,10 @@ def crossing_length(design_class: str, half_width: float) -> float:
     than 9 m from the axis to the edge) the latter decides.
     """
     change = 2.0 * LEAST_CROSSFALL_PERCENT
-    longest = change / LEAST_RUN_OFF
-    return 0.5 * (longest + min(longest, half_width * change / steepest_percent(design_class, half_width)))
+    longest_length = change / LEAST_RUN_OFF
+    return 0.5 * (
+        longest_length + min(longest_length, half_width * change / steepest_percent(design_class, half_width))
+    )
 
 
 def wanted_percent(design_class: str, side: str, curvature: float) -> float:
@@ -84,25 +86,32 @@ def crossfall_points(
         percent = wanted_percent(design_class, side, elements[-1].curvature_end)
         corners += _run_off_corners(design_class, half_width, (from_station, from_percent), (station, percent))
     points: list[CrossfallPoint] = []
-    for at, percent in corners:
-        if not points or round_value(at) > points[-1].station:
-            points.append(CrossfallPoint(station=round_value(at), crossfall_percent=round_value(percent)))
+    for corner_station, percent in corners:
+        if not points or round_value(corner_station) > points[-1].station:
+            points.append(CrossfallPoint(station=round_value(corner_station), crossfall_percent=round_value(percent)))
     return tuple(points)
 
 
 def _run_off_corners(
     design_class: str, half_width: float, begin: tuple[float, float], end: tuple[float, float]
 ) -> list[tuple[float, float]]:
-    """Return (station m, crossfall %) at the corners of a crossfall transition after ``begin`` up to ``end``."""
-    (s0, a), (s1, b) = begin, end
-    if a * b >= 0.0 or s1 <= s0:
+    """Return (station m, crossfall %) at the corners of a crossfall transition after ``begin`` up to ``end``.
+
+    Without a change of sign that is its end alone: the transition is linear. Else the part between 2.5 % one way and
+    2.5 % the other has `crossing_length`, and the rest is shared out before and after it by the change needed there.
+    """
+    (s0, start_percent), (s1, end_percent) = begin, end
+    if start_percent * end_percent >= 0.0 or s1 <= s0:
         return [end]
     length = min(s1 - s0, crossing_length(design_class, half_width))
-    before, after = abs(a) - LEAST_CROSSFALL_PERCENT, abs(b) - LEAST_CROSSFALL_PERCENT
-    share = before / (before + after) if before + after > 0.0 else 0.5
-    middle = s0 + (s1 - s0 - length) * share
+    change_before, change_after = (
+        abs(start_percent) - LEAST_CROSSFALL_PERCENT,
+        abs(end_percent) - LEAST_CROSSFALL_PERCENT,
+    )
+    share = change_before / (change_before + change_after) if change_before + change_after > 0.0 else 0.5
+    crossing_start = s0 + (s1 - s0 - length) * share
     return [
-        (middle, math.copysign(LEAST_CROSSFALL_PERCENT, a)),
-        (middle + length, math.copysign(LEAST_CROSSFALL_PERCENT, b)),
+        (crossing_start, math.copysign(LEAST_CROSSFALL_PERCENT, start_percent)),
+        (crossing_start + length, math.copysign(LEAST_CROSSFALL_PERCENT, end_percent)),
         end,
     ]

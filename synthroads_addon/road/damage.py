@@ -37,17 +37,17 @@ DAMAGES = (
 def damage_numbers(pavement: Pavement) -> list[int]:
     """Return the index in `DAMAGES` of each of a pavement's damages: ruts, potholes, patches, cracks, old markings."""
     numbers = [1] * len(pavement.ruts) + [2] * len(pavement.potholes) + [3] * len(pavement.patches)
-    first = DAMAGES.index("longitudinal crack")
+    first_crack = DAMAGES.index("longitudinal crack")
     kinds = ("longitudinal", "transverse", "alligator")
-    numbers += [first + kinds.index(crack.kind) + len(kinds) * crack.sealed for crack in pavement.cracks]
+    numbers += [first_crack + kinds.index(crack.kind) + len(kinds) * crack.sealed for crack in pavement.cracks]
     return numbers + [DAMAGES.index("removed marking")] * len(pavement.removed_markings)
 
 
 def damage_depth(section: CarriagewaySection, station: Float, offset: Float) -> Float:
     """Return the depth (N,) of ruts and potholes at stations and offsets (N,), m; where both are, the deeper one."""
     depth = np.zeros(station.shape)
-    for _, near, of_one in _damage_depths(section, station, offset):
-        depth[near] = np.maximum(depth[near], of_one)
+    for _, places, depths in _damage_depths(section, station, offset):
+        depth[places] = np.maximum(depth[places], depths)
     return depth
 
 
@@ -56,11 +56,11 @@ def deepest_damage(section: CarriagewaySection, station: Float, offset: Float) -
 
     Of two that are as deep the first counts.
     """
-    deepest, result = np.full(station.shape, _SHALLOW), np.full(station.shape, -1, dtype=np.int64)
-    for number, near, of_one in _damage_depths(section, station, offset):
-        deeper = near[of_one > deepest[near]]
-        result[deeper] = number
-        deepest[near] = np.maximum(deepest[near], of_one)
+    depth_so_far, result = np.full(station.shape, _SHALLOW), np.full(station.shape, -1, dtype=np.int64)
+    for number, places, depths in _damage_depths(section, station, offset):
+        deeper_places = places[depths > depth_so_far[places]]
+        result[deeper_places] = number
+        depth_so_far[places] = np.maximum(depth_so_far[places], depths)
     return result
 
 
@@ -74,17 +74,21 @@ def _damage_depths(section: CarriagewaySection, station: Float, offset: Float) -
         return
     starts, ends = section.damage_ranges
     candidates = np.flatnonzero((starts <= np.nanmax(station)) & (ends >= np.nanmin(station))).tolist()
-    along = _Along(station, len(candidates))
+    places = _Along(station, len(candidates))
     for number in candidates:
-        near = along.between(starts[number], ends[number])
+        indices = places.between(starts[number], ends[number])
         if number < len(pavement.ruts):
             rut = pavement.ruts[number]
-            near = near[(station[near] > rut.start_station) & (station[near] < rut.end_station)]
-            yield number, near, _rut_depth(section, rut, station[near], offset[near]) if len(near) else np.empty(0)
+            indices = indices[(station[indices] > rut.start_station) & (station[indices] < rut.end_station)]
+            yield (
+                number,
+                indices,
+                _rut_depth(section, rut, station[indices], offset[indices]) if len(indices) else np.empty(0),
+            )
         else:
             pothole = pavement.potholes[number - len(pavement.ruts)]
-            near = near[np.abs(station[near] - pothole.station) < pothole.length / 2.0]
-            yield number, near, _pothole_depth(pothole, station[near], offset[near])
+            indices = indices[np.abs(station[indices] - pothole.station) < pothole.length / 2.0]
+            yield number, indices, _pothole_depth(pothole, station[indices], offset[indices])
 
 
 class _Along:
@@ -109,36 +113,38 @@ class _Along:
         """Return the indices (K,) of the places from a start to an end, m, both included."""
         if self._sorted is None:
             return np.flatnonzero((self._station >= start) & (self._station <= end))
-        first, last = np.searchsorted(self._sorted, start), np.searchsorted(self._sorted, end, "right")
-        return np.arange(first, last) if self._order is None else self._order[first:last]
+        begin, stop = np.searchsorted(self._sorted, start), np.searchsorted(self._sorted, end, "right")
+        return np.arange(begin, stop) if self._order is None else self._order[begin:stop]
 
 
 def _rut_depth(section: CarriagewaySection, rut: Rut, station: Float, offset: Float) -> Float:
+    """Return a rut's depth (N,), m: cosine squared across each wheel track, eased in and out along the ramps."""
     if not _has_lane(section, rut):
         return np.zeros(station.shape)
     boundaries = section.lane_boundaries(station)
     middle = (boundaries[:, rut.lane] + boundaries[:, rut.lane + 1]) / 2.0
-    across = np.abs(section.carriageway.sign * offset - middle)
-    from_track = np.minimum(np.abs(across - rut.track / 2.0), rut.width / 2.0)
-    grown = np.minimum(station - rut.start_station, rut.end_station - station) / rut.ramp_length
-    share = 0.5 - 0.5 * np.cos(np.pi * np.clip(grown, 0.0, 1.0))
-    return rut.depth * share * np.cos(np.pi * from_track / rut.width) ** 2
+    distance_from_middle = np.abs(section.carriageway.sign * offset - middle)
+    distance_from_track = np.minimum(np.abs(distance_from_middle - rut.track / 2.0), rut.width / 2.0)
+    ramp_share = np.minimum(station - rut.start_station, rut.end_station - station) / rut.ramp_length
+    depth_share = 0.5 - 0.5 * np.cos(np.pi * np.clip(ramp_share, 0.0, 1.0))
+    return rut.depth * depth_share * np.cos(np.pi * distance_from_track / rut.width) ** 2
 
 
 def _pothole_depth(pothole: Pothole, station: Float, offset: Float) -> Float:
-    along = (station - pothole.station) / (pothole.length / 2.0)
-    across = (offset - pothole.offset) / (pothole.width / 2.0)
-    return pothole.depth * np.maximum(1.0 - along**2 - across**2, 0.0)
+    """Return a pothole's depth (N,), m: an elliptic paraboloid, depth (1 - x^2 - y^2) in units of its half axes."""
+    relative_station = (station - pothole.station) / (pothole.length / 2.0)
+    relative_offset = (offset - pothole.offset) / (pothole.width / 2.0)
+    return pothole.depth * np.maximum(1.0 - relative_station**2 - relative_offset**2, 0.0)
 
 
 def damaged_strips(section: CarriagewaySection) -> list[int]:
     """Return the sorted indices into ``section.kinds`` of the strips that ruts or potholes lie in."""
-    first, lanes = section.kinds.index("lane"), len(section.carriageway.lanes)
-    strips = {first + lanes - 1 - rut.lane for rut in section.carriageway.pavement.ruts if rut.lane < lanes}
+    first_lane, lanes = section.kinds.index("lane"), len(section.carriageway.lanes)
+    strips = {first_lane + lanes - 1 - rut.lane for rut in section.carriageway.pavement.ruts if rut.lane < lanes}
     for pothole in section.carriageway.pavement.potholes:
-        low, high = _pothole_edges(section, pothole)
+        inner_edge, outer_edge = _pothole_edges(section, pothole)
         distances = section.distances(pothole.station)[0]
-        strips |= set(np.flatnonzero((distances[:-1] < high) & (distances[1:] > low)).tolist())
+        strips |= set(np.flatnonzero((distances[:-1] < outer_edge) & (distances[1:] > inner_edge)).tolist())
     return sorted(strips)
 
 
@@ -150,8 +156,10 @@ def damage_rows(section: CarriagewaySection, tolerance: float) -> list[float]:
         steps = np.linspace(0.0, ramp, 2 + _cells_of_cosine(rut.depth, tolerance))
         rows += [*(rut.start_station + steps), *(rut.end_station - steps)]
     for pothole in section.carriageway.pavement.potholes:
-        half = pothole.length / 2.0
-        rows += list(pothole.station + np.linspace(-half, half, 1 + _cells_of_bowl(pothole.depth, tolerance)))
+        half_length = pothole.length / 2.0
+        rows += list(
+            pothole.station + np.linspace(-half_length, half_length, 1 + _cells_of_bowl(pothole.depth, tolerance))
+        )
     return rows
 
 
@@ -170,32 +178,37 @@ def damage_columns(
     for rut in section.carriageway.pavement.ruts:
         if rut.start_station > end or rut.end_station < start:
             continue
-        at = (rut.start_station + rut.end_station) / 2.0
-        middle = section.lane_boundaries(at)[0, rut.lane : rut.lane + 2].mean() if _has_lane(section, rut) else 0.0
-        across = np.linspace(-0.5, 0.5, 1 + 2 * _cells_of_cosine(rut.depth, tolerance)) * rut.width
+        middle_station = (rut.start_station + rut.end_station) / 2.0
+        middle = (
+            section.lane_boundaries(middle_station)[0, rut.lane : rut.lane + 2].mean()
+            if _has_lane(section, rut)
+            else 0.0
+        )
+        distances_from_track = np.linspace(-0.5, 0.5, 1 + 2 * _cells_of_cosine(rut.depth, tolerance)) * rut.width
         for track in (-rut.track / 2.0, rut.track / 2.0):
-            shares.append(_shares(section, strip, at, middle + track + across))
+            shares.append(_shares(section, strip, middle_station, middle + track + distances_from_track))
     for pothole in section.carriageway.pavement.potholes:
         if not start <= pothole.station <= end:
             continue
-        low, high = _pothole_edges(section, pothole)
+        inner_edge, outer_edge = _pothole_edges(section, pothole)
         cells = _cells_of_bowl(pothole.depth, tolerance)
-        shares.append(_shares(section, strip, pothole.station, np.linspace(low, high, cells + 1)))
-    together = np.unique(np.concatenate(shares))
-    inside = together[(together >= 0.0) & (together <= 1.0)]
+        shares.append(_shares(section, strip, pothole.station, np.linspace(inner_edge, outer_edge, cells + 1)))
+    all_shares = np.unique(np.concatenate(shares))
+    inside = all_shares[(all_shares >= 0.0) & (all_shares <= 1.0)]
     return space_shares(inside)
 
 
 def space_shares(shares: Float) -> Float:
     """Return sorted shares (K,) of a strip's width without those that make slivers; both ends are kept."""
-    kept = [shares[0]]
+    spaced_shares = [shares[0]]
     for share in shares[1:-1].tolist():
-        if min(share - kept[-1], shares[-1] - share) > _SLIVER:
-            kept.append(share)
-    return np.array([*kept, shares[-1]])
+        if min(share - spaced_shares[-1], shares[-1] - share) > _SLIVER:
+            spaced_shares.append(share)
+    return np.array([*spaced_shares, shares[-1]])
 
 
 def _shares(section: CarriagewaySection, strip: int, station: float, distance: Float) -> Float:
+    """Return distances (K,) from the centreline, m, as shares of a strip's width at a station, from its inner edge."""
     inner, outer = section.distances(station)[0, strip : strip + 2]
     return (distance - inner) / max(outer - inner, 1e-9)
 
@@ -207,6 +220,7 @@ def _pothole_edges(section: CarriagewaySection, pothole: Pothole) -> tuple[float
 
 
 def _has_lane(section: CarriagewaySection, rut: Rut) -> bool:
+    """Return whether a rut's lane exists on the carriageway."""
     return rut.lane < len(section.carriageway.lanes)
 
 

@@ -87,16 +87,16 @@ class HeightGrid:
         """Return the fractional rows and columns (2, ...) of map coordinates (...), m."""
         return np.stack([(north - self.north) / self.step_north, (east - self.east) / self.step_east])
 
-    def between_centres(self, located: Float) -> Bool:
+    def between_centres(self, cells: Float) -> Bool:
         """Return a mask (...): which fractional rows and columns (2, ...) lie within the outermost cells' centres."""
-        row, column = located
-        room = 1e-6  # of a cell, for rounding
-        inside = (row >= -room) & (row <= self.rows - 1 + room)
-        return inside & (column >= -room) & (column <= self.columns - 1 + room)
+        row, column = cells
+        margin = 1e-6  # of a cell, for rounding
+        is_inside = (row >= -margin) & (row <= self.rows - 1 + margin)
+        return is_inside & (column >= -margin) & (column <= self.columns - 1 + margin)
 
-    def first_of_four(self, located: Float) -> Cells:
+    def first_of_four(self, cells: Float) -> Cells:
         """Return the cell of least row and column (2, ...) of the four around fractional ones (2, ...), not NaN."""
-        row, column = np.floor(located).astype(np.int64)
+        row, column = np.floor(cells).astype(np.int64)
         return np.stack([np.clip(row, 0, self.rows - 2), np.clip(column, 0, self.columns - 2)])
 
 
@@ -121,14 +121,14 @@ class Corridor:
         So each cell that a height within the reach is interpolated from is one of the four around some point.
         """
         reach, step = self.reach + cell, cell / 2.0
-        across = np.linspace(-reach, reach, math.ceil(2.0 * reach / step) + 1)
-        bend = max(max(abs(e.curvature_start), abs(e.curvature_end)) for e in self.alignment.elements)
+        offsets = np.linspace(-reach, reach, math.ceil(2.0 * reach / step) + 1)
+        largest_curvature = max(max(abs(e.curvature_start), abs(e.curvature_end)) for e in self.alignment.elements)
         length = self.alignment.length + 2.0 * reach
-        stations = np.linspace(-reach, length - reach, math.ceil(length * (1.0 + reach * bend) / step) + 1)
-        for block in np.array_split(stations, math.ceil(len(stations) * len(across) / 250_000)):
+        stations = np.linspace(-reach, length - reach, math.ceil(length * (1.0 + reach * largest_curvature) / step) + 1)
+        for block in np.array_split(stations, math.ceil(len(stations) * len(offsets) / 250_000)):
             position, heading, _ = self.alignment.frame(block)
-            east = self.east + position[:, :1] - np.sin(heading)[:, None] * across
-            north = self.north + position[:, 1:] + np.cos(heading)[:, None] * across
+            east = self.east + position[:, :1] - np.sin(heading)[:, None] * offsets
+            north = self.north + position[:, 1:] + np.cos(heading)[:, None] * offsets
             yield np.stack([east.ravel(), north.ravel()])
 
 
@@ -153,21 +153,21 @@ class ElevationModel:
         NaN outside the centres of the outermost cells, beside cells without height, and where nothing was loaded.
         """
         x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
-        located = self.grid.locate(x, y)
-        inside = self.grid.between_centres(located)
-        located = np.where(inside, located, 0.0)
-        row, column = first = self.grid.first_of_four(located)
-        down, right = located - first
-        upper = self.at((row, column)) * (1.0 - right) + self.at((row, column + 1)) * right
-        lower = self.at((row + 1, column)) * (1.0 - right) + self.at((row + 1, column + 1)) * right
-        return np.where(inside, upper * (1.0 - down) + lower * down, np.nan)
+        cells = self.grid.locate(x, y)
+        is_inside = self.grid.between_centres(cells)
+        cells = np.where(is_inside, cells, 0.0)
+        row, column = first_cell = self.grid.first_of_four(cells)
+        row_share, column_share = cells - first_cell
+        upper_height = self.at((row, column)) * (1.0 - column_share) + self.at((row, column + 1)) * column_share
+        lower_height = self.at((row + 1, column)) * (1.0 - column_share) + self.at((row + 1, column + 1)) * column_share
+        return np.where(is_inside, upper_height * (1.0 - row_share) + lower_height * row_share, np.nan)
 
     def at(self, cells: Cells | tuple[Cells, Cells]) -> Float:
         """Return the heights (...) of cells (2, ...), m; NaN where there is none."""
         row, column = cells
-        there = (row >= 0) & (row < self.grid.rows) & (column >= 0) & (column < self.grid.columns)
-        row, column = np.where(there, row, 0), np.where(there, column, 0)
-        number = np.where(there, self._number[row // _TILE, column // _TILE], 0)
+        exists = (row >= 0) & (row < self.grid.rows) & (column >= 0) & (column < self.grid.columns)
+        row, column = np.where(exists, row, 0), np.where(exists, column, 0)
+        number = np.where(exists, self._number[row // _TILE, column // _TILE], 0)
         return self._tiles[number, row % _TILE, column % _TILE]
 
     def set(self, cells: Cells, heights: Float) -> None:
@@ -184,15 +184,17 @@ class ElevationModel:
         """
         from rasterio.windows import Window  # the package is optional
 
-        needed = np.ones(self._number.shape, dtype=bool) if cells is None else np.zeros(self._number.shape, dtype=bool)
+        is_needed = (
+            np.ones(self._number.shape, dtype=bool) if cells is None else np.zeros(self._number.shape, dtype=bool)
+        )
         if cells is not None:
-            needed[tuple(cells // _TILE)] = True
-        tiles = np.argwhere(needed)
+            is_needed[tuple(cells // _TILE)] = True
+        tiles = np.argwhere(is_needed)
         if len(tiles) > _MOST_TILES:
             raise _too_fine(self.path)
         scale, offset = dataset.scales[0], dataset.offsets[0]
         self._tiles = np.full((len(tiles) + 1, _TILE, _TILE), np.nan)
-        self._number[needed] = np.arange(1, len(tiles) + 1)
+        self._number[is_needed] = np.arange(1, len(tiles) + 1)
         for number, (row, column) in enumerate((tiles * _TILE).tolist(), 1):
             height, width = min(_TILE, self.grid.rows - row), min(_TILE, self.grid.columns - column)
             values = dataset.read(1, window=Window(column, row, width, height), masked=True)
@@ -202,8 +204,8 @@ class ElevationModel:
         """Return a lowest and a highest of the loaded cells as columns of (2, 2); (2, 0) if none has a height."""
         if np.isnan(self._tiles).all():
             return np.empty((2, 0), dtype=np.int64)
-        flat = np.nanargmin(self._tiles), np.nanargmax(self._tiles)
-        number, row, column = np.unravel_index(np.array(flat), self._tiles.shape)
+        flat_indices = np.nanargmin(self._tiles), np.nanargmax(self._tiles)
+        number, row, column = np.unravel_index(np.array(flat_indices), self._tiles.shape)
         tiles = np.array([np.argwhere(self._number == n)[0] for n in number]).T
         return tiles * _TILE + np.stack([row, column])
 
@@ -232,8 +234,8 @@ def read_elevation_model(path: str | os.PathLike[str], epsg: int, corridor: Corr
         import rasterio
         from rasterio.errors import CRSError, RasterioError
     except ImportError as error:
-        missing = isinstance(error, ModuleNotFoundError)
-        advice = "SynthRoads brings it, install that again" if missing else "it doesn't load here"
+        is_missing = isinstance(error, ModuleNotFoundError)
+        advice = "SynthRoads brings it, install that again" if is_missing else "it doesn't load here"
         raise InputError(name, None, f"an elevation model needs rasterio: {advice} ({error})") from None
     try:
         with warnings.catch_warnings():
@@ -282,9 +284,10 @@ def _check_kind(name: str, dataset: DatasetReader) -> None:
         raise InputError(f"{name}: scale and offset", (scale, offset), "finite numbers are needed, the scale not 0")
 
 
-def _check_unit(name: str, what: str, unit: str) -> None:
+def _check_unit(name: str, quantity_name: str, unit: str) -> None:
+    """Raise InputError unless the unit of a raster's coordinates or heights is the metre."""
     if unit.lower() not in _METRES:
-        raise InputError(f"{name}: unit of {what}", unit, "metres are needed")
+        raise InputError(f"{name}: unit of {quantity_name}", unit, "metres are needed")
 
 
 def _check_system(name: str, dataset: DatasetReader, epsg: int) -> None:
@@ -292,21 +295,23 @@ def _check_system(name: str, dataset: DatasetReader, epsg: int) -> None:
     from rasterio.crs import CRS  # the package is optional
     from rasterio.errors import CRSError
 
-    described = Path(name).with_suffix(".prj")
-    if dataset.crs is None and dataset.driver == "AAIGrid" and not described.exists():
+    prj_path = Path(name).with_suffix(".prj")
+    if dataset.crs is None and dataset.driver == "AAIGrid" and not prj_path.exists():
         return
     if dataset.crs is None:
-        what = f"{described.name} isn't understood" if described.exists() else "the file names none"
-        raise InputError(f"{name}: coordinate system", None, f"{what}; EPSG:{epsg} is needed")
+        reason = f"{prj_path.name} isn't understood" if prj_path.exists() else "the file names none"
+        raise InputError(f"{name}: coordinate system", None, f"{reason}; EPSG:{epsg} is needed")
     horizontal, unit = _horizontal(dataset.crs)
     try:
-        needed, _ = _horizontal(CRS.from_epsg(epsg))
+        road_system, _ = _horizontal(CRS.from_epsg(epsg))
     except CRSError:
         raise InputError("road.epsg", epsg, "must be the EPSG code of a coordinate system") from None
     code = horizontal.to_epsg()
-    if code is None or code != needed.to_epsg():
-        shown = f"EPSG:{code}" if code else horizontal.to_dict(projjson=True).get("name", "unknown")
-        raise InputError(f"{name}: coordinate system", shown, f"EPSG:{epsg} is needed, the road's own (road.epsg)")
+    if code is None or code != road_system.to_epsg():
+        system_text = f"EPSG:{code}" if code else horizontal.to_dict(projjson=True).get("name", "unknown")
+        raise InputError(
+            f"{name}: coordinate system", system_text, f"EPSG:{epsg} is needed, the road's own (road.epsg)"
+        )
     _check_unit(name, "coordinates", horizontal.linear_units)
     _check_unit(name, "heights", unit)
 
@@ -321,12 +326,13 @@ def _horizontal(system: CRS) -> tuple[CRS, str]:
 
 
 def _grid(name: str, dataset: DatasetReader) -> HeightGrid:
+    """Return where a raster's cells lie; InputError for a rotation, and for sizes and places that aren't plausible."""
     transform = dataset.transform
     if transform.is_identity:
         raise InputError(f"{name}: georeference", None, "the file has none: it doesn't say where its cells lie")
     if transform.b != 0.0 or transform.d != 0.0:
-        turned = (transform.b, transform.d)
-        raise InputError(f"{name}: rotation", turned, "rows must run along the east axis, columns along the north axis")
+        shear = (transform.b, transform.d)
+        raise InputError(f"{name}: rotation", shear, "rows must run along the east axis, columns along the north axis")
     if min(dataset.width, dataset.height) < 2:
         raise InputError(f"{name}: size", (dataset.width, dataset.height), "at least 2 by 2 cells are needed")
     sides = (abs(transform.a), abs(transform.e))
@@ -346,69 +352,79 @@ def _grid(name: str, dataset: DatasetReader) -> HeightGrid:
 
 def _cells_needed(model: ElevationModel, corridor: Corridor) -> Cells:
     """Return the cells (2, N) that the corridor's heights are interpolated from; InputError if some aren't there."""
-    grid, missing = model.grid, False
+    grid, is_uncovered = model.grid, False
     area = 2.0 * corridor.reach * (corridor.alignment.length + 2.0 * corridor.reach)
     if area / abs(grid.step_east * grid.step_north) > _MOST_TILES * _TILE**2:
         raise _too_fine(model.path)
-    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    lower, upper = np.full(2, np.inf), np.full(2, -np.inf)
     numbers = []
     for points in corridor.points(grid.cell):
-        located = grid.locate(*points)
-        missing = missing or not grid.between_centres(located).all()
-        low, high = np.minimum(low, points.min(axis=1)), np.maximum(high, points.max(axis=1))
-        row, column = _four_around(grid.first_of_four(located))
+        fractional_cells = grid.locate(*points)
+        is_uncovered = is_uncovered or not grid.between_centres(fractional_cells).all()
+        lower, upper = np.minimum(lower, points.min(axis=1)), np.maximum(upper, points.max(axis=1))
+        row, column = _four_around(grid.first_of_four(fractional_cells))
         numbers.append(row * grid.columns + column)
-    if missing:
-        have = _area(*grid.bounds())
-        raise InputError(f"{model.path}: area", None, f"{have} are covered; the road needs {_area(low, high)}")
+    if is_uncovered:
+        covered_area = _area(*grid.bounds())
+        raise InputError(
+            f"{model.path}: area", None, f"{covered_area} are covered; the road needs {_area(lower, upper)}"
+        )
     return np.stack(np.divmod(np.unique(np.concatenate(numbers)), grid.columns))
 
 
 def _too_fine(path: str) -> InputError:
-    most = _MOST_TILES * _TILE**2 / 1e6
-    return InputError(f"{path}: size", None, f"at most {most:.0f} million cells; a coarser model is needed")
+    """Return the error for a raster of which a road needs more cells than fit into memory."""
+    largest_count = _MOST_TILES * _TILE**2 / 1e6
+    return InputError(f"{path}: size", None, f"at most {largest_count:.0f} million cells; a coarser model is needed")
 
 
-def _four_around(first: Cells) -> Cells:
+def _four_around(first_cells: Cells) -> Cells:
     """Return the distinct cells (2, M) of all blocks of 2 by 2 cells whose first cells are given (2, N)."""
-    corner = first.min(axis=1, keepdims=True)
-    seen = np.zeros(first.max(axis=1) - corner[:, 0] + 2, dtype=bool)
-    seen[tuple(first - corner)] = True
-    seen[1:] |= seen[:-1].copy()
-    seen[:, 1:] |= seen[:, :-1].copy()
-    return np.stack(np.nonzero(seen)) + corner
+    corner = first_cells.min(axis=1, keepdims=True)
+    is_needed = np.zeros(first_cells.max(axis=1) - corner[:, 0] + 2, dtype=bool)
+    is_needed[tuple(first_cells - corner)] = True
+    is_needed[1:] |= is_needed[:-1].copy()
+    is_needed[:, 1:] |= is_needed[:, :-1].copy()
+    return np.stack(np.nonzero(is_needed)) + corner
 
 
-def _area(low: Float, high: Float) -> str:
-    return f"x {low[0]:.1f} to {high[0]:.1f} m, y {low[1]:.1f} to {high[1]:.1f} m"
+def _area(lower: Float, upper: Float) -> str:
+    """Return a box on the map as text, by its least and its greatest (east, north), m."""
+    return f"x {lower[0]:.1f} to {upper[0]:.1f} m, y {lower[1]:.1f} to {upper[1]:.1f} m"
 
 
 def _check_heights(model: ElevationModel, cells: Cells) -> None:
     """Raise InputError if a cell (2, N) is lower than `LOWEST` or higher than `HIGHEST`."""
     heights = model.at(cells)
-    wrong = np.flatnonzero((heights < LOWEST) | (heights > HIGHEST))
-    if len(wrong):
+    wrong_cells = np.flatnonzero((heights < LOWEST) | (heights > HIGHEST))
+    if len(wrong_cells):
         allowed = f"must be from {LOWEST:g} to {HIGHEST:g} m; is it a nodata value that the file doesn't declare?"
-        raise InputError(f"{model.path}: {_place(model, cells[:, wrong[0]])}", float(heights[wrong[0]]), allowed)
+        raise InputError(
+            f"{model.path}: {_place(model, cells[:, wrong_cells[0]])}", float(heights[wrong_cells[0]]), allowed
+        )
 
 
 def _fill_holes(model: ElevationModel, cells: Cells) -> None:
     """Fill in place those of the cells (2, N) without height, from around them; InputError if they are too many."""
-    needed = cells.shape[1]
+    needed_count = cells.shape[1]
     cells = cells[:, np.isnan(model.at(cells))]
-    if cells.shape[1] > HOLES_SHARE * needed:
-        share = 100.0 * cells.shape[1] / needed
+    if cells.shape[1] > HOLES_SHARE * needed_count:
+        share = 100.0 * cells.shape[1] / needed_count
         _refuse(model, cells, f"no height, and {share:.3g} % of the cells beneath the road have none")
-    left = cells
+    # From the rim inwards: each round fills the cells that have a neighbour with a height by the mean of these.
+    unfilled = cells
     for _ in range(HOLE_REACH):
-        around = model.at(left[:, :, None] + _AROUND[:, None])
-        known = ~np.isnan(around)
-        count = known.sum(axis=1)
-        rim = count > 0
-        model.set(left[:, rim], np.where(known, around, 0.0)[rim].sum(axis=1) / count[rim])
-        left = left[:, ~rim]
-    if left.size:
-        _refuse(model, left, "no height, and the hole there is too large")
+        neighbour_heights = model.at(unfilled[:, :, None] + _AROUND[:, None])
+        has_height = ~np.isnan(neighbour_heights)
+        count = has_height.sum(axis=1)
+        is_at_rim = count > 0
+        model.set(
+            unfilled[:, is_at_rim],
+            np.where(has_height, neighbour_heights, 0.0)[is_at_rim].sum(axis=1) / count[is_at_rim],
+        )
+        unfilled = unfilled[:, ~is_at_rim]
+    if unfilled.size:
+        _refuse(model, unfilled, "no height, and the hole there is too large")
     _smooth_filled(model, cells)
 
 
@@ -418,16 +434,18 @@ def _smooth_filled(model: ElevationModel, cells: Cells) -> None:
     for _ in range(_MOST_ROUNDS):
         mean = np.nanmean(model.at(cells[:, :, None] + _BESIDE[:, None]), axis=1)
         model.set(cells, mean)
-        moved, heights = np.abs(mean - heights).max(initial=0.0), mean
-        if moved < _STILL:
+        largest_change, heights = np.abs(mean - heights).max(initial=0.0), mean
+        if largest_change < _STILL:
             return
 
 
-def _refuse(model: ElevationModel, holes: Cells, what: str) -> NoReturn:
+def _refuse(model: ElevationModel, holes: Cells, fault: str) -> NoReturn:
+    """Raise the InputError for cells (2, N) whose missing heights aren't filled; it names the middle one's place."""
     allowed = f"holes of up to {100.0 * HOLES_SHARE:g} % of the cells and {2 * HOLE_REACH} cells across are filled"
-    raise InputError(f"{model.path}: {_place(model, holes[:, holes.shape[1] // 2])}", None, f"{what}; {allowed}")
+    raise InputError(f"{model.path}: {_place(model, holes[:, holes.shape[1] // 2])}", None, f"{fault}; {allowed}")
 
 
 def _place(model: ElevationModel, cell: Cells) -> str:
+    """Return the map coordinates of a cell's centre as text for messages."""
     east, north = model.grid.position(cell)
     return f"height at x {east:.1f} m, y {north:.1f} m"

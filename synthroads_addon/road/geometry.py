@@ -94,8 +94,8 @@ class RoadGeometry:
 
     def crossfall(self, carriageway: Carriageway, station: ArrayLike) -> Float:
         """Return a carriageway's crossfall (m/m, positive where it falls to the right) at stations, same shape."""
-        at, percent = zip(*((p.station, p.crossfall_percent) for p in carriageway.crossfall), strict=True)
-        return np.interp(np.asarray(station, dtype=np.float64), at, percent) / 100.0
+        stations, percent = zip(*((p.station, p.crossfall_percent) for p in carriageway.crossfall), strict=True)
+        return np.interp(np.asarray(station, dtype=np.float64), stations, percent) / 100.0
 
     def offsets(self, station: ArrayLike) -> Float:
         """Return the (N, M + 1) offsets of the strips' boundaries at N stations, from left (largest) to right, m."""
@@ -108,15 +108,17 @@ class RoadGeometry:
     def boundaries(self, station: ArrayLike) -> tuple[Float, Float]:
         """Return `offsets` and `boundary_elevations` at N stations, which together take little longer than one."""
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
-        once, index = without_repeats(station)
-        distances = {side: section.distances(once) for side, section in self.sections.items()}
-        relative = {
-            side: section.elevations(once, self.crossfall(section.carriageway, once), distances[side])
+        distinct_stations, index = without_repeats(station)
+        distances = {side: section.distances(distinct_stations) for side, section in self.sections.items()}
+        heights_above_profile = {
+            side: section.elevations(
+                distinct_stations, self.crossfall(section.carriageway, distinct_stations), distances[side]
+            )
             for side, section in self.sections.items()
         }
         offsets = self._across(distances, True)
-        heights = self.profile.elevation(once)[:, None] + self._across(relative, False)
-        return (offsets, heights) if len(once) == len(station) else (offsets[index], heights[index])
+        heights = self.profile.elevation(distinct_stations)[:, None] + self._across(heights_above_profile, False)
+        return (offsets, heights) if len(distinct_stations) == len(station) else (offsets[index], heights[index])
 
     def elevation(self, station: ArrayLike, offset: ArrayLike, boundaries: tuple[Float, Float] | None = None) -> Float:
         """Return the surface's local elevation (N,), m, damage included; NaN outside the outermost boundaries.
@@ -128,12 +130,12 @@ class RoadGeometry:
         station, offset = _flat_arrays(station, offset)
         offsets, heights = boundaries or self.boundaries(station)
         strip = self._strip_between(offsets, offset)
-        inside = np.flatnonzero(strip >= 0)
+        on_road = np.flatnonzero(strip >= 0)
         result = np.full(offset.shape, np.nan)
-        index = strip[inside]
-        left, right = offsets[inside, index], offsets[inside, index + 1]
-        share = (left - offset[inside]) / np.maximum(left - right, 1e-300)
-        result[inside] = heights[inside, index] * (1.0 - share) + heights[inside, index + 1] * share
+        index = strip[on_road]
+        left_offset, right_offset = offsets[on_road, index], offsets[on_road, index + 1]
+        share = (left_offset - offset[on_road]) / np.maximum(left_offset - right_offset, 1e-300)
+        result[on_road] = heights[on_road, index] * (1.0 - share) + heights[on_road, index + 1] * share
         for section in self.sections.values():
             if section.carriageway.pavement.ruts or section.carriageway.pavement.potholes:
                 result -= damage_depth(section, station, offset)
@@ -146,12 +148,14 @@ class RoadGeometry:
 
     def _strip_between(self, boundaries: Float, offset: Float) -> Index:
         """Return the index (N,) of the strip at offsets (N,) between the boundaries' offsets (N, M + 1)."""
+        # Boundaries are sorted from left (largest offset) to right: the strip is the one behind the last boundary that
+        # isn't to the right of the place.
         index = np.count_nonzero(boundaries >= offset[:, None], axis=1) - 1
-        last = len(self.strips) - 1
+        last_strip = len(self.strips) - 1
         # The right-most boundary belongs to the right-most strip that has a width.
         at_end = np.flatnonzero(offset == boundaries[:, -1])
-        index[at_end] = last - np.argmax(np.diff(boundaries[at_end], axis=1)[:, ::-1] < 0.0, axis=1)
-        return np.where((index < 0) | (index > last), -1, index)
+        index[at_end] = last_strip - np.argmax(np.diff(boundaries[at_end], axis=1)[:, ::-1] < 0.0, axis=1)
+        return np.where((index < 0) | (index > last_strip), -1, index)
 
     def instances(self, strip: SurfaceStrip, station: ArrayLike) -> Int:
         """Return the instance numbers (N,) that a strip's surface has at stations (N,)."""
@@ -159,8 +163,8 @@ class RoadGeometry:
         result = np.full(station.shape, strip.instance, dtype=np.int64)
         if strip.side and strip.kind in TURNOUT_STRIPS:
             for shape in self.sections[strip.side].turnouts:
-                low, high = shape.range()
-                result[(station >= low) & (station <= high)] = shape.turnout.instance
+                start_station, end_station = shape.range()
+                result[(station >= start_station) & (station <= end_station)] = shape.turnout.instance
         return result
 
     def point(self, station: ArrayLike, offset: ArrayLike) -> Float:
@@ -176,15 +180,15 @@ class RoadGeometry:
         """
         carriageway = self.parameters.carriageway_of(line)
         section = self.sections[carriageway.side]
-        outwards = {"outer_edge": 0.5, "block": 0.5, "turnout_edge": 0.5, "inner_edge": -0.5, "gore_edge": -0.5}
+        shift_of_kind = {"outer_edge": 0.5, "block": 0.5, "turnout_edge": 0.5, "inner_edge": -0.5, "gore_edge": -0.5}
         if line.kind == "free":
-            beside = width_at(line.offset, np.atleast_1d(station))
+            line_distance = width_at(line.offset, np.atleast_1d(station))
         elif line.kind in ("turnout_edge", "gore_edge"):
             inner, outer = section.boundaries_of("turnout_lane", station)
-            beside = outer if line.kind == "turnout_edge" else inner
+            line_distance = outer if line.kind == "turnout_edge" else inner
         else:
-            beside = section.lane_boundaries(station)[:, line.boundary]
-        centre = carriageway.sign * (beside + outwards.get(line.kind, 0.0) * line.width)
+            line_distance = section.lane_boundaries(station)[:, line.boundary]
+        centre = carriageway.sign * (line_distance + shift_of_kind.get(line.kind, 0.0) * line.width)
         return centre + line.width / 2, centre - line.width / 2
 
     def dashes(self, line: LineMarking) -> Float:
@@ -193,15 +197,18 @@ class RoadGeometry:
         if line.dash_length == 0:
             return np.array([[start, end]]) if end > start else np.empty((0, 2))
         period = line.dash_length + line.gap_length
-        first = start + period * np.arange(max(0, int(np.ceil((end - start) / period))))
-        return np.column_stack([first, np.minimum(first + line.dash_length, end)])
+        dash_starts = start + period * np.arange(max(0, int(np.ceil((end - start) / period))))
+        return np.column_stack([dash_starts, np.minimum(dash_starts + line.dash_length, end)])
 
-    def _across(self, by_side: dict[Side, Float], signed: bool) -> Float:
-        """Return values (N, B) of both sides, innermost first, joined to one row from left to right, (N, M + 1)."""
+    def _across(self, by_side: dict[Side, Float], has_sign: bool) -> Float:
+        """Return values (N, B) of both sides, innermost first, joined to one row from left to right, (N, M + 1).
+
+        With `has_sign` the values are distances from the centreline, which become offsets: negative on the right.
+        """
         parts = []
         for side in _SIDES:
             if side in by_side:
-                values = by_side[side] * (self.sections[side].carriageway.sign if signed else 1.0)
+                values = by_side[side] * (self.sections[side].carriageway.sign if has_sign else 1.0)
                 parts.append(values[:, ::-1] if side == "left" else values)
         return np.hstack(parts)
 
@@ -228,9 +235,9 @@ def sections_of(parameters: RoadParameters) -> dict[Side, CarriagewaySection]:
 
 def _strips(section: CarriagewaySection) -> list[SurfaceStrip]:
     """Return the strips of one carriageway's surface, innermost first."""
-    paved = ("road", section.carriageway.pavement.kind)
+    pavement_surface = ("road", section.carriageway.pavement.kind)
     instance, side = section.carriageway.instance, section.carriageway.side
-    return [SurfaceStrip(kind, *_SURFACES.get(kind, paved), instance, side) for kind in section.kinds]
+    return [SurfaceStrip(kind, *_SURFACES.get(kind, pavement_surface), instance, side) for kind in section.kinds]
 
 
 def _flat_arrays(*values: ArrayLike) -> list[Float]:

@@ -62,9 +62,9 @@ class PassNumbers:
     first: int
     step: int
 
-    def number(self, own: int, passes: int) -> int:
-        """Return the instance number of a vehicle's pass, 0 the first, which has the number ``own``."""
-        return own if passes <= 0 else self.first + (passes - 1) * self.step
+    def number(self, vehicle_number: int, passes: int) -> int:
+        """Return the instance number of a vehicle's pass, 0 the first, which has the number ``vehicle_number``."""
+        return vehicle_number if passes <= 0 else self.first + (passes - 1) * self.step
 
 
 class InstanceNumbers:
@@ -83,22 +83,23 @@ class InstanceNumbers:
 
     def __init__(self, parameters: RoadParameters) -> None:
         self._parameters = parameters
-        taken = sorted(item.instance for item in parameters.objects.values())
-        free = _FreeNumbers(taken)
+        object_numbers = sorted(item.instance for item in parameters.objects.values())
+        free_numbers = _FreeNumbers(object_numbers)
         length = math.ceil(parameters.alignment.length)
         self.parts: dict[str, Parts] = {}
         for name, item in parameters.objects.items():
             kind, count, room = _parts_of(item, parameters, length)
             if count:
-                self.parts[name] = Parts(kind, free.block(max(count, room), name), count, max(count, room))
+                self.parts[name] = Parts(kind, free_numbers.block(max(count, room), name), count, max(count, room))
         vehicles = parameters.of_type(Vehicle)
-        first = free.rest()
-        self.passes = {name: PassNumbers(first + number, len(vehicles)) for number, name in enumerate(vehicles)}
+        first_free = free_numbers.rest()
+        self.passes = {name: PassNumbers(first_free + number, len(vehicles)) for number, name in enumerate(vehicles)}
 
     def name_of(self, number: int) -> str | None:
         """Return an instance number's object id, for a part with a slash and the part's name; None if it is unused."""
-        if number in self._own:
-            return self._own[number]
+        if number in self._object_names:
+            return self._object_names[number]
+        # Parts: the last block that starts at the number or before it, if the number lies within that block.
         starts, names = self._blocks
         block = bisect_right(starts, number) - 1
         if block >= 0:
@@ -107,10 +108,10 @@ class InstanceNumbers:
             if part < self.parts[name].room:
                 return f"{name}/{self.part_name(name, part)}"
         if self.passes:
-            first = next(iter(self.passes.values())).first
-            again, vehicle = divmod(number - first, len(self.passes))
-            if again >= 0:
-                return f"{list(self.passes)[vehicle]}/pass-{again + 1}"
+            first_number = next(iter(self.passes.values())).first
+            later_pass, vehicle = divmod(number - first_number, len(self.passes))
+            if later_pass >= 0:
+                return f"{list(self.passes)[vehicle]}/pass-{later_pass + 1}"
         return None
 
     def part_name(self, name: str, part: int) -> str:
@@ -146,10 +147,12 @@ class InstanceNumbers:
 
     def part_attributes(self, instance: int) -> dict[str, int]:
         """Return the first instance numbers and counts of an object's parts and passes, as attributes by name."""
-        name = self._own[instance]
-        parts, again = self.parts.get(name), self.passes.get(name)
-        told = {"first_part_instance": parts.first, "part_count": parts.count} if parts else {}
-        return told | ({"first_pass_instance": again.first, "pass_step": again.step} if again else {})
+        name = self._object_names[instance]
+        parts, later_passes = self.parts.get(name), self.passes.get(name)
+        attributes = {"first_part_instance": parts.first, "part_count": parts.count} if parts else {}
+        return attributes | (
+            {"first_pass_instance": later_passes.first, "pass_step": later_passes.step} if later_passes else {}
+        )
 
     def belong(self, name: str, numbers: NDArray[np.integer]) -> Bool:
         """Return a mask (N,) of the instance numbers that are an object's or its parts', not those of later passes."""
@@ -162,34 +165,35 @@ class InstanceNumbers:
     def to_dict(self) -> dict[str, object]:
         """Return the instance numbers of parts and passes as JSON data, as a job's report has them."""
         parts = {
-            name: {"instance": self._parameters.objects[name].instance, "part": one.kind, "first": one.first}
-            | {"count": one.count}
-            for name, one in self.parts.items()
+            name: {"instance": self._parameters.objects[name].instance, "part": block.kind, "first": block.first}
+            | {"count": block.count}
+            for name, block in self.parts.items()
         }
-        passes = {name: {"first": one.first, "step": one.step} for name, one in self.passes.items()}
+        passes = {name: {"first": block.first, "step": block.step} for name, block in self.passes.items()}
         return {"parts": parts, "passes": passes}
 
     @cached_property
-    def _own(self) -> dict[int, str]:
+    def _object_names(self) -> dict[int, str]:
+        """Return the id of each object by the instance number that its parameters have."""
         return {item.instance: name for name, item in self._parameters.objects.items()}
 
     @cached_property
     def _blocks(self) -> tuple[list[int], list[str]]:
         """Return the sorted first numbers of all blocks of parts, and the ids of the objects that they are of."""
-        ordered = sorted((one.first, name) for name, one in self.parts.items())
-        return [first for first, _ in ordered], [name for _, name in ordered]
+        ordered = sorted((block.first, name) for name, block in self.parts.items())
+        return [first_number for first_number, _ in ordered], [name for _, name in ordered]
 
 
 class _FreeNumbers:
     """Instance numbers that no object has, lowest first.
 
     Args:
-        taken: numbers of the objects, in order.
+        object_numbers: numbers of the objects, in order.
     """
 
-    def __init__(self, taken: list[int]) -> None:
-        ends = [*taken, LARGEST + 1]
-        self._gaps = [(a + 1, b) for a, b in zip([0, *taken], ends, strict=True) if b > a + 1]
+    def __init__(self, object_numbers: list[int]) -> None:
+        ends = [*object_numbers, LARGEST + 1]
+        self._gaps = [(a + 1, b) for a, b in zip([0, *object_numbers], ends, strict=True) if b > a + 1]
 
     def block(self, count: int, name: str) -> int:
         """Take the lowest ``count`` consecutive free numbers and return the first; InputError if there are none."""
@@ -221,7 +225,7 @@ def damage_kinds(pavement: Pavement) -> list[str]:
     """Return "rut", "pothole", "patch", "crack" or "removed-marking" for each of a pavement's damages, in order."""
     names = ("rut", "pothole", "patch", "crack", "removed-marking")
     items = (pavement.ruts, pavement.potholes, pavement.patches, pavement.cracks, pavement.removed_markings)
-    return [name for name, of_kind in zip(names, items, strict=True) for _ in of_kind]
+    return [name for name, damages in zip(names, items, strict=True) for _ in damages]
 
 
 def places_per_metre(plants: Vegetation, terrain: Terrain) -> int:

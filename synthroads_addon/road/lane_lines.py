@@ -36,9 +36,9 @@ class LaneLine:
         self.lane = lane
         pavement = carriageway.pavement.model_copy(update={"potholes": ()})
         self._section = CarriagewaySection(carriageway.model_copy(update={"pavement": pavement}))
-        inside = [carriageway.inner_offset, carriageway.inner_edge_strip_width]
+        widths_inside = [carriageway.inner_offset, carriageway.inner_edge_strip_width]
         self._width = carriageway.lanes[lane].width
-        self._inside = [*inside, *(item.width for item in carriageway.lanes[lane + 1 :])]
+        self._inside = [*widths_inside, *(item.width for item in carriageway.lanes[lane + 1 :])]
 
     def offset(self, station: Float) -> Float:
         """Return the offset of the lane's centre at stations of any shape, m."""
@@ -51,19 +51,19 @@ class LaneLine:
         It is that of the chord between the lane's places ``reach`` (m) before and behind: a vehicle that passes a
         point from which on its lane widens turns as its axles pass it, and not at once.
         """
-        across = self.offset(station + reach) - self.offset(station - reach)
-        bend = self.geometry.alignment.curvature(station)
-        along = 2.0 * reach * (1.0 - bend * clip_offset(self.offset(station), bend))
-        return np.arctan2(across, along)
+        lateral_shift = self.offset(station + reach) - self.offset(station - reach)
+        curvature = self.geometry.alignment.curvature(station)
+        chord_length = 2.0 * reach * (1.0 - curvature * clip_offset(self.offset(station), curvature))
+        return np.arctan2(lateral_shift, chord_length)
 
     def height(self, station: Float, offset: Float) -> Float:
         """Return the surface's local elevation (N,), m, at stations and offsets (N,) on the carriageway's pavement.
 
         The pavement's plane goes on beyond its edges.
         """
-        rise = self.carriageway.sign * self.geometry.crossfall(self.carriageway, station)
-        across = self.carriageway.sign * offset - self._section.pivot(station)
-        height = self.geometry.profile.elevation(station) + rise * across
+        slope = self.carriageway.sign * self.geometry.crossfall(self.carriageway, station)
+        distance_from_pivot = self.carriageway.sign * offset - self._section.pivot(station)
+        height = self.geometry.profile.elevation(station) + slope * distance_from_pivot
         if self.carriageway.pavement.ruts:
             height -= damage_depth(self._section, station, offset)
         return np.asarray(height)
@@ -73,15 +73,19 @@ class LaneLine:
 
         It ends where the lane becomes narrower than `VEHICLE_LANE_WIDTH`, or than it is at the station itself.
         """
-        inside = {s for s in width_kinks(self._width) if 0.0 < s < self.geometry.length}
-        kinks = np.array(sorted({0.0, self.geometry.length, *inside}))
-        least = min(VEHICLE_LANE_WIDTH, float(width_at(self._width, station)))
-        spare = width_at(self._width, kinks) - least + 1e-9
-        crossed = np.flatnonzero(spare[:-1] * spare[1:] < 0.0)
-        share = spare[crossed] / (spare[crossed] - spare[crossed + 1])
-        ends = kinks[crossed] + share * np.diff(kinks)[crossed]
-        low, high = ends[ends <= station], ends[ends > station]
-        return float(low[-1]) if len(low) else 0.0, float(high[0]) if len(high) else self.geometry.length
+        inner_kinks = {s for s in width_kinks(self._width) if 0.0 < s < self.geometry.length}
+        kinks = np.array(sorted({0.0, self.geometry.length, *inner_kinks}))
+        least_width = min(VEHICLE_LANE_WIDTH, float(width_at(self._width, station)))
+        spare_width = width_at(self._width, kinks) - least_width + 1e-9
+        crossing_intervals = np.flatnonzero(spare_width[:-1] * spare_width[1:] < 0.0)
+        share = spare_width[crossing_intervals] / (
+            spare_width[crossing_intervals] - spare_width[crossing_intervals + 1]
+        )
+        ends = kinks[crossing_intervals] + share * np.diff(kinks)[crossing_intervals]
+        ends_before, ends_after = ends[ends <= station], ends[ends > station]
+        return float(ends_before[-1]) if len(ends_before) else 0.0, float(ends_after[0]) if len(
+            ends_after
+        ) else self.geometry.length
 
     def distance(self, station: Float) -> Float:
         """Return the distances (N,) along the lane's line from the road's beginning at stations (N,), m."""
@@ -100,30 +104,42 @@ class LaneLine:
         panel = _panel(distances, distance)
         length, step = np.diff(distances)[panel], np.diff(knots)[panel]
         u = (distance - distances[panel]) / length
-        first, last = length / rates[0][panel], length / rates[1][panel]
-        cubic = u * (first + u * (3.0 * step - 2.0 * first - last + u * (first + last - 2.0 * step)))
-        within = knots[panel] + np.where(u < 0.0, u * first, np.where(u > 1.0, step + (u - 1.0) * last, cubic))
-        return np.asarray(within)
+        start_rate, end_rate = length / rates[0][panel], length / rates[1][panel]
+        cubic = u * (
+            start_rate + u * (3.0 * step - 2.0 * start_rate - end_rate + u * (start_rate + end_rate - 2.0 * step))
+        )
+        stations = knots[panel] + np.where(
+            u < 0.0, u * start_rate, np.where(u > 1.0, step + (u - 1.0) * end_rate, cubic)
+        )
+        return np.asarray(stations)
 
     @cached_property
     def _table(self) -> tuple[Float, Float, tuple[Float, Float]]:
         """Return stations of the panels' borders (P + 1,), distances there, and metres per station at panels' ends."""
         road = self.geometry
         kinks = [s for width in (self._width, *self._inside) for s in width_kinks(width)]
-        borders = np.clip(np.concatenate([road.alignment.element_starts, kinks, [0.0, road.length]]), 0.0, road.length)
-        borders = np.unique(borders)
-        borders = borders[np.append(True, np.diff(borders) > 1e-6)]
-        borders[-1] = road.length
-        count = np.maximum(1, np.ceil(np.diff(borders) / _PANEL)).astype(int)
-        owner = np.repeat(np.arange(len(count)), count)
-        nth = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-        knots = np.append(borders[owner] + nth * (np.diff(borders) / count)[owner], road.length)
+        panel_borders = np.clip(
+            np.concatenate([road.alignment.element_starts, kinks, [0.0, road.length]]), 0.0, road.length
+        )
+        panel_borders = np.unique(panel_borders)
+        panel_borders = panel_borders[np.append(True, np.diff(panel_borders) > 1e-6)]
+        panel_borders[-1] = road.length
+        count = np.maximum(1, np.ceil(np.diff(panel_borders) / _PANEL)).astype(int)
+        border_interval = np.repeat(np.arange(len(count)), count)
+        number_in_interval = np.arange(len(border_interval)) - np.repeat(np.cumsum(count) - count, count)
+        knots = np.append(
+            panel_borders[border_interval] + number_in_interval * (np.diff(panel_borders) / count)[border_interval],
+            road.length,
+        )
         step = np.diff(knots)
         distances = running_sum(self._length(knots[:-1], step).tolist())
         return knots, distances, (self._rate(knots[:-1], step, 0.0), self._rate(knots[:-1], step, 1.0))
 
     def _length(self, begin: Float, step: Float) -> Float:
-        """Return the lengths (N,) of the lane's line, m, from stations over steps (N,) within one panel each."""
+        """Return the lengths (N,) of the lane's line, m, from stations over steps (N,) within one panel each.
+
+        By Gauss-Legendre quadrature of `_rate` with 5 nodes.
+        """
         shares, weights = (_GAUSS[0] + 1.0) / 2.0, _GAUSS[1] / 2.0
         rates = (weight * self._rate(begin, step, share) for share, weight in zip(shares, weights, strict=True))
         return np.asarray(step * sum(rates))
@@ -134,13 +150,16 @@ class LaneLine:
         Within a panel curvature and offset are linear; both are read inside of it, as they may jump or bend at its
         ends.
         """
-        near, far = begin + 0.25 * step, begin + 0.75 * step
-        offsets, bends = (self.offset(near), self.offset(far)), self.geometry.alignment.curvature(np.stack([near, far]))
-        along = 2.0 * share - 0.5
-        bend = bends[0] + along * (bends[1] - bends[0])
-        offset = offsets[0] + along * (offsets[1] - offsets[0])
-        across = (offsets[1] - offsets[0]) / np.where(step == 0.0, 1.0, 0.5 * step)
-        return np.asarray(np.hypot(1.0 - bend * clip_offset(offset, bend), across))
+        first_quarter, third_quarter = begin + 0.25 * step, begin + 0.75 * step
+        offsets, curvatures = (
+            (self.offset(first_quarter), self.offset(third_quarter)),
+            self.geometry.alignment.curvature(np.stack([first_quarter, third_quarter])),
+        )
+        share_between = 2.0 * share - 0.5
+        curvature = curvatures[0] + share_between * (curvatures[1] - curvatures[0])
+        offset = offsets[0] + share_between * (offsets[1] - offsets[0])
+        lateral_rate = (offsets[1] - offsets[0]) / np.where(step == 0.0, 1.0, 0.5 * step)
+        return np.asarray(np.hypot(1.0 - curvature * clip_offset(offset, curvature), lateral_rate))
 
 
 def lane_of(geometry: RoadGeometry, vehicle: Vehicle) -> LaneLine:
@@ -156,6 +175,7 @@ def lane_of(geometry: RoadGeometry, vehicle: Vehicle) -> LaneLine:
 
 
 def _panel(borders: Float, value: Float) -> Index:
+    """Return the index (N,) of the panel between borders (P + 1,) that values (N,) lie in, clipped to the ends."""
     return np.clip(np.searchsorted(borders, value, side="right") - 1, 0, len(borders) - 2)
 
 
@@ -166,34 +186,40 @@ def wheel_pose(line: LaneLine, chassis: Chassis, station: Float) -> tuple[Float,
     axles' wheels, so that grade and crossfall pitch and roll it.
     """
     alignment, traffic = line.geometry.alignment, line.carriageway.traffic
-    position, axis, bend = alignment.frame(station)
+    position, axis, curvature = alignment.frame(station)
     offset = line.offset(station)
-    middle = np.stack([position[:, 0] - offset * np.sin(axis), position[:, 1] + offset * np.cos(axis)])
+    middle_xy = np.stack([position[:, 0] - offset * np.sin(axis), position[:, 1] + offset * np.cos(axis)])
     turn = line.turn(station, chassis.wheel_base / 2.0)
     heading = axis + turn + (0.0 if traffic > 0 else np.pi)
-    ahead = np.stack([np.cos(heading), np.sin(heading)])
-    left = np.stack([-ahead[1], ahead[0]])
+    forward_xy = np.stack([np.cos(heading), np.sin(heading)])
+    left_xy = np.stack([-forward_xy[1], forward_xy[0]])
     front, rear, track = chassis
     heights = {}
-    per_metre = traffic * np.cos(turn) / np.maximum(1.0 - bend * offset, 0.02)
-    for along in (rear, front):
-        for beside in (-track, track):
-            wheel = middle + along * ahead + beside * left
-            heights[along, beside] = _road_height(line, wheel.T, station + along * per_metre)
-    behind, before = (0.5 * (heights[along, -track] + heights[along, track]) for along in (rear, front))
-    rise = (before - behind) / (front - rear)
-    roll = sum(heights[along, track] - heights[along, -track] for along in (rear, front)) / (4.0 * track)
-    forward = _unit(np.stack([*ahead, rise]))
-    side = np.stack([*left, roll])
+    stations_per_metre = traffic * np.cos(turn) / np.maximum(1.0 - curvature * offset, 0.02)
+    for ahead_distance in (rear, front):
+        for left_distance in (-track, track):
+            wheel = middle_xy + ahead_distance * forward_xy + left_distance * left_xy
+            heights[ahead_distance, left_distance] = _road_height(
+                line, wheel.T, station + ahead_distance * stations_per_metre
+            )
+    rear_height, front_height = (
+        0.5 * (heights[ahead_distance, -track] + heights[ahead_distance, track]) for ahead_distance in (rear, front)
+    )
+    grade = (front_height - rear_height) / (front - rear)
+    roll = sum(heights[ahead_distance, track] - heights[ahead_distance, -track] for ahead_distance in (rear, front)) / (
+        4.0 * track
+    )
+    forward = _unit(np.stack([*forward_xy, grade]))
+    side = np.stack([*left_xy, roll])
     side = _unit(side - (side * forward).sum(axis=0) * forward)
-    up = np.cross(forward, side, axis=0)
-    place = np.stack([*middle, behind - rise * rear])
-    return np.moveaxis(np.stack([forward, side, up], axis=1), -1, 0), place.T
+    upward = np.cross(forward, side, axis=0)
+    place = np.stack([*middle_xy, rear_height - grade * rear])
+    return np.moveaxis(np.stack([forward, side, upward], axis=1), -1, 0), place.T
 
 
-def _road_height(line: LaneLine, plan: Float, near: Float) -> Float:
-    """Return the road's local elevation (K,), m, at plan points (K, 2) within 2 m of stations ``near`` (K,)."""
-    return line.height(*line.geometry.alignment.project_near(plan, near, 2.0))
+def _road_height(line: LaneLine, xy: Float, near_station: Float) -> Float:
+    """Return the road's local elevation (K,), m, at plan points (K, 2) within 2 m of stations ``near_station`` (K,)."""
+    return line.height(*line.geometry.alignment.project_near(xy, near_station, 2.0))
 
 
 def _unit(vectors: Float) -> Float:

@@ -86,9 +86,10 @@ class SignedWidthPoint(WidthPoint):
 
 
 def _in_order(points: tuple[WidthPoint, ...]) -> tuple[WidthPoint, ...]:
-    for before, after in pairwise(points):
-        if after.station <= before.station:
-            raise ValueError(f"station {after.station} must be greater than the one before, {before.station}")
+    """Return width points unchanged; ValueError unless their stations increase."""
+    for previous, following in pairwise(points):
+        if following.station <= previous.station:
+            raise ValueError(f"station {following.station} must be greater than the one before, {previous.station}")
     return points
 
 

@@ -26,6 +26,7 @@ _MERGE_SHAFT = [(0.0, -0.03), (0.35, -0.03), (0.35, 0.03), (0.0, 0.03)]
 
 
 def _mirror_outline(shape: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return an outline mirrored at the x axis, its corners in reversed order so that it runs the same way round."""
     return [(x, -y) for x, y in reversed(shape)]
 
 
@@ -57,51 +58,54 @@ def hatching_outlines(geometry: RoadGeometry, hatching: Hatching) -> list[Float]
     forward = 1.0 if nose > tip else -1.0
     stations = np.linspace(tip, nose, 400)
     inner, outer = _hatched_range(section, stations)
-    wide = np.flatnonzero(outer - inner >= _NARROWEST)
-    if not len(wide):
+    wide_rows = np.flatnonzero(outer - inner >= _NARROWEST)
+    if not len(wide_rows):
         return []
     pitch = hatching.stripe_width + hatching.gap_width
-    first = stations[wide[0]]
-    count = int(abs(nose - first) // pitch)
-    lean = 1.0 / np.tan(np.radians(hatching.angle_deg))
-    middle = first + forward * (pitch * np.arange(count) + hatching.stripe_width / 2.0)
+    first_station = stations[wide_rows[0]]
+    count = int(abs(nose - first_station) // pitch)
+    slant = 1.0 / np.tan(np.radians(hatching.angle_deg))
+    stripe_middles = first_station + forward * (pitch * np.arange(count) + hatching.stripe_width / 2.0)
     edges = []
     for shift in (-hatching.stripe_width / 2.0, hatching.stripe_width / 2.0):
-        for outside in (False, True):
-            edges.append(_edge_crossings(section, middle + shift, forward * lean, outside, (tip, nose)))
+        for at_outer_edge in (False, True):
+            edges.append(_edge_crossings(section, stripe_middles + shift, forward * slant, at_outer_edge, (tip, nose)))
     corners = np.stack([edges[0], edges[2], edges[3], edges[1]], axis=1)
     corners[:, :, 1] *= section.carriageway.sign
-    keep = (corners[:, :, 0] * forward).max(axis=1) < nose * forward - 0.2
-    return [_counter_clockwise(corner) for corner in corners[keep]]
+    keep_mask = (corners[:, :, 0] * forward).max(axis=1) < nose * forward - 0.2
+    return [_counter_clockwise(corner) for corner in corners[keep_mask]]
 
 
 def arrow_outlines(arrow: Arrow) -> list[Float]:
     """Return the convex parts (K, 2) of an arrow in stations and offsets, counter-clockwise from above."""
     turn = np.radians(arrow.rotation_deg)
-    along = np.array([np.cos(turn), np.sin(turn)])
-    rotation = np.column_stack([along, [-along[1], along[0]]])
+    direction = np.array([np.cos(turn), np.sin(turn)])
+    rotation = np.column_stack([direction, [-direction[1], direction[0]]])
     parts = [(np.array(part) - (0.5, 0.0)) * arrow.length @ rotation.T for part in ARROWS[arrow.kind]]
     return [_counter_clockwise(part + (arrow.station, arrow.offset)) for part in parts]
 
 
 def cut_outline(outline: Float, cuts: Float) -> Iterator[Float]:
     """Yield the pieces (M, 2) of a convex outline (K, 2) between each two neighbours of the stations ``cuts``, m."""
-    for first, last in pairwise(cuts):
-        piece = _clip_outline(_clip_outline(outline, first, 1.0), last, -1.0)
+    for start, end in pairwise(cuts):
+        piece = _clip_outline(_clip_outline(outline, start, 1.0), end, -1.0)
         if len(piece) > 2:
             yield piece
 
 
-def _clip_outline(outline: Float, station: float, keep: float) -> Float:
-    """Return the part of a convex outline beyond (``keep`` 1) or before (-1) a station."""
-    inside = (outline[:, 0] - station) * keep >= 0.0
+def _clip_outline(outline: Float, station: float, direction: float) -> Float:
+    """Return the part of a convex outline beyond (``direction`` 1) or before (-1) a station.
+
+    Sutherland and Hodgman's clipping of a polygon at one line.
+    """
+    is_inside = (outline[:, 0] - station) * direction >= 0.0
     corners = []
     for i, corner in enumerate(outline):
         previous = outline[i - 1]
-        if inside[i] != inside[i - 1]:
+        if is_inside[i] != is_inside[i - 1]:
             share = (station - previous[0]) / (corner[0] - previous[0])
             corners.append(previous + share * (corner - previous))
-        if inside[i]:
+        if is_inside[i]:
             corners.append(corner)
     return np.array(corners).reshape(-1, 2)
 
@@ -109,20 +113,21 @@ def _clip_outline(outline: Float, station: float, keep: float) -> Float:
 def _hatched_range(section: CarriagewaySection, station: Float) -> tuple[Float, Float]:
     """Return the inner and outer distances (N,) from the centreline between which a gore is hatched, m."""
     inner = section.lane_boundaries(station)[:, 0] + _EDGE_LINE
-    lane, _ = section.boundaries_of("turnout_lane", station)
-    return inner, lane - _EDGE_LINE
+    lane_edge, _ = section.boundaries_of("turnout_lane", station)
+    return inner, lane_edge - _EDGE_LINE
 
 
 def _edge_crossings(
-    section: CarriagewaySection, station: Float, lean: float, outside: bool, limits: tuple[float, float]
+    section: CarriagewaySection, station: Float, slant: float, at_outer_edge: bool, limits: tuple[float, float]
 ) -> Float:
     """Return the points (N, 2: station, distance), m, where slanting lines from a gore's middle meet its edge."""
     inner, outer = _hatched_range(section, station)
-    middle, at = (inner + outer) / 2.0, station
+    middle, crossing_station = (inner + outer) / 2.0, station
+    # Fixed-point iteration: where the line meets the edge depends on the edge's distance there.
     for _ in range(_STEPS):
-        edge = _hatched_range(section, at)[1 if outside else 0]
-        at = np.clip(station + lean * (edge - middle), min(limits), max(limits))
-    return np.column_stack([at, _hatched_range(section, at)[1 if outside else 0]])
+        edge = _hatched_range(section, crossing_station)[1 if at_outer_edge else 0]
+        crossing_station = np.clip(station + slant * (edge - middle), min(limits), max(limits))
+    return np.column_stack([crossing_station, _hatched_range(section, crossing_station)[1 if at_outer_edge else 0]])
 
 
 def _counter_clockwise(outline: Float) -> Float:

@@ -97,8 +97,9 @@ class HorizontalElement(Model):
 
     @model_validator(mode="after")
     def _kind_fits(self) -> HorizontalElement:
-        straight = self.curvature_start == 0.0 == self.curvature_end
-        fits = {"line": straight, "arc": self.curvature_start == self.curvature_end and not straight}
+        """Return the element unchanged; ValueError if its kind contradicts its curvatures."""
+        is_straight = self.curvature_start == 0.0 == self.curvature_end
+        fits = {"line": is_straight, "arc": self.curvature_start == self.curvature_end and not is_straight}
         if not fits.get(self.kind, self.curvature_start != self.curvature_end):
             raise ValueError(f"kind '{self.kind}' contradicts its curvatures")
         return self
@@ -111,8 +112,10 @@ class HorizontalElement(Model):
             >>> HorizontalElement.between(120.0, 0.0, 1 / 800).kind
             'clothoid'
         """
-        same = curvature_start == curvature_end
-        kind: Literal["line", "arc", "clothoid"] = "clothoid" if not same else "arc" if curvature_start else "line"
+        is_constant = curvature_start == curvature_end
+        kind: Literal["line", "arc", "clothoid"] = (
+            "clothoid" if not is_constant else "arc" if curvature_start else "line"
+        )
         return cls(kind=kind, length=length, curvature_start=curvature_start, curvature_end=curvature_end)
 
 
@@ -149,6 +152,7 @@ class AlignmentObject(RoadObject):
 
     @model_validator(mode="after")
     def _equations_in_order(self) -> AlignmentObject:
+        """Return the alignment unchanged; ValueError unless the stations of its equations increase."""
         if any(a.station >= b.station for a, b in itertools.pairwise(self.equations)):
             raise ValueError("equations must be in the order of their stations")
         return self
@@ -165,16 +169,20 @@ class AlignmentObject(RoadObject):
         """Return the stations (m) at which the count is a multiple of a spacing (m), and which multiple."""
         borders = [0.0, *(equation.station for equation in self.equations), self.length]
         multiples = []
-        for first, last in itertools.pairwise(borders):
-            at = self.counted(first)
-            for multiple in range(math.ceil(at / spacing - 1e-9), math.floor((at + last - first) / spacing + 1e-9) + 1):
-                place = first + multiple * spacing - at
-                if place < last or last == self.length:
-                    multiples.append((min(max(place, 0.0), self.length), multiple))
+        for border, next_border in itertools.pairwise(borders):
+            first_count = self.counted(border)
+            for multiple in range(
+                math.ceil(first_count / spacing - 1e-9),
+                math.floor((first_count + next_border - border) / spacing + 1e-9) + 1,
+            ):
+                station = border + multiple * spacing - first_count
+                if station < next_border or next_border == self.length:
+                    multiples.append((min(max(station, 0.0), self.length), multiple))
         return multiples
 
     @model_validator(mode="after")
     def _no_longer_than_any_road(self) -> AlignmentObject:
+        """Return the alignment unchanged; ValueError if it is longer than `LONGEST_ROAD`."""
         if self.length > LONGEST_ROAD:
             raise ValueError(f"horizontal elements must be at most {LONGEST_ROAD:g} m long together")
         return self
@@ -221,6 +229,7 @@ class RoadParameters(Model):
 
     @model_validator(mode="after")
     def _consistent(self) -> RoadParameters:
+        """Return the set unchanged; ValueError for a bad id, doubled numbers, or missing or unknown objects."""
         for name in self.objects:
             if not re.fullmatch(OBJECT_ID, name):
                 raise ValueError(f"object id {name!r}: letters, digits, '_', '-' and '.' are allowed, at most 64")
@@ -239,6 +248,7 @@ class RoadParameters(Model):
         return self
 
     def _check_carriageways(self) -> None:
+        """Raise ValueError unless there are one or two carriageways, on different sides and without overlap."""
         sides = [item.side for item in self.of_type(Carriageway).values()]
         if len(set(sides)) != len(sides) or not sides:
             raise ValueError("objects must contain one Carriageway per side at most, and at least one")
@@ -247,9 +257,9 @@ class RoadParameters(Model):
 
     def _least_median(self) -> float:
         """Return the least distance of the two carriageways' inner edges along the road, m."""
-        inner = [item.inner_offset for item in self.of_type(Carriageway).values()]
-        station = [0.0, *(s for width in inner for s in width_kinks(width))]
-        return float(sum((width_at(width, station) for width in inner), np.zeros(len(station))).min())
+        inner_offsets = [item.inner_offset for item in self.of_type(Carriageway).values()]
+        station = [0.0, *(s for width in inner_offsets for s in width_kinks(width))]
+        return float(sum((width_at(width, station) for width in inner_offsets), np.zeros(len(station))).min())
 
     def _missing_reference(self, item: RoadObject) -> str:
         """Return a message if an object names a carriageway, lane or turnout that isn't there, else an empty string."""

@@ -74,49 +74,53 @@ class Profile:
         self.points = tuple(points)
         station = np.array([point.station for point in self.points], dtype=np.float64)
         elevation = np.array([point.elevation for point in self.points], dtype=np.float64)
-        gap = np.diff(station)
-        if (gap <= 0).any():
-            place = int(np.argmax(gap <= 0)) + 1
-            allowed = f"stations must increase: more than {station[place - 1]!r} m"
-            raise InputError(f"profile.points[{place}].station", float(station[place]), allowed)
-        self.grades = _grades(gap, np.diff(elevation))
-        change = np.diff(self.grades)
+        distances = np.diff(station)
+        if (distances <= 0).any():
+            point_index = int(np.argmax(distances <= 0)) + 1
+            allowed = f"stations must increase: more than {station[point_index - 1]!r} m"
+            raise InputError(f"profile.points[{point_index}].station", float(station[point_index]), allowed)
+        self.grades = _grades(distances, np.diff(elevation))
+        grade_changes = np.diff(self.grades)
         radius = np.array([point.radius for point in self.points], dtype=np.float64)
-        tangent = 0.5 * radius * np.abs(change)
-        self.tangent_lengths = np.where(tangent > NO_ROUNDING, tangent, 0.0)
-        self._refuse_overlap(gap)
-        rounded = self.tangent_lengths > 0
-        self._build_pieces(station, elevation, np.where(rounded, np.sign(change) / np.where(rounded, radius, 1.0), 0.0))
-        kinked = ~rounded & (change != 0)
+        tangent_lengths = 0.5 * radius * np.abs(grade_changes)
+        self.tangent_lengths = np.where(tangent_lengths > NO_ROUNDING, tangent_lengths, 0.0)
+        self._refuse_overlap(distances)
+        is_rounded = self.tangent_lengths > 0
+        self._build_pieces(
+            station, elevation, np.where(is_rounded, np.sign(grade_changes) / np.where(is_rounded, radius, 1.0), 0.0)
+        )
+        is_kink = ~is_rounded & (grade_changes != 0)
         ends = np.concatenate((station - self.tangent_lengths, station + self.tangent_lengths))
-        self.breakpoints = np.unique(np.concatenate((ends[np.tile(rounded, 2)], station[kinked])))
+        self.breakpoints = np.unique(np.concatenate((ends[np.tile(is_rounded, 2)], station[is_kink])))
 
-    def _refuse_overlap(self, gap: Float) -> None:
-        reach = self.tangent_lengths[:-1] + self.tangent_lengths[1:]
-        over = reach > gap + TOUCH
-        if over.any():
-            place = int(np.argmax(over))
+    def _refuse_overlap(self, distances: Float) -> None:
+        """Raise InputError if the tangents of neighbouring roundings need more than the distance (P - 1,) between."""
+        needed_lengths = self.tangent_lengths[:-1] + self.tangent_lengths[1:]
+        overlaps = needed_lengths > distances + TOUCH
+        if overlaps.any():
+            point_index = int(np.argmax(overlaps))
             allowed = (
-                f"the tangents of points {place} and {place + 1} need {reach[place]:.6g} m and have {gap[place]:.6g} m:"
-                " smaller radii or more distance are needed"
+                f"the tangents of points {point_index} and {point_index + 1} need {needed_lengths[point_index]:.6g} m"
+                f" and have {distances[point_index]:.6g} m: smaller radii or more distance are needed"
             )
-            raise InputError(f"profile.points[{place + 1}].radius", self.points[place + 1].radius, allowed)
+            raise InputError(f"profile.points[{point_index + 1}].radius", self.points[point_index + 1].radius, allowed)
 
     def _build_pieces(self, station: Float, elevation: Float, curvature: Float) -> None:
         """Store quadratics z + u (g + c u / 2): the first grade, then a rounding and a grade for each point.
 
         A grade is measured from its point, a rounding from its start: nothing is carried along the road.
         """
-        tangent, before, after = self.tangent_lengths, self.grades[:-1], self.grades[1:]
+        tangent_lengths, grades_before, grades_after = self.tangent_lengths, self.grades[:-1], self.grades[1:]
 
-        def interleaved(first: float, rounding: Float, grade: Float) -> Float:
-            return np.concatenate(([first], np.column_stack((rounding, grade)).ravel()))
+        def interleaved(first_value: float, rounding_values: Float, grade_values: Float) -> Float:
+            """Return the first grade's value, then for each point its rounding's and its grade's (2 P + 1,)."""
+            return np.concatenate(([first_value], np.column_stack((rounding_values, grade_values)).ravel()))
 
-        borders = interleaved(-np.inf, station - tangent, station + tangent)
+        borders = interleaved(-np.inf, station - tangent_lengths, station + tangent_lengths)
         self._borders = np.maximum.accumulate(borders)[1:]  # touching roundings may cross by a rounding error
-        self._bases = interleaved(station[0], station - tangent, station)
-        self._elevations = interleaved(elevation[0], elevation - before * tangent, elevation)
-        self._grades = interleaved(before[0], before, after)
+        self._bases = interleaved(station[0], station - tangent_lengths, station)
+        self._elevations = interleaved(elevation[0], elevation - grades_before * tangent_lengths, elevation)
+        self._grades = interleaved(grades_before[0], grades_before, grades_after)
         self._curvatures = interleaved(0.0, curvature, np.zeros_like(curvature))
 
     def _evaluate(self, station: ArrayLike) -> tuple[Float, Float, Float]:
@@ -143,9 +147,9 @@ class Profile:
         return self._evaluate(station)[2]
 
 
-def _grades(gap: Float, rise: Float) -> Float:
+def _grades(distances: Float, height_differences: Float) -> Float:
     """Return the grades (P + 1,) before, between and after P points, the outer ones repeated; 0 for one point."""
-    if not len(gap):
+    if not len(distances):
         return np.zeros(2)
-    grades = rise / gap
+    grades = height_differences / distances
     return np.concatenate((grades[:1], grades, grades[-1:]))

@@ -118,6 +118,7 @@ class RemovedMarking(Model):
 
     @model_validator(mode="after")
     def _dashes_fit(self) -> RemovedMarking:
+        """Return the marking unchanged; ValueError for dashes without gaps, or too short ones."""
         check_dashes(self.dash_length, self.gap_length)
         return self
 
@@ -280,6 +281,7 @@ class Turnout(RoadObject):
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Turnout:
+        """Return the turnout unchanged; ValueError if its kind doesn't go with its ramp or its tapers."""
         if (self.ramp is None) != (self.kind == "emergency_bay"):
             raise ValueError("ramp must be given for an exit or entry, and only there")
         tapers = {"emergency_bay": (True, True), "exit": (True, False), "entry": (False, True)}[self.kind]
@@ -291,8 +293,8 @@ class Turnout(RoadObject):
     @property
     def length(self) -> float:
         """Return its whole length along the centreline, m."""
-        along = self.taper_in_length + self.lane_length + self.taper_out_length
-        return along + (self.ramp.length if self.ramp else 0.0)
+        own_length = self.taper_in_length + self.lane_length + self.taper_out_length
+        return own_length + (self.ramp.length if self.ramp else 0.0)
 
     @property
     def end_station(self) -> float:
@@ -347,6 +349,7 @@ class LineMarking(Marking, RoadObject):
 
     @model_validator(mode="after")
     def _dashes_fit(self) -> LineMarking:
+        """Return the marking unchanged; ValueError for dashes without gaps, or a turnout with the wrong kind."""
         check_dashes(self.dash_length, self.gap_length)
         if (self.turnout is not None) != (self.kind in ("turnout_edge", "gore_edge")):
             raise ValueError("turnout must be given for turnout_edge and gore_edge, and only there")

@@ -88,9 +88,9 @@ class CarriagewaySection:
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
         if self._constant is not None:
             return np.repeat(self._constant, len(station), axis=0)
-        once, index = without_repeats(station)  # the places of a grid have few stations
-        distances = self._distances(once)
-        return distances if len(once) == len(station) else distances[index]
+        distinct_stations, index = without_repeats(station)  # the places of a grid have few stations
+        distances = self._distances(distinct_stations)
+        return distances if len(distinct_stations) == len(station) else distances[index]
 
     def paved_edge(self, station: ArrayLike) -> Float:
         """Return the (N,) distances from the centreline of the pavement's outer edge, ramps and bays included, m."""
@@ -103,28 +103,28 @@ class CarriagewaySection:
     def main_edge(self, station: ArrayLike) -> Float:
         """Return the (N,) distances from the centreline of the pavement's outer edge, turnouts left out, m."""
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
-        inner = width_at(self.carriageway.inner_offset, station)
+        inner_offset = width_at(self.carriageway.inner_offset, station)
         widths = [width for kind, width in self._widths if kind not in TURNOUT_STRIPS and kind != "verge"]
-        return inner + sum(width_at(width, station) for width in widths)
+        return inner_offset + sum(width_at(width, station) for width in widths)
 
     def pivot(self, station: ArrayLike) -> Float:
         """Return the (N,) distances from the centreline of the line about which the crossfall turns, m."""
-        inner = width_at(self.carriageway.inner_offset, np.atleast_1d(station))
+        inner_offset = width_at(self.carriageway.inner_offset, np.atleast_1d(station))
         if self.carriageway.rotation_axis == "inner_edge":
-            return inner
+            return inner_offset
         if self.carriageway.rotation_axis == "centreline":
-            return np.zeros(inner.shape)
-        return (inner + self.main_edge(station)) / 2.0
+            return np.zeros(inner_offset.shape)
+        return (inner_offset + self.main_edge(station)) / 2.0
 
     def lane_boundaries(self, station: ArrayLike) -> Float:
         """Return the (N, lanes + 1) distances from the centreline of the lanes' boundaries, outermost first, m."""
-        first = self.kinds.index("lane")
-        return self.distances(station)[:, first : first + len(self.carriageway.lanes) + 1][:, ::-1]
+        first_lane = self.kinds.index("lane")
+        return self.distances(station)[:, first_lane : first_lane + len(self.carriageway.lanes) + 1][:, ::-1]
 
     def boundaries_of(self, kind: str, station: ArrayLike) -> tuple[Float, Float]:
         """Return the inner and the outer distances (N,) from the centreline of the one strip of a kind, m."""
-        at, distances = self.kinds.index(kind), self.distances(station)
-        return distances[:, at], distances[:, at + 1]
+        strip_index, distances = self.kinds.index(kind), self.distances(station)
+        return distances[:, strip_index], distances[:, strip_index + 1]
 
     def elevations(self, station: Float, crossfall: Float, distances: Float | None = None) -> Float:
         """Return the (N, B) heights of the strips' boundaries above the profile, innermost first, m.
@@ -135,16 +135,18 @@ class CarriagewaySection:
             distances: (N, B) `distances` there, if they are known.
         """
         distances = self.distances(station) if distances is None else distances
-        plane = np.minimum(distances, self._plane_edge(station, distances)[:, None])
+        plane_distances = np.minimum(distances, self._plane_edge(station, distances)[:, None])
         # A surface that falls to the right rises with the offset, and the offset is sign * distance outwards.
-        rise = self.carriageway.sign * crossfall
-        verge_fall = (distances - plane) * self.carriageway.verge_slope_percent / 100.0
-        heights = rise[:, None] * (plane - self.pivot(station)[:, None]) - verge_fall
-        for surface, tilt, behind in self._ramps(station, rise):
-            first = self._beyond_island
-            on_ramp = surface.lift[:, None] + tilt[:, None] * (plane[:, first:] - distances[:, first, None])
-            heights[:, first:] += surface.there[:, None] * on_ramp
-            heights[:, -1] += behind
+        outward_slope = self.carriageway.sign * crossfall
+        verge_fall = (distances - plane_distances) * self.carriageway.verge_slope_percent / 100.0
+        heights = outward_slope[:, None] * (plane_distances - self.pivot(station)[:, None]) - verge_fall
+        for surface, tilt, lift_behind in self._ramps(station, outward_slope):
+            ramp_start = self._beyond_island
+            on_ramp = surface.lift[:, None] + tilt[:, None] * (
+                plane_distances[:, ramp_start:] - distances[:, ramp_start, None]
+            )
+            heights[:, ramp_start:] += surface.there[:, None] * on_ramp
+            heights[:, -1] += lift_behind
         return heights
 
     def ramp_fields(self, station: Float, crossfall: Float) -> RampFields:
@@ -152,41 +154,43 @@ class CarriagewaySection:
 
         In the step at a ramp's end they are those of either end of it.
         """
-        distances, rise = self.distances(station), self.carriageway.sign * crossfall
+        distances, outward_slope = self.distances(station), self.carriageway.sign * crossfall
         fields = RampFields(*(np.zeros(station.shape) for _ in range(3)))
-        for surface, tilt, behind in self._ramps(station, rise):
-            ended = surface.there < 0.5
-            width = np.where(ended, 0.0, self._plane_edge(station, distances) - distances[:, self._beyond_island])
-            lift = np.where(ended, behind, surface.lift)
-            mine = np.where(ended, surface.behind > 0.0, (surface.lift != 0.0) | (surface.own > 0.0))
+        for surface, tilt, lift_behind in self._ramps(station, outward_slope):
+            is_behind_ramp = surface.there < 0.5
+            width = np.where(
+                is_behind_ramp, 0.0, self._plane_edge(station, distances) - distances[:, self._beyond_island]
+            )
+            lift = np.where(is_behind_ramp, lift_behind, surface.lift)
+            is_of_ramp = np.where(is_behind_ramp, surface.behind > 0.0, (surface.lift != 0.0) | (surface.own > 0.0))
             fields = RampFields(
-                np.where(mine, width, fields.width),
-                np.where(mine, lift, fields.lift),
-                np.where(mine & ~ended, tilt, fields.tilt),
+                np.where(is_of_ramp, width, fields.width),
+                np.where(is_of_ramp, lift, fields.lift),
+                np.where(is_of_ramp & ~is_behind_ramp, tilt, fields.tilt),
             )
         return fields
 
-    def _ramps(self, station: Float, rise: Float) -> Iterator[tuple[RampSurface, Float, Float]]:
+    def _ramps(self, station: Float, outward_slope: Float) -> Iterator[tuple[RampSurface, Float, Float]]:
         """Yield of each ramp near that leaves the pavement's plane how it lies, its tilt, and its verge's lift behind.
 
         Args:
             station: (N,) stations, m.
-            rise: (N,) how much the plane rises outwards there, m/m. The tilt (N,), m/m, is what the ramp rises more;
-                the lift (N,), m, is that of the verge's outer edge behind the ramp's end.
+            outward_slope: (N,) how much the plane rises outwards there, m/m. The tilt (N,), m/m, is what the ramp rises
+                more; the lift (N,), m, is that of the verge's outer edge behind the ramp's end.
         """
         for shape in self._turnouts_near(station):
             ramp, surface = shape.turnout.ramp, shape.ramp_surface(station)
             if ramp is not None and surface is not None:
-                tilt = surface.own * (self.carriageway.sign * (ramp.crossfall_percent or 0.0) / 100.0 - rise)
+                tilt = surface.own * (self.carriageway.sign * (ramp.crossfall_percent or 0.0) / 100.0 - outward_slope)
                 yield surface, tilt, surface.behind * (surface.lift + tilt * ramp_width(ramp))
 
     def _turnouts_near(self, station: Float) -> list[TurnoutShape]:
         """Return the turnouts that may change a width at any station (N,); of a long road's many only a few are."""
         if not self.turnouts or not len(station):
             return []
-        # Not what lies apart, so that stations that aren't a number are near all.
-        near = ~((self._first > station.max()) | (self._last < station.min()))
-        return [self.turnouts[number] for number in np.flatnonzero(near) if self.turnouts[number].reaches(station)]
+        # As a negation, so that a NaN among the stations, with which all comparisons are false, is near all turnouts.
+        is_near = ~((self._first > station.max()) | (self._last < station.min()))
+        return [self.turnouts[number] for number in np.flatnonzero(is_near) if self.turnouts[number].reaches(station)]
 
     @property
     def _beyond_island(self) -> int:
@@ -198,8 +202,8 @@ class CarriagewaySection:
 
         Only behind a ramp's end is it not the pavement's edge.
         """
-        near = [shape.widths(station).verge_extra for shape in self._turnouts_near(station)]
-        return np.asarray(sum(near, distances[:, -2]))
+        verge_extras = [shape.widths(station).verge_extra for shape in self._turnouts_near(station)]
+        return np.asarray(sum(verge_extras, distances[:, -2]))
 
     def kinks(self) -> list[float]:
         """Return the stations (m, unsorted) at which the rate of change of a strip's width jumps."""
@@ -219,6 +223,10 @@ class CarriagewaySection:
         return sum((shape.bend(station) for shape in self.turnouts), np.zeros(station.shape))
 
     def _distances(self, station: Float) -> Float:
+        """Return the (N, B) `distances` at stations (N,), m: the sums of the strips' widths from the inside out.
+
+        Beside turnouts the hard shoulder gives way, and behind a ramp's end the verge is wider.
+        """
         shapes = [shape.widths(station) for shape in self._turnouts_near(station)]
         columns = [width_at(self.carriageway.inner_offset, station)]
         for kind, width in self._widths:

@@ -52,9 +52,11 @@ def frame_of(geometry: RoadGeometry, start: float, end: float) -> tuple[Float, i
         geometry: the whole road's.
         start, end: stations, m.
     """
-    middle = np.array([(start + end) / 2.0])
-    place = np.array([*geometry.alignment.position(middle)[0], *geometry.profile.elevation(middle)])
-    origin = FRAME * np.round(place / FRAME) + 0.0  # no negative zero
+    middle_station = np.array([(start + end) / 2.0])
+    middle_point = np.array(
+        [*geometry.alignment.position(middle_station)[0], *geometry.profile.elevation(middle_station)]
+    )
+    origin = FRAME * np.round(middle_point / FRAME) + 0.0  # no negative zero
     return origin, int(max(0.0, FRAME * math.floor((start - _BEFORE) / FRAME)))
 
 
@@ -64,11 +66,11 @@ def cut_stretch(parameters: RoadParameters, start: float, end: float) -> RoadPar
     The road itself stays whole, and so do plants, which are cut with its surface, and what runs obliquely. What is
     periodic (posts, dashes) is cut in its rhythm.
     """
-    last = end >= parameters.alignment.length
+    is_last = end >= parameters.alignment.length
     objects: dict[str, RoadObject] = {}
     for name, item in parameters.objects.items():
         if isinstance(item, PointObject | Vehicle):
-            if start <= item.station < end or (last and item.station >= end):
+            if start <= item.station < end or (is_last and item.station >= end):
                 objects[name] = item
         elif isinstance(item, LineObject | LineMarking):
             if item.end_station > start and item.start_station < end:
@@ -80,17 +82,20 @@ def cut_stretch(parameters: RoadParameters, start: float, end: float) -> RoadPar
 
 def _cut_line(item: LineObject | LineMarking, start: float, end: float) -> RoadObject:
     """Return a line object cut to begin and end near a stretch; its beginning moves by whole periods."""
-    low, high = start - BEYOND, end + BEYOND
+    first_station, last_station = start - BEYOND, end + BEYOND
     update: dict[str, float] = {}
-    if item.start_station < low:
+    if item.start_station < first_station:
         period = _period(item)
-        update["start_station"] = item.start_station + period * math.floor((low - item.start_station) / period)
-    if item.end_station > high:
-        update["end_station"] = high
+        update["start_station"] = item.start_station + period * math.floor(
+            (first_station - item.start_station) / period
+        )
+    if item.end_station > last_station:
+        update["end_station"] = last_station
     return item.model_copy(update=update) if update else item
 
 
 def _period(item: LineObject | LineMarking) -> float:
+    """Return the length (m) after which a line object repeats itself: dash and gap, or the spacing of its posts."""
     if isinstance(item, LineMarking):
         return item.dash_length + item.gap_length or 1.0
     return float(getattr(item, "post_spacing", 0.0) or _BARRIER_PERIOD)

@@ -108,6 +108,7 @@ class Vegetation(RoadObject):
 
     @model_validator(mode="after")
     def _fits(self) -> Vegetation:
+        """Return the plants unchanged; ValueError for a range that ends before its begin or a species of other kind."""
         ends = (self.band_end, self.height_max, self.end_station)
         begins = (self.band_start, self.height_min, self.start_station)
         if any(end < begin for begin, end in zip(begins, ends, strict=True)):
@@ -176,6 +177,7 @@ class Landscape(RoadObject):
 
     @model_validator(mode="after")
     def _fits(self) -> Landscape:
+        """Return the landscape unchanged; ValueError if forest and meadow have more than all of the land."""
         if self.forest_share + self.meadow_share > 1.0:
             raise ValueError("forest_share and meadow_share must not be more than 1 together")
         return self
@@ -230,9 +232,10 @@ class MaterialVariation(Model):
 
     @model_validator(mode="after")
     def _name_materials_once(self) -> MaterialVariation:
-        twice = first_repeated([texture.material for texture in self.textures])
-        if twice is not None:
-            raise ValueError(f"textures has '{twice}' twice: one set of images is allowed for each material")
+        """Return the variation unchanged; ValueError if two sets of images are for the same material."""
+        repeated_name = first_repeated([texture.material for texture in self.textures])
+        if repeated_name is not None:
+            raise ValueError(f"textures has '{repeated_name}' twice: one set of images is allowed for each material")
         return self
 
     def texture(self, material: str) -> MaterialTexture | None:

@@ -42,33 +42,33 @@ def ground_elevation(geometry: RoadGeometry, terrain: Terrain, station: Float, o
     Raises:
         InputError: the elevation model is missing, unreadable or unfit for this road.
     """
-    plan = geometry.alignment.place(station, offset)
+    xy = geometry.alignment.place(station, offset)
     if terrain.elevation_model is None:
-        return geometry.profile.elevation(station) - terrain.embankment_height + undulation(terrain, plan)
+        return geometry.profile.elevation(station) - terrain.embankment_height + undulation(terrain, xy)
     parameters = geometry.parameters
     east, north, height = parameters.transform.translate
     model = road_elevation_model(
         terrain.elevation_model, parameters.metadata.epsg, parameters.alignment, (east, north), terrain.half_width
     )
-    return model.elevation(plan[:, 0] + east, plan[:, 1] + north) - height
+    return model.elevation(xy[:, 0] + east, xy[:, 1] + north) - height
 
 
-def undulation(terrain: Terrain, plan: Float) -> Float:
+def undulation(terrain: Terrain, xy: Float) -> Float:
     """Return the generated ground's height (N,) above its mean at local points (N, 2), m.
 
     A sum of seeded plane waves over the plan, whose wavelengths spread over three octaves above ``wavelength`` and
     whose heights have the standard deviation ``undulation``.
     """
     rng = stream(terrain.seed, "terrain undulation")
-    octave = rng.uniform(0.0, _OCTAVES, _WAVES)
-    direction = rng.uniform(0.0, 2.0 * np.pi, _WAVES)
-    phase = rng.uniform(0.0, 2.0 * np.pi, _WAVES)
+    octaves = rng.uniform(0.0, _OCTAVES, _WAVES)
+    directions = rng.uniform(0.0, 2.0 * np.pi, _WAVES)
+    phases = rng.uniform(0.0, 2.0 * np.pi, _WAVES)
     # Longer waves are higher; a wave of amplitude a has the variance a^2 / 2.
-    weight = 2.0**octave
-    amplitude = terrain.undulation * weight * np.sqrt(2.0 / np.sum(weight**2))
-    number = 2.0 * np.pi / (terrain.wavelength * weight)
-    vectors = number * np.stack([np.cos(direction), np.sin(direction)])
-    return np.sin(plan @ vectors + phase) @ amplitude
+    weights = 2.0**octaves
+    amplitude = terrain.undulation * weights * np.sqrt(2.0 / np.sum(weights**2))
+    wave_numbers = 2.0 * np.pi / (terrain.wavelength * weights)
+    vectors = wave_numbers * np.stack([np.cos(directions), np.sin(directions)])
+    return np.sin(xy @ vectors + phases) @ amplitude
 
 
 def road_elevation_model(
@@ -94,6 +94,7 @@ def road_elevation_model(
 def _read_model(
     path: str, _stamp: tuple[int, int], epsg: int, axis: AlignmentObject, origin: tuple[float, float], reach: float
 ) -> ElevationModel:
+    """Return the elevation model for a road's corridor; the file's stamp is in the cache's key and not used else."""
     return read_elevation_model(path, epsg, Corridor(alignment_of(axis), *origin, reach))
 
 
@@ -111,9 +112,9 @@ def fit_to_ground(
     alignment, (east, north) = alignment_of(axis), origin
     count = int(np.ceil(alignment.length / _FIT_SPACING))
     station = (np.arange(count) + 0.5) * (alignment.length / count)
-    plan = alignment.position(station)
-    above = profile_of(axis).elevation(station) - model.elevation(plan[:, 0] + east, plan[:, 1] + north)
-    return east, north, round_value(embankment_height - float(np.mean(above)))
+    xy = alignment.position(station)
+    heights_above = profile_of(axis).elevation(station) - model.elevation(xy[:, 0] + east, xy[:, 1] + north)
+    return east, north, round_value(embankment_height - float(np.mean(heights_above)))
 
 
 def surface_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
@@ -123,40 +124,44 @@ def surface_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> 
     as in `batter_height`; without a terrain the road's edge goes on level.
     """
     boundaries = geometry.boundaries(station)
-    within = np.clip(offset, boundaries[0][:, -1], boundaries[0][:, 0])
-    height = geometry.elevation(station, within, boundaries)
+    edge_offset = np.clip(offset, boundaries[0][:, -1], boundaries[0][:, 0])
+    height = geometry.elevation(station, edge_offset, boundaries)
     terrain = geometry.terrain
-    beside = np.flatnonzero(within != offset)
-    if terrain is not None and len(beside):
-        distance, edge = np.abs(offset - within)[beside], height[beside]
-        above = ground_elevation(geometry, terrain, station[beside], offset[beside]) - edge
-        at_edge = above
+    beside_road = np.flatnonzero(edge_offset != offset)
+    if terrain is not None and len(beside_road):
+        distance, edge = np.abs(offset - edge_offset)[beside_road], height[beside_road]
+        ground_height = ground_elevation(geometry, terrain, station[beside_road], offset[beside_road]) - edge
+        ground_at_edge = ground_height
         if is_shaped(terrain):
-            at_edge = ground_elevation(geometry, terrain, station[beside], within[beside]) - edge
-        height[beside] = edge + batter_height(terrain, distance, above, at_edge)
+            ground_at_edge = ground_elevation(geometry, terrain, station[beside_road], edge_offset[beside_road]) - edge
+        height[beside_road] = edge + batter_height(terrain, distance, ground_height, ground_at_edge)
     return height
 
 
 def known_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
     """Return the surface's local elevation (N,), m, with the road's edge going on where an elevation model ends."""
     height = np.empty(station.shape)
-    for first in range(0, len(station), _BLOCK):
-        part = slice(first, first + _BLOCK)
-        height[part] = surface_elevation(geometry, station[part], offset[part])
-    unknown = np.flatnonzero(np.isnan(height))
-    if len(unknown):
-        edges = geometry.offsets(station[unknown])
-        within = np.clip(offset[unknown], edges[:, -1], edges[:, 0])
-        height[unknown] = geometry.elevation(station[unknown], within)
+    for begin in range(0, len(station), _BLOCK):
+        block = slice(begin, begin + _BLOCK)
+        height[block] = surface_elevation(geometry, station[block], offset[block])
+    unknown_rows = np.flatnonzero(np.isnan(height))
+    if len(unknown_rows):
+        edges = geometry.offsets(station[unknown_rows])
+        edge_offset = np.clip(offset[unknown_rows], edges[:, -1], edges[:, 0])
+        height[unknown_rows] = geometry.elevation(station[unknown_rows], edge_offset)
     return height
 
 
 def highest_pavement(geometry: RoadGeometry, station: Float, offset: Float) -> float | None:
     """Return the largest local elevation, m, of those places (N,) that are paved; None if none is."""
     strip = geometry.strip_index(station, offset)
-    paved = np.array([item.class_name == "road" for item in geometry.strips])
-    on = (strip >= 0) & paved[strip] & (station >= 0.0) & (station <= geometry.length)
-    return float(np.max(geometry.elevation(station[on], offset[on]))) if on.any() else None
+    is_pavement = np.array([item.class_name == "road" for item in geometry.strips])
+    is_on_pavement = (strip >= 0) & is_pavement[strip] & (station >= 0.0) & (station <= geometry.length)
+    return (
+        float(np.max(geometry.elevation(station[is_on_pavement], offset[is_on_pavement])))
+        if is_on_pavement.any()
+        else None
+    )
 
 
 def is_shaped(terrain: Terrain) -> bool:
@@ -164,76 +169,82 @@ def is_shaped(terrain: Terrain) -> bool:
     return bool(terrain.crest_length or terrain.rounding_length or terrain.swale_width or terrain.ditch_width)
 
 
-def batter_height(terrain: Terrain, distance: Float, ground: Float, at_edge: Float) -> Float:
-    """Return the height (N,) above the road's edge, m, of what lies beside it.
+def batter_height(terrain: Terrain, distance: Float, ground: Float, ground_at_edge: Float) -> Float:
+    """Return the height (N,) above the road's edge, m, of the batter or the ground beside it.
+
+    In a cutting: the lower one of the ground and the surface that rises through the swale to the batter. On an
+    embankment: the higher one of the ground and the surface that falls over the crest. Either pair is rounded where the
+    two meet.
 
     Args:
         terrain: its slope, lengths and widths.
         distance: (N,) outwards from the edge, m.
         ground: (N,) height of the ground there before the road was built, above the edge, m.
-        at_edge: (N,) height of that ground at the edge, above the edge, m.
+        ground_at_edge: (N,) height of that ground at the edge, above the edge, m.
     """
-    width, rounding = terrain.swale_width, rounding_height(terrain, at_edge)
-    depth = swale_share(at_edge) * terrain.swale_depth if width else np.zeros(distance.shape)
-    upper = _rise(distance - width / 2.0, width / 4.0) / terrain.batter_slope
-    lower = -_rise(distance, terrain.crest_length) / terrain.batter_slope
+    width, rounding = terrain.swale_width, rounding_height(terrain, ground_at_edge)
+    depth = swale_share(ground_at_edge) * terrain.swale_depth if width else np.zeros(distance.shape)
+    cutting_surface = _rise(distance - width / 2.0, width / 4.0) / terrain.batter_slope
+    embankment_surface = -_rise(distance, terrain.crest_length) / terrain.batter_slope
     if width:
-        upper = upper - depth * np.sin(np.pi * np.minimum(distance / width, 1.0)) ** 2
-    cutting = np.maximum(-_smooth_maximum(-ground, -upper, rounding), lower - 2.0 * depth)
+        cutting_surface = cutting_surface - depth * np.sin(np.pi * np.minimum(distance / width, 1.0)) ** 2
+    cutting = np.maximum(-_smooth_maximum(-ground, -cutting_surface, rounding), embankment_surface - 2.0 * depth)
     if terrain.ditch_width:
-        ditch = ditch_share(terrain, at_edge)
-        # How far beyond the foot a place lies, on level ground.
-        beyond = np.clip((ground - lower) * terrain.batter_slope / terrain.ditch_width, 0.0, 1.0)
-        ground = ground - ditch * terrain.ditch_depth * np.sin(np.pi * beyond) ** 2
+        ditch = ditch_share(terrain, ground_at_edge)
+        # Distance beyond the batter's foot as a share of the ditch's width, exact on level ground.
+        share_beyond_foot = np.clip(
+            (ground - embankment_surface) * terrain.batter_slope / terrain.ditch_width, 0.0, 1.0
+        )
+        ground = ground - ditch * terrain.ditch_depth * np.sin(np.pi * share_beyond_foot) ** 2
         rounding = rounding * (1.0 - ditch)
-    embankment = np.minimum(_smooth_maximum(ground, lower, rounding), upper)
-    return np.where(at_edge > 0.0, cutting, embankment)
+    embankment = np.minimum(_smooth_maximum(ground, embankment_surface, rounding), cutting_surface)
+    return np.where(ground_at_edge > 0.0, cutting, embankment)
 
 
-def swale_share(at_edge: Float) -> Float:
+def swale_share(ground_at_edge: Float) -> Float:
     """Return the share (N,) of its full depth that a swale has, by the ground's height at the road's edge (N,), m."""
-    return np.clip((at_edge - SWALE_FROM) / (SWALE_FULL - SWALE_FROM), 0.0, 1.0)
+    return np.clip((ground_at_edge - SWALE_FROM) / (SWALE_FULL - SWALE_FROM), 0.0, 1.0)
 
 
-def ditch_share(terrain: Terrain, at_edge: Float) -> Float:
+def ditch_share(terrain: Terrain, ground_at_edge: Float) -> Float:
     """Return the share (N,) of its full depth that a ditch has; beside it the batter's foot isn't rounded."""
-    return swale_share(-at_edge) if terrain.ditch_width else np.zeros(at_edge.shape)
+    return swale_share(-ground_at_edge) if terrain.ditch_width else np.zeros(ground_at_edge.shape)
 
 
-def foot_reach(terrain: Terrain, at_edge: Float) -> tuple[Float, Float]:
+def foot_reach(terrain: Terrain, ground_at_edge: Float) -> tuple[Float, Float]:
     """Return how far (N,) before and beyond the batter's foot rounding or ditch reach, m."""
-    ditch = ditch_share(terrain, at_edge)
-    tangent = rounding_height(terrain, at_edge) * terrain.batter_slope * (1.0 - ditch)
+    ditch = ditch_share(terrain, ground_at_edge)
+    tangent = rounding_height(terrain, ground_at_edge) * terrain.batter_slope * (1.0 - ditch)
     return tangent, np.maximum(tangent, np.where(ditch > 0.0, terrain.ditch_width, 0.0))
 
 
-def rounding_height(terrain: Terrain, at_edge: Float) -> Float:
+def rounding_height(terrain: Terrain, ground_at_edge: Float) -> Float:
     """Return the height (N,), m, by which batter and ground differ where their rounding begins.
 
     The tangents are as long as the terrain's rounding on a batter high enough for it, else shorter.
     """
-    return np.minimum(terrain.rounding_length / terrain.batter_slope, np.abs(at_edge))
+    return np.minimum(terrain.rounding_length / terrain.batter_slope, np.abs(ground_at_edge))
 
 
-def batter_begin(terrain: Terrain, at_edge: Float) -> Float:
+def batter_begin(terrain: Terrain, ground_at_edge: Float) -> Float:
     """Return the distance (N,) from the road's edge, m, at which the batter's plane is as high as the edge."""
-    return np.where(at_edge > 0.0, 0.75 * terrain.swale_width, terrain.crest_length)
+    return np.where(ground_at_edge > 0.0, 0.75 * terrain.swale_width, terrain.crest_length)
 
 
-def shaped_width(terrain: Terrain, at_edge: Float) -> Float:
+def shaped_width(terrain: Terrain, ground_at_edge: Float) -> Float:
     """Return the distance (N,) from the road's edge, m, from which the batter is a plane."""
-    return np.where(at_edge > 0.0, terrain.swale_width, 2.0 * terrain.crest_length)
+    return np.where(ground_at_edge > 0.0, terrain.swale_width, 2.0 * terrain.crest_length)
 
 
 def _rise(distance: Float, tangent: float) -> Float:
     """Return how far (N,) a plane of slope 1 has risen at distances (N,), rounded from level over two tangents (m)."""
-    beyond = np.maximum(distance, 0.0)
+    distance_beyond = np.maximum(distance, 0.0)
     if tangent <= 0.0:
-        return beyond
-    return np.where(beyond < 2.0 * tangent, beyond**2 / (4.0 * tangent), beyond - tangent)
+        return distance_beyond
+    return np.where(distance_beyond < 2.0 * tangent, distance_beyond**2 / (4.0 * tangent), distance_beyond - tangent)
 
 
 def _smooth_maximum(first: Float, second: Float, rounding: Float) -> Float:
     """Return the larger of two heights (N,), m, rounded by a parabola where they differ by less than ``rounding``."""
-    near = np.maximum(rounding - np.abs(first - second), 0.0)
-    return np.maximum(first, second) + near**2 / np.maximum(4.0 * rounding, 1e-12)
+    closeness = np.maximum(rounding - np.abs(first - second), 0.0)
+    return np.maximum(first, second) + closeness**2 / np.maximum(4.0 * rounding, 1e-12)

@@ -44,50 +44,51 @@ def sample_stations(geometry: RoadGeometry, tolerance: float, start: float = 0.0
     # Between the two ends of a step there is nothing to follow.
     spacing = np.where(np.diff(kinks) <= 2.0 * STEP, np.inf, np.minimum(spacing, MAXIMUM_SPACING))
     counts = np.maximum(1, np.ceil(np.diff(kinks) / spacing - 1e-9)).astype(int)
-    first = np.repeat(kinks[:-1], counts)
-    step = np.repeat(np.diff(kinks) / counts, counts)
-    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    stations = np.append(first + within * step, kinks[-1])
-    low, high = (int(np.searchsorted(stations, place, side="right")) - 1 for place in (start, end))
-    low = max(low, 0)
-    return stations[low : max(high, low + 1) + 1]
+    interval_starts = np.repeat(kinks[:-1], counts)
+    steps = np.repeat(np.diff(kinks) / counts, counts)
+    number_in_interval = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    stations = np.append(interval_starts + number_in_interval * steps, kinks[-1])
+    first_row, last_row = (int(np.searchsorted(stations, place, side="right")) - 1 for place in (start, end))
+    first_row = max(first_row, 0)
+    return stations[first_row : max(last_row, first_row + 1) + 1]
 
 
 def _kinks(geometry: RoadGeometry, tolerance: float) -> Float:
+    """Return the sorted stations (K,), m, at which any of the road's functions bends or jumps, both ends included."""
     parameters, end = geometry.parameters, geometry.length
     stations = [geometry.alignment.element_starts, np.asarray(geometry.profile.breakpoints), [0.0, end]]
     for section in geometry.sections.values():
         stations.append([point.station for point in section.carriageway.crossfall])
         stations += [section.kinks(), damage_rows(section, tolerance)]
     stations += [geometry.dashes(line).ravel() for line in parameters.of_type(LineMarking).values()]
-    inside = np.clip(np.concatenate([np.asarray(s, dtype=np.float64) for s in stations]), 0.0, end)
-    kinks = np.unique(inside)
+    clipped = np.clip(np.concatenate([np.asarray(s, dtype=np.float64) for s in stations]), 0.0, end)
+    kinks = np.unique(clipped)
     # Kinks closer than a tenth of a millimetre are one: they would only make faces without area.
-    keep = np.append(np.diff(kinks) > 1e-4, True)
-    keep[0] = True
-    return kinks[keep] if len(kinks) > 2 else kinks
+    keep_mask = np.append(np.diff(kinks) > 1e-4, True)
+    keep_mask[0] = True
+    return kinks[keep_mask] if len(kinks) > 2 else kinks
 
 
 def _enclosing_kinks(kinks: Float, start: float, end: float) -> Float:
     """Return those of the sorted kinks that enclose the stations from start to end, at least two."""
-    low = int(np.clip(np.searchsorted(kinks, start, side="right") - 1, 0, len(kinks) - 2))
-    high = int(np.searchsorted(kinks, end, side="left"))
-    return kinks[low : max(high, low + 1) + 1]
+    first_kink = int(np.clip(np.searchsorted(kinks, start, side="right") - 1, 0, len(kinks) - 2))
+    last_kink = int(np.searchsorted(kinks, end, side="left"))
+    return kinks[first_kink : max(last_kink, first_kink + 1) + 1]
 
 
 def _chord_spacing(geometry: RoadGeometry, kinks: Float, tolerance: float) -> Float:
     """Return the largest spacings (K,), m, whose horizontal and vertical sagitta keep their share of the tolerance."""
     samples = np.linspace(kinks[:-1] + 1e-6, kinks[1:] - 1e-6, 5)
-    widest = np.abs(geometry.offsets(kinks)).max(axis=1)
-    reach = np.maximum(widest[:-1], widest[1:])
-    bend = np.abs(geometry.alignment.curvature(samples)).max(axis=0)
+    largest_offsets = np.abs(geometry.offsets(kinks)).max(axis=1)
+    reach = np.maximum(largest_offsets[:-1], largest_offsets[1:])
+    curvature = np.abs(geometry.alignment.curvature(samples)).max(axis=0)
     for section in geometry.sections.values():
-        bend = bend + section.bend(samples.ravel()).reshape(samples.shape).max(axis=0)
-    horizontal = bend * (1.0 + bend * reach)
-    vertical = np.abs(geometry.profile.curvature(samples)).max(axis=0)
+        curvature = curvature + section.bend(samples.ravel()).reshape(samples.shape).max(axis=0)
+    horizontal_curvature = curvature * (1.0 + curvature * reach)
+    vertical_curvature = np.abs(geometry.profile.curvature(samples)).max(axis=0)
     for section in geometry.sections.values():
-        vertical = vertical + section.ramp_bend(samples.ravel()).reshape(samples.shape).max(axis=0)
-    return np.sqrt(8.0 * _SHARE * tolerance / np.maximum(np.maximum(horizontal, vertical), 1e-12))
+        vertical_curvature = vertical_curvature + section.ramp_bend(samples.ravel()).reshape(samples.shape).max(axis=0)
+    return np.sqrt(8.0 * _SHARE * tolerance / np.maximum(np.maximum(horizontal_curvature, vertical_curvature), 1e-12))
 
 
 def _twist_spacing(geometry: RoadGeometry, kinks: Float, tolerance: float) -> Float:
@@ -99,7 +100,7 @@ def _twist_spacing(geometry: RoadGeometry, kinks: Float, tolerance: float) -> Fl
     heights = np.diff(geometry.boundary_elevations(kinks), axis=1)
     # A strip without width lies in no plane; one that opens from 0 has the slope that it opens to.
     slopes = np.where(widths > 1e-6, heights / np.maximum(widths, 1e-6), np.nan)
-    change = np.nan_to_num(np.abs(np.diff(slopes, axis=0)))
-    widest = np.maximum(widths[:-1], widths[1:])
-    twist = (change * widest).max(axis=1) / np.diff(kinks)
+    slope_changes = np.nan_to_num(np.abs(np.diff(slopes, axis=0)))
+    largest_widths = np.maximum(widths[:-1], widths[1:])
+    twist = (slope_changes * largest_widths).max(axis=1) / np.diff(kinks)
     return 4.0 * _SHARE * tolerance / np.maximum(twist, 1e-12)

@@ -89,9 +89,10 @@ class TurnoutShape:
         self._tip = self._taper + turnout.lane_length
         self.nose = np.inf
         if turnout.ramp:
-            full = float(width_at(carriageway.hard_shoulder_width, self.station(self._tip)))
-            cubed = 6.0 * turnout.ramp.clothoid_parameter**2 * (full + NOSE_WIDTH)
-            self.nose = max(min(cubed ** (1.0 / 3.0), turnout.ramp.length - NOSE_BEFORE_END), STEP)
+            # Where x^3 / (6 A^2), by which a clothoid leaves its tangent, is the shoulder's width and the nose's.
+            shoulder_at_tip = float(width_at(carriageway.hard_shoulder_width, self.station(self._tip)))
+            nose_cubed = 6.0 * turnout.ramp.clothoid_parameter**2 * (shoulder_at_tip + NOSE_WIDTH)
+            self.nose = max(min(nose_cubed ** (1.0 / 3.0), turnout.ramp.length - NOSE_BEFORE_END), STEP)
         self._range = self.range()
 
     def station(self, w: float) -> float:
@@ -100,12 +101,15 @@ class TurnoutShape:
 
     def kinks(self) -> list[float]:
         """Return the stations (m, unsorted) at which a width's rate of change, or a width, jumps."""
-        last = self.turnout.length + STEP + BLEND if self.turnout.ramp else self.turnout.length
-        marks = [self.station(w) for w in (0.0, self._taper, self._tip, last)]
+        end_distance = self.turnout.length + STEP + BLEND if self.turnout.ramp else self.turnout.length
+        marks = [self.station(w) for w in (0.0, self._taper, self._tip, end_distance)]
         if self.turnout.ramp:
-            marks += [self.nose_station(behind) for behind in NOSE_ROUND[2:].tolist()]
-            last = self.turnout.ramp.length - self.nose
-            marks += [self.nose_station(min(behind, last)) for behind in self._surface_marks(self.turnout.ramp)]
+            marks += [self.nose_station(distance_behind) for distance_behind in NOSE_ROUND[2:].tolist()]
+            end_distance = self.turnout.ramp.length - self.nose
+            marks += [
+                self.nose_station(min(distance_behind, end_distance))
+                for distance_behind in self._surface_marks(self.turnout.ramp)
+            ]
         return [*marks, *(station for step in self.steps() for station in step)]
 
     def steps(self) -> list[tuple[float, float]]:
@@ -114,7 +118,7 @@ class TurnoutShape:
             return []
         begins = [self._tip + x for x in (self.nose, self.turnout.ramp.length)]
         steps = [sorted((self.station(w), self.station(w + STEP))) for w in begins]
-        return [(low, high) for low, high in steps]
+        return [(lowest, highest) for lowest, highest in steps]
 
     def range(self) -> tuple[float, float]:
         """Return the lowest and the highest station, m, at which the turnout changes any width."""
@@ -123,8 +127,8 @@ class TurnoutShape:
 
     def reaches(self, station: Float) -> bool:
         """Say whether any station (N,) may lie where the turnout changes a width."""
-        low, high = self._range
-        return not np.all((station > high) | (station < low))
+        lowest, highest = self._range
+        return not np.all((station > highest) | (station < lowest))
 
     def gore_tip(self) -> float:
         """Return the station of the gore's tip, m; only exits and entries have one."""
@@ -147,8 +151,10 @@ class TurnoutShape:
         ramp = self.turnout.ramp
         if ramp is None or ramp.grade_percent == 0.0:
             return np.zeros(station.shape)
-        behind = self._x(station) - self.nose
-        return np.where((behind > 0.0) & (behind < _curve_length(ramp)), 1.0 / ramp.rounding_radius, 0.0)
+        distance_behind = self._x(station) - self.nose
+        return np.where(
+            (distance_behind > 0.0) & (distance_behind < _curve_length(ramp)), 1.0 / ramp.rounding_radius, 0.0
+        )
 
     def ramp_surface(self, station: Float) -> RampSurface | None:
         """Return how the ramp lies at stations (N,), m; None where it has neither crossfall nor grade of its own."""
@@ -156,13 +162,17 @@ class TurnoutShape:
         if ramp is None or (ramp.crossfall_percent is None and ramp.grade_percent == 0.0):
             return None
         x = self._x(station)
-        there, blend = _end_of_ramp(ramp, x)
-        behind = np.clip(x, self.nose, ramp.length) - self.nose
-        curve = np.minimum(behind, _curve_length(ramp))
-        rounded = np.copysign(curve**2 / (2.0 * ramp.rounding_radius), ramp.grade_percent)
-        lift = rounded + ramp.grade_percent / 100.0 * (behind - curve)
-        run_off = np.zeros(x.shape) if ramp.crossfall_percent is None else np.minimum(behind / ramp.run_off_length, 1.0)
-        return RampSurface(there, (1.0 - there) * blend, lift, run_off)
+        presence, blend = _end_of_ramp(ramp, x)
+        distance_behind = np.clip(x, self.nose, ramp.length) - self.nose
+        distance_in_curve = np.minimum(distance_behind, _curve_length(ramp))
+        curve_rise = np.copysign(distance_in_curve**2 / (2.0 * ramp.rounding_radius), ramp.grade_percent)
+        lift = curve_rise + ramp.grade_percent / 100.0 * (distance_behind - distance_in_curve)
+        run_off = (
+            np.zeros(x.shape)
+            if ramp.crossfall_percent is None
+            else np.minimum(distance_behind / ramp.run_off_length, 1.0)
+        )
+        return RampSurface(presence, (1.0 - presence) * blend, lift, run_off)
 
     @staticmethod
     def _surface_marks(ramp: Ramp) -> list[float]:
@@ -172,47 +182,58 @@ class TurnoutShape:
 
     def widths(self, station: Float) -> TurnoutWidths:
         """Return the widths of the turnout's strips, and how others change, at stations (N,), m."""
-        full = width_at(self.carriageway.hard_shoulder_width, station)
+        full_shoulder = width_at(self.carriageway.hard_shoulder_width, station)
         strips = {kind: np.zeros(station.shape) for kind in TURNOUT_STRIPS}
         turnout, w = self.turnout, self._w(station)
         if turnout.ramp is None:
-            opened = np.minimum(w / turnout.taper_in_length, (turnout.length - w) / turnout.taper_out_length)
-            strips["bay"] = turnout.lane_width * np.clip(opened, 0.0, 1.0)
-            return TurnoutWidths(strips, full, np.zeros(station.shape), np.zeros(station.shape))
-        return self._with_ramp(turnout.ramp, w, full, strips)
+            open_share = np.minimum(w / turnout.taper_in_length, (turnout.length - w) / turnout.taper_out_length)
+            strips["bay"] = turnout.lane_width * np.clip(open_share, 0.0, 1.0)
+            return TurnoutWidths(strips, full_shoulder, np.zeros(station.shape), np.zeros(station.shape))
+        return self._with_ramp(turnout.ramp, w, full_shoulder, strips)
 
-    def _with_ramp(self, ramp: Ramp, w: Float, full: Float, strips: dict[str, Float]) -> TurnoutWidths:
+    def _with_ramp(self, ramp: Ramp, w: Float, full_shoulder: Float, strips: dict[str, Float]) -> TurnoutWidths:
+        """Return the widths of an exit's or entry's strips, m, filled into the zeros of `strips`.
+
+        Args:
+            ramp: its ramp.
+            w: (N,) distances along the turnout, m.
+            full_shoulder: (N,) width of the main road's hard shoulder, m.
+            strips: width by kind, changed in place.
+        """
         turnout, x = self.turnout, w - self._taper - self.turnout.lane_length
-        opened = np.clip(w / self._taper, 0.0, 1.0)
+        open_share = np.clip(w / self._taper, 0.0, 1.0)
         to_ramp = np.clip(x / self.nose, 0.0, 1.0)
         behind_nose = np.clip((x - self.nose) / STEP, 0.0, 1.0)
-        there, blend = _end_of_ramp(ramp, x)
-        wedge = np.clip(x, 0.0, ramp.length) ** 3 / (6.0 * ramp.clothoid_parameter**2)
+        presence, blend = _end_of_ramp(ramp, x)
+        distance_apart = np.clip(x, 0.0, ramp.length) ** 3 / (6.0 * ramp.clothoid_parameter**2)
 
-        def between(lane: float, of_ramp: float) -> Float:
-            return there * (opened * lane * (1.0 - to_ramp) + of_ramp * to_ramp)
+        def between(lane_width: float, ramp_width_there: float) -> Float:
+            """Return a strip's width (N,), m: it opens over the taper and turns into the ramp's up to the nose."""
+            return presence * (open_share * lane_width * (1.0 - to_ramp) + ramp_width_there * to_ramp)
 
-        shoulder = np.minimum(full, wedge)
-        whole = wedge - shoulder
-        island = whole * np.interp(x - self.nose, NOSE_ROUND, NOSE_SHARE)
+        shoulder = np.minimum(full_shoulder, distance_apart)
+        gap_width = distance_apart - shoulder
+        island = gap_width * np.interp(x - self.nose, NOSE_ROUND, NOSE_SHARE)
         # Half of what the rounded nose leaves lies on either side; over the step it grows evenly.
-        beside = behind_nose * (whole - np.maximum(island, NOSE_SHARE[1] * whole)) / 2.0
-        strips["island"] = there * island
-        stepping = wedge - island - behind_nose * shoulder - beside
-        strips["gore"] = there * np.where(behind_nose < 1.0, stepping, beside)
+        edge_width = behind_nose * (gap_width - np.maximum(island, NOSE_SHARE[1] * gap_width)) / 2.0
+        strips["island"] = presence * island
+        step_width = distance_apart - island - behind_nose * shoulder - edge_width
+        strips["gore"] = presence * np.where(behind_nose < 1.0, step_width, edge_width)
         strips["ramp_inner_strip"] = between(0.0, ramp.edge_strip_width)
         strips["turnout_lane"] = between(turnout.lane_width, ramp.lane_width)
         strips["turnout_edge_strip"] = between(turnout.edge_strip_width, ramp.edge_strip_width)
         strips["turnout_shoulder"] = between(turnout.shoulder_width, 0.0)
-        before = full * (1.0 - opened) * (1.0 - behind_nose)
-        hard_shoulder = there * (before + behind_nose * shoulder) + (1.0 - there) * full
-        at_end = wedge - shoulder + ramp_width(ramp)
-        return TurnoutWidths(strips, hard_shoulder, there * beside, (1.0 - there) * blend * at_end)
+        narrowing_shoulder = full_shoulder * (1.0 - open_share) * (1.0 - behind_nose)
+        hard_shoulder = presence * (narrowing_shoulder + behind_nose * shoulder) + (1.0 - presence) * full_shoulder
+        at_end = distance_apart - shoulder + ramp_width(ramp)
+        return TurnoutWidths(strips, hard_shoulder, presence * edge_width, (1.0 - presence) * blend * at_end)
 
     def _w(self, station: Float) -> Float:
+        """Return the distances (N,) along the turnout from its beginning, m, at stations (N,)."""
         return station - self.turnout.start_station if self._forward else self.turnout.end_station - station
 
     def _x(self, station: Float) -> Float:
+        """Return the distances (N,) along the turnout from the gore's tip, m, at stations (N,)."""
         return self._w(station) - self._taper - self.turnout.lane_length
 
 
@@ -227,6 +248,10 @@ def _curve_length(ramp: Ramp) -> float:
 
 
 def _end_of_ramp(ramp: Ramp, x: Float) -> tuple[Float, Float]:
-    """Return at distances (N,) from the gore's tip, m, how much of a ramp is there, and of its width behind its end."""
-    there = 1.0 - np.clip((x - ramp.length) / STEP, 0.0, 1.0)
-    return there, np.clip(1.0 - (x - ramp.length - STEP) / BLEND, 0.0, 1.0)
+    """Return two shares (N,) at distances (N,) from the gore's tip, m.
+
+    The first is 1 where the ramp is there and falls to 0 over the `STEP` at its end; the second falls from 1 to 0 over
+    the `BLEND` behind that, in which the verge comes back.
+    """
+    presence = 1.0 - np.clip((x - ramp.length) / STEP, 0.0, 1.0)
+    return presence, np.clip(1.0 - (x - ramp.length - STEP) / BLEND, 0.0, 1.0)

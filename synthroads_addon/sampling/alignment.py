@@ -55,6 +55,7 @@ class _AlignmentPart:
 
     @property
     def grows(self) -> bool:
+        """Return whether the part is a straight or an arc, not a clothoid."""
         return self.start == self.end
 
 
@@ -73,8 +74,10 @@ class HorizontalSampler:
 
     def draw(self) -> tuple[HorizontalElement, ...]:
         """Return the drawn elements, whose lengths add up to the scenario's length."""
-        first = 0.0 if self._may_begin_straight() and self.rng.random() < 0.35 else self._turn() / self._radius(None)
-        self.parts = [_AlignmentPart(min(_SHORTEST_END, self.length), first, first)]
+        first_curvature = (
+            0.0 if self._may_begin_straight() and self.rng.random() < 0.35 else self._turn() / self._radius(None)
+        )
+        self.parts = [_AlignmentPart(min(_SHORTEST_END, self.length), first_curvature, first_curvature)]
         self.room = self.length - self.parts[0].length
         while joint := self._next_parts():
             self.parts += joint
@@ -93,147 +96,184 @@ class HorizontalSampler:
         What was the end has a neighbour then: it gets what it lacks to its full least length. Nothing follows where the
         road has no room for it.
         """
-        last = self.parts[-1]
-        if last.start == 0.0:
-            return self._arc_after_straight(last)
-        lacking = max(0.0, self.shortest_arc - last.length) if len(self.parts) > 1 else 0.0
-        grown = _AlignmentPart(lacking, last.start, last.start)
-        room = self.room - lacking - _SHORTEST_END
+        last_part = self.parts[-1]
+        if last_part.start == 0.0:
+            return self._arc_after_straight(last_part)
+        missing_length = max(0.0, self.shortest_arc - last_part.length) if len(self.parts) > 1 else 0.0
+        lengthening = _AlignmentPart(missing_length, last_part.start, last_part.start)
+        room = self.room - missing_length - _SHORTEST_END
         chance = self.rng.random()
-        drawn = "straight" if chance < 0.25 else "egg" if chance < 0.5 else "s"
-        for kind in dict.fromkeys((drawn, "s", "egg", "straight")):
+        drawn_kind = "straight" if chance < 0.25 else "egg" if chance < 0.5 else "s"
+        for kind in dict.fromkeys((drawn_kind, "s", "egg", "straight")):
             if kind == "straight":
-                joint = self._clothoids([(last.start, 0.0)], self._transition(last.start, 0.0), room)
+                joint = self._clothoids([(last_part.start, 0.0)], self._transition(last_part.start, 0.0), room)
             else:
-                joint = self._arc_after_arc(kind, last.start, room)
+                joint = self._arc_after_arc(kind, last_part.start, room)
             if joint:
                 end = joint[-1].end
-                return [grown, *joint, _AlignmentPart(_SHORTEST_END, end, end)]
+                return [lengthening, *joint, _AlignmentPart(_SHORTEST_END, end, end)]
         return []
 
-    def _arc_after_straight(self, last: _AlignmentPart) -> list[_AlignmentPart]:
-        before = next((part.start for part in reversed(self.parts[:-1]) if part.start), 0.0)
+    def _arc_after_straight(self, straight: _AlignmentPart) -> list[_AlignmentPart]:
+        """Return what makes a straight long enough, a clothoid, and the begin of an arc; none without room."""
+        curvature_before = next((part.start for part in reversed(self.parts[:-1]) if part.start), 0.0)
         sign = self._turn()
-        least = (STRAIGHT_SAME_DIRECTION if before * sign > 0.0 else _SHORTEST_STRAIGHT) if before else 0.0
-        lacking = max(0.0, least - last.length)
-        room = self.room - lacking - _SHORTEST_END
-        if not (radius := self._radius(1.0 / abs(before) if before else None, room)):
+        least_straight = (
+            (STRAIGHT_SAME_DIRECTION if curvature_before * sign > 0.0 else _SHORTEST_STRAIGHT)
+            if curvature_before
+            else 0.0
+        )
+        missing_length = max(0.0, least_straight - straight.length)
+        room = self.room - missing_length - _SHORTEST_END
+        if not (radius := self._radius(1.0 / abs(curvature_before) if curvature_before else None, room)):
             return []
         curvature = sign / radius
         joint = self._clothoids([(0.0, curvature)], self._transition(0.0, curvature), room)
         end = _AlignmentPart(_SHORTEST_END, curvature, curvature)
-        return [_AlignmentPart(lacking, 0.0, 0.0), *joint, end] if joint else []
+        return [_AlignmentPart(missing_length, 0.0, 0.0), *joint, end] if joint else []
 
     def _arc_after_arc(self, kind: str, start: float, room: float) -> list[_AlignmentPart]:
         """Return the clothoids of an S-curve ("s") or egg curve ("egg") after a curvature; none without room."""
-        least = self._least_length(start, 0.0) if kind == "s" else 0.0
-        if not (radius := self._radius(1.0 / abs(start), room - least)):
+        least_length = self._least_length(start, 0.0) if kind == "s" else 0.0
+        if not (radius := self._radius(1.0 / abs(start), room - least_length)):
             return []
         if kind == "s":
             end = -math.copysign(1.0 / radius, start)
             return self._clothoids([(start, 0.0), (0.0, end)], self._s_curve(start, end), room)
         end = math.copysign(1.0 / radius, start)
-        alike = max(start / end, end / start) < _EGG_RATIO
-        return [] if alike else self._clothoids([(start, end)], self._egg(start, end), room)
+        is_alike = max(start / end, end / start) < _EGG_RATIO
+        return [] if is_alike else self._clothoids([(start, end)], self._egg(start, end), room)
 
     def _clothoids(self, curvatures: list[_Pair], lengths: Lengths, room: float) -> list[_AlignmentPart]:
         """Return clothoids with lengths between the least and the drawn ones, as the room (m) allows; else none.
 
         Every rule for lengths is linear in them, so that what lies between two sets that keep it keeps it as well.
         """
-        least, drawn = lengths
-        spare, asked = room - math.fsum(least), math.fsum(drawn) - math.fsum(least)
-        if spare < 0.0:
+        least_lengths, drawn_lengths = lengths
+        spare_room, wish = room - math.fsum(least_lengths), math.fsum(drawn_lengths) - math.fsum(least_lengths)
+        if spare_room < 0.0:
             return []
-        share = min(1.0, spare / asked) if asked > 0.0 else 0.0
-        fitting = [a + (b - a) * share for a, b in zip(least, drawn, strict=True)]
-        return [_AlignmentPart(length, *pair) for length, pair in zip(fitting, curvatures, strict=True)]
+        share = min(1.0, spare_room / wish) if wish > 0.0 else 0.0
+        fitted_lengths = [a + (b - a) * share for a, b in zip(least_lengths, drawn_lengths, strict=True)]
+        return [_AlignmentPart(length, *pair) for length, pair in zip(fitted_lengths, curvatures, strict=True)]
 
     def _turn(self) -> float:
         """Return 1 (left) or -1 at random; the farther the road has turned, the likelier back again."""
-        left = 0.5 - min(0.45, max(-0.45, 0.4 * self.turned))
-        return 1.0 if self.rng.random() < left else -1.0
+        left_probability = 0.5 - min(0.45, max(-0.45, 0.4 * self.turned))
+        return 1.0 if self.rng.random() < left_probability else -1.0
 
-    def _radius(self, before: float | None, room: float = math.inf) -> float:
+    def _radius(self, radius_before: float | None, room: float = math.inf) -> float:
         """Draw a radius (m) balanced with the one before and whose clothoid has room; 0 where there is none.
 
         It is even in the logarithm, as small radii matter more.
         """
-        low, high = self.radii
-        if before is not None:
+        smallest, largest = self.radii
+        if radius_before is not None:
             # Beyond this no pair of clothoids has R/3 <= A <= R on both sides and parameters within 1.5 of each other.
-            low, high = max(low, before / _WIDEST_RATIO), min(high, before * _WIDEST_RATIO)
-        if before is not None and self.design_class != "EKA3":
-            low = max(low, before / BALANCE if before < BALANCED_BELOW else min(_BALANCED_FROM, before / BALANCE))
-            high = min(high, before * BALANCE) if before < BALANCED_BELOW else high
+            smallest, largest = (
+                max(smallest, radius_before / _WIDEST_RATIO),
+                min(largest, radius_before * _WIDEST_RATIO),
+            )
+        if radius_before is not None and self.design_class != "EKA3":
+            smallest = max(
+                smallest,
+                radius_before / BALANCE
+                if radius_before < BALANCED_BELOW
+                else min(_BALANCED_FROM, radius_before / BALANCE),
+            )
+            largest = min(largest, radius_before * BALANCE) if radius_before < BALANCED_BELOW else largest
         if room < math.inf:
-            low, high = max(low, self.limits.clothoid**2 / max(room, 1.0)), min(high, _widest_radius(room))
-        if low > high:
+            smallest, largest = (
+                max(smallest, self.limits.clothoid**2 / max(room, 1.0)),
+                min(largest, _widest_radius(room)),
+            )
+        if smallest > largest:
             return 0.0
-        return round_value(math.exp(self.rng.uniform(math.log(low), math.log(high))), 6)
+        return round_value(math.exp(self.rng.uniform(math.log(smallest), math.log(largest))), 6)
 
     def _least_length(self, start: float, end: float) -> float:
         """Return the least length (m) of a clothoid from a straight to an arc: A >= R/3, and the run-off's."""
         radius = 1.0 / max(abs(start), abs(end))
         return max(max(self.limits.clothoid, radius / 3.0) ** 2 / radius, self._run_off(start, end))
 
-    def _transition(self, start: float, end: float, crossing: float = 0.0) -> Lengths:
+    def _transition(self, start: float, end: float, crossing_run_off: float = 0.0) -> Lengths:
         """Return the least length and a drawn one, m, of a clothoid between a straight and an arc; A <= R."""
         radius = 1.0 / max(abs(start), abs(end))
-        least = max(crossing, self._least_length(start, end))
-        return [least], [self.rng.uniform(least, max(least, min(radius, 2.0 * least)))]
+        least_length = max(crossing_run_off, self._least_length(start, end))
+        return [least_length], [self.rng.uniform(least_length, max(least_length, min(radius, 2.0 * least_length)))]
 
     def _s_curve(self, start: float, end: float) -> Lengths:
         """Return least and drawn lengths (m) of an S-curve's two clothoids, of parameters within 1.5 of each other."""
         crossing = self._run_off(start, end) / 2.0
-        first, second = self._transition(start, 0.0, crossing), self._transition(0.0, end, crossing)
-        least, drawn = (self._limit_ratio(a + b, start, end) for a, b in zip(first, second, strict=True))
-        return least, drawn
+        first_clothoid, second_clothoid = self._transition(start, 0.0, crossing), self._transition(0.0, end, crossing)
+        least_lengths, drawn_lengths = (
+            self._limit_ratio(a + b, start, end) for a, b in zip(first_clothoid, second_clothoid, strict=True)
+        )
+        return least_lengths, drawn_lengths
 
     @staticmethod
     def _limit_ratio(lengths: list[float], start: float, end: float) -> list[float]:
-        """Return an S-curve's clothoid lengths, that of the smaller parameter A raised to what the ratio allows."""
-        a = [length / abs(k) for length, k in zip(lengths, (start, end), strict=True)]
-        least = max(a) / 1.5**2
-        return [max(square, least) * abs(k) for square, k in zip(a, (start, end), strict=True)]
+        """Return an S-curve's clothoid lengths, that of the smaller parameter A raised to what the ratio allows.
+
+        A clothoid from a straight to the curvature k has A^2 = length / |k|; the larger A is at most 1.5 times the
+        other.
+        """
+        squared_parameters = [length / abs(k) for length, k in zip(lengths, (start, end), strict=True)]
+        least_square = max(squared_parameters) / 1.5**2
+        return [max(square, least_square) * abs(k) for square, k in zip(squared_parameters, (start, end), strict=True)]
 
     def _egg(self, start: float, end: float) -> Lengths:
         """Return least and drawn length (m) of an egg's clothoid: A from a third of the wider to the tighter radius.
 
         Short ones are left out: they would hardly turn.
         """
-        change = abs(end - start)
-        small, large = 1.0 / max(abs(start), abs(end)), 1.0 / min(abs(start), abs(end))
-        least = max(self.limits.clothoid, large / 3.0, math.sqrt(self._run_off(start, end) / change), 0.6 * small)
-        return [least**2 * change], [self.rng.uniform(least, max(least, small)) ** 2 * change]
+        curvature_change = abs(end - start)
+        small_radius, large_radius = 1.0 / max(abs(start), abs(end)), 1.0 / min(abs(start), abs(end))
+        least_parameter = max(
+            self.limits.clothoid,
+            large_radius / 3.0,
+            math.sqrt(self._run_off(start, end) / curvature_change),
+            0.6 * small_radius,
+        )
+        return [least_parameter**2 * curvature_change], [
+            self.rng.uniform(least_parameter, max(least_parameter, small_radius)) ** 2 * curvature_change
+        ]
 
     def _run_off(self, start: float, end: float) -> float:
+        """Return the least length (m) in which the crossfall can change between two curvatures (1/m)."""
         return run_off_length(self.design_class, self.half_width, start, end)
 
     def _distribute_length(self) -> None:
         """Lengthen straights and arcs, in place, to the road's length, within the longest straight and turn."""
         self.parts = _merge_parts(self.parts)
-        spare = self.length - math.fsum(part.length for part in self.parts)
-        growing = [part for part in self.parts if part.grows]
-        room = np.array([self._room(part) for part in growing])
-        weights = self.rng.uniform(0.2, 1.0, len(growing)) * np.minimum(room, spare + 1e-9)
-        given = np.minimum(room, spare * weights / max(weights.sum(), 1e-12))
-        for _ in range(len(growing)):
-            left = spare - given.sum()
-            if left <= 1e-9:
+        spare_length = self.length - math.fsum(part.length for part in self.parts)
+        growing_parts = [part for part in self.parts if part.grows]
+        room = np.array([self._room(part) for part in growing_parts])
+        # The spare length is first given by random weights, then evenly to the parts that still have room; what none of
+        # them can take makes the arcs longer than their longest turn.
+        weights = self.rng.uniform(0.2, 1.0, len(growing_parts)) * np.minimum(room, spare_length + 1e-9)
+        extra_lengths = np.minimum(room, spare_length * weights / max(weights.sum(), 1e-12))
+        for _ in range(len(growing_parts)):
+            rest = spare_length - extra_lengths.sum()
+            if rest <= 1e-9:
                 break
-            open_ = np.flatnonzero(room - given > 1e-9)
-            if not len(open_):
-                arcs = np.array([i for i, part in enumerate(growing) if part.start], dtype=int)
-                given[arcs] += left / len(arcs)
+            open_parts = np.flatnonzero(room - extra_lengths > 1e-9)
+            if not len(open_parts):
+                arcs = np.array([i for i, part in enumerate(growing_parts) if part.start], dtype=int)
+                extra_lengths[arcs] += rest / len(arcs)
                 break
-            given[open_] += np.minimum(room[open_] - given[open_], left / len(open_))
-        for part, extra in zip(growing, given, strict=True):
-            part.length += float(extra)
+            extra_lengths[open_parts] += np.minimum(
+                room[open_parts] - extra_lengths[open_parts], rest / len(open_parts)
+            )
+        for part, extra_length in zip(growing_parts, extra_lengths, strict=True):
+            part.length += float(extra_length)
 
     def _room(self, part: _AlignmentPart) -> float:
-        longest = LONGEST_STRAIGHT if part.start == 0.0 else max(_LONGEST_TURN / abs(part.start), self.shortest_arc)
-        return max(0.0, longest - part.length)
+        """Return by how much (m) a straight or arc may still be lengthened."""
+        longest_length = (
+            LONGEST_STRAIGHT if part.start == 0.0 else max(_LONGEST_TURN / abs(part.start), self.shortest_arc)
+        )
+        return max(0.0, longest_length - part.length)
 
     def _elements(self) -> tuple[HorizontalElement, ...]:
         """Return the parts as elements, rounded; the last length takes what rounding leaves."""
@@ -246,13 +286,13 @@ class HorizontalSampler:
 
 def _merge_parts(parts: list[_AlignmentPart]) -> list[_AlignmentPart]:
     """Return parts with neighbouring straights or arcs of one curvature joined."""
-    result: list[_AlignmentPart] = []
+    merged_parts: list[_AlignmentPart] = []
     for part in parts:
-        if result and part.grows and result[-1].grows and result[-1].start == part.start:
-            result[-1].length += part.length
+        if merged_parts and part.grows and merged_parts[-1].grows and merged_parts[-1].start == part.start:
+            merged_parts[-1].length += part.length
         else:
-            result.append(part)
-    return result
+            merged_parts.append(part)
+    return merged_parts
 
 
 def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[VerticalPoint, ...]:
@@ -262,28 +302,32 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
     within it. Long roads turn back to the height they came from.
     """
     limits = LIMITS[scenario.design_class]
-    steepest = limits.grade_percent
-    lowest, highest = bounds(scenario.grade_percent) if scenario.grade_percent else (-steepest, steepest)
+    steepest_grade = limits.grade_percent
+    lowest_grade, highest_grade = (
+        bounds(scenario.grade_percent) if scenario.grade_percent else (-steepest_grade, steepest_grade)
+    )
     stations = _intersection_stations(scenario.length, rng)
-    grades = [round_value(rng.uniform(lowest, highest))]
+    grades = [round_value(rng.uniform(lowest_grade, highest_grade))]
     radii: list[float] = []
-    climbed = 0.0
-    for before, here, after in zip(stations[:-2], stations[1:-1], stations[2:], strict=True):
+    climb = 0.0
+    for station_before, station_of_point, station_after in zip(
+        stations[:-2], stations[1:-1], stations[2:], strict=True
+    ):
         # The first and last span have no rounding at the road's end: they can give their whole length.
-        span_before = (here - before) / (1 if before == stations[0] else 2)
-        tangent = min(span_before, (after - here) / (1 if after == stations[-1] else 2))
-        climbed += grades[-1] / 100.0 * (here - before)
-        low = max(lowest, grades[-1] - 200.0 * tangent / limits.crest)
-        high = min(highest, grades[-1] + 200.0 * tangent / limits.sag)
-        if climbed > HIGHEST_CLIMB:
-            high = max(low, min(high, 0.0))
-        elif climbed < -HIGHEST_CLIMB:
-            low = min(high, max(low, 0.0))
-        grades.append(round_value(rng.uniform(low, high)))
-        change = abs(grades[-1] - grades[-2]) / 100.0
-        least = limits.crest if grades[-1] < grades[-2] else limits.sag
-        largest = max(least, min(2.0 * tangent / max(change, 1e-9), 5.0 * least))
-        radii.append(round_value(rng.uniform(least, largest)) if change > 0 else 0.0)
+        span_before = (station_of_point - station_before) / (1 if station_before == stations[0] else 2)
+        tangent = min(span_before, (station_after - station_of_point) / (1 if station_after == stations[-1] else 2))
+        climb += grades[-1] / 100.0 * (station_of_point - station_before)
+        least_grade = max(lowest_grade, grades[-1] - 200.0 * tangent / limits.crest)
+        largest_grade = min(highest_grade, grades[-1] + 200.0 * tangent / limits.sag)
+        if climb > HIGHEST_CLIMB:
+            largest_grade = max(least_grade, min(largest_grade, 0.0))
+        elif climb < -HIGHEST_CLIMB:
+            least_grade = min(largest_grade, max(least_grade, 0.0))
+        grades.append(round_value(rng.uniform(least_grade, largest_grade)))
+        grade_change = abs(grades[-1] - grades[-2]) / 100.0
+        least_radius = limits.crest if grades[-1] < grades[-2] else limits.sag
+        largest_radius = max(least_radius, min(2.0 * tangent / max(grade_change, 1e-9), 5.0 * least_radius))
+        radii.append(round_value(rng.uniform(least_radius, largest_radius)) if grade_change > 0 else 0.0)
     elevations = np.concatenate([[0.0], np.cumsum(np.diff(stations) * np.array(grades) / 100.0)])
     elevations -= np.interp(scenario.length / 2.0, stations, elevations)
     rows = zip(stations, elevations, [0.0, *radii, 0.0], strict=True)

@@ -133,21 +133,23 @@ def conflicts(scenario: RoadScenario, with_axis: bool = False) -> tuple[str, ...
 
 def _ranges(scenario: RoadScenario) -> Iterator[str]:
     """Yield a sentence for each interval that reaches beyond what a parameter set may hold."""
-    for path, (low, high) in _ALLOWED.items():
+    for path, (least, largest) in _ALLOWED.items():
         limits: Interval = attrgetter(path)(scenario)
-        if limits.minimum < low:
-            yield f"{path}.minimum is {limits.minimum:g}, at least {low:g} is allowed"
-        if limits.maximum > high:
-            yield f"{path}.maximum is {limits.maximum:g}, at most {high:g} is allowed"
+        if limits.minimum < least:
+            yield f"{path}.minimum is {limits.minimum:g}, at least {least:g} is allowed"
+        if limits.maximum > largest:
+            yield f"{path}.maximum is {limits.maximum:g}, at most {largest:g} is allowed"
 
 
 def _land_use(scenario: RoadScenario) -> Iterator[str]:
+    """Yield a sentence if forest and meadow may have more than all of the land together."""
     shares = scenario.landscape.forest_share.maximum, scenario.landscape.meadow_share.maximum
     if sum(shares) > 1.0:
         yield f"landscape.forest_share.maximum and meadow_share.maximum are {sum(shares):g} together, at most 1 allowed"
 
 
 def _alignment(scenario: RoadScenario) -> Iterator[str]:
+    """Yield a sentence for each limit of radii and grades that the design class or the road's length doesn't allow."""
     limits, name = LIMITS[scenario.design_class], scenario.design_class
     if scenario.radius and scenario.radius.minimum < limits.radius:
         yield f"radius.minimum is {scenario.radius.minimum:g} m, {name} needs {limits.radius:g} m"
@@ -158,30 +160,35 @@ def _alignment(scenario: RoadScenario) -> Iterator[str]:
     for end, grade in (("minimum", grades.minimum), ("maximum", grades.maximum)):
         if abs(grade) > limits.grade_percent:
             yield f"grade_percent.{end} is {grade:g} %, {name} allows {limits.grade_percent:g} %"
-    gentlest = max(grades.minimum, -grades.maximum, 0.0)
-    climb = gentlest / 100.0 * scenario.length / 2.0
+    gentlest_grade = max(grades.minimum, -grades.maximum, 0.0)
+    climb = gentlest_grade / 100.0 * scenario.length / 2.0
     if climb > STEADY_CLIMB:
         yield (
-            f"grade_percent is {gentlest:g} % or more one way, which over half of length {scenario.length:g} m "
+            f"grade_percent is {gentlest_grade:g} % or more one way, which over half of length {scenario.length:g} m "
             f"is {climb:.0f} m of height, at most {STEADY_CLIMB:g} m are allowed"
         )
 
 
 def _cross_section(scenario: RoadScenario) -> Iterator[str]:
+    """Yield a sentence for each width or number of lanes that doesn't go with the cross-section or design class."""
     section, name = cross_section_of(scenario), scenario.cross_section
     if isinstance(name, str):
         standard = STANDARD_CROSS_SECTIONS[name]
         width = 2.0 * (section.paved_width + section.verge) + section.median
-        allowed = 2.0 * (standard.paved_width + standard.verge) + standard.median
+        allowed_width = 2.0 * (standard.paved_width + standard.verge) + standard.median
         if len(section.lanes) > len(standard.lanes):
             yield f"lanes is {len(section.lanes)}, {name} has {len(standard.lanes)} per direction"
-        if width > allowed + 1e-9:
-            asked = [field for field in ("lanes", "lane_width", "median_width") if getattr(scenario, field) is not None]
-            yield f"{' and '.join(asked)} make the road {width:g} m wide, {name} is {allowed:g} m wide"
-    least = min(min(STANDARD_CROSS_SECTIONS[each].lanes) for each in SECTIONS_OF_CLASS[scenario.design_class])
-    if min(section.lanes) < least:
+        if width > allowed_width + 1e-9:
+            changed_fields = [
+                field for field in ("lanes", "lane_width", "median_width") if getattr(scenario, field) is not None
+            ]
+            yield f"{' and '.join(changed_fields)} make the road {width:g} m wide, {name} is {allowed_width:g} m wide"
+    least_width = min(
+        min(STANDARD_CROSS_SECTIONS[section_name].lanes) for section_name in SECTIONS_OF_CLASS[scenario.design_class]
+    )
+    if min(section.lanes) < least_width:
         field = "cross_section.lanes" if scenario.lane_width is None else "lane_width"
-        yield f"{field} is {min(section.lanes):g} m, {scenario.design_class} needs {least:g} m"
+        yield f"{field} is {min(section.lanes):g} m, {scenario.design_class} needs {least_width:g} m"
     if section.median < LEAST_MEDIAN:
         field = "cross_section.median" if scenario.median_width is None else "median_width"
         yield f"{field} is {section.median:g} m, {LEAST_MEDIAN:g} m are needed"
@@ -191,9 +198,10 @@ def _cross_section(scenario: RoadScenario) -> Iterator[str]:
 
 
 def _lane_changes(scenario: RoadScenario) -> Iterator[str]:
-    limits, least = scenario.lane_changes, LANE_TAPER_LENGTH[scenario.design_class]
+    """Yield a sentence if lanes may begin or end, but their tapers are all too short."""
+    limits, least_length = scenario.lane_changes, LANE_TAPER_LENGTH[scenario.design_class]
     if limits.share > 0.0 and may_change_lanes(scenario, cross_section_of(scenario)):
-        yield from _short("lane_changes.taper_length", limits.taper_length, least, scenario.design_class)
+        yield from _short("lane_changes.taper_length", limits.taper_length, least_length, scenario.design_class)
 
 
 def _turnouts(scenario: RoadScenario) -> Iterator[str]:
@@ -220,47 +228,48 @@ def _lengths(scenario: RoadScenario) -> Iterator[str]:
     zone = TAPERS_IN[0] + SHORTEST_ALONG + TAPER_OUT
     if furniture.construction_zone > 0.0:
         yield from _short("furniture.construction_length", furniture.construction_length, zone, "a construction zone")
-    for field, share, least in (
+    for field, share, least_length in (
         ("furniture.construction_zone", furniture.construction_zone, max(furniture.construction_length.minimum, zone)),
         ("furniture.overpass", furniture.overpass, furniture.overpass_width.minimum),
         ("barriers.noise_barrier", barriers.noise_barrier, barriers.noise_barrier_length.minimum),
     ):
-        if share >= 1.0 and least > length:
-            yield f"{field} is 1, it needs {least:g} m and length is {length:g} m"
+        if share >= 1.0 and least_length > length:
+            yield f"{field} is 1, it needs {least_length:g} m and length is {length:g} m"
 
 
 def _features(scenario: RoadScenario) -> Iterator[str]:
     """Yield sentences on turnouts and lane changes that must be there, but don't fit in the road or beside it."""
     limits, section = scenario.turnouts, cross_section_of(scenario)
     ramps = RampLimits(scenario, section)
-    narrow = f"is 1, within half_width {scenario.half_width:g} m there is no room for it"
+    reason = f"is 1, within half_width {scenario.half_width:g} m there is no room for it"
     if ramps.lengths[0] > ramps.lengths[1] and ramps.shortest <= limits.ramp_length.maximum:
-        yield from (f"turnouts.{name} {narrow}" for name in ("exits", "entries") if getattr(limits, name) >= 1.0)
+        yield from (f"turnouts.{name} {reason}" for name in ("exits", "entries") if getattr(limits, name) >= 1.0)
     if limits.emergency_bays >= 1.0 and not ramps.room_for_bay:
-        yield f"turnouts.emergency_bays {narrow}"
-    certain = [feature for feature in features_of(scenario, section, ramps) if feature.share >= 1.0]
-    need = math.fsum(feature.least for feature in certain) + TURNOUT_GAP * (len(certain) - 1)
-    if certain and need > scenario.length:
-        fields = " and ".join(f"{_SHARES[feature.kind]} is 1" for feature in certain)
-        yield f"{fields}, {need:.0f} m are needed and length is {scenario.length:g} m"
+        yield f"turnouts.emergency_bays {reason}"
+    certain_features = [feature for feature in features_of(scenario, section, ramps) if feature.share >= 1.0]
+    needed_length = math.fsum(feature.least for feature in certain_features) + TURNOUT_GAP * (len(certain_features) - 1)
+    if certain_features and needed_length > scenario.length:
+        fields = " and ".join(f"{_SHARES[feature.kind]} is 1" for feature in certain_features)
+        yield f"{fields}, {needed_length:.0f} m are needed and length is {scenario.length:g} m"
 
 
-def _short(path: str, limits: Interval, least: float, what: str) -> Iterator[str]:
-    if limits.maximum < least:
-        yield f"{path}.maximum is {limits.maximum:g} m, {what} needs {least:g} m"
+def _short(path: str, limits: Interval, least_value: float, thing_name: str) -> Iterator[str]:
+    """Yield a sentence if the whole interval of a length (m) lies below the least that a thing needs."""
+    if limits.maximum < least_value:
+        yield f"{path}.maximum is {limits.maximum:g} m, {thing_name} needs {least_value:g} m"
 
 
 def _allowed_range(model: type[Model], name: str) -> tuple[float, float]:
     """Return the least and the largest value that a model's field may have."""
-    low, high = -1e8, 1e8
+    least, largest = -1e8, 1e8
     for limit in model.model_fields[name].metadata:
         if hasattr(limit, "ge"):
-            low = limit.ge
+            least = limit.ge
         elif hasattr(limit, "gt"):
-            low = limit.gt + _ABOVE
+            least = limit.gt + _ABOVE
         elif hasattr(limit, "le"):
-            high = limit.le
-    return low, high
+            largest = limit.le
+    return least, largest
 
 
 def _allowed_by_things() -> Iterator[tuple[str, tuple[float, float]]]:

@@ -36,24 +36,29 @@ def sample_forest_edges(site: PlacementSite, room: float, first_tree: float) -> 
         yield from _beside(site, side, room, max(NEAREST, first_tree))
 
 
-def _beside(site: PlacementSite, side: Side, room: float, nearest: float) -> Iterator[tuple[str, Vegetation]]:
+def _beside(site: PlacementSite, side: Side, room: float, nearest_distance: float) -> Iterator[tuple[str, Vegetation]]:
+    """Yield (id, stand) of the forest edges on one side: for each the shrubs of its mantle, then its trees.
+
+    All numbers of an edge are drawn before it is known whether there is room, so that one edge more or less doesn't
+    change the others.
+    """
     limits, rng = site.scenario.vegetation, site.stream("forest edges", side)
-    taken, number = Reservations(), 0
+    taken_stretches, number = Reservations(), 0
     for _ in range(int(draw(rng, limits.forest_edges_per_km) * site.length / 1000.0 + rng.random())):
         length, depth = draw(rng, limits.forest_edge_length), draw(rng, limits.forest_depth)
-        begin = nearest + draw_between(rng, (0.0, STAND_BACK))
-        low, high = sorted((draw(rng, limits.forest_height), draw(rng, limits.forest_height)))
+        begin = nearest_distance + draw_between(rng, (0.0, STAND_BACK))
+        least_height, largest_height = sorted((draw(rng, limits.forest_height), draw(rng, limits.forest_height)))
         tree, shrub = pick(rng, limits.trees), pick(rng, limits.shrubs)
         seeds = rng.integers(2**31, size=2).tolist()
         length = min(length, site.length)
-        start = draw_start(rng, free_ranges(0.0, site.length, taken), length)
+        start = draw_start(rng, free_ranges(0.0, site.length, taken_stretches), length)
         end = round_value(min(begin + depth, room))
         if start is None or end - begin < SHALLOWEST:
             continue
         number += 1
-        taken.add(start - _GAP, start + length + _GAP)
-        where = {"side": side, "start_station": round_value(start), "end_station": round_value(start + length)}
-        front, stand = round_value(begin), round_value(begin + MANTLE / 2.0)
+        taken_stretches.add(start - _GAP, start + length + _GAP)
+        stretch_fields = {"side": side, "start_station": round_value(start), "end_station": round_value(start + length)}
+        mantle_start, stand_start = round_value(begin), round_value(begin + MANTLE / 2.0)
         yield (
             f"forest-{side}-{number}-{shrub}",
             Vegetation(
@@ -61,12 +66,12 @@ def _beside(site: PlacementSite, side: Side, room: float, nearest: float) -> Ite
                 kind="shrub",
                 species=shrub,
                 density=SHRUBS,
-                band_start=front,
+                band_start=mantle_start,
                 band_end=round_value(begin + MANTLE),
                 height_min=1.0,
                 height_max=3.5,
                 seed=seeds[0],
-                **where,
+                **stretch_fields,
             ),
         )
         yield (
@@ -76,11 +81,11 @@ def _beside(site: PlacementSite, side: Side, room: float, nearest: float) -> Ite
                 kind="tree",
                 species=tree,
                 density=TREES,
-                band_start=stand,
+                band_start=stand_start,
                 band_end=end,
-                height_min=low,
-                height_max=high,
+                height_min=least_height,
+                height_max=largest_height,
                 seed=seeds[1],
-                **where,
+                **stretch_fields,
             ),
         )

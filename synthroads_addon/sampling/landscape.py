@@ -27,18 +27,19 @@ def sample_landscape(site: PlacementSite) -> Landscape:
     """Return the drawn landscape of a road; its instance number is 1."""
     limits, rng = site.scenario.landscape, site.stream("landscape")
     names = ("hill_height", "hill_length", "parcel_size", "forest_share", "meadow_share")
-    drawn = {name: draw(rng, getattr(limits, name)) for name in names}
+    values = {name: draw(rng, getattr(limits, name)) for name in names}
     return Landscape(
         instance=1,
         reach=limits.reach,
         seed=int(rng.integers(_HIGHEST_SEED)),
         villages=_villages(site, site.stream("landscape", "villages")),
         turbines=_turbines(site, site.stream("landscape", "turbines")),
-        **drawn,
+        **values,
     )
 
 
 def _villages(site: PlacementSite, rng: np.random.Generator) -> tuple[Village, ...]:
+    """Return drawn villages, each with a radius that has room for its houses."""
     villages = []
     for _ in range(int(draw(rng, site.scenario.landscape.villages) + rng.random())):
         houses = int(draw_between(rng, _HOUSES))
@@ -50,22 +51,25 @@ def _villages(site: PlacementSite, rng: np.random.Generator) -> tuple[Village, .
 
 def _turbines(site: PlacementSite, rng: np.random.Generator) -> tuple[WindTurbine, ...]:
     """Return wind turbines of one make in a row, all turned to one wind."""
-    hub, wind = draw_between(rng, _HUBS), draw_between(rng, (200.0, 300.0))
-    rotor, along = round_value(hub * draw_between(rng, _ROTORS)), draw_between(rng, (0.0, math.pi))
+    hub_height, wind_azimuth = draw_between(rng, _HUBS), draw_between(rng, (200.0, 300.0))
+    rotor_diameter, row_direction = (
+        round_value(hub_height * draw_between(rng, _ROTORS)),
+        draw_between(rng, (0.0, math.pi)),
+    )
     x, y = _beside(site, rng, _TURBINE_DISTANCE, 0.0)
     turbines = []
     for number in range(int(draw(rng, site.scenario.landscape.turbines) + rng.random())):
-        aside = draw_between(rng, (-60.0, 60.0))
+        lateral_shift = draw_between(rng, (-60.0, 60.0))
         place = (
-            x + number * _TURBINE_SPACING * math.cos(along),
-            y + number * _TURBINE_SPACING * math.sin(along) + aside,
+            x + number * _TURBINE_SPACING * math.cos(row_direction),
+            y + number * _TURBINE_SPACING * math.sin(row_direction) + lateral_shift,
         )
         turbine = WindTurbine(
             x=round_value(place[0]),
             y=round_value(place[1]),
-            hub_height=hub,
-            rotor_diameter=rotor,
-            azimuth_deg=wind,
+            hub_height=hub_height,
+            rotor_diameter=rotor_diameter,
+            azimuth_deg=wind_azimuth,
             rotor_deg=draw_between(rng, (0.0, 120.0)),
         )
         turbines.append(turbine)
@@ -78,11 +82,11 @@ def _beside(
     """Return a drawn place, local x and y (m), beside the road's middle stretch, its distance within the reach."""
     alignment, reach = alignment_of(site.alignment), site.scenario.landscape.reach * _SHARE_OF_REACH
     station = np.array([site.length * draw_between(rng, (0.2, 1.0))])
-    far = min(draw_between(rng, distances), reach)
+    distance = min(draw_between(rng, distances), reach)
     side = 1.0 if rng.random() < 0.5 else -1.0
-    offset = side * max(far, site.terrain.half_width + room + 60.0)
+    offset = side * max(distance, site.terrain.half_width + room + 60.0)
     position, heading, _ = alignment.frame(station)
-    ahead = draw_between(rng, (0.0, 600.0))
-    x = position[0, 0] - offset * math.sin(heading[0]) + ahead * math.cos(heading[0])
-    y = position[0, 1] + offset * math.cos(heading[0]) + ahead * math.sin(heading[0])
+    ahead_distance = draw_between(rng, (0.0, 600.0))
+    x = position[0, 0] - offset * math.sin(heading[0]) + ahead_distance * math.cos(heading[0])
+    y = position[0, 1] + offset * math.cos(heading[0]) + ahead_distance * math.sin(heading[0])
     return round_value(float(x)), round_value(float(y))

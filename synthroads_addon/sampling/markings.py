@@ -31,11 +31,11 @@ def place_markings(site: PlacementSite) -> Iterator[tuple[str, LineMarking | Hat
     """Yield (id, marking) of everything painted on a road, all with instance 1 and films of one thickness."""
     limits = site.scenario.markings.film_thickness
     film = round_value(site.stream("film").uniform(limits.minimum, limits.maximum))
-    meeting = _meet(site.carriageways)
+    is_meeting = _meet(site.carriageways)
     for side, carriageway in site.carriageways.items():
         sampler = _Painter(site, side, carriageway, film)
-        yield from sampler.lines(inner_edge=not meeting)
-        if meeting and side == "right":
+        yield from sampler.lines(inner_edge=not is_meeting)
+        if is_meeting and side == "right":
             yield sampler.centre_line()
         for name, turnout in site.turnouts_of(side).items():
             if turnout.ramp:
@@ -60,6 +60,7 @@ class _Painter:
         return "centre-line", self._line("free", (0.0, self.length), **fields)
 
     def _dashes(self) -> tuple[float, float]:
+        """Return the lengths (m) of a lane line's dashes and gaps: the scenario's, else the usual ones."""
         limits = self.site.scenario.markings
         return limits.lane_dash or LANE_DASH, limits.lane_gap or LANE_GAP
 
@@ -77,8 +78,10 @@ class _Painter:
             yield name, self._line("outer_edge", span, boundary=0, width=BROAD)
         for boundary in range(1, len(lanes)):
             # Only an outermost or innermost lane ends: one of the two beside a boundary.
-            (start, end), (begin, stop) = (_lane_stretch(lanes[i].width, self.length) for i in (boundary - 1, boundary))
-            span = max(start, begin), min(end, stop)
+            (outer_start, outer_end), (inner_start, inner_end) = (
+                _lane_stretch(lanes[i].width, self.length) for i in (boundary - 1, boundary)
+            )
+            span = max(outer_start, inner_start), min(outer_end, inner_end)
             if span[1] <= span[0]:
                 continue  # one of both is nowhere
             line = self._line("lane", span, boundary=boundary, dash_length=dash, gap_length=gap)
@@ -110,29 +113,32 @@ class _Painter:
 
     def merge_arrows(self) -> Iterator[tuple[str, Arrow]]:
         """Yield (id, arrow) of the arrows on a lane that ends, in front of its taper."""
-        lanes, ahead = self.carriageway.lanes, self.carriageway.traffic
+        lanes, traffic = self.carriageway.lanes, self.carriageway.traffic
         for index, lane in enumerate(lanes):
             if not isinstance(lane.width, tuple) or not _changes_once(lane.width):
                 continue
-            before, start, _, after = lane.width if ahead > 0 else lane.width[::-1]
-            if before.width < after.width:
+            width_before, taper_start, _, width_after = lane.width if traffic > 0 else lane.width[::-1]
+            if width_before.width < width_after.width:
                 continue
-            first = start.station - ahead * _FIRST_MERGE_ARROW
-            stations = [first - ahead * ARROW_SPACING * i for i in range(_ARROWS_AT_LEAST)]
-            room = self.arrow_length / 2.0
-            stations = [s for s in stations if room <= s <= self.length - room]
+            first_station = taper_start.station - traffic * _FIRST_MERGE_ARROW
+            stations = [first_station - traffic * ARROW_SPACING * i for i in range(_ARROWS_AT_LEAST)]
+            half_arrow = self.arrow_length / 2.0
+            stations = [s for s in stations if half_arrow <= s <= self.length - half_arrow]
             boundaries = self.section.lane_boundaries(stations)
             kind = "merge_left" if index == 0 else "merge_right"
-            middle = boundaries[:, index : index + 2].mean(axis=1)
-            yield from self._arrows(f"{self.name}-merge-arrow", kind, stations, middle)
+            lane_middles = boundaries[:, index : index + 2].mean(axis=1)
+            yield from self._arrows(f"{self.name}-merge-arrow", kind, stations, lane_middles)
 
     def _line(self, kind: Any, span: Range, **values: Any) -> LineMarking:
-        given = {"width": NARROW, "dash_length": 0.0, "gap_length": 0.0, "film_thickness": self.film} | values
+        """Return a line marking between two stations (m): solid and narrow unless `values` says otherwise."""
+        fields = {"width": NARROW, "dash_length": 0.0, "gap_length": 0.0, "film_thickness": self.film} | values
         start, end = span
-        return LineMarking(instance=1, carriageway=self.name, kind=kind, start_station=start, end_station=end, **given)
+        return LineMarking(instance=1, carriageway=self.name, kind=kind, start_station=start, end_station=end, **fields)
 
-    def _arrows(self, name: str, kind: Any, stations: list[float], away: np.ndarray) -> Iterator[tuple[str, Arrow]]:
-        for number, (station, distance) in enumerate(zip(stations, away.tolist(), strict=True), start=1):
+    def _arrows(
+        self, name: str, kind: Any, stations: list[float], distances: np.ndarray
+    ) -> Iterator[tuple[str, Arrow]]:
+        for number, (station, distance) in enumerate(zip(stations, distances.tolist(), strict=True), start=1):
             arrow = Arrow(
                 instance=1,
                 carriageway=self.name,
@@ -150,17 +156,17 @@ def _meet(carriageways: Mapping[Side, Carriageway]) -> bool:
     """Return whether the innermost lanes of both directions meet all along at one offset."""
     edges: list[float] = []
     for carriageway in carriageways.values():
-        inner, strip = carriageway.inner_offset, carriageway.inner_edge_strip_width
-        if isinstance(inner, tuple) or nominal_width(strip) > 0.0:
+        inner_offset, edge_strip = carriageway.inner_offset, carriageway.inner_edge_strip_width
+        if isinstance(inner_offset, tuple) or nominal_width(edge_strip) > 0.0:
             return False
-        edges.append(carriageway.sign * inner)
+        edges.append(carriageway.sign * inner_offset)
     return len(edges) == 2 and abs(edges[0] - edges[1]) < _MEETING
 
 
 def _stations(shape: TurnoutShape, begin: float, end: float) -> Range:
     """Return the stations (m), the lower one first, of a stretch between two distances along a turnout."""
-    low, high = sorted((shape.station(begin), shape.station(end)))
-    return max(0.0, round_value(low)), round_value(high)
+    lowest, highest = sorted((shape.station(begin), shape.station(end)))
+    return max(0.0, round_value(lowest)), round_value(highest)
 
 
 def _block_span(shape: TurnoutShape) -> Range:
@@ -189,11 +195,11 @@ def _changes_once(width: tuple[WidthPoint, ...]) -> bool:
 
 def _longest_stretch(station: np.ndarray, width: np.ndarray, length: float) -> Range:
     """Return the longest stretch (m) on which a lane of any widths (K,) by station is there; of none an empty one."""
-    fine = np.unique(np.concatenate([np.linspace(0.0, length, 2001), station.clip(0.0, length)]))
-    there = np.interp(fine, station, width) >= LANE_THERE
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
+    samples = np.unique(np.concatenate([np.linspace(0.0, length, 2001), station.clip(0.0, length)]))
+    exists = np.interp(samples, station, width) >= LANE_THERE
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], exists, [False]]).astype(int)))
     if not len(edges):
         return 0.0, 0.0
-    starts, ends = fine[edges[::2]], fine[edges[1::2] - 1]
+    starts, ends = samples[edges[::2]], samples[edges[1::2] - 1]
     longest = int(np.argmax(ends - starts))
     return round_value(float(starts[longest])), round_value(float(ends[longest]))

@@ -50,8 +50,8 @@ class PavementDamage:
     """
 
     def __init__(self, limits: MaterialLimits, seed: int, side: Side, length: float, edges: tuple[float, ...]) -> None:
-        drawn = draw_materials(limits, seed)
-        self._patch_density, self._crack_density = drawn["patch_density"], drawn["crack_density"]
+        densities = draw_materials(limits, seed)
+        self._patch_density, self._crack_density = densities["patch_density"], densities["crack_density"]
         self._seed, self._side, self._length, self._edges = seed, side, length, edges
         self._depths = stream(seed, "crack depths", side)
         self._sign = 1.0 if side == "left" else -1.0
@@ -63,10 +63,10 @@ class PavementDamage:
         for _ in range(_count(self._patch_density * self._length / 100.0, rng)):
             outer, inner = self._lane(rng)
             middle = (outer + inner) / 2.0
-            low, high = [(inner, outer), (inner, middle), (middle, outer)][rng.integers(3)]
-            low, high = low + 0.15, high - 0.15  # beside the markings
+            inner_edge, outer_edge = [(inner, outer), (inner, middle), (middle, outer)][rng.integers(3)]
+            inner_edge, outer_edge = inner_edge + 0.15, outer_edge - 0.15  # beside the markings
             start, end = self._stretch(_LENGTH["patch"], rng)
-            corners = [(start, low), (end, low), (end, high), (start, high)]
+            corners = [(start, inner_edge), (end, inner_edge), (end, outer_edge), (start, outer_edge)]
             age, height = draw_between(rng, (0.0, 1.0)), draw_between(heights, _PATCH_HEIGHT)
             result.append(Patch(outline=tuple(map(self._corner, corners)), age=age, height=height))
         return tuple(result)
@@ -80,23 +80,27 @@ class PavementDamage:
         return (*result, *(self._net(rng) for _ in range(_count(_NETS_PER_KM * share, rng))))
 
     def _along(self, rng: np.random.Generator) -> Crack:
+        """Return a drawn longitudinal crack in a wheel track or at a lane's outer joint."""
         outer, inner = self._lane(rng)
         middle = (outer + inner) / 2.0
-        beside = [middle - _TRACK, middle + _TRACK, outer - 0.13][rng.integers(3)]
+        crack_distance = [middle - _TRACK, middle + _TRACK, outer - 0.13][rng.integers(3)]
         start, end = self._stretch(_LENGTH["long"], rng)
         stations = np.linspace(start, end, 2 + int((end - start) / _STEP))
-        wander = _wander(len(stations), 0.03, rng)
-        return self._crack("longitudinal", [np.column_stack([stations, beside + wander])], rng, sealed=0.6)
+        deviation = _wander(len(stations), 0.03, rng)
+        return self._crack(
+            "longitudinal", [np.column_stack([stations, crack_distance + deviation])], rng, sealed_share=0.6
+        )
 
     def _across(self, rng: np.random.Generator) -> Crack:
-        first = int(rng.integers(len(self._edges) - 1))
-        last = int(rng.integers(first + 1, len(self._edges)))
-        outer, inner = self._edges[first], self._edges[last]
+        """Return a drawn transverse crack over one or more lanes."""
+        first_edge = int(rng.integers(len(self._edges) - 1))
+        last_edge = int(rng.integers(first_edge + 1, len(self._edges)))
+        outer, inner = self._edges[first_edge], self._edges[last_edge]
         distances = np.linspace(inner, outer, 2 + int((outer - inner) / _STEP))
-        wander = _wander(len(distances), 0.06, rng)
+        deviation = _wander(len(distances), 0.06, rng)
         middle = draw_between(rng, (1.0, max(1.0, self._length - 1.0)))
-        stations = np.clip(middle + wander - wander.mean(), 0.0, self._length)
-        return self._crack("transverse", [np.column_stack([stations, distances])], rng, sealed=0.7)
+        stations = np.clip(middle + deviation - deviation.mean(), 0.0, self._length)
+        return self._crack("transverse", [np.column_stack([stations, distances])], rng, sealed_share=0.7)
 
     def _net(self, rng: np.random.Generator) -> Crack:
         """Return an alligator crack: rows and columns of a grid whose nodes were moved."""
@@ -104,19 +108,20 @@ class PavementDamage:
         track = (outer + inner) / 2.0 + _TRACK * (1.0 if rng.random() < 0.5 else -1.0)
         start, end = self._stretch(_LENGTH["net"], rng)
         rows, columns = 2 + int((end - start) / _CELL), 4
-        along, across = np.meshgrid(np.linspace(start, end, rows), track + _CELL * (np.arange(columns) - 1.5))
-        grid = np.stack([along, across], axis=-1).swapaxes(0, 1)
+        stations, distances = np.meshgrid(np.linspace(start, end, rows), track + _CELL * (np.arange(columns) - 1.5))
+        grid = np.stack([stations, distances], axis=-1).swapaxes(0, 1)
         grid = grid + rng.uniform(-0.35, 0.35, grid.shape) * _CELL
         grid[..., 0] = np.clip(grid[..., 0], 0.0, self._length)
         lines = [*grid, *grid.swapaxes(0, 1)]
-        return self._crack("alligator", lines, rng, sealed=0.0)
+        return self._crack("alligator", lines, rng, sealed_share=0.0)
 
-    def _crack(self, kind: str, lines: list[np.ndarray], rng: np.random.Generator, sealed: float) -> Crack:
-        closed = bool(rng.random() < sealed)
+    def _crack(self, kind: str, lines: list[np.ndarray], rng: np.random.Generator, sealed_share: float) -> Crack:
+        """Return a crack along lines of (station, distance), m, of a drawn width and depth, perhaps sealed."""
+        is_sealed = bool(rng.random() < sealed_share)
         corners = tuple(tuple(self._corner((float(s), float(d))) for s, d in line) for line in lines)
-        width = draw_between(rng, _BAND if closed else _GAP)
-        depth = draw_between(self._depths, _BAND_DEPTH if closed else _GAP_DEPTH)
-        return Crack(kind=kind, width=width, sealed=closed, depth=depth, lines=corners)
+        width = draw_between(rng, _BAND if is_sealed else _GAP)
+        depth = draw_between(self._depths, _BAND_DEPTH if is_sealed else _GAP_DEPTH)
+        return Crack(kind=kind, width=width, sealed=is_sealed, depth=depth, lines=corners)
 
     def _lane(self, rng: np.random.Generator) -> tuple[float, float]:
         """Return the distances (m) of outer and inner edge of a drawn lane, mostly an outer one: of heavy vehicles."""
@@ -125,15 +130,18 @@ class PavementDamage:
         return self._edges[number], self._edges[number + 1]
 
     def _stretch(self, lengths: tuple[float, float], rng: np.random.Generator) -> tuple[float, float]:
+        """Return the stations (m) of a drawn stretch with a length within limits (m), somewhere on the road."""
         length = min(draw_between(rng, lengths), self._length)
         start = (self._length - length) * rng.random()
         return start, start + length
 
     def _corner(self, place: tuple[float, float]) -> Corner:
+        """Return the station and offset (m), rounded, of a place given as station and distance from the centreline."""
         return round_value(min(place[0], self._length)), round_value(self._sign * place[1])
 
 
 def _count(expected: float, rng: np.random.Generator) -> int:
+    """Return a whole number whose mean is the expected number: the fraction decides the chance of one more."""
     return math.floor(expected + rng.random()) if expected > 0.0 else 0
 
 

@@ -37,7 +37,7 @@ def sample_road(
     seed: int,
     title: str = "",
     axis: AlignmentObject | None = None,
-    given: GivenRoad | None = None,
+    fixed_parts: GivenRoad | None = None,
 ) -> RoadParameters:
     """Return the parameter set of a road drawn from a seed within a scenario's limits.
 
@@ -47,7 +47,7 @@ def sample_road(
         title: title for people.
         axis: take this alignment (instance 1) instead of drawing one; its coordinates are local. It may break the
             rules of its design class.
-        given: parts along that alignment that are taken as they are; the rest is drawn around them.
+        fixed_parts: parts along that alignment that are taken as they are; the rest is drawn around them.
 
     Raises:
         InputError: limits contradict each other; the message names them all.
@@ -63,25 +63,26 @@ def sample_road(
     if axis:
         scenario = scenario.model_copy(update={"length": round_value(axis.length)})
     check_conflicts(scenario, with_axis=axis is not None)
-    site = _sample_site(scenario, seed, axis or sample_alignment(scenario, seed), given)
+    site = _sample_site(scenario, seed, axis or sample_alignment(scenario, seed), fixed_parts)
     objects: dict[str, Any] = {"alignment": site.alignment}
 
     def add(items: Iterable[tuple[str, RoadObject]]) -> None:
+        """Add objects under free ids, each with the next instance number."""
         for name, item in list(items):
             objects[_free_id(name, objects)] = item.model_copy(update={"instance": len(objects) + 1})
 
     add(_structure(site))
-    add(place_markings(site) if given is None or given.markings is None else given.markings.items())
-    given_things = None if given is None else given.things
-    if given_things is not None:
-        add(given_things.items())
+    add(place_markings(site) if fixed_parts is None or fixed_parts.markings is None else fixed_parts.markings.items())
+    fixed_things = None if fixed_parts is None else fixed_parts.things
+    if fixed_things is not None:
+        add(fixed_things.items())
     else:
         add(place_furniture(site))
         add(place_roadside(site, objects))
     add([("terrain", site.terrain)])
     add(sample_vegetation(site))
     add(sample_vehicles(site, objects))
-    if given_things is None:
+    if fixed_things is None:
         add(sample_assets(site))
     add([("landscape", sample_landscape(site))])
     origin = origin_on_ground(scenario, site.alignment, site.terrain)
@@ -104,13 +105,13 @@ def sample_road(
     )
 
 
-def _free_id(name: str, taken: Mapping[str, Any]) -> str:
+def _free_id(name: str, objects: Mapping[str, Any]) -> str:
     """Return an id, with a number where what is given has it already."""
-    free, count = name, 1
-    while free in taken:
+    free_name, count = name, 1
+    while free_name in objects:
         count += 1
-        free = f"{name[:56]}-{count}"
-    return free
+        free_name = f"{name[:56]}-{count}"
+    return free_name
 
 
 def sample_alignment(scenario: RoadScenario, seed: int) -> AlignmentObject:
@@ -136,18 +137,24 @@ def sample_alignment(scenario: RoadScenario, seed: int) -> AlignmentObject:
     return axis.model_copy(update={"start_x": round_value(-x, 3), "start_y": round_value(-y, 3)})
 
 
-def _sample_site(scenario: RoadScenario, seed: int, axis: AlignmentObject, given: GivenRoad | None) -> PlacementSite:
+def _sample_site(
+    scenario: RoadScenario, seed: int, axis: AlignmentObject, fixed_parts: GivenRoad | None
+) -> PlacementSite:
     """Return a drawn road without what stands on and beside it: axis, carriageways, turnouts and terrain."""
     sampler = CarriagewaySampler(scenario, seed, axis)
     carriageways: dict[Side, Carriageway] = {}
     turnouts: dict[str, Turnout] = {}
-    if given is not None and given.carriageways:
-        carriageways = {side: sampler.pave(given.carriageways[side]) for side in SIDES if side in given.carriageways}
-        return PlacementSite(scenario, seed, axis, carriageways, dict(given.turnouts), sample_terrain(scenario, seed))
+    if fixed_parts is not None and fixed_parts.carriageways:
+        carriageways = {
+            side: sampler.pave(fixed_parts.carriageways[side]) for side in SIDES if side in fixed_parts.carriageways
+        }
+        return PlacementSite(
+            scenario, seed, axis, carriageways, dict(fixed_parts.turnouts), sample_terrain(scenario, seed)
+        )
     for side in SIDES:
-        crossfall = None if given is None else given.crossfall.get(side)
-        carriageways[side], of_side = sampler.draw(side, crossfall)
-        turnouts |= of_side
+        crossfall = None if fixed_parts is None else fixed_parts.crossfall.get(side)
+        carriageways[side], turnouts_of_side = sampler.draw(side, crossfall)
+        turnouts |= turnouts_of_side
     return PlacementSite(scenario, seed, axis, carriageways, turnouts, sample_terrain(scenario, seed))
 
 

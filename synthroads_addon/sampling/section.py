@@ -108,25 +108,27 @@ class RampLimits:
         room_for_bay: whether an emergency bay lies within the terrain.
     """
 
-    def __init__(self, scenario: RoadScenario, section: StandardCrossSection, tightest: float = math.inf) -> None:
+    def __init__(
+        self, scenario: RoadScenario, section: StandardCrossSection, tightest_radius: float = math.inf
+    ) -> None:
         """Work them out from a scenario's limits, the cross-section and the road's tightest radius (m)."""
         limits = scenario.turnouts
         # Inside the terrain, and well clear of the centre of a curve.
-        reach = min(scenario.half_width - _BESIDE_ROAD, FARTHEST_REACH, 0.5 * tightest)
+        reach = min(scenario.half_width - _BESIDE_ROAD, FARTHEST_REACH, 0.5 * tightest_radius)
         self.clothoids = limits.ramp_clothoid
         self.nose_wedge = section.hard_shoulder + NOSE_WIDTH
         edge = section.median / 2.0 + section.paved_width + section.verge
         self.room_for_bay = edge + limits.bay_width.maximum <= reach
         self.shortest = self.nose(self.clothoids.minimum) + NOSE_BEFORE_END
         self.widest_wedge = reach - edge + section.hard_shoulder - RAMP_LANE - 2.0 * RAMP_EDGE_STRIP
-        beside = limits.lane_width.maximum + TURNOUT_EDGE_STRIP + limits.shoulder_width.maximum
-        if self.widest_wedge <= max(self.nose_wedge, beside - RAMP_LANE - 2.0 * RAMP_EDGE_STRIP):
+        widest_lane = limits.lane_width.maximum + TURNOUT_EDGE_STRIP + limits.shoulder_width.maximum
+        if self.widest_wedge <= max(self.nose_wedge, widest_lane - RAMP_LANE - 2.0 * RAMP_EDGE_STRIP):
             self.lengths = math.inf, 0.0
             return
         ratio = (self.widest_wedge / self.nose_wedge) ** (1.0 / 3.0)  # of the ramp's length to the nose's, at most
-        least = max(self.shortest, NOSE_BEFORE_END * ratio / (ratio - 1.0))
-        most = (6.0 * self.clothoids.maximum**2 * self.widest_wedge) ** (1.0 / 3.0)
-        self.lengths = max(limits.ramp_length.minimum, least), min(limits.ramp_length.maximum, most)
+        least_length = max(self.shortest, NOSE_BEFORE_END * ratio / (ratio - 1.0))
+        largest_length = (6.0 * self.clothoids.maximum**2 * self.widest_wedge) ** (1.0 / 3.0)
+        self.lengths = max(limits.ramp_length.minimum, least_length), min(limits.ramp_length.maximum, largest_length)
 
     def nose(self, clothoid: float) -> float:
         """Return the distance (m) from the gore's tip to the nose for a clothoid parameter A (m)."""
@@ -134,9 +136,9 @@ class RampLimits:
 
     def clothoid(self, length: float, share: float) -> float:
         """Return the clothoid parameter A (m) at a share (0 to 1) of those that a ramp of this length (m) may have."""
-        low = max(self.clothoids.minimum, math.sqrt(length**3 / (6.0 * self.widest_wedge)))
-        high = min(self.clothoids.maximum, math.sqrt((length - NOSE_BEFORE_END) ** 3 / (6.0 * self.nose_wedge)))
-        return round_value(low + max(0.0, high - low) * share)
+        smallest = max(self.clothoids.minimum, math.sqrt(length**3 / (6.0 * self.widest_wedge)))
+        largest = min(self.clothoids.maximum, math.sqrt((length - NOSE_BEFORE_END) ** 3 / (6.0 * self.nose_wedge)))
+        return round_value(smallest + max(0.0, largest - smallest) * share)
 
 
 def bounds(limits: Interval, least: float = -math.inf) -> tuple[float, float]:
@@ -150,20 +152,20 @@ def features_of(scenario: RoadScenario, section: StandardCrossSection, ramps: Ra
     taper, lane = limits.taper_length, limits.lane_length
     with_ramp = (bounds(taper, TURNOUT_TAPER), bounds(lane, TURNOUT_LANE_LENGTH[design_class]), ramps.lengths)
     spacing = INTERCHANGE_SPACING[design_class]
-    every = spacing or _INTERCHANGE_EVERY
+    length_of_another = spacing or _INTERCHANGE_EVERY
     features = [
-        Feature("exit", limits.exits, with_ramp, BLEND + STEP, spacing, every),
-        Feature("entry", limits.entries, with_ramp, BLEND + STEP, spacing, every),
+        Feature("exit", limits.exits, with_ramp, BLEND + STEP, spacing, length_of_another),
+        Feature("entry", limits.entries, with_ramp, BLEND + STEP, spacing, length_of_another),
     ]
     if ramps.room_for_bay:
         bay_tapers = bounds(limits.bay_taper_length, EMERGENCY_BAY_TAPER)
-        bay = (bay_tapers, bounds(limits.bay_length, EMERGENCY_BAY_LENGTH), bay_tapers)
-        features.append(Feature("emergency_bay", limits.emergency_bays, bay, every=_BAY_EVERY))
+        bay_lengths = (bay_tapers, bounds(limits.bay_length, EMERGENCY_BAY_LENGTH), bay_tapers)
+        features.append(Feature("emergency_bay", limits.emergency_bays, bay_lengths, every=_BAY_EVERY))
     if may_change_lanes(scenario, section):
-        change = scenario.lane_changes
-        tapers = (bounds(change.taper_length, LANE_TAPER_LENGTH[design_class]),)
-        features.append(Feature("lane_change", change.share, tapers, 2.0 * BESIDE_LANE_CHANGE))
-    return tuple(f for f in features if f.share > 0.0 and all(low <= high for low, high in f.lengths))
+        lane_changes = scenario.lane_changes
+        tapers = (bounds(lane_changes.taper_length, LANE_TAPER_LENGTH[design_class]),)
+        features.append(Feature("lane_change", lane_changes.share, tapers, 2.0 * BESIDE_LANE_CHANGE))
+    return tuple(f for f in features if f.share > 0.0 and all(least <= largest for least, largest in f.lengths))
 
 
 def may_change_lanes(scenario: RoadScenario, section: StandardCrossSection) -> bool:
@@ -185,34 +187,36 @@ def arrange_features(features: tuple[Feature, ...], length: float, rng: np.rando
     ]
     order: list[tuple[float, Feature]] = []
     for *_, feature in sorted(candidates, key=lambda item: item[:3]):
-        longer = sorted([*order, (rng.random(), feature)], key=lambda item: item[0])
-        if pack_features([(chosen, chosen.least) for _, chosen in longer])[-1] <= length:
-            order = longer
-    chosen = [feature for _, feature in order]
-    spare = length - pack_features([(feature, feature.least) for feature in chosen])[-1]
-    extras = [[(high - low) * rng.random() for low, high in feature.lengths] for feature in chosen]
-    granted = min(1.0, spare / max(math.fsum(map(math.fsum, extras)), 1e-9))
+        extended = sorted([*order, (rng.random(), feature)], key=lambda item: item[0])
+        if pack_features([(chosen_features, chosen_features.least) for _, chosen_features in extended])[-1] <= length:
+            order = extended
+    chosen_features = [feature for _, feature in order]
+    spare_length = length - pack_features([(feature, feature.least) for feature in chosen_features])[-1]
+    extras = [[(largest - least) * rng.random() for least, largest in feature.lengths] for feature in chosen_features]
+    granted_share = min(1.0, spare_length / max(math.fsum(map(math.fsum, extras)), 1e-9))
     lengths = [
-        tuple(round_value(low + extra * granted) for (low, _), extra in zip(feature.lengths, parts, strict=True))
-        for feature, parts in zip(chosen, extras, strict=True)
+        tuple(
+            round_value(least + extra * granted_share) for (least, _), extra in zip(feature.lengths, parts, strict=True)
+        )
+        for feature, parts in zip(chosen_features, extras, strict=True)
     ]
-    begins = pack_features([(f, f.fixed + math.fsum(parts)) for f, parts in zip(chosen, lengths, strict=True)])
-    spare = max(0.0, length - begins.pop())
-    shifts = sorted(spare * rng.random() for _ in chosen)
+    begins = pack_features([(f, f.fixed + math.fsum(parts)) for f, parts in zip(chosen_features, lengths, strict=True)])
+    spare_length = max(0.0, length - begins.pop())
+    shifts = sorted(spare_length * rng.random() for _ in chosen_features)
     return [
         TurnoutPlace(feature.kind, begin + shift, parts)
-        for feature, begin, shift, parts in zip(chosen, begins, shifts, lengths, strict=True)
+        for feature, begin, shift, parts in zip(chosen_features, begins, shifts, lengths, strict=True)
     ]
 
 
 def pack_features(stretches: Sequence[tuple[Feature, float]]) -> list[float]:
     """Return where features of given lengths (m) begin, each as early as allowed, and, last, where all end."""
     begins: list[float] = []
-    reached, ends = -TURNOUT_GAP, dict[FeatureKind, float]()
+    end_so_far, ends = -TURNOUT_GAP, dict[FeatureKind, float]()
     for feature, length in stretches:
-        begins.append(max(reached + TURNOUT_GAP, ends.get(feature.kind, -math.inf) + feature.apart))
-        reached = ends[feature.kind] = begins[-1] + length
-    return [*begins, max(reached, 0.0)]
+        begins.append(max(end_so_far + TURNOUT_GAP, ends.get(feature.kind, -math.inf) + feature.apart))
+        end_so_far = ends[feature.kind] = begins[-1] + length
+    return [*begins, max(end_so_far, 0.0)]
 
 
 def lowest_station(side: Side, road_length: float, begin: float, length: float) -> float:
@@ -226,7 +230,7 @@ def sample_turnout(
     """Return a drawn turnout at a place beside a road of a length (m), with instance 1."""
     limits = scenario.turnouts
     begin = place.begin + BLEND + STEP if place.kind == "entry" else place.begin
-    same: dict[str, Any] = {
+    common_fields: dict[str, Any] = {
         "instance": 1,
         "carriageway": f"carriageway-{side}",
         "kind": place.kind,
@@ -234,7 +238,7 @@ def sample_turnout(
     }
     if place.kind == "emergency_bay":
         return Turnout(
-            **same,
+            **common_fields,
             taper_in_length=place.lengths[0],
             lane_length=place.lengths[1],
             taper_out_length=place.lengths[2],
@@ -242,12 +246,12 @@ def sample_turnout(
             edge_strip_width=0.0,
         )
     taper, lane, ramp = place.lengths
-    leaving = place.kind == "exit"
+    is_exit = place.kind == "exit"
     return Turnout(
-        **same,
-        taper_in_length=taper if leaving else 0.0,
+        **common_fields,
+        taper_in_length=taper if is_exit else 0.0,
         lane_length=lane,
-        taper_out_length=0.0 if leaving else taper,
+        taper_out_length=0.0 if is_exit else taper,
         lane_width=draw_between(rng, bounds(limits.lane_width, TURNOUT_LANE_WIDTH)),
         edge_strip_width=TURNOUT_EDGE_STRIP,
         shoulder_width=draw_between(rng, bounds(limits.shoulder_width)),
@@ -267,11 +271,13 @@ def lay_ramp(limits: TurnoutLimits, turnout: Turnout, road: Carriageway, rng: np
     """
     if turnout.ramp is None:
         return turnout
-    fall, grade = (draw_between(rng, bounds(limit)) for limit in (limits.ramp_crossfall, limits.ramp_grade))
+    fall_percent, grade = (draw_between(rng, bounds(limit)) for limit in (limits.ramp_crossfall, limits.ramp_grade))
     station, percent = zip(*((point.station, point.crossfall_percent) for point in road.crossfall), strict=True)
-    there = float(np.interp(TurnoutShape(turnout, road).nose_station(), station, percent))
-    target = -road.sign * fall
-    crossfall = round_value(min(max(target, there - SHARPEST_RIDGE), there + SHARPEST_RIDGE))
+    percent_at_nose = float(np.interp(TurnoutShape(turnout, road).nose_station(), station, percent))
+    target_percent = -road.sign * fall_percent
+    crossfall = round_value(
+        min(max(target_percent, percent_at_nose - SHARPEST_RIDGE), percent_at_nose + SHARPEST_RIDGE)
+    )
     ramp = turnout.ramp.model_copy(update={"crossfall_percent": crossfall, "grade_percent": grade})
     return turnout.model_copy(update={"ramp": ramp})
 
@@ -292,6 +298,7 @@ def cross_section_of(scenario: RoadScenario) -> StandardCrossSection:
 
 
 def _unchanged_cross_section(cross_section: str | FreeCrossSection) -> StandardCrossSection:
+    """Return the standard cross-section of a name, or one by hand, as the guidelines' table would have it."""
     if isinstance(cross_section, str):
         return STANDARD_CROSS_SECTIONS[cross_section]
     return StandardCrossSection(**{name: getattr(cross_section, name) for name in FreeCrossSection.model_fields})
@@ -332,10 +339,11 @@ class CarriagewaySampler:
     def pave(self, carriageway: Carriageway) -> Carriageway:
         """Return a given carriageway with a drawn surface course; nothing is drawn that would change its surface."""
         side = carriageway.side
-        drawn = {**self._courses.draw(side, len(carriageway.lanes)), **self._relief(side)}
-        return carriageway.model_copy(update={"pavement": Pavement(**drawn)})
+        fields = {**self._courses.draw(side, len(carriageway.lanes)), **self._relief(side)}
+        return carriageway.model_copy(update={"pavement": Pavement(**fields)})
 
     def _lay_ramp(self, name: str, turnout: Turnout, road: Carriageway) -> Turnout:
+        """Return a turnout with a drawn ramp surface, from random numbers of its own."""
         return lay_ramp(self.scenario.turnouts, turnout, road, stream(self.seed, "ramp surface", name))
 
     def _change_lane(
@@ -343,17 +351,18 @@ class CarriagewaySampler:
     ) -> tuple[Lane, ...]:
         """Return the lanes with the outermost or innermost one ending, or beginning, over the taper of a place."""
         index = 0 if rng.random() < 0.5 else len(lanes) - 1
-        drops = rng.random() < 0.5
+        is_dropped = rng.random() < 0.5
         (taper,) = place.lengths
         start = lowest_station(side, self.length, place.begin + BESIDE_LANE_CHANGE, taper)
-        full = self.section.lanes[index]
-        low, high = (full, 0.0) if drops == (side == "right") else (0.0, full)
+        full_width = self.section.lanes[index]
+        first_width, last_width = (full_width, 0.0) if is_dropped == (side == "right") else (0.0, full_width)
         stations = (0.0, start, round_value(start + taper), round_value(self.length))
-        points = zip(stations, (low, low, high, high), strict=True)
-        changed = Lane(width=tuple(WidthPoint(station=station, width=width) for station, width in points))
-        return tuple(changed if i == index else lane for i, lane in enumerate(lanes))
+        points = zip(stations, (first_width, first_width, last_width, last_width), strict=True)
+        changed_lane = Lane(width=tuple(WidthPoint(station=station, width=width) for station, width in points))
+        return tuple(changed_lane if i == index else lane for i, lane in enumerate(lanes))
 
     def _carriageway(self, side: Side, lanes: tuple[Lane, ...], rng: np.random.Generator) -> Carriageway:
+        """Return a carriageway of the road's cross-section with its crossfall, and its pavement with drawn damage."""
         section, axis = self.section, self.axis.horizontal
         damage = PavementDamage(self.scenario.materials, self.seed, side, self.length, self._lane_edges(lanes))
         return Carriageway(
@@ -385,14 +394,17 @@ class CarriagewaySampler:
 
     def _lane_edges(self, lanes: tuple[Lane, ...]) -> tuple[float, ...]:
         """Return the distances (m) from the centreline of the boundaries of steady lanes, outermost first."""
-        inner = self.section.median / 2.0 + self.section.inner_edge_strip
-        steady = [lane.width if isinstance(lane.width, float) else 0.0 for lane in lanes]
-        first = next(i for i, width in enumerate(steady) if width)
-        steady = steady[first:]
+        innermost_edge = self.section.median / 2.0 + self.section.inner_edge_strip
+        steady_widths = [lane.width if isinstance(lane.width, float) else 0.0 for lane in lanes]
+        first_steady = next(i for i, width in enumerate(steady_widths) if width)
+        steady_widths = steady_widths[first_steady:]
         # A lane that begins or ends is the outermost or the innermost one: the latter moves nothing outside of it.
-        if not steady[-1]:
-            inner, steady = inner + max(point.width for point in lanes[-1].width), steady[:-1]  # type: ignore[union-attr]
-        return tuple(inner + sum(steady[i:]) for i in range(len(steady) + 1))
+        if not steady_widths[-1]:
+            innermost_edge, steady_widths = (
+                innermost_edge + max(point.width for point in lanes[-1].width),
+                steady_widths[:-1],
+            )  # type: ignore[union-attr]
+        return tuple(innermost_edge + sum(steady_widths[i:]) for i in range(len(steady_widths) + 1))
 
     def _ruts(self, lanes: tuple[Lane, ...], rng: np.random.Generator) -> tuple[Rut, ...]:
         """Return at most one drawn rut, of the outermost lane that is there all along, on a part of the road."""
@@ -418,23 +430,25 @@ class CarriagewaySampler:
         """Return drawn potholes that lie wholly on the main road's pavement."""
         limits, sign = self.scenario.pavement, 1.0 if side == "left" else -1.0
         count = int(draw_between(rng, bounds(limits.potholes_per_km)) * self.length / 1000.0 + rng.random())
-        inner, (smallest, largest) = self.section.median / 2.0, bounds(limits.pothole_size)
+        inner_edge, (smallest, largest) = self.section.median / 2.0, bounds(limits.pothole_size)
         potholes = []
         for _ in range(count if smallest <= self.length else 0):
             length = draw_between(rng, (smallest, min(largest, self.length)))
             station = draw_between(rng, (length / 2.0, self.length - length / 2.0))
             # A lane only grows or only shrinks: one of the ends is the narrowest place.
-            paved = min(self._paved_width(lanes, station + half) for half in (-length / 2.0, length / 2.0))
-            width = min(draw_between(rng, (smallest, largest)), paved)
-            offset = sign * draw_between(rng, (inner + width / 2.0, inner + paved - width / 2.0))
+            paved_width = min(
+                self._paved_width(lanes, station + half_length) for half_length in (-length / 2.0, length / 2.0)
+            )
+            width = min(draw_between(rng, (smallest, largest)), paved_width)
+            offset = sign * draw_between(rng, (inner_edge + width / 2.0, inner_edge + paved_width - width / 2.0))
             depth = draw_between(rng, bounds(limits.pothole_depth))
             potholes.append(Pothole(station=station, offset=offset, length=length, width=width, depth=depth))
         return tuple(potholes)
 
     def _paved_width(self, lanes: tuple[Lane, ...], station: float) -> float:
         """Return the width (m) of the main road's pavement of one carriageway at a station."""
-        full = self.section.paved_width
+        total_width = self.section.paved_width
         for lane in lanes:
             if isinstance(lane.width, tuple):
-                full += float(width_at(lane.width, station)) - nominal_width(lane.width)
-        return full
+                total_width += float(width_at(lane.width, station)) - nominal_width(lane.width)
+        return total_width

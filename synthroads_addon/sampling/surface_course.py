@@ -45,11 +45,11 @@ class SurfaceCourses:
         fields: dict[str, Any] = {"kind": kind}
         if rng.random() >= self._scenario.pavement.renewed:
             return fields
-        newer = draw_between(rng, (0.0, 0.7 * self._age))
-        which = pick(rng, ("outer lane", "lanes", "shoulder"))
-        if which == "shoulder":
-            return fields | {"shoulder_age": newer}
-        return fields | {"lane_ages": (newer,) * (lanes if which == "lanes" else 1)}
+        renewed_age = draw_between(rng, (0.0, 0.7 * self._age))
+        renewed_part = pick(rng, ("outer lane", "lanes", "shoulder"))
+        if renewed_part == "shoulder":
+            return fields | {"shoulder_age": renewed_age}
+        return fields | {"lane_ages": (renewed_age,) * (lanes if renewed_part == "lanes" else 1)}
 
     def removed_markings(self, side: Side, edges: tuple[float, ...]) -> tuple[RemovedMarking, ...]:
         """Return drawn lines that were ground off a carriageway: those between its lanes as they were for a while.
@@ -62,13 +62,13 @@ class SurfaceCourses:
         if len(edges) < 3 or self._length < _SHORTEST or rng.random() >= self._scenario.markings.removed:
             return ()
         sign = 1.0 if side == "left" else -1.0
-        moved = draw_between(rng, _MOVED) * pick(rng, (-1.0, 1.0))
+        line_shift = draw_between(rng, _MOVED) * pick(rng, (-1.0, 1.0))
         length = draw_between(rng, (_SHORTEST, self._length))
         start = round_value((self._length - length) * rng.random())
         depth = draw_between(rng, _REMOVED_DEPTH)
         return tuple(
             RemovedMarking(
-                offset=round_value(sign * (edge + moved)),
+                offset=round_value(sign * (edge + line_shift)),
                 width=_LINE + _REMOVED_WIDTH,
                 dash_length=_DASH,
                 gap_length=_GAP,

@@ -53,6 +53,7 @@ _COLOR_SUMS = np.cumsum(list(COLORS.values()))
 
 
 def _seed(rng: np.random.Generator) -> int:
+    """Return a drawn seed for the random numbers of an object."""
     return int(rng.integers(_HIGHEST_SEED))
 
 
@@ -60,15 +61,15 @@ def sample_terrain(scenario: RoadScenario, seed: int) -> Terrain:
     """Return the drawn terrain of a seed; its instance number is 1."""
     rng = stream(seed, "terrain")
     names = ("embankment_height", "undulation", "wavelength", "batter_slope")
-    drawn = {name: draw(rng, getattr(scenario, name)) for name in names}
-    given = {"half_width": scenario.half_width, "elevation_model": scenario.elevation_model}
+    values = {name: draw(rng, getattr(scenario, name)) for name in names}
+    scenario_values = {"half_width": scenario.half_width, "elevation_model": scenario.elevation_model}
     batter = stream(seed, "terrain", "batter")
     shape = {name: draw(batter, getattr(scenario, name)) for name in ("crest_length", "rounding_length", "swale_width")}
     shape["swale_depth"] = round_value(shape["swale_width"] * SWALE_DEPTH_SHARE)
     ditch = draw(stream(seed, "terrain", "ditch"), scenario.ditch_width)
     shape["ditch_width"] = ditch if ditch >= NARROWEST_DITCH else 0.0
     shape["ditch_depth"] = round_value(shape["ditch_width"] * SWALE_DEPTH_SHARE)
-    return Terrain(instance=1, seed=_seed(rng), **drawn, **shape, **given)
+    return Terrain(instance=1, seed=_seed(rng), **values, **shape, **scenario_values)
 
 
 def sample_environment(scenario: RoadScenario, seed: int) -> Environment:
@@ -76,14 +77,14 @@ def sample_environment(scenario: RoadScenario, seed: int) -> Environment:
     rng, limits = stream(seed, "environment"), scenario.environment
     names = ("sun_azimuth_deg", "sun_elevation_deg", "cloud_cover")
     light = {name: draw(rng, getattr(limits, name)) for name in names}
-    wet, wetness = rng.random() < limits.wet, draw(rng, limits.wetness)
+    is_wet, wetness = rng.random() < limits.wet, draw(rng, limits.wetness)
     if rng.random() < limits.bad_weather:
         weather = list(WEATHER)[rng.integers(len(WEATHER))]
         light["visibility"], light["sun_strength"] = WEATHER[weather]
     else:
         weather = "clear"
     season: Literal["summer", "winter"] = "winter" if rng.random() < limits.winter else "summer"
-    wetness = wetness if wet or weather == "rain" else 0.0
+    wetness = wetness if is_wet or weather == "rain" else 0.0
     return Environment(wetness=wetness, weather=weather, season=season, **light)
 
 
@@ -93,8 +94,8 @@ def sample_materials(scenario: RoadScenario, seed: int) -> MaterialVariation:
     Raises:
         InputError: the folder of textures can't be read, see `materials.textures.texture_sets`.
     """
-    drawn = draw_materials(scenario.materials, seed)
-    values = {name: value for name, value in drawn.items() if name in MaterialVariation.model_fields}
+    draws = draw_materials(scenario.materials, seed)
+    values = {name: value for name, value in draws.items() if name in MaterialVariation.model_fields}
     sets = {} if scenario.textures is None else texture_sets(scenario.textures)
     textures = tuple(
         choices[stream(seed, "textures", name).integers(len(choices))] for name, choices in sorted(sets.items())
@@ -136,17 +137,17 @@ def _room_beside(site: PlacementSite) -> float:
 
 def _first_tree(site: PlacementSite) -> float:
     """Return the distance (m) behind the verge from which trees may stand beside either carriageway."""
-    narrowest = min(least_width(road.verge_width) for road in site.carriageways.values())
-    return round_value(max(0.0, OBSTACLE_DISTANCE[site.design_class] - narrowest))
+    narrowest_verge = min(least_width(road.verge_width) for road in site.carriageways.values())
+    return round_value(max(0.0, OBSTACLE_DISTANCE[site.design_class] - narrowest_verge))
 
 
 def _draw_species(rng: np.random.Generator, kind: Kind, names: tuple[str, ...]) -> list[str]:
     """Return some drawn species of a kind in random order; reed is not the first of several."""
-    known = list(dict.fromkeys(names))
-    mixed = [known[i] for i in rng.permutation(len(known))]
-    if mixed[0] == "reed":
-        mixed[:2] = mixed[1::-1]
-    return mixed[: rng.integers(1, min(len(mixed), MOST_SPECIES[kind]) + 1)]
+    distinct = list(dict.fromkeys(names))
+    shuffled = [distinct[i] for i in rng.permutation(len(distinct))]
+    if shuffled[0] == "reed":
+        shuffled[:2] = shuffled[1::-1]
+    return shuffled[: rng.integers(1, min(len(shuffled), MOST_SPECIES[kind]) + 1)]
 
 
 def _mix_species(
@@ -170,8 +171,8 @@ def _shrub_belts(site: PlacementSite, room: float) -> Iterator[tuple[str, Vegeta
         return
     rng = site.stream("shrub")
     species = _draw_species(rng, "shrub", limits.shrubs)
-    between = np.sort(rng.uniform(SHRUB_DISTANCE, room, len(species) - 1))
-    borders = [SHRUB_DISTANCE, *map(round_value, between), site.terrain.half_width]
+    inner_borders = np.sort(rng.uniform(SHRUB_DISTANCE, room, len(species) - 1))
+    borders = [SHRUB_DISTANCE, *map(round_value, inner_borders), site.terrain.half_width]
     for name, band in zip(species, pairwise(borders), strict=True):
         yield _plants(rng, "shrub", name, density, band, limits.shrub_height)
 
@@ -179,7 +180,7 @@ def _shrub_belts(site: PlacementSite, room: float) -> Iterator[tuple[str, Vegeta
 def _plants(
     rng: np.random.Generator, kind: Kind, species: str, density: float, band: tuple[float, float], heights: Interval
 ) -> tuple[str, Vegetation]:
-    low, high = sorted((draw(rng, heights), draw(rng, heights)))
+    least_height, largest_height = sorted((draw(rng, heights), draw(rng, heights)))
     plants = Vegetation(
         instance=1,
         kind=kind,
@@ -187,8 +188,8 @@ def _plants(
         density=density,
         band_start=band[0],
         band_end=band[1],
-        height_min=low,
-        height_max=high,
+        height_min=least_height,
+        height_max=largest_height,
         seed=_seed(rng),
     )
     return f"{kind}-{species}", plants
@@ -256,8 +257,8 @@ def _open_stretches(section: CarriagewaySection, length: float, closures: Float)
     if len(closures):
         boundaries = section.lane_boundaries(closures[:, 0])
         centres = (boundaries[:, :-1] + boundaries[:, 1:]) / 2.0
-        low, high = closures[:, 1].min() - VEHICLE_ROOM, closures[:, 1].max() + VEHICLE_ROOM
-        stretches[((centres > low) & (centres < high)).any(axis=0)] = 0.0
+        nearest, farthest = closures[:, 1].min() - VEHICLE_ROOM, closures[:, 1].max() + VEHICLE_ROOM
+        stretches[((centres > nearest) & (centres < farthest)).any(axis=0)] = 0.0
     return stretches
 
 
@@ -266,12 +267,12 @@ def _wide_stretch(width: AnyWidth, length: float) -> tuple[float, float]:
     if not isinstance(width, tuple):
         return 0.0, length if width >= VEHICLE_LANE_WIDTH else 0.0
     kinks = np.unique([0.0, length, *(s for s in width_kinks(width) if 0.0 < s < length)])
-    spare = width_at(width, kinks) - VEHICLE_LANE_WIDTH
-    crossed = np.flatnonzero(spare[:-1] * spare[1:] < 0.0)
-    share = spare[crossed] / (spare[crossed] - spare[crossed + 1])
-    borders = np.unique([*kinks, *(kinks[crossed] + share * np.diff(kinks)[crossed])])
-    wide = width_at(width, (borders[:-1] + borders[1:]) / 2.0) >= VEHICLE_LANE_WIDTH
-    changes = np.flatnonzero(np.diff(np.concatenate([[False], wide, [False]]).astype(np.int8)))
+    spare_width = width_at(width, kinks) - VEHICLE_LANE_WIDTH
+    crossing_intervals = np.flatnonzero(spare_width[:-1] * spare_width[1:] < 0.0)
+    share = spare_width[crossing_intervals] / (spare_width[crossing_intervals] - spare_width[crossing_intervals + 1])
+    borders = np.unique([*kinks, *(kinks[crossing_intervals] + share * np.diff(kinks)[crossing_intervals])])
+    is_wide = width_at(width, (borders[:-1] + borders[1:]) / 2.0) >= VEHICLE_LANE_WIDTH
+    changes = np.flatnonzero(np.diff(np.concatenate([[False], is_wide, [False]]).astype(np.int8)))
     starts, ends = borders[changes[0::2]], borders[changes[1::2]]
     if not len(starts):
         return 0.0, 0.0
@@ -279,7 +280,9 @@ def _wide_stretch(width: AnyWidth, length: float) -> tuple[float, float]:
     return float(starts[longest]), float(ends[longest])
 
 
-def _traffic(rng: np.random.Generator, stretches: Float, heavy: Bool, limits: Interval) -> list[tuple[int, float, str]]:
+def _traffic(
+    rng: np.random.Generator, stretches: Float, is_heavy: Bool, limits: Interval
+) -> list[tuple[int, float, str]]:
     """Return sorted (lane, speed in m/s, model) of drawn vehicles; none where every lane is closed.
 
     The outer lanes have most. Heavy vehicles drive in the outermost, and of three or more in the second as well; where
@@ -287,17 +290,21 @@ def _traffic(rng: np.random.Generator, stretches: Float, heavy: Bool, limits: In
     """
     count = len(stretches)
     sums = np.cumsum(np.arange(count, 0, -1) * (stretches[:, 1] - stretches[:, 0]))
-    outer = sums[: 2 if count > 2 else 1]
+    outer_sums = sums[: 2 if count > 2 else 1]
     if sums[-1] == 0.0:
         return []
-    if outer[-1] == 0.0:
-        heavy = np.zeros_like(heavy)
-    lanes = np.where(heavy, _draw_indices(rng, outer, len(heavy)), _draw_indices(rng, sums, len(heavy)))
-    models = np.where(heavy, _draw_indices(rng, _HEAVY_SUMS, len(heavy)), _draw_indices(rng, _LIGHT_SUMS, len(heavy)))
-    highest = np.where(heavy, min(HEAVY_SPEED, limits.maximum), limits.maximum)
-    speeds = limits.minimum + (highest - limits.minimum) * rng.random(len(heavy))
-    rows = zip(lanes.tolist(), speeds.tolist(), models.tolist(), highest.tolist(), strict=True)
-    return sorted((lane, min(round_value(speed), most), _MODELS[model]) for lane, speed, model, most in rows)
+    if outer_sums[-1] == 0.0:
+        is_heavy = np.zeros_like(is_heavy)
+    lanes = np.where(is_heavy, _draw_indices(rng, outer_sums, len(is_heavy)), _draw_indices(rng, sums, len(is_heavy)))
+    models = np.where(
+        is_heavy, _draw_indices(rng, _HEAVY_SUMS, len(is_heavy)), _draw_indices(rng, _LIGHT_SUMS, len(is_heavy))
+    )
+    highest_speeds = np.where(is_heavy, min(HEAVY_SPEED, limits.maximum), limits.maximum)
+    speeds = limits.minimum + (highest_speeds - limits.minimum) * rng.random(len(is_heavy))
+    rows = zip(lanes.tolist(), speeds.tolist(), models.tolist(), highest_speeds.tolist(), strict=True)
+    return sorted(
+        (lane, min(round_value(speed), highest_speed), _MODELS[model]) for lane, speed, model, highest_speed in rows
+    )
 
 
 def _draw_indices(rng: np.random.Generator, sums: Float, number: int) -> Index:
@@ -316,15 +323,15 @@ def _queue(rng: np.random.Generator, lengths: list[float], stretch: list[float],
         traffic: 1 where they drive with the stations, -1 against them.
     """
     start, end = stretch
-    middles, front = [], -VEHICLE_GAP
+    middles, front_end = [], -VEHICLE_GAP
     for length in lengths:
-        if front + VEHICLE_GAP + length > end - start:
+        if front_end + VEHICLE_GAP + length > end - start:
             break
-        middles.append(front + VEHICLE_GAP + length / 2.0)
-        front += VEHICLE_GAP + length
+        middles.append(front_end + VEHICLE_GAP + length / 2.0)
+        front_end += VEHICLE_GAP + length
     for middle, share in zip(middles, sorted(rng.random(len(middles)).tolist()), strict=True):
-        ahead = middle + share * (end - start - front)
-        yield start + ahead if traffic > 0 else end - ahead
+        driven_distance = middle + share * (end - start - front_end)
+        yield start + driven_distance if traffic > 0 else end - driven_distance
 
 
 def origin_on_ground(scenario: RoadScenario, axis: AlignmentObject, terrain: Terrain) -> tuple[float, float, float]:

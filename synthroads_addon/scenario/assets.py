@@ -42,6 +42,7 @@ class AssetPlacement(ClosedModel):
 
     @model_validator(mode="after")
     def _check_placement(self) -> Self:
+        """Refuse spacing with or without per_km, intervals beyond their limits, and an end before the start."""
         if (self.spacing is None) == (self.per_km is None):
             raise ValueError("either spacing or per_km is needed, and not both")
         for name, (least, most) in _ALLOWED.items():
@@ -72,6 +73,7 @@ class LibraryAsset(ClosedModel):
     @field_validator("file")
     @classmethod
     def _check_path(cls, file: str) -> str:
+        """Refuse a file of another kind, or one that doesn't lie in the library's folder."""
         path = PurePosixPath(file)
         if path.suffix.lower() not in SUFFIXES:
             raise ValueError(f"'{file}' must be one of {', '.join(SUFFIXES)}")
@@ -81,6 +83,7 @@ class LibraryAsset(ClosedModel):
 
     @model_validator(mode="after")
     def _check_object(self) -> Self:
+        """Refuse the name of an object in a file that has none."""
         if self.object is not None and not self.file.lower().endswith(".blend"):
             raise ValueError(f"object is '{self.object}': only a .blend file has named objects to choose from")
         return self
@@ -123,15 +126,17 @@ def read_asset_library(name_or_file: str | os.PathLike[str]) -> AssetLibrary:
 
 @lru_cache(maxsize=8)
 def _read_library(path: str, _stamp: tuple[int, int]) -> AssetLibrary:
+    """Read an asset library; the cache keeps the last ones read, by path and change stamp."""
     return AssetLibrary.from_dict(read_json(path), source=path)
 
 
-def _check_file(path: Path, field: str, shown: str) -> None:
+def _check_file(path: Path, field: str, file_name: str) -> None:
+    """Raise MissingFileError if a file can't be read, InputError if it is empty."""
     try:
         with path.open("rb") as file:
-            empty = not file.read(1)
+            is_empty = not file.read(1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise MissingFileError(field, shown, f"cannot be read ({reason})") from None
-    if empty:
-        raise InputError(field, shown, "the file is empty")
+        raise MissingFileError(field, file_name, f"cannot be read ({reason})") from None
+    if is_empty:
+        raise InputError(field, file_name, "the file is empty")

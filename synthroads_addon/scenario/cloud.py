@@ -45,9 +45,10 @@ class CloudScenario(ClosedModel):
 
     @model_validator(mode="after")
     def _refuse_repetitions(self) -> Self:
+        """Refuse a format or an attribute that is named twice."""
         for name in ("formats", "attributes"):
-            if (twice := first_repeated(getattr(self, name))) is not None:
-                raise ValueError(f"{name} names {twice} twice")
+            if (repeated_name := first_repeated(getattr(self, name))) is not None:
+                raise ValueError(f"{name} names {repeated_name} twice")
         return self
 
     def file_names(self) -> tuple[str, ...]:

@@ -103,10 +103,12 @@ class ColourScenario(ClosedModel):
     @field_validator("intensity_from_layers", mode="before")
     @classmethod
     def _yes_or_no(cls, value: Any) -> Any:
+        """Return "always" or "never" for true or false; anything else as it is."""
         return {True: "always", False: "never"}[value] if isinstance(value, bool) else value
 
     @model_validator(mode="after")
     def _check_samples(self) -> Self:
+        """Refuse samples with direct lighting."""
         if self.lighting == "direct" and (self.samples or 1) > 1:
             raise ValueError("samples can't be given for direct lighting, which has no noise")
         return self
@@ -119,14 +121,14 @@ class ColourScenario(ClosedModel):
             typical_range: the platform's usual range, m: images from farther away are farther apart and coarser.
         """
         preset, scale = COLOUR_FIDELITIES[fidelity], image_scale(typical_range)
-        usual: dict[str, Any] = {
+        preset_values: dict[str, Any] = {
             "image_spacing": preset.image_spacing * scale,
             "ground_sampling_distance": preset.ground_sampling_distance * scale,
             "samples": 1 if self.lighting == "direct" else preset.samples,
         }
-        names = (*usual, "source", "engine", "mode", "lighting", "max_resolution")
-        given = {name: value for name in names if (value := getattr(self, name)) is not None}
-        return ColourSettings(**(usual | given))
+        names = (*preset_values, "source", "engine", "mode", "lighting", "max_resolution")
+        own_values = {name: value for name in names if (value := getattr(self, name)) is not None}
+        return ColourSettings(**(preset_values | own_values))
 
 
 COLOUR_FIDELITIES = {

@@ -315,22 +315,23 @@ class RoadScenario(ClosedModel):
         """Return data with the missing one of design class and cross-section filled in so that it fits the other."""
         if not isinstance(data, dict):
             return data
-        given, section = str(data.get("design_class")), data.get("cross_section")
-        if "cross_section" not in data and given in USUAL_SECTION:
-            return {**data, "cross_section": USUAL_SECTION[given]}
+        design_class, section = str(data.get("design_class")), data.get("cross_section")
+        if "cross_section" not in data and design_class in USUAL_SECTION:
+            return {**data, "cross_section": USUAL_SECTION[design_class]}
         if "design_class" not in data and isinstance(section, str) and section in STANDARD_CROSS_SECTIONS:
             return {**data, "design_class": design_class_of(section, next(iter(USUAL_SECTION)))}
         return data
 
     @model_validator(mode="after")
     def _check_cross_section(self) -> RoadScenario:
+        """Refuse a cross-section that isn't a standard one, or that the design class doesn't allow."""
         if not isinstance(self.cross_section, str):
             return self
         if self.cross_section not in STANDARD_CROSS_SECTIONS:
             names = ", ".join(STANDARD_CROSS_SECTIONS)
             raise ValueError(f"cross_section is '{self.cross_section}': must be one of {names}")
-        allowed = SECTIONS_OF_CLASS[self.design_class]
-        if self.cross_section not in allowed:
-            names = ", ".join(allowed)
+        class_sections = SECTIONS_OF_CLASS[self.design_class]
+        if self.cross_section not in class_sections:
+            names = ", ".join(class_sections)
             raise ValueError(f"cross_section is '{self.cross_section}': {self.design_class} allows {names}")
         return self

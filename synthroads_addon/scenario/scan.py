@@ -118,6 +118,7 @@ class ScanScenario(DeviceChoice):
     @model_validator(mode="before")
     @classmethod
     def _refuse_contradictions(cls, data: Any) -> Any:
+        """Refuse two fields that say the same in different ways."""
         if isinstance(data, dict):
             for a, b in (("rays_per_pulse", "beam_rings"), ("attenuation", "weather")):
                 if data.get(a) is not None and data.get(b) is not None:

@@ -112,6 +112,7 @@ class Scenario(ClosedModel):
     @field_validator("time_budget", mode="before")
     @classmethod
     def _read_unit(cls, value: Any) -> Any:
+        """Return a time with a unit, such as "2 h", in seconds; anything else as it is."""
         if not isinstance(value, str):
             return value
         try:
@@ -146,8 +147,8 @@ class Scenario(ClosedModel):
         """Return whether a scan may have to render: whether it does depends on the scene's materials as well."""
         colour = self.colour
         by_layers = {"always": True, "never": False, "auto": takes_nodes(colour.settings(self.fidelity))}
-        asked = bool(self.coloured_layers) or by_layers[colour.intensity_from_layers]
-        return bool(set(self.outputs) & set(OF_POINTS)) and asked and self.colour.source != "material"
+        needs_materials = bool(self.coloured_layers) or by_layers[colour.intensity_from_layers]
+        return bool(set(self.outputs) & set(OF_POINTS)) and needs_materials and self.colour.source != "material"
 
     def own_materials(self) -> dict[str, Material]:
         """Return the materials of the scenario's own table by name; none if it has none.
@@ -161,22 +162,24 @@ class Scenario(ClosedModel):
         """Return the length (m) of the sections by which a road of a length (m) is scanned; None if whole."""
         if not set(self.outputs) & set(OF_POINTS):
             return None
-        given = self.scan.section_length
-        section, longest = (SECTION_LENGTH, LONGEST_WHOLE) if given is None else (given, 2.0 * given)
-        return section if length > longest else None
+        own_length = self.scan.section_length
+        section_length, longest_whole = (
+            (SECTION_LENGTH, LONGEST_WHOLE) if own_length is None else (own_length, 2.0 * own_length)
+        )
+        return section_length if length > longest_whole else None
 
     def check_sections(self, length: float) -> None:
         """Raise an InputError if a road of a length (m) is scanned by sections and the job needs all of its model."""
-        section = self.section_length(length)
-        if section is None:
+        section_length = self.section_length(length)
+        if section_length is None:
             return
         if self.chooses:
             name = "time_budget" if self.tolerance is None else "tolerance"
-            text = f"can't be kept on a road of {length:g} m, which is built by sections of {section:g} m: choose on a "
-            raise InputError(name, getattr(self, name), f"{text}shorter road, and use its settings")
+            text = f"can't be kept on a road of {length:g} m, which is built by sections of {section_length:g} m: "
+            raise InputError(name, getattr(self, name), f"{text}choose on a shorter road, and use its settings")
         if "scene" in self.outputs:
-            text = f"can't have scene: a road of {length:g} m is built by sections of {section:g} m; leave scene out, "
-            text += f"or set scan.section_length to {length / 2.0:g} or more"
+            text = f"can't have scene: a road of {length:g} m is built by sections of {section_length:g} m; "
+            text += f"leave scene out, or set scan.section_length to {length / 2.0:g} or more"
             raise InputError("outputs", list(self.outputs), text)
 
     def settings(self) -> Settings:
@@ -188,8 +191,8 @@ class Scenario(ClosedModel):
             "relief_octaves": self.scan.relief_octaves,
             "footprints": self.scan.footprints,
         }
-        given = {name: value for name, value in values.items() if value is not None}
-        return replace(FIDELITIES[self.fidelity], **given)
+        own_values = {name: value for name, value in values.items() if value is not None}
+        return replace(FIDELITIES[self.fidelity], **own_values)
 
 
 @dataclass(frozen=True)
@@ -259,14 +262,16 @@ def with_changes(data: Any, changes: Iterable[tuple[str, Any]]) -> Any:
 
     What the scenario said itself and doesn't fit them any more gives way, see `drop_misfits`.
     """
-    before, named = data, set()
+    data_before, changed_paths = data, set()
     for path, value in changes:
         data = apply_values(data, {path: value})
-        named.add(path)
-    return drop_misfits(data, before, named)
+        changed_paths.add(path)
+    return drop_misfits(data, data_before, changed_paths)
 
 
-def drop_misfits(data: dict[str, Any], before: Mapping[str, Any], named: AbstractSet[str]) -> dict[str, Any]:
+def drop_misfits(
+    data: dict[str, Any], data_before: Mapping[str, Any], changed_paths: AbstractSet[str]
+) -> dict[str, Any]:
     """Return a changed scenario's JSON data without its former settings that don't fit the changes any more.
 
     Of a design class and a standard cross-section that don't fit each other, the one that no change names is left out;
@@ -276,48 +281,66 @@ def drop_misfits(data: dict[str, Any], before: Mapping[str, Any], named: Abstrac
 
     Args:
         data: after the changes.
-        before: without them.
-        named: paths of the changed fields, e.g. ``road.design_class``.
+        data_before: without them.
+        changed_paths: paths of the changed fields, e.g. ``road.design_class``.
     """
     road = data.get("road")
     if isinstance(road, dict):
-        data = data | {"road": _without(road, _misfit_of_road(road, named))}
-    for part, tag, kept in _KINDS:  # first: a scan with fields of another platform can't tell what its device can't do
-        data = _reset_part(data, before, named, part, tag, kept)
+        data = data | {"road": _without(road, _misfit_of_road(road, changed_paths))}
+    for (
+        part,
+        tag,
+        kept_fields,
+    ) in _KINDS:  # first: a scan with fields of another platform can't tell what its device can't do
+        data = _reset_part(data, data_before, changed_paths, part, tag, kept_fields)
     scan = data.get("scan")
-    if isinstance(scan, dict) and "scan.device" in named:
-        data = data | {"scan": _without(scan, *_misfits_of_device(scan, named))}
+    if isinstance(scan, dict) and "scan.device" in changed_paths:
+        data = data | {"scan": _without(scan, *_misfits_of_device(scan, changed_paths))}
     return data
 
 
 def _reset_part(
-    data: dict[str, Any], before: Mapping[str, Any], named: AbstractSet[str], part: str, tag: str, kept: Sequence[str]
+    data: dict[str, Any],
+    data_before: Mapping[str, Any],
+    changed_paths: AbstractSet[str],
+    part: str,
+    tag: str,
+    kept_fields: Sequence[str],
 ) -> dict[str, Any]:
     """Return data in which a platform or weather of another kind than before keeps what may stay or was changed."""
     scan = data.get("scan")
-    given = scan.get(part) if isinstance(scan, dict) else None
+    part_data = scan.get(part) if isinstance(scan, dict) else None
     path = f"scan.{part}"
-    if not isinstance(given, dict) or f"{path}.{tag}" not in named or given.get(tag) == _kind(before, part, tag):
+    if (
+        not isinstance(part_data, dict)
+        or f"{path}.{tag}" not in changed_paths
+        or part_data.get(tag) == _kind(data_before, part, tag)
+    ):
         return data
-    changed = {name: value for name, value in given.items() if f"{path}.{name}" in named or name in kept}
-    return data | {"scan": data["scan"] | {part: changed}}
+    new_part_data = {
+        name: value for name, value in part_data.items() if f"{path}.{name}" in changed_paths or name in kept_fields
+    }
+    return data | {"scan": data["scan"] | {part: new_part_data}}
 
 
 def _kind(data: Mapping[str, Any], part: str, tag: str) -> Any:
+    """Return the kind of a scenario's platform or weather, by its data; None if there is none."""
     parts = (data.get("scan") or {}).get(part) or {}
     return parts.get(tag) if isinstance(parts, dict) else None
 
 
-def _misfit_of_road(road: dict[str, Any], named: AbstractSet[str]) -> str | None:
+def _misfit_of_road(road: dict[str, Any], changed_paths: AbstractSet[str]) -> str | None:
     """Return "design_class" or "cross_section", whichever gives way to the other; None if neither does."""
-    others = [name for name in _CLASS_AND_SECTION if not any(path.startswith(f"road.{name}") for path in named)]
+    unchanged_names = [
+        name for name in _CLASS_AND_SECTION if not any(path.startswith(f"road.{name}") for path in changed_paths)
+    ]
     section = road.get("cross_section")
-    if len(others) != 1 or not isinstance(section, str):
+    if len(unchanged_names) != 1 or not isinstance(section, str):
         return None
-    return None if section in SECTIONS_OF_CLASS.get(str(road.get("design_class")), ()) else others[0]
+    return None if section in SECTIONS_OF_CLASS.get(str(road.get("design_class")), ()) else unchanged_names[0]
 
 
-def _misfits_of_device(scan: dict[str, Any], named: AbstractSet[str]) -> list[str]:
+def _misfits_of_device(scan: dict[str, Any], changed_paths: AbstractSet[str]) -> list[str]:
     """Return the names of a scan's settings that its device can't do and that no change names."""
     misfits: list[str] = []
     try:
@@ -329,11 +352,12 @@ def _misfits_of_device(scan: dict[str, Any], named: AbstractSet[str]) -> list[st
             scanner_setting(ScanScenario.from_dict(_without(scan, *misfits)), device)
         except InputError as error:
             name = error.field.removeprefix("scan.")
-            if name in _DEVICE_SETTINGS and name not in misfits and error.field not in named and name in scan:
+            if name in _DEVICE_SETTINGS and name not in misfits and error.field not in changed_paths and name in scan:
                 misfits.append(name)
                 continue
         return misfits
 
 
 def _without(data: dict[str, Any], *names: str | None) -> dict[str, Any]:
+    """Return data without the fields of some names."""
     return {name: value for name, value in data.items() if name not in names}

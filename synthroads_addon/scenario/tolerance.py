@@ -64,6 +64,7 @@ class Tolerance(ClosedModel):
     @model_validator(mode="before")
     @classmethod
     def _read_units(cls, data: Any) -> Any:
+        """Return data whose texts, such as "5mm", are numbers in SI units."""
         if isinstance(data, str):
             data = parse_tolerance(data, "tolerance")
         if not isinstance(data, dict):
@@ -92,16 +93,16 @@ def with_unit(field: str, text: str, units: dict[str, float]) -> float:
         InputError: it is no number, or lacks a unit where it needs one, or has another.
     """
     match = _NUMBER.fullmatch(text)
-    named = [unit for unit in units if unit]
-    allowed = f"a number with a unit of {', '.join(named)}" if named else "a number without a unit"
-    if "" in units and named:
-        allowed = f"a number, or one with a unit of {', '.join(named)}"
+    unit_names = [unit for unit in units if unit]
+    allowed = f"a number with a unit of {', '.join(unit_names)}" if unit_names else "a number without a unit"
+    if "" in units and unit_names:
+        allowed = f"a number, or one with a unit of {', '.join(unit_names)}"
     if not match:
         raise InputError(field, text, f"must be {allowed}")
     number, unit = match.groups()
     if unit not in units:
         fault = f"has the unit '{unit}'" if unit else "has no unit"
-        raise InputError(field, text, f"{fault}: must be {allowed}{nearest_name(unit, named) if unit else ''}")
+        raise InputError(field, text, f"{fault}: must be {allowed}{nearest_name(unit, unit_names) if unit else ''}")
     # As a decimal, so that 5mm is the number that 0.005 is.
     return float(f"{float(number) * units[unit]:.15g}")
 

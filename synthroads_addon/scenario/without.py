@@ -65,11 +65,11 @@ def scenario_without(scenario: Scenario, effects: Iterable[str]) -> Scenario:
     changes: list[str] = []
     effects = list(effects)
     # Without weather there is nothing whose echoes could be left out.
-    echoes = getattr(scenario.scan.weather, "echoes", False) and "weather" not in effects
+    has_weather_echoes = getattr(scenario.scan.weather, "echoes", False) and "weather" not in effects
     for effect in effects:
         if effect not in EFFECTS:
-            allowed = f"must be one of {', '.join(EFFECTS)}{nearest_name(effect, EFFECTS)}"
-            raise InputError("--without", effect, allowed)
-        if effect != "weather-echoes" or echoes:
+            allowed_text = f"must be one of {', '.join(EFFECTS)}{nearest_name(effect, EFFECTS)}"
+            raise InputError("--without", effect, allowed_text)
+        if effect != "weather-echoes" or has_weather_echoes:
             changes += EFFECTS[effect]
     return Scenario.from_dict(with_changes(data_as_given(scenario), scenario_changes(changes))) if changes else scenario

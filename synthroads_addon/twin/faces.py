@@ -50,26 +50,26 @@ def join_faces(parts: Sequence[Faces]) -> Faces:
 
 def ring_faces(points: Float, rings: Iterable[Sequence[int]]) -> Faces:
     """Return the polygons whose corners are given as rings of indices into points (N, 3)."""
-    listed = [np.asarray(ring, dtype=np.int64) for ring in rings]
-    sizes = np.array([len(ring) for ring in listed], dtype=np.int64)
-    return Faces(points, np.concatenate(listed), sizes)
+    corners_of_rings = [np.asarray(ring, dtype=np.int64) for ring in rings]
+    sizes = np.array([len(ring) for ring in corners_of_rings], dtype=np.int64)
+    return Faces(points, np.concatenate(corners_of_rings), sizes)
 
 
 def drop_unused_points(faces: Faces) -> Faces:
     """Return the same polygons with points that no polygon uses removed and the corner indices renumbered."""
-    used, corners = np.unique(faces.corners, return_inverse=True)
-    return Faces(faces.points[used], corners, faces.sizes)
+    used_points, corners = np.unique(faces.corners, return_inverse=True)
+    return Faces(faces.points[used_points], corners, faces.sizes)
 
 
 def quad_faces(points: Float, corners: Int) -> Faces:
     """Return quadrilaterals (Q, 4 indices) as polygons, those that aren't flat split into two triangles each."""
-    flat = quad_twist(points, corners) <= FLAT
+    is_flat = quad_twist(points, corners) <= FLAT
     # Six slots per quadrilateral: the ring of one and two slots left out, or two rings of three.
-    slots = np.where(flat[:, None], corners[:, [0, 1, 2, 3, 0, 0]], corners[:, [0, 1, 2, 0, 2, 3]])
-    keep = np.ones(slots.shape, dtype=bool)
-    keep[flat, 4:] = False
-    counts = np.where(flat, 1, 2)
-    return Faces(points, slots[keep], np.repeat(np.where(flat, 4, 3), counts))
+    slots = np.where(is_flat[:, None], corners[:, [0, 1, 2, 3, 0, 0]], corners[:, [0, 1, 2, 0, 2, 3]])
+    keep_mask = np.ones(slots.shape, dtype=bool)
+    keep_mask[is_flat, 4:] = False
+    counts = np.where(is_flat, 1, 2)
+    return Faces(points, slots[keep_mask], np.repeat(np.where(is_flat, 4, 3), counts))
 
 
 def quad_twist(points: Float, corners: Int) -> Float:
@@ -78,10 +78,10 @@ def quad_twist(points: Float, corners: Int) -> Float:
     A quadrilateral without area (a strip that is nowhere wide there) has none.
     """
     a, b, c, d = (points[corners[:, i]] for i in range(4))
-    # The distance of the diagonals: a volume through the area of their parallelogram.
-    across = np.cross(c - a, d - b)
-    area = np.linalg.norm(across, axis=1)
-    volume = np.abs(np.einsum("ij,ij->i", across, b - a))
+    # Distance of two skew lines, the diagonals: volume of the parallelepiped over the area of its base.
+    normal = np.cross(c - a, d - b)
+    area = np.linalg.norm(normal, axis=1)
+    volume = np.abs(np.einsum("ij,ij->i", normal, b - a))
     return np.where(area > 1e-9, volume / np.maximum(area, 1e-9), 0.0)
 
 
@@ -91,8 +91,9 @@ def grid_corners(rows: int, columns: int) -> Int:
     Points are numbered row by row; rows follow each other forwards, columns from left to right, so that the
     quadrilaterals are anticlockwise from above.
     """
-    first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    return np.stack([first + 1, first + columns + 1, first + columns, first], axis=1)
+    # Index of each cell's corner in the rear row and the left column.
+    rear_left = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    return np.stack([rear_left + 1, rear_left + columns + 1, rear_left + columns, rear_left], axis=1)
 
 
 def split_quads(corners: Int) -> Int:
@@ -102,10 +103,10 @@ def split_quads(corners: Int) -> Int:
 
 def upward_triangles(points: Float, corners: Int) -> Faces:
     """Return only those triangles (T, 3 indices) that are anticlockwise and not degenerate seen from above."""
-    flat = points[corners][..., :2]
-    one, two = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
-    kept = corners[one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0] > _NO_AREA]
-    return drop_unused_points(Faces(points, kept.ravel(), np.full(len(kept), 3)))
+    xy = points[corners][..., :2]
+    first_edge, second_edge = xy[:, 1] - xy[:, 0], xy[:, 2] - xy[:, 0]
+    upward_corners = corners[first_edge[:, 0] * second_edge[:, 1] - first_edge[:, 1] * second_edge[:, 0] > _NO_AREA]
+    return drop_unused_points(Faces(points, upward_corners.ravel(), np.full(len(upward_corners), 3)))
 
 
 def loft(sections: Float) -> Faces:
@@ -114,14 +115,22 @@ def loft(sections: Float) -> Faces:
     Args:
         sections: R >= 2 outlines of K corners each, in the same order round.
     """
-    rows, count = sections.shape[:2]
+    sections_count, count = sections.shape[:2]
     points = sections.reshape(-1, 3)
-    here = np.arange(count)
-    after = np.roll(here, -1)
-    start = (np.arange(rows - 1) * count)[:, None]
-    sides = np.stack([start + here, start + after, start + count + after, start + count + here], axis=-1)
-    last = (rows - 1) * count
-    caps = Faces(points, np.concatenate([here[::-1], last + here]), np.array([count, count]))
+    corner = np.arange(count)
+    next_corner_index = np.roll(corner, -1)
+    row_start = (np.arange(sections_count - 1) * count)[:, None]
+    sides = np.stack(
+        [
+            row_start + corner,
+            row_start + next_corner_index,
+            row_start + count + next_corner_index,
+            row_start + count + corner,
+        ],
+        axis=-1,
+    )
+    last_row_start = (sections_count - 1) * count
+    caps = Faces(points, np.concatenate([corner[::-1], last_row_start + corner]), np.array([count, count]))
     if max(_off_plane(sections[0]), _off_plane(sections[-1])) > FLAT / 2.0:
         triangles = triangulate(caps)
         caps = Faces(points, triangles.ravel(), np.full(len(triangles), 3))
@@ -130,9 +139,9 @@ def loft(sections: Float) -> Faces:
     return closed if enclosed_volume(closed) >= 0.0 else flip_faces(closed)
 
 
-def _off_plane(ring: Float) -> float:
+def _off_plane(polygon: Float) -> float:
     """Return the largest distance of a polygon's corners (K, 3) from its mean plane, m."""
-    arms = ring - ring.mean(axis=0)
+    arms = polygon - polygon.mean(axis=0)
     normal = np.cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0)
     return float(np.abs(arms @ normal).max() / max(float(np.linalg.norm(normal)), 1e-12))
 
@@ -143,41 +152,45 @@ def flip_faces(faces: Faces) -> Faces:
 
 
 def triangulate(faces: Faces) -> Int:
-    """Triangulate polygons as strips between their first and last corners; return corner indices (T, 3).
+    """Triangulate polygons by zigzag strips between their first and last corners; return corner indices (T, 3).
 
-    So a polygon needs not be convex if its corner i faces the last one but i.
+    The strip's rungs join corner i with the i-th corner from the end. So an outline that isn't convex is filled rightly
+    too, if each of its rungs lies within it: such are the thin profiles of posts, rails and barriers.
     """
     triangles = []
     starts = np.cumsum(faces.sizes) - faces.sizes
     for size in np.unique(faces.sizes).tolist():
         rings = faces.corners[starts[faces.sizes == size][:, None] + np.arange(size)]
-        order, low, high = [], 0, size - 1
-        while high - low > 1:
-            order.append((low, low + 1, high))
-            if high - low > 2:
-                order.append((low + 1, high - 1, high))
-            low, high = low + 1, high - 1
-        triangles.append(rings[:, order].reshape(-1, 3))
+        pattern, low_corner, high_corner = [], 0, size - 1
+        while high_corner - low_corner > 1:
+            pattern.append((low_corner, low_corner + 1, high_corner))
+            if high_corner - low_corner > 2:
+                pattern.append((low_corner + 1, high_corner - 1, high_corner))
+            low_corner, high_corner = low_corner + 1, high_corner - 1
+        triangles.append(rings[:, pattern].reshape(-1, 3))
     return np.concatenate(triangles) if triangles else np.empty((0, 3), np.int64)
 
 
 def enclosed_volume(faces: Faces) -> float:
-    """Return the signed volume that closed polygons enclose, m3; negative where they look inwards."""
+    """Return the signed volume that closed polygons enclose, m3; negative where they look inwards.
+
+    By the divergence theorem: the sum of the signed tetrahedra from one point to the triangles of each polygon's fan.
+    """
     if not len(faces):
         return 0.0
     points = faces.points - faces.points[faces.corners[0]]
     starts = np.cumsum(faces.sizes) - faces.sizes
-    first = np.repeat(faces.corners[starts], faces.sizes)
-    a, b, c = points[first], points[faces.corners], points[faces.corners[next_corner(faces.sizes)]]
+    fan_centre = np.repeat(faces.corners[starts], faces.sizes)
+    a, b, c = points[fan_centre], points[faces.corners], points[faces.corners[next_corner(faces.sizes)]]
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
 
 def next_corner(sizes: Int) -> Int:
     """Return for each corner the index (C,) of the corner that follows it round its polygon."""
-    following = np.arange(1, int(sizes.sum()) + 1)
+    next_index = np.arange(1, int(sizes.sum()) + 1)
     starts = np.cumsum(sizes) - sizes
-    following[starts + sizes - 1] = starts
-    return following
+    next_index[starts + sizes - 1] = starts
+    return next_index
 
 
 def polygon_areas(points: Float, corners: Int, sizes: Int) -> Float:
@@ -185,20 +198,20 @@ def polygon_areas(points: Float, corners: Int, sizes: Int) -> Float:
     if not len(sizes):
         return np.empty(0)
     starts = np.cumsum(sizes) - sizes
-    first = points[np.repeat(corners[starts], sizes)]
-    arms = points[corners] - first, points[corners[next_corner(sizes)]] - first
+    fan_centre = points[np.repeat(corners[starts], sizes)]
+    arms = points[corners] - fan_centre, points[corners[next_corner(sizes)]] - fan_centre
     return np.asarray(np.linalg.norm(np.add.reduceat(np.cross(*arms), starts), axis=1) / 2.0)
 
 
-def drop_polygons(corners: Int, sizes: Int, kept: NDArray[np.bool_]) -> tuple[Int, Int]:
+def drop_polygons(corners: Int, sizes: Int, keep_mask: NDArray[np.bool_]) -> tuple[Int, Int]:
     """Return corners and sizes of only those polygons that a mask (F,) keeps."""
-    return corners[np.repeat(kept, sizes)], sizes[kept]
+    return corners[np.repeat(keep_mask, sizes)], sizes[keep_mask]
 
 
 def drop_collapsed(corners: Int, sizes: Int) -> tuple[Int, Int, NDArray[np.bool_]]:
     """Merge equal neighbouring corners and drop polygons left with fewer than 3; return corners, sizes, kept (F,)."""
-    distinct = corners != corners[next_corner(sizes)]
-    polygon = np.repeat(np.arange(len(sizes)), sizes)
-    left = np.bincount(polygon[distinct], minlength=len(sizes))
-    kept = left >= 3
-    return corners[distinct & kept[polygon]], left[kept], kept
+    differs = corners != corners[next_corner(sizes)]
+    polygon_of_corner = np.repeat(np.arange(len(sizes)), sizes)
+    corner_counts = np.bincount(polygon_of_corner[differs], minlength=len(sizes))
+    keep_mask = corner_counts >= 3
+    return corners[differs & keep_mask[polygon_of_corner]], corner_counts[keep_mask], keep_mask

@@ -133,11 +133,11 @@ def known_format(name: str) -> TwinFormat:
     """Return a format's name unchanged, or raise an InputError that suggests the nearest known name.
 
     Raises:
-        InputError: there is none; the nearest name is suggested.
+        InputError: no format has this name; the nearest name is suggested.
     """
-    for known in TWIN_FORMATS:
-        if name == known:
-            return known
+    for format_name in TWIN_FORMATS:
+        if name == format_name:
+            return format_name
     raise InputError("twin", name, f"must be one of {', '.join(TWIN_FORMATS)}{nearest_name(name, TWIN_FORMATS)}")
 
 
@@ -181,10 +181,10 @@ def write_twin(
         tolerance: largest chord error (m) of curved surfaces and lines; their vertices are exact.
         ifc: settings of the format ``ifc``; the usual ones if None.
         local_projection: whether the format ``opendrive`` has a projection about the site in place of an offset.
-        progress: is told how far it is.
+        progress: receives the format's name and the share of the work that is done.
 
     Raises:
-        InputError: a format is unknown or its package isn't installed, or a road can't be said in it.
+        InputError: a format is unknown or its package isn't installed, or the format can't hold this road.
 
     Example:
         >>> from pathlib import Path
@@ -197,17 +197,19 @@ def write_twin(
     check_formats(formats)
     # Progress is the share of the seconds that the formats usually take.
     total = sum(FORMATS[name].seconds for name in formats)
-    start = 0.0
+    seconds_before = 0.0
     for name in formats:
         entry = FORMATS[name]
-        end = start + entry.seconds
-        progress(entry.label, start / total)
+        seconds_after = seconds_before + entry.seconds
+        progress(entry.label, seconds_before / total)
         settings: dict[str, Any] = {}
         if name == "ifc":
-            settings = (ifc or IfcSettings()).to_dict() | {"progress": part_of(progress, start / total, end / total)}
+            settings = (ifc or IfcSettings()).to_dict() | {
+                "progress": part_of(progress, seconds_before / total, seconds_after / total)
+            }
         elif name == "opendrive":
             settings = {"local_projection": local_projection}
         writer: _Writer = getattr(import_module(entry.module, __package__), f"write_{name}")
         trace = writer(parameters, folder / entry.file, tolerance, **settings)
         trace.write(folder / report_file_name(name), name, entry.file)
-        start = end
+        seconds_before = seconds_after

@@ -59,35 +59,39 @@ class GroundSide:
 
     def points(self, distance: Float) -> Float:
         """Return the ground's local points (R * K, 3) at distances (R, K) outwards from the road's edge, m."""
-        bend = self.geometry.alignment.curvature(self.station)
-        offset = clip_offset(self.edge[:, None] + self.sign * distance, bend[:, None])
+        curvature = self.geometry.alignment.curvature(self.station)
+        offset = clip_offset(self.edge[:, None] + self.sign * distance, curvature[:, None])
         return surface_points(self.geometry, np.repeat(self.station, distance.shape[1]), offset.ravel())
 
-    def triangles(self, road: Float) -> Faces:
+    def triangles(self, road_stations: Float) -> Faces:
         """Return the ground's triangles, anticlockwise from above, with the road's edge points as their seam.
 
         Args:
-            road: (N,) stations at which the road's edge has points: the ground's are the same.
+            road_stations: (N,) stations at which the road's edge has points: the ground's are the same.
         """
+        # Two parts, told apart by who numbers their points: the band from the road's edge to the first column, whose
+        # inner side has the road's own points (the seam), and the grid of the columns beyond.
         rows, columns = self.distance.shape
         grid = self.points(self.distance)
-        edge = self.geometry.offsets(road)[:, 0 if self.sign > 0.0 else -1]
-        seam = surface_points(self.geometry, road, edge)
-        inner, toe = len(grid) + np.arange(len(road)), np.arange(rows) * columns + 1
-        first = np.append(inner, toe)[np.array(triangulate_rows(road, self.station))]
+        edge = self.geometry.offsets(road_stations)[:, 0 if self.sign > 0.0 else -1]
+        seam = surface_points(self.geometry, road_stations, edge)
+        seam_index, column_index = len(grid) + np.arange(len(road_stations)), np.arange(rows) * columns + 1
+        seam_triangles = np.append(seam_index, column_index)[np.array(triangulate_rows(road_stations, self.station))]
         cells = grid_corners(rows, columns - 1)
-        beyond = split_quads(cells + cells // (columns - 1) + 1)
-        # Seen from above the first are against the clock on the left, the others on the right.
-        corners = np.concatenate([first, beyond[:, ::-1]] if self.sign > 0.0 else [first[:, ::-1], beyond])
+        grid_triangles = split_quads(cells + cells // (columns - 1) + 1)
+        # From above, the seam's triangles run anticlockwise on the left of the road, and the grid's on its right.
+        corners = np.concatenate(
+            [seam_triangles, grid_triangles[:, ::-1]] if self.sign > 0.0 else [seam_triangles[:, ::-1], grid_triangles]
+        )
         points = np.concatenate([grid, seam])
         return upward_triangles(points, corners)
 
     def swale_faces(self, width: float) -> Faces:
         """Return the triangles of a swale of a width (m) within the ground's reach; none where there is no cutting."""
         rows = np.flatnonzero((self.swale[:-1] > 0.0) | (self.swale[1:] > 0.0))
-        across = np.linspace(0.0, width, _SHAPE_PIECES + 1)
-        points = self.points(np.minimum(across, self.distance[:, -1:]))
-        corners = grid_corners(len(self.station), len(across)).reshape(len(self.station) - 1, -1, 4)
+        distances = np.linspace(0.0, width, _SHAPE_PIECES + 1)
+        points = self.points(np.minimum(distances, self.distance[:, -1:]))
+        corners = grid_corners(len(self.station), len(distances)).reshape(len(self.station) - 1, -1, 4)
         triangles = split_quads(corners[rows].reshape(-1, 4))
         return upward_triangles(points, triangles[:, ::-1] if self.sign > 0.0 else triangles)
 
@@ -112,19 +116,19 @@ class GroundMesh:
     deviation: float
 
 
-def triangulate_ground(geometry: RoadGeometry, terrain: Terrain, road: Float, tolerance: float) -> GroundMesh:
+def triangulate_ground(geometry: RoadGeometry, terrain: Terrain, road_stations: Float, tolerance: float) -> GroundMesh:
     """Triangulate the ground beside a road as coarsely as `GROUND_TOLERANCE`, or a larger tolerance, allows.
 
     Args:
         geometry: the road.
         terrain: its terrain.
-        road: (N,) stations at which the road's surface has rows.
+        road_stations: (N,) stations at which the road's surface has rows.
         tolerance: that of the model, m.
     """
     mesh: GroundMesh | None = None
     for spacing in _SPACINGS:
         sides = (_side(geometry, terrain, 1.0, spacing), _side(geometry, terrain, -1.0, spacing))
-        faces = (sides[0].triangles(road), sides[1].triangles(road))
+        faces = (sides[0].triangles(road_stations), sides[1].triangles(road_stations))
         mesh = GroundMesh(sides, faces, max(_deviation(geometry, part) for part in faces))
         if mesh.deviation <= max(tolerance, GROUND_TOLERANCE):
             break
@@ -140,38 +144,42 @@ def swales(name: str, terrain: Terrain, ground: GroundMesh) -> Iterator[tuple[st
 
 
 def _side(geometry: RoadGeometry, terrain: Terrain, sign: float, spacing: float) -> GroundSide:
-    even = np.linspace(0.0, geometry.length, max(2, int(np.ceil(geometry.length / spacing)) + 1))
+    """Sample the ground on one side of the road in rows and columns that are `spacing` (m) apart at most.
+
+    Rows lie also where the road's width bends, and columns also over the batter's shape (crest, swale, toe).
+    """
+    regular_stations = np.linspace(0.0, geometry.length, max(2, int(np.ceil(geometry.length / spacing)) + 1))
     kinks = [s for section in geometry.sections.values() for s in section.kinks() if 0.0 < s < geometry.length]
-    station = np.unique(np.concatenate([even, kinks]))
+    station = np.unique(np.concatenate([regular_stations, kinks]))
     edge = geometry.offsets(station)[:, 0 if sign > 0.0 else -1]
     reach = np.maximum(terrain.half_width - sign * edge, 0.0)
-    at_edge = ground_elevation(geometry, terrain, station, edge) - geometry.elevation(station, edge)
-    toe = _toe_distance(geometry, terrain, station, edge, reach * sign, at_edge)
-    columns = _columns_to_toe(terrain, toe, at_edge)
-    further = np.arange(1, int(np.ceil(reach.max() / spacing)) + 1) * spacing
-    beyond = np.clip(further[None, :], columns[:, -1:], reach[:, None])
-    swale = swale_share(np.nan_to_num(at_edge)) * (terrain.swale_width > 0.0)
-    distance = np.minimum(np.column_stack([np.zeros(len(station)), columns, beyond]), reach[:, None])
-    return GroundSide(geometry, sign, station, edge, distance, swale)
+    ground_above_edge = ground_elevation(geometry, terrain, station, edge) - geometry.elevation(station, edge)
+    toe = _toe_distance(geometry, terrain, station, edge, reach * sign, ground_above_edge)
+    columns = _columns_to_toe(terrain, toe, ground_above_edge)
+    outer_distances = np.arange(1, int(np.ceil(reach.max() / spacing)) + 1) * spacing
+    outer_columns = np.clip(outer_distances[None, :], columns[:, -1:], reach[:, None])
+    swale_shares = swale_share(np.nan_to_num(ground_above_edge)) * (terrain.swale_width > 0.0)
+    distance = np.minimum(np.column_stack([np.zeros(len(station)), columns, outer_columns]), reach[:, None])
+    return GroundSide(geometry, sign, station, edge, distance, swale_shares)
 
 
-def _columns_to_toe(terrain: Terrain, toe: Float, at_edge: Float) -> Float:
+def _columns_to_toe(terrain: Terrain, toe: Float, ground_above_edge: Float) -> Float:
     """Return the distances (R, C) from the road's edge, m, of the columns up to where the batter has met the ground."""
     if not is_shaped(terrain):
         return toe[:, None]
-    at_edge = np.nan_to_num(at_edge)
+    ground_above_edge = np.nan_to_num(ground_above_edge)
     # Not at the edge itself, where the road's points are.
-    shaped = np.maximum(shaped_width(terrain, at_edge), _LEAST_WIDTH)
-    before, beyond = foot_reach(terrain, at_edge)
-    begin = np.maximum(toe - before, shaped)
-    end = np.maximum(toe + beyond, begin)
-    over_shape = shaped[:, None] * (np.arange(1, _SHAPE_PIECES + 1) / _SHAPE_PIECES)
-    over_toe = begin[:, None] + (end - begin)[:, None] * np.linspace(0.0, 1.0, _TOE_PIECES + 1)
-    return np.column_stack([over_shape, over_toe])
+    shape_width = np.maximum(shaped_width(terrain, ground_above_edge), _LEAST_WIDTH)
+    reach_before_toe, reach_beyond_toe = foot_reach(terrain, ground_above_edge)
+    toe_begin = np.maximum(toe - reach_before_toe, shape_width)
+    toe_end = np.maximum(toe + reach_beyond_toe, toe_begin)
+    shape_columns = shape_width[:, None] * (np.arange(1, _SHAPE_PIECES + 1) / _SHAPE_PIECES)
+    toe_columns = toe_begin[:, None] + (toe_end - toe_begin)[:, None] * np.linspace(0.0, 1.0, _TOE_PIECES + 1)
+    return np.column_stack([shape_columns, toe_columns])
 
 
 def _toe_distance(
-    geometry: RoadGeometry, terrain: Terrain, station: Float, edge: Float, reach: Float, at_edge: Float
+    geometry: RoadGeometry, terrain: Terrain, station: Float, edge: Float, reach: Float, ground_above_edge: Float
 ) -> Float:
     """Return the distance (R,) from the road's edge at which its batter meets the ground, m; the reach if nowhere.
 
@@ -179,41 +187,46 @@ def _toe_distance(
         geometry, terrain: the road and its ground.
         station, edge: (R,) stations, and offsets of the road's edge.
         reach: (R,) largest distance, negative on the right.
-        at_edge: (R,) height of the ground above the edge there, m.
+        ground_above_edge: (R,) height of the ground above the edge there, m.
     """
-    level, far = geometry.elevation(station, edge), np.abs(reach)
-    begin = batter_begin(terrain, at_edge)[:, None]
+    edge_height, largest_distance = geometry.elevation(station, edge), np.abs(reach)
+    batter_begins = batter_begin(terrain, ground_above_edge)[:, None]
 
     def excess_height(distance: Float) -> Float:
         """Return by how much the ground's height over the edge exceeds the batter's (R, D), m; -1 where unknown."""
-        every = np.repeat(station, distance.shape[1])
+        stations = np.repeat(station, distance.shape[1])
         offset = (edge[:, None] + np.sign(reach)[:, None] * distance).ravel()
-        ground = ground_elevation(geometry, terrain, every, offset).reshape(distance.shape)
-        excess = np.abs(ground - level[:, None]) - np.maximum(distance - begin, 0.0) / terrain.batter_slope
+        ground = ground_elevation(geometry, terrain, stations, offset).reshape(distance.shape)
+        excess = (
+            np.abs(ground - edge_height[:, None]) - np.maximum(distance - batter_begins, 0.0) / terrain.batter_slope
+        )
         return np.where(np.isnan(excess), -1.0, excess)
 
-    steps = np.linspace(0.0, 1.0, max(2, int(np.ceil(far.max() / _FIRST_LOOK)) + 1))
-    met = excess_height(far[:, None] * steps) <= 0.0
-    first = np.where(met.any(axis=1), met.argmax(axis=1), len(steps) - 1)
-    high = far * steps[first]
-    low = far * steps[np.maximum(first - 1, 0)]
+    # The first place, from the edge outwards, at which ground and batter have met; bisection then narrows the toe down
+    # between it and the place before.
+    steps = np.linspace(0.0, 1.0, max(2, int(np.ceil(largest_distance.max() / _FIRST_LOOK)) + 1))
+    has_met = excess_height(largest_distance[:, None] * steps) <= 0.0
+    first_met = np.where(has_met.any(axis=1), has_met.argmax(axis=1), len(steps) - 1)
+    upper = largest_distance * steps[first_met]
+    lower = largest_distance * steps[np.maximum(first_met - 1, 0)]
     for _ in range(_HALVINGS):
-        middle = (low + high) / 2.0
-        there = excess_height(middle[:, None])[:, 0] <= 0.0
-        low, high = np.where(there, low, middle), np.where(there, middle, high)
-    return np.where(met.any(axis=1), high, far)
+        middle = (lower + upper) / 2.0
+        has_met_at_middle = excess_height(middle[:, None])[:, 0] <= 0.0
+        lower, upper = np.where(has_met_at_middle, lower, middle), np.where(has_met_at_middle, middle, upper)
+    return np.where(has_met.any(axis=1), upper, largest_distance)
 
 
 def _deviation(geometry: RoadGeometry, faces: Faces) -> float:
     """Return the largest vertical distance of sampled triangles from the ground, at centroids and edge middles, m."""
-    return max((float(np.abs(away).max()) for away in _away(geometry, faces) if len(away)), default=0.0)
+    return max((float(np.abs(distances).max()) for distances in _away(geometry, faces) if len(distances)), default=0.0)
 
 
 def _away(geometry: RoadGeometry, faces: Faces) -> Iterator[Float]:
+    """Yield the surface's height above the triangles, m: at their centroids, then at the middle of each edge."""
     corners = faces.corners.reshape(-1, 3)
     corners = corners[:: max(1, -(-len(corners) // _LOOKED_AT))]
     a, b, c = (faces.points[corners[:, number]] for number in range(3))
-    for place in ((a + b + c) / 3.0, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0):
-        station, offset = geometry.alignment.project(place[:, :2])
-        within = (station >= 0.0) & (station <= geometry.length)
-        yield (surface_points(geometry, station[within], offset[within]) - place[within])[:, 2]
+    for samples in ((a + b + c) / 3.0, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0):
+        station, offset = geometry.alignment.project(samples[:, :2])
+        on_road = (station >= 0.0) & (station <= geometry.length)
+        yield (surface_points(geometry, station[on_road], offset[on_road]) - samples[on_road])[:, 2]

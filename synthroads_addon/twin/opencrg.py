@@ -47,9 +47,9 @@ def write_opencrg(parameters: RoadParameters, path: Path, tolerance: float) -> T
     geometry = RoadGeometry(parameters)
     grid, trace = _Grid(geometry), Trace(geometry, "heights on a grid", _WITHIN, _LOST)
     comments: list[str] = []
-    for instance, about in _places(geometry, grid):
+    for instance, place in _places(geometry, grid):
         trace.record_entity(instance, comment=len(comments))
-        comments.append(f"instance {instance}: {about}")
+        comments.append(f"instance {instance}: {place}")
     with path.open("wb") as file:
         file.write("\n".join([*grid.header(comments), ""]).encode("ascii"))
         written = 0
@@ -65,14 +65,17 @@ def write_opencrg(parameters: RoadParameters, path: Path, tolerance: float) -> T
 
 def _places(geometry: RoadGeometry, grid: _Grid) -> Iterator[tuple[int, str]]:
     """Yield the instance numbers of what the file has, and where in the grid it is."""
-    middle, last = int(np.searchsorted(grid.offsets, 0.0)), len(grid.offsets)
-    sections = {"right": f"long sections 1 to {middle}", "left": f"long sections {middle + 1} to {last}"}
+    right_count, total_count = int(np.searchsorted(grid.offsets, 0.0)), len(grid.offsets)
+    sections = {
+        "right": f"long sections 1 to {right_count}",
+        "left": f"long sections {right_count + 1} to {total_count}",
+    }
     yield geometry.parameters.alignment.instance, "the reference line"
     for side, section in geometry.sections.items():
         yield section.carriageway.instance, sections[side]
         for shape in section.turnouts:
-            low, high = shape.range()
-            yield shape.turnout.instance, f"u {low:.1f} to {high:.1f} of {sections[side]}"
+            start_station, end_station = shape.range()
+            yield shape.turnout.instance, f"u {start_station:.1f} to {end_station:.1f} of {sections[side]}"
 
 
 class _Grid:
@@ -83,32 +86,32 @@ class _Grid:
         self.count = max(2, round(geometry.length / ALONG) + 1)
         self.step = geometry.length / (self.count - 1)
         edges = {side: self._edge(side) for side in geometry.sections}
-        right, left = (np.ceil(edges.get(side, 0.0) / ACROSS) for side in ("right", "left"))
-        self.offsets = np.arange(-right, left + 1) * ACROSS
+        right_count, left_count = (np.ceil(edges.get(side, 0.0) / ACROSS) for side in ("right", "left"))
+        self.offsets = np.arange(-right_count, left_count + 1) * ACROSS
         self._base = float(np.floor(geometry.profile.elevation(np.zeros(1))[0]))
 
     def _edge(self, side: Side) -> float:
         """Return the largest distance (m) of a carriageway's pavement from the centreline that the grid has."""
         section = self._geometry.sections[side]
         station = np.linspace(0.0, self._geometry.length, max(2, int(self._geometry.length)))
-        farthest = np.minimum(section.paved_edge(station), section.main_edge(station) + _BESIDE)
-        return float(farthest.max())
+        edge = np.minimum(section.paved_edge(station), section.main_edge(station) + _BESIDE)
+        return float(edge.max())
 
     def header(self, comments: Iterable[str]) -> list[str]:
         """Return the lines of the header, with further comments."""
-        start, end = self._line(np.array([0.0, self._geometry.length]))
-        east, north, up = self._geometry.parameters.transform.translate
+        start_point, end_point = self._line(np.array([0.0, self._geometry.length]))
+        east, north, height = self._geometry.parameters.transform.translate
         metadata = self._geometry.parameters.metadata
         values = {
             "REFERENCE_LINE_START_U": 0.0,
             "REFERENCE_LINE_END_U": self._geometry.length,
             "REFERENCE_LINE_INCREMENT": self.step,
-            "REFERENCE_LINE_START_X": start[0] + east,
-            "REFERENCE_LINE_START_Y": start[1] + north,
-            "REFERENCE_LINE_END_X": end[0] + east,
-            "REFERENCE_LINE_END_Y": end[1] + north,
-            "REFERENCE_LINE_START_Z": self._base + up,
-            "REFERENCE_LINE_END_Z": self._base + up,
+            "REFERENCE_LINE_START_X": start_point[0] + east,
+            "REFERENCE_LINE_START_Y": start_point[1] + north,
+            "REFERENCE_LINE_END_X": end_point[0] + east,
+            "REFERENCE_LINE_END_Y": end_point[1] + north,
+            "REFERENCE_LINE_START_Z": self._base + height,
+            "REFERENCE_LINE_END_Z": self._base + height,
             "LONG_SECTION_V_RIGHT": self.offsets[0],
             "LONG_SECTION_V_LEFT": self.offsets[-1],
             "LONG_SECTION_V_INCREMENT": ACROSS,
@@ -138,25 +141,28 @@ class _Grid:
 
     def records(self) -> Iterator[Float]:
         """Yield cross sections (R, 1 + V), those of the whole road one after the other."""
-        for first in range(0, self.count, _ROWS):
-            number = np.arange(first, min(first + _ROWS, self.count))
-            station = np.minimum(number * self.step, self._geometry.length)
+        for first_row in range(0, self.count, _ROWS):
+            row_numbers = np.arange(first_row, min(first_row + _ROWS, self.count))
+            station = np.minimum(row_numbers * self.step, self._geometry.length)
             legs = np.diff(self._line(np.append(max(station[0] - self.step, 0.0), station)), axis=0)
-            if first == 0:  # the line's first point has no leg before it
+            if first_row == 0:  # the line's first point has no leg before it
                 legs[0] = legs[1]
             heading = np.arctan2(legs[:, 1], legs[:, 0])
             yield np.column_stack([heading, self._elevations(station)])
 
     def _line(self, station: Float) -> Float:
+        """Return the local plan coordinates (R, 2) of the reference line at stations (R,), m."""
         return self._geometry.alignment.position(station)
 
     def _elevations(self, station: Float) -> Float:
         """Return the elevations (R, V) above the base at stations (R,)."""
-        along, across = (values.ravel() for values in np.meshgrid(station, self.offsets, indexing="ij"))
-        inside = self._is_inside(along, across)
-        along, across = along[inside], across[inside]
-        result = np.full(inside.shape, np.nan)
-        result[inside] = self._geometry.elevation(along, across) + self._surface.height(along, across) - self._base
+        stations, offsets = (values.ravel() for values in np.meshgrid(station, self.offsets, indexing="ij"))
+        is_inside = self._is_inside(stations, offsets)
+        stations, offsets = stations[is_inside], offsets[is_inside]
+        result = np.full(is_inside.shape, np.nan)
+        result[is_inside] = (
+            self._geometry.elevation(stations, offsets) + self._surface.height(stations, offsets) - self._base
+        )
         return result.reshape(len(station), -1)
 
     def _is_inside(self, station: Float, offset: Float) -> Bool:

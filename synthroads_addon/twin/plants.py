@@ -24,7 +24,7 @@ class PlacedPlant(NamedTuple):
     Attributes:
         name, instance: its id and its number in the cloud.
         stand: id of the stand that it belongs to.
-        about: that stand.
+        vegetation: that stand.
         variant: which of the kinds of its species it is.
         station, offset: m.
         foot: (3,) local, m.
@@ -36,7 +36,7 @@ class PlacedPlant(NamedTuple):
     name: str
     instance: int
     stand: str
-    about: Vegetation
+    vegetation: Vegetation
     variant: int
     station: float
     offset: float
@@ -47,16 +47,16 @@ class PlacedPlant(NamedTuple):
 
     def attributes(self) -> dict[str, str | int | float]:
         """Return the plant's attributes for a file: instance number, class, species and measures (m)."""
-        told: dict[str, str | int | float] = {"instance": self.instance, "class": self.about.points_class}
-        told |= {"function": self.about.kind, "species": self.about.species, "stand": self.stand}
-        told |= {
+        values: dict[str, str | int | float] = {"instance": self.instance, "class": self.vegetation.points_class}
+        values |= {"function": self.vegetation.kind, "species": self.vegetation.species, "stand": self.stand}
+        values |= {
             "height": round(self.height, 4),
             "crownDiameter": round(2.0 * self.breadth * self.shape.crown_radius, 4),
         }
-        told["crownBottom"] = round(self.height * self.shape.crown_bottom, 4)
+        values["crownBottom"] = round(self.height * self.shape.crown_bottom, 4)
         if self.shape.trunk_radius:
-            told["trunkDiameter"] = round(2.0 * self.breadth * self.shape.trunk_radius, 4)
-        return told
+            values["trunkDiameter"] = round(2.0 * self.breadth * self.shape.trunk_radius, 4)
+        return values
 
     @property
     def scale(self) -> tuple[float, float, float]:
@@ -70,7 +70,7 @@ class GrassStrip(NamedTuple):
     Attributes:
         name, instance: its id and its number in the cloud.
         stand: id of the stand that it belongs to.
-        about: that stand.
+        vegetation: that stand.
         mean_height: m.
         faces: its surface, as high above the ground as the grass is on average.
     """
@@ -78,52 +78,53 @@ class GrassStrip(NamedTuple):
     name: str
     instance: int
     stand: str
-    about: Vegetation
+    vegetation: Vegetation
     mean_height: float
     faces: Faces
 
     def attributes(self) -> dict[str, str | int | float]:
         """Return the strip's attributes for a file: instance number, class, species and mean height (m)."""
-        told: dict[str, str | int | float] = {"instance": self.instance, "class": self.about.points_class}
-        told |= {"function": self.about.kind, "species": self.about.species, "stand": self.stand}
-        return told | {"strip": self.name.rpartition("/")[2], "averageHeight": round(self.mean_height, 4)}
+        values: dict[str, str | int | float] = {"instance": self.instance, "class": self.vegetation.points_class}
+        values |= {"function": self.vegetation.kind, "species": self.vegetation.species, "stand": self.stand}
+        return values | {"strip": self.name.rpartition("/")[2], "averageHeight": round(self.mean_height, 4)}
 
 
 def placed_plants(geometry: RoadGeometry) -> Iterator[PlacedPlant]:
     """Yield all trees and shrubs of a road, stand by stand in the parameter set's order; none without terrain."""
     terrain = geometry.parameters.terrain
-    for stand, about in geometry.parameters.of_type(Vegetation).items():
-        if about.kind == "grass" or terrain is None:
+    for stand, vegetation in geometry.parameters.of_type(Vegetation).items():
+        if vegetation.kind == "grass" or terrain is None:
             continue
-        grown = grown_plants(geometry, about, terrain)
+        # The fields of `GrownPlants` in the order of their definition, plant by plant.
+        grown = grown_plants(geometry, vegetation, terrain)
         for number, station, offset, foot, height, breadth, variant in zip(*vars(grown).values(), strict=True):
             name, instance = geometry.numbers.part(stand, int(number))
-            shape = plant_shape(about.kind, about.species, int(variant))
-            place = int(variant), float(station), float(offset), foot, float(height), float(breadth)
-            yield PlacedPlant(name, instance, stand, about, *place, shape)
+            shape = plant_shape(vegetation.kind, vegetation.species, int(variant))
+            measures = int(variant), float(station), float(offset), foot, float(height), float(breadth)
+            yield PlacedPlant(name, instance, stand, vegetation, *measures, shape)
 
 
 def grass_strips(geometry: RoadGeometry, ground: GroundMesh) -> Iterator[GrassStrip]:
     """Yield the strips of all stands of grass that have an area, stand by stand in the parameter set's order."""
-    for stand, about in geometry.parameters.of_type(Vegetation).items():
-        if about.kind != "grass":
+    for stand, vegetation in geometry.parameters.of_type(Vegetation).items():
+        if vegetation.kind != "grass":
             continue
-        mean = (about.height_min + about.height_max) / 2.0
+        mean_height = (vegetation.height_min + vegetation.height_max) / 2.0
         for number, strip in enumerate(GRASS_STRIPS):
-            band = strip.endswith("band")
-            if not band and about.species in WILD_GRASSES:
+            is_band = strip.endswith("band")
+            if not is_band and vegetation.species in WILD_GRASSES:
                 continue
-            height = mean if band else mean * ROADSIDE_HEIGHT
-            faces = _band(ground, number, about, height) if band else _verges(geometry, ground, strip, height)
+            height = mean_height if is_band else mean_height * ROADSIDE_HEIGHT
+            faces = _band(ground, number, vegetation, height) if is_band else _verges(geometry, ground, strip, height)
             if len(faces):
                 name, instance = geometry.numbers.part(stand, number)
-                yield GrassStrip(name, instance, stand, about, height, faces)
+                yield GrassStrip(name, instance, stand, vegetation, height, faces)
 
 
-def _band(ground: GroundMesh, number: int, about: Vegetation, height: float) -> Faces:
+def _band(ground: GroundMesh, number: int, vegetation: Vegetation, height: float) -> Faces:
     """Return the triangles of a stand's band of grass on one side of the road (number 0 left, 1 right)."""
     side = ground.sides[number]
-    distance = side.clip_to_band(about.band_start, about.band_end)
+    distance = side.clip_to_band(vegetation.band_start, vegetation.band_end)
     return _raised(side.points(distance), (len(distance), distance.shape[1]), height, side.sign < 0.0)
 
 
@@ -132,16 +133,25 @@ def _verges(geometry: RoadGeometry, ground: GroundMesh, strip: str, height: floa
     station = ground.sides[0].station
     offsets = geometry.offsets(station)
     parts = []
-    for number, one in enumerate(geometry.strips):
-        if one.class_name == "roadside" and strip == ("median" if one.side is None else f"{one.side}-verge"):
+    for number, surface_strip in enumerate(geometry.strips):
+        if surface_strip.class_name == "roadside" and strip == (
+            "median" if surface_strip.side is None else f"{surface_strip.side}-verge"
+        ):
             # From left to right.
             points = surface_points(geometry, np.repeat(station, 2), offsets[:, number : number + 2].ravel())
             parts.append(_raised(points, (len(station), 2), height, True))
     return join_faces(parts)
 
 
-def _raised(points: Float, shape: tuple[int, int], height: float, rightwards: bool) -> Faces:
-    """Triangulate a grid of points (rows, columns), raised by a height (m); triangles without area are left out."""
+def _raised(points: Float, shape: tuple[int, int], height: float, columns_rightwards: bool) -> Faces:
+    """Triangulate a grid of points (rows, columns), raised by a height (m); triangles without area are left out.
+
+    Args:
+        points: (N, 3), row by row.
+        shape: number of rows and of columns.
+        height: m.
+        columns_rightwards: whether columns run from left to right, seen along the road; else from right to left.
+    """
     corners = split_quads(grid_corners(*shape))
-    raised = points + np.array([0.0, 0.0, height])
-    return upward_triangles(raised, corners if rightwards else corners[:, ::-1])
+    raised_points = points + np.array([0.0, 0.0, height])
+    return upward_triangles(raised_points, corners if columns_rightwards else corners[:, ::-1])

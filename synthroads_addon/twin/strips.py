@@ -63,9 +63,9 @@ class _Edges:
     offsets: Float
     heights: Float
 
-    def points(self, first: int, last: int, shares: Float) -> Float:
-        """Return surface points (R, C, 3) of rows `first` to `last` at shares (C,) of the width, lowered by damage."""
-        rows = slice(first, last + 1)
+    def points(self, first_row: int, last_row: int, shares: Float) -> Float:
+        """Return surface points (R, C, 3) of a range of rows at shares (C,) of the width, lowered by damage."""
+        rows = slice(first_row, last_row + 1)
         offset = self.offsets[rows, :1] * (1.0 - shares) + self.offsets[rows, 1:] * shares
         height = self.heights[rows, :1] * (1.0 - shares) + self.heights[rows, 1:] * shares
         station = np.repeat(self.stations[rows], len(shares))
@@ -73,8 +73,8 @@ class _Edges:
             pavement = section.carriageway.pavement
             if pavement.ruts or pavement.potholes:
                 height = height - damage_depth(section, station, offset.ravel()).reshape(offset.shape)
-        plan = self.plan[rows, None] + offset[..., None] * self.left[rows, None]
-        return np.concatenate([plan, height[..., None]], axis=2)
+        xy = self.plan[rows, None] + offset[..., None] * self.left[rows, None]
+        return np.concatenate([xy, height[..., None]], axis=2)
 
 
 def strip_surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> Iterator[StripSurface]:
@@ -89,14 +89,16 @@ def strip_surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) ->
         tolerance: chord error within damage, m.
     """
     offsets, heights = geometry.boundaries(stations)
-    plan, heading, _ = geometry.alignment.frame(stations)
-    middle = (stations[:-1] + stations[1:]) / 2.0
+    xy, heading, _ = geometry.alignment.frame(stations)
+    interval_middles = (stations[:-1] + stations[1:]) / 2.0
     damages, lanes = _damages_by_strip(geometry, tolerance), _lane_numbers(geometry)
     for number, strip in enumerate(geometry.strips):
-        two = slice(number, number + 2)
-        edges = _Edges(geometry, stations, plan, left_vectors(heading), offsets[:, two], heights[:, two])
+        edge_columns = slice(number, number + 2)
+        edges = _Edges(
+            geometry, stations, xy, left_vectors(heading), offsets[:, edge_columns], heights[:, edge_columns]
+        )
         width = offsets[:, number] - offsets[:, number + 1]
-        owners = geometry.instances(strip, middle)
+        owners = geometry.instances(strip, interval_middles)
         for owner in np.unique(owners).tolist():
             faces = _strip_faces(edges, damages.get(number, []), (width[:-1] + width[1:] > 1e-9) & (owners == owner))
             if len(faces):
@@ -120,27 +122,28 @@ def _damages_by_strip(geometry: RoadGeometry, tolerance: float) -> dict[int, lis
     damages: dict[int, list[_StripDamage]] = {}
     for side, section in geometry.sections.items():
         strips = [number for number, strip in enumerate(geometry.strips) if strip.side == side]
-        outwards = strips[::-1] if side == "left" else strips
+        strips_outwards = strips[::-1] if side == "left" else strips
         pavement = section.carriageway.pavement
         items: list[Rut | Pothole] = [*pavement.ruts, *pavement.potholes]
         for item in items:
-            alone = _with_only(section, item)
-            for index in damaged_strips(alone):
-                shares = damage_columns(alone, index, tolerance)
+            section_with_item = _with_only(section, item)
+            for index in damaged_strips(section_with_item):
+                shares = damage_columns(section_with_item, index, tolerance)
                 shares = 1.0 - shares[::-1] if side == "left" else shares
-                damages.setdefault(outwards[index], []).append(_StripDamage(*_range(item), shares))
+                damages.setdefault(strips_outwards[index], []).append(_StripDamage(*_range(item), shares))
     return damages
 
 
 def _with_only(section: CarriagewaySection, item: Rut | Pothole) -> CarriagewaySection:
     """Return a copy of a section with one rut or pothole as its only damage."""
-    alone, carriageway = copy.copy(section), section.carriageway
+    other_section, carriageway = copy.copy(section), section.carriageway
     pavement = Pavement(ruts=(item,)) if isinstance(item, Rut) else Pavement(potholes=(item,))
-    alone.carriageway = carriageway.model_copy(update={"pavement": pavement})
-    return alone
+    other_section.carriageway = carriageway.model_copy(update={"pavement": pavement})
+    return other_section
 
 
 def _range(item: Rut | Pothole) -> tuple[float, float]:
+    """Return the start and end stations (m) of a rut or pothole."""
     if isinstance(item, Rut):
         return item.start_station, item.end_station
     return item.station - item.length / 2.0, item.station + item.length / 2.0
@@ -149,62 +152,76 @@ def _range(item: Rut | Pothole) -> tuple[float, float]:
 def _row_masks(stations: Float, damages: list[_StripDamage]) -> Mask:
     """Return which damages (N, D) reach the interval before or behind each row, so that its points follow them."""
     starts, ends = np.array([d.start for d in damages]), np.array([d.end for d in damages])
-    between = (starts < stations[1:, None] - 1e-6) & (ends > stations[:-1, None] + 1e-6)
-    rows = np.zeros((len(stations), len(damages)), dtype=bool)
-    rows[:-1] |= between
-    rows[1:] |= between
-    return rows
+    reaches_interval = (starts < stations[1:, None] - 1e-6) & (ends > stations[:-1, None] + 1e-6)
+    reaches_row = np.zeros((len(stations), len(damages)), dtype=bool)
+    reaches_row[:-1] |= reaches_interval
+    reaches_row[1:] |= reaches_interval
+    return reaches_row
 
 
 def _shares(damages: list[_StripDamage], mask: Mask) -> Float:
     """Return the shares (C,) of the width at which a row needs points, from 0 (left edge) to 1 (right edge)."""
-    inside = [damage.shares for damage, there in zip(damages, mask.tolist(), strict=True) if there]
-    return space_shares(np.unique(np.concatenate([[0.0, 1.0], *inside])))
+    damage_shares = [damage.shares for damage, is_here in zip(damages, mask.tolist(), strict=True) if is_here]
+    return space_shares(np.unique(np.concatenate([[0.0, 1.0], *damage_shares])))
 
 
 # --- polygons ---------------------------------------------------------------------------------------------------
 
 
-def _strip_faces(edges: _Edges, damages: list[_StripDamage], chosen: Mask) -> Faces:
+def _strip_faces(edges: _Edges, damages: list[_StripDamage], interval_mask: Mask) -> Faces:
     """Return a strip's polygons in the chosen intervals (N - 1,) between its rows, in the order of the rows.
 
     From edge to edge there is one polygon, but where the strip is damaged. Rows with different numbers of points are
     joined by triangles, so that all points are corners on both sides.
     """
-    if not chosen.any():
+    if not interval_mask.any():
         return join_faces([])
     masks = _row_masks(edges.stations, damages) if damages else np.zeros((len(edges.stations), 1), dtype=bool)
-    even = np.all(masks[:-1] == masks[1:], axis=1)
+    is_regular = np.all(masks[:-1] == masks[1:], axis=1)
     parts = []
-    for first, last in _row_runs(even & chosen, chosen):
-        shares, others = (_shares(damages, masks[row]) if damages else np.array([0.0, 1.0]) for row in (first, last))
-        if even[first]:
-            points = edges.points(first, last, shares)
+    for first_row, last_row in _row_runs(is_regular & interval_mask, interval_mask):
+        first_shares, last_shares = (
+            _shares(damages, masks[row]) if damages else np.array([0.0, 1.0]) for row in (first_row, last_row)
+        )
+        if is_regular[first_row]:
+            points = edges.points(first_row, last_row, first_shares)
             parts.append(quad_faces(points.reshape(-1, 3), grid_corners(*points.shape[:2])))
         else:
-            points = np.concatenate([edges.points(first, first, shares)[0], edges.points(last, last, others)[0]])
-            parts.append(ring_faces(points, triangulate_rows(shares, others)))
+            points = np.concatenate(
+                [edges.points(first_row, first_row, first_shares)[0], edges.points(last_row, last_row, last_shares)[0]]
+            )
+            parts.append(ring_faces(points, triangulate_rows(first_shares, last_shares)))
     return drop_unused_points(join_faces(parts))
 
 
-def _row_runs(even: Mask, chosen: Mask) -> Iterator[tuple[int, int]]:
+def _row_runs(is_regular: Mask, interval_mask: Mask) -> Iterator[tuple[int, int]]:
     """Yield (first, last) rows of chosen intervals: maximal runs with the same damages, or single intervals."""
-    number = np.flatnonzero(chosen)
-    breaks = np.ones(len(number), dtype=bool)
-    breaks[1:] = (np.diff(number) > 1) | ~even[number[1:]] | ~even[number[:-1]]
-    starts = number[breaks]
-    ends = np.append(number[:-1][breaks[1:]], number[-1]) + 1
+    intervals = np.flatnonzero(interval_mask)
+    starts_run = np.ones(len(intervals), dtype=bool)
+    starts_run[1:] = (np.diff(intervals) > 1) | ~is_regular[intervals[1:]] | ~is_regular[intervals[:-1]]
+    starts = intervals[starts_run]
+    ends = np.append(intervals[:-1][starts_run[1:]], intervals[-1]) + 1
     yield from zip(starts.tolist(), ends.tolist(), strict=True)
 
 
-def triangulate_rows(here: Float, there: Float) -> list[list[int]]:
-    """Triangulate between a row of points at shares (C,) and the next at shares (D,); return triples of indices."""
-    rings, i, j, ahead = [], 0, 0, len(here)
-    while i < len(here) - 1 or j < len(there) - 1:
-        if j == len(there) - 1 or (i < len(here) - 1 and here[i + 1] <= there[j + 1]):
-            rings.append([i, i + 1, ahead + j])
-            i += 1
+def triangulate_rows(rear_shares: Float, front_shares: Float) -> list[list[int]]:
+    """Triangulate the band between two rows of points; return triples of point indices.
+
+    Starting at the first points, the band advances on the row whose next point has the smaller share, one triangle per
+    step. Each has an edge on one row and its third corner on the other.
+
+    Args:
+        rear_shares: (C,) places of the rear row's points along it, increasing; their indices count from 0.
+        front_shares: (D,) those of the front row in the same measure; their indices count from C.
+    """
+    triangles, rear, front, front_start = [], 0, 0, len(rear_shares)
+    while rear < len(rear_shares) - 1 or front < len(front_shares) - 1:
+        if front == len(front_shares) - 1 or (
+            rear < len(rear_shares) - 1 and rear_shares[rear + 1] <= front_shares[front + 1]
+        ):
+            triangles.append([rear, rear + 1, front_start + front])
+            rear += 1
         else:
-            rings.append([ahead + j, i, ahead + j + 1])
-            j += 1
-    return rings
+            triangles.append([front_start + front, rear, front_start + front + 1])
+            front += 1
+    return triangles

@@ -31,8 +31,8 @@ def road_stations(geometry: RoadGeometry, tolerance: float) -> Float:
     """Return the stations (N,) at which the road's surface is sampled to keep a chord error (m), without markings."""
     parameters = geometry.parameters
     objects = {name: item for name, item in parameters.objects.items() if not isinstance(item, LineMarking)}
-    bare = RoadGeometry(parameters.model_copy(update={"objects": objects}))
-    return sample_stations(bare, tolerance)
+    unmarked_road = RoadGeometry(parameters.model_copy(update={"objects": objects}))
+    return sample_stations(unmarked_road, tolerance)
 
 
 def surface_points(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
@@ -70,15 +70,15 @@ def dash_surfaces(geometry: RoadGeometry, line: LineMarking, stations: Float) ->
     dashes, station, owner = dash_stations(geometry, line, stations)
     if not len(dashes):
         return dashes, join_faces([]), owner
-    left, right = geometry.marking_edges(line, station)
-    points = surface_points(geometry, np.repeat(station, 2), np.stack([left, right], axis=1).ravel())
+    left_edge, right_edge = geometry.marking_edges(line, station)
+    points = surface_points(geometry, np.repeat(station, 2), np.stack([left_edge, right_edge], axis=1).ravel())
     points[:, 2] += line.film_thickness
-    same = owner[:-1] == owner[1:]
-    corners = grid_corners(len(station), 2)[same]
+    within_dash = owner[:-1] == owner[1:]
+    corners = grid_corners(len(station), 2)[within_dash]
     faces = quad_faces(points, corners)
     # A quadrilateral's polygons begin with its right rear corner, 2 * row + 1, or contain it.
-    first = faces.corners[np.cumsum(faces.sizes) - faces.sizes]
-    return dashes, faces, owner[first // 2]
+    first_corner = faces.corners[np.cumsum(faces.sizes) - faces.sizes]
+    return dashes, faces, owner[first_corner // 2]
 
 
 def painted_surface(geometry: RoadGeometry, item: Hatching | Arrow, stations: Float) -> Faces:
@@ -139,15 +139,15 @@ def triangulate_twisted(faces: Faces) -> Faces:
     starts = np.cumsum(faces.sizes) - faces.sizes
     parts = []
     for start, size in zip(starts.tolist(), faces.sizes.tolist(), strict=True):
-        ring = faces.corners[start : start + size]
+        polygon = faces.corners[start : start + size]
         if size == 3:
-            parts.append(Faces(faces.points, ring, np.array([3])))
+            parts.append(Faces(faces.points, polygon, np.array([3])))
             continue
-        fans = np.stack([np.full(size - 3, ring[0]), ring[1:-2], ring[2:-1], ring[3:]], axis=1)
+        fans = np.stack([np.full(size - 3, polygon[0]), polygon[1:-2], polygon[2:-1], polygon[3:]], axis=1)
         if np.all(_flat_fans(faces.points, fans)):
-            parts.append(Faces(faces.points, ring, np.array([size])))
+            parts.append(Faces(faces.points, polygon, np.array([size])))
         else:
-            triangles = np.stack([np.full(size - 2, ring[0]), ring[1:-1], ring[2:]], axis=1)
+            triangles = np.stack([np.full(size - 2, polygon[0]), polygon[1:-1], polygon[2:]], axis=1)
             parts.append(Faces(faces.points, triangles.ravel(), np.full(size - 2, 3)))
     corners, sizes = [part.corners for part in parts], [part.sizes for part in parts]
     return Faces(faces.points, np.concatenate(corners), np.concatenate(sizes))
@@ -159,8 +159,8 @@ def _flat_fans(points: Float, fans: Int) -> NDArray[np.bool_]:
 
 def _stations_between(stations: Float, start: float, end: float) -> Float:
     """Return a range's ends and the stations between them, leaving out those within a millimetre of an end."""
-    inside = stations[np.searchsorted(stations, start + 1e-3) : np.searchsorted(stations, end - 1e-3)]
-    return np.concatenate([[start], inside, [end]])
+    inner_stations = stations[np.searchsorted(stations, start + 1e-3) : np.searchsorted(stations, end - 1e-3)]
+    return np.concatenate([[start], inner_stations, [end]])
 
 
 def _inside(stations: Float, outline: Float) -> Float:
@@ -178,19 +178,24 @@ def pothole_surface(geometry: RoadGeometry, pothole: Pothole, tolerance: float) 
     Rings of a paraboloid of the depth d, n of them, leave d / (4 n^2).
     """
     rings = 1 + int(np.ceil(np.sqrt(pothole.depth / (4.0 * tolerance))))
-    turn = 2.0 * np.pi * np.arange(_RIM) / _RIM
-    radius = np.arange(1, rings + 1) / rings
-    along = np.append(0.0, (radius[:, None] * np.cos(turn)).ravel()) * pothole.length / 2.0
-    across = np.append(0.0, (radius[:, None] * np.sin(turn)).ravel()) * pothole.width / 2.0
-    points = geometry.point(pothole.station + along, pothole.offset + across)
-    here, after = 1 + np.arange(_RIM), 1 + np.roll(np.arange(_RIM), -1)
-    triangles = [np.stack([np.zeros(_RIM, np.int64), here, after], axis=1)]
-    for inner in range(0, (rings - 1) * _RIM, _RIM):
-        a, b, c, d = here + inner, here + inner + _RIM, after + inner + _RIM, after + inner
+    azimuths = 2.0 * np.pi * np.arange(_RIM) / _RIM
+    radii = np.arange(1, rings + 1) / rings
+    station_offsets = np.append(0.0, (radii[:, None] * np.cos(azimuths)).ravel()) * pothole.length / 2.0
+    lateral_offsets = np.append(0.0, (radii[:, None] * np.sin(azimuths)).ravel()) * pothole.width / 2.0
+    points = geometry.point(pothole.station + station_offsets, pothole.offset + lateral_offsets)
+    rim_corner, next_corner = 1 + np.arange(_RIM), 1 + np.roll(np.arange(_RIM), -1)
+    triangles = [np.stack([np.zeros(_RIM, np.int64), rim_corner, next_corner], axis=1)]
+    for ring_start in range(0, (rings - 1) * _RIM, _RIM):
+        a, b, c, d = (
+            rim_corner + ring_start,
+            rim_corner + ring_start + _RIM,
+            next_corner + ring_start + _RIM,
+            next_corner + ring_start,
+        )
         triangles += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
     corners = np.concatenate(triangles)
-    inside = ~np.isnan(points[corners, 2]).any(axis=1)
-    return drop_unused_points(Faces(points, corners[inside].ravel(), np.full(int(inside.sum()), 3)))
+    is_on_road = ~np.isnan(points[corners, 2]).any(axis=1)
+    return drop_unused_points(Faces(points, corners[is_on_road].ravel(), np.full(int(is_on_road.sum()), 3)))
 
 
 # --- along the road ---------------------------------------------------------------------------------------------
@@ -208,28 +213,28 @@ def line_points(geometry: RoadGeometry, item: LineObject, tolerance: float) -> F
     return points[simplify_polyline(points, tolerance)]
 
 
-def simplify_polyline(points: Float, tolerance: float, kept: NDArray[np.bool_] | None = None) -> NDArray[np.intp]:
+def simplify_polyline(points: Float, tolerance: float, required: NDArray[np.bool_] | None = None) -> NDArray[np.intp]:
     """Return the indices of a polyline's points (N, 3) that Douglas-Peucker simplification keeps at a tolerance (m).
 
-    Douglas and Peucker's way: the farthest point from a chord is kept until none is too far.
+    The point farthest from a chord is kept and divides the chord, until no point is farther away than the tolerance.
 
     Args:
-        kept: (N,) rows that are kept in any case; the first and the last always are.
+        required: (N,) rows that are kept in any case; the first and the last always are.
     """
-    keep = np.zeros(len(points), dtype=bool) if kept is None else kept.copy()
-    keep[[0, -1]] = True
-    borders = np.flatnonzero(keep)
+    keep_mask = np.zeros(len(points), dtype=bool) if required is None else required.copy()
+    keep_mask[[0, -1]] = True
+    borders = np.flatnonzero(keep_mask)
     stack = list(zip(borders[:-1].tolist(), borders[1:].tolist(), strict=True))
     while stack:
-        first, last = stack.pop()
-        if last - first < 2:
+        first_point, last_point = stack.pop()
+        if last_point - first_point < 2:
             continue
-        chord = points[last] - points[first]
-        beside = points[first + 1 : last] - points[first]
-        along = beside @ chord / max(float(chord @ chord), 1e-12)
-        away = np.linalg.norm(beside - along[:, None] * chord, axis=1)
-        worst = int(np.argmax(away))
-        if away[worst] > tolerance:
-            keep[first + 1 + worst] = True
-            stack += [(first, first + 1 + worst), (first + 1 + worst, last)]
-    return np.flatnonzero(keep)
+        chord = points[last_point] - points[first_point]
+        vectors = points[first_point + 1 : last_point] - points[first_point]
+        projections = vectors @ chord / max(float(chord @ chord), 1e-12)
+        distances = np.linalg.norm(vectors - projections[:, None] * chord, axis=1)
+        farthest = int(np.argmax(distances))
+        if distances[farthest] > tolerance:
+            keep_mask[first_point + 1 + farthest] = True
+            stack += [(first_point, first_point + 1 + farthest), (first_point + 1 + farthest, last_point)]
+    return np.flatnonzero(keep_mask)

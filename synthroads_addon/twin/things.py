@@ -37,8 +37,8 @@ class Frame:
 
     def to_local(self, points: Float) -> Float:
         """Transform points (..., 3) from this frame into the road's local coordinates."""
-        plan = points[..., :1] * self.right + points[..., 1:2] * self.along
-        return self.origin + np.concatenate([plan, points[..., 2:]], axis=-1)
+        xy = points[..., :1] * self.right + points[..., 1:2] * self.along
+        return self.origin + np.concatenate([xy, points[..., 2:]], axis=-1)
 
     def place(self) -> Place:
         """Return the ground and pavement heights around this frame as functions of x and y, and the batters' slope."""
@@ -46,17 +46,25 @@ class Frame:
         return Place(self._ground, self._pavement, terrain.batter_slope if terrain else _SLOPE)
 
     def _located(self, x: Float, y: Float) -> tuple[Float, Float]:
+        """Return the stations and offsets (N,) of places x, y (N,) in this frame, m."""
         return self.geometry.alignment.project(self.origin[:2] + x[:, None] * self.right + y[:, None] * self.along)
 
     def _ground(self, x: ArrayLike, y: ArrayLike) -> Float:
-        beside, ahead = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
-        return surface_points(self.geometry, *self._located(beside, ahead))[:, 2] - self.origin[2]
+        """Return the ground's heights (N,) above the thing's foot at x, y in this frame, m."""
+        right_distance, ahead_distance = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
+        return surface_points(self.geometry, *self._located(right_distance, ahead_distance))[:, 2] - self.origin[2]
 
     def _pavement(self, x: tuple[float, float], y: tuple[float, float], shear: float) -> float:
-        across = np.linspace(*x, max(2, int(np.ceil((x[1] - x[0]) / _ACROSS)) + 1))
-        beside, ahead = (grid.ravel() for grid in np.meshgrid(across, np.linspace(*y, _ROWS)))
-        highest = highest_pavement(self.geometry, *self._located(beside, ahead + shear * beside))
-        return 0.0 if highest is None else highest - float(self.origin[2])
+        """Return the height of the highest pavement above the thing's foot in a range of x and y, m; 0 if none.
+
+        The range is a parallelogram: y is counted from the line y = shear x.
+        """
+        columns = np.linspace(*x, max(2, int(np.ceil((x[1] - x[0]) / _ACROSS)) + 1))
+        right_distance, ahead_distance = (grid.ravel() for grid in np.meshgrid(columns, np.linspace(*y, _ROWS)))
+        highest_elevation = highest_pavement(
+            self.geometry, *self._located(right_distance, ahead_distance + shear * right_distance)
+        )
+        return 0.0 if highest_elevation is None else highest_elevation - float(self.origin[2])
 
 
 class PlacedThing(NamedTuple):
@@ -86,39 +94,40 @@ def placed_things(geometry: RoadGeometry, tolerance: float) -> Iterator[PlacedTh
         geometry: the road.
         tolerance: largest chord error of what runs along it, m.
     """
-    standing = standing_things(geometry)
+    remaining_things = standing_things(geometry)
     course = _course(geometry, tolerance)
     for name, item in geometry.parameters.objects.items():
         if isinstance(item, StandingThing):
-            yield next(standing)
+            yield next(remaining_things)
         elif isinstance(item, LengthwiseThing):
             yield PlacedThing(name, item, None, item.bodies(course))
 
 
 def standing_things(geometry: RoadGeometry) -> Iterator[PlacedThing]:
     """Yield only the things that stand at one place, with frames and bodies, in the parameter set's order."""
-    standing = geometry.parameters.of_type(StandingThing)
-    frames = standing_frames(geometry, list(standing.values()))
-    for (name, item), frame in zip(standing.items(), frames, strict=True):
+    things = geometry.parameters.of_type(StandingThing)
+    frames = standing_frames(geometry, list(things.values()))
+    for (name, item), frame in zip(things.items(), frames, strict=True):
         yield PlacedThing(name, item, frame, item.bodies(frame.place()))
 
 
 def standing_frames(geometry: RoadGeometry, items: Sequence[StandingThing]) -> list[Frame]:
     """Return the frames of standing things, placed on the surface below them and turned by their rotations."""
     places = [(item.station, item.offset, item.elevation, item.turn) for item in items]
-    station, offset, above, turn = np.array(places, dtype=np.float64).reshape(-1, 4).T
+    station, offset, elevations, turn = np.array(places, dtype=np.float64).reshape(-1, 4).T
     origins = surface_points(geometry, station, offset)
-    origins[:, 2] += above
+    origins[:, 2] += elevations
     heading = geometry.alignment.heading(station) + turn
-    along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
-    right = np.stack([along[:, 1], -along[:, 0]], axis=1)
-    return [Frame(geometry, *axes) for axes in zip(origins, right, along, strict=True)]
+    ahead_axes = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    right_axes = np.stack([ahead_axes[:, 1], -ahead_axes[:, 0]], axis=1)
+    return [Frame(geometry, *origin_and_axes) for origin_and_axes in zip(origins, right_axes, ahead_axes, strict=True)]
 
 
 def _course(geometry: RoadGeometry, tolerance: float) -> Course:
     """Return the road as bodies along it are built from it: its length, surface points, left vectors and sampling."""
 
     def rows(offset: Callable[[Float], Float], start: float, end: float, kinks: Sequence[float]) -> Float:
+        """Return the stations (R,) at which a body along the road needs sections: the kinks, and by the tolerance."""
         station = np.unique(np.concatenate([even_stations(start, end), kinks]))
         feet = surface_points(geometry, station, offset(station))
         return station[simplify_polyline(feet, tolerance, np.isin(station, kinks))]

@@ -75,8 +75,8 @@ class Trace:
         """Record the details of a thing that every format omits: fittings, an unknown shape, what the thing names."""
         sizes = [body.detail for body in placed.bodies if body.detail]
         if sizes:
-            few = "a fitting" if len(sizes) == 1 else f"{len(sizes)} fittings"
-            self.record_loss(placed.name, f"without {few} of up to {max(sizes):.3g} m")
+            fittings = "a fitting" if len(sizes) == 1 else f"{len(sizes)} fittings"
+            self.record_loss(placed.name, f"without {fittings} of up to {max(sizes):.3g} m")
         if not placed.bodies and isinstance(placed.thing, StandingThing):
             self.record_loss(placed.name, "its place alone: its shape isn't in the parameter set")
         if placed.thing.left_out:
@@ -96,37 +96,43 @@ class Trace:
             file: name of its file.
         """
         parameters, numbers = self._geometry.parameters, self._geometry.numbers
-        about = {"type": "TwinReport", "version": "1.0", "generator": generator(), "format": name, "file": file}
-        about |= {"identifier": parameters.metadata.identifier, "level_of_detail": self.level}
-        traced, losses = self._rows()
+        members = {"type": "TwinReport", "version": "1.0", "generator": generator(), "format": name, "file": file}
+        members |= {"identifier": parameters.metadata.identifier, "level_of_detail": self.level}
+        instance_rows, losses = self._rows()
         instances = {key: item.instance for key, item in parameters.objects.items()}
         reduced = [{"id": key, "instance": instances[key], "reason": reason} for key, reason in self._reduced]
         passes = [
-            {"id": key, "instance": instances[key], "first_pass_instance": one.first, "pass_step": one.step}
-            for key, one in numbers.passes.items()
+            {
+                "id": key,
+                "instance": instances[key],
+                "first_pass_instance": first_pass.first,
+                "pass_step": first_pass.step,
+            }
+            for key, first_pass in numbers.passes.items()
         ]
-        text = compact_json(about)[:-1]
-        for key, rows in (("lost", losses), ("reduced", reduced), ("passes", passes), ("instances", traced)):
+        text = compact_json(members)[:-1]
+        for key, rows in (("lost", losses), ("reduced", reduced), ("passes", passes), ("instances", instance_rows)):
             text += f',\n"{key}":[' + ",".join("\n" + compact_json(row) for row in rows) + "]"
         path.write_text(text + "}\n", encoding="utf-8", newline="\n")
 
     def _rows(self) -> tuple[list[Entity], list[Entity]]:
         """Return the report's rows for instance numbers with entities, and for those that are missing with reasons."""
         objects = self._geometry.parameters.objects
-        if not self._grown:  # the format has no plants
+        if not self._grown:  # the format has no plants, but the report lists them all the same
             for plant in placed_plants(self._geometry):
                 self.record_plant(plant)
-        traced, losses = [], []
+        instance_rows, losses = [], []
         for number, name, kinds in self._numbers():
             entities = self._entities.get(number)
             if not entities and self._within.intersection(kinds):
+                # A part without entities of its own lies in those of its object, whose id is before the slash.
                 entities = self._entities.get(objects[name.partition("/")[0]].instance)
             if entities:
-                traced.append({"instance": number, "id": name, "entities": entities})
+                instance_rows.append({"instance": number, "id": name, "entities": entities})
             elif not self._is_only_parts(objects.get(name)):
                 reason = next((self._reasons[kind] for kind in kinds if kind in self._reasons), "")
                 losses.append({"instance": number, "id": name, "reason": reason})
-        return traced, losses
+        return instance_rows, losses
 
     def _is_only_parts(self, item: RoadObject | None) -> bool:
         """Return whether an object consists of numbered parts only, so that no point has its own number."""

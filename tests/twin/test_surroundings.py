@@ -172,8 +172,8 @@ def test_plants_stand_on_the_ground_within_their_band(twins: Twins) -> None:
         np.testing.assert_allclose(plant.foot, surface[0], rtol=0, atol=1e-6)
         edges = geometry.offsets(np.array([station]))[0]
         distance = max(offset - edges[0], edges[-1] - offset)
-        assert plant.about.band_start - 1e-6 <= distance <= plant.about.band_end + 1e-6
-        assert plant.about.height_min <= plant.height <= plant.about.height_max
+        assert plant.vegetation.band_start - 1e-6 <= distance <= plant.vegetation.band_end + 1e-6
+        assert plant.vegetation.height_min <= plant.height <= plant.vegetation.height_max
 
 
 def test_stands_hold_their_plants(twins: Twins) -> None:

@@ -74,7 +74,7 @@ def noise_field(
     wavelength: float | Float,
     seed: int,
     octaves: int = 4,
-    averaged: tuple[Float, Float] | None = None,
+    patch_deviations: tuple[Float, Float] | None = None,
 ) -> Float:
     """Return a random field (N,) at positions (N, 3): mean 0, standard deviation 1, nearly normal from 3 octaves on.
 
@@ -85,8 +85,9 @@ def noise_field(
         wavelength: (N,) or one number, longest wavelength (two cells of the coarsest lattice), m; positive.
         seed: of the field.
         octaves: 1 to `MAX_OCTAVES`, each of half the wavelength and half the variance of the one before.
-        averaged: standard deviations (N,) along both axes, m, of the Gaussian patch of a surface over which each value
-            is a mean: octaves have the deviations of such means, see `mean_deviation`. None: values of places.
+        patch_deviations: standard deviations (N,) along both axes, m, of the Gaussian patch of a surface over which
+            each value is a mean: octaves have the deviations of such means, see `mean_deviation`. None: values of
+            places.
 
     Returns:
         (N,) values.
@@ -101,13 +102,13 @@ def noise_field(
     gains = np.sqrt(variance / variance.sum()).astype(np.float32)
     cells = np.atleast_1d(2.0 / np.asarray(wavelength, dtype=np.float64))
     for kernel in _kernels[-1:]:
-        return kernel.fill(position, cells, keys, gains, averaged)
-    cells, result = np.broadcast_to(cells, (len(position),)), np.empty(len(position))
-    for first in range(0, len(position), CHUNK):
-        part = slice(first, first + CHUNK)
-        point = [position[part, axis] * cells[part] for axis in range(3)]
+        return kernel.fill(position, cells, keys, gains, patch_deviations)
+    cells, values = np.broadcast_to(cells, (len(position),)), np.empty(len(position))
+    for begin in range(0, len(position), CHUNK):
+        block = slice(begin, begin + CHUNK)
+        point = [position[block, axis] * cells[block] for axis in range(3)]
         total = np.zeros(len(point[0]), dtype=np.float32)
-        patch = None if averaged is None else [axis[part] * cells[part] for axis in averaged]
+        patch = None if patch_deviations is None else [axis[block] * cells[block] for axis in patch_deviations]
         for key, gain in zip(keys, gains, strict=False):
             point = _turn_coordinates(point)
             octave = gain * _octave(point, key)
@@ -116,8 +117,8 @@ def noise_field(
                 patch = [axis * 2.0 for axis in patch]
             total += octave
             point = [coordinate * 2.0 for coordinate in point]
-        result[part] = total
-    return result
+        values[block] = total
+    return values
 
 
 @lru_cache(maxsize=64)
@@ -128,7 +129,7 @@ def _keys(seed: int) -> Hash:
     return keys
 
 
-def mean_deviation(long: Float, short: Float) -> Float32:
+def mean_deviation(long_deviation: Float, short_deviation: Float) -> Float32:
     """Return the standard deviation (N,) of means of an octave over Gaussian patches of a surface, 0 to 1.
 
     The correlation of an octave falls nearly as exp(-(x / l)^2) with l of 0.58 cells, as means over patches of 0.1 to
@@ -136,20 +137,22 @@ def mean_deviation(long: Float, short: Float) -> Float32:
     / l^2)). It is kept to 4 % of the octave's variance.
 
     Args:
-        long, short: standard deviations a, b (N,) of the patch along its two axes, in cells.
+        long_deviation, short_deviation: standard deviations a, b (N,) of the patch along its two axes, in cells.
     """
-    spread = 1.0 + SPREAD * long**2
-    spread *= 1.0 + SPREAD * short**2
+    variance_factor = 1.0 + SPREAD * long_deviation**2
+    variance_factor *= 1.0 + SPREAD * short_deviation**2
     # Two roots are exact to the last digits, as a power is, in a fraction of its time.
-    return np.asarray(1.0 / np.sqrt(np.sqrt(spread)), dtype=np.float32)
+    return np.asarray(1.0 / np.sqrt(np.sqrt(variance_factor)), dtype=np.float32)
 
 
 def hash_cells(cells: NDArray[np.int64], key: int) -> NDArray[np.uint32]:
     """Return random whole numbers (N,), uniform from 0 to 2^32 - 1, of cells (3, N) of a lattice, by a key."""
-    first, second, third = (axis.astype(np.uint32) * prime for axis, prime in zip(cells, _AXES, strict=True))
-    node = _mix_bits(first + np.uint32(key))
-    node = _mix_bits(node + second)
-    node = _mix_bits(node + third)
+    first_hash, second_hash, third_hash = (
+        axis.astype(np.uint32) * prime for axis, prime in zip(cells, _AXES, strict=True)
+    )
+    node = _mix_bits(first_hash + np.uint32(key))
+    node = _mix_bits(node + second_hash)
+    node = _mix_bits(node + third_hash)
     node *= _FACTORS[1]
     return node ^ (node >> _FIRST)
 
@@ -157,14 +160,14 @@ def hash_cells(cells: NDArray[np.int64], key: int) -> NDArray[np.uint32]:
 def _turn_coordinates(point: list[Float]) -> list[Float]:
     """Return coordinates, three arrays (N,), rotated by `_TURN`."""
     x, y, z = point
-    result, product = [], np.empty_like(x)
+    coordinates, product = [], np.empty_like(x)
     for a, b, c in _TURN:
-        turned = a * x
-        turned += np.multiply(y, b, out=product)
-        turned += np.multiply(z, c, out=product)
-        turned /= 19.0
-        result.append(turned)
-    return result
+        coordinate = a * x
+        coordinate += np.multiply(y, b, out=product)
+        coordinate += np.multiply(z, c, out=product)
+        coordinate /= 19.0
+        coordinates.append(coordinate)
+    return coordinates
 
 
 def _octave(point: list[Float], key: np.uint32) -> Float32:
@@ -197,26 +200,26 @@ def _octave(point: list[Float], key: np.uint32) -> Float32:
 
 def _weights(t: Float32) -> Float32:
     """Return the weights (2, N) of the nodes below and above at shares t of a cell, their squares summing to 1."""
-    result = np.empty((2, len(t)), dtype=np.float32)
-    below, above = result
-    np.multiply(t, t, out=above)
+    weights = np.empty((2, len(t)), dtype=np.float32)
+    lower_weights, upper_weights = weights
+    np.multiply(t, t, out=upper_weights)
     t *= np.float32(-2.0)
     t += np.float32(3.0)
-    above *= t
-    np.subtract(np.float32(1.0), above, out=below)
-    squares = result * result
+    upper_weights *= t
+    np.subtract(np.float32(1.0), upper_weights, out=lower_weights)
+    squares = weights * weights
     scale = squares[1]
     scale += squares[0]
     np.sqrt(scale, out=scale)
     np.divide(np.float32(1.0), scale, out=scale)
-    result *= scale
-    return result
+    weights *= scale
+    return weights
 
 
 def _mix_bits(node: Hash) -> Hash:
-    """Mix the bits of hashes where they are, and return them."""
-    spare = node >> _FIRST
-    node ^= spare
+    """Mix the bits of hashes in place, and return them: xor them with shifted bits, twice, around one odd factor."""
+    shifted = node >> _FIRST
+    node ^= shifted
     node *= _FACTORS[0]
-    node ^= np.right_shift(node, _SECOND, out=spare)
+    node ^= np.right_shift(node, _SECOND, out=shifted)
     return node

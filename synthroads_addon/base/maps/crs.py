@@ -105,8 +105,8 @@ class MapSystem:
     @cached_property
     def scale(self) -> Float:
         """Return metres per unit of x, y and z (3,); heights without a system of their own have the plan's unit."""
-        plan = 1.0 if self.unit is None else self.unit
-        return np.array([plan, plan, plan if self.height_unit is None else self.height_unit])
+        plan_unit = 1.0 if self.unit is None else self.unit
+        return np.array([plan_unit, plan_unit, plan_unit if self.height_unit is None else self.height_unit])
 
     def metric(self) -> MapSystem:
         """Return the same system with metres as its unit, which often has a code of its own; itself if it has them.
@@ -122,12 +122,12 @@ class MapSystem:
             return True
         return bool(_plan(self.text).equals(_plan(other.text), ignore_axis_order=True))
 
-    def outside(self, plan: Float) -> Float:
+    def outside(self, points: Float) -> Float:
         """Return how far (N,), degrees, points (N, 2) lie outside the area that the system is meant for.
 
         0 within it, and where the system doesn't say what it is meant for; infinite where no map is.
         """
-        return _outside(_plan(self.text), self.epsg, plan)
+        return _outside(_plan(self.text), self.epsg, points)
 
     @property
     def area(self) -> str:
@@ -183,8 +183,10 @@ def metric_system(epsg: int, height_epsg: int | None = None, field: str = "epsg"
     if system.unit is None:
         raise InputError(field, epsg, "must be a projected system with coordinates in metres; this one has degrees")
     if not system.in_metres:
-        instead = system.metric().label
-        raise InputError(field, epsg, f"must have coordinates in metres, as {instead} has; this one has other units")
+        metric_label = system.metric().label
+        raise InputError(
+            field, epsg, f"must have coordinates in metres, as {metric_label} has; this one has other units"
+        )
     return system
 
 
@@ -225,19 +227,20 @@ def moved(points: Float, source: MapSystem, target: MapSystem) -> tuple[Float, f
     from pyproj.exceptions import ProjError  # takes a fifth of a second, and few commands need it
 
     try:
-        way = _way(source.text, target.text)
-        x, y = way.transform(points[:, 0], points[:, 1], errcheck=True)
-        exact = float(way.get_last_used_operation().accuracy)
+        transformer = _way(source.text, target.text)
+        x, y = transformer.transform(points[:, 0], points[:, 1], errcheck=True)
+        accuracy = float(transformer.get_last_used_operation().accuracy)
     except ProjError as problem:
         reason = " ".join(str(problem).split())[:100]
         raise InputError(
             "coordinates", points[0, :2].tolist(), f"can't be moved to {target.label} ({reason})"
         ) from None
-    return np.column_stack([x, y, points[:, 2]]), exact if exact >= 0.0 else np.nan
+    return np.column_stack([x, y, points[:, 2]]), accuracy if accuracy >= 0.0 else np.nan
 
 
 @cache
 def _of_codes(epsg: int, height_epsg: int | None) -> MapSystem:
+    """Return the system of a horizontal and perhaps a vertical EPSG code; InputError names the wrong one. Cached."""
     from pyproj.exceptions import CRSError  # takes a fifth of a second, and few commands need it
 
     try:
@@ -287,6 +290,7 @@ def _named(text: str) -> str:
 
 @lru_cache(64)
 def _read(text: str) -> MapSystem:
+    """Return the system that a text names; UnknownSystemError if PROJ knows none. Cached."""
     from pyproj.exceptions import CRSError  # takes a fifth of a second, and few commands need it
 
     if not text or len(text) > _LONGEST_TEXT:
@@ -312,48 +316,57 @@ def _parts(crs: CRS) -> Iterator[CRS]:
 
 
 def _described(text: str, crs: CRS, parts: list[CRS]) -> MapSystem:
-    plan, vertical = parts[0], parts[1] if len(parts) > 1 else None
-    if plan.is_vertical:
-        raise InputError("coordinate system", plan.name, "has heights only: a system with x and y is needed")
-    if plan.is_geocentric:
-        raise InputError("coordinate system", plan.name, "is geocentric: a projected system is needed")
-    directions = [axis.direction.lower() for axis in plan.axis_info[:2]]
+    """Return a system by its parts: codes, units, heights; InputError if axes don't run east, north and up."""
+    horizontal, vertical = parts[0], parts[1] if len(parts) > 1 else None
+    if horizontal.is_vertical:
+        raise InputError("coordinate system", horizontal.name, "has heights only: a system with x and y is needed")
+    if horizontal.is_geocentric:
+        raise InputError("coordinate system", horizontal.name, "is geocentric: a projected system is needed")
+    directions = [axis.direction.lower() for axis in horizontal.axis_info[:2]]
     if set(directions) & {"west", "south"} and directions[0] != directions[-1]:  # the two axes of a polar one run alike
-        way = " and ".join(directions)
-        raise InputError("coordinate system", plan.name, f"has axes {way}: axes east and north are needed")
-    unit = None if plan.is_geographic else float(plan.axis_info[0].unit_conversion_factor) if plan.axis_info else 1.0
+        direction_text = " and ".join(directions)
+        raise InputError(
+            "coordinate system", horizontal.name, f"has axes {direction_text}: axes east and north are needed"
+        )
+    unit = (
+        None
+        if horizontal.is_geographic
+        else float(horizontal.axis_info[0].unit_conversion_factor)
+        if horizontal.axis_info
+        else 1.0
+    )
     height_unit, ellipsoidal = None, False
     if vertical is not None:
         axis = vertical.axis_info[0]
         if axis.direction.lower() == "down":
             raise InputError("coordinate system", vertical.name, "has depths, counted downwards: heights are needed")
         height_unit = float(axis.unit_conversion_factor)
-    elif len(plan.axis_info) == 3:
-        height_unit, ellipsoidal = float(plan.axis_info[2].unit_conversion_factor), True
-        plan = plan.to_2d()
+    elif len(horizontal.axis_info) == 3:
+        height_unit, ellipsoidal = float(horizontal.axis_info[2].unit_conversion_factor), True
+        horizontal = horizontal.to_2d()
     return MapSystem(
         text,
         crs.name,
-        None if plan.is_engineering else _code(plan),
+        None if horizontal.is_engineering else _code(horizontal),
         None if vertical is None else _code(vertical),
         unit,
         height_unit,
         ellipsoidal,
-        plan.is_engineering,
+        horizontal.is_engineering,
     )
 
 
 @lru_cache(256)
 def _plan(text: str) -> CRS:
     """Return the horizontal part of a system, with two axes."""
-    plan = next(_parts(_crs(text)))
-    return plan.to_2d() if len(plan.axis_info) == 3 else plan
+    horizontal = next(_parts(_crs(text)))
+    return horizontal.to_2d() if len(horizontal.axis_info) == 3 else horizontal
 
 
 def _code(part: CRS) -> int | None:
     """Return the EPSG code of one part of a system: the one it names if that means the same, else one that does."""
-    named = part.to_json_dict().get("id", {})
-    codes = [int(named["code"])] if named.get("authority") == "EPSG" else []
+    named_id = part.to_json_dict().get("id", {})
+    codes = [int(named_id["code"])] if named_id.get("authority") == "EPSG" else []
     epsg = part.to_epsg()
     codes += [epsg] if epsg else []
     return next((code for code in codes if _means(part, code)), None)
@@ -365,38 +378,45 @@ def _means(part: CRS, code: int) -> bool:
     from pyproj.exceptions import CRSError, ProjError
 
     try:
-        known = CRS.from_epsg(code)
+        registered = CRS.from_epsg(code)
     except CRSError:
         return False
-    if part.equals(known, ignore_axis_order=True):
+    if part.equals(registered, ignore_axis_order=True):
         return True
-    factors, its = ([axis.unit_conversion_factor for axis in crs.axis_info] for crs in (part, known))
-    if part.type_name != known.type_name or not np.allclose(factors, its, rtol=_SAME_UNIT, atol=0.0):
+    factors, registered_factors = (
+        [axis.unit_conversion_factor for axis in crs.axis_info] for crs in (part, registered)
+    )
+    if part.type_name != registered.type_name or not np.allclose(
+        factors, registered_factors, rtol=_SAME_UNIT, atol=0.0
+    ):
         return False
     if part.is_vertical:
-        return bool(part.name == known.name or part.to_epsg() == code)
-    if known.area_of_use is None:
+        return bool(part.name == registered.name or part.to_epsg() == code)
+    if registered.area_of_use is None:
         return False
-    west, south, east, north = known.area_of_use.bounds
-    middle = 0.5 * (west + east if west <= east else west + east + 360.0), 0.5 * (south + north)
+    west, south, east, north = registered.area_of_use.bounds
+    area_middle = 0.5 * (west + east if west <= east else west + east + 360.0), 0.5 * (south + north)
     try:
-        here, there = (
-            Transformer.from_crs(crs.geodetic_crs, crs, always_xy=True).transform(*middle) for crs in (part, known)
+        place, registered_place = (
+            Transformer.from_crs(crs.geodetic_crs, crs, always_xy=True).transform(*area_middle)
+            for crs in (part, registered)
         )
     except ProjError:
         return False
-    same_shape = part.ellipsoid == known.ellipsoid and part.prime_meridian == known.prime_meridian
-    return same_shape and bool(np.allclose(here, there, rtol=0.0, atol=_SAME_PLACE))
+    same_shape = part.ellipsoid == registered.ellipsoid and part.prime_meridian == registered.prime_meridian
+    return same_shape and bool(np.allclose(place, registered_place, rtol=0.0, atol=_SAME_PLACE))
 
 
 @lru_cache(64)
 def _compound_code(epsg: int, height_epsg: int) -> int | None:
+    """Return the EPSG code of a pair of a horizontal and a vertical system; None if it has none. Cached."""
     code = _crs(f"EPSG:{epsg}+{height_epsg}").to_epsg()
     return None if code is None else int(code)
 
 
 @lru_cache(64)
 def _wkt(system: MapSystem) -> str:
+    """Return a system's WKT 1, or WKT 2 where the older one can't say it; InputError if neither can. Cached."""
     from pyproj.exceptions import CRSError  # takes a fifth of a second, and few commands need it
 
     crs = _crs(system.text)
@@ -411,6 +431,7 @@ def _wkt(system: MapSystem) -> str:
 
 
 def _metric(system: MapSystem) -> MapSystem:
+    """Return a projected system with metres as the unit of all its coordinates."""
     if system.unit is None:
         raise InputError("coordinate system", system.label, "is in degrees: one in metres is needed")
     return _with_units(system, 1.0, 1.0)
@@ -418,12 +439,16 @@ def _metric(system: MapSystem) -> MapSystem:
 
 @lru_cache(64)
 def _with_units(system: MapSystem, unit: float | None, height_unit: float | None) -> MapSystem:
+    """Return a system with other units (m) of x and y, and of z; None keeps a unit. Cached."""
     parts = list(_parts(_crs(system.text)))
     if len(parts[0].axis_info) == 3:
         parts[0] = _with_unit(parts[0], unit)  # of all its axes
     else:
         units = (unit, height_unit)
-        parts = [part if new is None else _with_unit(part, new) for part, new in zip(parts, units, strict=False)]
+        parts = [
+            part if new_unit is None else _with_unit(part, new_unit)
+            for part, new_unit in zip(parts, units, strict=False)
+        ]
     if len(parts) == 1:
         base_system = _read(_json(parts[0]))
         return (
@@ -444,22 +469,23 @@ def _with_unit(part: CRS, unit: float | None) -> CRS:
         return part
     data: dict[str, Any] = part.to_json_dict()
     data.pop("id", None)
-    name, metre = _UNIT_IN_NAME.sub("", data["name"]), abs(unit - 1.0) < _SAME_UNIT
+    name, is_metre = _UNIT_IN_NAME.sub("", data["name"]), abs(unit - 1.0) < _SAME_UNIT
     for axis in data["coordinate_system"]["axis"]:
-        axis["unit"] = "metre" if metre else {"type": "LinearUnit", "name": f"{unit!r} m", "conversion_factor": unit}
+        axis["unit"] = "metre" if is_metre else {"type": "LinearUnit", "name": f"{unit!r} m", "conversion_factor": unit}
     # By its name PROJ would take it for the one in the former unit again.
     code = CRS.from_json_dict(data | {"name": "unknown"}).to_epsg()
-    if code is None and part.is_vertical and metre:
+    if code is None and part.is_vertical and is_metre:
         code = _code_of_heights(_registered_name(part))
     if code is not None:
         return CRS.from_epsg(code)
-    return CRS.from_json_dict(data | {"name": f"{name} ({'m' if metre else f'unit {unit:.9g} m'})"})
+    return CRS.from_json_dict(data | {"name": f"{name} ({'m' if is_metre else f'unit {unit:.9g} m'})"})
 
 
 _UNIT_IN_NAME = re.compile(r"\s*\((m|ft|ftUS|unit [0-9.]+ m)\)$")
 
 
 def _registered_name(part: CRS) -> str:
+    """Return the EPSG registry's name of a part of a system, or its own, without a unit at the end."""
     code = _code(part)
     return _UNIT_IN_NAME.sub("", (_crs(f"EPSG:{code}") if code else part).name)
 
@@ -469,39 +495,45 @@ def _code_of_heights(name: str) -> int | None:
     from pyproj.database import query_crs_info  # takes a fifth of a second, and few commands need it
     from pyproj.enums import PJType
 
-    known = query_crs_info("EPSG", PJType.VERTICAL_CRS, allow_deprecated=False)
-    return next((int(entry.code) for entry in known if entry.name == name), None)
+    registered = query_crs_info("EPSG", PJType.VERTICAL_CRS, allow_deprecated=False)
+    return next((int(entry.code) for entry in registered if entry.name == name), None)
 
 
 def _json(crs: CRS) -> str:
+    """Return a text that `_read` takes for a system: its code if that means the same, else PROJJSON."""
     code = crs.to_epsg()
     return f"EPSG:{code}" if code and crs.equals(_crs(f"EPSG:{code}")) else json.dumps(crs.to_json_dict())
 
 
 @lru_cache(64)
 def _way(source: str, target: str) -> Transformer:
+    """Return the transformer between two systems' horizontal parts, x east and y north. Cached."""
     from pyproj import Transformer  # takes a fifth of a second, and few commands need it
 
     return Transformer.from_crs(_plan(source), _plan(target), always_xy=True)
 
 
-def _area(plan: CRS, epsg: int | None) -> tuple[float, float, float, float] | None:
-    area = plan.area_of_use or (_crs(f"EPSG:{epsg}").area_of_use if epsg else None)
+def _area(horizontal: CRS, epsg: int | None) -> tuple[float, float, float, float] | None:
+    """Return west, south, east and north (degrees) of the area that a system is for; None if it isn't known."""
+    area = horizontal.area_of_use or (_crs(f"EPSG:{epsg}").area_of_use if epsg else None)
     return None if area is None else area.bounds
 
 
-def _outside(plan: CRS, epsg: int | None, points: Float) -> Float:
+def _outside(horizontal: CRS, epsg: int | None, points: Float) -> Float:
+    """Return how far (N,), degrees, points (N, 2) lie outside of a system's area; see `MapSystem.outside`."""
     from pyproj import Transformer  # takes a fifth of a second, and few commands need it
 
-    bounds = _area(plan, epsg)
-    if bounds is None or plan.is_engineering:
+    bounds = _area(horizontal, epsg)
+    if bounds is None or horizontal.is_engineering:
         return np.zeros(len(points))
     west, south, east, north = bounds
-    to_degrees = Transformer.from_crs(plan, plan.geodetic_crs, always_xy=True)
+    to_degrees = Transformer.from_crs(horizontal, horizontal.geodetic_crs, always_xy=True)
     longitude, latitude = to_degrees.transform(points[:, 0], points[:, 1])
-    real: Bool = np.isfinite(longitude) & np.isfinite(latitude)
-    width = (east - west) % 360.0
-    around = np.mod(np.where(real, longitude, west) - west, 360.0)  # how far east of the western edge
-    beside = np.where(around <= width, 0.0, np.minimum(around - width, 360.0 - around))
-    above = np.maximum(np.maximum(south - latitude, latitude - north), 0.0)
-    return np.where(real, np.maximum(beside, above), np.inf)
+    is_defined: Bool = np.isfinite(longitude) & np.isfinite(latitude)
+    area_width = (east - west) % 360.0
+    degrees_east = np.mod(np.where(is_defined, longitude, west) - west, 360.0)  # how far east of the western edge
+    degrees_beside = np.where(
+        degrees_east <= area_width, 0.0, np.minimum(degrees_east - area_width, 360.0 - degrees_east)
+    )
+    degrees_above = np.maximum(np.maximum(south - latitude, latitude - north), 0.0)
+    return np.where(is_defined, np.maximum(degrees_beside, degrees_above), np.inf)

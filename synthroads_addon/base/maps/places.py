@@ -104,8 +104,10 @@ def bring(name: str, points: Float, declared: MapSystem | None, place: Placement
 def bring_plan(name: str, lines: list[Float], document: Any, place: Placement) -> list[Float]:
     """Return lines (N, 2) of a GeoJSON document in the system that they are wanted in; see `bring`."""
     points = np.concatenate(lines)
-    there = bring(name, np.column_stack([points, np.zeros(len(points))]), geojson_system(name, document), place, True)
-    return np.split(there[:, :2], np.cumsum([len(line) for line in lines])[:-1])
+    target_points = bring(
+        name, np.column_stack([points, np.zeros(len(points))]), geojson_system(name, document), place, True
+    )
+    return np.split(target_points[:, :2], np.cumsum([len(line) for line in lines])[:-1])
 
 
 def check_heights(name: str, points: Float) -> Float:
@@ -125,9 +127,11 @@ def geojson_system(name: str, document: Any) -> MapSystem | None:
         InputError: a member names no system that is known, or two name different ones.
     """
     systems = [_system_of_member(name, member) for member in _members(document)]
-    for other in systems[1:]:
-        if other.label != systems[0].label:
-            raise InputError(f"{name} crs", other.label, f"one system is needed, {systems[0].label} is named as well")
+    for other_system in systems[1:]:
+        if other_system.label != systems[0].label:
+            raise InputError(
+                f"{name} crs", other_system.label, f"one system is needed, {systems[0].label} is named as well"
+            )
     return systems[0] if systems else None
 
 
@@ -137,32 +141,34 @@ def _members(node: Any) -> Iterator[Any]:
         if node.get("crs"):
             yield node["crs"]
         features = node.get("features")
-        for inner in (*(features if isinstance(features, list) else ()), node.get("geometry")):
-            yield from _members(inner)
+        for inner_node in (*(features if isinstance(features, list) else ()), node.get("geometry")):
+            yield from _members(inner_node)
 
 
 def _system_of_member(name: str, member: Any) -> MapSystem:
+    """Return the system that a member ``crs`` of a GeoJSON document names, by its name or code."""
     properties = member.get("properties") if isinstance(member, dict) else None
-    named = properties.get("name", properties.get("code")) if isinstance(properties, dict) else member
-    if isinstance(named, int) and not isinstance(named, bool):
-        named = f"EPSG:{named}"
-    if not isinstance(named, str):
+    system_name = properties.get("name", properties.get("code")) if isinstance(properties, dict) else member
+    if isinstance(system_name, int) and not isinstance(system_name, bool):
+        system_name = f"EPSG:{system_name}"
+    if not isinstance(system_name, str):
         raise InputError(f"{name} crs", str(member)[:80], "a system's name or code is needed: links aren't followed")
     try:
-        return MapSystem.read(named)
+        return MapSystem.read(system_name)
     except UnknownSystemError:
         raise InputError(
-            f"{name} crs", named, "a coordinate system that PROJ knows is needed, e.g. EPSG:25832"
+            f"{name} crs", system_name, "a coordinate system that PROJ knows is needed, e.g. EPSG:25832"
         ) from None
 
 
 def _seem_degrees(points: Float) -> bool:
     """Return whether points look like longitudes and latitudes, by their size and extent."""
-    plan = points[:, :2]
-    return bool((np.abs(plan) <= (180.0, 90.0)).all()) and float(np.ptp(plan, axis=0).max()) < 2.0
+    xy = points[:, :2]
+    return bool((np.abs(xy) <= (180.0, 90.0)).all()) and float(np.ptp(xy, axis=0).max()) < 2.0
 
 
 def _metres_without_target(name: str, points: Float, source: MapSystem) -> Float:
+    """Return points in metres of the file's own system, with a warning; InputError for degrees."""
     if source.unit is None:
         raise InputError(f"{name} coordinates", points[0, :2].tolist(), _METRES)
     warn("%s is in %s: the data beside it name no system, and are read in the same system", name, source.label)
@@ -176,8 +182,8 @@ def _check_heights_alike(name: str, source: MapSystem, system: MapSystem) -> Non
     )
     if height_surface is None:
         return
-    known = source if source.unit is None else source.metric()
-    if system.height_epsg and (source.ellipsoidal or known.height_epsg != system.height_epsg):
+    metric_source = source if source.unit is None else source.metric()
+    if system.height_epsg and (source.ellipsoidal or metric_source.height_epsg != system.height_epsg):
         allowed = f"EPSG:{system.height_epsg} is needed: heights can't be converted from one to the other"
         raise InputError(
             f"{name}: heights", f"counted from {height_surface}" if source.ellipsoidal else height_surface, allowed
@@ -187,13 +193,20 @@ def _check_heights_alike(name: str, source: MapSystem, system: MapSystem) -> Non
 
 
 def _moved(name: str, points: Float, source: MapSystem, system: MapSystem) -> Float:
+    """Return points (N, 3) moved from one system to another, and log how exactly that is known."""
     try:
-        there, exact = moved(points, source, system)
+        target_points, accuracy = moved(points, source, system)
     except InputError as problem:
         raise InputError(f"{name} coordinates", problem.value, problem.allowed) from None
-    how = "how exactly isn't known" if np.isnan(exact) else "exactly" if exact < _EXACT else f"to within {exact:g} m"
-    assume("%s is moved from %s to %s, %s", name, source.label, system.label, how)
-    return there
+    accuracy_text = (
+        "how exactly isn't known"
+        if np.isnan(accuracy)
+        else "exactly"
+        if accuracy < _EXACT
+        else f"to within {accuracy:g} m"
+    )
+    assume("%s is moved from %s to %s, %s", name, source.label, system.label, accuracy_text)
+    return target_points
 
 
 def check_area(name: str, points: Float, system: MapSystem, may_be_local: bool) -> None:
@@ -205,15 +218,15 @@ def check_area(name: str, points: Float, system: MapSystem, may_be_local: bool) 
         system: that they are in.
         may_be_local: whether small coordinates may be a site's own, of no map.
     """
-    outside = system.outside(points[:, :2])
-    row = int(outside.argmax())
-    if outside[row] <= _BESIDE:
+    degrees_outside = system.outside(points[:, :2])
+    row = int(degrees_outside.argmax())
+    if degrees_outside[row] <= _BESIDE:
         return
     place = [round(float(value), 3) for value in points[row, :2]]
     if may_be_local and np.abs(points[:, :2]).max() <= _LOCAL:
         text = "%s: coordinates such as %s lie outside of the area of %s: they are read as a site's own"
         warn(text, name, place, system.label)
-    elif outside[row] > _FAR:
+    elif degrees_outside[row] > _FAR:
         allowed = f"{system.label} is for {system.area}: is it the file's coordinate system, and is x east and y north?"
         raise InputError(f"{name}: point {row + 1}", place, f"lies outside of the system's area of use: {allowed}")
     else:

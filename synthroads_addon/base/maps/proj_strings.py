@@ -61,39 +61,40 @@ def read_proj_string(text: str) -> MapSystem:
 
     if len(text) > _LONGEST:
         raise UnknownSystemError("coordinate system", text[:80], f"must be at most {_LONGEST:,} characters long")
-    kept: dict[str, str] = {}
+    parameters: dict[str, str] = {}
     for word in text.split():
         key, sign, value = word.lstrip("+").partition("=")
         if key in _LEFT_OUT:
             continue
-        known = (
+        is_known = (
             (key in _NUMBERS and _NUMBER.fullmatch(value))
             or (key in _WORDS and _WORD.fullmatch(value))
             or (key in _FLAGS and not sign)
         )
-        if not known:
+        if not is_known:
             raise UnknownSystemError("coordinate system", word, "isn't known: keys of plain projections are")
-        kept[key] = value
-    _refuse_contradiction(text, kept)
-    kept.setdefault("no_defs", "")
-    kept.pop("type", None)
-    named = " ".join(f"+{key}={value}" if value else f"+{key}" for key, value in kept.items())
+        parameters[key] = value
+    _refuse_contradiction(text, parameters)
+    parameters.setdefault("no_defs", "")
+    parameters.pop("type", None)
+    proj_string = " ".join(f"+{key}={value}" if value else f"+{key}" for key, value in parameters.items())
     try:
-        return MapSystem.read(CRS.from_proj4(f"{named} +type=crs").to_wkt())
+        return MapSystem.read(CRS.from_proj4(f"{proj_string} +type=crs").to_wkt())
     except CRSError as error:
         reason = " ".join(str(error).split())[-100:]
         raise UnknownSystemError("coordinate system", text[:80], f"must be one that PROJ knows ({reason})") from None
 
 
-def _refuse_contradiction(text: str, kept: dict[str, str]) -> None:
+def _refuse_contradiction(text: str, parameters: dict[str, str]) -> None:
     """Raise an error for a zone of UTM whose meridian lies elsewhere than the origin that is named beside it."""
-    if kept.get("proj") != "utm" or "zone" not in kept or "lon_0" not in kept:
+    if parameters.get("proj") != "utm" or "zone" not in parameters or "lon_0" not in parameters:
         return
-    meridian = _ZONE_WIDTH * float(kept["zone"]) - 183.0
-    away = abs((float(kept["lon_0"]) - meridian + 180.0) % 360.0 - 180.0)
-    if away > 0.5 * _ZONE_WIDTH:
+    meridian = _ZONE_WIDTH * float(parameters["zone"]) - 183.0
+    degrees_away = abs((float(parameters["lon_0"]) - meridian + 180.0) % 360.0 - 180.0)
+    if degrees_away > 0.5 * _ZONE_WIDTH:
         contradiction = (
-            f"contradicts itself: the meridian of zone {kept['zone']} is {meridian:g}, {away:.0f} degrees away"
+            f"contradicts itself: the meridian of zone {parameters['zone']} is {meridian:g}, "
+            f"{degrees_away:.0f} degrees away"
         )
         raise UnknownSystemError("coordinate system", text[:80], contradiction)
     warn("lon_0 and lat_0 beside a zone of UTM mean nothing and are ignored")

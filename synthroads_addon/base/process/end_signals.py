@@ -35,14 +35,15 @@ def was_stopped() -> bool:
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
+    """Signal handler: raise KeyboardInterrupt in the main thread, once for signals that come together."""
     global _stopped, _ended_at
     _stopped = True
     if time.monotonic() < _ended_at + _ONCE:
         return
     if _in_callback(frame):
-        again = threading.Timer(_AGAIN, _thread.interrupt_main, (number,))
-        again.daemon = True
-        again.start()
+        retry = threading.Timer(_AGAIN, _thread.interrupt_main, (number,))
+        retry.daemon = True
+        retry.start()
         return
     _ended_at = time.monotonic()
     signal.default_int_handler(signal.SIGINT, frame)
@@ -57,9 +58,9 @@ def ignore_end_signals() -> None:
 
 def _in_callback(frame: FrameType | None) -> bool:
     """Return whether Python is being called by a Blender operator, which would swallow an exception raised there."""
-    inner = frame
+    innermost = frame
     while frame is not None:
-        if frame.f_code.co_filename.endswith(_OPERATORS) and frame is not inner:
+        if frame.f_code.co_filename.endswith(_OPERATORS) and frame is not innermost:
             return True
         frame = frame.f_back
     return False

@@ -70,8 +70,8 @@ def temporary_files_in_scratch() -> Iterator[None]:
     with ExitStack() as stack:
         with suppress(OSError):
             folder = stack.enter_context(scratch_folder())
-            before = {name: os.environ.get(name) for name in _VARIABLES}, tempfile.tempdir
-            stack.callback(_use_for_temporary_files, *before)
+            former_settings = {name: os.environ.get(name) for name in _VARIABLES}, tempfile.tempdir
+            stack.callback(_use_for_temporary_files, *former_settings)
             _use_for_temporary_files(dict.fromkeys(_VARIABLES, str(folder)), str(folder))
         yield
 
@@ -99,9 +99,9 @@ def _look_for_leftovers(parent: Path) -> None:
 
     Work that puts a thousand files into one folder would list it a thousand times.
     """
-    left = _calls_left.pop(parent, 0)
-    if left := left - 1 if left else remove_leftovers(parent) // _ENTRIES_PER_CALL:
-        _calls_left[parent] = left
+    calls_left = _calls_left.pop(parent, 0)
+    if calls_left := calls_left - 1 if calls_left else remove_leftovers(parent) // _ENTRIES_PER_CALL:
+        _calls_left[parent] = calls_left
 
 
 def remove_leftovers(parent: Path) -> int:
@@ -110,13 +110,13 @@ def remove_leftovers(parent: Path) -> int:
     Returns:
         the number of entries that the folder has.
     """
-    count, named = 0, []
+    count, candidates = 0, []
     with suppress(OSError), os.scandir(parent) as entries:
         for entry in entries:
             count += 1
             if _NAME.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False):
-                named.append(Path(entry.path))
-    for folder in named:
+                candidates.append(Path(entry.path))
+    for folder in candidates:
         if folder not in _mine:
             with suppress(OSError):  # the others' turn comes all the same
                 _remove_leftover(folder)
@@ -213,19 +213,19 @@ def _finish_move(folder: Path) -> bool:
 
     Nothing is moved, and the folder stays, where links in it lead elsewhere: it isn't as a move leaves it.
     """
-    aside, target = folder / ASIDE, folder.parent
-    if not folder.name.startswith(_IN_OUTPUT) or not aside.is_dir():
+    aside_folder, target = folder / ASIDE, folder.parent
+    if not folder.name.startswith(_IN_OUTPUT) or not aside_folder.is_dir():
         return True
     if not all(is_inside(folder, name, follow=True) for name in (NEW, ASIDE)):
         return False
     for name in names_to_move(folder / NEW):
         with suppress(OSError):
             (folder / NEW / name).replace(target / name)
-    for name in names_to_move(aside):
+    for name in names_to_move(aside_folder):
         with suppress(OSError):
             if not (target / name).exists():
-                (aside / name).replace(target / name)
-    return all((target / name).exists() for name in names_to_move(aside))
+                (aside_folder / name).replace(target / name)
+    return all((target / name).exists() for name in names_to_move(aside_folder))
 
 
 def _remove_leftover(folder: Path) -> None:
@@ -239,19 +239,20 @@ def _remove_leftover(folder: Path) -> None:
     except OSError:
         return
     try:
-        dead = _owner_is_dead(lock)
-        if dead:
+        is_owner_dead = _owner_is_dead(lock)
+        if is_owner_dead:
             _remove(folder)
     finally:
         os.close(lock)
-    if dead:  # Windows removes no file that is open
+    if is_owner_dead:  # Windows removes no file that is open
         _remove(folder)
 
 
 def _owner_is_dead(lock: int) -> bool:
-    taken = try_lock(lock)
+    """Return whether the process that an open lock file names is known to have ended."""
+    lock_taken = try_lock(lock)
     owner = read_owner(os.read(lock, 4096).decode(errors="replace"))
     if owner is None:
         age = time.time() - os.fstat(lock).st_mtime  # noqa: TID251 - files are dated by the wall clock
-        return taken is not False and age > _UNREADABLE
-    return is_dead(owner, taken)
+        return lock_taken is not False and age > _UNREADABLE
+    return is_dead(owner, lock_taken)

@@ -107,6 +107,7 @@ def is_dead(owner: Owner, lock: bool | None) -> bool:
 
 @cache
 def _boot_id() -> str:
+    """Return the id of the machine's boot; empty where the system tells none. Cached."""
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
     except OSError:  # not Linux
@@ -114,6 +115,7 @@ def _boot_id() -> str:
 
 
 def _space() -> str:
+    """Return the process-number namespace of this process; empty where the system tells none."""
     try:
         return str(Path("/proc/self/ns/pid").readlink())
     except OSError:  # not Linux

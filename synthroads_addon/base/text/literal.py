@@ -26,5 +26,5 @@ def shown_text(text: str) -> str:
 
     Matplotlib leaves such labels out of legends, and can't draw the parts of file names that are no text.
     """
-    shown = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in text)
-    return f"{_NO_WIDTH}{shown}" if shown.startswith("_") else shown
+    printable = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in text)
+    return f"{_NO_WIDTH}{printable}" if printable.startswith("_") else printable

@@ -27,7 +27,7 @@ def typed_value(model: type[BaseModel], path: str, text: str) -> Any:
         return text
     if value is None or isinstance(value, str):
         return value
-    kinds = [one for kind in declared_kinds(model, path.split(".")) for one in alternatives(kind)]
+    kinds = [alternative for kind in declared_kinds(model, path.split(".")) for alternative in alternatives(kind)]
     if isinstance(value, (dict, list)) and set(kinds) - {str, NoneType}:
         return value
     return text if not _is_taken(value, kinds) and _is_taken(text, kinds) else value
@@ -43,12 +43,16 @@ def declared_kinds(kind: Any, path: Sequence[str]) -> list[Any]:
     if not path:
         return [kind]
     kinds: list[Any] = []
-    for one in alternatives(kind):
-        if isinstance(one, type) and issubclass(one, BaseModel):
-            named = (field for name, field in one.model_fields.items() if path[0] == (field.alias or name))
-            kinds += [inner for field in named for inner in declared_kinds(field.annotation, path[1:])]
-        elif get_origin(one) is dict:
-            kinds += declared_kinds(get_args(one)[1], path[1:])
+    for alternative in alternatives(kind):
+        if isinstance(alternative, type) and issubclass(alternative, BaseModel):
+            matching_fields = (
+                field for name, field in alternative.model_fields.items() if path[0] == (field.alias or name)
+            )
+            kinds += [
+                inner_kind for field in matching_fields for inner_kind in declared_kinds(field.annotation, path[1:])
+            ]
+        elif get_origin(alternative) is dict:
+            kinds += declared_kinds(get_args(alternative)[1], path[1:])
     return kinds
 
 
@@ -60,19 +64,19 @@ def nearest_path(model: type[BaseModel], name: str) -> str:
     paths: dict[str, str] = {}
     level: list[tuple[str, Any]] = [("", model)]
     while level:
-        below: list[tuple[str, Any]] = []
-        for above, kind in level:
-            for one in alternatives(kind):
-                if not (isinstance(one, type) and issubclass(one, BaseModel)):
+        next_level: list[tuple[str, Any]] = []
+        for prefix, kind in level:
+            for alternative in alternatives(kind):
+                if not (isinstance(alternative, type) and issubclass(alternative, BaseModel)):
                     continue
-                for key, field in one.model_fields.items():
-                    called = field.alias or key
-                    if called not in paths:
-                        paths[called] = f"{above}{called}"
-                        below.append((f"{above}{called}.", field.annotation))
-        level = below
-    close = difflib.get_close_matches(name, paths, n=1, cutoff=0.6)
-    return f" (did you mean '{paths[close[0]]}'?)" if close else ""
+                for key, field in alternative.model_fields.items():
+                    field_name = field.alias or key
+                    if field_name not in paths:
+                        paths[field_name] = f"{prefix}{field_name}"
+                        next_level.append((f"{prefix}{field_name}.", field.annotation))
+        level = next_level
+    close_names = difflib.get_close_matches(name, paths, n=1, cutoff=0.6)
+    return f" (did you mean '{paths[close_names[0]]}'?)" if close_names else ""
 
 
 def alternatives(kind: Any) -> Iterator[Any]:
@@ -80,8 +84,8 @@ def alternatives(kind: Any) -> Iterator[Any]:
     if get_origin(kind) is Annotated:
         yield from alternatives(get_args(kind)[0])
     elif get_origin(kind) in (Union, UnionType):
-        for one in get_args(kind):
-            yield from alternatives(one)
+        for member in get_args(kind):
+            yield from alternatives(member)
     else:
         yield kind
 

@@ -46,22 +46,22 @@ class MainThreadCalls:
         """
         if current_thread() is main_thread():
             return work()
-        asked = _Call(work)
+        waiting_call = _Call(work)
         with self._lock:
             if not self._open:
                 raise Cancelled("the main thread makes no more calls")
-            self._waiting.put(asked)
-        result: T = asked.result.result()
+            self._waiting.put(waiting_call)
+        result: T = waiting_call.result.result()
         return result
 
     def make_next(self) -> bool:
         """Make the call that has waited longest; return whether one has waited. In the main thread only."""
         try:
-            asked = self._waiting.get_nowait()
+            waiting_call = self._waiting.get_nowait()
         except Empty:
             return False
-        if asked is not None:
-            asked.make()
+        if waiting_call is not None:
+            waiting_call.make()
         return True
 
     def result_of(self, future: Future[T]) -> T:
@@ -69,9 +69,9 @@ class MainThreadCalls:
         if current_thread() is main_thread():
             future.add_done_callback(lambda _: self._waiting.put(None))
             while not future.done():
-                asked = self._waiting.get()
-                if asked is not None:
-                    asked.make()
+                waiting_call = self._waiting.get()
+                if waiting_call is not None:
+                    waiting_call.make()
         return future.result()
 
     def open(self) -> None:
@@ -84,6 +84,6 @@ class MainThreadCalls:
         with self._lock:
             self._open = False
             while not self._waiting.empty():
-                asked = self._waiting.get_nowait()
-                if asked is not None:
-                    asked.result.set_exception(Cancelled("the main thread makes no more calls"))
+                waiting_call = self._waiting.get_nowait()
+                if waiting_call is not None:
+                    waiting_call.result.set_exception(Cancelled("the main thread makes no more calls"))

@@ -78,8 +78,8 @@ class Stepper(Generic[T]):
                 self._change.wait_for(lambda: self._state is not _State.ASIDE, timeout=min(seconds, _SHORT))
             self._give_turn()
             while self._asked is not None:
-                asked, self._asked = self._asked, None
-                asked()
+                function, self._asked = self._asked, None
+                function()
                 self._give_turn()
         if self._error is not None:
             raise self._error
@@ -113,6 +113,7 @@ class Stepper(Generic[T]):
     # In the work's own thread
 
     def _run(self) -> None:
+        """Do the work in its own thread, and keep what it returns or raises; an error while stopping is none."""
         _here.stepper = self
         try:
             self._result = self._work()

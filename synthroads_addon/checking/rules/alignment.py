@@ -24,34 +24,36 @@ SAME_GRADE = 1e-6
 
 
 def _element_length(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each element without a length above 0."""
     for i in np.flatnonzero(~(road.lengths > 0.0)):
         text = f"Element {i + 1} is {road.lengths[i]:g} m long; above 0 is needed."
         yield Finding(road.axis, road.starts[i], road.lengths[i], 0.0, text)
 
 
 def _radius(road: Road) -> Iterator[Finding]:
-    least = road.limits.radius
-    sharp = [(run.start, run.radius) for run in road.runs if not run.straight]
-    sharp += [(station, 1.0 / curvature) for station, curvature in _sharp_clothoid_ends(road)]
-    for station, radius in sorted(sharp):
-        text = f"The radius of {radius:.1f} m is below {least:.0f} m ({road.guideline})."
-        yield from at_least(road.axis, station, radius, least, text)
+    """Yield a finding for each arc, or sharp end of a clothoid, below the smallest radius of the design class."""
+    least_radius = road.limits.radius
+    curves = [(run.start, run.radius) for run in road.runs if not run.straight]
+    curves += [(station, 1.0 / curvature) for station, curvature in _sharp_clothoid_ends(road)]
+    for station, radius in sorted(curves):
+        text = f"The radius of {radius:.1f} m is below {least_radius:.0f} m ({road.guideline})."
+        yield from at_least(road.axis, station, radius, least_radius, text)
 
 
 def _sharp_clothoid_ends(road: Road) -> Iterator[tuple[float, float]]:
     """Yield (station m, |curvature| 1/m) of clothoids' sharper ends beside which no neighbour is as sharp."""
     k0, k1 = np.abs(road.k0), np.abs(road.k1)
-    last = len(k0) - 1
+    last_element = len(k0) - 1
     for i in np.flatnonzero(~road.constant).tolist():
         if k1[i] >= k0[i]:
-            stands = i < last and (road.constant[i + 1] or k1[i + 1] > k0[i + 1])
-            beside = k0[i + 1] * (1.0 + 1e-6) if stands else 0.0
-            at, curvature = road.starts[i + 1], k1[i]
+            has_sharper_neighbour = i < last_element and (road.constant[i + 1] or k1[i + 1] > k0[i + 1])
+            neighbour_curvature = k0[i + 1] * (1.0 + 1e-6) if has_sharper_neighbour else 0.0
+            station, curvature = road.starts[i + 1], k1[i]
         else:
-            beside = k1[i - 1] * (1.0 + 1e-6) if i > 0 else 0.0
-            at, curvature = road.starts[i], k0[i]
-        if curvature > beside:
-            yield float(at), float(curvature)
+            neighbour_curvature = k1[i - 1] * (1.0 + 1e-6) if i > 0 else 0.0
+            station, curvature = road.starts[i], k0[i]
+        if curvature > neighbour_curvature:
+            yield float(station), float(curvature)
 
 
 def _clothoids(road: Road) -> Iterator[tuple[int, float, float, float]]:
@@ -61,58 +63,67 @@ def _clothoids(road: Road) -> Iterator[tuple[int, float, float, float]]:
     too, must suit the smaller radius. The largest is 0 where the road's begin or end cuts the clothoid's sharper end:
     the radius that it leads to is then unknown (and smaller).
     """
-    last = len(road.lengths) - 1
+    last_element = len(road.lengths) - 1
     for i in np.flatnonzero(~road.constant).tolist():
         k0, k1 = road.k0[i], road.k1[i]
         parameter = float(np.sqrt(road.lengths[i] / np.abs(k1 - k0)))
-        ends = [k for k, cut in ((k0, i == 0), (k1, i == last)) if not cut]
-        sharper = max(abs(k0), abs(k1))
+        ends = [k for k, is_cut in ((k0, i == 0), (k1, i == last_element)) if not is_cut]
+        largest_curvature = max(abs(k0), abs(k1))
         if k0 * k1 >= 0.0:
-            ends = [k for k in ends if abs(k) == sharper]
-        known = [1.0 / abs(k) for k in ends if abs(k) > STRAIGHT]
-        yield i, parameter, float(1.0 / sharper), float(max(known, default=0.0))
+            ends = [k for k in ends if abs(k) == largest_curvature]
+        radii = [1.0 / abs(k) for k in ends if abs(k) > STRAIGHT]
+        yield i, parameter, float(1.0 / largest_curvature), float(max(radii, default=0.0))
 
 
 def _clothoid_minimum(road: Road) -> Iterator[Finding]:
-    least = road.limits.clothoid
+    """Yield a finding for each clothoid whose parameter A is below the class's smallest."""
+    least_parameter = road.limits.clothoid
     for i, parameter, _, _ in _clothoids(road):
-        text = f"The clothoid's A = {parameter:.1f} m is below {least:.0f} m ({road.guideline})."
-        yield from at_least(road.axis, road.starts[i], parameter, least, text)
+        text = f"The clothoid's A = {parameter:.1f} m is below {least_parameter:.0f} m ({road.guideline})."
+        yield from at_least(road.axis, road.starts[i], parameter, least_parameter, text)
 
 
 def _clothoid_short(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each clothoid whose A is below a third of the largest radius that it must suit."""
     for i, parameter, _, radius in _clothoids(road):
         text = f"The clothoid's A = {parameter:.1f} m is below R/3 = {radius / 3.0:.1f} m (RAA: R/3 <= A <= R)."
         yield from at_least(road.axis, road.starts[i], parameter, radius / 3.0, text)
 
 
 def _clothoid_long(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each clothoid whose A is above the smallest radius at its ends."""
     for i, parameter, radius, _ in _clothoids(road):
         text = f"The clothoid's A = {parameter:.1f} m is above R = {radius:.1f} m (RAA: R/3 <= A <= R)."
         yield from at_most(road.axis, road.starts[i], parameter, radius, text)
 
 
 def _clothoid_ratio(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each S-curve whose two clothoids' parameters differ by too much."""
     parameters = {i: parameter for i, parameter, _, _ in _clothoids(road)}
-    for i, before in parameters.items():
-        after = parameters.get(i + 1)
-        if after is None or max(abs(road.k1[i]), abs(road.k0[i + 1])) > STRAIGHT or road.k0[i] * road.k1[i + 1] >= 0.0:
+    for i, parameter_before in parameters.items():
+        parameter_after = parameters.get(i + 1)
+        if (
+            parameter_after is None
+            or max(abs(road.k1[i]), abs(road.k0[i + 1])) > STRAIGHT
+            or road.k0[i] * road.k1[i + 1] >= 0.0
+        ):
             continue
-        ratio = _ratio(before, after)
+        ratio = _ratio(parameter_before, parameter_after)
         text = (
-            f"The S-curve's clothoids, A = {before:.1f} m and {after:.1f} m, are as 1 : {ratio:.2f}; "
-            f"1 : {CLOTHOID_RATIO} is allowed (RAA)."
+            f"The S-curve's clothoids, A = {parameter_before:.1f} m and {parameter_after:.1f} m, "
+            f"are as 1 : {ratio:.2f}; 1 : {CLOTHOID_RATIO} is allowed (RAA)."
         )
         yield from at_most(road.axis, road.starts[i + 1], ratio, CLOTHOID_RATIO, text)
 
 
-def _ratio(one: float, other: float) -> float:
+def _ratio(length: float, other_length: float) -> float:
     """Return the larger of two lengths over the smaller; infinite or NaN where the smaller is 0."""
-    small, large = sorted((np.float64(one), np.float64(other)))
-    return float(large / small)
+    shorter, longer = sorted((np.float64(length), np.float64(other_length)))
+    return float(longer / shorter)
 
 
 def _curvature_jump(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each border of elements at which the curvature jumps."""
     for i in np.flatnonzero(~same_curvature(road.k1[:-1], road.k0[1:])):
         jump = abs(road.k0[i + 1] - road.k1[i])
         if jump < _LEAST_JUMP:
@@ -122,6 +133,7 @@ def _curvature_jump(road: Road) -> Iterator[Finding]:
 
 
 def _straight_longest(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each straight longer than the RAA allow."""
     for run in road.runs:
         if run.straight:
             text = f"The straight is {run.length:.0f} m long; {LONGEST_STRAIGHT:.0f} m are allowed (RAA)."
@@ -129,55 +141,64 @@ def _straight_longest(road: Road) -> Iterator[Finding]:
 
 
 def _straight_between(road: Road) -> Iterator[Finding]:
-    least = SHORTEST_STRAIGHT_SAME_DIRECTION
+    """Yield a finding for each short straight between two curves of the same direction."""
+    least_length = SHORTEST_STRAIGHT_SAME_DIRECTION
     for run in road.runs:
         if not run.straight or road.is_cut(run):
             continue
-        before = _direction(road.k1[run.first - 1], road.k0[run.first - 1])
-        after = _direction(road.k0[run.last + 1], road.k1[run.last + 1])
-        if before * after > 0.0:
+        direction_before = _direction(road.k1[run.first - 1], road.k0[run.first - 1])
+        direction_after = _direction(road.k0[run.last + 1], road.k1[run.last + 1])
+        if direction_before * direction_after > 0.0:
             text = (
                 f"The straight between two curves of the same direction is {run.length:.1f} m long; it must be absent "
-                f"or {least:.0f} m and more (RAA)."
+                f"or {least_length:.0f} m and more (RAA)."
             )
-            yield from at_least(road.axis, run.start, run.length, least, text)
+            yield from at_least(road.axis, run.start, run.length, least_length, text)
 
 
-def _direction(near: float, far: float) -> float:
+def _direction(near_curvature: float, far_curvature: float) -> float:
     """Return the sign (1 left, -1 right) of an element beside a straight: of its curvature there or at its far end."""
-    return float(np.sign(near if abs(near) > STRAIGHT else far))
+    return float(np.sign(near_curvature if abs(near_curvature) > STRAIGHT else far_curvature))
 
 
 def _arcs(road: Road) -> list[CurvatureRun]:
     """Return the arcs in order; where two clothoids meet at their sharper ends an arc of length 0 is added."""
     arcs = [run for run in road.runs if not run.straight]
     k0, k1 = road.k0, road.k1
-    for i, (a, b) in enumerate(pairwise(~road.constant)):
-        if a and b and abs(k0[i]) < abs(k1[i]) and abs(k1[i + 1]) < abs(k0[i + 1]) and k1[i] * k0[i + 1] > 0.0:
-            at = float(road.starts[i + 1])
-            arcs.append(CurvatureRun(at, at, float(k1[i]), i, i + 1))
+    for i, (is_clothoid, is_next_clothoid) in enumerate(pairwise(~road.constant)):
+        if (
+            is_clothoid
+            and is_next_clothoid
+            and abs(k0[i]) < abs(k1[i])
+            and abs(k1[i + 1]) < abs(k0[i + 1])
+            and k1[i] * k0[i + 1] > 0.0
+        ):
+            station = float(road.starts[i + 1])
+            arcs.append(CurvatureRun(station, station, float(k1[i]), i, i + 1))
     return sorted(arcs, key=lambda arc: (arc.start, arc.end))
 
 
 def _radius_ratio(road: Road) -> Iterator[Finding]:
+    """Yield a finding for neighbouring arcs, hardly apart, whose radii differ by too much; not in EKA 3."""
     if road.design_class == "EKA3":
         return
     straights = [run for run in road.runs if run.straight]
     starts = np.array([run.start for run in straights])
     lengths = np.concatenate(([0.0], np.cumsum([run.end - run.start for run in straights])))
-    for before, after in pairwise(_arcs(road)):
-        span = np.searchsorted(starts, [before.end, after.start])
-        straight = lengths[span[1]] - lengths[span[0]]
-        ratio = _ratio(before.radius, after.radius)
-        if straight < road.two_seconds and min(before.radius, after.radius) < RADIUS_RATIO_BELOW:
+    for arc_before, arc_after in pairwise(_arcs(road)):
+        span = np.searchsorted(starts, [arc_before.end, arc_after.start])
+        straight_length = lengths[span[1]] - lengths[span[0]]
+        ratio = _ratio(arc_before.radius, arc_after.radius)
+        if straight_length < road.two_seconds and min(arc_before.radius, arc_after.radius) < RADIUS_RATIO_BELOW:
             text = (
-                f"The neighbouring radii {before.radius:.0f} m and {after.radius:.0f} m are as 1 : {ratio:.2f}; "
-                f"1 : {RADIUS_RATIO} is allowed below {RADIUS_RATIO_BELOW:.0f} m (RAA)."
+                f"The neighbouring radii {arc_before.radius:.0f} m and {arc_after.radius:.0f} m "
+                f"are as 1 : {ratio:.2f}; 1 : {RADIUS_RATIO} is allowed below {RADIUS_RATIO_BELOW:.0f} m (RAA)."
             )
-            yield from at_most(road.axis, after.start, ratio, RADIUS_RATIO, text)
+            yield from at_most(road.axis, arc_after.start, ratio, RADIUS_RATIO, text)
 
 
 def _arc_length(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each arc that is passed in less than two seconds; cut ones aren't judged."""
     for arc in _arcs(road):
         if arc.length == 0.0 or not road.is_cut(arc):
             text = f"The arc is {arc.length:.1f} m long; two seconds of travel are {road.two_seconds:.1f} m (RAA)."
@@ -185,49 +206,58 @@ def _arc_length(road: Road) -> Iterator[Finding]:
 
 
 def _vertical_order(road: Road) -> Iterator[Finding]:
-    for number, at, past in out_of_order(point.station for point in road.parameters.alignment.vertical):
-        text = f"Point of vertical intersection {number} at {at:.3f} m does not follow the one at {past:.3f} m."
-        yield Finding(road.axis, at, at, past, text)
+    """Yield a finding for each point of vertical intersection that doesn't follow those before it."""
+    for number, station, largest_before in out_of_order(point.station for point in road.parameters.alignment.vertical):
+        text = (
+            f"Point of vertical intersection {number} at {station:.3f} m "
+            f"does not follow the one at {largest_before:.3f} m."
+        )
+        yield Finding(road.axis, station, station, largest_before, text)
 
 
 def _grade(road: Road) -> Iterator[Finding]:
-    profile, steepest = road.vertical, road.limits.grade_percent
-    begin = np.concatenate(([-np.inf], profile.station + profile.tangents))
-    end = np.concatenate((profile.station - profile.tangents, [np.inf]))
+    """Yield a finding for each grade, also within a cut rounding, that is steeper than the class allows."""
+    profile, steepest_grade = road.vertical, road.limits.grade_percent
+    grade_begins = np.concatenate(([-np.inf], profile.station + profile.tangents))
+    grade_ends = np.concatenate((profile.station - profile.tangents, [np.inf]))
     grades = [
-        (max(float(begin[i]), 0.0), float(grade))
+        (max(float(grade_begins[i]), 0.0), float(grade))
         for i, grade in enumerate(profile.grades)
-        if begin[i] < road.length and end[i] > 0.0 and begin[i] <= end[i]
+        if grade_begins[i] < road.length and grade_ends[i] > 0.0 and grade_begins[i] <= grade_ends[i]
     ]
     # A rounding that the road's begin or end cuts: the steepest grade is that of the cut.
-    for at in (0.0, road.length):
-        for i in np.flatnonzero(np.abs(profile.station - at) < profile.tangents).tolist():
-            share = (at - end[i]) / (2.0 * profile.tangents[i])
-            grades.append((at, float(profile.grades[i] + share * (profile.grades[i + 1] - profile.grades[i]))))
+    for road_end in (0.0, road.length):
+        for i in np.flatnonzero(np.abs(profile.station - road_end) < profile.tangents).tolist():
+            share = (road_end - grade_ends[i]) / (2.0 * profile.tangents[i])
+            grades.append((road_end, float(profile.grades[i] + share * (profile.grades[i + 1] - profile.grades[i]))))
     for station, grade in dict.fromkeys(grades):
-        text = f"The grade of {100.0 * grade:.2f} % is steeper than {steepest} % ({road.guideline})."
-        yield from at_most(road.axis, station, 100.0 * abs(grade), steepest, text)
+        text = f"The grade of {100.0 * grade:.2f} % is steeper than {steepest_grade} % ({road.guideline})."
+        yield from at_most(road.axis, station, 100.0 * abs(grade), steepest_grade, text)
 
 
 def _rounding(road: Road, kind: Literal["crest", "sag"]) -> Iterator[Finding]:
+    """Yield a finding for each crest or sag on the road whose radius is below the class's smallest."""
     profile = road.vertical
-    least = road.limits.crest if kind == "crest" else road.limits.sag
-    change = np.diff(profile.grades) * (-1.0 if kind == "crest" else 1.0)
+    least_radius = road.limits.crest if kind == "crest" else road.limits.sag
+    grade_change = np.diff(profile.grades) * (-1.0 if kind == "crest" else 1.0)
     on_road = (profile.station + profile.tangents > 0.0) & (profile.station - profile.tangents < road.length)
-    for i in np.flatnonzero((change > SAME_GRADE) & on_road):
+    for i in np.flatnonzero((grade_change > SAME_GRADE) & on_road):
         radius = profile.radius[i]
-        has = f"radius of {radius:.0f} m" if radius else "missing rounding"
-        text = f"The {kind}'s {has} is below {least:.0f} m ({road.guideline})."
-        yield from at_least(road.axis, profile.station[i], radius, least, text)
+        radius_text = f"radius of {radius:.0f} m" if radius else "missing rounding"
+        text = f"The {kind}'s {radius_text} is below {least_radius:.0f} m ({road.guideline})."
+        yield from at_least(road.axis, profile.station[i], radius, least_radius, text)
 
 
 def _rounding_overlap(road: Road) -> Iterator[Finding]:
+    """Yield a finding for neighbouring roundings whose tangents need more than the distance between them."""
     profile = road.vertical
-    room = np.diff(profile.station)
-    need = profile.tangents[:-1] + profile.tangents[1:]
-    for i in np.flatnonzero(need > room * (1.0 + 1e-6)):
-        text = f"The tangents of two roundings need {need[i]:.2f} m and have {room[i]:.2f} m between their points."
-        yield Finding(road.axis, profile.station[i + 1] - profile.tangents[i + 1], need[i], room[i], text)
+    available = np.diff(profile.station)
+    needed = profile.tangents[:-1] + profile.tangents[1:]
+    for i in np.flatnonzero(needed > available * (1.0 + 1e-6)):
+        text = (
+            f"The tangents of two roundings need {needed[i]:.2f} m and have {available[i]:.2f} m between their points."
+        )
+        yield Finding(road.axis, profile.station[i + 1] - profile.tangents[i + 1], needed[i], available[i], text)
 
 
 RULES = (

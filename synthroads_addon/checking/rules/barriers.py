@@ -37,21 +37,23 @@ def _gaps(road: Road, edges: Edges, protecting: Bool, start: float, end: float) 
 
 
 def _median_barrier(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each stretch of a carriageway without a barrier that faces it in the median."""
     if len(road.sides) < 2:
         return
     barriers = road.barriers
-    middle = 0.5 * barriers.start + 0.5 * barriers.end
-    between = np.ones(len(barriers.offset), dtype=bool)
+    middle_stations = 0.5 * barriers.start + 0.5 * barriers.end
+    is_in_median = np.ones(len(barriers.offset), dtype=bool)
     for edges in road.sides.values():
-        between &= edges.sign * barriers.offset <= edges.inner(middle)
+        is_in_median &= edges.sign * barriers.offset <= edges.inner(middle_stations)
     for name, edges in road.sides.items():
-        spans = barriers.spans(between & barriers.faces[:, 0 if edges.sign > 0 else 1])
+        spans = barriers.spans(is_in_median & barriers.faces[:, 0 if edges.sign > 0 else 1])
         for start, end in gaps(spans, 0.0, road.length, BARRIER_GAP):
             text = f"The median has no barrier towards this carriageway for {end - start:.1f} m (RPS)."
             yield Finding(name, start, end - start, 0.0, text)
 
 
 def _embankment_barrier(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each stretch beside a high, steep embankment without an outer barrier."""
     terrain = road.terrain
     if terrain is None or not above(terrain.embankment_height, EMBANKMENT_HEIGHT):
         return
@@ -67,6 +69,7 @@ def _embankment_barrier(road: Road) -> Iterator[Finding]:
 
 
 def _curve_barrier(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each stretch outside of a tight curve without an outer barrier."""
     below_radius = TIGHT_CURVE * LIMITS[road.design_class].radius
     curves = [run for run in road.runs if not run.straight and below(run.radius, below_radius)]
     for run, (name, edges) in product(curves, road.sides.items()):
@@ -98,31 +101,41 @@ def _missing_barrier(road: Road, edges: Edges, index: int, reach: tuple[float, f
         reach: m that the barriers begin before it and end behind it, in the direction of traffic.
     """
     body, facing = road.bodies.items[index], road.protecting[edges.name]
-    low, high = edges.distances(body.low, body.high)
-    outside = road.positions.outer[edges.name][index]
-    between = facing.outer & (facing.distance < low) if outside else facing.inner & (facing.distance > high)
-    before, behind = reach if edges.traffic > 0 else reach[::-1]
-    start, end = max(body.start - before, 0.0), min(body.end + behind, road.length)
-    missing = list(_gaps(road, edges, between, start, end))
-    return (math.fsum(end - start for start, end in missing), missing[0][0]) if missing else None
+    nearest_distance, farthest_distance = edges.distances(body.low, body.high)
+    is_outside = road.positions.outer[edges.name][index]
+    is_between = (
+        facing.outer & (facing.distance < nearest_distance)
+        if is_outside
+        else facing.inner & (facing.distance > farthest_distance)
+    )
+    lead, tail = reach if edges.traffic > 0 else reach[::-1]
+    start, end = max(body.start - lead, 0.0), min(body.end + tail, road.length)
+    missing_stretches = list(_gaps(road, edges, is_between, start, end))
+    return (
+        (math.fsum(end - start for start, end in missing_stretches), missing_stretches[0][0])
+        if missing_stretches
+        else None
+    )
 
 
 def _obstacle_barrier(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each obstacle near a carriageway before which barrier is missing."""
     limit = OBSTACLE_DISTANCE[road.design_class]
-    for i, what in _obstacles(road):
+    for i, obstacle in _obstacles(road):
         for side, edges in road.sides.items():
             distance = road.positions.clearance[side][i]
             if distance < 0.0 or not below(distance, limit):
                 continue
-            if lacking := _missing_barrier(road, edges, i, (OBSTACLE_LEAD, OBSTACLE_TAIL)):
+            if missing := _missing_barrier(road, edges, i, (OBSTACLE_LEAD, OBSTACLE_TAIL)):
                 text = (
-                    f"The {what} stands {distance:.2f} m from {side} and {lacking[0]:.1f} m of the barrier in front of "
-                    f"it are missing; nearer than {limit} m it is needed (RPS)."
+                    f"The {obstacle} stands {distance:.2f} m from {side} and {missing[0]:.1f} m "
+                    f"of the barrier in front of it are missing; nearer than {limit} m it is needed (RPS)."
                 )
-                yield Finding(road.bodies.names[i], lacking[1], lacking[0], 0.0, text)
+                yield Finding(road.bodies.names[i], missing[1], missing[0], 0.0, text)
 
 
 def _noise_barrier(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each noise barrier before which barrier is missing."""
     limit = OBSTACLE_DISTANCE[road.design_class]
     for i in road.bodies.of(NoiseBarrier, part="barrier"):
         for side, edges in road.sides.items():
@@ -130,34 +143,40 @@ def _noise_barrier(road: Road) -> Iterator[Finding]:
             if distance < 0.0 or not road.positions.outer[side][i]:
                 continue
             reach = (OBSTACLE_LEAD, OBSTACLE_TAIL) if below(distance, limit) else (0.0, 0.0)
-            if lacking := _missing_barrier(road, edges, i, reach):
+            if missing := _missing_barrier(road, edges, i, reach):
                 text = (
-                    f"The noise barrier stands {distance:.2f} m from {side} and {lacking[0]:.1f} m of the barrier in "
+                    f"The noise barrier stands {distance:.2f} m from {side} and {missing[0]:.1f} m of the barrier in "
                     "front of it are missing (RPS)."
                 )
-                yield Finding(road.bodies.names[i], lacking[1], lacking[0], 0.0, text)
+                yield Finding(road.bodies.names[i], missing[1], missing[0], 0.0, text)
 
 
 def _tree_distance(road: Road) -> Iterator[Finding]:
-    least = OBSTACLE_DISTANCE[road.design_class]
+    """Yield a finding for each stand of trees so near that a barrier must stand before it, where none does."""
+    least_distance = OBSTACLE_DISTANCE[road.design_class]
     for name, plants in road.of(Vegetation).items():
         if plants.kind != "tree" or plants.density == 0.0:
             continue
         for edges in road.sides.values():
             distance = edges.verge + plants.band_start
-            if plants.side not in ("both", edges.carriageway.side) or distance < 0.0 or not below(distance, least):
+            if (
+                plants.side not in ("both", edges.carriageway.side)
+                or distance < 0.0
+                or not below(distance, least_distance)
+            ):
                 continue
-            near = road.protecting[edges.name].outer & (road.barriers.clearance < distance)
+            is_before_trees = road.protecting[edges.name].outer & (road.barriers.clearance < distance)
             stretch = plants.start_station, min(plants.end_station, road.length)
-            for start, _ in islice(_gaps(road, edges, near, *stretch), 1):
+            for start, _ in islice(_gaps(road, edges, is_before_trees, *stretch), 1):
                 text = (
                     f"Trees stand {distance:.2f} m from the {edges.carriageway.side} paved edge with no barrier in "
-                    f"front; {least} m are needed (RPS)."
+                    f"front; {least_distance} m are needed (RPS)."
                 )
-                yield Finding(name, start, distance, least, text)
+                yield Finding(name, start, distance, least_distance, text)
 
 
 def _barrier_distance(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each barrier that stands too near to the paved edge."""
     barriers = road.barriers
     for i, name in enumerate(barriers.names):
         distance = barriers.clearance[i]
@@ -167,6 +186,7 @@ def _barrier_distance(road: Road) -> Iterator[Finding]:
 
 
 def _barrier_length(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each barrier, wholly on the road, that is too short."""
     barriers = road.barriers
     for i, name in enumerate(barriers.names):
         start, end = barriers.start[i], barriers.end[i]

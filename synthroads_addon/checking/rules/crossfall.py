@@ -18,54 +18,58 @@ NARROW_RUN_OFF = 4.0
 
 
 def _crossfall_order(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each crossfall point that doesn't follow the points before it."""
     for name, edges in road.sides.items():
         points = edges.carriageway.crossfall
-        for number, at, past in out_of_order(point.station for point in points):
-            if at < past or points[number - 1].crossfall_percent != points[number - 2].crossfall_percent:
-                text = f"Crossfall point {number} at {at:.3f} m does not follow the one at {past:.3f} m."
-                yield Finding(name, at, at, past, text)
+        for number, station, largest_before in out_of_order(point.station for point in points):
+            if station < largest_before or points[number - 1].crossfall_percent != points[number - 2].crossfall_percent:
+                text = f"Crossfall point {number} at {station:.3f} m does not follow the one at {largest_before:.3f} m."
+                yield Finding(name, station, station, largest_before, text)
 
 
 def _crossfall_least(road: Road) -> Iterator[Finding]:
-    least = LEAST_CROSSFALL_PERCENT
+    """Yield a finding for each stretch of less than the least crossfall outside of run-offs."""
+    least_percent = LEAST_CROSSFALL_PERCENT
     for name, fall in road.crossfalls.items():
         value = np.abs(fall.percent[:-1])
-        for first, last in stretches(~fall.runs_off & (value < least * (1.0 - TOLERANCE))):
-            worst = value[first : last + 1].min()
-            text = f"The crossfall is {worst:.2f} % outside of a run-off; {least} % are needed (RAA)."
-            yield Finding(name, fall.station[first], worst, least, text)
+        for first_piece, last_piece in stretches(~fall.runs_off & (value < least_percent * (1.0 - TOLERANCE))):
+            worst_percent = value[first_piece : last_piece + 1].min()
+            text = f"The crossfall is {worst_percent:.2f} % outside of a run-off; {least_percent} % are needed (RAA)."
+            yield Finding(name, fall.station[first_piece], worst_percent, least_percent, text)
 
 
 def _crossfall_largest(road: Road) -> Iterator[Finding]:
-    largest = LARGEST_CROSSFALL_PERCENT
+    """Yield a finding for each stretch of more than the largest crossfall."""
+    largest_percent = LARGEST_CROSSFALL_PERCENT
     for name, fall in road.crossfalls.items():
         value = np.abs(fall.percent)
-        for first, last in stretches(value > largest * (1.0 + TOLERANCE)):
-            worst = first + int(np.argmax(value[first : last + 1]))
-            text = f"The crossfall is {value[worst]:.2f} %; {largest} % are allowed (RAA)."
-            yield Finding(name, fall.station[worst], value[worst], largest, text)
+        for first_row, last_row in stretches(value > largest_percent * (1.0 + TOLERANCE)):
+            worst_row = first_row + int(np.argmax(value[first_row : last_row + 1]))
+            text = f"The crossfall is {value[worst_row]:.2f} %; {largest_percent} % are allowed (RAA)."
+            yield Finding(name, fall.station[worst_row], value[worst_row], largest_percent, text)
 
 
 def _crossfall_inside(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each curve that doesn't fall to its inside as its radius needs."""
     for name, fall in road.crossfalls.items():
         for run in road.runs:
             if run.straight or not below(run.radius, road.limits.radius_outwards):
                 continue
-            low = run.start + (RUN_OFF_BEYOND if run.first > 0 else 0.0)
-            high = run.end - (RUN_OFF_BEYOND if run.end < road.length else 0.0)
-            if high < low:
-                low = high = 0.5 * (run.start + run.end)
-            span = np.searchsorted(fall.station, [low, high])
-            at = np.concatenate(([low], fall.station[span[0] : span[1]], [high]))
-            inwards = -np.sign(run.curvature) * np.interp(at, fall.station, fall.percent)
-            worst = int(np.argmin(inwards))
-            needed = curve_crossfall_percent(road.design_class, run.curvature)
+            start = run.start + (RUN_OFF_BEYOND if run.first > 0 else 0.0)
+            end = run.end - (RUN_OFF_BEYOND if run.end < road.length else 0.0)
+            if end < start:
+                start = end = 0.5 * (run.start + run.end)
+            span = np.searchsorted(fall.station, [start, end])
+            stations = np.concatenate(([start], fall.station[span[0] : span[1]], [end]))
+            inward_percent = -np.sign(run.curvature) * np.interp(stations, fall.station, fall.percent)
+            worst_row = int(np.argmin(inward_percent))
+            needed_percent = curve_crossfall_percent(road.design_class, run.curvature)
             text = (
-                f"The crossfall towards the inside of the {run.radius:.0f} m curve is {inwards[worst]:.2f} %; "
-                f"{needed} % are needed ({road.guideline})."
+                f"The crossfall towards the inside of the {run.radius:.0f} m curve is "
+                f"{inward_percent[worst_row]:.2f} %; {needed_percent} % are needed ({road.guideline})."
             )
-            station = run.start if worst == 0 else at[worst]
-            yield from at_least(name, station, inwards[worst], needed, text)
+            station = run.start if worst_row == 0 else stations[worst_row]
+            yield from at_least(name, station, inward_percent[worst_row], needed_percent, text)
 
 
 def _edge_lever(edges: Edges) -> float:
@@ -78,52 +82,63 @@ def _edge_lever(edges: Edges) -> float:
 
 def _flat_pieces(fall: Crossfall) -> tuple[Bool, Bool]:
     """Return two masks (N - 1,): pieces wholly, and at least partly, of less than the least crossfall."""
-    low = np.minimum(fall.percent[:-1], fall.percent[1:])
-    high = np.maximum(fall.percent[:-1], fall.percent[1:])
-    least = LEAST_CROSSFALL_PERCENT
-    wholly = (low >= -least * (1.0 + TOLERANCE)) & (high <= least * (1.0 + TOLERANCE))
-    return wholly, (low < least * (1.0 - TOLERANCE)) & (high > -least * (1.0 - TOLERANCE))
+    least_percent = np.minimum(fall.percent[:-1], fall.percent[1:])
+    largest_percent = np.maximum(fall.percent[:-1], fall.percent[1:])
+    flat_limit = LEAST_CROSSFALL_PERCENT
+    is_wholly_flat = (least_percent >= -flat_limit * (1.0 + TOLERANCE)) & (
+        largest_percent <= flat_limit * (1.0 + TOLERANCE)
+    )
+    return is_wholly_flat, (least_percent < flat_limit * (1.0 - TOLERANCE)) & (
+        largest_percent > -flat_limit * (1.0 - TOLERANCE)
+    )
 
 
 def _run_off_steepest(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each run-off in which the pavement's edge is too steep against the rotation axis."""
     for name, fall in road.crossfalls.items():
         lever = _edge_lever(road.sides[name])
-        wide = lever >= NARROW_RUN_OFF
-        allowed = road.limits.run_off_percent if wide else NARROW_RUN_OFF_PER_METRE * lever
-        wholly, _ = _flat_pieces(fall)
-        limit = np.where(wholly, max(allowed, LEAST_RUN_OFF_PER_METRE * lever), allowed)
+        is_wide = lever >= NARROW_RUN_OFF
+        allowed_slope = road.limits.run_off_percent if is_wide else NARROW_RUN_OFF_PER_METRE * lever
+        is_wholly_flat, _ = _flat_pieces(fall)
+        limit = np.where(is_wholly_flat, max(allowed_slope, LEAST_RUN_OFF_PER_METRE * lever), allowed_slope)
         slope = np.abs(fall.slope) * lever
-        for first, last in stretches(fall.runs_off & (slope > limit * (1.0 + TOLERANCE))):
-            worst = first + int(np.argmax(slope[first : last + 1] / limit[first : last + 1]))
-            text = f"The edge runs off at {slope[worst]:.3f} %; {limit[worst]:.3f} % are allowed (RAA)."
-            yield Finding(name, fall.station[worst], slope[worst], limit[worst], text)
+        for first_piece, last_piece in stretches(fall.runs_off & (slope > limit * (1.0 + TOLERANCE))):
+            worst_piece = first_piece + int(
+                np.argmax(slope[first_piece : last_piece + 1] / limit[first_piece : last_piece + 1])
+            )
+            text = f"The edge runs off at {slope[worst_piece]:.3f} %; {limit[worst_piece]:.3f} % are allowed (RAA)."
+            yield Finding(name, fall.station[worst_piece], slope[worst_piece], limit[worst_piece], text)
 
 
 def _run_off_least(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each run-off whose edge is too level where the crossfall is too small to drain."""
     for name, fall in road.crossfalls.items():
         lever = _edge_lever(road.sides[name])
-        least = LEAST_RUN_OFF_PER_METRE * lever
-        _, partly = _flat_pieces(fall)
+        least_slope = LEAST_RUN_OFF_PER_METRE * lever
+        _, is_partly_flat = _flat_pieces(fall)
         slope = np.abs(fall.slope) * lever
-        for first, last in stretches(fall.runs_off & partly & (slope < least * (1.0 - TOLERANCE))):
-            worst = first + int(np.argmin(slope[first : last + 1]))
+        for first_piece, last_piece in stretches(
+            fall.runs_off & is_partly_flat & (slope < least_slope * (1.0 - TOLERANCE))
+        ):
+            worst_piece = first_piece + int(np.argmin(slope[first_piece : last_piece + 1]))
             text = (
-                f"The edge runs off at {slope[worst]:.3f} % where the crossfall is below {LEAST_CROSSFALL_PERCENT} %; "
-                f"{least:.3f} % are needed to drain it (RAA)."
+                f"The edge runs off at {slope[worst_piece]:.3f} % where the crossfall is below "
+                f"{LEAST_CROSSFALL_PERCENT} %; {least_slope:.3f} % are needed to drain it (RAA)."
             )
-            yield Finding(name, fall.station[worst], slope[worst], least, text)
+            yield Finding(name, fall.station[worst_piece], slope[worst_piece], least_slope, text)
 
 
 def _run_off_place(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each stretch over which the crossfall changes although the curvature doesn't."""
     for name, fall in road.crossfalls.items():
         cuts = np.union1d(fall.station, road.starts)
-        middle = 0.5 * (cuts[:-1] + cuts[1:])
-        piece = np.clip(np.searchsorted(fall.station, middle) - 1, 0, len(fall.runs_off) - 1)
-        element = np.clip(np.searchsorted(road.starts, middle) - 1, 0, len(road.lengths) - 1)
-        for first, last in stretches(fall.runs_off[piece] & road.constant[element]):
-            length = cuts[last + 1] - cuts[first]
+        interval_middles = 0.5 * (cuts[:-1] + cuts[1:])
+        piece = np.clip(np.searchsorted(fall.station, interval_middles) - 1, 0, len(fall.runs_off) - 1)
+        element = np.clip(np.searchsorted(road.starts, interval_middles) - 1, 0, len(road.lengths) - 1)
+        for first_interval, last_interval in stretches(fall.runs_off[piece] & road.constant[element]):
+            length = cuts[last_interval + 1] - cuts[first_interval]
             text = f"The crossfall changes over {length:.1f} m where the curvature doesn't (RAA)."
-            yield from at_most(name, cuts[first], length, RUN_OFF_BEYOND, text)
+            yield from at_most(name, cuts[first_interval], length, RUN_OFF_BEYOND, text)
 
 
 RULES = (

@@ -70,11 +70,11 @@ class EdgeDistances(NamedTuple):
         """Return the distance (N,) of the middle of the main road's pavement, m."""
         return 0.5 * (self.inner + self.main)
 
-    def clearance(self, low: Float, high: Float) -> Float:
+    def clearance(self, nearest: Float, farthest: Float) -> Float:
         """Return how far (N,), m, what lies between two distances is from the pavement; negative over it."""
-        main = np.maximum(self.inner - high, low - self.gap_low)
-        ramp = np.maximum(self.gap_high - high, low - self.outer)
-        return np.minimum(main, ramp)
+        main_clearance = np.maximum(self.inner - farthest, nearest - self.gap_low)
+        ramp_clearance = np.maximum(self.gap_high - farthest, nearest - self.outer)
+        return np.minimum(main_clearance, ramp_clearance)
 
 
 class TurnoutEdges:
@@ -97,28 +97,28 @@ class TurnoutEdges:
         self.taper = turnout.taper_out_length if turnout.kind == "entry" else turnout.taper_in_length
         self.tip = self.taper + turnout.lane_length
         self.natural_nose = 0.0
-        self._apart = np.inf
+        self._wedge_divisor = np.inf
         if ramp is None:
             self.nose = self.end = turnout.length
             self._added = np.array([0.0, self.taper, self.tip, self.end]), turnout.lane_width * np.array([0.0, 1, 1, 0])
             return
         self.end = self.tip + ramp.length
-        self._apart = 6.0 * ramp.clothoid_parameter**2
-        full = float(shoulder(np.array([self.station(self.tip)]))[0])
-        self.natural_nose = float(np.cbrt(self._apart * (full + NOSE_WIDTH)))
+        self._wedge_divisor = 6.0 * ramp.clothoid_parameter**2
+        shoulder_at_tip = float(shoulder(np.array([self.station(self.tip)]))[0])
+        self.natural_nose = float(np.cbrt(self._wedge_divisor * (shoulder_at_tip + NOSE_WIDTH)))
         self.nose = self.tip + min(self.natural_nose, ramp.length - NOSE_BEFORE_END)
-        lane = turnout.lane_width + turnout.edge_strip_width + turnout.shoulder_width
-        beyond = ramp.lane_width + 2.0 * ramp.edge_strip_width
+        lane_widening = turnout.lane_width + turnout.edge_strip_width + turnout.shoulder_width
+        ramp_width = ramp.lane_width + 2.0 * ramp.edge_strip_width
         marks = [0.0, self.taper, self.tip, self.nose, self.end]
-        self._added = np.array(marks), np.array([0.0, lane, lane, beyond, beyond])
+        self._added = np.array(marks), np.array([0.0, lane_widening, lane_widening, ramp_width, ramp_width])
 
     def station(self, w: float) -> float:
         """Return the station at a distance w along the turnout (both m), for an entry backwards from its end."""
         return self.turnout.start_station + w if self._forward else self.turnout.end_station - w
 
-    def span(self, first: float, last: float) -> tuple[float, float]:
+    def span(self, first_distance: float, last_distance: float) -> tuple[float, float]:
         """Return the stations of two distances w along the turnout, the lower one first, m."""
-        a, b = self.station(first), self.station(last)
+        a, b = self.station(first_distance), self.station(last_distance)
         return (a, b) if a <= b else (b, a)
 
     @property
@@ -133,28 +133,28 @@ class TurnoutEdges:
             parts = ((self.tip, self.nose), (self.nose, self.end))
             w += [a + (b - a) * i / (BETWEEN + 1) for a, b in parts for i in range(1, BETWEEN + 1)]
             w += list(self.nose + ROUNDING[1:])
-        return np.array([self.station(at) for at in w])
+        return np.array([self.station(distance) for distance in w])
 
     def widen(self, station: Float, edges: _WidthSums) -> None:
         """Add the turnout's widths at N stations to the carriageway's sums, in place."""
         start, end = self.turnout.start_station, self.turnout.end_station
         w = station - start if self._forward else end - station
-        inside = np.flatnonzero((w > 0.0) & (w <= self.end))
-        if not len(inside):
+        rows = np.flatnonzero((w > 0.0) & (w <= self.end))
+        if not len(rows):
             return
-        w, full = w[inside], edges.full[inside]
-        edges.added[inside] += np.interp(w, *self._added)
+        w, full_shoulder = w[rows], edges.full[rows]
+        edges.added[rows] += np.interp(w, *self._added)
         if self.turnout.ramp is None:
             return
-        left = np.maximum(1.0 - w / self.taper, 0.0) * full
+        remaining_shoulder = np.maximum(1.0 - w / self.taper, 0.0) * full_shoulder
         x = np.maximum(w - self.tip, 0.0)
-        wedge = x * x * x / self._apart
-        edges.left[inside] = np.minimum(edges.left[inside], left)
-        edges.wedge[inside] += wedge
-        between = np.where(w >= self.nose, np.maximum(wedge - full, 0.0), 0.0)
-        bare = between * np.interp(w - self.nose, ROUNDING, ROUNDED)
-        edges.bare[inside] += bare
-        edges.beside[inside] += (between - bare) / 2.0
+        wedge = x * x * x / self._wedge_divisor  # a clothoid leaves its tangent by x^3 / (6 A^2)
+        edges.left[rows] = np.minimum(edges.left[rows], remaining_shoulder)
+        edges.wedge[rows] += wedge
+        gap_width = np.where(w >= self.nose, np.maximum(wedge - full_shoulder, 0.0), 0.0)
+        bare_width = gap_width * np.interp(w - self.nose, ROUNDING, ROUNDED)
+        edges.bare[rows] += bare_width
+        edges.beside[rows] += (gap_width - bare_width) / 2.0
 
 
 class _WidthSums(NamedTuple):
@@ -202,9 +202,9 @@ class Edges:
         widths = (self._inner, self._shoulder, self._inner_strip, self._outer_strip, *self.lane_widths)
         self.turnouts = [TurnoutEdges(key, item, self.traffic, self._shoulder) for key, item in turnouts.items()]
         bends = [width.station for width in widths if not width.constant] + [t.marks() for t in self.turnouts]
-        inside = np.concatenate(bends) if bends else np.zeros(0)
-        inside = inside[(inside > 0.0) & (inside < length)]
-        self.marks = np.unique(np.concatenate(([0.0], inside, [length])))
+        inner_bends = np.concatenate(bends) if bends else np.zeros(0)
+        inner_bends = inner_bends[(inner_bends > 0.0) & (inner_bends < length)]
+        self.marks = np.unique(np.concatenate(([0.0], inner_bends, [length])))
         self._constant = self._main(np.zeros(1)) if all(width.constant for width in widths) else None
         self.at_marks = self.at(self.marks)
 
@@ -212,17 +212,17 @@ class Edges:
         """Return the edges' distances at N stations."""
         count = len(station)
         parts = self._main(station) if self._constant is None else [np.repeat(x, count, axis=0) for x in self._constant]
-        inner, lanes, base, full = parts
+        inner, lanes, strip_edge, shoulder = parts
         if not self.turnouts:
-            main = base + full
+            main = strip_edge + shoulder
             return EdgeDistances(inner, lanes, main, main, main, main)
-        sums = _WidthSums(full, full.copy(), *np.zeros((4, count)))
+        sums = _WidthSums(shoulder, shoulder.copy(), *np.zeros((4, count)))
         for turnout in self.turnouts:
             turnout.widen(station, sums)
-        high = base + sums.left + sums.wedge
-        outer, gap, ramp = high + sums.added, sums.bare > 0.0, high - sums.beside
-        gap_low, gap_high = np.where(gap, ramp - sums.bare, outer), np.where(gap, ramp, outer)
-        return EdgeDistances(inner, lanes, base + full, outer, gap_low, gap_high)
+        ramp_edge_base = strip_edge + sums.left + sums.wedge
+        outer, has_gap, ramp_edge = ramp_edge_base + sums.added, sums.bare > 0.0, ramp_edge_base - sums.beside
+        gap_low, gap_high = np.where(has_gap, ramp_edge - sums.bare, outer), np.where(has_gap, ramp_edge, outer)
+        return EdgeDistances(inner, lanes, strip_edge + shoulder, outer, gap_low, gap_high)
 
     def inner(self, station: Float) -> Float:
         """Return the distance (N,), m, of the inner paved edge from the centreline at N stations."""
@@ -230,12 +230,12 @@ class Edges:
 
     def between(self, start: float, end: float) -> Float:
         """Return the stations (K,), m: the begin, the marks between it and the end, and the end."""
-        inside = self.marks[(self.marks > start) & (self.marks < end)]
-        return np.concatenate(([start], inside, [end]))
+        marks_between = self.marks[(self.marks > start) & (self.marks < end)]
+        return np.concatenate(([start], marks_between, [end]))
 
-    def distances(self, low: Offset, high: Offset) -> tuple[Offset, Offset]:
+    def distances(self, lower_offset: Offset, higher_offset: Offset) -> tuple[Offset, Offset]:
         """Return the smaller and the larger distance from the centreline of what lies between two offsets, all m."""
-        return (low, high) if self.sign > 0 else (-high, -low)
+        return (lower_offset, higher_offset) if self.sign > 0 else (-higher_offset, -lower_offset)
 
     def _main(self, station: Float) -> list[Float]:
         """Return inner edge, lane boundaries, outer edge of the outer edge strip, and width of the hard shoulder, m."""

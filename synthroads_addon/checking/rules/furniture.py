@@ -41,26 +41,32 @@ def _spacing(road: Road, borders: Float) -> Float:
     element = np.clip(np.searchsorted(road.starts, borders, side="right") - 1, 0, len(road.lengths) - 1)
     share = (borders - road.starts[element]) / np.where(road.lengths[element] > 0.0, road.lengths[element], 1.0)
     share = np.clip(share, 0.0, 1.0)
-    at = np.abs(road.k0[element] * (1.0 - share) + road.k1[element] * share)
-    tightest = np.maximum(at[:-1], at[1:])
-    inside = (stations > borders[0]) & (stations < borders[-1])
-    np.maximum.at(tightest, np.searchsorted(borders, stations[inside], side="left") - 1, curvature[inside])
+    curvature_at_borders = np.abs(road.k0[element] * (1.0 - share) + road.k1[element] * share)
+    largest_curvature = np.maximum(curvature_at_borders[:-1], curvature_at_borders[1:])
+    is_inside = (stations > borders[0]) & (stations < borders[-1])
+    np.maximum.at(
+        largest_curvature, np.searchsorted(borders, stations[is_inside], side="left") - 1, curvature[is_inside]
+    )
     radii, spacings = np.array(DELINEATOR_SPACING).T
-    return np.interp(1.0 / np.maximum(tightest, 1e-9), radii, spacings)
+    return np.interp(1.0 / np.maximum(largest_curvature, 1e-9), radii, spacings)
 
 
 def _delineator_missing(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each carriageway whose first delineator stands too far from the road's begin."""
     for name, edges in road.sides.items():
         posts = _posts(road, edges)
-        first = float(posts[0]) if len(posts) else road.length
-        limit = float(_spacing(road, np.array([0.0, max(first, 0.0)]))[0]) / 2.0
-        if first > limit + SPACING_ROOM:
-            what = f"The first delineator stands at {first:.1f} m" if len(posts) else "There is no delineator"
-            text = f"{what} on the outer side; one is needed within {limit:.1f} m of the beginning (HLB)."
-            yield Finding(name, 0.0, first, limit, text)
+        first_station = float(posts[0]) if len(posts) else road.length
+        limit = float(_spacing(road, np.array([0.0, max(first_station, 0.0)]))[0]) / 2.0
+        if first_station > limit + SPACING_ROOM:
+            subject = (
+                f"The first delineator stands at {first_station:.1f} m" if len(posts) else "There is no delineator"
+            )
+            text = f"{subject} on the outer side; one is needed within {limit:.1f} m of the beginning (HLB)."
+            yield Finding(name, 0.0, first_station, limit, text)
 
 
 def _delineator_spacing(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each gap between delineators that is too long for the curvature in it."""
     for name, edges in road.sides.items():
         posts = _posts(road, edges)
         if not len(posts):
@@ -73,6 +79,7 @@ def _delineator_spacing(road: Road) -> Iterator[Finding]:
 
 
 def _delineator_distance(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each delineator that stands too near to the paved edge."""
     posts, clearance = road.of(Delineator), road.positions.nearest
     for i in np.flatnonzero((clearance >= 0.0) & (clearance < DELINEATOR_DISTANCE)).tolist():
         name, distance = road.bodies.names[i], float(clearance[i]) + sizes.REACH
@@ -91,18 +98,21 @@ def _by_side(road: Road, items: dict[str, KilometreBoard] | dict[str, Cabinet]) 
 
 
 def _apart(road: Road, items: dict[str, KilometreBoard] | dict[str, Cabinet], limit: float) -> Iterator[Finding]:
+    """Yield a finding for each object whose next one on the same side is farther away than the limit (m)."""
     for places in _by_side(road, items):
-        for (name, here), (_, there) in pairwise(places):
-            if there - here > limit + SPACING_ROOM:
-                text = f"The next one on this side stands {there - here:.1f} m on; {limit:.0f} m are allowed."
-                yield Finding(name, here, there - here, limit, text)
+        for (name, station), (_, next_station) in pairwise(places):
+            if next_station - station > limit + SPACING_ROOM:
+                text = f"The next one on this side stands {next_station - station:.1f} m on; {limit:.0f} m are allowed."
+                yield Finding(name, station, next_station - station, limit, text)
 
 
 def _kilometre_spacing(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each gap between kilometre boards that is too long."""
     yield from _apart(road, road.of(KilometreBoard), KILOMETRE_BOARD_SPACING)
 
 
 def _phone_spacing(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each gap between emergency phones that is too long."""
     phones = {name: item for name, item in road.of(Cabinet).items() if item.kind == "emergency_phone"}
     yield from _apart(road, phones, EMERGENCY_PHONE_SPACING)
 
@@ -114,30 +124,38 @@ def _kilometre_text(road: Road) -> Iterator[Finding]:
         return
     names, station = list(boards), np.array([board.station for board in boards.values()])
     kilometre = np.array([_metres(board.text) for board in boards.values()])
-    known = np.isfinite(kilometre)
-    begins = [kilometre - station, kilometre + station] if known.any() else [kilometre]
-    off = min((_kilometre_errors(begin, known) for begin in begins), key=lambda far: int(np.sum(far > KILOMETRE_ROOM)))
-    for i in np.flatnonzero(~(off <= KILOMETRE_ROOM)).tolist():
+    is_known = np.isfinite(kilometre)
+    begins = [kilometre - station, kilometre + station] if is_known.any() else [kilometre]
+    errors = min(
+        (_kilometre_errors(beginning, is_known) for beginning in begins),
+        key=lambda distances: int(np.sum(distances > KILOMETRE_ROOM)),
+    )
+    for i in np.flatnonzero(~(errors <= KILOMETRE_ROOM)).tolist():
         board = boards[names[i]]
-        value = float(np.nan_to_num(off[i], nan=road.length))
+        value = float(np.nan_to_num(errors[i], nan=road.length))
         text = f"The board's '{board.text}' is {value:.0f} m from the kilometre that the other boards give its place."
         yield Finding(names[i], board.station, value, KILOMETRE_ROOM, text)
 
 
-def _kilometre_errors(begin: Float, known: Bool) -> Float:
+def _kilometre_errors(beginnings: Float, is_known: Bool) -> Float:
     """Return the distances (N,), m, of the road's beginnings that boards tell from the middle one of those known."""
-    middle = np.sort(begin[known])[np.sum(known) // 2] if known.any() else np.nan
-    return np.abs(begin - middle)
+    median_begin = np.sort(beginnings[is_known])[np.sum(is_known) // 2] if is_known.any() else np.nan
+    return np.abs(beginnings - median_begin)
 
 
 def _metres(text: str) -> float:
     """Return the kilometre that a board tells in m, or NaN where its text is no number."""
-    whole, _, part = text.strip().replace(",", ".").partition(".")
-    digits = whole + part
-    return float(f"{whole}.{part}0") * 1000.0 if whole.isascii() and digits.isascii() and digits.isdigit() else np.nan
+    whole_part, _, fraction_part = text.strip().replace(",", ".").partition(".")
+    digits = whole_part + fraction_part
+    return (
+        float(f"{whole_part}.{fraction_part}0") * 1000.0
+        if whole_part.isascii() and digits.isascii() and digits.isdigit()
+        else np.nan
+    )
 
 
 def _object_range(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each object that ends before it begins, or beyond the road's end."""
     for name, start, end in _ranges(road):
         if end < start:
             yield Finding(name, end, end, start, f"The object ends at {end:.3f} m before it begins at {start:.3f} m.")
@@ -160,14 +178,15 @@ def _ranges(road: Road) -> Iterator[tuple[str, float, float]]:
 
 
 def _object_on_pavement(road: Road) -> Iterator[Finding]:
-    allowed = road.of(ConstructionBeacon)
+    """Yield a finding for each object, or stand of plants, that reaches over the pavement."""
+    allowed_objects = road.of(ConstructionBeacon)
     clearance, where = road.positions.nearest, road.positions.where
-    worst: dict[str, tuple[float, float]] = {}
+    worst_places: dict[str, tuple[float, float]] = {}
     for i in np.flatnonzero(clearance < -TOLERANCE).tolist():
         name = road.bodies.names[i]
-        if road.bodies.items[i].part in ("foot", "barrier", "wall") and name not in allowed:
-            worst[name] = min(worst.get(name, (0.0, 0.0)), (float(clearance[i]), float(where[i])))
-    places = [(name, station, distance) for name, (distance, station) in worst.items()]
+        if road.bodies.items[i].part in ("foot", "barrier", "wall") and name not in allowed_objects:
+            worst_places[name] = min(worst_places.get(name, (0.0, 0.0)), (float(clearance[i]), float(where[i])))
+    places = [(name, station, distance) for name, (distance, station) in worst_places.items()]
     for name, plants in road.of(Vegetation).items():
         verge = min(edges.verge for edges in road.sides.values())
         if plants.density > 0.0 and verge + plants.band_start < -TOLERANCE:
@@ -177,30 +196,35 @@ def _object_on_pavement(road: Road) -> Iterator[Finding]:
 
 
 def _object_overlap(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each pair of objects whose boxes reach into each other."""
     bodies = road.bodies
-    first, second = _near_pairs(bodies)
-    depth = np.full(len(first), np.inf)
-    for low, high in ((bodies.start, bodies.end), (bodies.low, bodies.high), (bodies.bottom, bodies.top)):
-        depth = np.minimum(depth, np.minimum(high[first], high[second]) - np.maximum(low[first], low[second]))
-    reported = set()
+    first_body, second_body = _near_pairs(bodies)
+    depth = np.full(len(first_body), np.inf)
+    for lower, upper in ((bodies.start, bodies.end), (bodies.low, bodies.high), (bodies.bottom, bodies.top)):
+        depth = np.minimum(
+            depth, np.minimum(upper[first_body], upper[second_body]) - np.maximum(lower[first_body], lower[second_body])
+        )
+    reported_pairs = set()
     for i in np.flatnonzero(depth > OVERLAP_ROOM).tolist():
-        pair = (bodies.names[first[i]], bodies.names[second[i]])
-        if pair[0] == pair[1] or pair in reported:
+        pair = (bodies.names[first_body[i]], bodies.names[second_body[i]])
+        if pair[0] == pair[1] or pair in reported_pairs:
             continue
-        reported.add(pair)
+        reported_pairs.add(pair)
         text = f"The object and {pair[0]} reach {depth[i]:.2f} m into each other."
-        yield Finding(pair[1], float(max(bodies.start[first[i]], bodies.start[second[i]])), float(depth[i]), 0.0, text)
+        yield Finding(
+            pair[1], float(max(bodies.start[first_body[i]], bodies.start[second_body[i]])), float(depth[i]), 0.0, text
+        )
 
 
 def _near_pairs(bodies: Bodies) -> tuple[np.ndarray, np.ndarray]:
     """Return the indices (P,), (P,) of all pairs of bodies whose stations overlap, of each pair the lower one first."""
     order = np.argsort(bodies.start, kind="stable")
-    until = np.searchsorted(bodies.start[order], bodies.end[order], side="left")
-    count = np.maximum(until - np.arange(len(order)) - 1, 0)
-    one = np.repeat(np.arange(len(order)), count)
-    other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(count) - count, count)
-    one, other = order[one], order[other]
-    return np.minimum(one, other), np.maximum(one, other)
+    end_position = np.searchsorted(bodies.start[order], bodies.end[order], side="left")
+    count = np.maximum(end_position - np.arange(len(order)) - 1, 0)
+    first_position = np.repeat(np.arange(len(order)), count)
+    second_position = first_position + 1 + np.arange(len(first_position)) - np.repeat(np.cumsum(count) - count, count)
+    first_position, second_position = order[first_position], order[second_position]
+    return np.minimum(first_position, second_position), np.maximum(first_position, second_position)
 
 
 RULES = (

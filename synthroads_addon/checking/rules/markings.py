@@ -33,10 +33,12 @@ _Spans = list[tuple[float, float]]
 
 
 def _readable(kind: str) -> str:
+    """Return a kind of line as words for people, such as ``outer edge``."""
     return kind.replace("_", " ")
 
 
 def _lines_on(road: Road, edges: Edges) -> _Lines:
+    """Return the line markings of a carriageway with their ids."""
     return [(name, line) for name, line in road.of(LineMarking).items() if line.carriageway == edges.name]
 
 
@@ -47,30 +49,31 @@ def _select_lines(lines: _Lines, kinds: Iterable[str], boundary: int) -> _Lines:
 
 def _lanes_beside(road: Road, edges: Edges, boundary: int) -> tuple[Bool, Bool]:
     """Return masks (M - 1,) of the pieces between marks: both lanes beside a boundary full; one of them gone."""
-    least = narrowest_lane(road)
-    full, gone = [], []
+    least_width = narrowest_lane(road)
+    are_full, are_gone = [], []
     for lane in (boundary - 1, boundary):
         width = edges.lane_widths[lane](edges.marks)
-        wide = width >= min(least, nominal_width(edges.carriageway.lanes[lane].width)) * (1.0 - TOLERANCE)
-        full.append(wide[:-1] & wide[1:])
-        gone.append((width[:-1] < NO_LANE) & (width[1:] < NO_LANE))
-    return full[0] & full[1], gone[0] | gone[1]
+        is_wide = width >= min(least_width, nominal_width(edges.carriageway.lanes[lane].width)) * (1.0 - TOLERANCE)
+        are_full.append(is_wide[:-1] & is_wide[1:])
+        are_gone.append((width[:-1] < NO_LANE) & (width[1:] < NO_LANE))
+    return are_full[0] & are_full[1], are_gone[0] | are_gone[1]
 
 
-def _spans(marks: Float, where: Bool) -> _Spans:
-    return [(marks[first], marks[last + 1]) for first, last in stretches(where)]
+def _spans(marks: Float, mask: Bool) -> _Spans:
+    """Return the stretches (start, end), m, of the pieces between marks (M,) that a mask (M - 1,) chooses."""
+    return [(marks[first_piece], marks[last_piece + 1]) for first_piece, last_piece in stretches(mask)]
 
 
 def _required_lines(road: Road, edges: Edges) -> Iterator[tuple[str, int, _Spans, _Lines]]:
     """Yield (kind, boundary, stretches where it must run, its lines) for every line along a carriageway's lanes."""
-    lines, whole, last = _lines_on(road, edges), [(0.0, road.length)], len(edges.lane_widths)
-    yield "outer_edge", 0, whole, _select_lines(lines, ("outer_edge", "block"), 0)
-    for boundary in range(1, last):
-        spans = whole
+    lines, whole_road, last_boundary = _lines_on(road, edges), [(0.0, road.length)], len(edges.lane_widths)
+    yield "outer_edge", 0, whole_road, _select_lines(lines, ("outer_edge", "block"), 0)
+    for boundary in range(1, last_boundary):
+        spans = whole_road
         if not (edges.lane_widths[boundary - 1].constant and edges.lane_widths[boundary].constant):
             spans = _spans(edges.marks, _lanes_beside(road, edges, boundary)[0])
         yield "lane", boundary, spans, _select_lines(lines, ("lane",), boundary)
-    yield "inner_edge", last, whole, _select_lines(lines, ("inner_edge",), last)
+    yield "inner_edge", last_boundary, whole_road, _select_lines(lines, ("inner_edge",), last_boundary)
 
 
 def _required_at(road: Road, turnout: TurnoutEdges) -> Iterator[tuple[str, tuple[float, float], _Lines]]:
@@ -82,27 +85,29 @@ def _required_at(road: Road, turnout: TurnoutEdges) -> Iterator[tuple[str, tuple
 
 
 def _marking_missing(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each lane boundary, exit or entry without one of its lines or its hatching."""
     for name, edges in road.sides.items():
         for kind, boundary, spans, lines in _required_lines(road, edges):
             if spans and not lines:
                 text = f"There is no {_readable(kind)} line on lane boundary {boundary} (RMS)."
                 yield Finding(name, spans[0][0], 0.0, 1.0, text)
-    hatched = {hatching.turnout for hatching in road.of(Hatching).values()}
+    hatched_turnouts = {hatching.turnout for hatching in road.of(Hatching).values()}
     for edges, turnout in road.turnouts:
         if turnout.turnout.ramp is None:
             continue
-        missing = [kind for kind, _, lines in _required_at(road, turnout) if not lines]
-        low, high = turnout.span(turnout.taper, turnout.tip)
+        missing_kinds = [kind for kind, _, lines in _required_at(road, turnout) if not lines]
+        start, end = turnout.span(turnout.taper, turnout.tip)
         blocks = _select_lines(_lines_on(road, edges), ("block",), 0)
-        if not any(line.start_station < high and line.end_station > low for _, line in blocks):
-            missing.append("block")
-        missing += [] if turnout.name in hatched else ["hatching"]
-        for kind in missing:
+        if not any(line.start_station < end and line.end_station > start for _, line in blocks):
+            missing_kinds.append("block")
+        missing_kinds += [] if turnout.name in hatched_turnouts else ["hatching"]
+        for kind in missing_kinds:
             text = f"The {turnout.turnout.kind} has no {_readable(kind)} (RMS)."
             yield Finding(turnout.name, turnout.turnout.start_station, 0.0, 1.0, text)
 
 
 def _marking_coverage(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each stretch along which a line that is there doesn't run as it must."""
     for edges in road.sides.values():
         for _, boundary, spans, lines in _required_lines(road, edges):
             yield from _find_uncovered(road, f"Lane boundary {boundary}", spans, lines)
@@ -111,22 +116,24 @@ def _marking_coverage(road: Road) -> Iterator[Finding]:
             yield from _find_uncovered(road, f"The {_readable(kind)} of {turnout.name}", [span], lines)
 
 
-def _find_uncovered(road: Road, what: str, spans: _Spans, lines: _Lines) -> Iterator[Finding]:
-    covered = [(line.start_station, line.end_station) for _, line in lines]
-    for low, high in spans if lines else ():
-        for start, end in gaps(covered, max(low, 0.0), min(high, road.length)):
-            yield Finding(lines[0][0], start, end - start, 0.0, f"{what} has no line for {end - start:.2f} m (RMS).")
+def _find_uncovered(road: Road, subject: str, spans: _Spans, lines: _Lines) -> Iterator[Finding]:
+    """Yield a finding for each part of the spans that none of the lines covers; none without any line."""
+    covered_stretches = [(line.start_station, line.end_station) for _, line in lines]
+    for span_start, span_end in spans if lines else ():
+        for start, end in gaps(covered_stretches, max(span_start, 0.0), min(span_end, road.length)):
+            yield Finding(lines[0][0], start, end - start, 0.0, f"{subject} has no line for {end - start:.2f} m (RMS).")
 
 
 def _marking_between(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each stretch of a lane line beside a lane that is gone there."""
     for edges in road.sides.values():
         for boundary in range(1, len(edges.lane_widths)):
             if edges.lane_widths[boundary - 1].constant and edges.lane_widths[boundary].constant:
                 continue
-            gone = _spans(edges.marks, _lanes_beside(road, edges, boundary)[1])
+            gone_stretches = _spans(edges.marks, _lanes_beside(road, edges, boundary)[1])
             for name, line in _select_lines(_lines_on(road, edges), ("lane",), boundary):
-                for low, high in gone:
-                    start, end = max(low, line.start_station), min(high, line.end_station)
+                for gone_start, gone_end in gone_stretches:
+                    start, end = max(gone_start, line.start_station), min(gone_end, line.end_station)
                     text = f"The lane line runs {end - start:.2f} m where the lane beside it is gone (RMS)."
                     yield from at_most(name, start, end - start, 0.0, text)
 
@@ -139,6 +146,7 @@ def _regulated_lines(road: Road) -> Iterator[tuple[str, LineMarking]]:
 
 
 def _marking_width(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each line whose width isn't one that its kind may have."""
     for name, line in _regulated_lines(road):
         limit = min(LINE_WIDTHS[line.kind], key=lambda width: abs(width - line.width))
         if below(line.width, limit) or above(line.width, limit):
@@ -147,6 +155,7 @@ def _marking_width(road: Road) -> Iterator[Finding]:
 
 
 def _marking_pattern(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each line whose dash or gap isn't that of its kind."""
     for name, line in _regulated_lines(road):
         pattern = PATTERNS.get(line.kind, (0.0, 0.0))
         for part, value, limit in zip(("dash", "gap"), (line.dash_length, line.gap_length), pattern, strict=True):
@@ -157,15 +166,16 @@ def _marking_pattern(road: Road) -> Iterator[Finding]:
 
 
 def _marking_pavement(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each free line or arrow that lies beside its carriageway's pavement."""
     items: list[tuple[str, LineMarking | Arrow]] = [*road.of(LineMarking).items(), *road.of(Arrow).items()]
     for (side, edges), (name, item) in product(road.sides.items(), items):
         if item.carriageway == side and (isinstance(item, Arrow) or item.kind == "free"):
             station, distance = _course(edges, item)
-            beyond = edges.at(station).clearance(distance, distance)
-            worst = np.argmax(beyond)
-            if beyond[worst] > TOLERANCE:
-                text = f"The marking lies {beyond[worst]:.2f} m beside the carriageway's pavement."
-                yield Finding(name, station[worst], beyond[worst], 0.0, text)
+            overshoot = edges.at(station).clearance(distance, distance)
+            worst_row = np.argmax(overshoot)
+            if overshoot[worst_row] > TOLERANCE:
+                text = f"The marking lies {overshoot[worst_row]:.2f} m beside the carriageway's pavement."
+                yield Finding(name, station[worst_row], overshoot[worst_row], 0.0, text)
 
 
 def _course(edges: Edges, item: LineMarking | Arrow) -> tuple[Float, Float]:
@@ -173,17 +183,18 @@ def _course(edges: Edges, item: LineMarking | Arrow) -> tuple[Float, Float]:
     if isinstance(item, Arrow):
         return np.array([item.station]), np.array([edges.sign * item.offset])
     bends = np.concatenate((edges.marks, width_kinks(item.offset)))
-    inside = bends[(bends > item.start_station) & (bends < item.end_station)]
-    station = np.concatenate(([item.start_station], inside, [item.end_station]))
+    inner_bends = bends[(bends > item.start_station) & (bends < item.end_station)]
+    station = np.concatenate(([item.start_station], inner_bends, [item.end_station]))
     return station, width_at(item.offset, station)
 
 
 def _arrow_direction(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each arrow that points away from its lane's traffic."""
     for name, arrow in road.of(Arrow).items():
-        ahead = 0.0 if road.sides[arrow.carriageway].traffic > 0 else 180.0
-        turned = abs((arrow.rotation_deg - ahead + 180.0) % 360.0 - 180.0)
-        text = f"The arrow is turned {turned:.0f} degrees away from its traffic; {TURNED:.0f} are allowed."
-        yield from at_most(name, arrow.station, turned, TURNED, text)
+        traffic_rotation = 0.0 if road.sides[arrow.carriageway].traffic > 0 else 180.0
+        angle = abs((arrow.rotation_deg - traffic_rotation + 180.0) % 360.0 - 180.0)
+        text = f"The arrow is turned {angle:.0f} degrees away from its traffic; {TURNED:.0f} are allowed."
+        yield from at_most(name, arrow.station, angle, TURNED, text)
 
 
 RULES = (

@@ -37,10 +37,10 @@ class Bodies:
         self._of: dict[type, list[int]] = {}
         for name, item in parameters.objects.items():
             if isinstance(item, Thing):
-                first = len(self.items)
+                first_box = len(self.items)
                 self.items += item.footprint()
-                self.names += [name] * (len(self.items) - first)
-                self._of.setdefault(type(item), []).extend(range(first, len(self.items)))
+                self.names += [name] * (len(self.items) - first_box)
+                self._of.setdefault(type(item), []).extend(range(first_box, len(self.items)))
         numbers = np.array([block[1:] for block in self.items], dtype=np.float64).reshape(-1, 6)
         self.start, self.end, self.low, self.high, self.bottom, self.top = numbers.T
 
@@ -68,38 +68,42 @@ class BodyPositions:
     """
 
     def __init__(self, bodies: Bodies, sides: dict[str, Edges], marks: Float) -> None:
-        count, middle = len(bodies.items), bodies.station
-        first = np.searchsorted(marks, bodies.start, side="right")
-        inside = np.maximum(np.searchsorted(marks, bodies.end, side="left") - first, 0)
-        long = np.flatnonzero(bodies.end - bodies.start > LONG)
-        between = [marks[first[i] : first[i] + inside[i]] for i in long.tolist()]
-        station = np.concatenate((middle, bodies.start[long], bodies.end[long], *between))
-        index = np.concatenate((np.arange(count), long, long, np.repeat(long, inside[long])))
-        low, high = bodies.low[index], bodies.high[index]
+        count, middle_stations = len(bodies.items), bodies.station
+        first_mark = np.searchsorted(marks, bodies.start, side="right")
+        mark_counts = np.maximum(np.searchsorted(marks, bodies.end, side="left") - first_mark, 0)
+        long_bodies = np.flatnonzero(bodies.end - bodies.start > LONG)
+        marks_between = [marks[first_mark[i] : first_mark[i] + mark_counts[i]] for i in long_bodies.tolist()]
+        station = np.concatenate((middle_stations, bodies.start[long_bodies], bodies.end[long_bodies], *marks_between))
+        index = np.concatenate(
+            (np.arange(count), long_bodies, long_bodies, np.repeat(long_bodies, mark_counts[long_bodies]))
+        )
+        lower_offset, higher_offset = bodies.low[index], bodies.high[index]
         self.clearance: dict[str, Float] = {}
         self.outer: dict[str, Bool] = {}
         self.bare: dict[str, Bool] = {}
-        distance = np.full(len(station), np.inf)
+        nearest_distance = np.full(len(station), np.inf)
         for name, edges in sides.items():
-            across, span = edges.at(station), edges.distances(low, high)
-            clearance = across.clearance(*span)
+            edge_distances, span = edges.at(station), edges.distances(lower_offset, higher_offset)
+            clearance = edge_distances.clearance(*span)
             self.clearance[name] = _least(clearance, index, count)
-            at = 0.5 * (span[0] + span[1])[:count]
-            self.outer[name] = at > across.middle[:count]
-            self.bare[name] = (at > across.gap_low[:count]) & (at < across.gap_high[:count])
-            distance = np.minimum(distance, clearance)
-        self.nearest = _least(distance, index, count)
+            middle_distance = 0.5 * (span[0] + span[1])[:count]
+            self.outer[name] = middle_distance > edge_distances.middle[:count]
+            self.bare[name] = (middle_distance > edge_distances.gap_low[:count]) & (
+                middle_distance < edge_distances.gap_high[:count]
+            )
+            nearest_distance = np.minimum(nearest_distance, clearance)
+        self.nearest = _least(nearest_distance, index, count)
         order = np.argsort(-station, kind="stable")
-        order = order[distance[order] <= self.nearest[index[order]]]
+        order = order[nearest_distance[order] <= self.nearest[index[order]]]
         self.where = np.zeros(count)
         self.where[index[order]] = station[order]
 
 
 def _least(values: Float, index: NDArray[np.intp], count: int) -> Float:
     """Return the smallest of the values of each index, (count,); infinite where it has none."""
-    least = np.full(count, np.inf)
-    np.minimum.at(least, index, values)
-    return least
+    least_values = np.full(count, np.inf)
+    np.minimum.at(least_values, index, values)
+    return least_values
 
 
 class Barriers:
@@ -124,9 +128,9 @@ class Barriers:
         self.clearance, self.where = positions.nearest[index], positions.where[index]
         self.outer = {name: outer[index] for name, outer in positions.outer.items()}
 
-    def spans(self, which: Bool) -> Spans:
+    def spans(self, mask: Bool) -> Spans:
         """Return the (start, end) stations, m, of the barriers of a mask (B,)."""
-        return list(zip(self.start[which].tolist(), self.end[which].tolist(), strict=True))
+        return list(zip(self.start[mask].tolist(), self.end[mask].tolist(), strict=True))
 
 
 class ProtectingBarriers:
@@ -139,11 +143,14 @@ class ProtectingBarriers:
 
     def __init__(self, barriers: Barriers, name: str, edges: Edges) -> None:
         self.distance = edges.sign * barriers.offset
-        outside = barriers.outer[name]
+        is_outside = barriers.outer[name]
         to_left, to_right = barriers.faces.T
-        outwards, inwards = (to_left, to_right) if edges.sign > 0 else (to_right, to_left)
-        off = barriers.clearance >= 0.0
-        self.outer, self.inner = off & outside & inwards, off & ~outside & outwards
+        faces_outwards, faces_inwards = (to_left, to_right) if edges.sign > 0 else (to_right, to_left)
+        is_off_pavement = barriers.clearance >= 0.0
+        self.outer, self.inner = (
+            is_off_pavement & is_outside & faces_inwards,
+            is_off_pavement & ~is_outside & faces_outwards,
+        )
 
 
 class Signs:
@@ -166,15 +173,17 @@ class Signs:
         self.station, rotation = np.array(numbers, dtype=np.float64).reshape(-1, 2).T
         self.turned = np.abs((rotation + 180.0) % 360.0 - 180.0)
         outer = {name: values[index] for name, values in positions.outer.items()}
-        anyone = np.any(list(outer.values()), axis=0)
-        self.of: dict[str, Bool] = {name: values | ~anyone for name, values in outer.items()}
+        is_outside_any = np.any(list(outer.values()), axis=0)
+        self.of: dict[str, Bool] = {name: values | ~is_outside_any for name, values in outer.items()}
         self.bare = {name: values[index] for name, values in positions.bare.items()}
 
     def away(self, edges: Edges) -> Float:
         """Return the angles (S,) by which the signs are turned away from a carriageway's traffic, degrees."""
         return self.turned if edges.traffic > 0 else 180.0 - self.turned
 
-    def seen_by(self, edges: Edges, code: str, room: float) -> NDArray[np.intp]:
-        """Return the indices of a code's signs that a carriageway's traffic sees, turned at most ``room`` degrees."""
-        seen = self.of[edges.name] & (self.away(edges) <= room)
-        return np.array([i for i, sign_code in enumerate(self.codes) if sign_code == code and seen[i]], dtype=np.intp)
+    def seen_by(self, edges: Edges, code: str, largest_angle: float) -> NDArray[np.intp]:
+        """Return indices of a code's signs facing a carriageway's traffic, at most ``largest_angle`` degrees off."""
+        is_seen = self.of[edges.name] & (self.away(edges) <= largest_angle)
+        return np.array(
+            [i for i, sign_code in enumerate(self.codes) if sign_code == code and is_seen[i]], dtype=np.intp
+        )

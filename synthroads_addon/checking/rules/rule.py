@@ -213,14 +213,17 @@ class Road:
         return {name: ProtectingBarriers(self.barriers, name, edges) for name, edges in self.sides.items()}
 
     def _runs(self) -> list[CurvatureRun]:
+        """Return the stretches of constant curvature in order: neighbouring elements of one curvature as one."""
         runs: list[CurvatureRun] = []
         for i in np.flatnonzero(self.constant).tolist():
             curvature = float(0.5 * (self.k0[i] + self.k1[i]))
-            first = i
+            first_element = i
             if runs and runs[-1].last == i - 1 and bool(same_curvature(self.k1[i - 1], self.k0[i])):
-                previous = runs.pop()
-                first, curvature = previous.first, previous.curvature
-            runs.append(CurvatureRun(float(self.starts[first]), float(self.starts[i + 1]), curvature, first, i))
+                previous_run = runs.pop()
+                first_element, curvature = previous_run.first, previous_run.curvature
+            runs.append(
+                CurvatureRun(float(self.starts[first_element]), float(self.starts[i + 1]), curvature, first_element, i)
+            )
         return runs
 
     def is_cut(self, run: CurvatureRun) -> bool:
@@ -240,8 +243,10 @@ class Vertical:
     def __init__(self, alignment: AlignmentObject) -> None:
         points = np.array([(p.station, p.elevation, p.radius) for p in alignment.vertical], dtype=np.float64)
         self.station, elevation, self.radius = points[indices_of_increase(points[:, 0])].T
-        between = np.diff(elevation) / np.diff(self.station)
-        self.grades = np.concatenate((between[:1], between, between[-1:])) if len(between) else np.zeros(2)
+        inner_grades = np.diff(elevation) / np.diff(self.station)
+        self.grades = (
+            np.concatenate((inner_grades[:1], inner_grades, inner_grades[-1:])) if len(inner_grades) else np.zeros(2)
+        )
         self.tangents = 0.5 * self.radius * np.abs(np.diff(self.grades))
 
 
@@ -258,33 +263,33 @@ class Crossfall:
     def __init__(self, carriageway: Carriageway, length: float) -> None:
         points = np.array([(p.station, p.crossfall_percent) for p in carriageway.crossfall])
         station, percent = points[indices_of_increase(points[:, 0])].T
-        inside = (station > 0.0) & (station < length)
-        self.station = np.concatenate(([0.0], station[inside], [length]))
+        is_on_road = (station > 0.0) & (station < length)
+        self.station = np.concatenate(([0.0], station[is_on_road], [length]))
         self.percent = np.interp(self.station, station, percent)
-        change = np.diff(self.percent)
-        self.runs_off: Bool = np.abs(change) > SAME_CROSSFALL
-        self.slope = change / np.diff(self.station)
+        percent_change = np.diff(self.percent)
+        self.runs_off: Bool = np.abs(percent_change) > SAME_CROSSFALL
+        self.slope = percent_change / np.diff(self.station)
 
 
 def same_curvature(a: Float | float, b: Float | float) -> Bool:
     """Return a mask of where two curvatures (1/m) count as equal."""
-    room = SAME_CURVATURE + TOLERANCE * np.maximum(np.abs(a), np.abs(b))
-    return np.asarray(np.abs(np.subtract(a, b)) <= room)
+    tolerance = SAME_CURVATURE + TOLERANCE * np.maximum(np.abs(a), np.abs(b))
+    return np.asarray(np.abs(np.subtract(a, b)) <= tolerance)
 
 
 def indices_of_increase(station: Float) -> NDArray[np.intp]:
     """Return the indices of the stations that lie past all stations before them."""
-    before = np.concatenate(([-np.inf], np.maximum.accumulate(station)[:-1]))
-    return np.flatnonzero(station > before)
+    largest_before = np.concatenate(([-np.inf], np.maximum.accumulate(station)[:-1]))
+    return np.flatnonzero(station > largest_before)
 
 
 def out_of_order(stations: Iterable[float]) -> Iterator[tuple[int, float, float]]:
     """Yield (number from 1, station, largest one before) of the stations that don't lie past all before them."""
-    past = -np.inf
+    largest_before = -np.inf
     for number, station in enumerate(stations, start=1):
-        if station <= past:
-            yield number, station, past
-        past = max(past, station)
+        if station <= largest_before:
+            yield number, station, largest_before
+        largest_before = max(largest_before, station)
 
 
 def below(value: float, limit: float) -> bool:
@@ -313,17 +318,17 @@ def stretches(mask: Bool) -> Iterator[tuple[int, int]]:
     """Yield the (first, last) index of every run of neighbouring True values in a mask."""
     if not mask.any():
         return
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
-    for first, end in edges.reshape(-1, 2).tolist():
-        yield first, end - 1
+    borders = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    for run_start, run_end in borders.reshape(-1, 2).tolist():
+        yield run_start, run_end - 1
 
 
 def gaps(
-    ranges: Iterable[tuple[float, float]], start: float, end: float, least: float = SAME_STATION
+    ranges: Iterable[tuple[float, float]], start: float, end: float, least_length: float = SAME_STATION
 ) -> Iterator[tuple[float, float]]:
-    """Yield the parts of start..end (m) that no range covers and that are longer than `least`."""
-    reached = start
-    for low, high in [*sorted(ranges), (end, end)]:
-        if low > reached + least and reached < end - least:
-            yield reached, min(low, end)
-        reached = max(reached, high)
+    """Yield the parts of start..end (m) that no range covers and that are longer than `least_length`."""
+    covered_up_to = start
+    for range_start, range_end in [*sorted(ranges), (end, end)]:
+        if range_start > covered_up_to + least_length and covered_up_to < end - least_length:
+            yield covered_up_to, min(range_start, end)
+        covered_up_to = max(covered_up_to, range_end)

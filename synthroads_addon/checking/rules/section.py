@@ -31,11 +31,15 @@ def _widths(carriageway: Carriageway) -> Iterator[tuple[str, AnyWidth]]:
 
 
 def _width_order(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each point of a width that doesn't follow the points before it."""
     for name, edges in road.sides.items():
-        for what, width in _widths(edges.carriageway):
-            for _, at, past in out_of_order(width_kinks(width)):
-                text = f"{what} has a width at {at:.3f} m that does not follow the one at {past:.3f} m."
-                yield Finding(name, at, at, past, text)
+        for width_name, width in _widths(edges.carriageway):
+            for _, station, largest_before in out_of_order(width_kinks(width)):
+                text = (
+                    f"{width_name} has a width at {station:.3f} m "
+                    f"that does not follow the one at {largest_before:.3f} m."
+                )
+                yield Finding(name, station, station, largest_before, text)
 
 
 def narrowest_lane(road: Road) -> float:
@@ -44,6 +48,7 @@ def narrowest_lane(road: Road) -> float:
 
 
 def _standard_sections(road: Road) -> list[StandardCrossSection]:
+    """Return the standard cross-sections that the road's design class may have."""
     return [STANDARD_CROSS_SECTIONS[name] for name in SECTIONS_OF_CLASS[road.design_class]]
 
 
@@ -52,56 +57,68 @@ def _lane_ramps(lane: WidthByStation) -> list[tuple[int, int]]:
     if lane.constant:
         return []
     slope = np.diff(lane.width) / np.diff(lane.station)
-    same = np.abs(np.diff(slope)) <= SAME_SLOPE * np.abs(slope[1:])
+    continues = np.abs(np.diff(slope)) <= SAME_SLOPE * np.abs(slope[1:])
     pieces: list[tuple[int, int]] = []
     for i in range(len(slope)):
-        if pieces and same[i - 1]:
+        if pieces and continues[i - 1]:
             pieces[-1] = (pieces[-1][0], i + 1)
         else:
             pieces.append((i, i + 1))
-    zero = lane.width < NO_LANE
-    return [(first, last) for first, last in pieces if zero[first] != zero[last]]
+    is_zero = lane.width < NO_LANE
+    return [
+        (first_point, last_point) for first_point, last_point in pieces if is_zero[first_point] != is_zero[last_point]
+    ]
 
 
 def _lane_width(road: Road) -> Iterator[Finding]:
-    least, names = narrowest_lane(road), ", ".join(SECTIONS_OF_CLASS[road.design_class])
+    """Yield a finding for each stretch of a lane that is too narrow, tapers to or from nothing left out."""
+    least_width, names = narrowest_lane(road), ", ".join(SECTIONS_OF_CLASS[road.design_class])
     for name, edges in road.sides.items():
         for i, lane in enumerate(edges.lane_widths):
-            narrow = (lane.width < least * (1.0 - TOLERANCE)) & (lane.width >= NO_LANE)
-            for first, last in _lane_ramps(lane):
-                narrow[first + 1 : last] = False
-            for first, last in stretches(narrow):
-                worst = first + int(np.argmin(lane.width[first : last + 1]))
-                text = f"Lane {i + 1} is {lane.width[worst]:.2f} m wide; {least:.2f} m are needed (RAA, {names})."
-                yield Finding(name, np.clip(lane.station[worst], 0.0, road.length), lane.width[worst], least, text)
+            is_narrow = (lane.width < least_width * (1.0 - TOLERANCE)) & (lane.width >= NO_LANE)
+            for first_point, last_point in _lane_ramps(lane):
+                is_narrow[first_point + 1 : last_point] = False
+            for first_point, last_point in stretches(is_narrow):
+                worst_point = first_point + int(np.argmin(lane.width[first_point : last_point + 1]))
+                width = lane.width[worst_point]
+                text = f"Lane {i + 1} is {width:.2f} m wide; {least_width:.2f} m are needed (RAA, {names})."
+                yield Finding(
+                    name,
+                    np.clip(lane.station[worst_point], 0.0, road.length),
+                    width,
+                    least_width,
+                    text,
+                )
 
 
 def lane_tapers(road: Road, edges: Edges) -> Iterator[tuple[int, float, float]]:
     """Yield (lane, first station, last station) of every taper on the road along which a lane begins or ends."""
     for i, lane in enumerate(edges.lane_widths):
-        for first, last in _lane_ramps(lane):
-            begin, end = float(lane.station[first]), float(lane.station[last])
+        for first_point, last_point in _lane_ramps(lane):
+            begin, end = float(lane.station[first_point]), float(lane.station[last_point])
             if begin < road.length - SAME_STATION and end > SAME_STATION:
                 yield i, begin, end
 
 
 def _lane_taper(road: Road) -> Iterator[Finding]:
-    least = LANE_TAPER_LENGTH[road.design_class]
+    """Yield a finding for each taper over which a lane begins or ends that is too short."""
+    least_length = LANE_TAPER_LENGTH[road.design_class]
     for name, edges in road.sides.items():
         for lane, begin, end in lane_tapers(road, edges):
-            text = f"Lane {lane + 1} begins or ends over {end - begin:.1f} m; {least:.0f} m are needed (RAA)."
-            yield from at_least(name, max(begin, 0.0), end - begin, least, text)
+            text = f"Lane {lane + 1} begins or ends over {end - begin:.1f} m; {least_length:.0f} m are needed (RAA)."
+            yield from at_least(name, max(begin, 0.0), end - begin, least_length, text)
 
 
 def _median_width(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each stretch along which the median is narrower than any standard one."""
     if len(road.sides) < 2:
         return
     width = np.sum([edges.inner(road.marks) for edges in road.sides.values()], axis=0)
     name = next(iter([*road.of(Median), *road.sides]))
-    for first, last in stretches(width < LEAST_MEDIAN * (1.0 - TOLERANCE)):
-        worst = first + int(np.argmin(width[first : last + 1]))
-        text = f"The median is {width[worst]:.2f} m wide; {LEAST_MEDIAN} m are needed (RAA)."
-        yield Finding(name, road.marks[worst], width[worst], LEAST_MEDIAN, text)
+    for first_mark, last_mark in stretches(width < LEAST_MEDIAN * (1.0 - TOLERANCE)):
+        worst_mark = first_mark + int(np.argmin(width[first_mark : last_mark + 1]))
+        text = f"The median is {width[worst_mark]:.2f} m wide; {LEAST_MEDIAN} m are needed (RAA)."
+        yield Finding(name, road.marks[worst_mark], width[worst_mark], LEAST_MEDIAN, text)
 
 
 def _is_standard(edges: Edges) -> bool:
@@ -113,39 +130,51 @@ def _is_standard(edges: Edges) -> bool:
 def _strip_widths(road: Road, fields: tuple[str, ...]) -> Iterator[Finding]:
     """Yield findings for strips of a standard cross-section narrower than in those of the class."""
     for field in fields:
-        what, least = field.replace("_", " "), min(getattr(section, field) for section in _standard_sections(road))
+        strip_name, least_width = (
+            field.replace("_", " "),
+            min(getattr(section, field) for section in _standard_sections(road)),
+        )
         for name, edges in road.sides.items():
             if _is_standard(edges):
                 strip = WidthByStation(getattr(edges.carriageway, f"{field}_width"))
-                worst = int(np.argmin(strip.width))
-                station, value = np.clip(strip.station[worst], 0.0, road.length), strip.width[worst]
-                text = f"The {what} is {value:.2f} m wide; the class's standard cross-sections have {least} m (RAA)."
-                yield from at_least(name, station, value, least, text)
+                worst_point = int(np.argmin(strip.width))
+                station, value = np.clip(strip.station[worst_point], 0.0, road.length), strip.width[worst_point]
+                text = (
+                    f"The {strip_name} is {value:.2f} m wide; "
+                    f"the class's standard cross-sections have {least_width} m (RAA)."
+                )
+                yield from at_least(name, station, value, least_width, text)
 
 
 def _rut_lane(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each rut whose lane is missing or narrower than the rut."""
     for name, edges in road.sides.items():
         for i, rut in enumerate(edges.carriageway.pavement.ruts):
-            needed, narrowest, station = rut.track + rut.width, 0.0, rut.start_station
+            needed_width, narrowest_width, station = rut.track + rut.width, 0.0, rut.start_station
             if rut.lane < len(edges.lane_widths):
-                at = edges.between(rut.start_station, rut.end_station)
-                width = edges.lane_widths[rut.lane](at)
-                narrowest, station = width.min(), at[np.argmin(width)]
-            place = f"lane {rut.lane + 1} that it lies in is {narrowest:.2f} m wide there"
-            yield from at_least(name, station, narrowest, needed, f"Rut {i + 1} takes {needed:.2f} m, and {place}.")
+                stations = edges.between(rut.start_station, rut.end_station)
+                width = edges.lane_widths[rut.lane](stations)
+                narrowest_width, station = width.min(), stations[np.argmin(width)]
+            place = f"lane {rut.lane + 1} that it lies in is {narrowest_width:.2f} m wide there"
+            yield from at_least(
+                name, station, narrowest_width, needed_width, f"Rut {i + 1} takes {needed_width:.2f} m, and {place}."
+            )
 
 
 def _pothole_pavement(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each pothole that reaches beyond its carriageway's pavement."""
     for name, edges in road.sides.items():
         potholes = edges.carriageway.pavement.potholes
         if not potholes:
             continue
         station, offset, width = np.array([(pothole.station, pothole.offset, pothole.width) for pothole in potholes]).T
-        low, high = edges.distances(offset - width / 2.0, offset + width / 2.0)
-        over = edges.at(station).clearance(high, low)  # with its edges exchanged: of the edge that lies farther off
-        for i in np.flatnonzero(over > TOLERANCE):
-            text = f"Pothole {i + 1} reaches {over[i]:.2f} m beyond the carriageway's pavement."
-            yield Finding(name, station[i], over[i], 0.0, text)
+        nearest, farthest = edges.distances(offset - width / 2.0, offset + width / 2.0)
+        overshoot = edges.at(station).clearance(
+            farthest, nearest
+        )  # with its edges exchanged: of the edge that lies farther off
+        for i in np.flatnonzero(overshoot > TOLERANCE):
+            text = f"Pothole {i + 1} reaches {overshoot[i]:.2f} m beyond the carriageway's pavement."
+            yield Finding(name, station[i], overshoot[i], 0.0, text)
 
 
 _HARD_SHOULDER = partial(_strip_widths, fields=("hard_shoulder",))

@@ -18,6 +18,7 @@ LOW_SIGNS = "450"
 
 
 def _sign_distance(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each sign's face, lower than the clearance, too near to the paved edge."""
     clearance = road.positions.nearest
     for i in np.flatnonzero((clearance >= 0.0) & (clearance < SIGN_DISTANCE)):
         body, name, distance = road.bodies.items[i], road.bodies.names[i], clearance[i]
@@ -27,6 +28,7 @@ def _sign_distance(road: Road) -> Iterator[Finding]:
 
 
 def _sign_lower_edge(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each traffic sign that hangs too low, beacons before exits left out."""
     for name, sign in road.of(TrafficSign).items():
         if not sign.code.startswith(LOW_SIGNS):
             text = f"The sign's lower edge is {sign.lower_edge:.2f} m high; {SIGN_LOWER_EDGE} m are needed (VwV-StVO)."
@@ -34,61 +36,67 @@ def _sign_lower_edge(road: Road) -> Iterator[Finding]:
 
 
 def _sign_facing(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each sign that no carriageway's traffic sees from the front."""
     signs = road.signs
-    turned = np.full(len(signs.names), np.inf)
+    angles = np.full(len(signs.names), np.inf)
     for name, edges in road.sides.items():
-        turned = np.where(signs.of[name], np.minimum(turned, signs.away(edges)), turned)
-    for i in np.flatnonzero(turned > TURNED):
-        text = f"It is turned {turned[i]:.0f} degrees away from its traffic; {TURNED:.0f} are allowed."
-        yield Finding(signs.names[i], signs.station[i], turned[i], TURNED, text)
+        angles = np.where(signs.of[name], np.minimum(angles, signs.away(edges)), angles)
+    for i in np.flatnonzero(angles > TURNED):
+        text = f"It is turned {angles[i]:.0f} degrees away from its traffic; {TURNED:.0f} are allowed."
+        yield Finding(signs.names[i], signs.station[i], angles[i], TURNED, text)
 
 
 def _exits(road: Road) -> list[tuple[Edges, TurnoutEdges]]:
+    """Return the exits of all carriageways, with the carriageway's edges."""
     return [(edges, turnout) for edges, turnout in road.turnouts if turnout.turnout.kind == "exit"]
 
 
 def _exit_sign_missing(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each sign of the sequence before an exit that is missing at its place."""
     for edges, turnout in _exits(road):
         signs, begin = road.signs, turnout.station(0.0)
-        for before, code in EXIT_SEQUENCE.items():
-            place = begin - edges.traffic * before
+        for distance_before, code in EXIT_SEQUENCE.items():
+            place = begin - edges.traffic * distance_before
             if 0.0 <= place <= road.length:
                 stations = signs.station[signs.seen_by(edges, code, TURNED)]
-                away = np.abs(stations - place).min(initial=road.length)
+                distance = np.abs(stations - place).min(initial=road.length)
                 text = (
-                    f"The nearest sign {code} is {away:.0f} m from its place {before:.0f} m before the exit; "
-                    f"{EXIT_SIGN_ROOM:.0f} m are allowed (StVO)."
+                    f"The nearest sign {code} is {distance:.0f} m from its place {distance_before:.0f} m before "
+                    f"the exit; {EXIT_SIGN_ROOM:.0f} m are allowed (StVO)."
                 )
-                yield from at_most(turnout.name, place, away, EXIT_SIGN_ROOM, text)
+                yield from at_most(turnout.name, place, distance, EXIT_SIGN_ROOM, text)
 
 
 def _exit_sign_place(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each sign of the sequence that stands away from its place before an exit."""
     exits, signs = _exits(road), road.signs
     for side in {edges.name: edges for edges, _ in exits}.values():
         begins = np.array([turnout.station(0.0) for edges, turnout in exits if edges is side])
-        for before, code in EXIT_SEQUENCE.items():
+        for distance_before, code in EXIT_SEQUENCE.items():
             for i in signs.seen_by(side, code, TURNED):
-                ahead = side.traffic * (begins - signs.station[i])
-                away = np.abs(ahead - before).min()
-                if np.any((ahead >= 0.0) & (ahead <= max(EXIT_SEQUENCE) + EXIT_SIGN_ROOM)):
+                distance_ahead = side.traffic * (begins - signs.station[i])
+                distance = np.abs(distance_ahead - distance_before).min()
+                if np.any((distance_ahead >= 0.0) & (distance_ahead <= max(EXIT_SEQUENCE) + EXIT_SIGN_ROOM)):
                     text = (
-                        f"The sign {code} stands {away:.0f} m from where it belongs, {before:.0f} m before an exit; "
-                        f"{EXIT_SIGN_ROOM:.0f} m are allowed (StVO)."
+                        f"The sign {code} stands {distance:.0f} m from where it belongs, "
+                        f"{distance_before:.0f} m before an exit; {EXIT_SIGN_ROOM:.0f} m are allowed (StVO)."
                     )
-                    yield from at_most(signs.names[i], signs.station[i], away, EXIT_SIGN_ROOM, text)
+                    yield from at_most(signs.names[i], signs.station[i], distance, EXIT_SIGN_ROOM, text)
 
 
 def _gore_sign(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each exit without an exit board in its gore."""
     for edges, turnout in _exits(road):
         signs = road.signs
-        low, high = turnout.span(turnout.nose, turnout.end)
-        there = signs.bare[edges.name] & (signs.station >= low) & (signs.station <= high)
-        if not any(signs.codes[i].split("-")[0] == GORE_SIGN for i in np.flatnonzero(there)):
+        start, end = turnout.span(turnout.nose, turnout.end)
+        is_in_gore = signs.bare[edges.name] & (signs.station >= start) & (signs.station <= end)
+        if not any(signs.codes[i].split("-")[0] == GORE_SIGN for i in np.flatnonzero(is_in_gore)):
             text = f"No sign {GORE_SIGN} stands in the exit's gore, behind its nose (StVO)."
             yield Finding(turnout.name, turnout.station(turnout.nose), 0.0, 1.0, text)
 
 
 def _clearance(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each gantry, overpass or sign too low over the pavement."""
     spans = [(name, item.station, item.clearance) for name, item in road.each(Gantry, Overpass)]
     for i in np.flatnonzero(road.positions.nearest < 0.0):
         body = road.bodies.items[i]
@@ -100,13 +108,16 @@ def _clearance(road: Road) -> Iterator[Finding]:
 
 
 def _gantry_sign(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each sign that reaches beyond its gantry's beam."""
     for name, gantry in road.of(Gantry).items():
         for sign in gantry.signs:
-            half = sign.width / 2.0
-            beyond = max(sign.offset + half - gantry.left_offset, gantry.right_offset - sign.offset + half)
-            if beyond > TOLERANCE:
-                text = f"A sign reaches {beyond:.2f} m beyond the gantry's beam."
-                yield Finding(name, gantry.station, beyond, 0.0, text)
+            half_width = sign.width / 2.0
+            overshoot = max(
+                sign.offset + half_width - gantry.left_offset, gantry.right_offset - sign.offset + half_width
+            )
+            if overshoot > TOLERANCE:
+                text = f"A sign reaches {overshoot:.2f} m beyond the gantry's beam."
+                yield Finding(name, gantry.station, overshoot, 0.0, text)
 
 
 RULES = (

@@ -58,12 +58,12 @@ def _beacon_rows(road: Road) -> Iterator[tuple[Edges, list[_Beacon]]]:
 def _construction_zones(road: Road) -> Iterator[tuple[Edges, list[_Beacon]]]:
     """Yield (carriageway, beacons by station) for each construction zone."""
     for edges, beacons in _beacon_rows(road):
-        first = 0
-        for i, (here, there) in enumerate(pairwise(beacons), start=1):
-            if there.station - here.station > ZONES_APART:
-                yield edges, beacons[first:i]
-                first = i
-        yield edges, beacons[first:]
+        first_beacon = 0
+        for i, (beacon, next_beacon) in enumerate(pairwise(beacons), start=1):
+            if next_beacon.station - beacon.station > ZONES_APART:
+                yield edges, beacons[first_beacon:i]
+                first_beacon = i
+        yield edges, beacons[first_beacon:]
 
 
 def _is_passed_outside(edges: Edges, place: _Beacon) -> bool:
@@ -72,24 +72,28 @@ def _is_passed_outside(edges: Edges, place: _Beacon) -> bool:
 
 
 def _beacon_spacing(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each gap between beacons that is too long, in tapers or along a zone."""
     for _, beacons in _construction_zones(road):
-        for here, there in pairwise(beacons):
-            gap = there.station - here.station
-            sideways = abs(there.distance - here.distance) > TAPER_SLOPE * gap
-            limit = BEACON_SPACING_TAPER if sideways else BEACON_SPACING
+        for beacon, next_beacon in pairwise(beacons):
+            gap = next_beacon.station - beacon.station
+            is_taper = abs(next_beacon.distance - beacon.distance) > TAPER_SLOPE * gap
+            limit = BEACON_SPACING_TAPER if is_taper else BEACON_SPACING
             if gap > limit + SPACING_ROOM:
-                where = "in a taper" if sideways else "along a construction zone"
-                text = f"The next beacon stands {gap:.1f} m on; {limit:.0f} m are allowed {where} (RSA)."
-                yield Finding(here.name, here.station, gap, limit, text)
+                place_text = "in a taper" if is_taper else "along a construction zone"
+                text = f"The next beacon stands {gap:.1f} m on; {limit:.0f} m are allowed {place_text} (RSA)."
+                yield Finding(beacon.name, beacon.station, gap, limit, text)
 
 
 def _open_lane(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each beacon or movable barrier beside which too little of the lanes is left open."""
     for edges, beacons in _beacon_rows(road):
         station = np.array([place.station for place in beacons])
         distance = np.array([place.distance for place in beacons])
-        inwards, outwards = _open_widths(edges, station, distance, np.array([b.beacon.width for b in beacons]) / 2.0)
-        beyond = np.array([_is_passed_outside(edges, place) for place in beacons])
-        for place, width in zip(beacons, np.where(beyond, outwards, inwards), strict=True):
+        inner_widths, outer_widths = _open_widths(
+            edges, station, distance, np.array([b.beacon.width for b in beacons]) / 2.0
+        )
+        is_passed_outside = np.array([_is_passed_outside(edges, place) for place in beacons])
+        for place, width in zip(beacons, np.where(is_passed_outside, outer_widths, inner_widths), strict=True):
             yield from _find_narrow(place.name, place.station, width)
     for name, barrier in road.of(TemporaryBarrier).items():
         side = _carriageway_at(road, barrier.offset)
@@ -97,49 +101,52 @@ def _open_lane(road: Road) -> Iterator[Finding]:
             continue
         station = np.array([barrier.start_station, barrier.end_station])
         distance = side.sign * np.array([barrier.offset, barrier.end_offset], dtype=np.float64)
-        widest = np.maximum(*_open_widths(side, station, distance, barrier.base_width / 2.0))
-        worst = np.argmin(widest)
-        yield from _find_narrow(name, station[worst], widest[worst])
+        open_widths = np.maximum(*_open_widths(side, station, distance, barrier.base_width / 2.0))
+        worst_end = np.argmin(open_widths)
+        yield from _find_narrow(name, station[worst_end], open_widths[worst_end])
 
 
-def _open_widths(edges: Edges, station: Float, distance: Float, half: Float | float) -> tuple[Float, Float]:
+def _open_widths(edges: Edges, station: Float, distance: Float, half_width: Float | float) -> tuple[Float, Float]:
     """Return the widths (N,), (N,) of the lanes left open inwards and outwards of what stands at N distances, m."""
     lanes = edges.at(station).lanes
-    outermost, innermost = lanes[:, 0], lanes[:, -1]
-    inwards = np.minimum(distance - half, outermost) - innermost
-    return inwards, outermost - np.maximum(distance + half, innermost)
+    outer_boundary, inner_boundary = lanes[:, 0], lanes[:, -1]
+    inner_width = np.minimum(distance - half_width, outer_boundary) - inner_boundary
+    return inner_width, outer_boundary - np.maximum(distance + half_width, inner_boundary)
 
 
 def _find_narrow(name: str, station: float, open_width: float) -> Iterator[Finding]:
+    """Yield a finding if less than the least width (m) of the lanes is open beside an object."""
     text = f"{open_width:.2f} m of the lanes are left open beside it; {CONSTRUCTION_LANE_WIDTH} m are needed (RSA)."
     return at_least(name, station, open_width, CONSTRUCTION_LANE_WIDTH, text)
 
 
 def _vehicle_lane(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each vehicle whose lane is narrower than itself."""
     for name, vehicle in road.of(Vehicle).items():
         edges = road.sides[vehicle.carriageway]
-        length, needed = VEHICLE_SIZES[vehicle.model]
+        length, needed_width = VEHICLE_SIZES[vehicle.model]
         lane = edges.lane_widths[vehicle.lane]
-        low, high = vehicle.station - length / 2.0, vehicle.station + length / 2.0
-        width = lane.width[0] if lane.constant else lane(edges.between(low, high)).min()
-        text = f"Lane {vehicle.lane + 1} is {width:.2f} m wide there; the {vehicle.model} takes {needed} m."
-        yield from at_least(name, vehicle.station, width, needed, text)
+        start, end = vehicle.station - length / 2.0, vehicle.station + length / 2.0
+        width = lane.width[0] if lane.constant else lane(edges.between(start, end)).min()
+        text = f"Lane {vehicle.lane + 1} is {width:.2f} m wide there; the {vehicle.model} takes {needed_width} m."
+        yield from at_least(name, vehicle.station, width, needed_width, text)
 
 
 def _vehicle_overlap(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each vehicle that reaches into the one before it in its lane."""
     lanes: dict[tuple[str, int], list[tuple[float, float, str]]] = {}
     for name, vehicle in road.of(Vehicle).items():
-        half = VEHICLE_SIZES[vehicle.model][0] / 2.0
-        lanes.setdefault((vehicle.carriageway, vehicle.lane), []).append((vehicle.station, half, name))
+        half_length = VEHICLE_SIZES[vehicle.model][0] / 2.0
+        lanes.setdefault((vehicle.carriageway, vehicle.lane), []).append((vehicle.station, half_length, name))
     for vehicles in lanes.values():
-        reached, before = -np.inf, ""
-        for station, half, name in sorted(vehicles):
-            gap = station - half - reached
+        end_so_far, vehicle_before = -np.inf, ""
+        for station, half_length, name in sorted(vehicles):
+            gap = station - half_length - end_so_far
             if gap < -TOLERANCE:
-                text = f"The vehicle and {before} reach {-gap:.2f} m into each other."
+                text = f"The vehicle and {vehicle_before} reach {-gap:.2f} m into each other."
                 yield Finding(name, station, gap, 0.0, text)
-            if station + half > reached:
-                reached, before = station + half, name
+            if station + half_length > end_so_far:
+                end_so_far, vehicle_before = station + half_length, name
 
 
 def _vehicles_beside(road: Road, edges: Edges, row: Float) -> Iterator[tuple[str, float, float, float]]:
@@ -147,31 +154,32 @@ def _vehicles_beside(road: Road, edges: Edges, row: Float) -> Iterator[tuple[str
     for name, vehicle in road.of(Vehicle).items():
         if vehicle.carriageway == edges.name and row[0, 0] <= vehicle.station <= row[-1, 0]:
             lanes = edges.at(np.array([vehicle.station])).lanes[0]
-            middle = 0.5 * float(lanes[vehicle.lane] + lanes[vehicle.lane + 1])
-            yield name, vehicle.station, middle, float(np.interp(vehicle.station, row[:, 0], row[:, 1]))
+            middle_distance = 0.5 * float(lanes[vehicle.lane] + lanes[vehicle.lane + 1])
+            yield name, vehicle.station, middle_distance, float(np.interp(vehicle.station, row[:, 0], row[:, 1]))
 
 
 def _vehicle_closed(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each vehicle that reaches over the beacons or barriers that close its lane."""
     vehicles = road.of(Vehicle)
     overlaps: list[tuple[str, float, float]] = []
     for edges, beacons in _construction_zones(road):
         row = np.array([(place.station, place.distance) for place in beacons])
-        for name, station, middle, line in _vehicles_beside(road, edges, row):
-            free = middle - line if _is_passed_outside(edges, beacons[0]) else line - middle
-            overlaps.append((name, station, VEHICLE_SIZES[vehicles[name].model][1] / 2.0 - free))
+        for name, station, vehicle_distance, line in _vehicles_beside(road, edges, row):
+            free_width = vehicle_distance - line if _is_passed_outside(edges, beacons[0]) else line - vehicle_distance
+            overlaps.append((name, station, VEHICLE_SIZES[vehicles[name].model][1] / 2.0 - free_width))
     for barrier in road.of(TemporaryBarrier).values():
         side = _carriageway_at(road, barrier.offset)
         places = [(barrier.start_station, barrier.offset), (barrier.end_station, barrier.end_offset)]
         if side is None:
             continue
         row = np.array([(station, side.sign * offset) for station, offset in places])
-        for name, station, middle, line in _vehicles_beside(road, side, row):
+        for name, station, vehicle_distance, line in _vehicles_beside(road, side, row):
             reach = VEHICLE_SIZES[vehicles[name].model][1] / 2.0 + barrier.base_width / 2.0
-            overlaps.append((name, station, reach - abs(middle - line)))
-    for name, station, over in overlaps:
-        if over > TOLERANCE:
-            text = f"The vehicle reaches {over:.2f} m over the beacons or barriers that close its lane."
-            yield Finding(name, station, over, 0.0, text)
+            overlaps.append((name, station, reach - abs(vehicle_distance - line)))
+    for name, station, overshoot in overlaps:
+        if overshoot > TOLERANCE:
+            text = f"The vehicle reaches {overshoot:.2f} m over the beacons or barriers that close its lane."
+            yield Finding(name, station, overshoot, 0.0, text)
 
 
 RULES = (

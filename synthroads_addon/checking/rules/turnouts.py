@@ -26,49 +26,59 @@ def _clip_to_road(road: Road, station: float) -> float:
     return min(max(station, 0.0), road.length)
 
 
-def _find_small(road: Road, bays: bool, field: str, least: float, text: str) -> Iterator[Finding]:
+def _find_small(road: Road, of_bays: bool, field: str, least_value: float, text: str) -> Iterator[Finding]:
     """Yield findings for bays, or for exits and entries, with a length or width below the least (m)."""
     for name, turnout in road.of(Turnout).items():
-        if (turnout.ramp is None) == bays:
+        if (turnout.ramp is None) == of_bays:
             value = getattr(turnout, field)
-            sentence = text.format(kind=_NAMES[turnout.kind], value=value, least=least)
-            yield from at_least(name, _clip_to_road(road, turnout.start_station), value, least, sentence)
+            sentence = text.format(kind=_NAMES[turnout.kind], value=value, least=least_value)
+            yield from at_least(name, _clip_to_road(road, turnout.start_station), value, least_value, sentence)
 
 
 def _lane_length(road: Road) -> Iterator[Finding]:
+    """Return an iterator over findings for exits and entries with too short a lane."""
     text = "The {kind}'s lane is {value:.1f} m long; {least:.0f} m are needed (RAA)."
     return _find_small(road, False, "lane_length", TURNOUT_LANE_LENGTH[road.design_class], text)
 
 
 def _lane_width(road: Road) -> Iterator[Finding]:
+    """Return an iterator over findings for exits and entries with too narrow a lane."""
     text = "The {kind}'s lane is {value:.2f} m wide; {least} m are needed (RAA)."
     return _find_small(road, False, "lane_width", TURNOUT_LANE_WIDTH, text)
 
 
 def _bay_width(road: Road) -> Iterator[Finding]:
+    """Return an iterator over findings for emergency bays that are too narrow."""
     text = "The {kind} is {value:.2f} m wide; {least} m are needed (RAA)."
     return _find_small(road, True, "lane_width", EMERGENCY_BAY_WIDTH, text)
 
 
 def _bay_length(road: Road) -> Iterator[Finding]:
+    """Return an iterator over findings for emergency bays that are too short."""
     text = "The {kind} is {value:.1f} m long; {least:.0f} m are needed (RAA)."
     return _find_small(road, True, "lane_length", EMERGENCY_BAY_LENGTH, text)
 
 
 def _taper(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each turnout with too short a taper."""
     for name, turnout in road.of(Turnout).items():
-        least = TURNOUT_TAPER if turnout.ramp else EMERGENCY_BAY_TAPER
-        shortest = min(taper for taper in (turnout.taper_in_length, turnout.taper_out_length) if taper > 0.0)
-        text = f"The {_NAMES[turnout.kind]}'s taper is {shortest:.1f} m long; {least:.0f} m are needed (RAA)."
-        yield from at_least(name, _clip_to_road(road, turnout.start_station), shortest, least, text)
+        least_length = TURNOUT_TAPER if turnout.ramp else EMERGENCY_BAY_TAPER
+        shortest_taper = min(taper for taper in (turnout.taper_in_length, turnout.taper_out_length) if taper > 0.0)
+        text = (
+            f"The {_NAMES[turnout.kind]}'s taper is {shortest_taper:.1f} m long; {least_length:.0f} m are needed (RAA)."
+        )
+        yield from at_least(name, _clip_to_road(road, turnout.start_station), shortest_taper, least_length, text)
 
 
 def _nose(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each ramp that ends before, or hardly behind, its nose."""
     for _, edges in road.turnouts:
         if ramp := edges.turnout.ramp:
-            needed = edges.natural_nose + NOSE_BEFORE_END
-            text = f"The ramp is {ramp.length:.1f} m long; {needed:.1f} m are needed to reach its nose."
-            yield from at_least(edges.name, _clip_to_road(road, edges.station(edges.tip)), ramp.length, needed, text)
+            needed_length = edges.natural_nose + NOSE_BEFORE_END
+            text = f"The ramp is {ramp.length:.1f} m long; {needed_length:.1f} m are needed to reach its nose."
+            yield from at_least(
+                edges.name, _clip_to_road(road, edges.station(edges.tip)), ramp.length, needed_length, text
+            )
 
 
 def _consecutive(turnouts: Iterable[TurnoutEdges]) -> Iterator[tuple[TurnoutEdges, TurnoutEdges]]:
@@ -77,25 +87,28 @@ def _consecutive(turnouts: Iterable[TurnoutEdges]) -> Iterator[tuple[TurnoutEdge
 
 
 def _gap(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each turnout that begins too near behind another one of its carriageway."""
     for side in road.sides.values():
-        for before, after in _consecutive(side.turnouts):
-            begin = after.turnout.start_station
-            gap = begin - before.turnout.end_station
-            text = f"The turnout begins {gap:.1f} m behind {before.name}; {TURNOUT_GAP:.0f} m are needed (RAA)."
-            yield from at_least(after.name, _clip_to_road(road, begin), gap, TURNOUT_GAP, text)
+        for earlier, later in _consecutive(side.turnouts):
+            begin = later.turnout.start_station
+            gap = begin - earlier.turnout.end_station
+            text = f"The turnout begins {gap:.1f} m behind {earlier.name}; {TURNOUT_GAP:.0f} m are needed (RAA)."
+            yield from at_least(later.name, _clip_to_road(road, begin), gap, TURNOUT_GAP, text)
 
 
 def _interchange(road: Road) -> Iterator[Finding]:
-    least = INTERCHANGE_SPACING[road.design_class]
+    """Yield a finding for each exit, or entry, too near behind another one of its carriageway."""
+    least_spacing = INTERCHANGE_SPACING[road.design_class]
     for side, kind in product(road.sides.values(), ("exit", "entry")):
-        for before, after in _consecutive(item for item in side.turnouts if item.turnout.kind == kind):
-            begin = after.turnout.start_station
-            spacing = begin - before.turnout.start_station
-            text = f"The {kind} lies {spacing:.0f} m behind {before.name}; {least:.0f} m are needed (RAA)."
-            yield from at_least(after.name, _clip_to_road(road, begin), spacing, least, text)
+        for earlier, later in _consecutive(item for item in side.turnouts if item.turnout.kind == kind):
+            begin = later.turnout.start_station
+            spacing = begin - earlier.turnout.start_station
+            text = f"The {kind} lies {spacing:.0f} m behind {earlier.name}; {least_spacing:.0f} m are needed (RAA)."
+            yield from at_least(later.name, _clip_to_road(road, begin), spacing, least_spacing, text)
 
 
 def _range(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each turnout that begins before the road or ends behind it."""
     for name, turnout in road.of(Turnout).items():
         start, end = turnout.start_station, turnout.end_station
         if start < -SAME_STATION:
@@ -107,13 +120,14 @@ def _range(road: Road) -> Iterator[Finding]:
 
 
 def _lane_change(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each stretch along which a lane begins or ends beside a turnout."""
     for side, item in road.turnouts:
         for lane, begin, end in lane_tapers(road, side):
-            low, high = max(begin, item.turnout.start_station), min(end, item.turnout.end_station)
-            if high > low + SAME_STATION:
+            overlap_start, overlap_end = max(begin, item.turnout.start_station), min(end, item.turnout.end_station)
+            if overlap_end > overlap_start + SAME_STATION:
                 kind = _NAMES[item.turnout.kind]
-                text = f"Lane {lane + 1} begins or ends beside the {kind} for {high - low:.1f} m."
-                yield Finding(item.name, low, high - low, 0.0, text)
+                text = f"Lane {lane + 1} begins or ends beside the {kind} for {overlap_end - overlap_start:.1f} m."
+                yield Finding(item.name, overlap_start, overlap_end - overlap_start, 0.0, text)
 
 
 RULES = (

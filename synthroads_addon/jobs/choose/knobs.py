@@ -75,13 +75,13 @@ def octave_choices(scenario: Scenario) -> tuple[int, ...]:
     return tuple(preset.relief_octaves for preset in FIDELITIES.values())
 
 
-def colour_choices(scenario: Scenario, typical_range: float, returns: bool) -> dict[str, dict[str, Any]]:
+def colour_choices(scenario: Scenario, typical_range: float, has_return_camera: bool) -> dict[str, dict[str, Any]]:
     """Return the colour sources to choose from, name -> changes of the scenario, from least to most accurate.
 
     Args:
         scenario: its colours' own fields stay as they are.
         typical_range: the path's, m.
-        returns: whether this Blender has a pixel per return.
+        has_return_camera: whether this Blender has a pixel per return.
     """
     colour, scale = scenario.colour, image_scale(typical_range)
     choices: dict[str, dict[str, Any]] = {"material": {"colour.source": "material"}}
@@ -95,7 +95,7 @@ def colour_choices(scenario: Scenario, typical_range: float, returns: bool) -> d
             choices[name] = changes
     if colour.engine == "cycles" and colour.lighting == "direct":
         choices["nodes"] = {"colour.source": "nodes"}
-    if returns and colour.engine == "cycles" and colour.lighting == "direct":
+    if has_return_camera and colour.engine == "cycles" and colour.lighting == "direct":
         choices["returns"] = {"colour.source": "returns"}
     if colour.source == "auto":
         return choices

@@ -47,10 +47,15 @@ Knobs = Sequence[Sequence[Option]]
 
 def combine(options: Iterable[Option]) -> Option:
     """Return one option for several knobs together: changes and errors merged, costs and seconds summed."""
-    several = tuple(options)
-    changes = {path: value for option in several for path, value in option.changes.items()}
-    errors = {kind: pair for option in several for kind, pair in option.errors.items()}
-    return Option(changes, errors, sum(one.cost for one in several), sum(one.seconds for one in several))
+    combined_options = tuple(options)
+    changes = {path: value for option in combined_options for path, value in option.changes.items()}
+    errors = {kind: pair for option in combined_options for kind, pair in option.errors.items()}
+    return Option(
+        changes,
+        errors,
+        sum(member.cost for member in combined_options),
+        sum(member.seconds for member in combined_options),
+    )
 
 
 def options_within(knobs: Knobs, limits: Mapping[str, float]) -> list[list[Option]]:
@@ -68,13 +73,15 @@ def options_within(knobs: Knobs, limits: Mapping[str, float]) -> list[list[Optio
 def _tolerance_error(options: Sequence[Option], limits: Mapping[str, float]) -> InputError:
     """Return the InputError for limits that no option keeps, naming the best that can be had."""
     for kind, limit in limits.items():
-        best = min(option.upper(kind) for option in options)
-        if best > limit:
-            text = f"can't be reached here: the smallest possible error is {error_text(kind, best)}"
+        least_error = min(option.upper(kind) for option in options)
+        if least_error > limit:
+            text = f"can't be reached here: the smallest possible error is {error_text(kind, least_error)}"
             return InputError(f"tolerance.{kind}", limit, text)
     kinds = [kind for kind in limits if any(kind in option.errors for option in options)]
-    nearest = min(options, key=lambda option: max(option.upper(kind) / max(limits[kind], _LEAST) for kind in kinds))
-    values = ", ".join(f"{kind}={error_text(kind, nearest.upper(kind))}" for kind in kinds)
+    nearest_option = min(
+        options, key=lambda option: max(option.upper(kind) / max(limits[kind], _LEAST) for kind in kinds)
+    )
+    values = ", ".join(f"{kind}={error_text(kind, nearest_option.upper(kind))}" for kind in kinds)
     return InputError("tolerance", None, f"{' and '.join(kinds)} can't be reached together: the nearest is {values}")
 
 
@@ -104,19 +111,22 @@ def best_in_time(
         InputError: not even the fastest settings fit, or none keeps the tolerance.
     """
     choices = list(map(combine, itertools.product(*options_within(knobs, limits or {}))))
-    fitting = [choice for choice in choices if choice.seconds <= seconds]
-    if not fitting:
+    fitting_choices = [choice for choice in choices if choice.seconds <= seconds]
+    if not fitting_choices:
         raise too_short_error(seconds, min(choice.seconds for choice in choices), bool(limits))
-    return min(fitting, key=lambda choice: _loss(choice, reference))
+    return min(fitting_choices, key=lambda choice: _loss(choice, reference))
 
 
-def too_short_error(seconds: float, fastest: float, tolerance: bool = False) -> InputError:
+def too_short_error(seconds: float, fastest: float, has_tolerance: bool = False) -> InputError:
     """Return the InputError for a time budget that even the fastest settings exceed, in seconds."""
-    which = "that keep the tolerance " if tolerance else ""
-    text = f"too short: {max(seconds, 0.0):.0f} s of it can still be used, and the fastest settings {which}take about "
+    condition = "that keep the tolerance " if has_tolerance else ""
+    text = (
+        f"too short: {max(seconds, 0.0):.0f} s of it can still be used, and the fastest settings {condition}take about "
+    )
     return InputError("time_budget", None, f"{text}{fastest:.0f} s")
 
 
 def _loss(choice: Option, reference: Mapping[str, float]) -> tuple[float, float, float]:
+    """Return a choice's largest error relative to the reference, the sum of these, and its seconds, as a sort key."""
     ratios = [choice.errors.get(kind, (0.0, 0.0))[0] / max(base, _LEAST) for kind, base in reference.items()]
     return round(max(ratios, default=0.0), 6), round(sum(ratios), 6), choice.seconds

@@ -67,8 +67,8 @@ def choose_settings(scene: S, begun: float, timer: StageTimer) -> tuple[S, dict[
         search = _Search(scene, begun, timer.progress)
         scenario, report = search.decide()
     settings = scenario.settings()
-    chosen = ModelKnobs(settings.tolerance, settings.vegetation_detail)
-    return scene.with_settings(scenario, search.trial is None or search.trial[0] in (None, chosen)), report
+    chosen_model = ModelKnobs(settings.tolerance, settings.vegetation_detail)
+    return scene.with_settings(scenario, search.trial is None or search.trial[0] in (None, chosen_model)), report
 
 
 class _Search:
@@ -100,7 +100,7 @@ class _Search:
         """Return the scenario with the chosen settings, and a report of the choice as JSON data."""
         budget = self.scenario.time_budget
         findings, choice = self._choose_by_tolerance() if budget is None else self._choose_by_time(budget)
-        here, given_knobs = time.perf_counter(), choices.given_knobs(self.scenario)
+        now, given_knobs = time.perf_counter(), choices.given_knobs(self.scenario)
         goals = {"tolerance": self.limits or None, "time_budget": budget}
         return choices.with_changes(self.scenario, choice.changes), {
             "asked": {name: value for name, value in goals.items() if value is not None},
@@ -109,13 +109,14 @@ class _Search:
             "expected": {
                 "errors": {kind: float(f"{pair[0]:.6g}") for kind, pair in choice.errors.items()},
                 "at_most": {kind: float(f"{choice.errors[kind][1]:.6g}") for kind in self.limits},
-                "seconds": round(here - self.begun + choice.seconds, 1),
+                "seconds": round(now - self.begun + choice.seconds, 1),
             },
             "by": findings.source,
-            "pilot_seconds": round(here - self.began_here, 3),
+            "pilot_seconds": round(now - self.began_here, 3),
         }
 
     def _choose_by_tolerance(self) -> tuple[_Findings, Option]:
+        """Return the measured errors, and the cheapest option within the tolerance with the seconds it will take."""
         findings = self._measure()
         rays = int(cheapest(self._options(findings), self.limits).changes.get("scan.rays_per_pulse", max(self.rays)))
         self.times.calibrate(rays, *self._trial.time_scan(self.rays[rays]))
@@ -123,16 +124,23 @@ class _Search:
         return findings, cheapest(self._options(findings), self.limits)
 
     def _choose_by_time(self, budget: float) -> tuple[_Findings, Option]:
+        """Return the errors, and the option with the smallest error that fits a budget (s from the job's begin).
+
+        From cheap to dear: the shipped table alone, then a timed scan with the fewest rays, then the relief and as many
+        rays as a tenth of the time left allows.
+        """
+
         def left() -> float:
+            """Return the seconds of the budget that are left now."""
             return budget - (time.perf_counter() - self.begun)
 
-        fewest, times = min(self.rays), self.times
-        seconds = times.model_seconds(0) + times.scan_seconds(fewest) + times.other_seconds(self.scenario)
+        fewest_rays, times = min(self.rays), self.times
+        seconds = times.model_seconds(0) + times.scan_seconds(fewest_rays) + times.other_seconds(self.scenario)
         if seconds > _HOPELESS * left():  # by the shipped table, before anything is built
             raise too_short_error(left(), seconds)
-        times.calibrate(fewest, *self._try_model(self.models[0]).time_scan(self.rays[fewest]))
-        if (fastest := times.scan_seconds(fewest) + times.other_seconds(self.scenario)) > left():
-            raise too_short_error(left(), fastest)
+        times.calibrate(fewest_rays, *self._try_model(self.models[0]).time_scan(self.rays[fewest_rays]))
+        if (fastest_seconds := times.scan_seconds(fewest_rays) + times.other_seconds(self.scenario)) > left():
+            raise too_short_error(left(), fastest_seconds)
         self._time_relief()
         self._time_many_rays(_TIMING * left())
         # The error of the height follows from the model, without a measurement.
@@ -144,22 +152,24 @@ class _Search:
         if (octaves := max(self.octaves, default=2)) > 2:
             self.times.relief = octaves, self._trial.time_relief(self.rays[min(self.rays)], octaves)
 
-    def _time_many_rays(self, most: float) -> None:
+    def _time_many_rays(self, most_seconds: float) -> None:
         """Time the largest number of rays per pulse whose timing is expected to take at most so many seconds."""
         while True:
-            fitting = [rays for rays in self.rays if TIMED_SHARE * self.times.scan_seconds(rays) <= most]
-            if (rays := max(fitting, default=0)) <= max(self.times.timed):
+            affordable_rays = [
+                rays for rays in self.rays if TIMED_SHARE * self.times.scan_seconds(rays) <= most_seconds
+            ]
+            if (rays := max(affordable_rays, default=0)) <= max(self.times.timed):
                 return
             self.times.calibrate(rays, *self._trial.time_scan(self.rays[rays]))
 
     def _measure(self) -> _Findings:
         """Return errors measured in trials; those of beam and colours only if the tolerance limits them."""
-        limited = set(self.limits)
-        beam = self._measure_beam() if _BEAM & limited else {(self.models[0], min(self.rays)): {}}
+        limited_kinds = set(self.limits)
+        beam = self._measure_beam() if _BEAM & limited_kinds else {(self.models[0], min(self.rays)): {}}
         if self.trial is None:
             self._try_model(self.models[0])
         colour: Mapping[str, Errors] = {name: {} for name in self.colours}
-        if self.colours and _COLOURS & limited:
+        if self.colours and _COLOURS & limited_kinds:
             colour = self._trial.colour_errors(self.colours, self.scenario.coloured_layers)
         return _Findings(beam, self._trial.relief_errors(self.octaves) if self.octaves else {}, colour)
 
@@ -172,18 +182,22 @@ class _Search:
                 points[model, rays] = trial.points(rings)
                 # The truth, colours and relief are measured afterwards: a fifth of it, by and large.
                 self.progress("choice", 0.8 * (number + step / len(self.rays)) / len(self.models))
-        exact = self.rays.get(CONVERGED) == RINGS[CONVERGED]
-        truth = points[self.models[-1], CONVERGED] if exact else self._trial.points()
-        return {knobs: beam_errors(mine, truth) for knobs, mine in points.items()}
+        has_converged_rays = self.rays.get(CONVERGED) == RINGS[CONVERGED]
+        truth = points[self.models[-1], CONVERGED] if has_converged_rays else self._trial.points()
+        return {knobs: beam_errors(point_blocks, truth) for knobs, point_blocks in points.items()}
 
     def _table_errors(self) -> _Findings:
         """Return the errors of all options from the shipped table instead of from measurements."""
         table, beam = self.times.table, {}
         for model in self.models:
-            few = model is not None and model.detail < FIDELITIES["standard"].vegetation_detail
-            few = few and self.scenario.vegetation_detail is None  # as many plants as are wanted otherwise
+            has_few_plants = model is not None and model.detail < FIDELITIES["standard"].vegetation_detail
+            has_few_plants = (
+                has_few_plants and self.scenario.vegetation_detail is None
+            )  # as many plants as are wanted otherwise
             for rays in self.rays if model == self.models[-1] else (min(self.rays),):
-                beam[model, rays] = _exact({**nearest_row(table.beam, rays), **(table.few_plants if few else {})})
+                beam[model, rays] = _exact(
+                    {**nearest_row(table.beam, rays), **(table.few_plants if has_few_plants else {})}
+                )
         relief = {octaves: _exact({"relief": nearest_row(table.relief, octaves)}) for octaves in self.octaves}
         kinds = [kind for kind in sorted(_COLOURS) if has_kind(self.scenario, kind)]
         colour = {name: _exact({kind: table.colour[name][kind] for kind in kinds}) for name in self.colours}
@@ -191,9 +205,12 @@ class _Search:
 
     def _reference_errors(self) -> dict[str, float]:
         """Return the standard fidelity's error of each kind, by which errors are weighed against each other."""
-        table, standard = self.times.table, FIDELITIES["standard"]
-        errors = {"height": standard.tolerance, "relief": nearest_row(table.relief, standard.relief_octaves)}
-        errors |= {**nearest_row(table.beam, standard.rays_per_pulse), **table.colour["standard"]}
+        table, standard_fidelity = self.times.table, FIDELITIES["standard"]
+        errors = {
+            "height": standard_fidelity.tolerance,
+            "relief": nearest_row(table.relief, standard_fidelity.relief_octaves),
+        }
+        errors |= {**nearest_row(table.beam, standard_fidelity.rays_per_pulse), **table.colour["standard"]}
         return {kind: error for kind, error in errors.items() if error > 0.0}
 
     def _options(self, findings: _Findings) -> Knobs:
@@ -204,8 +221,8 @@ class _Search:
             for octaves, errors in findings.relief.items()
         ]
         colour = [self._colour_option(name, errors) for name, errors in findings.colour.items()]
-        rest = [Option({}, {}, 0.0, self.times.other_seconds(self.scenario))]
-        return [options for options in (beam, relief, colour, rest) if options]
+        other_work = [Option({}, {}, 0.0, self.times.other_seconds(self.scenario))]
+        return [options for options in (beam, relief, colour, other_work) if options]
 
     def _beam_option(self, model: ModelKnobs | None, rays: int, errors: Errors) -> Option:
         """Return the option of a model and rays per pulse; its seconds include building a model that isn't open."""
@@ -213,20 +230,26 @@ class _Search:
         changes: dict[str, Any] = {"scan.rays_per_pulse": rays} if self.scenario.scan.beam_rings is None else {}
         if model is None:
             return Option(changes, errors, cost, seconds)
-        estimate, bound = errors.get("position", (0.0, 0.0))
+        estimate, upper_bound = errors.get("position", (0.0, 0.0))
         # The model's vertices lie on the surface: heights are off by its tolerance at most, positions by half of it.
-        errors = {**errors, "height": (model.tolerance,) * 2, "position": (estimate, bound + model.tolerance / 2.0)}
+        errors = {
+            **errors,
+            "height": (model.tolerance,) * 2,
+            "position": (estimate, upper_bound + model.tolerance / 2.0),
+        }
         if self.trial is None or model != self.trial[0]:
             seconds += self.build_seconds.get(model, self.times.model_seconds(self.models.index(model)))
         return Option({**model.changes, **changes}, errors, cost + 0.5 * model.detail, seconds)
 
     def _colour_option(self, name: str, errors: Errors) -> Option:
+        """Return the option of a colour source with its errors, cost and seconds."""
         changes = self.colours[name]
         work = changes["colour.source"], *self._trial.count_images(changes)
         return Option(changes, errors, self.times.colour_cost(*work), self.times.colour_seconds(*work))
 
     @property
     def _trial(self) -> Trial:
+        """Return the trial of the model that was built last."""
         assert self.trial is not None
         return self.trial[1]
 
@@ -240,4 +263,5 @@ class _Search:
 
 
 def _exact(errors: Mapping[str, float]) -> Errors:
+    """Return errors whose upper bounds are their estimates: a table's are taken as they are."""
     return {kind: (error, error) for kind, error in errors.items()}

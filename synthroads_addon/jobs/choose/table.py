@@ -55,8 +55,10 @@ class Table:
         """Return the seconds per pulse for a number of rays, interpolated linearly between measured numbers."""
         rows = sorted((int(number), 1e-6 * value) for number, value in self.pulse.items())
         rays = max(rays, rows[0][0])
-        (a, low), (b, high) = next((pair for pair in pairwise(rows) if rays <= pair[1][0]), (rows[-2], rows[-1]))
-        return low + (high - low) * (rays - a) / (b - a)
+        (rays_below, seconds_below), (rays_above, seconds_above) = next(
+            (pair for pair in pairwise(rows) if rays <= pair[1][0]), (rows[-2], rows[-1])
+        )
+        return seconds_below + (seconds_above - seconds_below) * (rays - rays_below) / (rays_above - rays_below)
 
 
 @cache
@@ -108,13 +110,14 @@ class JobTimes:
         """
         seconds = self._table_seconds(rays)
         if len(self.timed) > 1:
-            (few, less), *_, (many, more) = sorted(self.timed.items())
-            begin, end = self._table_seconds(few), self._table_seconds(many)
-            if begin < end and less < more:  # else the clock or the table shows no difference
-                return less + (more - less) * (seconds - begin) / (end - begin)
+            (few_rays, few_seconds), *_, (many_rays, many_seconds) = sorted(self.timed.items())
+            table_few, table_many = self._table_seconds(few_rays), self._table_seconds(many_rays)
+            if table_few < table_many and few_seconds < many_seconds:  # else the clock or the table shows no difference
+                return few_seconds + (many_seconds - few_seconds) * (seconds - table_few) / (table_many - table_few)
         return seconds * self.speed
 
     def _table_seconds(self, rays: int) -> float:
+        """Return the seconds of the whole scan on the table's machine for a number of rays per pulse."""
         return self.pulses * self.table.pulse_seconds(rays)
 
     def model_seconds(self, number: int) -> float:
@@ -127,20 +130,23 @@ class JobTimes:
         Where some were timed the table only says how others compare to them. It has processor seconds, and `speed` is a
         second here for one of the table's cores together.
         """
-        if self.relief is not None and (timed := self._extra_octaves(self.relief[0])) > 0.0:
-            return self.relief[1] * self._extra_octaves(octaves) / timed
+        if self.relief is not None and (timed_cost := self._extra_octaves(self.relief[0])) > 0.0:
+            return self.relief[1] * self._extra_octaves(octaves) / timed_cost
         return self._extra_octaves(octaves) * 1e-6 * self.points * self.speed / self.table.cores
 
     def _extra_octaves(self, octaves: int) -> float:
+        """Return the table's microseconds per point that octaves cost beyond the two that every scan has."""
         return max(0.0, nearest_row(self.table.octave, octaves) - nearest_row(self.table.octave, 2))
 
     def colour_seconds(self, source: str, images: int, megapixels: float) -> float:
         """Return the additional seconds of a colour source beyond the materials' mean colours."""
         if source == "material":
             return 0.0
-        first, each, pixel = self.table.image if source == "images" else (0.0, 0.0, 0.0)
-        rendered = first + each * images + pixel * megapixels
-        return (rendered + 1e-6 * self.table.sample[source] * self.points) * self.speed
+        seconds_before, seconds_per_image, seconds_per_megapixel = (
+            self.table.image if source == "images" else (0.0, 0.0, 0.0)
+        )
+        rendering_seconds = seconds_before + seconds_per_image * images + seconds_per_megapixel * megapixels
+        return (rendering_seconds + 1e-6 * self.table.sample[source] * self.points) * self.speed
 
     def colour_cost(self, source: str, images: int, megapixels: float) -> float:
         """Return a colour source's cost in megapixels rendered, independent of the machine."""

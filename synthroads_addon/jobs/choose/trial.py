@@ -73,11 +73,11 @@ class Trial:
     def of(cls, site: Site, scene: ScannedScene) -> Self:
         """Return a trial of a scene, without range noise; plans the scan and builds its ray casters."""
         receiver = site.scenario.scan.receiver.model_copy(update={"threshold_to_noise": 0.0})
-        quiet = site.scenario.scan.model_copy(
+        noiseless_scan = site.scenario.scan.model_copy(
             update={"noise": Noise(range_sigma=0.0), "receiver": receiver, "strip_errors": StripErrors()}
         )
         colour = site.scenario.colour.model_copy(update={"intensity_from_layers": "never"})
-        scenario = site.scenario.model_copy(update={"scan": quiet, "colour": colour})
+        scenario = site.scenario.model_copy(update={"scan": noiseless_scan, "colour": colour})
         site = replace(site, scenario=scenario, view=None)
         return cls(site, site.plan(scene, BlenderServices()))
 
@@ -100,7 +100,7 @@ class Trial:
 
     def relief_errors(self, octaves: Iterable[int]) -> dict[int, Errors]:
         """Return the micro-relief's position error (m, 95th percentile, with bound) by number of octaves."""
-        results = [one for one in self.scan_lines(RINGS[1]) if len(one.points)]
+        results = [result for result in self.scan_lines(RINGS[1]) if len(result.points)]
         truth = shift_points(results, self.plan, FINEST)
         return {number: relief_errors(shift_points(results, self.plan, number), truth) for number in octaves}
 
@@ -113,22 +113,28 @@ class Trial:
             choices: name -> changes of the scenario.
             layers: ``rgb`` and names of layers.
         """
-        seen = [one.seen for one in self.scan_lines(RINGS[1], _COLOURED) if one.seen is not None and len(one.seen)]
-        request = replace(self.layer_request({}), wanted=layers, pick=lambda views: views_near(views, seen))
-        true = truest_settings(request)
-        truth = render_layers(replace(request, settings=true), seen)
+        seen_points = [
+            result.seen
+            for result in self.scan_lines(RINGS[1], _COLOURED)
+            if result.seen is not None and len(result.seen)
+        ]
+        request = replace(self.layer_request({}), wanted=layers, pick=lambda views: views_near(views, seen_points))
+        true_settings = truest_settings(request)
+        truth = render_layers(replace(request, settings=true_settings), seen_points)
         errors = {}
         for name, changes in choices.items():
             settings = self.layer_request(changes).settings
-            mine = truth if settings == true else render_layers(replace(request, settings=settings), seen)
-            errors[name] = colour_errors(mine, truth, layers)
+            values = (
+                truth if settings == true_settings else render_layers(replace(request, settings=settings), seen_points)
+            )
+            errors[name] = colour_errors(values, truth, layers)
         return errors
 
     def layer_request(self, changes: Mapping[str, Any]) -> LayerRequest:
         """Return the plan's request for colours and layers with the scenario's `colour` fields changed."""
-        given = {path.removeprefix("colour."): value for path, value in changes.items()}
+        colour_fields = {path.removeprefix("colour."): value for path, value in changes.items()}
         scenario = self.site.scenario
-        colour = type(scenario.colour).from_dict(scenario.colour.to_dict() | given)
+        colour = type(scenario.colour).from_dict(scenario.colour.to_dict() | colour_fields)
         assert self.plan.layers.request is not None
         settings = colour.settings(scenario.fidelity, self.plan.path.typical_range)
         return replace(self.plan.layers.request, settings=settings)
@@ -148,20 +154,23 @@ class Trial:
         more, and the shorter time counts, as other work on the machine may have disturbed one. Colours are the
         materials' means and the relief is the coarsest: what more than that costs is known apart.
         """
-        few, many = (self._few, _FEW_SHARE), (2 * self._few, 2.0 * _FEW_SHARE)
-        _, (less, before, _), (more, late, points), (_, after, _) = [
-            self._time_stretches(rings, *stretches) for stretches in (few, few, many, few)
+        few_stretches, many_stretches = (self._few, _FEW_SHARE), (2 * self._few, 2.0 * _FEW_SHARE)
+        _, (few_pulses, seconds_before, _), (many_pulses, many_seconds, points), (_, seconds_after, _) = [
+            self._time_stretches(rings, *stretches)
+            for stretches in (few_stretches, few_stretches, many_stretches, few_stretches)
         ]
-        return _project((less, min(before, after)), (more, late), self.pulses), round(points * self.pulses / more)
+        return _project(
+            (few_pulses, min(seconds_before, seconds_after)), (many_pulses, many_seconds), self.pulses
+        ), round(points * self.pulses / many_pulses)
 
     def time_relief(self, rings: tuple[int, ...], octaves: int) -> float:
         """Measure stretches and return the projected seconds that so many octaves take beyond two in the whole scan.
 
         Stretches with and without them take turns, and the shorter of two times counts, as in `time_scan`.
         """
-        turns = (2, octaves, 2, octaves)
-        timed = [self._time_stretches(rings, self._few, _FEW_SHARE, number) for number in turns]
-        pulses, seconds = timed[0][0], [took for _, took, _ in timed]
+        octaves_in_turn = (2, octaves, 2, octaves)
+        measurements = [self._time_stretches(rings, self._few, _FEW_SHARE, number) for number in octaves_in_turn]
+        pulses, seconds = measurements[0][0], [duration for _, duration, _ in measurements]
         return max(0.0, min(seconds[1::2]) - min(seconds[::2])) * self.pulses / pulses
 
     @property
@@ -190,15 +199,16 @@ class Trial:
         return sum(map(plan.pulse_count, plan.path.strips)), seconds, files.counts.points
 
 
-def _project(few: tuple[int, float], many: tuple[int, float], pulses: int) -> float:
+def _project(few_run: tuple[int, float], many_run: tuple[int, float], pulses: int) -> float:
     """Return the seconds that so many pulses take, by the numbers and seconds of few pulses and of many.
 
     No scan takes longer per pulse than a shorter one, nor less time in all: where the clock says so other work on the
     machine disturbed it, and the shorter time per pulse counts.
     """
-    (less, soon), (more, late) = few, many
-    rate = min(soon / less, late / more)
-    late = rate * more
-    if more > less and late > soon:
-        rate = min(rate, (late - soon) / (more - less))
-    return late + rate * (pulses - more)
+    (few_pulses, few_seconds), (many_pulses, many_seconds) = few_run, many_run
+    # Seconds per pulse; where both runs show a fixed part as well, the slope between them.
+    rate = min(few_seconds / few_pulses, many_seconds / many_pulses)
+    many_seconds = rate * many_pulses
+    if many_pulses > few_pulses and many_seconds > few_seconds:
+        rate = min(rate, (many_seconds - few_seconds) / (many_pulses - few_pulses))
+    return many_seconds + rate * (pulses - many_pulses)

@@ -105,6 +105,7 @@ def dask_workers(cluster: Cluster) -> Submit:
         raise InputError("--scheduler", address, f"no scheduler answers there ({error})") from None
 
     def submit(folders: list[str]) -> Iterator[Outcome]:
+        """Have the tasks in folders done by the cluster's workers, and yield how each ended."""
         with client:
             futures = client.map(run_on_worker, folders, key=folders, retries=ATTEMPTS, pure=False)
             for future in _ended_futures(client, futures, WorkerAbsence(address, cluster.worker_timeout)):
@@ -117,15 +118,15 @@ def _ended_futures(client: Any, futures: list[Any], absence: WorkerAbsence) -> I
     """Yield Dask futures as they end; raises an InputError if the cluster has no worker for too long."""
     from distributed import as_completed as completed  # an optional package
 
-    ending, looked = completed(futures, loop=client.loop, raise_errors=False), 0.0
-    while not ending.is_empty():
-        if ending.has_ready():
-            yield from ending.next_batch(block=False)
+    iterator, last_look = completed(futures, loop=client.loop, raise_errors=False), 0.0
+    while not iterator.is_empty():
+        if iterator.has_ready():
+            yield from iterator.next_batch(block=False)
             continue
         time.sleep(_TICK)
-        if client.status == "running" and time.monotonic() - looked >= _LOOK:
-            looked = time.monotonic()
-            absence.update(len(client.scheduler_info(n_workers=-1)["workers"]), looked)
+        if client.status == "running" and time.monotonic() - last_look >= _LOOK:
+            last_look = time.monotonic()
+            absence.update(len(client.scheduler_info(n_workers=-1)["workers"]), last_look)
 
 
 def _outcome(future: Any, address: str) -> Outcome:

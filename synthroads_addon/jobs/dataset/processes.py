@@ -102,6 +102,7 @@ def _run_process(path: Path, threads: int, stopping: Stop) -> int:
 
 
 def _reason(code: int, log: Path) -> str:
+    """Return why a process failed, by its exit code and the last line of its log."""
     if code == EXIT_CODE:
         return f"its process was terminated, {ATTEMPTS} times"
     if code < 0:
@@ -120,17 +121,19 @@ def local_processes(jobs: int) -> Submit:
     threads = max(1, available_cores() // jobs)
 
     def submit(folders: list[str]) -> Iterator[Outcome]:
+        """Run the tasks in folders, so many at once, and yield how each ended; stops all if it is closed early."""
         stopping = Event()
         pool = ThreadPoolExecutor(jobs)
         folders_begun: list[str] = []
-        ended: list[str] = []
+        folders_ended: list[str] = []
 
         def task(folder: str) -> Outcome:
+            """Run the task in a folder, and note when a thread begins with it and ends."""
             folders_begun.append(folder)
             try:
                 return run_task(folder, threads, stopping)
             finally:
-                ended.append(folder)
+                folders_ended.append(folder)
 
         try:
             for future in as_completed([pool.submit(task, folder) for folder in folders]):
@@ -139,7 +142,7 @@ def local_processes(jobs: int) -> Submit:
             stopping.set()
             pool.shutdown(wait=True, cancel_futures=True)
             # The pool doesn't know, and doesn't wait for, a thread that was just starting when the user interrupted.
-            while len(ended) < len(folders_begun):
+            while len(folders_ended) < len(folders_begun):
                 time.sleep(_TICK)
 
     return submit

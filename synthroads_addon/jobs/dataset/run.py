@@ -113,19 +113,21 @@ class DatasetRun:
                     self._abandon()
                     raise
         except OSError as error:
-            again = "; what is done stays, --resume continues" if self.entries else ""
-            raise OutputError("--output", str(self.folder), f"cannot be written ({error.strerror}){again}") from None
+            resume_text = "; what is done stays, --resume continues" if self.entries else ""
+            raise OutputError(
+                "--output", str(self.folder), f"cannot be written ({error.strerror}){resume_text}"
+            ) from None
         return self._manifest()
 
     def _make(self, submit: Submit) -> None:
         """Make the missing scenes of the chosen splits, and publish each when it is complete."""
-        chosen = [job for job in self.jobs if self.splits is None or job.split in self.splits]
-        jobs = [job for job in chosen if not self._is_done(job)]
-        first = len(chosen) - len(jobs)
-        self.progress("scenes", first / len(chosen))
+        chosen_jobs = [job for job in self.jobs if self.splits is None or job.split in self.splits]
+        jobs = [job for job in chosen_jobs if not self._is_done(job)]
+        done_before = len(chosen_jobs) - len(jobs)
+        self.progress("scenes", done_before / len(chosen_jobs))
         for number, outcome in enumerate(submit([self._write_task(job) for job in jobs]), start=1):
             self._publish(outcome)
-            self.progress("scenes", (first + number) / len(chosen))
+            self.progress("scenes", (done_before + number) / len(chosen_jobs))
 
     def _open_folder(self) -> None:
         """Check that the folder is empty, or take over or remove the data set in it as requested."""
@@ -180,11 +182,11 @@ class DatasetRun:
                 raise InputError(str(path), None, f"is damaged ({error}); remove {WORK}") from None
         return names
 
-    def _unrecorded_folders(self, known: Set[str] = frozenset()) -> list[Path]:
-        """Return existing folders named as scenes of the recipe that are neither recorded nor in ``known``."""
-        there = {name for entry in self.entries.values() for name in entry.folders or ()} | known
+    def _unrecorded_folders(self, known_names: Set[str] = frozenset()) -> list[Path]:
+        """Return existing folders named as scenes of the recipe that are neither recorded nor in ``known_names``."""
+        recorded_names = {name for entry in self.entries.values() for name in entry.folders or ()} | known_names
         paths = [path for pattern in PUBLISHED for path in sorted(self.folder.glob(pattern)) if self._is_scenes(path)]
-        return [path for path in paths if path.relative_to(self.folder).as_posix() not in there]
+        return [path for path in paths if path.relative_to(self.folder).as_posix() not in recorded_names]
 
     def _remove_unrecorded(self) -> None:
         """Remove what an interrupted run has published and not recorded."""
@@ -197,12 +199,13 @@ class DatasetRun:
 
     def _is_scenes(self, path: Path) -> bool:
         """Return whether a folder's name is that of a scene of the recipe."""
-        top = path.relative_to(self.folder).parts[0]
-        if top == "semantickitti":
+        top_folder = path.relative_to(self.folder).parts[0]
+        if top_folder == "semantickitti":
             return path.name in self._sequences
-        return (path.name if top == "scenes" else path.name.rpartition("-")[0]) in self._names
+        return (path.name if top_folder == "scenes" else path.name.rpartition("-")[0]) in self._names
 
     def _is_done(self, job: SceneJob) -> bool:
+        """Return whether a scene is among those done or failed."""
         return job.name in self.entries
 
     def _write_task(self, job: SceneJob) -> str:
@@ -215,7 +218,7 @@ class DatasetRun:
         """Publish the files of a complete scene, or log its failure, and record it in the manifest."""
         task = json.loads((outcome.folder / TASK).read_text(encoding="utf-8"))
         job = self.jobs[task["number"]]
-        about: dict[str, Any] = {"name": job.name, "split": job.split, "seed": job.scenario.seed}
+        scene_fields: dict[str, Any] = {"name": job.name, "split": job.split, "seed": job.scenario.seed}
         if outcome.error is None:
             result = json.loads((outcome.folder / DONE).read_text(encoding="utf-8"))
             for name in result["folders"]:
@@ -223,13 +226,13 @@ class DatasetRun:
                 target.parent.mkdir(parents=True, exist_ok=True)
                 (outcome.folder / FILES / name).rename(target)
             self._describe_layouts()  # before it is recorded: a set that is stopped now can be learned from
-            entry = SceneEntry.from_dict({**about, "status": "done", **result}, "scene")
+            entry = SceneEntry.from_dict({**scene_fields, "status": "done", **result}, "scene")
             (outcome.folder / "report.json").replace(self._place(f"logs/{job.name}.json"))
             if not entry.points:
                 _logger.warning("warning: %s: no pulse came back", job.name)
             _logger.debug("%s is done: %s points", job.name, f"{entry.points:,}")
         else:
-            entry = SceneEntry.from_dict({**about, "status": "failed", "error": outcome.error}, "scene")
+            entry = SceneEntry.from_dict({**scene_fields, "status": "failed", "error": outcome.error}, "scene")
             with suppress(FileNotFoundError):  # of a lost worker there is none
                 (outcome.folder / "log.txt").replace(self._place(f"logs/{job.name}.txt"))
             _logger.error("failed: %s: %s", job.name, outcome.error)
@@ -273,4 +276,5 @@ class DatasetRun:
 
     @cached_property
     def _layout_texts(self) -> dict[str, str]:
+        """Return the descriptions of the recipe's layouts by file name; cached."""
         return layout_descriptions(self.recipe, self.jobs)

@@ -69,16 +69,16 @@ def make_scene(folder: Path, plan: StreamPlan, number: int, stopping: Stop, thre
     outcome = run_task(str(work), threads, stopping)
     if stopping.is_set():
         return
-    about: dict[str, Any] = {"name": job.name, "split": job.split, "seed": job.scenario.seed}
+    scene_fields: dict[str, Any] = {"name": job.name, "split": job.split, "seed": job.scenario.seed}
     files = outcome.folder / FILES
     if outcome.error is None:
         result = json.loads((outcome.folder / DONE).read_text(encoding="utf-8"))
-        entry = SceneEntry.from_dict({**about, "status": "done", **result}, "scene")
+        entry = SceneEntry.from_dict({**scene_fields, "status": "done", **result}, "scene")
     elif _is_of_scenario(outcome.folder):
         # The same seed fails again: the training goes on without it, each time that it is done again.
         shutil.rmtree(files, ignore_errors=True)
         files.mkdir()
-        entry = SceneEntry.from_dict({**about, "status": "failed", "error": outcome.error}, "scene")
+        entry = SceneEntry.from_dict({**scene_fields, "status": "failed", "error": outcome.error}, "scene")
     else:
         raise SceneFailedError(Failure(number=number, name=job.name, error=outcome.error))
     publish(folder, number, files, entry, plan)
@@ -113,8 +113,8 @@ def produce(folder: Path, producers: int, make: Make, stopping: threading.Event)
                     running.pop(number).result()
                 numbers = [k for k in read_wanted(folder) if k not in running and not is_made(folder, k)]
                 # What was removed since is no longer wanted: that is said before it is removed.
-                still = read_wanted(folder)
-                for number in [k for k in numbers if k in still][: producers - len(running)]:
+                still_requested = read_wanted(folder)
+                for number in [k for k in numbers if k in still_requested][: producers - len(running)]:
                     running[number] = pool.submit(make, folder, plan, number, stopping)
         finally:
             stopping.set()
@@ -124,17 +124,17 @@ def serve(folder: Path, producers: int, make: Make, patience: float = _PATIENCE)
     """Make scenes until standard input is closed; return the exit code, 2 if there is a failure, which is written."""
     stopping = threading.Event()
     threading.Thread(target=_stop_with_parent, args=(stopping,), daemon=True).start()
-    waited = 0.0
+    waited_seconds = 0.0
     while not stopping.is_set():
         try:
             with exclusive(folder / LOCK):
                 _serve_alone(folder, producers, make, stopping)
             return 0
         except LockHeldError:
-            if waited >= patience:
+            if waited_seconds >= patience:
                 write_failure(folder, Failure(number=0, error="another training is running in this folder"))
                 return 2
-            waited += _TICK
+            waited_seconds += _TICK
             stopping.wait(_TICK)
         except SceneFailedError as failed:
             write_failure(folder, failed.failure)

@@ -71,32 +71,32 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         record_cloud([plan], files, timer)
         seconds, memory = timer.seconds, peak_memory_mb()
         # The scene, its caster and the materials are the same for every number of rays.
-        bare = replace(plan, layers=replace(plan.layers, seen_points=False, measured=frozenset()))
-        casting = {rays: _measure_casting(with_rings(bare, RINGS[rays])) for rays in _RAYS}
+        bare_plan = replace(plan, layers=replace(plan.layers, seen_points=False, measured=frozenset()))
+        casting = {rays: _measure_casting(with_rings(bare_plan, RINGS[rays])) for rays in _RAYS}
         writing = _measure_writing(files)
         rates = casting[plan.rays_per_pulse]
         scanning = timer.stages["scan"]["seconds"]
         assert scanning is not None
-        whole = _scan_rate(files, scanning, rates, writing)
-        floors = [*casting.values(), writing, whole]
+        scan_rate = _scan_rate(files, scanning, rates, writing)
+        floors = [*casting.values(), writing, scan_rate]
         assert plan.layers.request is not None
         if scenario.colour.source != "material":
             floors.append(measure_rendering(plan.layers.request, _VIEWS))
-    edit, edited = panel_edit(model, road.parameters)
-    building = sum(timer.stages[name]["seconds"] or 0.0 for name in ("parameters", "model", "scene mesh"))
-    least = files.counts.points / whole["floor"] / 1e6
+    edit_seconds, edited_triangles = panel_edit(model, road.parameters)
+    building_seconds = sum(timer.stages[name]["seconds"] or 0.0 for name in ("parameters", "model", "scene mesh"))
+    least_seconds = files.counts.points / scan_rate["floor"] / 1e6
     lines = {
         "points": files.counts.points / 1e6,
         "memory_mb": memory,
-        "job": seconds / least,
-        "model": building / bare_mesh_seconds(plan.target.triangles),
-        "panel_edit": edit / bare_mesh_seconds(edited),
+        "job": seconds / least_seconds,
+        "model": building_seconds / bare_mesh_seconds(plan.target.triangles),
+        "panel_edit": edit_seconds / bare_mesh_seconds(edited_triangles),
         "casting": 100.0 * rates["ours"] / rates["floor"],
         "writing": 100.0 * writing["ours"] / writing["floor"],
     }
     if scenario.colour.source != "material":
         lines["rendering"] = 100.0 * floors[-1]["ours"] / floors[-1]["floor"]
-    stages = timer.stages | {"panel edit": {"seconds": edit, "peak_memory_mb": None}}
+    stages = timer.stages | {"panel edit": {"seconds": edit_seconds, "peak_memory_mb": None}}
     return {"stages": stages, "lines": lines, "floors": floors}
 
 
@@ -109,9 +109,9 @@ def _scan_rate(files: CloudFiles, seconds: float, casting: Rate, writing: Rate) 
         casting, writing: rates of these, with as many rays per pulse as the scan's.
     """
     counts = files.counts
-    least = counts.rays / casting["floor"] + counts.points / writing["floor"]
+    least_seconds = counts.rays / casting["floor"] + counts.points / writing["floor"]
     name = "scan; Embree and lazrs alone, one after the other"
-    rates = {"ours": counts.points / seconds / 1e6, "floor": counts.points / least}
+    rates = {"ours": counts.points / seconds / 1e6, "floor": counts.points / least_seconds}
     return {"name": name, "unit": "million points/s", **rates}
 
 
@@ -123,12 +123,14 @@ def _measure_casting(plan: ScanPlan) -> Rate:
     threads, caster = available_cores(), plan.target._parts[0].caster
     blocks = spread_blocks(plan, _CAST_BLOCKS)
     origins, directions = rays_of_blocks(plan, blocks)
-    few = replace(plan, run=replace(plan.run, chosen_blocks=blocks, threads=threads))
+    sampled_plan = replace(plan, run=replace(plan.run, chosen_blocks=blocks, threads=threads))
 
     def ours() -> float:
-        return len(origins) / seconds_of(lambda: deque(scan_blocks(few), maxlen=0))
+        """Return the rays per second of casting with radiometry."""
+        return len(origins) / seconds_of(lambda: deque(scan_blocks(sampled_plan), maxlen=0))
 
     def floor() -> float:
+        """Return the rays per second of the bare caster."""
         limit = plan.setting.maximum_range
         return bare_rate(caster, origins, directions, limit, threads, repeats=1).rays_per_second
 
@@ -139,7 +141,7 @@ def _measure_casting(plan: ScanPlan) -> Rate:
 def _best_rates(ours: Callable[[], float], floor: Callable[[], float]) -> dict[str, float]:
     """Return the best rates, in millions per second, of two functions called in turn; disturbances hit both."""
     rates = [(ours(), floor()) for _ in range(_TURNS)]
-    return {"ours": max(rate for rate, _ in rates) / 1e6, "floor": max(bare for _, bare in rates) / 1e6}
+    return {"ours": max(rate for rate, _ in rates) / 1e6, "floor": max(floor_rate for _, floor_rate in rates) / 1e6}
 
 
 def _measure_writing(files: CloudFiles) -> Rate:
@@ -153,17 +155,19 @@ def _measure_writing(files: CloudFiles) -> Rate:
     count = sum(map(len, blocks))
 
     def ours() -> None:
+        """Write the blocks by the job's own writer."""
         with files.open_writer("ours.laz") as writer:
             for block in blocks:
                 writer.write(block)
 
     ours()
-    written = laspy.read(folder / "ours.laz")
+    written_cloud = laspy.read(folder / "ours.laz")
 
     def floor() -> None:
+        """Write the same points by lazrs alone."""
         backend = laspy.LazBackend.LazrsParallel
-        with laspy.open(folder / "bare.laz", "w", header=written.header, laz_backend=backend) as writer:
-            writer.point_writer.write_points(written.points)  # without laspy's bookkeeping
+        with laspy.open(folder / "bare.laz", "w", header=written_cloud.header, laz_backend=backend) as writer:
+            writer.point_writer.write_points(written_cloud.points)  # without laspy's bookkeeping
 
     rates = _best_rates(lambda: count / seconds_of(ours), lambda: count / seconds_of(floor))
     return {"name": "writing LAZ; lazrs alone", "unit": "million points/s", **rates}

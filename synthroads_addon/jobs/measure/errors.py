@@ -47,27 +47,30 @@ FINEST = 8
 """Octaves of the micro-relief that counts as truth."""
 
 
-def match_pulses(mine: PointBlock, truth: PointBlock) -> tuple[PointBlock, PointBlock]:
+def match_pulses(measured: PointBlock, truth: PointBlock) -> tuple[PointBlock, PointBlock]:
     """Return the first returns of pulses in both clouds, in the same order, matched by GPS time."""
-    a, b = (points.select(points.return_number == 1) for points in (mine, truth))
-    _times, first, second = np.intersect1d(a.gps_time, b.gps_time, return_indices=True)
-    return a.select(first), b.select(second)
+    measured_returns, true_returns = (points.select(points.return_number == 1) for points in (measured, truth))
+    _, measured_rows, true_rows = np.intersect1d(measured_returns.gps_time, true_returns.gps_time, return_indices=True)
+    return measured_returns.select(measured_rows), true_returns.select(true_rows)
 
 
-def beam_errors(mine: Sequence[PointBlock], truth: Sequence[PointBlock]) -> Errors:
+def beam_errors(measured: Sequence[PointBlock], truth: Sequence[PointBlock]) -> Errors:
     """Return a cloud's errors against the truth: position (m), intensity, labels, density (shares), with bounds."""
-    pairs = [match_pulses(a, b) for a, b in zip(mine, truth, strict=True)]
+    pairs = [match_pulses(a, b) for a, b in zip(measured, truth, strict=True)]
     position = [np.linalg.norm(a.xyz - b.xyz, axis=1) for a, b in pairs]
     intensity = [np.abs(a.intensity / b.intensity - 1.0) for a, b in pairs]
-    wrong = np.array([float((a.class_id != b.class_id).sum()) for a, b in pairs])
-    number = np.array([float(len(a)) for a, _ in pairs])
-    points, true = (np.array([float(len(one)) for one in several]) for several in (mine, truth))
-    fewer, more = ratio_bound(true - points, true, "density"), ratio_bound(points - true, true, "density")
+    wrong_labels = np.array([float((a.class_id != b.class_id).sum()) for a, b in pairs])
+    counts = np.array([float(len(a)) for a, _ in pairs])
+    point_counts, true_counts = (np.array([float(len(block)) for block in blocks]) for blocks in (measured, truth))
+    deficit, surplus = (
+        ratio_bound(true_counts - point_counts, true_counts, "density"),
+        ratio_bound(point_counts - true_counts, true_counts, "density"),
+    )
     return {
         "position": quantile_bound(position, QUANTILE, "position"),
         "intensity": quantile_bound(intensity, QUANTILE, "intensity"),
-        "labels": ratio_bound(wrong, number, "labels"),
-        "density": (max(fewer[0], more[0]), max(fewer[1], more[1])),
+        "labels": ratio_bound(wrong_labels, counts, "labels"),
+        "density": (max(deficit[0], surplus[0]), max(deficit[1], surplus[1])),
     }
 
 
@@ -76,17 +79,20 @@ def shift_points(results: Sequence[BlockResult], plan: ScanPlan, octaves: int) -
     assert plan.relief.micro is not None
     shift = partial(shift_by_relief, relief=plan.relief.micro, strength=plan.relief.strength, seed=plan.run.seed)
     # As if seen at a right angle: how far a slanting beam carries a height is not the relief's error.
-    seen = (
-        (one.points.with_arrays({"incidence_deg": np.zeros(len(one.points), np.float32)}), one.seen)
-        for one in results
-        if one.seen is not None
+    points_and_places = (
+        (result.points.with_arrays({"incidence_deg": np.zeros(len(result.points), np.float32)}), result.seen)
+        for result in results
+        if result.seen is not None
     )
-    return [shift(points, BeamEnds(at.position, at.normal), octaves=octaves).xyz for points, at in seen]
+    return [
+        shift(points, BeamEnds(place.position, place.normal), octaves=octaves).xyz
+        for points, place in points_and_places
+    ]
 
 
-def relief_errors(mine: Sequence[Float], truth: Sequence[Float]) -> Errors:
+def relief_errors(measured: Sequence[Float], truth: Sequence[Float]) -> Errors:
     """Return the 95th percentile of distances between two sets of shifted points (N, 3), m, with its upper bound."""
-    parts = [np.linalg.norm(a - b, axis=1) for a, b in zip(mine, truth, strict=True)]
+    parts = [np.linalg.norm(a - b, axis=1) for a, b in zip(measured, truth, strict=True)]
     return {"relief": quantile_bound(parts, QUANTILE, "relief")}
 
 
@@ -105,35 +111,36 @@ def render_layers(request: LayerRequest, parts: Sequence[SeenPoints]) -> list[La
         return [sample_points(source, seen, request.wanted) for seen in parts]
 
 
-def colour_errors(mine: Sequence[LayerValues], truth: Sequence[LayerValues], kinds: frozenset[str]) -> Errors:
+def colour_errors(measured: Sequence[LayerValues], truth: Sequence[LayerValues], kinds: frozenset[str]) -> Errors:
     """Return the 95th percentile of CIEDE2000 and the largest RMSE of a layer, with bounds, where truth is known."""
-    parts = [(a, b, known_rows(b)) for a, b in zip(mine, truth, strict=True)]
-    result: Errors = {}
+    parts = [(a, b, known_rows(b)) for a, b in zip(measured, truth, strict=True)]
+    errors: Errors = {}
     if "rgb" in kinds:
-        result["colour"] = quantile_bound([colour_difference(*part) for part in parts], QUANTILE, "colour")
+        errors["colour"] = quantile_bound([colour_difference(*part) for part in parts], QUANTILE, "colour")
     layers = []
     for name in sorted(kinds & set(MATERIAL_LAYERS)):
         squares = [squared_error(name, *part) for part in parts]
-        total, number = np.array([s.sum() for s in squares]), np.array([float(s.size) for s in squares])
-        layers.append(ratio_bound(total, number, name))
+        sums, counts = np.array([s.sum() for s in squares]), np.array([float(s.size) for s in squares])
+        layers.append(ratio_bound(sums, counts, name))
     if layers:
         estimate, bound = max(layers, key=lambda pair: pair[1])
-        result["layers"] = float(np.sqrt(estimate)), float(np.sqrt(bound))
-    return result
+        errors["layers"] = float(np.sqrt(estimate)), float(np.sqrt(bound))
+    return errors
 
 
-def errors_by_source(mine: LayerValues, truth: LayerValues) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
+def errors_by_source(measured: LayerValues, truth: LayerValues) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
     """Return colour and layer errors of all points, and the same by the source of each point's colour."""
-    known = known_rows(truth)
-    difference = colour_difference(mine, truth, known)
-    squares = [squared_error(name, mine, truth, known) for name in MATERIAL_LAYERS]
+    known_mask = known_rows(truth)
+    difference = colour_difference(measured, truth, known_mask)
+    squares = [squared_error(name, measured, truth, known_mask) for name in MATERIAL_LAYERS]
 
     def of(rows: Bool) -> dict[str, float]:
+        """Return the errors of a mask's points by name: median and 95th percentile of colours, RMSE of layers."""
         return {
             "colour_median": round(float(np.median(difference[rows])), 6),
             "colour_95": round(float(np.quantile(difference[rows], QUANTILE)), 6),
             "layers_rmse": round(max(float(np.sqrt(square[rows].mean())) for square in squares), 6),
         }
 
-    names = np.array([source_name(number) for number in range(256)])[mine.source[known]]
+    names = np.array([source_name(number) for number in range(256)])[measured.source[known_mask]]
     return of(np.ones(len(difference), bool)), {str(name): of(names == name) for name in np.unique(names)}

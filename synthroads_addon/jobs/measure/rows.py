@@ -65,37 +65,37 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
         return {"knob": knob, "value": value, "left_out": "a pixel per return needs Blender 5.0 or newer"}
     road = RoadGeometry(sample_road(scenario.road, scenario.seed))
     start = time.process_time()
-    shown = RoadScene.of(scenario, road)
-    shown.build()
-    scene = shown.read()
-    built = time.process_time()
-    plan = shown.plan()
-    ready = time.process_time()
-    costs, sample = _measure_stretches(shown.site, KNOBS[knob], plan)
+    road_scene = RoadScene.of(scenario, road)
+    road_scene.build()
+    scene = road_scene.read()
+    time_built = time.process_time()
+    plan = road_scene.plan()
+    time_ready = time.process_time()
+    costs, sample = _measure_stretches(road_scene.site, KNOBS[knob], plan)
     errors: dict[str, float] = {}
-    more: dict[str, Any] = {}
+    details: dict[str, Any] = {}
     if "relief" in KNOBS[knob].errors:
         errors["relief_mm"] = 1e3 * _relief_error(sample)
     if "colour" in KNOBS[knob].errors:
-        of_colours, more = _colour_errors(KNOBS[knob], sample)
-        errors |= of_colours
+        errors_of_colours, details = _colour_errors(KNOBS[knob], sample)
+        errors |= errors_of_colours
     if "height" in KNOBS[knob].errors:
         errors["height_mm"] = 1e3 * float(np.abs(mesh_height_errors(scene.static, road)).max())
     if "beam" in KNOBS[knob].errors:  # last, as its truth may be another scene
         plants = load_scenario(scenario_name).vegetation_detail or 1.0
-        errors |= _beam_errors(sample, _true_plan(shown, sample.plan, plants))
+        errors |= _beam_errors(sample, _true_plan(road_scene, sample.plan, plants))
     return {
         "knob": knob,
         "value": value,
-        "seconds": round(ready - start + costs["image_seconds"] + costs["scan_seconds"], 3),
-        "model_seconds": round(built - start, 3),
-        "caster_seconds": round(ready - built, 3),
+        "seconds": round(time_ready - start + costs["image_seconds"] + costs["scan_seconds"], 3),
+        "model_seconds": round(time_built - start, 3),
+        "caster_seconds": round(time_ready - time_built, 3),
         "triangles": plan.target.triangles,
         "kernels": plan.summary()["kernels"],
         "machine": machine({"Blender": sys.modules["bpy"].app.version_string}),
         **{name: round(cost, 3) if isinstance(cost, float) else cost for name, cost in costs.items()},
         "errors": {name: round(error, 6) for name, error in errors.items()},
-        **more,
+        **details,
     }
 
 
@@ -126,69 +126,69 @@ def _measure_stretches(site: Site, knob: Knob, plan: ScanPlan) -> tuple[dict[str
         ``scan_seconds`` from there to the file, of the whole path, and ``rays_per_second`` of that;
         ``peak_memory_mb``; ``shares`` of the points by the source of their colour.
     """
-    request, coloured = plan.layers.request, "colour" in knob.errors
+    request, is_coloured = plan.layers.request, "colour" in knob.errors
     assert request is not None
-    if coloured:
+    if is_coloured:
         request = replace(request, wanted=LAYERS)
     path = spread_stretches(plan.path, _STRETCHES, _SECONDS)
-    part = replace(plan, emission=replace(plan.emission, path=path))
-    result = join_results(record_as_measured(part))
+    stretch_plan = replace(plan, emission=replace(plan.emission, path=path))
+    result = join_results(record_as_measured(stretch_plan))
     start = time.process_time()
     with layer_source(request) as source, tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
-        if coloured and result.seen is not None:
+        if is_coloured and result.seen is not None:
             sample_points(source, result.seen.select(slice(0, _FEW)), LAYERS)
-        prepared, rendered = time.process_time(), dict(source.report)
-        files = site.files(Path(folder), part.target.origin)
+        time_prepared, render_report = time.process_time(), dict(source.report)
+        files = site.files(Path(folder), stretch_plan.target.origin)
         with files.open():
-            for block in scan_blocks(part, source):
+            for block in scan_blocks(stretch_plan, source):
                 files.write(block)
-        done, peak, counts = time.process_time(), peak_memory_mb(), files.counts
-        values = sample_points(source, result.seen, LAYERS) if coloured and result.seen is not None else None
-    images, restarts = prepared - start, 0
-    if coloured and renders_returns(request.settings):  # stretches are too few for the renderer to begin anew
+        time_done, peak_memory, counts = time.process_time(), peak_memory_mb(), files.counts
+        values = sample_points(source, result.seen, LAYERS) if is_coloured and result.seen is not None else None
+    image_seconds, restarts = time_prepared - start, 0
+    if is_coloured and renders_returns(request.settings):  # stretches are too few for the renderer to begin anew
         restarts = int(counts.points / path.share / RETURNS_AT_ONCE / RENDERINGS_KEPT)
     costs = {
-        "image_seconds": images,
-        "scan_seconds": (done - prepared) / path.share + restarts * images,
-        "rays_per_second": round(counts.rays / (done - prepared)),
-        "peak_memory_mb": peak,
-        "images": rendered.get("images", 0),
-        "megapixels": rendered.get("pixels", 0) / 1e6,
+        "image_seconds": image_seconds,
+        "scan_seconds": (time_done - time_prepared) / path.share + restarts * image_seconds,
+        "rays_per_second": round(counts.rays / (time_done - time_prepared)),
+        "peak_memory_mb": peak_memory,
+        "images": render_report.get("images", 0),
+        "megapixels": render_report.get("pixels", 0) / 1e6,
         "shares": shares_by_source(counts.by_source),
     }
-    return costs, StretchPoints(part, request, result, values, counts.points)
+    return costs, StretchPoints(stretch_plan, request, result, values, counts.points)
 
 
-def _true_plan(shown: RoadScene, part: ScanPlan, plants: float) -> ScanPlan | None:
+def _true_plan(road_scene: RoadScene, stretch_plan: ScanPlan, plant_share: float) -> ScanPlan | None:
     """Return the plan of the same stretches with 61 rays per pulse among all plants; None if it is that already.
 
     All of these rays are cast. The road is built anew, in place of the one scanned, if it lacks plants.
 
     Args:
-        shown: that was scanned.
-        part: the plan of the stretches.
-        plants: share of the plants that the truth has.
+        road_scene: that was scanned.
+        stretch_plan: the plan of the stretches.
+        plant_share: share of the plants that the truth has.
     """
-    detail = shown.scenario.settings().vegetation_detail
-    if detail == plants and part.rays_per_pulse == CONVERGED and not part.spares:
+    detail = road_scene.scenario.settings().vegetation_detail
+    if detail == plant_share and stretch_plan.rays_per_pulse == CONVERGED and not stretch_plan.spares:
         return None
-    if detail == plants and part.target.caster.name == "embree":
-        return replace(part, emission=replace(part.emission, rings=RINGS[CONVERGED], ground=None))
-    scan = shown.scenario.scan.model_copy(update={"caster": "auto"})
-    scenario = shown.scenario.model_copy(update={"scan": scan, "vegetation_detail": plants})
-    true = RoadScene(scenario, shown.road, shown.inputs)
-    if detail != plants:
-        true.build()
-    plan = true.plan()
-    emission = replace(plan.emission, path=part.path, rings=RINGS[CONVERGED], ground=None)
+    if detail == plant_share and stretch_plan.target.caster.name == "embree":
+        return replace(stretch_plan, emission=replace(stretch_plan.emission, rings=RINGS[CONVERGED], ground=None))
+    scan = road_scene.scenario.scan.model_copy(update={"caster": "auto"})
+    scenario = road_scene.scenario.model_copy(update={"scan": scan, "vegetation_detail": plant_share})
+    true_scene = RoadScene(scenario, road_scene.road, road_scene.inputs)
+    if detail != plant_share:
+        true_scene.build()
+    plan = true_scene.plan()
+    emission = replace(plan.emission, path=stretch_plan.path, rings=RINGS[CONVERGED], ground=None)
     return replace(plan, emission=emission)
 
 
 def _beam_errors(sample: StretchPoints, plan: ScanPlan | None) -> dict[str, float]:
     """Return errors of first returns against a plan of the truth: position (mm), intensity, labels, density (%)."""
-    mine = sample.result.points
-    truth = mine if plan is None else join_results(record_as_measured(plan)).points
-    errors = beam_errors([mine], [truth])
+    measured = sample.result.points
+    truth = measured if plan is None else join_results(record_as_measured(plan)).points
+    errors = beam_errors([measured], [truth])
     return {
         "position_mm": 1e3 * errors["position"][0],
         "intensity_percent": 100.0 * errors["intensity"][0],
@@ -202,9 +202,9 @@ def _relief_error(sample: StretchPoints) -> float:
     plan, materials = sample.plan, sample.plan.target.materials
     micro = plan.relief.micro or micro_relief(materials, BlenderServices().materials(materials))
     relief = replace(plan.relief, micro=micro)
-    mine = shift_points([sample.result], replace(plan, relief=relief), plan.relief.octaves)
+    measured = shift_points([sample.result], replace(plan, relief=relief), plan.relief.octaves)
     truth = shift_points([sample.result], replace(plan, relief=replace(relief, strength=1.0)), FINEST)
-    return relief_errors(mine, truth)["relief"][0]
+    return relief_errors(measured, truth)["relief"][0]
 
 
 def _colour_errors(knob: Knob, sample: StretchPoints) -> tuple[dict[str, float], dict[str, Any]]:
@@ -213,15 +213,15 @@ def _colour_errors(knob: Knob, sample: StretchPoints) -> tuple[dict[str, float],
     That is ``colour_truth``, what they were compared with, and ``errors_by_source``, their errors by what gave them to
     the points.
     """
-    seen, request = sample.result.seen, sample.request
-    assert seen is not None
+    seen_points, request = sample.result.seen, sample.request
+    assert seen_points is not None
     assert sample.values is not None
-    settings, chosen = truest_settings(request), np.arange(len(seen))
+    settings, rows = truest_settings(request), np.arange(len(seen_points))
     name = "a pixel per return" if HAS_RETURN_CAMERA else "the materials' nodes at the returns"
     if knob.whole_paths:
         settings = replace(settings, lighting="path", samples=TRUE_SAMPLES)
-        chosen, name = chosen[::_TENTH], f"a pixel per return with {TRUE_SAMPLES} samples of whole light paths"
-    (truth,) = render_layers(replace(request, settings=settings, wanted=LAYERS), [seen.select(chosen)])
-    mine = {name: array[chosen] for name, array in sample.values.arrays.items()}
-    errors, by_source = errors_by_source(LayerValues(mine, sample.values.source[chosen]), truth)
+        rows, name = rows[::_TENTH], f"a pixel per return with {TRUE_SAMPLES} samples of whole light paths"
+    (truth,) = render_layers(replace(request, settings=settings, wanted=LAYERS), [seen_points.select(rows)])
+    arrays = {name: array[rows] for name, array in sample.values.arrays.items()}
+    errors, by_source = errors_by_source(LayerValues(arrays, sample.values.source[rows]), truth)
     return errors, {"colour_truth": name, "errors_by_source": by_source}

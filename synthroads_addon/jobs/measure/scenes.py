@@ -56,8 +56,8 @@ def road_mesh(scenario: Scenario) -> SceneMesh:
 
 def spread_blocks(plan: ScanPlan, count: int) -> tuple[Block, ...]:
     """Return so many of a plan's blocks, spread evenly over the scan; all of them where it has fewer."""
-    every = list(plan.blocks())
-    return tuple(every[i] for i in np.unique(np.linspace(0, len(every) - 1, count + 2).astype(int)[1:-1]))
+    all_blocks = list(plan.blocks())
+    return tuple(all_blocks[i] for i in np.unique(np.linspace(0, len(all_blocks) - 1, count + 2).astype(int)[1:-1]))
 
 
 def with_rings(plan: ScanPlan, rings: tuple[int, ...]) -> ScanPlan:
@@ -67,18 +67,20 @@ def with_rings(plan: ScanPlan, rings: tuple[int, ...]) -> ScanPlan:
 
 def rays_of_blocks(plan: ScanPlan, blocks: Sequence[Block]) -> Rays:
     """Return the origins and directions (N, 3) of all rays that a scan of some blocks casts at what stands still."""
-    part, target, kept = plan.target._parts[0], copy(plan.target), list[Rays]()
+    part, target, recorded_rays = plan.target._parts[0], copy(plan.target), list[Rays]()
     caster = part.caster
 
     def cast_and_keep(origins: Float32, directions: Float32, maximum_range: float) -> NDArray[np.int32]:
-        kept.append((origins.copy(), directions.copy()))
+        recorded_rays.append((origins.copy(), directions.copy()))
         return caster.cast(origins, directions, maximum_range)
 
-    keeping: Any = SimpleNamespace(name=caster.name, main_thread_only=False, kernels=caster.kernels, cast=cast_and_keep)
-    target._parts, target.caster = [replace(part, caster=keeping), *target._parts[1:]], keeping
+    recording_caster: Any = SimpleNamespace(
+        name=caster.name, main_thread_only=False, kernels=caster.kernels, cast=cast_and_keep
+    )
+    target._parts, target.caster = [replace(part, caster=recording_caster), *target._parts[1:]], recording_caster
     for block in blocks:
         BlockScan(replace(plan, target=target, emission=replace(plan.emission, ground=None))).scan_block(*block)
-    origins, directions = map(np.concatenate, zip(*kept, strict=True))
+    origins, directions = map(np.concatenate, zip(*recorded_rays, strict=True))
     return origins, directions
 
 
@@ -108,9 +110,9 @@ def measure_scene(
         plan = site.plan(scene, BlenderServices())
         plan = replace(plan, run=replace(plan.run, threads=available_cores()))
     memory = peak_memory_mb() or 0.0
-    bare = _bare_casters(plan, scene.static)
-    rates = {rays: _rates_in_turn(site, with_rings(plan, RINGS[rays]), bare) for rays in rays_per_pulse}
-    fixed = _fixed_seconds(site, with_rings(plan, RINGS[1]))
+    bare_casters = _bare_casters(plan, scene.static)
+    rates = {rays: _rates_in_turn(site, with_rings(plan, RINGS[rays]), bare_casters) for rays in rays_per_pulse}
+    fixed_seconds = _fixed_seconds(site, with_rings(plan, RINGS[1]))
     floors = [
         {
             "name": f"{title}, {rays} rays per pulse; Embree's {kind}",
@@ -119,15 +121,15 @@ def measure_scene(
             "floor": rate[kind],
         }
         for rays, rate in rates.items()
-        for kind in bare
+        for kind in bare_casters
     ]
-    importing = min(bare_import_seconds(file) for _ in range(2))
+    import_seconds = min(bare_import_seconds(file) for _ in range(2))
     return {
         "rates": rates,
         "floors": floors,
         "memory_mb": memory,
-        "opening": timer.seconds / importing,
-        "fixed": fixed,
+        "opening": timer.seconds / import_seconds,
+        "fixed": fixed_seconds,
     }
 
 
@@ -139,24 +141,25 @@ def _bare_casters(plan: ScanPlan, mesh: SceneMesh) -> dict[str, Caster]:
     return {"packets": caster, "single rays": PacketCaster(caster._packets, mesh, packing=_NOT_PACKED)}
 
 
-def _rates_in_turn(site: Site, plan: ScanPlan, bare: dict[str, Caster]) -> dict[str, float]:
+def _rates_in_turn(site: Site, plan: ScanPlan, bare_casters: dict[str, Caster]) -> dict[str, float]:
     """Return the best rates of a scan and of bare casters on the same rays, measured in turn."""
-    scanned = replace(plan, run=replace(plan.run, chosen_blocks=spread_blocks(plan, _BLOCKS)))
+    sampled_plan = replace(plan, run=replace(plan.run, chosen_blocks=spread_blocks(plan, _BLOCKS)))
     origins, directions = rays_of_blocks(plan, spread_blocks(plan, _BARE_BLOCKS))
-    limit, best = plan.setting.maximum_range, dict[str, float]()
+    limit, best_rates = plan.setting.maximum_range, dict[str, float]()
 
     def keep(name: str, rate: float) -> None:
-        best[name] = max(best.get(name, 0.0), rate)
+        """Keep a rate if it is the best of its name so far."""
+        best_rates[name] = max(best_rates.get(name, 0.0), rate)
 
     for _ in range(_TURNS):
-        counts, processor, seconds = _scan(site, scanned)
+        counts, processor, seconds = _scan(site, sampled_plan)
         keep("ours", counts["rays"] / processor / 1e6)
         keep("pulses_per_second", counts["pulses"] / seconds / 1e6)
         keep("busy", processor / seconds / available_cores())
-        for name, caster in bare.items():
+        for name, caster in bare_casters.items():
             rate = bare_rate(caster, origins, directions, limit, available_cores(), repeats=1)
             keep(name, rate.rays_per_processor_second / 1e6)
-    return best
+    return best_rates
 
 
 def _scan(site: Site, plan: ScanPlan) -> tuple[dict[str, Any], float, float]:
@@ -170,12 +173,13 @@ def _scan(site: Site, plan: ScanPlan) -> tuple[dict[str, Any], float, float]:
 
 def _fixed_seconds(site: Site, plan: ScanPlan) -> float:
     """Return the processor time, s, that a scan takes besides its pulses: of two sizes, extrapolated to no pulse."""
-    every, (few, many) = tuple(plan.blocks()), _SIZES
+    all_blocks, (few_count, many_count) = tuple(plan.blocks()), _SIZES
 
     def seconds(count: int) -> float:
-        blocks = tuple(every[number % len(every)] for number in range(count))
-        some = replace(plan, run=replace(plan.run, chosen_blocks=blocks))
-        return min(_scan(site, some)[1] for _ in range(2 * _TURNS))
+        """Return the least processor time, s, of several scans of so many blocks, repeated where there are fewer."""
+        blocks = tuple(all_blocks[number % len(all_blocks)] for number in range(count))
+        sampled_plan = replace(plan, run=replace(plan.run, chosen_blocks=blocks))
+        return min(_scan(site, sampled_plan)[1] for _ in range(2 * _TURNS))
 
-    of_few = seconds(few)
-    return of_few - few * (seconds(many) - of_few) / (many - few)
+    few_seconds = seconds(few_count)
+    return few_seconds - few_count * (seconds(many_count) - few_seconds) / (many_count - few_count)

@@ -37,9 +37,11 @@ class Knob:
     whole_paths: bool = False
 
 
-def _read_knob(table: str, errors: list[str], always: list[str], rows: list[Any], whole_paths: bool = False) -> Knob:
-    """Return a `Knob` from its entry in the shipped file; ``always`` are changes that apply to every row."""
-    return Knob(table, {value: (*always, *changes) for value, changes in rows}, tuple(errors), whole_paths)
+def _read_knob(
+    table: str, errors: list[str], common_changes: list[str], rows: list[Any], whole_paths: bool = False
+) -> Knob:
+    """Return a `Knob` from its entry in the shipped file; ``common_changes`` are changes that apply to every row."""
+    return Knob(table, {value: (*common_changes, *changes) for value, changes in rows}, tuple(errors), whole_paths)
 
 
 KNOBS = {name: _read_knob(**data) for name, data in read_json(PRESETS / "tradeoff_rows.json").items()}
@@ -69,5 +71,6 @@ def row_scenario(scenario: str, knob: str, value: Any, changes: Iterable[str] = 
 
 
 def _scale_change(change: str, scale: float) -> str:
+    """Return a change ``path=value`` with the value scaled if it is a length that grows with the range."""
     path, _, value = change.partition("=")
     return f"{path}={float(value) * scale:g}" if path in _LENGTHS_OF_IMAGES else change

@@ -14,10 +14,13 @@ def wave_mesh(cells: int = CELLS) -> tuple[NDArray[np.float32], NDArray[np.int32
     x = np.linspace(-50.0, 50.0, cells + 1)
     grid = np.stack(np.meshgrid(x, x), axis=-1).reshape(-1, 2)
     vertices = np.column_stack([grid, 0.2 * np.sin(grid[:, 0]) * np.cos(grid[:, 1])]).astype(np.float32)
-    row = cells + 1
-    corner = (np.arange(cells)[:, None] * row + np.arange(cells)).ravel()
-    first, second = (corner, corner + 1, corner + row + 1), (corner, corner + row + 1, corner + row)
-    return vertices, np.stack([*first, *second], axis=-1).reshape(-1, 3).astype(np.int32)
+    row_length = cells + 1
+    corner = (np.arange(cells)[:, None] * row_length + np.arange(cells)).ravel()
+    first_triangles, second_triangles = (
+        (corner, corner + 1, corner + row_length + 1),
+        (corner, corner + row_length + 1, corner + row_length),
+    )
+    return vertices, np.stack([*first_triangles, *second_triangles], axis=-1).reshape(-1, 3).astype(np.int32)
 
 
 def write_waves(path: Path, cells: int = CELLS) -> int:

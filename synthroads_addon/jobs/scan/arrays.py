@@ -49,6 +49,7 @@ class ScanArrays:
     report: Mapping[str, Any]
 
     def __len__(self) -> int:
+        """Return the number of points, N."""
         return len(self.arrays["xyz"])
 
     def __getitem__(self, name: str) -> AnyArray:
@@ -109,10 +110,12 @@ class ArraySink(CloudSink):
 
     @contextmanager
     def _opened(self) -> Iterator[None]:
+        """Context in which points are kept; at its end the number of points that stayed is counted."""
         yield
         self.counts.points = self._count
 
     def _keep(self, points: PointBlock) -> None:
+        """Keep a block's arrays, the classes as ids of the scheme; InputError for one that the block lacks."""
         if not len(points):
             return
         for name, parts in self._parts.items():
@@ -128,8 +131,8 @@ class ArraySink(CloudSink):
 
     def _joined(self, parts: list[AnyArray], kind: str, width: int) -> AnyArray:
         """Return one array (N,) or (N, width) of a type from its parts."""
-        joined = np.empty((self._count, width) if width > 1 else self._count, dtype=kind)
-        return np.concatenate(parts, out=joined, casting="same_kind") if parts else joined
+        array = np.empty((self._count, width) if width > 1 else self._count, dtype=kind)
+        return np.concatenate(parts, out=array, casting="same_kind") if parts else array
 
     def units(self) -> dict[str, str]:
         """Return the unit of each array by its name; "1" for what has none."""

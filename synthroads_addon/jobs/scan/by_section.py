@@ -67,14 +67,14 @@ class SectionScan:
 
     def __init__(self, site: Site, road: RoadGeometry) -> None:
         self._site, self._scenario, self._road, self.cut = site, site.scenario, road, site.cut
-        every = lane_motions(road, self._scenario.scan.traffic_speed_factor)
-        self._motions = {name: motion for name, motion in every.items() if not motion.stands}
+        motions = lane_motions(road, self._scenario.scan.traffic_speed_factor)
+        self._motions = {name: motion for name, motion in motions.items() if not motion.stands}
         self._own = site.inputs.materials
         self._vehicles = VehicleMeshes(RoadMaterials.of(road.parameters, self._own))
-        standing = {name: item for name, item in road.parameters.objects.items() if name not in self._motions}
+        fixed_objects = {name: item for name, item in road.parameters.objects.items() if name not in self._motions}
         self.scanned = 0
         self.warnings: list[str] = []
-        self._standing = road.parameters.model_copy(update={"objects": standing})
+        self._standing = road.parameters.model_copy(update={"objects": fixed_objects})
 
     def sections(self) -> Iterator[RoadSection]:
         """Yield the road's sections from its start to its end."""
@@ -84,19 +84,19 @@ class SectionScan:
 
     def plans(self, timer: StageTimer) -> Generator[ScanPlan, None, None]:
         """Build each section in turn and yield its plan; the section is removed when the next one is asked for."""
-        done, total = 0, self.cut.count()
+        blocks_done, total = 0, self.cut.count()
         gc.collect()  # or what is garbage by now would stay
         gc.freeze()  # what is there before needn't be looked through after each section
         try:
             for section in self.sections():
-                shares = done / total, (done + len(section.blocks)) / total
+                shares = blocks_done / total, (blocks_done + len(section.blocks)) / total
                 try:
                     yield self.plan(section, timer, shares)
                 finally:
                     remove_road()
                     gc.collect()
                     release_memory()
-                done += len(section.blocks)
+                blocks_done += len(section.blocks)
                 self.scanned += 1
         finally:
             gc.unfreeze()
@@ -120,16 +120,16 @@ class SectionScan:
 
     def _build(self, section: RoadSection) -> tuple[ScannedScene, Float]:
         """Build a section; return its scene with passing vehicles, and its frame's origin (3,) in the road's, m."""
-        settings, whole, stretch = self._scenario.settings(), self._road.parameters, (section.low, section.high)
+        settings, parameters, stretch = self._scenario.settings(), self._road.parameters, (section.low, section.high)
         tolerance, detail = settings.tolerance, settings.vegetation_detail
         request = BuildRequest(self._standing, tolerance, detail, None, stretch, self._road, self._own)
         model = build_road(request)
-        frame = model.origin - np.array(whole.transform.translate)
+        frame = model.origin - np.array(parameters.transform.translate)
         class_ids = self._site.inputs.scheme.source_ids()
-        static = scene_mesh(objects=list(model.objects.values()), class_ids=class_ids)
-        section_warnings = material_warnings(dict.fromkeys(static.materials, ()))
+        static_mesh = scene_mesh(objects=list(model.objects.values()), class_ids=class_ids)
+        section_warnings = material_warnings(dict.fromkeys(static_mesh.materials, ()))
         self.warnings += [text for text in section_warnings if text not in self.warnings]
-        passing = vehicles_through(section, self.cut, self._motions, self._scenario.scan.traffic_speed_factor)
-        vehicles = {name: motion.vehicle for name, motion in passing.items()}
-        motions = {name: ShiftedMotion(motion, frame) for name, motion in passing.items()}
-        return self._vehicles.with_traffic(static, vehicles, motions, self._road.numbers.passes), frame
+        motions_here = vehicles_through(section, self.cut, self._motions, self._scenario.scan.traffic_speed_factor)
+        vehicles = {name: motion.vehicle for name, motion in motions_here.items()}
+        motions = {name: ShiftedMotion(motion, frame) for name, motion in motions_here.items()}
+        return self._vehicles.with_traffic(static_mesh, vehicles, motions, self._road.numbers.passes), frame

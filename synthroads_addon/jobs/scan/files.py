@@ -75,13 +75,14 @@ class CloudFiles(CloudSink):
         return open_writer(path, epsg, self.origin, scale, cloud.attributes, self.inputs.scheme, self.system_text)
 
     def _keep(self, points: PointBlock) -> None:
+        """Write a block to the cloud's files, and have it painted into the previews."""
         for writer in self._writers:
             writer.write(points)
         if self.view and self._painter:
             self._wait_for_painter(_MOST_PAINTED - 1)
             self._painting.append(self._painter.submit(self.view.add, points))
 
-    def _wait_for_painter(self, most: int) -> None:
+    def _wait_for_painter(self, most_waiting: int) -> None:
         """Wait until at most so many blocks wait for the previews; raises what failed in the others."""
-        while len(self._painting) > most:
+        while len(self._painting) > most_waiting:
             self._painting.pop(0).result()

@@ -64,8 +64,8 @@ class Survey:
 
     def damage_kinds(self) -> dict[int, int]:
         """Return the kinds of the road's damages by instance number, if the cloud's files hold them; else none."""
-        road, kept = self.conditions.road, self.scenario.kept_layers
-        return InstanceNumbers(road).damages() if road is not None and "damage" in kept else {}
+        road, kept_layers = self.conditions.road, self.scenario.kept_layers
+        return InstanceNumbers(road).damages() if road is not None and "damage" in kept_layers else {}
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class SceneMaterials:
         return cls(names, means, scanned, services.transparencies(names), images, give_intensities)
 
 
-def _intensity_from_layers(survey: Survey, scanned: list[Material], names: tuple[str, ...]) -> bool:
+def _intensity_from_layers(survey: Survey, scanned_materials: list[Material], names: tuple[str, ...]) -> bool:
     """Return whether intensities are computed from each point's own material layers.
 
     Where nothing is said they do if nodes give these layers, and no table says how the brightness varies: who fitted
@@ -116,8 +116,8 @@ def _intensity_from_layers(survey: Survey, scanned: list[Material], names: tuple
     colour, fidelity = survey.scenario.colour, survey.scenario.fidelity
     if colour.intensity_from_layers != "auto":
         return colour.intensity_from_layers == "always"
-    spread = any(row.spread_below or row.spread_above for row in scanned)
-    return takes_nodes(colour.settings(fidelity)) and not spread and survey.services.reflectance_varies(names)
+    has_spread = any(row.spread_below or row.spread_above for row in scanned_materials)
+    return takes_nodes(colour.settings(fidelity)) and not has_spread and survey.services.reflectance_varies(names)
 
 
 def make_atmosphere(survey: Survey, wavelength: float) -> Atmosphere:
@@ -126,20 +126,20 @@ def make_atmosphere(survey: Survey, wavelength: float) -> Atmosphere:
     An attenuation that the scenario gives stands for a weather without echoes.
     """
     scan = survey.scenario.scan
-    loss, weather = scan.attenuation, scan.weather or weather_of(survey.conditions.environment)
+    attenuation, weather = scan.attenuation, scan.weather or weather_of(survey.conditions.environment)
     return Atmosphere(
-        attenuation=weather.attenuation(wavelength) if loss is None else loss,
-        effects=weather.effects() if loss is None else (),
+        attenuation=weather.attenuation(wavelength) if attenuation is None else attenuation,
+        effects=weather.effects() if attenuation is None else (),
         air_class=survey.inputs.scheme.source_ids().get(AIR_CLASS, UNLABELLED),
     )
 
 
 def make_reflection(survey: Survey, scene: ScannedScene, materials: SceneMaterials) -> Reflection:
     """Return what a scene's materials make of the beam; the layers of each point have their own variation already."""
-    scan, clear, spread = survey.scenario.scan, materials.transparencies, not materials.give_intensities
+    scan, transparencies, has_spread = survey.scenario.scan, materials.transparencies, not materials.give_intensities
     return Reflection(
-        surfaces=surfaces_of(materials.scanned, scan.reflection, spread=spread, clear=clear),
-        transparency=_see_through(scene, clear) if clear else None,
+        surfaces=surfaces_of(materials.scanned, scan.reflection, spread=has_spread, clear=transparencies),
+        transparency=_see_through(scene, transparencies) if transparencies else None,
         multipath=_multipath(survey, materials) if scan.multipath else None,
     )
 
@@ -167,12 +167,12 @@ def make_emission(survey: Survey, cut: Blocks, mesh: SceneMesh, air: Atmosphere,
     """
     scenario, setting, scan, ground, outline = survey.scenario, cut.setting, survey.scenario.scan, None, None
     rings, divergence = scenario.beam_rings, setting.divergence
-    spares = scenario.settings().footprints == "where_needed" and (rings or scenario.chooses)
-    if spares and not air.effects and reflection.multipath is None:
+    may_spare = scenario.settings().footprints == "where_needed" and (rings or scenario.chooses)
+    if may_spare and not air.effects and reflection.multipath is None:
         ground = _bare_ground(mesh, reflection.surfaces, cut, outer_radii(rings, divergence))
     if rings and not air.effects and len(mesh.triangles):
-        widest = max(max(outer_radii(pattern, divergence)) for pattern in RINGS.values())
-        margin = widest * setting.maximum_range  # measurements take the plan with other rays per pulse
+        widest_radius = max(max(outer_radii(pattern, divergence)) for pattern in RINGS.values())
+        margin = widest_radius * setting.maximum_range  # measurements take the plan with other rays per pulse
         outline = Outline(mesh, survey.caster, margin)
     return Emission(setting, cut.path, rings, scan.beam, scan.platform.driven, ground, outline)
 
@@ -187,14 +187,14 @@ def _bare_ground(mesh: SceneMesh, surfaces: Surfaces, cut: Blocks, radii: tuple[
 def make_relief(survey: Survey, materials: SceneMaterials) -> Relief:
     """Return the relief of a scene's surfaces beyond the model's faces, as far as the scenario wants it."""
     scan, conditions, images = survey.scenario.scan, survey.conditions, materials.normal_images
-    shifts = scan.relief > 0.0
+    has_relief = scan.relief > 0.0
     return Relief(
-        micro=micro_relief(materials.names, materials.means) if shifts else None,
+        micro=micro_relief(materials.names, materials.means) if has_relief else None,
         strength=scan.relief,
         octaves=survey.scenario.settings().relief_octaves,
         normals=scan.relief_normals,
         images=NormalImages(images, conditions.pavement) if images else None,
-        pavement=conditions.pavement if shifts else None,
+        pavement=conditions.pavement if has_relief else None,
     )
 
 
@@ -202,18 +202,18 @@ def make_layers(
     survey: Survey, scene: ScannedScene, materials: SceneMaterials, relief: Relief, emission: Emission
 ) -> Layers:
     """Return which layers the points get, and where from; what relief and intensities need is among the measured."""
-    scenario, path, by_layers = survey.scenario, emission.path, materials.give_intensities
-    kept, coloured = scenario.kept_layers, scenario.coloured_layers
-    moved = relief.micro is not None or relief.images is not None
+    scenario, path, gives_intensities = survey.scenario, emission.path, materials.give_intensities
+    kept_layers, coloured_layers = scenario.kept_layers, scenario.coloured_layers
+    moves_points = relief.micro is not None or relief.images is not None
     return Layers(
-        measured=(kept & optional_arrays("scan")) | ({"normal", "material"} if moved else set()),
-        coloured=coloured,
-        kept=kept,
-        seen_points=bool(coloured) or by_layers or moved,
+        measured=(kept_layers & optional_arrays("scan")) | ({"normal", "material"} if moves_points else set()),
+        coloured=coloured_layers,
+        kept=kept_layers,
+        seen_points=bool(coloured_layers) or gives_intensities or moves_points,
         means=surfaces_of(materials.means),
         request=LayerRequest(
             settings=scenario.colour.settings(scenario.fidelity, path.typical_range),
-            wanted=coloured | (OF_INTENSITY if by_layers else set()),
+            wanted=coloured_layers | (OF_INTENSITY if gives_intensities else set()),
             mesh=scene.static,
             environment=survey.conditions.environment,
             path=path,

@@ -44,12 +44,12 @@ from .parts import (
 from .sink import CloudSink, record_cloud
 
 
-def check_scan(scenario: Scenario, foreign: bool = False) -> ScenarioInputs:
+def check_scan(scenario: Scenario, is_foreign: bool = False) -> ScenarioInputs:
     """Raise an InputError for a scan that can't be done, before any work starts; return what its files hold.
 
     Args:
         scenario: the job.
-        foreign: whether the scene was built elsewhere.
+        is_foreign: whether the scene was built elsewhere.
 
     Raises:
         InputError: see `check_colour` and `check_choice`; or the device can't do it, or a table of materials or classes
@@ -59,7 +59,7 @@ def check_scan(scenario: Scenario, foreign: bool = False) -> ScenarioInputs:
         from ...blender.cameras import check_colour  # Blender takes a second to start: other outputs need none
 
         check_colour(scenario.colour.settings(scenario.fidelity))
-    check_choice(scenario, foreign)
+    check_choice(scenario, is_foreign)
     return ScenarioInputs.read(scenario)
 
 
@@ -72,16 +72,16 @@ def plan_scan(survey: Survey, scene: ScannedScene, path: ScanPath) -> ScanPlan:
     scenario, inputs, scan = survey.scenario, survey.inputs, survey.scenario.scan
     cut = Blocks(inputs.setting(scan), with_motion(path, scan.motion, scenario.seed), 1 + sum(scenario.beam_rings))
     check_scan_size(forecast_scan(cut, len(scene.static), scan.threads), scan.most_pulses)
-    labelled = classify_scene(scene, inputs.scheme, survey.conditions.road)
+    labelled_scene = classify_scene(scene, inputs.scheme, survey.conditions.road)
     materials = SceneMaterials.of(survey, scene.static.materials)
-    target = Target(labelled, survey.caster, survey.damage_kinds())
+    target = Target(labelled_scene, survey.caster, survey.damage_kinds())
     air = make_atmosphere(survey, cut.setting.device.wavelength_nm)
-    reflection = make_reflection(survey, labelled, materials)
+    reflection = make_reflection(survey, labelled_scene, materials)
     emission = make_emission(survey, cut, scene.static, air, reflection)
     relief = make_relief(survey, materials)
-    layers = make_layers(survey, labelled, materials, relief, emission)
-    corrected = scenario.cloud.intensity == "range_corrected"
-    reception = Reception(scan.noise, scan.strip_errors, epoch_of(path), materials.give_intensities, corrected)
+    layers = make_layers(survey, labelled_scene, materials, relief, emission)
+    is_range_corrected = scenario.cloud.intensity == "range_corrected"
+    reception = Reception(scan.noise, scan.strip_errors, epoch_of(path), materials.give_intensities, is_range_corrected)
     return ScanPlan(target, emission, reflection, Run(scenario.seed, scan.threads), air, reception, relief, layers)
 
 
@@ -127,10 +127,10 @@ class Site:
 
     def files(self, folder: Path, origin: Float) -> CloudFiles:
         """Return a sink that writes cloud and previews to a folder; the origin (3,) is near the points, map, m."""
-        conditions, typical = self.conditions, self.path.typical_range
+        conditions, typical_range = self.conditions, self.path.typical_range
         text = conditions.system.to_wkt() if conditions.system else None
         return CloudFiles(
-            self.scenario, self.inputs, folder, origin, typical, conditions.epsg, self.view, system_text=text
+            self.scenario, self.inputs, folder, origin, typical_range, conditions.epsg, self.view, system_text=text
         )
 
     def arrays(self) -> ArraySink:

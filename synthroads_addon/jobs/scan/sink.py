@@ -80,11 +80,11 @@ class CloudSink(ABC):
         16 bits are full for a white target at a right angle at half the usual range: only what is nearer or a
         retro-reflector is brighter, and the weakest echoes still have hundreds of steps.
         """
-        corrected, response = self.scenario.cloud.intensity == "range_corrected", self._response
-        if not corrected and response not in (None, "power"):
+        is_range_corrected, response = self.scenario.cloud.intensity == "range_corrected", self._response
+        if not is_range_corrected and response not in (None, "power"):
             return self.scenario.cloud.intensity_scale or 65535.0
-        usual = 65535.0 / 4.0 * (1.0 if corrected else max(2.0, self.typical_range) ** 2)
-        return self.scenario.cloud.intensity_scale or usual
+        usual_scale = 65535.0 / 4.0 * (1.0 if is_range_corrected else max(2.0, self.typical_range) ** 2)
+        return self.scenario.cloud.intensity_scale or usual_scale
 
     @cached_property
     def _response(self) -> Response | None:
@@ -171,20 +171,20 @@ def record_cloud(
         the counts, as JSON data; triangles and vertices are those of the largest scene.
     """
     figures: dict[str, Any] = {}
-    rendered: dict[str, Any] = {}
+    rendering_sums: dict[str, Any] = {}
     with ExitStack() as stack:
         stack.enter_context(sink.open())
         for plan in plans:
             if announce and not figures:  # the path is the whole scan's, whatever section the plan is of
                 announce(plan.forecast().beside_others())
             summary = plan.summary()
-            largest = {name: max(figures.get(name, 0), summary[name]) for name in ("triangles", "vertices")}
-            figures = summary | largest
-            _add_up(rendered, record(plan, sink, timer))
+            largest_counts = {name: max(figures.get(name, 0), summary[name]) for name in ("triangles", "vertices")}
+            figures = summary | largest_counts
+            _add_up(rendering_sums, record(plan, sink, timer))
             del plan  # its scene, before the next one is built
         with timer.stage("files"):
             stack.close()
-    return {"triangles": 0, "vertices": 0} | figures | sink.summary() | {"rendered": rendered}
+    return {"triangles": 0, "vertices": 0} | figures | sink.summary() | {"rendered": rendering_sums}
 
 
 def _add_up(sums: dict[str, Any], figures: Mapping[str, Any]) -> None:

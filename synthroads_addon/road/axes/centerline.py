@@ -97,12 +97,12 @@ class AxisContent:
         """
         name, kind = os.fspath(path), "this is no text: CSV with columns x, y, z or GeoJSON is needed"
         text = read_text(name, kind, "an axis file is needed here", encoding="utf-8-sig")
-        geojson = text.lstrip().startswith(("{", "["))
-        rows, system = _read_json(name, text) if geojson else (_read_csv(name, text), csv_system(name, text))
+        is_geojson = text.lstrip().startswith(("{", "["))
+        rows, system = _read_json(name, text) if is_geojson else (_read_csv(name, text), csv_system(name, text))
         points = np.array(rows, dtype=np.float64).reshape(-1, 3)
         if len(np.unique(points[:, :2], axis=0)) < 2:
             raise InputError(name, None, f"{_TWO}, the file has {len(points)} points in all")
-        return cls(name, points, system, geojson)
+        return cls(name, points, system, is_geojson)
 
     def placed(self, place: Placement) -> Float:
         """Return the points (N, 3), m, moved into the map's coordinate system; see `read_axis`.
@@ -118,65 +118,78 @@ class AxisContent:
 def _check_spacing(name: str, points: Float) -> None:
     """Raise InputError for a point (of N, 3) implausibly far from its neighbours, as if it lacked a digit."""
     steps = np.diff(points[:, :2], axis=0)
-    length = np.hypot(*steps.T)
-    if length.max() > _LONGEST_STEP:
-        place = int(length.argmax())
-        allowed = f"is {length[place] / 1000.0:.0f} km from the point before, at most {_LONGEST_STEP / 1000.0:g} km"
-        raise InputError(f"{name}: point {place + 2}", points[place + 1].tolist(), allowed)
-    moved = np.flatnonzero(length > 0.0)
-    before, after = steps[moved[:-1]], steps[moved[1:]]
-    cosine = (before * after).sum(axis=1) / (length[moved[:-1]] * length[moved[1:]])
-    back = (cosine < _SHARPEST) & (np.maximum(length[moved[:-1]], length[moved[1:]]) > _LONG_STEP)
-    if back.any():
-        place = int(moved[1:][back.argmax()])
+    step_lengths = np.hypot(*steps.T)
+    if step_lengths.max() > _LONGEST_STEP:
+        point_index = int(step_lengths.argmax())
+        kilometres = step_lengths[point_index] / 1000.0
+        allowed = f"is {kilometres:.0f} km from the point before, at most {_LONGEST_STEP / 1000.0:g} km"
+        raise InputError(f"{name}: point {point_index + 2}", points[point_index + 1].tolist(), allowed)
+    moving_steps = np.flatnonzero(step_lengths > 0.0)
+    step_before, step_after = steps[moving_steps[:-1]], steps[moving_steps[1:]]
+    cosine = (step_before * step_after).sum(axis=1) / (step_lengths[moving_steps[:-1]] * step_lengths[moving_steps[1:]])
+    turns_back = (cosine < _SHARPEST) & (
+        np.maximum(step_lengths[moving_steps[:-1]], step_lengths[moving_steps[1:]]) > _LONG_STEP
+    )
+    if turns_back.any():
+        point_index = int(moving_steps[1:][turns_back.argmax()])
         allowed = f"the axis turns back after a step of more than {_LONG_STEP:g} m: is a digit of a point missing?"
-        raise InputError(f"{name}: point {place + 1}", points[place].tolist(), allowed)
+        raise InputError(f"{name}: point {point_index + 1}", points[point_index].tolist(), allowed)
 
 
 def _read_csv(name: str, text: str) -> list[tuple[float, float, float]]:
+    """Return the points x, y, z of CSV text, with or without a header; InputError for what isn't such a table."""
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
     lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
     if not lines:
         raise InputError(name, None, f"the file is empty: {_TWO}")
     separator = next((mark for mark in (";", ",", "\t") if mark in lines[0][1]), " ")
-    head = fields_of(lines[0][1], separator, f"{name}:{lines[0][0]}")
-    columns, body = [0, 1, 2], lines
-    if len(head) > 2 and all(_is_number(entry) for entry in head):
+    first_line_entries = fields_of(lines[0][1], separator, f"{name}:{lines[0][0]}")
+    columns, data_lines = [0, 1, 2], lines
+    if len(first_line_entries) > 2 and all(_is_number(entry) for entry in first_line_entries):
         _refuse_counting(name, [fields_of(line, separator, name) for _, line in lines])
-    if not all(_is_number(entry) for entry in head):
-        columns, body = _columns(f"{name}:{lines[0][0]}", head), lines[1:]
-    elif len(head) < 2:
+    if not all(_is_number(entry) for entry in first_line_entries):
+        columns, data_lines = _columns(f"{name}:{lines[0][0]}", first_line_entries), lines[1:]
+    elif len(first_line_entries) < 2:
         raise InputError(f"{name}:{lines[0][0]}", lines[0][1], "x, y and, optionally, z are needed")
-    elif len(head) == 2:
+    elif len(first_line_entries) == 2:
         columns = [0, 1]
-    places = ((f"{name}:{number}", line) for number, line in body)
+    places = ((f"{name}:{number}", line) for number, line in data_lines)
     return [_row(place, fields_of(line, separator, place), columns) for place, line in places]
 
 
 def _refuse_counting(name: str, rows: list[list[str]]) -> None:
-    """Raise InputError where the first column of a file without a header counts its lines, and isn't x."""
-    first = [row[0] if row else "" for row in rows]
-    whole = len(rows) > 2 and all(entry.isdecimal() and len(entry) < _MOST_DIGITS for entry in first)
-    broken = any("." in entry for row in rows for entry in row[1:3])
-    if whole and (broken or len(rows[0]) > 3) and set(np.diff([int(entry) for entry in first]).tolist()) == {1}:
+    """Raise InputError where the first column of a file without a header counts its lines, and isn't x.
+
+    It counts if it rises by exactly 1 and something else looks like coordinates: fractions, or a fourth column.
+    """
+    first_column = [row[0] if row else "" for row in rows]
+    has_whole_numbers = len(rows) > 2 and all(entry.isdecimal() and len(entry) < _MOST_DIGITS for entry in first_column)
+    has_fractions = any("." in entry for row in rows for entry in row[1:3])
+    if (
+        has_whole_numbers
+        and (has_fractions or len(rows[0]) > 3)
+        and set(np.diff([int(entry) for entry in first_column]).tolist()) == {1}
+    ):
         allowed = "the first column counts the lines: a header that names x and y (z) is needed above them"
-        raise InputError(f"{name}: first column", f"{first[0]}, {first[1]}, {first[2]} ...", allowed)
+        raise InputError(
+            f"{name}: first column", f"{first_column[0]}, {first_column[1]}, {first_column[2]} ...", allowed
+        )
 
 
 def csv_system(name: str, text: str | None = None) -> MapSystem | None:
     """Return the system that a line of comment names (``# crs: EPSG:25832``), or a .prj file beside; None without."""
     text = read_text(name, "CSV is needed", encoding="utf-8-sig") if text is None else text
     comments = (line.strip() for line in text.splitlines() if line.lstrip().startswith("#"))
-    named = next((match[1] for line in comments if (match := _NAMED.fullmatch(line))), None)
-    beside = Path(name).with_suffix(".prj")
-    if named is None and beside != Path(name) and beside.is_file():
-        name, named = str(beside), read_text(str(beside), "WKT is needed", encoding="utf-8-sig")
-    if named is None:
+    system_text = next((match[1] for line in comments if (match := _NAMED.fullmatch(line))), None)
+    prj_path = Path(name).with_suffix(".prj")
+    if system_text is None and prj_path != Path(name) and prj_path.is_file():
+        name, system_text = str(prj_path), read_text(str(prj_path), "WKT is needed", encoding="utf-8-sig")
+    if system_text is None:
         return None
     try:
-        return MapSystem.read(named)
+        return MapSystem.read(system_text)
     except UnknownSystemError as problem:
-        raise InputError(f"{name} crs", named[:80], problem.allowed) from None
+        raise InputError(f"{name} crs", system_text[:80], problem.allowed) from None
 
 
 def fields_of(line: str, separator: str, place: str) -> list[str]:
@@ -199,6 +212,7 @@ def fields_of(line: str, separator: str, place: str) -> list[str]:
 
 
 def _is_number(entry: str) -> bool:
+    """Return whether Python reads a text as a float."""
     try:
         float(entry)
     except ValueError:
@@ -206,19 +220,24 @@ def _is_number(entry: str) -> bool:
     return True
 
 
-def _columns(place: str, head: list[str]) -> list[int]:
+def _columns(place: str, header_entries: list[str]) -> list[int]:
     """Return the column indices of x, y and, if present, z in a header; InputError if x or y is missing or doubled."""
-    names = [entry.lower() for entry in head]
+    names = [entry.lower() for entry in header_entries]
     for axis in ("x", "y"):
         if axis not in names:
-            raise InputError(place, ", ".join(head), f"a header with columns x, y (z optional): {axis} is missing")
+            raise InputError(
+                place, ", ".join(header_entries), f"a header with columns x, y (z optional): {axis} is missing"
+            )
     for axis in ("x", "y", "z"):
         if names.count(axis) > 1:
-            raise InputError(place, ", ".join(head), f"each column once: {axis} is there {names.count(axis)} times")
+            raise InputError(
+                place, ", ".join(header_entries), f"each column once: {axis} is there {names.count(axis)} times"
+            )
     return [names.index(axis) for axis in ("x", "y", "z") if axis in names]
 
 
 def _row(place: str, entries: list[str], columns: list[int]) -> tuple[float, float, float]:
+    """Return x, y, z from the named columns of one line; InputError if the line has fewer columns."""
     if len(entries) <= max(columns):
         allowed = f"at least {max(columns) + 1} columns are needed, this line has {len(entries)}"
         raise InputError(place, " ".join(entries), allowed)
@@ -226,6 +245,7 @@ def _row(place: str, entries: list[str], columns: list[int]) -> tuple[float, flo
 
 
 def _point(place: str, entries: list[object]) -> tuple[float, float, float]:
+    """Return x, y, z from two or three entries, z 0 without; InputError for one that isn't a finite coordinate."""
     values = []
     for axis, entry in zip("xyz", entries, strict=False):
         try:
@@ -285,9 +305,9 @@ def centerline_geojson(geometry: RoadGeometry, stations: Float) -> dict[str, Any
     Coordinates are those of the parameter set's reference system, named by the member ``crs`` (GeoJSON 2008); 0.1 mm.
     """
     metadata = geometry.parameters.metadata
-    plan = geometry.alignment.position(stations)
-    local = np.column_stack([plan, geometry.profile.elevation(stations)])
-    points = np.round(local + np.array(geometry.parameters.transform.translate), 4)
+    xy = geometry.alignment.position(stations)
+    local_points = np.column_stack([xy, geometry.profile.elevation(stations)])
+    points = np.round(local_points + np.array(geometry.parameters.transform.translate), 4)
     properties = {
         "id": "alignment",
         "instance": geometry.parameters.alignment.instance,

@@ -52,21 +52,21 @@ class Parcels:
         """Return the parcels' areas (P,), m2."""
         return _area(self.corners)
 
-    def of_points(self, plan: Float) -> Int:
+    def of_points(self, xy: Float) -> Int:
         """Return the parcel (N,) that each of local points (N, 2) lies in; -1 outside of all."""
-        parcel = np.full(len(plan), -1)
-        low, high = self.corners.min(axis=1), self.corners.max(axis=1)
-        order = np.argsort(plan[:, 0])
-        sorted_x = plan[order, 0]
+        parcel = np.full(len(xy), -1)
+        lower, upper = self.corners.min(axis=1), self.corners.max(axis=1)
+        order = np.argsort(xy[:, 0])
+        sorted_x = xy[order, 0]
         for number in range(len(self)):
-            first, last = np.searchsorted(sorted_x, (low[number, 0], high[number, 0]))
-            near = order[first:last]
-            inside = (plan[near, 1] >= low[number, 1]) & (plan[near, 1] <= high[number, 1])
-            ring = self.corners[number]
-            for corner, after in zip(ring, np.roll(ring, -1, axis=0), strict=True):
-                along, away = after - corner, plan[near] - corner
-                inside &= along[0] * away[:, 1] - along[1] * away[:, 0] >= 0.0
-            parcel[near[inside]] = number
+            begin, end = np.searchsorted(sorted_x, (lower[number, 0], upper[number, 0]))
+            candidates = order[begin:end]
+            is_inside = (xy[candidates, 1] >= lower[number, 1]) & (xy[candidates, 1] <= upper[number, 1])
+            polygon = self.corners[number]
+            for corner, next_corner in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+                edge, from_corner = next_corner - corner, xy[candidates] - corner
+                is_inside &= edge[0] * from_corner[:, 1] - edge[1] * from_corner[:, 0] >= 0.0
+            parcel[candidates[is_inside]] = number
         return parcel
 
 
@@ -78,38 +78,45 @@ def parcels_of(geometry: RoadGeometry, landscape: Landscape) -> Parcels:
     """
     middle = geometry.alignment.position(np.array([geometry.length / 2.0]))[0]
     heading = float(geometry.alignment.heading(np.array([geometry.length / 2.0]))[0])
-    turn = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
+    rotation = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
     square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) * landscape.reach
     corners = np.array(_cut(square, landscape, stream(landscape.seed, "landscape", "parcels")))
-    corners = corners @ turn + middle
+    corners = corners @ rotation + middle
     kind = _land_use(corners, landscape)
     sides = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1]], axis=1)
-    length = np.linalg.norm(sides, axis=2)
-    longer = np.argmax(length, axis=1)
-    each = np.arange(len(corners))
-    return Parcels(corners, kind, sides[each, longer] / length[each, longer][:, None])
+    side_lengths = np.linalg.norm(sides, axis=2)
+    longer_side = np.argmax(side_lengths, axis=1)
+    parcel_index = np.arange(len(corners))
+    return Parcels(corners, kind, sides[parcel_index, longer_side] / side_lengths[parcel_index, longer_side][:, None])
 
 
 def _cut(square: Float, landscape: Landscape, rng: np.random.Generator) -> list[Float]:
-    """Return the pieces (4, 2) of a square around the origin."""
-    done, left = [], [square]
-    while left:
-        piece = left.pop()
-        across = float(np.linalg.norm(piece[1] - piece[0] + piece[2] - piece[3]) / 2.0)
-        deep = float(np.linalg.norm(piece[2] - piece[1] + piece[3] - piece[0]) / 2.0)
-        width = landscape.parcel_size * (1.0 + float(np.linalg.norm(piece.mean(axis=0))) / _GROWTH)
+    """Return the pieces (4, 2), m, of a square around the origin: cut in two across the longer side until small enough.
+
+    Small enough is a width of `parcel_size` (m), growing with the distance from the origin, and not too slender. The
+    cut lies at a random share of the side and leans a little; the numbers of its distributions are chosen.
+    """
+    pieces, uncut_pieces = [], [square]
+    while uncut_pieces:
+        piece = uncut_pieces.pop()
+        width_across = float(np.linalg.norm(piece[1] - piece[0] + piece[2] - piece[3]) / 2.0)
+        depth = float(np.linalg.norm(piece[2] - piece[1] + piece[3] - piece[0]) / 2.0)
+        largest_width = landscape.parcel_size * (1.0 + float(np.linalg.norm(piece.mean(axis=0))) / _GROWTH)
         share, skew = rng.uniform(0.38, 0.62), rng.normal(0.0, 0.025)
-        if min(across, deep) <= width and max(across, deep) <= _SLENDER * max(width, min(across, deep)):
-            done.append(piece)
+        if min(width_across, depth) <= largest_width and max(width_across, depth) <= _SLENDER * max(
+            largest_width, min(width_across, depth)
+        ):
+            pieces.append(piece)
             continue
-        ring = piece if across >= deep else np.roll(piece, -1, axis=0)
-        a, b, c, d = ring
-        first, second = a + (b - a) * (share + skew), d + (c - d) * (share - skew)
-        left += [np.array([a, first, second, d]), np.array([first, b, c, second])]
-    return done
+        turned_piece = piece if width_across >= depth else np.roll(piece, -1, axis=0)
+        a, b, c, d = turned_piece
+        rear_cut, front_cut = a + (b - a) * (share + skew), d + (c - d) * (share - skew)
+        uncut_pieces += [np.array([a, rear_cut, front_cut, d]), np.array([rear_cut, b, c, front_cut])]
+    return pieces
 
 
 def _area(corners: Float) -> Float:
+    """Return the signed areas (...) of polygons (..., K, 2) by the shoelace formula; positive if anticlockwise."""
     x, y = corners[..., 0], corners[..., 1]
     return np.asarray(0.5 * np.sum(x * np.roll(y, -1, axis=-1) - y * np.roll(x, -1, axis=-1), axis=-1))
 
@@ -120,11 +127,11 @@ def _land_use(corners: Float, landscape: Landscape) -> Int:
     rng = stream(landscape.seed, "landscape", "land use")
     weights = np.array(list(_CROPS.values()))
     kind = 2 + rng.choice(len(weights), size=len(corners), p=weights / weights.sum())
-    free = np.ones(len(corners), dtype=np.bool_)
+    is_free = np.ones(len(corners), dtype=np.bool_)
     for number, share in ((0, landscape.forest_share), (1, landscape.meadow_share)):
         scatter = rng.normal(0.0, 0.35, len(corners))
         order = np.argsort(-(plane_waves(middle, landscape.seed, KINDS[number], _CLUSTER) + scatter))
-        order = order[free[order]]
-        taken = order[np.cumsum(area[order]) <= share * area.sum()]
-        kind[taken], free[taken] = number, False
+        order = order[is_free[order]]
+        chosen_parcels = order[np.cumsum(area[order]) <= share * area.sum()]
+        kind[chosen_parcels], is_free[chosen_parcels] = number, False
     return kind

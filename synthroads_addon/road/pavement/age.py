@@ -20,14 +20,14 @@ _CONCRETE_OF_AGE = (1.08, 0.88)
 
 def asphalt_brightness(age: float) -> float:
     """Return a factor on asphalt's base colour and specular at an age, 0 new, 1 old."""
-    film, bare, old = ASPHALT_OF_AGE
-    return bare + (film - bare) * math.exp(-age / _FILM_LASTS) + (old - bare) * age
+    film_factor, bare_factor, old_factor = ASPHALT_OF_AGE
+    return bare_factor + (film_factor - bare_factor) * math.exp(-age / _FILM_LASTS) + (old_factor - bare_factor) * age
 
 
 def concrete_brightness(age: float) -> float:
     """Return a factor on concrete's base colour and specular at an age, 0 new, 1 old."""
-    new, old = _CONCRETE_OF_AGE
-    return new + (old - new) * age
+    new_factor, old_factor = _CONCRETE_OF_AGE
+    return new_factor + (old_factor - new_factor) * age
 
 
 def age_contrast(pavement: Pavement, age: float | None, road_age: float) -> float:
@@ -54,13 +54,13 @@ def strip_contrasts(section: CarriagewaySection, road_age: float) -> list[float]
     """Return `age_contrast` of each strip of a carriageway, innermost first; edge strips have their lane's."""
     carriageway = section.carriageway
     pavement, lanes = carriageway.pavement, len(carriageway.lanes)
-    of_lanes = lane_contrasts(pavement, lanes, road_age)
-    shoulder = age_contrast(pavement, pavement.shoulder_age, road_age)
-    first = section.kinds.index("lane")
-    result = []
+    contrasts_of_lanes = lane_contrasts(pavement, lanes, road_age)
+    shoulder_contrast = age_contrast(pavement, pavement.shoulder_age, road_age)
+    first_lane = section.kinds.index("lane")
+    contrasts = []
     for number, (_, lane) in enumerate(strip_lanes(section.kinds, lanes)):
         if section.kinds[lane] == "lane":
-            result.append(of_lanes[lanes - 1 - (lane - first)])
+            contrasts.append(contrasts_of_lanes[lanes - 1 - (lane - first_lane)])
         else:
-            result.append(shoulder if section.kinds[number] == "hard_shoulder" else 0.0)
-    return result
+            contrasts.append(shoulder_contrast if section.kinds[number] == "hard_shoulder" else 0.0)
+    return contrasts

@@ -12,36 +12,37 @@ _TOUCHES = 1e-9
 
 def edges_of(outline: Float) -> Float:
     """Return normal and distance (K, 3) of each edge of a convex outline (K, 2): inside where all are below 0, m."""
-    along = np.roll(outline, -1, axis=0) - outline
-    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-12)[:, None]
-    normal = np.column_stack([along[:, 1], -along[:, 0]])
+    directions = np.roll(outline, -1, axis=0) - outline
+    directions /= np.maximum(np.linalg.norm(directions, axis=1), 1e-12)[:, None]
+    normal = np.column_stack([directions[:, 1], -directions[:, 0]])
     return np.column_stack([normal, np.einsum("ij,ij->i", normal, outline)])
 
 
 def covers(edges: Float, station: Float, offset: Float) -> Bool:
     """Return which places (N,) lie within a convex outline, given by its edges (K, 3)."""
-    across = np.column_stack([station, offset]) @ edges[:, :2].T - edges[:, 2]
-    return np.asarray((across <= 0.0).all(axis=1))
+    distances = np.column_stack([station, offset]) @ edges[:, :2].T - edges[:, 2]
+    return np.asarray((distances <= 0.0).all(axis=1))
 
 
 def split_outline(outline: Float, area: Float) -> tuple[Float | None, list[Float]]:
     """Return the piece of a convex outline (K, 2) within a convex area (M, 2), None if none is, and those outside."""
-    outside: list[Float] = []
+    # Each edge of the area cuts off what lies beyond it; what is left after all edges lies within.
+    outer_pieces: list[Float] = []
     for edge in edges_of(area):
-        beyond, outline = _clip(outline, -edge), _clip(outline, edge)
-        if len(beyond) > 2:
-            outside.append(beyond)
+        outer_piece, outline = _clip(outline, -edge), _clip(outline, edge)
+        if len(outer_piece) > 2:
+            outer_pieces.append(outer_piece)
         if len(outline) < 3:
-            return None, outside
-    return outline, outside
+            return None, outer_pieces
+    return outline, outer_pieces
 
 
 def subtract(outline: Float, areas: Iterable[Float]) -> list[Float]:
     """Return the convex pieces of a convex outline (K, 2) that none of some convex areas (M, 2) covers."""
-    left = [outline]
+    remaining_pieces = [outline]
     for area in areas:
-        left = [piece for part in left for piece in _outside(part, area)]
-    return left
+        remaining_pieces = [piece for part in remaining_pieces for piece in _outside(part, area)]
+    return remaining_pieces
 
 
 def _outside(outline: Float, area: Float) -> Iterator[Float]:
@@ -49,8 +50,8 @@ def _outside(outline: Float, area: Float) -> Iterator[Float]:
     if not meet(outline, area):
         yield outline
         return
-    inside, outside = split_outline(outline, area)
-    yield from (outline,) if inside is None else outside
+    inner_piece, outer_pieces = split_outline(outline, area)
+    yield from (outline,) if inner_piece is None else outer_pieces
 
 
 def meet(outline: Float, area: Float) -> bool:
@@ -59,18 +60,23 @@ def meet(outline: Float, area: Float) -> bool:
 
 
 def _clip(outline: Float, edge: Float) -> Float:
-    """Return the part of a convex outline (K, 2) on the inner side of an edge (normal and distance)."""
+    """Return the part of a convex outline (K, 2) on the inner side of an edge (normal and distance).
+
+    Sutherland and Hodgman's clipping at one line; empty if nothing lies inside.
+    """
     if not len(outline):
         return outline
-    across = outline @ edge[:2] - edge[2]
-    across[np.abs(across) < _TOUCHES] = 0.0
-    if (across >= 0.0).all():
+    distances = outline @ edge[:2] - edge[2]
+    distances[np.abs(distances) < _TOUCHES] = 0.0
+    if (distances >= 0.0).all():
         return np.empty((0, 2))
     corners = []
     for i, corner in enumerate(outline):
-        before = across[i - 1]
-        if before * across[i] < 0.0:
-            corners.append(outline[i - 1] + (corner - outline[i - 1]) * (before / (before - across[i])))
-        if across[i] <= 0.0:
+        previous_distance = distances[i - 1]
+        if previous_distance * distances[i] < 0.0:
+            corners.append(
+                outline[i - 1] + (corner - outline[i - 1]) * (previous_distance / (previous_distance - distances[i]))
+            )
+        if distances[i] <= 0.0:
             corners.append(corner)
     return np.array(corners).reshape(-1, 2)

@@ -54,10 +54,10 @@ class MarkingFilms:
     def thickness(self, station: Float, offset: Float) -> Float:
         """Return the thickness (N,) of the thickest film at places (N,), m; 0 where there is none."""
         result = self._line_thickness(range(len(self._lines)), station, offset)
-        for (_, edges, film), low, high in zip(self._areas, self._lows[:, 0], self._highs[:, 0], strict=True):
-            near = np.flatnonzero((station >= low) & (station <= high))
-            inside = near[covers(edges, station[near], offset[near])]
-            result[inside] = np.maximum(result[inside], film)
+        for (_, edges, film), start, end in zip(self._areas, self._lows[:, 0], self._highs[:, 0], strict=True):
+            nearby = np.flatnonzero((station >= start) & (station <= end))
+            covered = nearby[covers(edges, station[nearby], offset[nearby])]
+            result[covered] = np.maximum(result[covered], film)
         return result
 
     def cut(self, outlines: Sequence[Float]) -> Iterator[tuple[Float, float]]:
@@ -68,10 +68,10 @@ class MarkingFilms:
             else:
                 yield from self._cut_by_areas(outline)
 
-    def _areas_near(self, low: Float, high: Float) -> list[int]:
+    def _areas_near(self, lower: Float, upper: Float) -> list[int]:
         """Return the numbers of the areas whose boxes meet a box (station, offset): a long road has hundreds."""
-        near: list[int] = np.flatnonzero(((self._lows < high) & (self._highs > low)).all(axis=1)).tolist()
-        return near
+        numbers: list[int] = np.flatnonzero(((self._lows < upper) & (self._highs > lower)).all(axis=1)).tolist()
+        return numbers
 
     def _cut_by_areas(self, outline: Float) -> Iterator[tuple[Float, float]]:
         """Yield the pieces of an outline on arrows and hatched areas, with the film's thickness, m; then the rest, 0.
@@ -92,40 +92,47 @@ class MarkingFilms:
         yield from ((part, 0.0) for part in remainder)
 
     def _cut_by_lines(self, outlines: Sequence[Float]) -> Iterator[tuple[Float, float]]:
+        """Yield the pieces of short convex outlines (K, 2) on line markings and beside them, with the film's thickness.
+
+        A piece is first cut at the ends of the dashes, then, with its columns swapped, at the offsets of the lines'
+        edges in the outline's middle; m, 0 beside all lines.
+        """
         if not outlines:
             return
-        low, high = (np.array([pick(outline, axis=0) for outline in outlines]) for pick in (np.min, np.max))
-        middle = (low[:, 0] + high[:, 0]) / 2.0
-        near = np.zeros((len(self._lines), len(outlines)), bool)
-        edges = np.zeros((*near.shape, 2))
+        lower, upper = (np.array([extreme(outline, axis=0) for outline in outlines]) for extreme in (np.min, np.max))
+        middle_stations = (lower[:, 0] + upper[:, 0]) / 2.0
+        is_near = np.zeros((len(self._lines), len(outlines)), bool)
+        edges = np.zeros((*is_near.shape, 2))
         for number, (line, dashes) in enumerate(zip(self._lines, self._dashes, strict=True)):
             # Edges cost far more than to see that a line ends before all this or begins behind it.
-            if not len(dashes) or dashes[0, 0] > high[:, 0].max() or dashes[-1, 1] < low[:, 0].min():
+            if not len(dashes) or dashes[0, 0] > upper[:, 0].max() or dashes[-1, 1] < lower[:, 0].min():
                 continue
-            edges[number] = np.stack(self._geometry.marking_edges(line, middle), axis=1)
-            near[number] = (edges[number, :, 1] < high[:, 1]) & (edges[number, :, 0] > low[:, 1])
+            edges[number] = np.stack(self._geometry.marking_edges(line, middle_stations), axis=1)
+            is_near[number] = (edges[number, :, 1] < upper[:, 1]) & (edges[number, :, 0] > lower[:, 1])
         for number, outline in enumerate(outlines):
-            met = np.flatnonzero(near[:, number])
-            if not len(met):
+            nearby_lines = np.flatnonzero(is_near[:, number])
+            if not len(nearby_lines):
                 yield outline, 0.0
                 continue
-            ends = np.concatenate([self._dashes[line].ravel() for line in met])
-            across = edges[met, number].ravel()
-            for part in _cut(outline, ends):
-                for piece in _cut(part[::-1, ::-1], across):
+            dash_ends = np.concatenate([self._dashes[line].ravel() for line in nearby_lines])
+            edge_offsets = edges[nearby_lines, number].ravel()
+            for part in _cut(outline, dash_ends):
+                for piece in _cut(part[::-1, ::-1], edge_offsets):
                     centre = piece[:, ::-1].mean(axis=0)
-                    yield piece[::-1, ::-1], float(self._line_thickness(met, centre[:1], centre[1:])[0])
+                    yield piece[::-1, ::-1], float(self._line_thickness(nearby_lines, centre[:1], centre[1:])[0])
 
     def _line_thickness(self, lines: Iterable[int], station: Float, offset: Float) -> Float:
         """Return the thickness (N,), m, of the thickest film of some lines, by number, at places (N,); 0 for none."""
         result = np.zeros(len(station))
         for number in lines:
-            painted = _is_painted(self._dashes[number], station)
-            if not painted.any():
+            is_painted = _is_painted(self._dashes[number], station)
+            if not is_painted.any():
                 continue
-            left, right = self._geometry.marking_edges(self._lines[number], station)
+            left_edge, right_edge = self._geometry.marking_edges(self._lines[number], station)
             film = self._lines[number].film_thickness
-            result = np.where(painted & (offset <= left) & (offset >= right), np.maximum(result, film), result)
+            result = np.where(
+                is_painted & (offset <= left_edge) & (offset >= right_edge), np.maximum(result, film), result
+            )
         return result
 
 
@@ -139,9 +146,9 @@ def _is_painted(dashes: Float, station: Float) -> Bool:
 
 def _cut(outline: Float, places: Float) -> Iterator[Float]:
     """Yield the pieces of a convex outline (K, 2) between some first coordinates."""
-    low, high = outline[:, 0].min(), outline[:, 0].max()
-    inside = np.unique(places[(places > low + 1e-4) & (places < high - 1e-4)])
-    if not len(inside):
+    lower, upper = outline[:, 0].min(), outline[:, 0].max()
+    inner_places = np.unique(places[(places > lower + 1e-4) & (places < upper - 1e-4)])
+    if not len(inner_places):
         yield outline
         return
-    yield from cut_outline(outline, np.array([low, *inside, high]))
+    yield from cut_outline(outline, np.array([lower, *inner_places, upper]))

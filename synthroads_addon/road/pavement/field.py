@@ -156,7 +156,16 @@ def damage_code(kind: int, age: float = 0.0) -> float:
 
 
 class _Strip(NamedTuple):
-    """Decoded place: whose it is, the lane's half width (m), the traffic's wear, whether it is a strip, its tracks."""
+    """Decoded place on the pavement.
+
+    Attributes:
+        owner: whole part of the code: kind and number of what the place belongs to; 0 where nothing is known.
+        kind: of strip, marking or damage.
+        half: half width of its lane, m.
+        wear: how much traffic wears it, 1 in the outermost lane, less inwards, 0 where no lane is.
+        strip: 1 on strips and markings, 0 on repaired and damaged places.
+        track, oil: wheel tracks and oil strip, from 0 to 1 across the lane, less their means.
+    """
 
     owner: Any
     kind: Any
@@ -168,17 +177,19 @@ class _Strip(NamedTuple):
 
 
 def _decode(m: Calculus, place: PavementPlace) -> _Strip:
-    owner = m.floor(place.code)
-    kind = owner - m.floor(owner * (1.0 / CODES)) * CODES
-    aside = m.absolute(place.across) - _TRACK / 2.0
-    track = m.exponential(aside * aside * (-0.5 / _TRACK_WIDTH**2))
+    """Return what a place's code says, with the profiles of wheel tracks and oil across its lane, each of mean 0."""
+    owner_code = m.floor(place.code)
+    kind = owner_code - m.floor(owner_code * (1.0 / CODES)) * CODES
+    distance_from_track = m.absolute(place.across) - _TRACK / 2.0
+    track = m.exponential(distance_from_track * distance_from_track * (-0.5 / _TRACK_WIDTH**2))
     oil = m.exponential(place.across * place.across * (-0.5 / _OIL_WIDTH**2))
     wear = m.below(kind, SHOULDER - 0.5) / (1.0 + _LESS_INWARDS * m.larger(kind - LANE, 0.0))
-    half = (place.code - owner) * HALF_UNIT
-    return _Strip(owner, kind, half, wear, m.below(kind, PATCH - 0.5), track - _TRACKS_MEAN, oil - _OIL_MEAN)
+    half_width = (place.code - owner_code) * HALF_UNIT
+    return _Strip(owner_code, kind, half_width, wear, m.below(kind, PATCH - 0.5), track - _TRACKS_MEAN, oil - _OIL_MEAN)
 
 
 def _signed_hash(m: Calculus, owner: Any, number: Any, seed: Any) -> Any:
+    """Return numbers from -1 to 1 that look random and follow from an owner's code and a whole number of it."""
     return m.hash(owner + number * _KNOTS, seed) * 2.0 - 1.0
 
 
@@ -189,34 +200,38 @@ def _line(m: Calculus, distance: Any, width: float) -> Any:
 
 def _slow(m: Calculus, place: PavementPlace, owner: Any, seed: Any, spacing: float = _SLOW) -> Any:
     """Return a smooth variation along the road from -1 to 1, of each lane for itself, by knots (m) apart."""
-    knots = place.station * (1.0 / spacing)
-    knot = m.floor(knots)
-    share = knots - knot
+    knot_coordinate = place.station * (1.0 / spacing)
+    knot = m.floor(knot_coordinate)
+    share = knot_coordinate - knot
     weight = share * share * (3.0 - 2.0 * share)
-    first, second = (_signed_hash(m, owner, knot + step, seed + 1.0) for step in (0.0, 1.0))
-    return first + (second - first) * weight
+    rear_value, front_value = (_signed_hash(m, owner, knot + step, seed + 1.0) for step in (0.0, 1.0))
+    return rear_value + (front_value - rear_value) * weight
 
 
 def _asphalt_joint(m: Calculus, place: PavementPlace, strip: _Strip) -> Any:
     """Return 1 on the paver's joints: beside each lane's outer boundary, and between two days' work."""
-    within = place.station % DAY
-    day = _line(m, m.smaller(within, DAY - within), SEAM)
+    distance_in_day = place.station % DAY
+    day_joint = _line(m, m.smaller(distance_in_day, DAY - distance_in_day), SEAM)
     seam = m.below(strip.kind, SHOULDER - 0.5) * _line(m, m.absolute(place.across + SEAM_INWARDS - strip.half), SEAM)
-    return m.larger(seam, day)
+    return m.larger(seam, day_joint)
 
 
 def _slab_joint(m: Calculus, place: PavementPlace, strip: _Strip, slab_length: Any) -> Any:
     """Return 1 on the joints between slabs of concrete."""
-    within = place.station % slab_length  # exact in float32 as well, which a difference of large quotients isn't
-    across = m.smaller(within, slab_length - within)
-    along = m.absolute(m.absolute(place.across) - strip.half) + (1.0 - m.below(strip.kind, SHOULDER - 0.5))
-    return _line(m, m.smaller(across, along), SLAB_JOINT)
+    distance_in_slab = (
+        place.station % slab_length
+    )  # exact in float32 as well, which a difference of large quotients isn't
+    distance_to_transverse = m.smaller(distance_in_slab, slab_length - distance_in_slab)
+    distance_to_longitudinal = m.absolute(m.absolute(place.across) - strip.half) + (
+        1.0 - m.below(strip.kind, SHOULDER - 0.5)
+    )
+    return _line(m, m.smaller(distance_to_transverse, distance_to_longitudinal), SLAB_JOINT)
 
 
 def _height(m: Calculus, strip: _Strip, joint: Any, shape: Shape) -> Any:
     """Return the height (m) of a strip of pavement, 0 of all else."""
-    paved = strip.strip * (1.0 - m.below(strip.owner, 0.5))
-    return (strip.wear * strip.track * shape.tracks + joint * shape.joints) * paved * -1.0
+    is_paved = strip.strip * (1.0 - m.below(strip.owner, 0.5))
+    return (strip.wear * strip.track * shape.tracks + joint * shape.joints) * is_paved * -1.0
 
 
 def asphalt_height(m: Calculus, place: PavementPlace, shape: Shape) -> Any:
@@ -232,19 +247,23 @@ def concrete_height(m: Calculus, place: PavementPlace, shape: Shape, slab_length
 
 
 def _repaired(m: Calculus, strip: _Strip, look: Look) -> Look:
-    """Return the look where patches and cracks have theirs in place of the pavement's."""
+    """Return the look where patches and cracks have theirs in place of the pavement's.
+
+    The figures are chosen: a patch from new (brightness 0.72) to old, an open crack darker, a sealed one smoother, a
+    removed marking brighter and rougher. Masks are 0 or 1 since nodes of materials know no branches.
+    """
     age = strip.half * (1.0 / HALF_UNIT)
-    removed = 1.0 - m.below(strip.kind, REMOVED_MARKING - 0.5)
-    sealed = 1.0 - m.below(strip.kind, SEALED_CRACK - 0.5) - removed
-    cracked = 1.0 - m.below(strip.kind, OPEN_CRACK - 0.5) - removed
-    intact = 1.0 - cracked - removed
-    brightness = (0.72 + 0.36 * age) * intact + cracked * 0.45 - sealed * 0.05 + removed * _GROUND
-    roughness = (0.06 - 0.1 * age) * intact + cracked * 0.05 - sealed * 0.4 + removed * 0.08
-    share, known = strip.strip, 1.0 - m.below(strip.owner, 0.5)
-    together = look.brightness * share + brightness * (1.0 - share)
+    is_removed = 1.0 - m.below(strip.kind, REMOVED_MARKING - 0.5)
+    is_sealed = 1.0 - m.below(strip.kind, SEALED_CRACK - 0.5) - is_removed
+    is_cracked = 1.0 - m.below(strip.kind, OPEN_CRACK - 0.5) - is_removed
+    is_patch = 1.0 - is_cracked - is_removed
+    brightness = (0.72 + 0.36 * age) * is_patch + is_cracked * 0.45 - is_sealed * 0.05 + is_removed * _GROUND
+    roughness = (0.06 - 0.1 * age) * is_patch + is_cracked * 0.05 - is_sealed * 0.4 + is_removed * 0.08
+    is_strip, is_known = strip.strip, 1.0 - m.below(strip.owner, 0.5)
+    blended = look.brightness * is_strip + brightness * (1.0 - is_strip)
     return Look(
-        (together - 1.0) * known + 1.0,
-        (look.roughness * share + roughness * (1.0 - share)) * known,
+        (blended - 1.0) * is_known + 1.0,
+        (look.roughness * is_strip + roughness * (1.0 - is_strip)) * is_known,
     )
 
 
@@ -257,13 +276,15 @@ def asphalt_look(m: Calculus, place: PavementPlace, wear: Wear) -> Look:
         wear: parameters.
     """
     strip = _decode(m, place)
-    deviation = _signed_hash(m, strip.owner, m.floor(place.station / DAY), wear.seed)
-    slow = _slow(m, place, strip.owner, wear.seed)
-    polished = strip.wear * strip.track * wear.polish
+    day_deviation = _signed_hash(m, strip.owner, m.floor(place.station / DAY), wear.seed)
+    slow_variation = _slow(m, place, strip.owner, wear.seed)
+    polish = strip.wear * strip.track * wear.polish
     joint = _asphalt_joint(m, place, strip)
-    used = 1.0 + 0.55 * polished - 0.14 * strip.wear * strip.oil
-    brightness = (1.0 + 0.09 * deviation + 0.04 * slow) * used * (1.0 - 0.35 * joint) * (1.0 + place.age)
-    roughness = 0.05 * deviation + 0.02 * slow - 0.3 * polished - 0.1 * joint
+    traffic_factor = 1.0 + 0.55 * polish - 0.14 * strip.wear * strip.oil
+    brightness = (
+        (1.0 + 0.09 * day_deviation + 0.04 * slow_variation) * traffic_factor * (1.0 - 0.35 * joint) * (1.0 + place.age)
+    )
+    roughness = 0.05 * day_deviation + 0.02 * slow_variation - 0.3 * polish - 0.1 * joint
     return _repaired(m, strip, Look(brightness, roughness))
 
 
@@ -279,12 +300,14 @@ def concrete_look(m: Calculus, place: PavementPlace, wear: Wear, slab_length: An
     strip = _decode(m, place)
     slab = m.floor(place.station / slab_length)
     joint = _slab_joint(m, place, strip, slab_length)
-    deviation = _signed_hash(m, strip.owner, slab, wear.seed)
-    slow = _slow(m, place, strip.owner, wear.seed)
-    polished = strip.wear * strip.track * wear.polish
-    used = 1.0 - 0.4 * polished - 0.1 * strip.wear * strip.oil
-    brightness = (1.0 + 0.06 * deviation + 0.03 * slow) * used * (1.0 - 0.6 * joint) * (1.0 + place.age)
-    roughness = 0.05 * deviation + 0.02 * slow - 0.25 * polished - 0.25 * joint
+    slab_deviation = _signed_hash(m, strip.owner, slab, wear.seed)
+    slow_variation = _slow(m, place, strip.owner, wear.seed)
+    polish = strip.wear * strip.track * wear.polish
+    traffic_factor = 1.0 - 0.4 * polish - 0.1 * strip.wear * strip.oil
+    brightness = (
+        (1.0 + 0.06 * slab_deviation + 0.03 * slow_variation) * traffic_factor * (1.0 - 0.6 * joint) * (1.0 + place.age)
+    )
+    roughness = 0.05 * slab_deviation + 0.02 * slow_variation - 0.25 * polish - 0.25 * joint
     return _repaired(m, strip, Look(brightness, roughness))
 
 
@@ -297,16 +320,18 @@ def paint_look(m: Calculus, place: PavementPlace, wear: Wear) -> Look:
         wear: parameters, whose polish says nothing here.
     """
     strip = _decode(m, place)
-    beside = 1.0 - m.below(strip.kind, PAINT_BESIDE - 0.5)
-    area = 1.0 - m.below(strip.kind, PAINT_AREA - 0.5)
-    in_lane = 1.0 - m.below(strip.kind, PAINT_IN_LANE - 0.5)
-    lines = _CROSSED + beside * (_BESIDE - _CROSSED) + area * (_AREA - _BESIDE)
-    traffic = lines + in_lane * ((strip.track + _TRACKS_MEAN) * (1.0 - _IN_LANE) + _IN_LANE - _AREA)
-    long = _slow(m, place, strip.owner, wear.seed)
-    short = _slow(m, place, strip.owner, wear.seed + 1.0, _CHANGES)
-    known = 1.0 - m.below(strip.owner, 0.5)
-    worn = traffic * (1.0 + 0.5 * long + 0.5 * short) * known
-    return Look(1.0 + known * 0.05 - worn * 0.22, worn * -0.06)  # 1 over all of a road's film, mostly edge lines
+    is_beside_lanes = 1.0 - m.below(strip.kind, PAINT_BESIDE - 0.5)
+    is_area = 1.0 - m.below(strip.kind, PAINT_AREA - 0.5)
+    is_in_lane = 1.0 - m.below(strip.kind, PAINT_IN_LANE - 0.5)
+    line_wear = _CROSSED + is_beside_lanes * (_BESIDE - _CROSSED) + is_area * (_AREA - _BESIDE)
+    traffic_wear = line_wear + is_in_lane * ((strip.track + _TRACKS_MEAN) * (1.0 - _IN_LANE) + _IN_LANE - _AREA)
+    long_variation = _slow(m, place, strip.owner, wear.seed)
+    short_variation = _slow(m, place, strip.owner, wear.seed + 1.0, _CHANGES)
+    is_known = 1.0 - m.below(strip.owner, 0.5)
+    film_loss = traffic_wear * (1.0 + 0.5 * long_variation + 0.5 * short_variation) * is_known
+    return Look(
+        1.0 + is_known * 0.05 - film_loss * 0.22, film_loss * -0.06
+    )  # 1 over all of a road's film, mostly edge lines
 
 
 class ArrayCalculus:
@@ -340,13 +365,17 @@ class ArrayCalculus:
         """Return numbers from 0 to 1 that follow from whole numbers: Jenkins' lookup3 of their bits as float32."""
         with np.errstate(over="ignore"):
             key, seed = np.broadcast_arrays(np.asarray(key, np.float32), np.asarray(seed, np.float32))
-            begin = np.uint32(0xDEADBEEF + (2 << 2) + 13)
-            a = np.ascontiguousarray(key).view(np.uint32) + begin
-            b = np.ascontiguousarray(seed).view(np.uint32) + begin
-            c = np.full(a.shape, begin, np.uint32)
-            for turn, (first, second) in zip((14, 11, 25, 16, 4, 14, 24), ((2, 1), (0, 2), (1, 0)) * 3, strict=False):
+            initial_word = np.uint32(0xDEADBEEF + (2 << 2) + 13)
+            a = np.ascontiguousarray(key).view(np.uint32) + initial_word
+            b = np.ascontiguousarray(seed).view(np.uint32) + initial_word
+            c = np.full(a.shape, initial_word, np.uint32)
+            for rotation, (target, source) in zip(
+                (14, 11, 25, 16, 4, 14, 24), ((2, 1), (0, 2), (1, 0)) * 3, strict=False
+            ):
                 parts = [a, b, c]
-                changed = parts[first] ^ parts[second]
-                parts[first] = changed - (parts[second] << np.uint32(turn) | parts[second] >> np.uint32(32 - turn))
+                mixed = parts[target] ^ parts[source]
+                parts[target] = mixed - (
+                    parts[source] << np.uint32(rotation) | parts[source] >> np.uint32(32 - rotation)
+                )
                 a, b, c = parts
         return c.astype(np.float64) / float(0xFFFFFFFF)

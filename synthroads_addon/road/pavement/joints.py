@@ -35,17 +35,17 @@ def joints_of(section: CarriagewaySection, stations: Float) -> Iterator[Joint]:
         section: the carriageway's.
         stations: (N,) from 0 to the road's end, m; joints along the road are straight between two.
     """
-    half, pavement = joint_width(section) / 2.0, section.carriageway.pavement
-    for distance, there in _along(section, stations):
-        places = list(zip(stations.tolist(), (distance - half).tolist(), strict=True))
-        rows = np.flatnonzero(there[:-1] & there[1:]).tolist()
-        yield Joint("longitudinal", [_quad(section, places[row], places[row + 1], 2.0 * half) for row in rows])
-    period, last = pavement.slab_length if pavement.is_concrete else DAY, float(stations[-1])
-    for number in range(int(last // period) + 1):
-        middle = number * period
-        start, end = max(middle - half, 0.0), min(middle + half, last)
+    half_width, pavement = joint_width(section) / 2.0, section.carriageway.pavement
+    for distance, exists in _along(section, stations):
+        places = list(zip(stations.tolist(), (distance - half_width).tolist(), strict=True))
+        rows = np.flatnonzero(exists[:-1] & exists[1:]).tolist()
+        yield Joint("longitudinal", [_quad(section, places[row], places[row + 1], 2.0 * half_width) for row in rows])
+    period, last_station = pavement.slab_length if pavement.is_concrete else DAY, float(stations[-1])
+    for number in range(int(last_station // period) + 1):
+        joint_station = number * period
+        start, end = max(joint_station - half_width, 0.0), min(joint_station + half_width, last_station)
         if end > start:
-            yield Joint("transverse", [_across(section, start, end, *part) for part in _paved(section, middle)])
+            yield Joint("transverse", [_across(section, start, end, *part) for part in _paved(section, joint_station)])
 
 
 def _along(section: CarriagewaySection, stations: Float) -> Iterator[tuple[Float, Bool]]:
@@ -63,9 +63,13 @@ def _paved(section: CarriagewaySection, station: float) -> list[tuple[float, flo
     edges = section.distances(station)[0]
     if "island" not in section.kinds:
         return [(float(edges[0]), float(edges[-2]))]
-    inner, outer = (float(value[0]) for value in section.boundaries_of("island", np.array([station])))
-    parts = [(float(edges[0]), inner), (outer, float(edges[-2]))]
-    return [part for part in parts if part[1] > part[0]] if outer > inner else [(float(edges[0]), float(edges[-2]))]
+    island_start, island_end = (float(value[0]) for value in section.boundaries_of("island", np.array([station])))
+    parts = [(float(edges[0]), island_start), (island_end, float(edges[-2]))]
+    return (
+        [part for part in parts if part[1] > part[0]]
+        if island_end > island_start
+        else [(float(edges[0]), float(edges[-2]))]
+    )
 
 
 def _quad(section: CarriagewaySection, first: tuple[float, float], second: tuple[float, float], width: float) -> Float:
@@ -76,4 +80,5 @@ def _quad(section: CarriagewaySection, first: tuple[float, float], second: tuple
 
 
 def _across(section: CarriagewaySection, start: float, end: float, inner: float, outer: float) -> Float:
+    """Return the outline (4, 2) of a joint across the road: between two stations and two distances, m."""
     return _quad(section, (start, inner), (end, inner), outer - inner)

@@ -21,8 +21,8 @@ def patch_outline(patch: Patch) -> Float:
     Corners on one line have none: K is less than 3. Andrew's monotone chain (1979).
     """
     corners = sorted(set(patch.outline))
-    lower, upper = _chain(corners), _chain(corners[::-1])
-    return np.array(lower[:-1] + upper[:-1]).reshape(-1, 2)
+    lower_chain, upper_chain = _chain(corners), _chain(corners[::-1])
+    return np.array(lower_chain[:-1] + upper_chain[:-1]).reshape(-1, 2)
 
 
 def _chain(corners: list[Corner]) -> list[Corner]:
@@ -37,8 +37,8 @@ def _chain(corners: list[Corner]) -> list[Corner]:
 
 def _turn(first: Corner, second: Corner, third: Corner) -> float:
     """Return twice the area of a triangle, positive against the clock."""
-    along, across = second[0] - first[0], second[1] - first[1]
-    return along * (third[1] - first[1]) - across * (third[0] - first[0])
+    station_difference, offset_difference = second[0] - first[0], second[1] - first[1]
+    return station_difference * (third[1] - first[1]) - offset_difference * (third[0] - first[0])
 
 
 def crack_outlines(crack: Crack) -> Iterator[Float]:
@@ -53,14 +53,18 @@ def crack_outlines(crack: Crack) -> Iterator[Float]:
             continue
         legs = np.diff(corners, axis=0)
         legs /= np.linalg.norm(legs, axis=1)[:, None]
-        left = np.column_stack([-legs[:, 1], legs[:, 0]])
-        before, behind = np.vstack([left[:1], left]), np.vstack([left, left[-1:]])
-        middle = before + behind
-        middle /= np.maximum(np.linalg.norm(middle, axis=1), 1e-9)[:, None]
-        reach = crack.width / 2.0 / np.maximum(np.einsum("ij,ij->i", middle, behind), _SHARPEST)
-        one, other = corners + middle * reach[:, None], corners - middle * reach[:, None]
+        normals = np.column_stack([-legs[:, 1], legs[:, 0]])
+        normals_before, normals_behind = np.vstack([normals[:1], normals]), np.vstack([normals, normals[-1:]])
+        bisectors = normals_before + normals_behind
+        bisectors /= np.maximum(np.linalg.norm(bisectors, axis=1), 1e-9)[:, None]
+        # A mitre: half the width over the cosine of half the turn, which is limited so that sharp corners are cut.
+        mitre_lengths = crack.width / 2.0 / np.maximum(np.einsum("ij,ij->i", bisectors, normals_behind), _SHARPEST)
+        left_edge, right_edge = (
+            corners + bisectors * mitre_lengths[:, None],
+            corners - bisectors * mitre_lengths[:, None],
+        )
         for number in range(len(legs)):
-            yield np.array([other[number], other[number + 1], one[number + 1], one[number]])
+            yield np.array([right_edge[number], right_edge[number + 1], left_edge[number + 1], left_edge[number]])
 
 
 def removed_outlines(marking: RemovedMarking, pavement: Pavement, length: float) -> Iterator[Float]:
@@ -77,10 +81,11 @@ def removed_outlines(marking: RemovedMarking, pavement: Pavement, length: float)
 
 
 def _removed_dashes(marking: RemovedMarking, length: float) -> Iterator[Float]:
-    low, high = marking.offset - marking.width / 2.0, marking.offset + marking.width / 2.0
-    end, period = min(marking.end_station, length), marking.dash_length + marking.gap_length
-    starts = np.arange(marking.start_station, end, period) if period else np.array([marking.start_station])
+    """Yield the rectangles (4, 2) of a removed marking's dashes on a road of a length (m); one for a solid line."""
+    right_edge, left_edge = marking.offset - marking.width / 2.0, marking.offset + marking.width / 2.0
+    line_end, period = min(marking.end_station, length), marking.dash_length + marking.gap_length
+    starts = np.arange(marking.start_station, line_end, period) if period else np.array([marking.start_station])
     for start in starts.tolist():
-        last = min(start + marking.dash_length, end) if period else end
-        if last > start:
-            yield np.array([(start, low), (last, low), (last, high), (start, high)])
+        dash_end = min(start + marking.dash_length, line_end) if period else line_end
+        if dash_end > start:
+            yield np.array([(start, right_edge), (dash_end, right_edge), (dash_end, left_edge), (start, left_edge)])

@@ -21,15 +21,17 @@ def strip_lanes(kinds: tuple[str, ...], lanes: int) -> list[tuple[int, int]]:
         kinds: of the strips, innermost first, as `CarriagewaySection.kinds` has them.
         lanes: number of lanes.
     """
-    first = kinds.index("lane")
-    outermost = first + lanes - 1
-    known = {"hard_shoulder": SHOULDER} | {kind: BAY + number for number, kind in enumerate(TURNOUT_STRIPS)}
-    result = []
+    first_lane = kinds.index("lane")
+    last_lane = first_lane + lanes - 1
+    kind_codes = {"hard_shoulder": SHOULDER} | {kind: BAY + number for number, kind in enumerate(TURNOUT_STRIPS)}
+    codes_and_lanes = []
     for number, kind in enumerate(kinds):
-        lane = min(max(number, first), outermost)
-        beside = kind in ("lane", "inner_edge_strip", "outer_edge_strip")
-        result.append((LANE + outermost - lane, lane) if beside else (known.get(kind, SHOULDER), number))
-    return result
+        lane = min(max(number, first_lane), last_lane)
+        is_lane_pavement = kind in ("lane", "inner_edge_strip", "outer_edge_strip")
+        codes_and_lanes.append(
+            (LANE + last_lane - lane, lane) if is_lane_pavement else (kind_codes.get(kind, SHOULDER), number)
+        )
+    return codes_and_lanes
 
 
 def pavement_places(
@@ -42,12 +44,12 @@ def pavement_places(
         station, offset: m.
         contrasts: of its strips, see `age.strip_contrasts`; none where nothing but heights is asked.
     """
-    distance, constant = section.carriageway.sign * offset, section.constant_distances
+    distance, constant_distances = section.carriageway.sign * offset, section.constant_distances
     lanes = np.array(strip_lanes(section.kinds, len(section.carriageway.lanes))).T
-    if constant is not None:
-        strip = np.minimum(np.searchsorted(constant[1:], distance, side="right"), len(section.kinds) - 1)
+    if constant_distances is not None:
+        strip = np.minimum(np.searchsorted(constant_distances[1:], distance, side="right"), len(section.kinds) - 1)
         kind, source = (np.take(row, strip) for row in lanes)
-        inner, outer = np.take(constant, source), np.take(constant, source + 1)
+        inner, outer = np.take(constant_distances, source), np.take(constant_distances, source + 1)
     else:
         distances = section.distances(station)
         strip = np.clip((distances[:, 1:] <= distance[:, None]).sum(axis=1), 0, len(section.kinds) - 1)

@@ -62,25 +62,25 @@ class PavementSurface:
         station, offset = (np.asarray(value, np.float64).ravel() for value in np.broadcast_arrays(station, offset))
         result = np.zeros(len(station))
         for side, section in self.geometry.sections.items():
-            mine = np.flatnonzero(self.is_paved(side, station, offset))
-            if len(mine):
-                places = self.geometry.alignment.place(station[mine], offset[mine])
-                result[mine] = self.worn_height(side, station[mine], offset[mine])
-                self._lay_damage(side, station, offset, mine, result)
-                result[mine] += self.waves(section.carriageway.pavement, places)
+            on_carriageway = np.flatnonzero(self.is_paved(side, station, offset))
+            if len(on_carriageway):
+                places = self.geometry.alignment.place(station[on_carriageway], offset[on_carriageway])
+                result[on_carriageway] = self.worn_height(side, station[on_carriageway], offset[on_carriageway])
+                self._lay_damage(side, station, offset, on_carriageway, result)
+                result[on_carriageway] += self.waves(section.carriageway.pavement, places)
         return result
 
     def is_paved(self, side: Side, station: Float, offset: Float) -> Bool:
         """Return which places (N,) lie on a carriageway's pavement."""
         section = self.geometry.sections[side]
-        distance, constant = section.carriageway.sign * offset, section.constant_distances
+        distance, constant_distances = section.carriageway.sign * offset, section.constant_distances
         # One row stands for all where widths are the same everywhere.
-        distances = section.distances(station) if constant is None else constant[None]
-        paved = (distance >= distances[:, 0]) & (distance <= distances[:, -2])
+        distances = section.distances(station) if constant_distances is None else constant_distances[None]
+        is_paved = (distance >= distances[:, 0]) & (distance <= distances[:, -2])
         if "island" in section.kinds:
-            inner, outer = section.boundaries_of("island", station)
-            paved &= (distance <= inner) | (distance >= outer)
-        return np.asarray(paved)
+            island_start, island_end = section.boundaries_of("island", station)
+            is_paved &= (distance <= island_start) | (distance >= island_end)
+        return np.asarray(is_paved)
 
     def worn_height(self, side: Side, station: Float, offset: Float, joints: bool = True) -> Float:
         """Return the heights (N,) of a carriageway's wheel tracks and joints, m, as if there were no damage.
@@ -108,12 +108,15 @@ class PavementSurface:
         """Give the rows on damage its heights: later ones lie over earlier ones, patches over cracks and markings."""
         cell = np.floor(station[rows] / _CELL).astype(np.int64)
         for number in np.unique(cell).tolist():
-            mine = rows[cell == number]
+            rows_of_cell = rows[cell == number]
             for area in self._areas[side].get(number, ()):
-                inside = mine[area.covers(station[mine], offset[mine])]
-                result[inside] = area.height + (0.0 if area.levels else self._tracks(side, station, offset, inside))
+                covered_rows = rows_of_cell[area.covers(station[rows_of_cell], offset[rows_of_cell])]
+                result[covered_rows] = area.height + (
+                    0.0 if area.levels else self._tracks(side, station, offset, covered_rows)
+                )
 
     def _tracks(self, side: Side, station: Float, offset: Float, rows: Index) -> Float:
+        """Return the heights (R,) of wheel tracks without joints, m, at the given rows of the places."""
         return self.worn_height(side, station[rows], offset[rows], joints=False)
 
     @cached_property
@@ -130,6 +133,7 @@ class PavementSurface:
 
 
 def _faces(pavement: Pavement, length: float) -> Iterator[_DamageArea]:
+    """Yield the faces of removed markings, then cracks, then patches: a later one covers an earlier one."""
     for marking in pavement.removed_markings:
         for outline in removed_outlines(marking, pavement, length):
             yield _area(outline, damage_height(marking), levels=False)
@@ -149,5 +153,5 @@ def damage_height(item: Patch | Crack | RemovedMarking) -> float:
 
 def _area(outline: Float, height: float, levels: bool) -> _DamageArea:
     """Return the face of a convex outline (K, 2) that goes against the clock."""
-    low, high = outline[:, 0].min(), outline[:, 0].max()
-    return _DamageArea(edges_of(outline), float(low), float(high), height, levels)
+    lowest, highest = outline[:, 0].min(), outline[:, 0].max()
+    return _DamageArea(edges_of(outline), float(lowest), float(highest), height, levels)

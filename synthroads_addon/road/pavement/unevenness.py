@@ -37,5 +37,5 @@ def unevenness(place: Float, density: float | Float, seed: int) -> Float:
         density: one, or (N,), at 0.1 cycles/m, cm3.
         seed: of the field.
     """
-    level = np.column_stack([place[:, :2], np.zeros(len(place))])
-    return noise_field(level, LONGEST, seed, OCTAVES) * unevenness_spread(1.0) * np.sqrt(density)
+    points_3d = np.column_stack([place[:, :2], np.zeros(len(place))])
+    return noise_field(points_3d, LONGEST, seed, OCTAVES) * unevenness_spread(1.0) * np.sqrt(density)

@@ -50,9 +50,11 @@ class Asset(StandingThing):
 
     def twin(self) -> TwinTypes:
         """Return its types in the twin formats: those that its library gives, else those of its semantic class."""
-        given = {name: getattr(self.twin_types, name) for name in AssetTypes.model_fields} if self.twin_types else {}
+        types_of_library = (
+            {name: getattr(self.twin_types, name) for name in AssetTypes.model_fields} if self.twin_types else {}
+        )
         types = {"opendrive": f"none.{self.name}"} | class_types().get(self.class_name, {})
-        return TwinTypes(kind=self.name, **(types | {key: value for key, value in given.items() if value}))
+        return TwinTypes(kind=self.name, **(types | {key: value for key, value in types_of_library.items() if value}))
 
     def bodies(self, place: Place) -> list[Body]:
         """Return an empty list: its shape is in its library's file."""

@@ -38,8 +38,8 @@ LENS_PROUD = 0.03
 def foot_outline() -> Float:
     """Return the outline (8, 2) of a beacon's foot, m, anticlockwise from above."""
     x, y, cut = FOOT[0] / 2.0, FOOT[1] / 2.0, CORNER
-    half = np.array([(x, cut - y), (x, y - cut), (x - cut, y), (cut - x, y)])
-    return np.concatenate([half, -half])
+    half_outline = np.array([(x, cut - y), (x, y - cut), (x - cut, y), (cut - x, y)])
+    return np.concatenate([half_outline, -half_outline])
 
 
 _REACH = 0.1
@@ -74,21 +74,21 @@ class ConstructionBeacon(StandingThing):
     def bodies(self, place: Place) -> list[Body]:
         """Return the closed solids of blade, foot and lamp, in its frame."""
         top = BLADE_BOTTOM + self.height
-        thick = BLADE + 2.0 * SHEETING
-        blade = box((self.width, thick, self.height), (0.0, 0.0, (BLADE_BOTTOM + top) / 2.0))
-        outline, (share, smaller) = foot_outline(), LEVELS
+        thickness = BLADE + 2.0 * SHEETING
+        blade = box((self.width, thickness, self.height), (0.0, 0.0, (BLADE_BOTTOM + top) / 2.0))
+        outline, (share, upper_scale) = foot_outline(), LEVELS
         feet = [
             prism(outline, -SUNK, FOOT[2] * share),
-            prism(outline * smaller, 0.0, FOOT[2]),
+            prism(outline * upper_scale, 0.0, FOOT[2]),
             box(TENON, (0.0, 0.0, TENON_MIDDLE)),
         ]
-        radius, deep = LENS
-        drum = plate(circle(2.0 * radius, LENS_SIDES), -deep / 2.0, deep / 2.0)
+        radius, lens_depth = LENS
+        drum = plate(circle(2.0 * radius, LENS_SIDES), -lens_depth / 2.0, lens_depth / 2.0)
         lamp = [
             box(HOUSING, (0.0, 0.0, top + HOUSING_MIDDLE)),
             shift(drum, (0.0, 0.0, top + LENS_MIDDLE)),
         ]
-        glass = box((2.0 * radius, deep + LENS_PROUD, 2.0 * radius), (0.0, 0.0, top + LENS_MIDDLE))
+        glass = box((2.0 * radius, lens_depth + LENS_PROUD, 2.0 * radius), (0.0, 0.0, top + LENS_MIDDLE))
         return [
             Body(blade, "sheeting_red"),
             *(Body(shape, "rubber") for shape in feet),

@@ -84,39 +84,39 @@ class Course:
 # --- shapes at one place --------------------------------------------------------------------------------------------
 
 
-def prism(outline: Sequence[Point2] | Float, low: float, high: float) -> Float:
+def prism(outline: Sequence[Point2] | Float, bottom: float, top: float) -> Float:
     """Return the sections (2, K, 3) of the prism over an outline (K, 2) in x, y between two heights, m."""
-    flat = np.asarray(outline, dtype=np.float64)
-    return np.stack([np.column_stack([flat, np.full(len(flat), z)]) for z in (low, high)])
+    corners = np.asarray(outline, dtype=np.float64)
+    return np.stack([np.column_stack([corners, np.full(len(corners), z)]) for z in (bottom, top)])
 
 
 def box(size: Sequence[float], middle: Sequence[float] = (0.0, 0.0, 0.0)) -> Float:
     """Return the sections (2, 4, 3) of a box of a size (x, y, z), m, around its middle."""
-    (x, y, z), half = middle, np.asarray(size, dtype=np.float64) / 2.0
-    corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) * half[:2] + (x, y)
-    return prism(corners, z - half[2], z + half[2])
+    (x, y, z), half_size = middle, np.asarray(size, dtype=np.float64) / 2.0
+    corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) * half_size[:2] + (x, y)
+    return prism(corners, z - half_size[2], z + half_size[2])
 
 
 def plate(outline: Sequence[Point2] | Float, front: float, back: float) -> Float:
     """Return the sections (2, K, 3) of an upright plate: an outline (K, 2) in x, z extruded between two y, m."""
-    flat = np.asarray(outline, dtype=np.float64)
-    return np.stack([np.column_stack([flat[:, 0], np.full(len(flat), y), flat[:, 1]]) for y in (front, back)])
+    corners = np.asarray(outline, dtype=np.float64)
+    return np.stack([np.column_stack([corners[:, 0], np.full(len(corners), y), corners[:, 1]]) for y in (front, back)])
 
 
 def circle(diameter: float, sides: int = 12) -> Float:
     """Return the corners (K, 2) of a regular polygon of so many sides, inscribed in a circle of the diameter, m."""
-    turn = 2.0 * np.pi * np.arange(sides) / sides
-    return diameter / 2.0 * np.column_stack([np.cos(turn), np.sin(turn)])
+    angles = 2.0 * np.pi * np.arange(sides) / sides
+    return diameter / 2.0 * np.column_stack([np.cos(angles), np.sin(angles)])
 
 
-def post(diameter: float, low: float, high: float, x: float = 0.0, y: float = 0.0, sides: int = 12) -> Float:
+def post(diameter: float, bottom: float, top: float, x: float = 0.0, y: float = 0.0, sides: int = 12) -> Float:
     """Return the sections (2, K, 3) of an upright round post between two heights, its axis at x and y, m."""
-    return prism(circle(diameter, sides) + (x, y), low, high)
+    return prism(circle(diameter, sides) + (x, y), bottom, top)
 
 
-def shift(sections: Float, by: Sequence[float], scale: Sequence[float] = (1.0, 1.0, 1.0)) -> Float:
+def shift(sections: Float, vector: Sequence[float], scale: Sequence[float] = (1.0, 1.0, 1.0)) -> Float:
     """Return sections (R, K, 3) scaled along each axis about the origin, then shifted."""
-    return sections * np.asarray(scale) + np.asarray(by)
+    return sections * np.asarray(scale) + np.asarray(vector)
 
 
 def rotate_x(sections: Float, angle: float) -> Float:
@@ -133,17 +133,18 @@ def rotate_z(sections: Float, angle: float) -> Float:
 
 def bar(start: Sequence[float] | Float, end: Sequence[float] | Float, width: float) -> Float:
     """Return the sections (2, 4, 3) of a bar of square section from one point to another, its sides ``width`` (m)."""
-    first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
-    along = (last - first) / np.linalg.norm(last - first)
-    axis = np.cross(_BAR_AXIS, along)
+    start_point, end_point = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    direction = (end_point - start_point) / np.linalg.norm(end_point - start_point)
+    axis = np.cross(_BAR_AXIS, direction)
     if not axis.any():
         axis = np.array([0.0, 0.0, 1.0])
     axis /= np.linalg.norm(axis)
-    cosine = float(_BAR_AXIS @ along)
+    # Rodrigues' rotation of the square from the x axis into the bar's direction.
+    cosine = float(_BAR_AXIS @ direction)
     sine = math.sqrt(max(1.0 - cosine**2, 0.0))
     sides = np.array([(0.0, y, z) for y, z in ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))]) * width
-    turned = sides * cosine + np.cross(axis, sides) * sine + axis * (sides @ axis)[:, None] * (1.0 - cosine)
-    return np.stack([first + turned, last + turned])
+    corners = sides * cosine + np.cross(axis, sides) * sine + axis * (sides @ axis)[:, None] * (1.0 - cosine)
+    return np.stack([start_point + corners, end_point + corners])
 
 
 # --- shapes along the road ------------------------------------------------------------------------------------------
@@ -162,20 +163,22 @@ def sweep(feet: Float, left: Float, across: ArrayLike, height: ArrayLike) -> Flo
     return sections
 
 
-def boxes(feet: Float, left: Float, size: Sequence[Any], low: ArrayLike, beside: float = 0.0) -> list[Float]:
+def boxes(
+    feet: Float, left: Float, size: Sequence[Any], bottom: ArrayLike, lateral_distance: float = 0.0
+) -> list[Float]:
     """Return the sections (2, 4, 3) of upright boxes beside feet (N, 3), one for each.
 
     Args:
         left: (N, 3) unit vectors to the left.
         size: across, along and height, m, each one for all or (N,).
-        low: height of the undersides above the feet, m, one for all or (N,).
-        beside: distance of their middles to the left of the feet, m.
+        bottom: height of the undersides above the feet, m, one for all or (N,).
+        lateral_distance: distance of their middles to the left of the feet, m.
     """
-    across, along, tall = (np.broadcast_to(value, len(feet))[:, None] for value in size)
-    ahead = np.stack([left[:, 1], -left[:, 0], left[:, 2]], axis=1)
+    widths, lengths, heights = (np.broadcast_to(value, len(feet))[:, None] for value in size)
+    forward_vectors = np.stack([left[:, 1], -left[:, 0], left[:, 2]], axis=1)
     corners = np.array([(-0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), (0.5, -0.5)])
-    plan = feet[:, None] + (corners[:, 0] * across + beside)[..., None] * left[:, None]
-    plan = plan + (corners[:, 1] * along)[..., None] * ahead[:, None]
-    under = plan + np.broadcast_to(low, len(feet))[:, None, None] * np.array([0.0, 0.0, 1.0])
-    over = under + tall[..., None] * np.array([0.0, 0.0, 1.0])
-    return list(np.stack([under, over], axis=1))
+    base_points = feet[:, None] + (corners[:, 0] * widths + lateral_distance)[..., None] * left[:, None]
+    base_points = base_points + (corners[:, 1] * lengths)[..., None] * forward_vectors[:, None]
+    bottom_points = base_points + np.broadcast_to(bottom, len(feet))[:, None, None] * np.array([0.0, 0.0, 1.0])
+    top_points = bottom_points + heights[..., None] * np.array([0.0, 0.0, 1.0])
+    return list(np.stack([bottom_points, top_points], axis=1))

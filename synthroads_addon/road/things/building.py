@@ -61,34 +61,42 @@ class Building(StandingThing):
 
     def twin(self) -> TwinTypes:
         """Return its types in the twin formats: a building."""
-        whole, element = "Building", "BuildingConstructiveElement"
-        return TwinTypes("IfcElementAssembly.USERDEFINED.SITE", f"building.{self.kind}", whole, element, kind=self.kind)
+        whole_type, part_type = "Building", "BuildingConstructiveElement"
+        return TwinTypes(
+            "IfcElementAssembly.USERDEFINED.SITE", f"building.{self.kind}", whole_type, part_type, kind=self.kind
+        )
 
     def bodies(self, place: Place) -> list[Body]:
         """Return the closed solids of walls, roof and chimney in its frame; windows and doors are details."""
         x, y = (np.array([-0.5, 0.5, 0.5, -0.5, 0.0]) * self.width, np.array([-0.5, -0.5, 0.5, 0.5, 0.0]) * self.depth)
         ground = place.ground(x, y)
-        floor, low = float(np.max(ground)), float(np.min(ground)) - BURIED
+        floor, bottom = float(np.max(ground)), float(np.min(ground)) - BURIED
         eaves = floor + self.height
-        walls = Body(self._walls(low, eaves), WALLS[self.kind], "walls", "IfcWall.SOLIDWALL")
+        walls = Body(self._walls(bottom, eaves), WALLS[self.kind], "walls", "IfcWall.SOLIDWALL")
         return [walls, *self._roof(eaves), *self._openings(floor)]
 
-    def _walls(self, low: float, eaves: float) -> Float:
+    def _walls(self, bottom: float, eaves: float) -> Float:
         """Return the sections of walls and gables: an outline across the ridge, extruded along it."""
-        half = self.depth / 2.0
-        outline = [(-half, low), (half, low), (half, eaves), (-half, eaves)]
+        half_depth = self.depth / 2.0
+        outline = [(-half_depth, bottom), (half_depth, bottom), (half_depth, eaves), (-half_depth, eaves)]
         if self.roof_height > 0.0:
             outline.insert(3, (0.0, eaves + self.roof_height))
         return self._along(outline, self.width / 2.0)
 
     def _roof(self, eaves: float) -> Iterator[Body]:
         """Yield the slabs of the roof and a house's chimney."""
-        end, half = self.width / 2.0 + OVERHANG, self.depth / 2.0 + OVERHANG
+        half_length, half_span = self.width / 2.0 + OVERHANG, self.depth / 2.0 + OVERHANG
         ridge, material = eaves + self.roof_height, ROOFS[self.kind]
+        # The roof's plane goes on beyond the wall: by so much the overhang's edge lies below the eaves.
         drop = OVERHANG * self.roof_height / (self.depth / 2.0)
         for side in (-1.0, 1.0):
-            slope = [(0.0, ridge), (side * half, eaves - drop), (side * half, eaves - drop + SLAB), (0.0, ridge + SLAB)]
-            shape = self._along(slope if side > 0.0 else slope[::-1], end)
+            slope = [
+                (0.0, ridge),
+                (side * half_span, eaves - drop),
+                (side * half_span, eaves - drop + SLAB),
+                (0.0, ridge + SLAB),
+            ]
+            shape = self._along(slope if side > 0.0 else slope[::-1], half_length)
             yield Body(shape, material, "roof", "IfcRoof.GABLE_ROOF")
         if self.kind in ("house", "brick_house"):
             top = ridge + 0.7
@@ -97,16 +105,17 @@ class Building(StandingThing):
             yield Body(shape, "brick", "chimney", "IfcChimney.NOTDEFINED")
 
     @staticmethod
-    def _along(outline: list[tuple[float, float]], end: float) -> Float:
-        flat = np.array(outline)
-        return np.stack([np.column_stack([np.full(len(flat), x), flat]) for x in (-end, end)])
+    def _along(outline: list[tuple[float, float]], half_length: float) -> Float:
+        """Return the sections (2, K, 3) of an outline in y, z extruded along x from -half_length to half_length, m."""
+        corners = np.array(outline)
+        return np.stack([np.column_stack([np.full(len(corners), x), corners]) for x in (-half_length, half_length)])
 
     def _openings(self, floor: float) -> Iterator[Body]:
         """Yield windows, doors and gates, which stand out of the walls by a little."""
         if self.kind in ("barn", "hall"):
-            wide, tall = min(GATE[0], 0.5 * self.width), min(GATE[1], self.height - 0.3)
+            gate_width, gate_height = min(GATE[0], 0.5 * self.width), min(GATE[1], self.height - 0.3)
             for side in (-1.0, 1.0):
-                yield self._opening((0.0, side, floor), (wide, tall), "gantry_steel")
+                yield self._opening((0.0, side, floor), (gate_width, gate_height), "gantry_steel")
             return
         bays = max(1, int(self.width / _BAY))
         pitch = self.width / bays
@@ -120,12 +129,19 @@ class Building(StandingThing):
                     else:
                         yield self._opening((x, side, sill), WINDOW, "glass")
 
-    def _opening(self, at: tuple[float, float, float], size: tuple[float, float], material: str) -> Body:
-        x, side, low = at
-        middle = (x, side * self.depth / 2.0, low + size[1] / 2.0)
+    def _opening(self, place: tuple[float, float, float], size: tuple[float, float], material: str) -> Body:
+        """Return a window, door or gate as a thin box before a wall.
+
+        Args:
+            place: x of its middle (m), side of the wall (-1 or 1 in y), and height of its lower edge (m).
+            size: width and height, m.
+            material: of its surface.
+        """
+        x, side, bottom = place
+        middle = (x, side * self.depth / 2.0, bottom + size[1] / 2.0)
         return Body(box((size[0], 2.0 * _PROUD, size[1]), middle), material, "openings", detail=_PROUD)
 
     def footprint(self) -> Iterator[Block]:
         """Yield the box that holds it, however it is turned; nothing else may stand there."""
-        half = math.hypot(self.width, self.depth) / 2.0 + OVERHANG
-        yield self.upright(half, self.height + self.roof_height + 1.0)
+        radius = math.hypot(self.width, self.depth) / 2.0 + OVERHANG
+        yield self.upright(radius, self.height + self.roof_height + 1.0)

@@ -34,11 +34,11 @@ PHONE_BAND = ((0.46, 1.0), (0.52, 1.0))
 
 def phone_outline() -> Float:
     """Return a square of side 1 with rounded corners (16, 2), anticlockwise from above."""
-    inner, radius = (1.0 - PHONE_CORNER) / 2.0, PHONE_CORNER / 2.0
-    start = np.deg2rad([-90.0, 0.0, 90.0, 180.0])
-    turn = start[:, None] + np.pi / 2.0 * np.arange(PHONE_STEPS) / (PHONE_STEPS - 1.0)
-    corners = np.array([(1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)]) * inner
-    return (corners[:, None] + radius * np.stack([np.cos(turn), np.sin(turn)], axis=2)).reshape(-1, 2)
+    inner_half, radius = (1.0 - PHONE_CORNER) / 2.0, PHONE_CORNER / 2.0
+    start_angles = np.deg2rad([-90.0, 0.0, 90.0, 180.0])
+    angles = start_angles[:, None] + np.pi / 2.0 * np.arange(PHONE_STEPS) / (PHONE_STEPS - 1.0)
+    corners = np.array([(1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)]) * inner_half
+    return (corners[:, None] + radius * np.stack([np.cos(angles), np.sin(angles)], axis=2)).reshape(-1, 2)
 
 
 class CabinetLimits(Limits):
@@ -83,16 +83,17 @@ class Cabinet(StandingThing):
         return self._phone() if self.kind == "emergency_phone" else self._cabinet(place)
 
     def _cabinet(self, place: Place) -> list[Body]:
+        """Return the bodies of a utility cabinet: it stands level on the highest ground below its corners."""
         pad = self.pad_margin
-        beside, ahead = np.array(CORNERS).T * [[self.width + 2.0 * pad], [self.depth + 2.0 * pad]]
-        ground = np.append(place.ground(beside, ahead), 0.0)
-        foot, low = float(ground.max()) + (PAD_RISE if pad else 0.0), float(ground.min()) - BURIED
-        top, body = foot + self.height, foot + self.height - LID
-        walls = self._block(OVERHANG, foot + PLINTH, body)
-        lid, plinth = self._block(0.0, body, top), self._block(2.0 * OVERHANG, low, foot + PLINTH)
-        tall = body - foot
-        doors = box((self.width, OVERHANG, tall), (0.0, (OVERHANG - self.depth) / 2.0, foot + tall / 2.0))
-        pads = [Body(self._block(-pad, low, foot), "concrete", "pad", "IfcSlab.PAVING")] if pad else []
+        corner_x, corner_y = np.array(CORNERS).T * [[self.width + 2.0 * pad], [self.depth + 2.0 * pad]]
+        ground = np.append(place.ground(corner_x, corner_y), 0.0)
+        foot, bottom = float(ground.max()) + (PAD_RISE if pad else 0.0), float(ground.min()) - BURIED
+        top, body_top = foot + self.height, foot + self.height - LID
+        walls = self._block(OVERHANG, foot + PLINTH, body_top)
+        lid, plinth = self._block(0.0, body_top, top), self._block(2.0 * OVERHANG, bottom, foot + PLINTH)
+        door_height = body_top - foot
+        doors = box((self.width, OVERHANG, door_height), (0.0, (OVERHANG - self.depth) / 2.0, foot + door_height / 2.0))
+        pads = [Body(self._block(-pad, bottom, foot), "concrete", "pad", "IfcSlab.PAVING")] if pad else []
         return [
             *pads,
             Body(walls, "cabinet_grey"),
@@ -101,28 +102,34 @@ class Cabinet(StandingThing):
             Body(doors, "cabinet_grey", "doors", detail=OVERHANG),
         ]
 
-    def _block(self, inset: float, low: float, high: float) -> Float:
+    def _block(self, inset: float, bottom: float, top: float) -> Float:
         """Return the sections of a box between two heights, on all sides by ``inset`` smaller than the cabinet, m."""
-        size = (self.width - 2.0 * inset, self.depth - 2.0 * inset, high - low)
-        return box(size, (0.0, 0.0, (high + low) / 2.0))
+        size = (self.width - 2.0 * inset, self.depth - 2.0 * inset, top - bottom)
+        return box(size, (0.0, 0.0, (top + bottom) / 2.0))
 
     def _phone(self) -> list[Body]:
+        """Return the bodies of an emergency phone: its pillar, plinth and band, and the panel as a detail."""
         solids = ((PHONE_BODY, "plastic_orange"), (PHONE_PLINTH, "concrete"), (PHONE_BAND, "sheeting_white"))
         panel = box((self.width, self.depth, self.height * 0.4), (0.0, 0.0, self.height * 0.74))
-        made = [Body(self._pillar(rows), material) for rows, material in solids]
-        return [*made, Body(panel, "plastic_black", "panel", detail=0.01)]
+        bodies = [Body(self._pillar(rows), material) for rows, material in solids]
+        return [*bodies, Body(panel, "plastic_black", "panel", detail=0.01)]
 
     def _pillar(self, rows: tuple[tuple[float, float], ...]) -> Float:
-        flat = phone_outline() * (self.width, self.depth)
+        """Return the sections (R, K, 3) of a solid through rows of height and width.
+
+        Args:
+            rows: heights (a share of the phone's; below the surface m), and widths as a share of the phone's.
+        """
+        outline = phone_outline() * (self.width, self.depth)
         return np.stack(
             [
-                np.column_stack([flat * share, np.full(len(flat), z if z < 0.0 else z * self.height)])
+                np.column_stack([outline * share, np.full(len(outline), z if z < 0.0 else z * self.height)])
                 for z, share in rows
             ]
         )
 
     def footprint(self) -> Iterator[Block]:
         """Yield the box that holds it, however it is turned, on a batter too; nothing else may stand there."""
-        half = max(self.width, self.depth) / 2.0 + (self.pad_margin if self.kind == "utility" else 0.0)
-        on_slope = half / STEEPEST if self.kind == "utility" else 0.0
-        yield self.upright(half, self.height + on_slope)
+        radius = max(self.width, self.depth) / 2.0 + (self.pad_margin if self.kind == "utility" else 0.0)
+        rise_on_slope = radius / STEEPEST if self.kind == "utility" else 0.0
+        yield self.upright(radius, self.height + rise_on_slope)

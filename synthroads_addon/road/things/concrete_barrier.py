@@ -65,11 +65,18 @@ class ConcreteBarrier(LengthwiseThing):
         ramp = self.ramp_length(end)
         station = course.rows(self.offset_at, self.start_station, end, (self.start_station + ramp, end - ramp))
         flank = np.array([(1.0, 0.0), *FLANKS[self.profile]])
-        across, share = np.append(flank[:, 0], -flank[::-1, 0]), np.append(flank[:, 1], flank[::-1, 1])
-        height = share * np.maximum(self.height * self.height_share(end, station), TIP)[:, None]
+        half_width_shares, height_shares = (
+            np.append(flank[:, 0], -flank[::-1, 0]),
+            np.append(flank[:, 1], flank[::-1, 1]),
+        )
+        height = height_shares * np.maximum(self.height * self.height_share(end, station), TIP)[:, None]
         height[:, [0, -1]] = -BURIED
         feet = course.feet(station, self.offset_at(station))
-        return [Body(sweep(feet, course.left(station), across * self.base_width / 2.0, height), "barrier_concrete")]
+        return [
+            Body(
+                sweep(feet, course.left(station), half_width_shares * self.base_width / 2.0, height), "barrier_concrete"
+            )
+        ]
 
     def footprint(self) -> Iterator[Block]:
         """Yield the barrier's box, in which nothing else may stand."""

@@ -49,9 +49,11 @@ class Delineator(StandingThing):
         outline = np.array(OUTLINE)
         top = TOP + SLANT * outline[:, 0]
         ends = [np.column_stack([outline, z * self.height]) for z in (np.full(len(outline), -BURIED), top)]
-        wide, high, middle = REFLECTOR
-        glass = box((wide + 0.03, 0.104, (high + 0.02) * self.height), (0.0, 0.0, middle * self.height))
-        return [Body(np.stack(ends), "plastic_white"), Body(glass, "reflector", detail=wide)]
+        glass_width, glass_height, glass_middle = REFLECTOR
+        glass = box(
+            (glass_width + 0.03, 0.104, (glass_height + 0.02) * self.height), (0.0, 0.0, glass_middle * self.height)
+        )
+        return [Body(np.stack(ends), "plastic_white"), Body(glass, "reflector", detail=glass_width)]
 
     def footprint(self) -> Iterator[Block]:
         """Yield the post's box, in which nothing else may stand."""

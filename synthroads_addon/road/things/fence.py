@@ -76,26 +76,28 @@ class Fence(LengthwiseThing):
         if end is None:
             return []
         station = self.posts(end)
-        feet, left = course.feet(station, self.offset_at(station)), course.left(station)
-        side, level = np.array([1.0, 1.0, -1.0, -1.0]), np.array([0.0, 1.0, 1.0, 0.0])
-        made = []
+        feet, left_vectors = course.feet(station, self.offset_at(station)), course.left(station)
+        corner_sides, corner_levels = np.array([1.0, 1.0, -1.0, -1.0]), np.array([0.0, 1.0, 1.0, 0.0])
+        bands = []
         for band in KINDS[self.kind]:
-            height = self.height * (band.low + (band.high - band.low) * level)
-            made.append(Body(sweep(feet, left, side * band.thickness / 2.0, height), MATERIALS[self.kind]))
-        return made + [Body(self._post(*place), "noise_wood") for place in zip(feet, left, strict=True)]
+            height = self.height * (band.low + (band.high - band.low) * corner_levels)
+            bands.append(
+                Body(sweep(feet, left_vectors, corner_sides * band.thickness / 2.0, height), MATERIALS[self.kind])
+            )
+        return bands + [Body(self._post(*place), "noise_wood") for place in zip(feet, left_vectors, strict=True)]
 
     def posts(self, end: float) -> Float:
         """Return the stations (N,), m, of its posts if it ends at a station (m)."""
-        last = min(self.end_station, end)  # the fence may say that it goes on far beyond the road's end
-        count = int(np.ceil((last - self.start_station) / self.post_spacing - 1e-4)) + 1
-        station = np.minimum(self.start_station + np.arange(count) * self.post_spacing, last)
+        last_station = min(self.end_station, end)  # the fence may say that it goes on far beyond the road's end
+        count = int(np.ceil((last_station - self.start_station) / self.post_spacing - 1e-4)) + 1
+        station = np.minimum(self.start_station + np.arange(count) * self.post_spacing, last_station)
         return np.append(station[station < end - 1e-3], end)
 
     def _post(self, foot: Float, left: Float) -> Float:
         """Return the sections of a post on a foot (3,), one of its corners to the left (unit vector (3,))."""
-        outline, ahead = circle(self.post_diameter, SIDES), np.array([-left[1], left[0], 0.0])
-        ring = foot + outline[:, :1] * left + outline[:, 1:] * ahead
-        return np.stack([ring - (0.0, 0.0, BURIED), ring + (0.0, 0.0, self.height)])
+        outline, forward = circle(self.post_diameter, SIDES), np.array([-left[1], left[0], 0.0])
+        corners = foot + outline[:, :1] * left + outline[:, 1:] * forward
+        return np.stack([corners - (0.0, 0.0, BURIED), corners + (0.0, 0.0, self.height)])
 
     def footprint(self) -> Iterator[Block]:
         """Yield the box around posts and bands, in which nothing else may stand."""

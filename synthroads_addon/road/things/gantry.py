@@ -129,6 +129,7 @@ class Gantry(StandingThing):
 
     @model_validator(mode="after")
     def _spans(self) -> Self:
+        """Return the gantry unchanged; ValueError unless its left end lies to the left of its right one."""
         if self.left_offset <= self.right_offset:
             raise ValueError("left_offset must be greater than right_offset")
         return self
@@ -138,14 +139,14 @@ class Gantry(StandingThing):
         signs = [HANGER + sign.depth for sign in self.signs if sign.facing == facing]
         return self.beam_depth / 2.0 + max(signs, default=0.0)
 
-    def beam_bottom(self, low: float) -> float:
+    def beam_bottom(self, lowest: float) -> float:
         """Return the height (m) of the beam's lower edge from that of the lowest part: taller signs hang below it."""
-        tallest = max((sign.height for sign in self.signs), default=0.0)
-        return low + max(tallest - self.beam_height, 0.0) * OVERHANG
+        largest_height = max((sign.height for sign in self.signs), default=0.0)
+        return lowest + max(largest_height - self.beam_height, 0.0) * OVERHANG
 
-    def ends_in_beam(self, sign: GantrySign, low: float) -> bool:
-        """Return whether a sign with its lower edge at the height ``low`` (m) would end below the beam's top."""
-        return low + sign.height < self.beam_bottom(low) + self.beam_height
+    def ends_in_beam(self, sign: GantrySign, lowest: float) -> bool:
+        """Return whether a sign with its lower edge at the height ``lowest`` (m) would end below the beam's top."""
+        return lowest + sign.height < self.beam_bottom(lowest) + self.beam_height
 
     def post_offsets(self) -> list[float]:
         """Return the offsets of its posts, m."""
@@ -180,19 +181,21 @@ class Gantry(StandingThing):
 
     def bodies(self, place: Place) -> list[Body]:
         """Return the closed solids of beam, posts, boards with their hangers, catwalk and ladder, in its frame."""
-        left, right = self.offset - self.left_offset, self.offset - self.right_offset
-        low = place.pavement((left, right), (-self.reach(1.0), self.reach(-1.0)), 0.0) + self.clearance
-        bottom = self.beam_bottom(low)
-        shapes = [shift(shape, (left, 0.0, bottom)) for shape in self._beam(right - left)]
-        made = [Body(shape, "gantry_steel", "beam", "IfcBeam.BEAM") for shape in shapes]
-        size = (right - left, self.beam_depth + JOINT, self.beam_height)
-        joints = box(size, ((left + right) / 2.0, 0.0, bottom + self.beam_height / 2.0))
-        made.append(Body(joints, "gantry_steel", "joints", detail=JOINT / 2.0))
+        left_x, right_x = self.offset - self.left_offset, self.offset - self.right_offset
+        lowest = place.pavement((left_x, right_x), (-self.reach(1.0), self.reach(-1.0)), 0.0) + self.clearance
+        bottom = self.beam_bottom(lowest)
+        shapes = [shift(shape, (left_x, 0.0, bottom)) for shape in self._beam(right_x - left_x)]
+        bodies = [Body(shape, "gantry_steel", "beam", "IfcBeam.BEAM") for shape in shapes]
+        size = (right_x - left_x, self.beam_depth + JOINT, self.beam_height)
+        joints = box(size, ((left_x + right_x) / 2.0, 0.0, bottom + self.beam_height / 2.0))
+        bodies.append(Body(joints, "gantry_steel", "joints", detail=JOINT / 2.0))
         for number, offset in enumerate(self.post_offsets(), 1):
-            made += self._post(place, f"post-{number}", offset, bottom)
+            bodies += self._post(place, f"post-{number}", offset, bottom)
         for name, sign in self.part_models().items():
-            made += self._board(name, sign, (low, bottom))
-        return [*made, *self._catwalk(place, (left, right), bottom + self.beam_height)] if self.catwalk else made
+            bodies += self._board(name, sign, (lowest, bottom))
+        return (
+            [*bodies, *self._catwalk(place, (left_x, right_x), bottom + self.beam_height)] if self.catwalk else bodies
+        )
 
     def _beam(self, length: float) -> list[Float]:
         """Return the sections of the beam's shapes (one, or a truss's bars) from x = 0 on, its lower edge on z = 0."""
@@ -201,36 +204,36 @@ class Gantry(StandingThing):
         if self.beam == "box":
             return [box((length, depth, height), middle)]
         if self.beam == "tube":
-            ring = circle(1.0, TUBE_SIDES)[:, ::-1] * (depth, height) + (0.0, height / 2.0)
-            return [np.stack([np.column_stack([np.full(TUBE_SIDES, x), ring]) for x in (0.0, length)])]
-        share, least, most = TRUSS_CHORD
-        wide = min(max(height * share, least), most)
-        beside, above = (depth - wide) / 2.0, (height - wide) / 2.0
+            section = circle(1.0, TUBE_SIDES)[:, ::-1] * (depth, height) + (0.0, height / 2.0)
+            return [np.stack([np.column_stack([np.full(TUBE_SIDES, x), section]) for x in (0.0, length)])]
+        share, least_width, largest_width = TRUSS_CHORD
+        chord_width = min(max(height * share, least_width), largest_width)
+        chord_y, chord_z = (depth - chord_width) / 2.0, (height - chord_width) / 2.0
         chords = [
-            box((length, wide, wide), (length / 2.0, y * beside, height / 2.0 + z * above))
+            box((length, chord_width, chord_width), (length / 2.0, y * chord_y, height / 2.0 + z * chord_z))
             for y in (-1.0, 1.0)
             for z in (-1.0, 1.0)
         ]
         bays = int(np.ceil(length / (max(height, TRUSS_BAY[0]) * TRUSS_BAY[1])))
-        begin, half = np.array([wide / 2.0, 0.0, height / 2.0]), np.array([0.0, 0.0, 0.5])
+        first_corner, half_height = np.array([chord_width / 2.0, 0.0, height / 2.0]), np.array([0.0, 0.0, 0.5])
         for number in range(bays * len(TRUSS_BARS) + TRUSS_FRAME):
             bay, kind = divmod(number, len(TRUSS_BARS))
-            turned = 1.0 - 2.0 * (bay % 2)
-            size = ((length - wide) / bays, beside * turned, 2.0 * above * turned)
-            first, last = begin + (np.array(TRUSS_BARS[kind]) + (bay, 0.0, 0.0) - half) * size
-            chords.append(bar(first, last, wide * TRUSS_BAR))
+            alternation = 1.0 - 2.0 * (bay % 2)
+            size = ((length - chord_width) / bays, chord_y * alternation, 2.0 * chord_z * alternation)
+            start, end = first_corner + (np.array(TRUSS_BARS[kind]) + (bay, 0.0, 0.0) - half_height) * size
+            chords.append(bar(start, end, chord_width * TRUSS_BAR))
         return chords
 
     def _post(self, place: Place, name: str, offset: float, bottom: float) -> list[Body]:
         """Return the solids of a post: one at an end encloses the beam's end, the middle one ends in it."""
-        x, outer = self.offset - offset, offset in (self.left_offset, self.right_offset)
+        x, is_at_end = self.offset - offset, offset in (self.left_offset, self.right_offset)
         foot = float(place.ground([x], [0.0])[0]) + self.elevation
-        top = bottom + (self.beam_height + POST_ENCLOSES if outer else POST_ENTERS)
-        depth = self.beam_depth + 2.0 * POST_ENCLOSES if outer else self.beam_depth * POST_SHARE
+        top = bottom + (self.beam_height + POST_ENCLOSES if is_at_end else POST_ENTERS)
+        depth = self.beam_depth + 2.0 * POST_ENCLOSES if is_at_end else self.beam_depth * POST_SHARE
 
-        def block(margin: float, low: float, high: float) -> Float:
-            size = (self.post_width + 2.0 * margin, depth + 2.0 * margin, high - low)
-            return box(size, (x, 0.0, (low + high) / 2.0))
+        def block(margin: float, bottom: float, block_top: float) -> Float:
+            size = (self.post_width + 2.0 * margin, depth + 2.0 * margin, block_top - bottom)
+            return box(size, (x, 0.0, (bottom + block_top) / 2.0))
 
         plate_top = foot + PLINTH + BASE_PLATE
         if plate_top >= top:
@@ -245,28 +248,32 @@ class Gantry(StandingThing):
 
     def _board(self, name: str, sign: GantrySign, levels: tuple[float, float]) -> list[Body]:
         """Return the solids of a board, in front of the beam as the traffic below sees it, and of its hangers."""
-        low, bottom = levels
-        beam = bottom + self.beam_height / 2.0
-        z = beam if self.ends_in_beam(sign, low) else low + sign.height / 2.0
-        x, behind = self.offset - sign.offset, self.beam_depth / 2.0
-        share, wide, longer = HUNG
+        lowest, bottom = levels
+        beam_middle = bottom + self.beam_height / 2.0
+        z = beam_middle if self.ends_in_beam(sign, lowest) else lowest + sign.height / 2.0
+        x, half_depth = self.offset - sign.offset, self.beam_depth / 2.0
+        share, hanger_width, hanger_excess = HUNG
 
-        def block(size: tuple[float, float, float], before: float, beside: float = 0.0, level: float = z) -> Float:
+        def block(
+            size: tuple[float, float, float], front_distance: float, lateral: float = 0.0, middle_z: float = z
+        ) -> Float:
             """Return the sections of a box whose middle is so far (m) before the beam's axis as its traffic sees it."""
-            return box(size, (x + beside, -sign.facing * before, level))
+            return box(size, (x + lateral, -sign.facing * front_distance, middle_z))
 
-        board = block((sign.width, sign.depth, sign.height), behind + HANGER + sign.depth / 2.0)
-        face = block((sign.width, FACE, sign.height), behind + HANGER + sign.depth + FACE / 2.0)
+        board = block((sign.width, sign.depth, sign.height), half_depth + HANGER + sign.depth / 2.0)
+        face = block((sign.width, FACE, sign.height), half_depth + HANGER + sign.depth + FACE / 2.0)
         kind, material = (
             ("IfcSignal.VISUAL", "display") if sign.kind == "display" else ("IfcSign.PICTORAL", "board_back")
         )
-        made = [Body(board, material, name, kind), Body(face, material, name, detail=FACE)]
-        tall, within = max(sign.height - 0.2, sign.height / 2.0), behind - self.beam_depth * 0.1
-        for beside in (-share * sign.width, share * sign.width):
-            hanger = block((wide, HANGER + longer, tall), behind + HANGER / 2.0, beside)
-            clamp = block((0.16, self.beam_depth * 0.3 + 0.05, self.beam_height * 0.3), within, beside, beam)
-            made += [Body(shape, "gantry_steel", "beam", "IfcBeam.BEAM") for shape in (hanger, clamp)]
-        return made
+        bodies = [Body(board, material, name, kind), Body(face, material, name, detail=FACE)]
+        hanger_height, clamp_distance = max(sign.height - 0.2, sign.height / 2.0), half_depth - self.beam_depth * 0.1
+        for lateral in (-share * sign.width, share * sign.width):
+            hanger = block((hanger_width, HANGER + hanger_excess, hanger_height), half_depth + HANGER / 2.0, lateral)
+            clamp = block(
+                (0.16, self.beam_depth * 0.3 + 0.05, self.beam_height * 0.3), clamp_distance, lateral, beam_middle
+            )
+            bodies += [Body(shape, "gantry_steel", "beam", "IfcBeam.BEAM") for shape in (hanger, clamp)]
+        return bodies
 
     def _catwalk(self, place: Place, ends: tuple[float, float], level: float) -> list[Body]:
         """Return the solids of the catwalk on the beam and of the ladder at the right post, else at the left one."""
@@ -307,22 +314,22 @@ class Gantry(StandingThing):
 
     def _ladder(self, place: Place, ends: tuple[float, float], level: float) -> tuple[list[Float], Float]:
         """Return the sections of a ladder's two rails, and of the box around its rungs."""
-        right = self.kind != "cantilever" or self.post_side == "right"
+        is_right = self.kind != "cantilever" or self.post_side == "right"
         # Behind the boards of the carriageway that the post stands beside.
-        x, y = ends[right], (self.beam_depth / 2.0 + LADDER_AWAY) * (1.0 if right else -1.0)
+        x, y = ends[is_right], (self.beam_depth / 2.0 + LADDER_AWAY) * (1.0 if is_right else -1.0)
         foot = float(place.ground([x], [0.0])[0]) + self.elevation + LADDER_FOOT
         top = level + CATWALK_RAIL
         rails = [
             box((LADDER_RAIL, LADDER_RAIL, top - foot), (x + side, y, (top + foot) / 2.0))
             for side in (-LADDER_HALF, LADDER_HALF)
         ]
-        wide, thick, _ = LADDER_RUNG
-        return rails, box((wide, thick, top - foot), (x, y, (top + foot) / 2.0))
+        rung_width, rung_thickness, _ = LADDER_RUNG
+        return rails, box((rung_width, rung_thickness, top - foot), (x, y, (top + foot) / 2.0))
 
     def footprint(self) -> Iterator[Block]:
         """Yield the boxes of its posts, then that of its beam, in which nothing else may stand."""
-        half, s, top = self.post_width / 2.0, self.station, self.clearance + self.beam_height
+        half_width, s, top = self.post_width / 2.0, self.station, self.clearance + self.beam_height
         for d in self.post_offsets():
-            yield Block("foot", s - half, s + half, d - half, d + half, 0.0, top)
-        deep = self.beam_depth / 2.0
-        yield Block("beam", s - deep, s + deep, self.right_offset, self.left_offset, self.clearance, top)
+            yield Block("foot", s - half_width, s + half_width, d - half_width, d + half_width, 0.0, top)
+        half_depth = self.beam_depth / 2.0
+        yield Block("beam", s - half_depth, s + half_depth, self.right_offset, self.left_offset, self.clearance, top)

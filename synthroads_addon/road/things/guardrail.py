@@ -101,6 +101,7 @@ class Guardrail(LengthwiseThing):
 
     @model_validator(mode="after")
     def _reflectors_fit(self) -> Guardrail:
+        """Return the guardrail unchanged; ValueError for reflectors closer than `SHORTEST_REFLECTOR_SPACING`."""
         if 0 < self.reflector_spacing < SHORTEST_REFLECTOR_SPACING:
             raise ValueError(f"reflector_spacing must be 0 (none) or at least {SHORTEST_REFLECTOR_SPACING:g} m")
         return self
@@ -111,9 +112,9 @@ class Guardrail(LengthwiseThing):
 
     def reach(self) -> tuple[float, float]:
         """Return how far its beams and posts reach to the right and to the left, m."""
-        rear = POST[0] / 2.0
-        face = rear + SPACER[self.faces] + max(depth for depth, _ in BEAM)
-        return rear if self.faces == "left" else face, rear if self.faces == "right" else face
+        rear_reach = POST[0] / 2.0
+        face_reach = rear_reach + SPACER[self.faces] + max(depth for depth, _ in BEAM)
+        return rear_reach if self.faces == "left" else face_reach, rear_reach if self.faces == "right" else face_reach
 
     def bodies(self, course: Course) -> list[Body]:
         """Return the closed solids of beams, posts, spacers and reflectors in local coordinates; none off the road.
@@ -130,27 +131,34 @@ class Guardrail(LengthwiseThing):
         return bodies + [Body(shape, "reflector") for shape in self._reflectors(course, end, sides)]
 
     def _beams(self, course: Course, end: float, sides: tuple[float, ...]) -> Iterator[Float]:
+        """Return the sections (N, K, 3) of the beam on each side (1 left, -1 right): a sheet swept along the road."""
         ramp = self.ramp_length(end)
         station = course.rows(self.offset_at, self.start_station, end, (self.start_station + ramp, end - ramp))
-        feet, left = course.feet(station, self.offset_at(station)), course.left(station)
+        feet, left_vectors = course.feet(station, self.offset_at(station)), course.left(station)
         profile = np.array([*BEAM, *((x - SHEET, z) for x, z in reversed(BEAM))])
-        across = profile[:, 0] + POST[0] / 2.0 + SPACER[self.faces]
-        height = self._top(end, station)[:, None] + profile[:, 1]
-        return (sweep(feet, left, side * across, height) for side in sides)
+        profile_offsets = profile[:, 0] + POST[0] / 2.0 + SPACER[self.faces]
+        profile_heights = self._top(end, station)[:, None] + profile[:, 1]
+        return (sweep(feet, left_vectors, side * profile_offsets, profile_heights) for side in sides)
 
     def _posts(self, course: Course, end: float, sides: tuple[float, ...]) -> list[Float]:
         """Return the sections of the posts, wherever the beam is high enough for one, and of their spacers."""
         count = int((end - self.start_station) / self.post_spacing + 1e-4) + 1
         station = self.start_station + np.arange(count) * self.post_spacing
         station = station[(self._top(end, station) >= LOWEST_POST) & (station <= end + 1e-9)]
-        feet, left = course.feet(station, self.offset_at(station)), course.left(station)
+        feet, left_vectors = course.feet(station, self.offset_at(station)), course.left(station)
         top = self._top(end, station)
         size = (*POST, top - POST_TOP + BURIED)
-        shapes = boxes(feet, left, size, -BURIED)
-        spacer, (share, long, high, below) = SPACER[self.faces], BLOCK
+        shapes = boxes(feet, left_vectors, size, -BURIED)
+        spacer, (share, spacer_length, spacer_height, middle_depth) = SPACER[self.faces], BLOCK
         for side in sides:
-            beside = side * (POST[0] + spacer) / 2.0
-            shapes += boxes(feet, left, (spacer * share, long, high), top - below - high / 2.0, beside)
+            lateral = side * (POST[0] + spacer) / 2.0
+            shapes += boxes(
+                feet,
+                left_vectors,
+                (spacer * share, spacer_length, spacer_height),
+                top - middle_depth - spacer_height / 2.0,
+                lateral,
+            )
         return shapes
 
     def splice_stations(self, end: float) -> Float:
@@ -169,29 +177,43 @@ class Guardrail(LengthwiseThing):
     def _splices(self, course: Course, end: float, sides: tuple[float, ...]) -> Iterator[Float]:
         """Yield the sections of what a splice adds in front of a beam: the upper sheet, and the bolts' heads on it."""
         # A head stands upright on its flank, so in depth it reaches farther; on a terminal it stays level.
-        flattest = min(math.cos(turn) for _, _, turn in BOLTS)
-        proud = (LAP_SHEET + BOLT_HEAD[1] + BOLT_HEAD[0] * _STEEPEST) / flattest
-        profile = np.array([*((x + proud, z) for x, z in BEAM), *reversed(BEAM)])
-        across = profile[:, 0] + POST[0] / 2.0 + SPACER[self.faces]
-        middle = self.splice_stations(end)
-        station = np.add.outer(middle, (-LAP / 2.0, LAP / 2.0)).ravel().clip(self.start_station, end)
-        feet, left = course.feet(station, self.offset_at(station)), course.left(station)
-        height = self._top(end, station)[:, None] + profile[:, 1]
+        least_cosine = min(math.cos(turn) for _, _, turn in BOLTS)
+        protrusion = (LAP_SHEET + BOLT_HEAD[1] + BOLT_HEAD[0] * _STEEPEST) / least_cosine
+        profile = np.array([*((x + protrusion, z) for x, z in BEAM), *reversed(BEAM)])
+        profile_offsets = profile[:, 0] + POST[0] / 2.0 + SPACER[self.faces]
+        splice_middles = self.splice_stations(end)
+        station = np.add.outer(splice_middles, (-LAP / 2.0, LAP / 2.0)).ravel().clip(self.start_station, end)
+        feet, left_vectors = course.feet(station, self.offset_at(station)), course.left(station)
+        profile_heights = self._top(end, station)[:, None] + profile[:, 1]
         for side in sides:
-            yield from sweep(feet, left, side * across, height).reshape(len(middle), 2, len(profile), 3)
+            yield from sweep(feet, left_vectors, side * profile_offsets, profile_heights).reshape(
+                len(splice_middles), 2, len(profile), 3
+            )
 
     def _reflectors(self, course: Course, end: float, sides: tuple[float, ...]) -> Iterator[Float]:
         """Yield the sections of the reflectors' plates, one behind and one before each station."""
         station = self.reflector_stations(end)
-        feet, left = course.feet(station, self.offset_at(station)), course.left(station)
-        ahead = np.stack([left[:, 1], -left[:, 0], left[:, 2]], axis=1) * (REFLECTOR_PLATE / 2.0)
-        corners = np.array(
-            [(x, sign * high / 2.0) for sign, edge in ((-1, 1), (1, -1)) for x, high in REFLECTOR[::edge]]
+        feet, left_vectors = course.feet(station, self.offset_at(station)), course.left(station)
+        half_plate = np.stack([left_vectors[:, 1], -left_vectors[:, 0], left_vectors[:, 2]], axis=1) * (
+            REFLECTOR_PLATE / 2.0
         )
-        across = corners[:, 0] + POST[0] / 2.0 + SPACER[self.faces]
-        height = (self._top(end, station) + REFLECTOR_MIDDLE)[:, None] + corners[:, 1]
+        corners = np.array(
+            [
+                (x, sign * edge_height / 2.0)
+                for sign, order in ((-1, 1), (1, -1))
+                for x, edge_height in REFLECTOR[::order]
+            ]
+        )
+        corner_offsets = corners[:, 0] + POST[0] / 2.0 + SPACER[self.faces]
+        corner_heights = (self._top(end, station) + REFLECTOR_MIDDLE)[:, None] + corners[:, 1]
         for side in sides:
-            yield from np.stack([sweep(feet + by * ahead, left, side * across, height) for by in (-1.0, 1.0)], axis=1)
+            yield from np.stack(
+                [
+                    sweep(feet + direction * half_plate, left_vectors, side * corner_offsets, corner_heights)
+                    for direction in (-1.0, 1.0)
+                ],
+                axis=1,
+            )
 
     def _top(self, end: float, station: Float) -> Float:
         """Return the height (N,) of the beam's top above the surface, m."""
@@ -200,5 +222,5 @@ class Guardrail(LengthwiseThing):
 
     def footprint(self) -> Iterator[Block]:
         """Yield the rail's box, to the face of its beam; nothing else may stand there."""
-        right, left = (_REAR if self.faces == other else _FACE for other in ("left", "right"))
-        yield self.strip(right, left, self.height)
+        right_reach, left_reach = (_REAR if self.faces == rear_side else _FACE for rear_side in ("left", "right"))
+        yield self.strip(right_reach, left_reach, self.height)

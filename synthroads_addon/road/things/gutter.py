@@ -58,9 +58,9 @@ class Gutter(LengthwiseThing):
             return []
         solids = []
         for outline, top in ((CHANNEL, RIM), (BLOCK, self.height)):
-            across, share = np.array(outline if self.kerb_side == "left" else mirrored(outline)).T
-            height = share * (top + BURIED) - BURIED
-            solids.append(Body(sweep(*line, across * self.width / 2.0, height), "concrete"))
+            width_shares, height_shares = np.array(outline if self.kerb_side == "left" else mirrored(outline)).T
+            heights = height_shares * (top + BURIED) - BURIED
+            solids.append(Body(sweep(*line, width_shares * self.width / 2.0, heights), "concrete"))
         return solids
 
     def footprint(self) -> Iterator[Block]:

@@ -61,9 +61,9 @@ class Hedge(LengthwiseThing):
         if line is None:
             return []
         flank = np.array(OUTLINE)
-        across = np.append(flank[:, 0], -flank[::-1, 0]) * self.width / 2.0
-        height = np.append(flank[:, 1], flank[::-1, 1]) * self.height
-        return [Body(sweep(*line, across, height), "leaves")]
+        flank_offsets = np.append(flank[:, 0], -flank[::-1, 0]) * self.width / 2.0
+        flank_heights = np.append(flank[:, 1], flank[::-1, 1]) * self.height
+        return [Body(sweep(*line, flank_offsets, flank_heights), "leaves")]
 
     def leaves_per_metre(self) -> int:
         """Return the number of leaves in each metre of its length."""

@@ -16,14 +16,15 @@ class Interval(ClosedModel):
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
+        """Return the limits unchanged; ValueError if the maximum is less than the minimum."""
         if self.maximum < self.minimum:
             raise ValueError(f"maximum {self.maximum} must not be less than minimum {self.minimum}")
         return self
 
 
-def interval(low: float, high: float, unit: str, description: str, title: str | None = None) -> Any:
+def interval(minimum: float, maximum: float, unit: str, description: str, title: str | None = None) -> Any:
     """Return a pydantic field for an `Interval` with its default limits."""
-    limits = Interval(minimum=low, maximum=high)
+    limits = Interval(minimum=minimum, maximum=maximum)
     return Field(limits, title=title, description=description, json_schema_extra=notes(unit=unit))
 
 

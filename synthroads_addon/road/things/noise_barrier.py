@@ -68,8 +68,8 @@ class NoiseBarrier(LengthwiseThing):
 
     def reach(self) -> tuple[float, float]:
         """Return how far it reaches to the right and to the left of its axis, m: half of panels or posts."""
-        half = max(self.thickness / 2.0, self.post_width * FLANGE)
-        return half, half
+        half_width = max(self.thickness / 2.0, self.post_width * FLANGE)
+        return half_width, half_width
 
     def bodies(self, course: Course) -> list[Body]:
         """Return the closed solids of panels, plinths and posts in local coordinates; none off the road."""
@@ -78,66 +78,100 @@ class NoiseBarrier(LengthwiseThing):
             return []
         bays = self.model_copy(update={"end_station": end}).element_ends(self.post_spacing, end)
         station = np.append(bays[:, 0], end)
-        feet, left, width = course.feet(station, self.offset_at(station)), course.left(station), self.post_width
-        tall = self.height + BURIED
-        web = boxes(feet, left, (2.0 * INSIDE * width, 2.0 * WEB * width, tall), -BURIED)
-        flange, beside = (FLANGE - INSIDE) * width, (FLANGE + INSIDE) / 2.0 * width
+        feet, left_vectors, post_width = (
+            course.feet(station, self.offset_at(station)),
+            course.left(station),
+            self.post_width,
+        )
+        post_height = self.height + BURIED
+        post_shapes = boxes(
+            feet, left_vectors, (2.0 * INSIDE * post_width, 2.0 * WEB * post_width, post_height), -BURIED
+        )
+        flange_thickness, flange_offset = (FLANGE - INSIDE) * post_width, (FLANGE + INSIDE) / 2.0 * post_width
         for side in (1.0, -1.0):
-            web += boxes(feet, left, (flange, width, tall), -BURIED, side * beside)
+            post_shapes += boxes(
+                feet, left_vectors, (flange_thickness, post_width, post_height), -BURIED, side * flange_offset
+            )
         pairs = feet[np.column_stack([np.arange(len(bays)), np.arange(len(bays)) + 1])]
         pairs = pairs[bays[:, 1] - bays[:, 0] >= _SHORTEST_BAY]
-        return [*self._walls(pairs), *(Body(shape, "galvanised_steel") for shape in web)]
+        return [*self._walls(pairs), *(Body(shape, "galvanised_steel") for shape in post_shapes)]
 
     def _walls(self, pairs: Float) -> list[Body]:
         """Return the solids of panels and plinths between the feet (B, 2, 3) of posts, level at the lower one."""
-        along = (pairs[:, 1] - pairs[:, 0]) * (1.0, 1.0, 0.0)
-        length = np.maximum(np.linalg.norm(along, axis=1), _NONE)
-        left = np.stack([-along[:, 1], along[:, 0], along[:, 2]], axis=1) / length[:, None]
-        middle = pairs.mean(axis=1)
-        middle[:, 2] = pairs[..., 2].min(axis=1)
-        inside = self.thickness < 2.0 * INSIDE * self.post_width
-        gap = self.post_width * (WEB if inside else 0.5) + PLAY
-        long = np.maximum(length - 2.0 * gap, 0.02)
-        plinth = min(self.height * PLINTH_SHARE, HIGHEST_PLINTH)
-        face, frame = MATERIALS[self.panel]
+        level_vectors = (pairs[:, 1] - pairs[:, 0]) * (1.0, 1.0, 0.0)
+        bay_lengths = np.maximum(np.linalg.norm(level_vectors, axis=1), _NONE)
+        left_vectors = (
+            np.stack([-level_vectors[:, 1], level_vectors[:, 0], level_vectors[:, 2]], axis=1) / bay_lengths[:, None]
+        )
+        bay_middles = pairs.mean(axis=1)
+        bay_middles[:, 2] = pairs[..., 2].min(axis=1)
+        is_between_flanges = self.thickness < 2.0 * INSIDE * self.post_width
+        post_gap = self.post_width * (WEB if is_between_flanges else 0.5) + PLAY
+        panel_lengths = np.maximum(bay_lengths - 2.0 * post_gap, 0.02)
+        plinth_height = min(self.height * PLINTH_SHARE, HIGHEST_PLINTH)
+        panel_material, frame_material = MATERIALS[self.panel]
 
-        def filled(depth: float, low: float, high: float, material: str, beside: float = 0.0) -> list[Body]:
-            shapes = boxes(middle, left, (depth, long, high - low), low, beside)
+        def filled(depth: float, bottom: float, upper_edge: float, material: str, lateral: float = 0.0) -> list[Body]:
+            """Return a solid in each bay, `depth` (m) thick, between two heights, moved to the left by `lateral`."""
+            shapes = boxes(bay_middles, left_vectors, (depth, panel_lengths, upper_edge - bottom), bottom, lateral)
             return [Body(shape, material) for shape in shapes]
 
-        made = filled(self.thickness, -BURIED, plinth, "noise_concrete")
+        bodies = filled(self.thickness, -BURIED, plinth_height, "noise_concrete")
         if self.panel == "glass":
-            return [*made, *self._glazing(middle, left, long, (plinth, long / (self.post_spacing - 2.0 * gap)))]
-        out = min(self.thickness * RELIEF_SHARE, RELIEFS[self.panel])
-        top = self.height - (CAP if self.panel != "concrete" else 0.0)
+            return [
+                *bodies,
+                *self._glazing(
+                    bay_middles,
+                    left_vectors,
+                    panel_lengths,
+                    (plinth_height, panel_lengths / (self.post_spacing - 2.0 * post_gap)),
+                ),
+            ]
+        relief = min(self.thickness * RELIEF_SHARE, RELIEFS[self.panel])
+        panel_top = self.height - (CAP if self.panel != "concrete" else 0.0)
         # The slats look towards the road; the wall stands behind them.
-        rear = -out / 2.0 if self.offset < 0.0 else out / 2.0
-        walls = filled(self.thickness - out, plinth, top, face, rear)
-        if top < self.height:
-            made += filled(self.thickness, top, self.height, frame)
-        before = rear - np.copysign(self.thickness / 2.0, rear)
-        slats = boxes(middle, left, (out, long, top - plinth), plinth, before)
-        return [*walls, *made, *(Body(shape, face, detail=out) for shape in slats)]
+        wall_offset = -relief / 2.0 if self.offset < 0.0 else relief / 2.0
+        walls = filled(self.thickness - relief, plinth_height, panel_top, panel_material, wall_offset)
+        if panel_top < self.height:
+            bodies += filled(self.thickness, panel_top, self.height, frame_material)
+        slat_offset = wall_offset - np.copysign(self.thickness / 2.0, wall_offset)
+        slats = boxes(
+            bay_middles, left_vectors, (relief, panel_lengths, panel_top - plinth_height), plinth_height, slat_offset
+        )
+        return [*walls, *bodies, *(Body(shape, panel_material, detail=relief) for shape in slats)]
 
-    def _glazing(self, middle: Float, left: Float, long: Float, levels: tuple[float, Float]) -> list[Body]:
-        """Return the solids of glass panes and their frames; those of shorter bays are squeezed."""
-        low, squeezed = levels
-        tall = self.height - low
-        ahead = np.stack([left[:, 1], -left[:, 0], left[:, 2]], axis=1)
+    def _glazing(
+        self, bay_middles: Float, left_vectors: Float, panel_lengths: Float, levels: tuple[float, Float]
+    ) -> list[Body]:
+        """Return the solids of glass panes and their frames in B bays.
+
+        Args:
+            bay_middles, left_vectors: (B, 3) middles of the bays, and unit vectors to the left.
+            panel_lengths: (B,) m.
+            levels: height of the panes' lower edge, m, and the factors (B,) on the frames' width: less than 1 in
+                shorter bays.
+        """
+        bottom, frame_factors = levels
+        panel_height = self.height - bottom
+        forward_vectors = np.stack([left_vectors[:, 1], -left_vectors[:, 0], left_vectors[:, 2]], axis=1)
         shapes = [
-            *boxes(middle, left, (self.thickness, long, FRAME), low),
-            *boxes(middle, left, (self.thickness, long, FRAME), self.height - FRAME),
+            *boxes(bay_middles, left_vectors, (self.thickness, panel_lengths, FRAME), bottom),
+            *boxes(bay_middles, left_vectors, (self.thickness, panel_lengths, FRAME), self.height - FRAME),
         ]
         for side in (1.0, -1.0):
-            ends = middle + ahead * (side * (long - FRAME * squeezed) / 2.0)[:, None]
-            size = (self.thickness, FRAME * squeezed, tall - 2.0 * FRAME)
-            shapes += boxes(ends, left, size, low + FRAME)
-        pane = (min(self.thickness * 0.6, PANE), long - 1.9 * FRAME * squeezed, tall - 1.9 * FRAME)
+            ends = bay_middles + forward_vectors * (side * (panel_lengths - FRAME * frame_factors) / 2.0)[:, None]
+            size = (self.thickness, FRAME * frame_factors, panel_height - 2.0 * FRAME)
+            shapes += boxes(ends, left_vectors, size, bottom + FRAME)
+        pane = (
+            min(self.thickness * 0.6, PANE),
+            panel_lengths - 1.9 * FRAME * frame_factors,
+            panel_height - 1.9 * FRAME,
+        )
         glass, frame = MATERIALS["glass"]
-        panes = boxes(middle, left, pane, low + 0.95 * FRAME)
+        panes = boxes(bay_middles, left_vectors, pane, bottom + 0.95 * FRAME)
         return [*(Body(shape, glass) for shape in panes), *(Body(shape, frame) for shape in shapes)]
 
     def footprint(self) -> Iterator[Block]:
         """Yield the box around panels and posts, in which nothing else may stand."""
-        half = max(self.thickness, self.post_width) / 2.0
-        yield self.strip(half, half, self.height)
+        half_width = max(self.thickness, self.post_width) / 2.0
+        yield self.strip(half_width, half_width, self.height)

@@ -107,92 +107,120 @@ class Overpass(StandingThing):
         The deck is level, its underside `clearance` above the pavement's highest point below it. A skewed bridge is
         sheared: its faces stay parallel to the road, as its piers do.
         """
-        shear, half = float(np.tan(np.deg2rad(self.rotation_deg))), self.width / 2.0
-        faces = self.offset - self.left_abutment, self.offset - self.right_abutment
-        low = place.pavement(faces, (-half, half), shear) + self.clearance
-        walls, ends = [], []
-        for number, (side, x) in enumerate(zip((-1.0, 1.0), faces, strict=True), 1):
-            ground = float(np.min(place.ground([x, x], np.array([half, -half]) + x * shear))) - low
-            wing = float(np.clip((self.deck_thickness - ground) * place.slope, *WINGS))
-            ends.append(x + side * wing)
-            for body in self._abutment(f"abutment-{number}", ground - BURIED, wing):
-                walls.append(replace(body, sections=shift(body.sections, (x, 0.0, 0.0), (side, 1.0, 1.0))))
-        deck = self._deck((faces[0] - SEAT, faces[1] + SEAT), (ends[0], ends[1]))
-        skewed = [replace(body, sections=_shear_sections(body.sections, shear, low)) for body in (*deck, *walls)]
+        shear, half_width = float(np.tan(np.deg2rad(self.rotation_deg))), self.width / 2.0
+        abutment_x = self.offset - self.left_abutment, self.offset - self.right_abutment
+        underside = place.pavement(abutment_x, (-half_width, half_width), shear) + self.clearance
+        abutments, ends = [], []
+        for number, (side, x) in enumerate(zip((-1.0, 1.0), abutment_x, strict=True), 1):
+            ground_below_deck = (
+                float(np.min(place.ground([x, x], np.array([half_width, -half_width]) + x * shear))) - underside
+            )
+            wing_length = float(np.clip((self.deck_thickness - ground_below_deck) * place.slope, *WINGS))
+            ends.append(x + side * wing_length)
+            for body in self._abutment(f"abutment-{number}", ground_below_deck - BURIED, wing_length):
+                abutments.append(replace(body, sections=shift(body.sections, (x, 0.0, 0.0), (side, 1.0, 1.0))))
+        deck = self._deck((abutment_x[0] - SEAT, abutment_x[1] + SEAT), (ends[0], ends[1]))
+        placed_bodies = [
+            replace(body, sections=_shear_sections(body.sections, shear, underside)) for body in (*deck, *abutments)
+        ]
         for number, offset in enumerate(self.pier_offsets, 1):
             x = self.offset - offset
-            foot = float(place.ground([x], [x * shear])[0]) - BURIED - low
+            foot = float(place.ground([x], [x * shear])[0]) - BURIED - underside
             for body in self._pier(f"pier-{number}", foot):
-                skewed.append(replace(body, sections=shift(body.sections, (x, x * shear, low))))
-        return skewed
+                placed_bodies.append(replace(body, sections=shift(body.sections, (x, x * shear, underside))))
+        return placed_bodies
 
     def _deck(self, ends: Point2, reach: Point2) -> list[Body]:
         """Return the solids of the deck between two x, and of pavement, edge beams and railings between two others."""
         width, height, (start, end) = self.width, self.deck_thickness, reach
-        half = np.array(DECK) * (width / 2.0, height - PAVEMENT / 2.0)
-        slab = half[[0, *range(3, len(half))]]
+        half_section = np.array(DECK) * (width / 2.0, height - PAVEMENT / 2.0)
+        slab = half_section[[0, *range(3, len(half_section))]]
         shapes = [_extrude(np.concatenate([slab, slab[::-1] * (-1.0, 1.0)]), ends)]
-        shapes += [_extrude(half[:4] * (side, 1.0), ends) for side in (1.0, -1.0)]
+        shapes += [_extrude(half_section[:4] * (side, 1.0), ends) for side in (1.0, -1.0)]
         size = (end - start, width * (1.0 - 1.96 * EDGE), PAVEMENT)
         shapes.append(box(size, ((start + end) / 2.0, 0.0, height - PAVEMENT / 2.0)))
         materials = (*["bridge_concrete"] * 3, "asphalt")
-        made = [Body(shape, m, "deck", "IfcSlab.USERDEFINED") for shape, m in zip(shapes, materials, strict=True)]
-        inner, nose = width / 2.0 - width * EDGE, width / 2.0 - NOSE
-        top, seat, hang = height + CURB, height - PAVEMENT, min(height * HANG[0], HANG[1])
-        below = height - hang
-        beam = [(width / 2.0, below), (width / 2.0, top), (inner, top), (inner, seat), (nose, seat), (nose, below)]
+        bodies = [Body(shape, m, "deck", "IfcSlab.USERDEFINED") for shape, m in zip(shapes, materials, strict=True)]
+        inner_y, nose_y = width / 2.0 - width * EDGE, width / 2.0 - NOSE
+        top_z, seat_z, hang_depth = height + CURB, height - PAVEMENT, min(height * HANG[0], HANG[1])
+        lower_z = height - hang_depth
+        edge_beam = [
+            (width / 2.0, lower_z),
+            (width / 2.0, top_z),
+            (inner_y, top_z),
+            (inner_y, seat_z),
+            (nose_y, seat_z),
+            (nose_y, lower_z),
+        ]
         for number, side in enumerate((-1.0, 1.0), 1):
-            outline = np.array(beam) * (side, 1.0)
-            made.append(Body(_extrude(outline, reach), "barrier_concrete", f"edge-beam-{number}", "IfcBeam.EDGEBEAM"))
+            outline = np.array(edge_beam) * (side, 1.0)
+            bodies.append(Body(_extrude(outline, reach), "barrier_concrete", f"edge-beam-{number}", "IfcBeam.EDGEBEAM"))
             if self.parapet_height > LOWEST_PARAPET:
-                place = (start, side * (width / 2.0 - RAILING_INSIDE), top)
-                made += self._railing(f"parapet-{number}", place, end - start)
-        return made
+                place = (start, side * (width / 2.0 - RAILING_INSIDE), top_z)
+                bodies += self._railing(f"parapet-{number}", place, end - start)
+        return bodies
 
     def _railing(self, name: str, place: Point3, length: float) -> list[Body]:
         """Return the solids of a railing that runs along x from a place on for a length, m."""
-        height, middle, (wide, high) = self.parapet_height - CURB, length / 2.0, RAILING_HAND
-        upper, rail = height - high - RAILING_LOWER, (length, RAILING_RAIL, RAILING_RAIL)
+        height, middle, (handrail_width, handrail_height) = self.parapet_height - CURB, length / 2.0, RAILING_HAND
+        upper_rail_z, rail_size = height - handrail_height - RAILING_LOWER, (length, RAILING_RAIL, RAILING_RAIL)
         shapes = [
-            box((length, wide, high), (middle, 0.0, height - high / 2.0)),
-            box(rail, (middle, 0.0, RAILING_LOWER)),
-            box(rail, (middle, 0.0, upper)),
+            box((length, handrail_width, handrail_height), (middle, 0.0, height - handrail_height / 2.0)),
+            box(rail_size, (middle, 0.0, RAILING_LOWER)),
+            box(rail_size, (middle, 0.0, upper_rail_z)),
         ]
-        bays, tall = int(np.ceil(length / RAILING_SPACING)), height - high / 2.0
-        along = RAILING_POST / 2.0 + np.arange(bays + 1) * (length - RAILING_POST) / bays
-        shapes += [box((RAILING_POST, RAILING_POST, tall), (x, 0.0, tall / 2.0)) for x in along.tolist()]
-        bars = box((length, 1.4 * RAILING_BAR, upper - RAILING_LOWER), (middle, 0.0, (upper + RAILING_LOWER) / 2.0))
+        bays, post_height = int(np.ceil(length / RAILING_SPACING)), height - handrail_height / 2.0
+        post_x = RAILING_POST / 2.0 + np.arange(bays + 1) * (length - RAILING_POST) / bays
+        shapes += [box((RAILING_POST, RAILING_POST, post_height), (x, 0.0, post_height / 2.0)) for x in post_x.tolist()]
+        bars = box(
+            (length, 1.4 * RAILING_BAR, upper_rail_z - RAILING_LOWER),
+            (middle, 0.0, (upper_rail_z + RAILING_LOWER) / 2.0),
+        )
         steel = [Body(shift(shape, place), "galvanised_steel", name, "IfcRailing.BALUSTRADE") for shape in shapes]
         return [*steel, Body(shift(bars, place), "galvanised_steel", name, detail=RAILING_BAR)]
 
     def _abutment(self, name: str, foot: float, wing: float) -> list[Body]:
-        """Return the solids of an abutment with its face on x = 0 towards -x; the deck's underside is z = 0."""
-        wide, height, (behind, before) = self.width - 2.0 * WALL_INSIDE, self.deck_thickness, BACK_WALL
-        end = ABUTMENT - before
+        """Return the solids of an abutment with its face on x = 0 towards -x; the deck's underside is z = 0.
 
-        def wall(along: Point2, top: float, thick: float, y: float = 0.0) -> Float:
-            size = (along[1] - along[0], thick, top - foot)
-            return box(size, (sum(along) / 2.0, y, (top + foot) / 2.0))
+        Bearing seat, back wall, two wing walls, then the bearings as a detail. The shares of the pavement's thickness
+        and the centimetres by which walls reach into each other are chosen: faces that coincide have no first hit.
 
-        shapes = [wall((0.0, ABUTMENT), -BEARING, wide)]
-        shapes.append(wall((SEAT + behind, end), height - PAVEMENT * 0.5, wide - 0.02))
+        Args:
+            name: of the part.
+            foot: height of the walls' foot, m.
+            wing: x at which the wing walls end, m.
+        """
+        abutment_width, height, (gap_to_seat, gap_to_back) = (
+            self.width - 2.0 * WALL_INSIDE,
+            self.deck_thickness,
+            BACK_WALL,
+        )
+        back_wall_end = ABUTMENT - gap_to_back
+
+        def wall(x_range: Point2, top: float, thickness: float, y: float = 0.0) -> Float:
+            """Return the sections of a wall from the foot up to a top, between two x, with its middle at y, m."""
+            size = (x_range[1] - x_range[0], thickness, top - foot)
+            return box(size, (sum(x_range) / 2.0, y, (top + foot) / 2.0))
+
+        shapes = [wall((0.0, ABUTMENT), -BEARING, abutment_width)]
+        shapes.append(wall((SEAT + gap_to_seat, back_wall_end), height - PAVEMENT * 0.5, abutment_width - 0.02))
         for side in (1.0, -1.0):
-            y = (wide - WALL) / 2.0 * side
+            y = (abutment_width - WALL) / 2.0 * side
             shapes.append(wall((ABUTMENT - 0.02, wing), height - PAVEMENT * 0.6, WALL, y))
-        web = self.width * sum(WEB) / 4.0
-        pads = box((0.5, 2.0 * web + 0.6, BEARING + 0.02), (SEAT / 2.0, 0.0, -BEARING / 2.0))
-        made = [Body(shape, "bridge_concrete", name, "IfcWall.RETAININGWALL") for shape in shapes]
-        return [*made, Body(pads, "galvanised_steel", name, detail=BEARING)]
+        web_distance = self.width * sum(WEB) / 4.0
+        pads = box((0.5, 2.0 * web_distance + 0.6, BEARING + 0.02), (SEAT / 2.0, 0.0, -BEARING / 2.0))
+        bodies = [Body(shape, "bridge_concrete", name, "IfcWall.RETAININGWALL") for shape in shapes]
+        return [*bodies, Body(pads, "galvanised_steel", name, detail=BEARING)]
 
     def _pier(self, name: str, foot: float) -> list[Body]:
         """Return the solids of a pier along y with rounded ends, and its bearings; the deck's underside is z = 0."""
-        wide = self.pier_width
-        straight = max((self.width * PIER_LENGTH - wide) / 2.0, 0.01 * wide)
-        turn = np.pi * np.arange(PIER_ROUND) / (PIER_ROUND - 1.0)
-        end = wide / 2.0 * np.column_stack([np.cos(turn), np.sin(turn)]) + (0.0, straight)
-        body = prism(np.concatenate([end, -end]), foot, -BEARING)
-        beside = min(self.width * sum(WEB) / 4.0, straight)
-        size = (min(wide * 0.8, 0.6), 2.0 * beside + 0.5, BEARING + 0.02)
+        pier_width = self.pier_width
+        half_straight = max((self.width * PIER_LENGTH - pier_width) / 2.0, 0.01 * pier_width)
+        angles = np.pi * np.arange(PIER_ROUND) / (PIER_ROUND - 1.0)
+        rounded_end = pier_width / 2.0 * np.column_stack([np.cos(angles), np.sin(angles)]) + (0.0, half_straight)
+        body = prism(np.concatenate([rounded_end, -rounded_end]), foot, -BEARING)
+        bearing_distance = min(self.width * sum(WEB) / 4.0, half_straight)
+        size = (min(pier_width * 0.8, 0.6), 2.0 * bearing_distance + 0.5, BEARING + 0.02)
         pads = box(size, (0.0, 0.0, -BEARING / 2.0))
         return [
             Body(body, "bridge_concrete", name, "IfcColumn.PIERSTEM"),
@@ -201,13 +229,13 @@ class Overpass(StandingThing):
 
     def footprint(self) -> Iterator[Block]:
         """Yield the boxes of its piers, its deck and what lies behind its abutments: nothing else may stand there."""
-        start, end, half = self.station - self.width / 2.0, self.station + self.width / 2.0, self.pier_width / 2.0
+        start, end, half_pier = self.station - self.width / 2.0, self.station + self.width / 2.0, self.pier_width / 2.0
         for d in self.pier_offsets:
-            yield Block("foot", start, end, d - half, d + half, 0.0, self.clearance)
-        left, right, top = self.left_abutment, self.right_abutment, self.clearance + self.deck_thickness
-        yield Block("beam", start, end, right, left, self.clearance, top)
-        yield Block("wall", start, end, left, _FAR, 0.0, top)
-        yield Block("wall", start, end, -_FAR, right, 0.0, top)
+            yield Block("foot", start, end, d - half_pier, d + half_pier, 0.0, self.clearance)
+        left_end, right_end, top = self.left_abutment, self.right_abutment, self.clearance + self.deck_thickness
+        yield Block("beam", start, end, right_end, left_end, self.clearance, top)
+        yield Block("wall", start, end, left_end, _FAR, 0.0, top)
+        yield Block("wall", start, end, -_FAR, right_end, 0.0, top)
 
 
 def _extrude(outline: Float, ends: Point2) -> Float:
@@ -215,6 +243,6 @@ def _extrude(outline: Float, ends: Point2) -> Float:
     return np.stack([np.column_stack([np.full(len(outline), x), outline]) for x in ends])
 
 
-def _shear_sections(sections: Float, shear: float, low: float) -> Float:
-    """Return sections sheared, y growing by ``shear`` times x, and moved up by ``low`` (m)."""
-    return sections + sections[..., :1] * np.array([0.0, shear, 0.0]) + (0.0, 0.0, low)
+def _shear_sections(sections: Float, shear: float, height: float) -> Float:
+    """Return sections sheared, y growing by ``shear`` times x, and moved up by ``height`` (m)."""
+    return sections + sections[..., :1] * np.array([0.0, shear, 0.0]) + (0.0, 0.0, height)

@@ -53,6 +53,6 @@ class ParkedVehicle(StandingThing):
         """Yield the box that holds it, in which nothing else may stand."""
         kind = VEHICLE_TYPES[self.model]
         sine, cosine = abs(math.sin(self.turn)), abs(math.cos(self.turn))
-        along, across = cosine * kind.length + sine * kind.width, sine * kind.length + cosine * kind.width
+        length, width = cosine * kind.length + sine * kind.width, sine * kind.length + cosine * kind.width
         s, d, z = self.station, self.offset, self.elevation
-        yield Block("foot", s - along / 2.0, s + along / 2.0, d - across / 2.0, d + across / 2.0, z, z + kind.height)
+        yield Block("foot", s - length / 2.0, s + length / 2.0, d - width / 2.0, d + width / 2.0, z, z + kind.height)

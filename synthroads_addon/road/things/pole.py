@@ -73,10 +73,10 @@ class Pole(StandingThing):
 
     def bodies(self, place: Place) -> list[Body]:
         """Return the closed solids of the mast, its arm, and a street light or cameras, in its frame."""
-        lighting = self.kind == "lighting"
-        mount = self.height - (LUMINAIRE_DEPTH / 2.0 if lighting else CAMERA_MOUNT)
+        is_lighting = self.kind == "lighting"
+        mount = self.height - (LUMINAIRE_DEPTH / 2.0 if is_lighting else CAMERA_MOUNT)
         rise = self.arm_length * ARM_RISE
-        top = mount - rise if lighting else self.height
+        top = mount - rise if is_lighting else self.height
         circles = circle(self.diameter, MAST_SIDES), circle(self.diameter * MAST_TAPER, MAST_SIDES)
         rings = ((circles[0], -BURIED), (circles[0], 0.0), (circles[1], top))
         shapes = [np.stack([np.column_stack([ring, np.full(MAST_SIDES, z)]) for ring, z in rings])]
@@ -85,36 +85,45 @@ class Pole(StandingThing):
         door = box((self.diameter * 0.45, 0.02, 0.35), (0.0, self.diameter * -0.465, 0.8))
         mast = [Body(shape, "galvanised_steel", "column", "IfcColumn.COLUMN") for shape in shapes]
         door_body = Body(door, "galvanised_steel", "door", detail=0.02)
-        return [*mast, door_body, *(self._luminaire() if lighting else self._cameras(mount))]
+        return [*mast, door_body, *(self._luminaire() if is_lighting else self._cameras(mount))]
 
     def _luminaire(self) -> list[Body]:
-        low, high = self.height - LUMINAIRE_DEPTH, self.height
+        """Return the solid of the street light at the arm's end, and its glass as a detail."""
+        bottom, top = self.height - LUMINAIRE_DEPTH, self.height
         outline = np.array(LUMINAIRE) - (self.arm_length, 0.0)
-        glass = box((0.4, 0.2, 0.02), (-self.arm_length - 0.36, 0.0, low))
+        glass = box((0.4, 0.2, 0.02), (-self.arm_length - 0.36, 0.0, bottom))
         return [
-            Body(prism(outline, low, high), "cabinet_grey", "light", "IfcLightFixture.POINTSOURCE"),
+            Body(prism(outline, bottom, top), "cabinet_grey", "light", "IfcLightFixture.POINTSOURCE"),
             Body(glass, "lamp_glass", "glass", detail=0.01),
         ]
 
     def _cameras(self, mount: float) -> list[Body]:
         """Return the solids of a camera either way along the road, a dome at the arm's end, and the mast's cabinet."""
-        across, along, high = CAMERA
-        wider, longer, thick = CAMERA_SHIELD
-        away, level = (self.diameter + along) / 2.0, mount - CAMERA_BELOW
-        wide, deep, tall, middle = POLE_CABINET
-        shapes, small = [box((wide, deep, tall), (0.0, self.diameter / 2.0 + 0.1, middle))], []
+        camera_width, camera_length, camera_height = CAMERA
+        shield_excess_width, shield_excess_length, shield_thickness = CAMERA_SHIELD
+        distance, camera_z = (self.diameter + camera_length) / 2.0, mount - CAMERA_BELOW
+        cabinet_width, cabinet_depth, cabinet_height, cabinet_z = POLE_CABINET
+        shapes, fittings = (
+            [box((cabinet_width, cabinet_depth, cabinet_height), (0.0, self.diameter / 2.0 + 0.1, cabinet_z))],
+            [],
+        )
         for side in (1.0, -1.0):
-            place, facing = (0.0, -side * away, level), (side, side, 1.0)
+            place, facing = (0.0, -side * distance, camera_z), (side, side, 1.0)
             shapes.append(shift(rotate_x(box(CAMERA), np.deg2rad(CAMERA_TILT)), place, facing))
-            shield = box((across + wider, along + longer, thick), (0.0, -0.03, high / 2.0 + 0.012))
-            lens = box((0.09, 0.02, 0.09), (0.0, -along / 2.0, 0.0))
-            small += [shift(rotate_x(shape, np.deg2rad(CAMERA_TILT)), place, facing) for shape in (shield, lens)]
+            shield = box(
+                (camera_width + shield_excess_width, camera_length + shield_excess_length, shield_thickness),
+                (0.0, -0.03, camera_height / 2.0 + 0.012),
+            )
+            lens = box((0.09, 0.02, 0.09), (0.0, -camera_length / 2.0, 0.0))
+            fittings += [shift(rotate_x(shape, np.deg2rad(CAMERA_TILT)), place, facing) for shape in (shield, lens)]
         if self.arm_length > SHORTEST_ARM:
-            radius, cap, low, ball = CAMERA_DOME
-            shapes.append(post(2.0 * radius, mount - low, mount - low + cap, -self.arm_length))
-            small.append(box((1.8 * radius, 1.8 * radius, 1.8 * radius), (-self.arm_length, 0.0, mount - ball)))
-        head = [Body(shape, "cabinet_grey", "camera", "IfcAudioVisualAppliance.CAMERA") for shape in shapes]
-        return [*head, *(Body(shape, "cabinet_grey", "fittings", detail=0.09) for shape in small)]
+            radius, cap_height, cap_depth, ball_depth = CAMERA_DOME
+            shapes.append(post(2.0 * radius, mount - cap_depth, mount - cap_depth + cap_height, -self.arm_length))
+            fittings.append(
+                box((1.8 * radius, 1.8 * radius, 1.8 * radius), (-self.arm_length, 0.0, mount - ball_depth))
+            )
+        cameras = [Body(shape, "cabinet_grey", "camera", "IfcAudioVisualAppliance.CAMERA") for shape in shapes]
+        return [*cameras, *(Body(shape, "cabinet_grey", "fittings", detail=0.09) for shape in fittings)]
 
     def footprint(self) -> Iterator[Block]:
         """Yield the box of its mast, in which nothing else may stand."""
@@ -123,11 +132,14 @@ class Pole(StandingThing):
 
 def _arm(length: float, mount: float, rise: float) -> Float:
     """Return the sections of a bent arm: a quarter of an ellipse from the mast's axis to the left, and up."""
-    turn = np.pi / 2.0 * np.arange(ARM_POINTS) / (ARM_POINTS - 1.0)
-    line = np.column_stack([length * (np.cos(turn) - 1.0), np.zeros(ARM_POINTS), mount - rise * (1.0 - np.sin(turn))])
+    angles = np.pi / 2.0 * np.arange(ARM_POINTS) / (ARM_POINTS - 1.0)
+    line = np.column_stack(
+        [length * (np.cos(angles) - 1.0), np.zeros(ARM_POINTS), mount - rise * (1.0 - np.sin(angles))]
+    )
+    # Tangents at the points: at inner ones the mean direction of the two pieces that meet there.
     steps = np.diff(line, axis=0) / np.linalg.norm(np.diff(line, axis=0), axis=1)[:, None]
     tangent = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
     tangent /= np.linalg.norm(tangent, axis=1)[:, None]
-    up = np.column_stack([-tangent[:, 2], tangent[:, 1], tangent[:, 0]])
-    ring = circle(2.0 * ARM_RADIUS, ARM_SIDES)
-    return line[:, None] + ring[None, :, :1] * up[:, None] + ring[None, :, 1:] * np.array([0.0, 1.0, 0.0])
+    normals = np.column_stack([-tangent[:, 2], tangent[:, 1], tangent[:, 0]])
+    section = circle(2.0 * ARM_RADIUS, ARM_SIDES)
+    return line[:, None] + section[None, :, :1] * normals[:, None] + section[None, :, 1:] * np.array([0.0, 1.0, 0.0])

@@ -72,11 +72,12 @@ class PowerLine(StandingThing):
     def pylon(self, foot: Float) -> list[Body]:
         """Return the bars of a pylon on a foot (3,), in its frame."""
         levels = np.append(np.linspace(0.0, WAIST[0], PANELS + 1), [0.8, 1.0])
-        half = np.interp(levels, [0.0, WAIST[0], 1.0], [FOOT, WAIST[1], TOP]) * self.height
+        half_widths = np.interp(levels, [0.0, WAIST[0], 1.0], [FOOT, WAIST[1], TOP]) * self.height
         corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 
         def corner(level: int, number: int) -> Float:
-            return foot + np.append(corners[number % 4] * half[level], levels[level] * self.height)
+            """Return the point (3,) of a leg (0 to 3, round the pylon) at the number of a level."""
+            return foot + np.append(corners[number % 4] * half_widths[level], levels[level] * self.height)
 
         bars = []
         for number in range(4):
@@ -88,30 +89,47 @@ class PowerLine(StandingThing):
         return [Body(shape, "galvanised_steel") for shape in (*bars, *self._arms(foot))]
 
     def _arms(self, foot: Float) -> Iterator[Float]:
-        for level, reach in ARMS:
-            middle = foot + (0.0, 0.0, level * self.height)
+        """Yield the sections of the crossarms' bars and of the insulators that hang from their tips."""
+        for level_share, reach_share in ARMS:
+            middle = foot + (0.0, 0.0, level_share * self.height)
             for side in (-1.0, 1.0):
-                tip = middle + (0.0, side * reach * HALF_ARM * self.height, 0.0)
-                for beside in (-1.0, 1.0):
-                    yield bar(middle + (beside * TOP * self.height, 0.0, 0.0), tip, BRACE)
+                tip = middle + (0.0, side * reach_share * HALF_ARM * self.height, 0.0)
+                for corner_side in (-1.0, 1.0):
+                    yield bar(middle + (corner_side * TOP * self.height, 0.0, 0.0), tip, BRACE)
                 yield bar(middle + (0.0, 0.0, 0.05 * self.height), tip, BRACE)
                 yield bar(tip, tip - (0.0, 0.0, INSULATOR), BRACE)
 
     def conductors(self, start: Float, end: Float) -> Iterator[Body]:
         """Yield the conductors between two pylons' feet (3,), which hang as parabolas, and the earth wire over them."""
-        along = np.linspace(0.0, 1.0, _ROWS + 1)
-        hung = [(side * reach * HALF_ARM, level, INSULATOR, 1.0) for level, reach in ARMS for side in (-1.0, 1.0)]
-        turn = 2.0 * np.pi * np.arange(3) / 3.0
-        ring = np.column_stack([np.zeros(3), np.cos(turn), np.sin(turn)]) * DIAMETER / 2.0
-        for across, level, below, share_ in [*hung, (0.0, 1.0, 0.0, 0.8)]:
-            line = start + (end - start) * along[:, None] + (0.0, across * self.height, level * self.height - below)
-            line[:, 2] -= 4.0 * share_ * self.sag * along * (1.0 - along)
-            yield Body(line[:, None] + ring, "conductor")
+        shares = np.linspace(0.0, 1.0, _ROWS + 1)
+        suspension_points = [
+            (side * reach * HALF_ARM, level_share, INSULATOR, 1.0)
+            for level_share, reach in ARMS
+            for side in (-1.0, 1.0)
+        ]
+        angles = 2.0 * np.pi * np.arange(3) / 3.0
+        section = np.column_stack([np.zeros(3), np.cos(angles), np.sin(angles)]) * DIAMETER / 2.0
+        for lateral_share, level_share, hanging_length, sag_share in [*suspension_points, (0.0, 1.0, 0.0, 0.8)]:
+            line = (
+                start
+                + (end - start) * shares[:, None]
+                + (0.0, lateral_share * self.height, level_share * self.height - hanging_length)
+            )
+            line[:, 2] -= 4.0 * sag_share * self.sag * shares * (1.0 - shares)
+            yield Body(line[:, None] + section, "conductor")
 
     def footprint(self) -> Iterator[Block]:
         """Yield the boxes of its pylons, in which nothing else may stand."""
-        turn = np.radians(self.rotation_deg)
-        half = FOOT * self.height + LEG
+        rotation = np.radians(self.rotation_deg)
+        half_foot = FOOT * self.height + LEG
         for x in self.pylons():
-            station, offset = self.station + x * float(np.sin(turn)), self.offset - x * float(np.cos(turn))
-            yield Block("foot", station - half, station + half, offset - half, offset + half, 0.0, self.height)
+            station, offset = self.station + x * float(np.sin(rotation)), self.offset - x * float(np.cos(rotation))
+            yield Block(
+                "foot",
+                station - half_foot,
+                station + half_foot,
+                offset - half_foot,
+                offset + half_foot,
+                0.0,
+                self.height,
+            )

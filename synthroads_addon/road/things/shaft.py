@@ -49,13 +49,16 @@ class Shaft(StandingThing):
 
     def bodies(self, place: Place) -> list[Body]:
         """Return the closed solid of its concrete in its frame; grating, slots or cover on it are details."""
-        wide, tall, top = self.size * LID, self.height + BURIED, self.height + LID_RISE
+        lid_width, concrete_height, top = self.size * LID, self.height + BURIED, self.height + LID_RISE
         if self.kind == "manhole":
-            ring, lid = post(self.size, -BURIED, self.height, sides=SIDES), post(wide, self.height, top, sides=SIDES)
-            return [Body(ring, "concrete"), Body(lid, "galvanised_steel", "cover", detail=LID_RISE)]
-        frame = box((self.size, self.size, tall), (0.0, 0.0, tall / 2.0 - BURIED))
-        grating = box((wide, wide, LID_RISE), (0.0, 0.0, self.height + LID_RISE / 2.0))
-        slots = box((wide, wide, SLOT_RISE), (0.0, 0.0, top + SLOT_RISE / 2.0))
+            concrete, cover = (
+                post(self.size, -BURIED, self.height, sides=SIDES),
+                post(lid_width, self.height, top, sides=SIDES),
+            )
+            return [Body(concrete, "concrete"), Body(cover, "galvanised_steel", "cover", detail=LID_RISE)]
+        frame = box((self.size, self.size, concrete_height), (0.0, 0.0, concrete_height / 2.0 - BURIED))
+        grating = box((lid_width, lid_width, LID_RISE), (0.0, 0.0, self.height + LID_RISE / 2.0))
+        slots = box((lid_width, lid_width, SLOT_RISE), (0.0, 0.0, top + SLOT_RISE / 2.0))
         return [
             Body(frame, "concrete"),
             Body(grating, "galvanised_steel", "grating", detail=LID_RISE),
@@ -64,5 +67,5 @@ class Shaft(StandingThing):
 
     def footprint(self) -> Iterator[Block]:
         """Yield the box that holds it, however it is turned; nothing else may stand there."""
-        half = self.size / 2.0 * (2.0**0.5 if self.kind == "inlet" else 1.0)
-        yield self.upright(half, self.height + LID_RISE)
+        radius = self.size / 2.0 * (2.0**0.5 if self.kind == "inlet" else 1.0)
+        yield self.upright(radius, self.height + LID_RISE)

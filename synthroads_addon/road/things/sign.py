@@ -63,8 +63,8 @@ class TrafficSign(StandingThing):
     @property
     def on_lattices(self) -> bool:
         """Return whether its posts are lattices instead of tubes."""
-        large = self.width * self.height >= _LARGE
-        return large and self.post_diameter >= _LARGE_POST and self.posts <= _MOST_LATTICES
+        is_large = self.width * self.height >= _LARGE
+        return is_large and self.post_diameter >= _LARGE_POST and self.posts <= _MOST_LATTICES
 
     def twin(self) -> TwinTypes:
         """Return its types in the twin formats: a sign, with its code as reference."""
@@ -78,45 +78,47 @@ class TrafficSign(StandingThing):
 
     def bodies(self, place: Place) -> list[Body]:
         """Return the closed solids of face and posts, from the ground below each, in its frame; rails are a detail."""
-        share, spread, long = BEHIND[self.shape]
-        half, top = self.post_diameter / 2.0, self.lower_edge + self.height * share
+        post_share, rail_spread, rail_length_share = BEHIND[self.shape]
+        post_radius, top = self.post_diameter / 2.0, self.lower_edge + self.height * post_share
         outline = face_outline(self.shape, self.width, self.height) + (0.0, self.lower_edge + self.height / 2.0)
-        face = plate(outline, -(half + RAIL + PLATE), -(half + RAIL))
-        across = ((np.arange(self.posts) + 0.5) / self.posts - 0.5) * self.width
-        feet = place.ground(across, np.zeros(self.posts)) + self.elevation - BURIED
+        face = plate(outline, -(post_radius + RAIL + PLATE), -(post_radius + RAIL))
+        post_x = ((np.arange(self.posts) + 0.5) / self.posts - 0.5) * self.width
+        feet = place.ground(post_x, np.zeros(self.posts)) + self.elevation - BURIED
         posts = [
             body
-            for x, foot in zip(across.tolist(), feet.tolist(), strict=True)
+            for x, foot in zip(post_x.tolist(), feet.tolist(), strict=True)
             for body in self._post(x, foot, max(top, foot + 0.1))
         ]
-        reach = max(self.width * long / 2.0, across[-1] + half + CLAMP)
-        size = (2.0 * reach, 2.0 * half + RAIL + CLAMP, self.height * spread)
-        middle = (0.0, (CLAMP - RAIL) / 2.0, self.lower_edge + self.height * spread / 2.0)
+        reach = max(self.width * rail_length_share / 2.0, post_x[-1] + post_radius + CLAMP)
+        size = (2.0 * reach, 2.0 * post_radius + RAIL + CLAMP, self.height * rail_spread)
+        middle = (0.0, (CLAMP - RAIL) / 2.0, self.lower_edge + self.height * rail_spread / 2.0)
         return [
             Body(face, "board_back", "face"),
             *posts,
             Body(box(size, middle), "board_back", "rails", detail=RAIL),
         ]
 
-    def _post(self, x: float, low: float, high: float) -> list[Body]:
+    def _post(self, x: float, bottom: float, top: float) -> list[Body]:
         """Return the solid of a tube, or those of the three chords of a lattice and a box for its diagonals."""
-        wide, steel = self.post_diameter, "galvanised_steel"
+        diameter, steel = self.post_diameter, "galvanised_steel"
         if not self.on_lattices:
-            return [Body(post(wide, low, high, x), steel)]
-        turn = np.pi / 2.0 + 2.0 * np.pi * np.arange(3) / 3.0
-        places = (wide - LATTICE_CHORD) / 2.0 * np.column_stack([np.cos(turn), np.sin(turn)]) + (x, 0.0)
+            return [Body(post(diameter, bottom, top, x), steel)]
+        angles = np.pi / 2.0 + 2.0 * np.pi * np.arange(3) / 3.0
+        chord_places = (diameter - LATTICE_CHORD) / 2.0 * np.column_stack([np.cos(angles), np.sin(angles)]) + (x, 0.0)
         square = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]) * LATTICE_CHORD
-        diagonals = box((wide, wide, high - low + LATTICE_CHORD), (x, 0.0, (high + low) / 2.0))
-        chords = [Body(prism(square + place, low, high), steel) for place in places]
+        diagonals = box((diameter, diameter, top - bottom + LATTICE_CHORD), (x, 0.0, (top + bottom) / 2.0))
+        chords = [Body(prism(square + place, bottom, top), steel) for place in chord_places]
         return [*chords, Body(diagonals, steel, "diagonals", detail=LATTICE_CHORD)]
 
     def footprint(self) -> Iterator[Block]:
         """Yield the boxes of its posts, then that of its face, in which nothing else may stand."""
         face = self.face(self.width, self.lower_edge, self.height)
-        half = self.post_diameter / 2.0
+        post_radius = self.post_diameter / 2.0
         for i in range(self.posts):
             share = (i + 0.5) / self.posts
             s = face.start + (face.end - face.start) * share
             d = face.low + (face.high - face.low) * share
-            yield Block("foot", s - half, s + half, d - half, d + half, self.elevation, face.top)
+            yield Block(
+                "foot", s - post_radius, s + post_radius, d - post_radius, d + post_radius, self.elevation, face.top
+            )
         yield face

@@ -71,6 +71,7 @@ class SignCatalogue(Model):
 
     @model_validator(mode="after")
     def _colors_known(self) -> Self:
+        """Return the catalogue unchanged; ValueError if a sign names a colour that isn't among the catalogue's."""
         for code, sign in self.signs.items():
             for name in (sign.ground, sign.border, sign.writing):
                 if name not in self.colors:

@@ -32,14 +32,16 @@ def corner_radius(shape: str, width: float, height: float) -> float:
 def face_outline(shape: str, width: float, height: float) -> Float:
     """Return the corners (K, 2) of a sign's rounded face around its middle, m, anticlockwise."""
     corners = np.array(SIGN_OUTLINES["rectangle" if shape == "round" else shape])
-    most = min(width, height) * MOST_OF_SIDE
-    radius = most if shape == "round" else min(corner_radius(shape, width, height), most)
-    middles = corners * (width - 2.0 * radius, height - 2.0 * radius)
-    sides = middles - np.roll(middles, 1, axis=0)
+    largest_radius = min(width, height) * MOST_OF_SIDE
+    radius = largest_radius if shape == "round" else min(corner_radius(shape, width, height), largest_radius)
+    # Around each corner an arc about a middle further in, from the outward normal of the side before to that of the
+    # side after.
+    arc_middles = corners * (width - 2.0 * radius, height - 2.0 * radius)
+    sides = arc_middles - np.roll(arc_middles, 1, axis=0)
     normals = np.column_stack([sides[:, 1], -sides[:, 0]]) / np.maximum(np.linalg.norm(sides, axis=1), 1e-300)[:, None]
-    heading = np.arctan2(normals[:, 1], normals[:, 0])
-    turn = (np.roll(heading, -1) - heading) % (2.0 * np.pi)
+    side_headings = np.arctan2(normals[:, 1], normals[:, 0])
+    corner_turns = (np.roll(side_headings, -1) - side_headings) % (2.0 * np.pi)
     share = np.linspace(0.0, 1.0, ROUND_STEPS if shape == "round" else CORNER_STEPS)
-    angle = heading[:, None] + turn[:, None] * share
-    arcs = middles[:, None] + radius * np.stack([np.cos(angle), np.sin(angle)], axis=2)
+    angles = side_headings[:, None] + corner_turns[:, None] * share
+    arcs = arc_middles[:, None] + radius * np.stack([np.cos(angles), np.sin(angles)], axis=2)
     return arcs.reshape(-1, 2)

@@ -61,29 +61,35 @@ class TemporaryBarrier(LengthwiseThing):
         """Return the closed solids of its straight elements, and of their reflectors, in local coordinates."""
         if self.end_on(course.length) is None:
             return []
-        gap = GAP / 2.0
-        station = np.clip(self.element_ends(self.segment_length, course.length) + (gap, -gap), 0.0, course.length)
-        number = np.flatnonzero(station[:, 1] - station[:, 0] >= _SHORTEST)
-        ends = station[number].ravel()
+        half_gap = GAP / 2.0
+        station = np.clip(
+            self.element_ends(self.segment_length, course.length) + (half_gap, -half_gap), 0.0, course.length
+        )
+        elements = np.flatnonzero(station[:, 1] - station[:, 0] >= _SHORTEST)
+        ends = station[elements].ravel()
         feet = course.feet(ends, self.offset_at(ends)).reshape(-1, 2, 3)
-        along = _unit(feet[:, 1] - feet[:, 0])
-        left = _unit(np.stack([-along[:, 1], along[:, 0], np.zeros(len(along))], axis=1))
-        up = np.cross(along, left)
+        directions = _unit(feet[:, 1] - feet[:, 0])
+        left_vectors = _unit(np.stack([-directions[:, 1], directions[:, 0], np.zeros(len(directions))], axis=1))
+        up_vectors = np.cross(directions, left_vectors)
         flank = np.array(FLANKS["plastic" if self.plastic else "steel"]) * (
             self.base_width / 2.0,
             self.height,
         )
         outline = np.concatenate([flank, flank[::-1] * (-1.0, 1.0)])
-        corners = outline[:, :1] * left[:, None, None] + outline[:, 1:] * up[:, None, None]
+        corners = outline[:, :1] * left_vectors[:, None, None] + outline[:, 1:] * up_vectors[:, None, None]
         colours = ("plastic_red", "plastic_white") if self.plastic else ("galvanised_steel", "galvanised_steel")
         shapes = feet[:, :, None] + corners
-        made = [Body(shape, colours[i % 2]) for i, shape in zip(number.tolist(), shapes, strict=True)]
-        return made if self.plastic else [*made, *self._reflectors(feet.mean(axis=1), np.stack([along, left, up], 1))]
+        bodies = [Body(shape, colours[i % 2]) for i, shape in zip(elements.tolist(), shapes, strict=True)]
+        return (
+            bodies
+            if self.plastic
+            else [*bodies, *self._reflectors(feet.mean(axis=1), np.stack([directions, left_vectors, up_vectors], 1))]
+        )
 
     def _reflectors(self, middle: Float, axes: Float) -> list[Body]:
         """Return the solids of reflectors on both flanks of elements: middles (E, 3), axes (E, 3, 3) as rows."""
-        beside = self.base_width / 2.0 * FLANKS["steel"][5][0] + REFLECTOR[1] / 4.0
-        shapes = [box(REFLECTOR, (0.0, side * beside, self.height * 0.82)) for side in (1.0, -1.0)]
+        lateral = self.base_width / 2.0 * FLANKS["steel"][5][0] + REFLECTOR[1] / 4.0
+        shapes = [box(REFLECTOR, (0.0, side * lateral, self.height * 0.82)) for side in (1.0, -1.0)]
         pairs = ((shape, place, frame) for shape in shapes for place, frame in zip(middle, axes, strict=True))
         return [Body(place + shape @ frame, "reflector", detail=REFLECTOR[1]) for shape, place, frame in pairs]
 

@@ -135,18 +135,18 @@ class StandingThing(Thing, PointObject):
         """Return the offset at which it has its foot, m."""
         return self.offset
 
-    def upright(self, half: float, top: float) -> Block:
-        """Return the box of what stands on its foot: ``half`` (m) is half its width both ways, ``top`` its height."""
+    def upright(self, radius: float, top: float) -> Block:
+        """Return the box of what stands on its foot: ``radius`` (m) is half its width both ways, ``top`` its height."""
         s, d, z = self.station, self.offset, self.elevation
-        return Block("foot", s - half, s + half, d - half, d + half, z, z + top)
+        return Block("foot", s - radius, s + radius, d - radius, d + radius, z, z + top)
 
     def face(self, width: float, lower_edge: float, height: float) -> Block:
         """Return the box around an upright face of a width and height (m), turned as the thing stands."""
         turn = np.radians(self.rotation_deg)
         sine, cosine = float(abs(np.sin(turn))), float(abs(np.cos(turn)))
-        across, along = cosine * width / 2.0 + _FACE_REACH * sine, sine * width / 2.0 + _FACE_REACH * cosine
+        half_width, half_length = cosine * width / 2.0 + _FACE_REACH * sine, sine * width / 2.0 + _FACE_REACH * cosine
         s, d, z = self.station, self.offset, self.elevation + lower_edge
-        return Block("face", s - along, s + along, d - across, d + across, z, z + height)
+        return Block("face", s - half_length, s + half_length, d - half_width, d + half_width, z, z + height)
 
 
 class LengthwiseThing(Thing, LineObject):
@@ -160,10 +160,10 @@ class LengthwiseThing(Thing, LineObject):
         """Return how far it reaches to the right and to the left of its axis, m."""
         raise NotImplementedError
 
-    def strip(self, right: float, left: float, height: float) -> Block:
+    def strip(self, right_reach: float, left_reach: float, height: float) -> Block:
         """Return the box of its whole length, so wide (m) to the right and left of its axis and so high (m)."""
         start, end = sorted((self.start_station, self.end_station))
-        return Block("barrier", start, end, self.offset - right, self.offset + left, 0.0, height)
+        return Block("barrier", start, end, self.offset - right_reach, self.offset + left_reach, 0.0, height)
 
     def end_on(self, length: float) -> float | None:
         """Return the station of its end on a road of a length (m); None if nothing of it is on the road."""

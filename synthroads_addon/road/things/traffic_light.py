@@ -65,33 +65,38 @@ class TrafficLight(StandingThing):
 
     def bodies(self, place: Place) -> list[Body]:
         """Return the closed solids of post, board, chambers and visors, in its frame; lights are a detail."""
-        wide, rear = self.light_diameter, -POST / 2.0
-        across, along, up = (share * wide for share in CHAMBER)
-        tall = up * self.lights
-        middle = (0.0, rear - BEHIND, self.height - MARGIN - tall / 2.0)
-        shapes = [box((wide * BOARD, RIM, tall + 2.0 * MARGIN), middle)]
-        deep, before = PANEL
-        edge, panel = 2.0 * (MARGIN - EDGE), (0.0, middle[1] - before, middle[2])
-        shapes.append(box((wide * BOARD - 2.0 * EDGE, deep, tall + edge), panel))
-        front = -along + rear - 0.01
+        diameter, board_y = self.light_diameter, -POST / 2.0
+        chamber_width, chamber_depth, chamber_height = (share * diameter for share in CHAMBER)
+        housing_height = chamber_height * self.lights
+        middle = (0.0, board_y - BEHIND, self.height - MARGIN - housing_height / 2.0)
+        shapes = [box((diameter * BOARD, RIM, housing_height + 2.0 * MARGIN), middle)]
+        panel_depth, panel_shift = PANEL
+        panel_excess, panel_middle = 2.0 * (MARGIN - EDGE), (0.0, middle[1] - panel_shift, middle[2])
+        shapes.append(box((diameter * BOARD - 2.0 * EDGE, panel_depth, housing_height + panel_excess), panel_middle))
+        front = -chamber_depth + board_y - 0.01
         lamps = []
         for number in range(self.lights):
             level = self.level(number)
-            shapes.append(box((across, along, up - JOINT * wide), (0.0, -along / 2.0 - 0.055, level)))
+            shapes.append(
+                box(
+                    (chamber_width, chamber_depth, chamber_height - JOINT * diameter),
+                    (0.0, -chamber_depth / 2.0 - 0.055, level),
+                )
+            )
             shapes.append(shift(self._visor(), (0.0, front, level)))
-            lamps.append(box((wide, 0.12 * wide, wide), (0.0, front - 0.06 * wide, level)))
+            lamps.append(box((diameter, 0.12 * diameter, diameter), (0.0, front - 0.06 * diameter, level)))
         mast = Body(post(POST, -BURIED, self.height - 0.03), "galvanised_steel")
         head = [Body(shape, "plastic_black", "head") for shape in shapes]
-        return [*head, mast, *(Body(lamp, "lamp_red", "lamps", detail=0.12 * wide) for lamp in lamps)]
+        return [*head, mast, *(Body(lamp, "lamp_red", "lamps", detail=0.12 * diameter) for lamp in lamps)]
 
     def _visor(self) -> Float:
         """Return the sections of a sheet bent over a light, open below, which reaches forward from its middle."""
-        radius, thick, reach, more = VISOR
-        turn, outer = np.array(VISOR_TURNS), radius * self.light_diameter
-        ring = np.column_stack([np.cos(turn), np.zeros(len(turn)), np.sin(turn)])
-        outline = np.concatenate([ring * outer, ring[::-1] * (outer - thick)])
-        ahead = reach * self.light_diameter + more * np.maximum(outline[:, 2], 0.0)
-        return np.stack([outline, outline - ahead[:, None] * (0.0, 1.0, 0.0)])
+        radius, thickness, reach, extra_reach = VISOR
+        angles, outer_radius = np.array(VISOR_TURNS), radius * self.light_diameter
+        directions = np.column_stack([np.cos(angles), np.zeros(len(angles)), np.sin(angles)])
+        outline = np.concatenate([directions * outer_radius, directions[::-1] * (outer_radius - thickness)])
+        depths = reach * self.light_diameter + extra_reach * np.maximum(outline[:, 2], 0.0)
+        return np.stack([outline, outline - depths[:, None] * (0.0, 1.0, 0.0)])
 
     def footprint(self) -> Iterator[Block]:
         """Yield the box of its post, in which nothing else may stand."""

@@ -46,18 +46,18 @@ class Wall(LengthwiseThing):
 
     def reach(self) -> tuple[float, float]:
         """Return how far it reaches to the right and to the left of its axis, m: half its coping."""
-        half = self.thickness / 2.0 + OVERHANG
-        return half, half
+        half_width = self.thickness / 2.0 + OVERHANG
+        return half_width, half_width
 
     def bodies(self, course: Course) -> list[Body]:
         """Return the closed solids of wall and coping in local coordinates; none off the road."""
         line = self.line(course)
         if line is None:
             return []
-        side, upper = np.array([1.0, 1.0, -1.0, -1.0]), np.array([False, True, True, False])
-        body, top = self.height - COPING, self.thickness / 2.0
-        wall = sweep(*line, side * top, np.where(upper, body, -BURIED))
-        coping = sweep(*line, side * (top + OVERHANG), np.where(upper, self.height, body))
+        side, is_upper = np.array([1.0, 1.0, -1.0, -1.0]), np.array([False, True, True, False])
+        body_top, half_thickness = self.height - COPING, self.thickness / 2.0
+        wall = sweep(*line, side * half_thickness, np.where(is_upper, body_top, -BURIED))
+        coping = sweep(*line, side * (half_thickness + OVERHANG), np.where(is_upper, self.height, body_top))
         return [Body(wall, MATERIALS[self.kind]), Body(coping, "noise_concrete")]
 
     def footprint(self) -> Iterator[Block]:

@@ -85,26 +85,32 @@ class Plants:
 
 def random_share(seed: int, number: Int) -> NDArray[np.float32]:
     """Return the random numbers (N,), 0 to 1, of Blender's node Random Value for a seed and ids (N,)."""
-    start = np.uint32(0xDEADBEEF + (2 << 2) + 13)
+    initial_word = np.uint32(0xDEADBEEF + (2 << 2) + 13)
     with np.errstate(over="ignore"):
-        a = np.full(len(number), start + np.uint32(seed % 2**32))
-        b = start + number.astype(np.uint32)
-        c = np.full(len(number), start)
-        for one, other, bits in (("c", "b", 14), ("a", "c", 11), ("b", "a", 25), ("c", "b", 16)):
-            a, b, c = _mix_words(a, b, c, one, other, bits)
-        for one, other, bits in (("a", "c", 4), ("b", "a", 14), ("c", "b", 24)):
-            a, b, c = _mix_words(a, b, c, one, other, bits)
+        a = np.full(len(number), initial_word + np.uint32(seed % 2**32))
+        b = initial_word + number.astype(np.uint32)
+        c = np.full(len(number), initial_word)
+        for target, source, bits in (("c", "b", 14), ("a", "c", 11), ("b", "a", 25), ("c", "b", 16)):
+            a, b, c = _mix_words(a, b, c, target, source, bits)
+        for target, source, bits in (("a", "c", 4), ("b", "a", 14), ("c", "b", 24)):
+            a, b, c = _mix_words(a, b, c, target, source, bits)
     return c.astype(np.float32) / np.float32(0xFFFFFFFF)
 
 
 Words = NDArray[np.uint32]
 
 
-def _mix_words(a: Words, b: Words, c: Words, one: str, other: str, bits: int) -> tuple[Words, Words, Words]:
-    """Return the state of Jenkins' hash after one step: ``one ^= other; one -= rotated(other)``."""
+def _mix_words(a: Words, b: Words, c: Words, target: str, source: str, bits: int) -> tuple[Words, Words, Words]:
+    """Return the state a, b, c of Jenkins' hash after one step: ``target ^= source; target -= rotated(source)``.
+
+    Args:
+        a, b, c: (N,) words of the state.
+        target, source: names of the word that changes and of the one that changes it.
+        bits: by which the source is rotated to the left.
+    """
     words = {"a": a, "b": b, "c": c}
-    turned = (words[other] << np.uint32(bits)) | (words[other] >> np.uint32(32 - bits))
-    words[one] = (words[one] ^ words[other]) - turned
+    rotated = (words[source] << np.uint32(bits)) | (words[source] >> np.uint32(32 - bits))
+    words[target] = (words[target] ^ words[source]) - rotated
     return words["a"], words["b"], words["c"]
 
 
@@ -115,10 +121,10 @@ def plant_places(
 
     Where plants grow there are as many on each square metre of ground, sloping or not, as the density says.
     """
-    each, seed = places_per_metre(plants, terrain), plants.seed % SEEDS
-    last = math.ceil(geometry.length if end is None else min(end, geometry.length))
-    number = np.arange(math.floor(start) * each, last * each, dtype=np.int64)
-    station = (number // each).astype(np.float64) + random_share(seed + STATION, number)
+    place_rate, seed = places_per_metre(plants, terrain), plants.seed % SEEDS
+    end_metre = math.ceil(geometry.length if end is None else min(end, geometry.length))
+    number = np.arange(math.floor(start) * place_rate, end_metre * place_rate, dtype=np.int64)
+    station = (number // place_rate).astype(np.float64) + random_share(seed + STATION, number)
     offset = (random_share(seed + OFFSET, number).astype(np.float64) * 2.0 - 1.0) * terrain.half_width
     curvature = geometry.alignment.curvature(np.minimum(station, geometry.length))
     boundaries = geometry.offsets(np.minimum(station, geometry.length))
@@ -129,10 +135,12 @@ def plant_places(
     if plants.side != "both":
         stands &= offset > 0.0 if plants.side == "left" else offset < 0.0
     stands &= ~_in_clearings(geometry, station, offset)
-    left = np.flatnonzero(stands)
-    ground = (1.0 - curvature[left] * offset[left]) * _steepness(geometry, station[left], offset[left], curvature[left])
-    needed = terrain.half_width * 2.0 * plants.density * ground
-    stands[left] = random_share(seed + CHANCE, number[left]) * each <= needed
+    candidates = np.flatnonzero(stands)
+    ground_area = (1.0 - curvature[candidates] * offset[candidates]) * _steepness(
+        geometry, station[candidates], offset[candidates], curvature[candidates]
+    )
+    plant_chance = terrain.half_width * 2.0 * plants.density * ground_area
+    stands[candidates] = random_share(seed + CHANCE, number[candidates]) * place_rate <= plant_chance
     return PlantPlaces(number, station, offset, stands)
 
 
@@ -141,32 +149,37 @@ def _in_clearings(geometry: RoadGeometry, station: Float, offset: Float) -> Bool
     mask = np.zeros(len(station), dtype=np.bool_)
     for item in geometry.parameters.of_type(Thing).values():
         for block in item.footprint() if item.clearing is not None else ():
-            near = item.clearing or 0.0
-            inside = (station > block.start - near) & (station < block.end + near)
-            mask |= inside & (offset > block.low - near) & (offset < block.high + near)
+            clearing = item.clearing or 0.0
+            is_within_stations = (station > block.start - clearing) & (station < block.end + clearing)
+            mask |= is_within_stations & (offset > block.low - clearing) & (offset < block.high + clearing)
     return mask
 
 
 def _steepness(geometry: RoadGeometry, station: Float, offset: Float, curvature: Float) -> Float:
     """Return the area of ground (N,) per area in plan at stations and offsets (N,), at most 10."""
-    along = _SLOPE / np.maximum(1.0 - curvature * offset, 0.02)
+    station_step = _SLOPE / np.maximum(1.0 - curvature * offset, 0.02)
 
-    def height(ahead: Float | float, beside: float) -> Float:
-        return known_elevation(geometry, np.clip(station + ahead, 0.0, geometry.length), offset + beside)
+    def height(station_shift: Float | float, offset_shift: float) -> Float:
+        """Return the surface's elevations (N,), m, at the places moved by a station and an offset, m."""
+        return known_elevation(geometry, np.clip(station + station_shift, 0.0, geometry.length), offset + offset_shift)
 
-    rise = (height(along, 0.0) - height(-along, 0.0)) / (2.0 * _SLOPE)
-    across = (height(0.0, _SLOPE) - height(0.0, -_SLOPE)) / (2.0 * _SLOPE)
-    return np.minimum(np.sqrt(1.0 + rise**2 + across**2), 10.0)
+    grade = (height(station_step, 0.0) - height(-station_step, 0.0)) / (2.0 * _SLOPE)
+    cross_slope = (height(0.0, _SLOPE) - height(0.0, -_SLOPE)) / (2.0 * _SLOPE)
+    return np.minimum(np.sqrt(1.0 + grade**2 + cross_slope**2), 10.0)
 
 
 def grown_plants(geometry: RoadGeometry, plants: Vegetation, terrain: Terrain) -> Plants:
-    """Return the trees or shrubs of a stand along the whole road: places, heights, breadths and kinds."""
+    """Return the trees or shrubs of a stand along the whole road: places, heights, breadths and kinds.
+
+    Each measure follows from the plant's place number and the stand's seed plus a constant of the measure, so that a
+    plant has the same measures in every stretch of the road. Breadths are drawn as a ratio to the height.
+    """
     places = plant_places(geometry, plants, terrain)
     number, seed = places.number[places.stands], plants.seed % SEEDS
     station, offset = places.station[places.stands], places.offset[places.stands]
     height = plants.height_min + (plants.height_max - plants.height_min) * random_share(seed + HEIGHT, number)
-    low, high = BREADTHS[plants.kind]
-    broad = low + (high - low) * random_share(seed + BREADTH, number)
+    least_breadth, largest_breadth = BREADTHS[plants.kind]
+    breadth_ratio = least_breadth + (largest_breadth - least_breadth) * random_share(seed + BREADTH, number)
     kind = np.floor(random_share(seed + KIND, number) * (len(KINDS[plants.kind]) - PICK)).astype(np.int64)
     position = np.column_stack([geometry.alignment.place(station, offset), known_elevation(geometry, station, offset)])
-    return Plants(number, station, offset, position, height, height * broad, kind)
+    return Plants(number, station, offset, position, height, height * breadth_ratio, kind)

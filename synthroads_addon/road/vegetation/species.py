@@ -68,17 +68,17 @@ class PlantShape(NamedTuple):
         if not self.trunk_radius:
             return None
         top = self.crown_bottom + (1.0 - self.crown_bottom) * self.widest
-        slimmer = 1.0 - (1.0 - TRUNK_TAPER) * (top + TRUNK_FOOT) / (TRUNK_TOP + TRUNK_FOOT)
-        rows = ((self.trunk_radius, -TRUNK_FOOT), (self.trunk_radius * slimmer, top))
+        radius_share = 1.0 - (1.0 - TRUNK_TAPER) * (top + TRUNK_FOOT) / (TRUNK_TOP + TRUNK_FOOT)
+        rows = ((self.trunk_radius, -TRUNK_FOOT), (self.trunk_radius * radius_share, top))
         return np.stack([_ring(radius, height, _TRUNK_SIDES) for radius, height in rows])
 
     def crown(self) -> Float:
         """Return the sections (R, K, 3) of its crown: the outline that its branches end on, revolved about its stem."""
-        turn = np.linspace(0.0, 1.0, _ROWS)  # the middle one is where it is widest
-        share = turn ** (math.log(self.widest) / math.log(0.5))
-        bulge = np.sin(np.pi * turn)
-        radius = self.crown_radius * np.maximum(np.maximum(bulge, 0.0) ** self.fullness, _LEAST)
-        height = self.crown_bottom + (1.0 - self.crown_bottom) * share
+        row_shares = np.linspace(0.0, 1.0, _ROWS)  # the middle one is where it is widest
+        height_shares = row_shares ** (math.log(self.widest) / math.log(0.5))
+        sine = np.sin(np.pi * row_shares)
+        radius = self.crown_radius * np.maximum(np.maximum(sine, 0.0) ** self.fullness, _LEAST)
+        height = self.crown_bottom + (1.0 - self.crown_bottom) * height_shares
         return np.stack([_ring(r, z, _SIDES) for r, z in zip(radius.tolist(), height.tolist(), strict=True)])
 
 
@@ -92,4 +92,5 @@ def plant_shape(kind: str, species: str, variant: int) -> PlantShape:
 
 
 def _ring(radius: float, height: float, sides: int) -> Float:
+    """Return the corners (K, 3) of a level regular polygon about the z axis at a height, m."""
     return np.column_stack([circle(2.0 * radius, sides), np.full(sides, height)])

@@ -28,7 +28,7 @@ def sample_assets(site: PlacementSite) -> Iterator[tuple[str, Asset]]:
             field = f"{path}: assets.{name}.placement.distance"
             for station, offset, rotation in _places(site, asset.placement, field, ("assets", number, name)):
                 count += 1
-                placed = Asset(
+                item = Asset(
                     instance=1,
                     station=round_value(station),
                     offset=round_value(offset),
@@ -39,7 +39,7 @@ def sample_assets(site: PlacementSite) -> Iterator[tuple[str, Asset]]:
                     scale=asset.scale,
                     twin_types=asset.twin_types,
                 )
-                yield f"asset-{count}", placed
+                yield f"asset-{count}", item
 
 
 def _places(
@@ -51,21 +51,24 @@ def _places(
     for group in [sides] if in_median else [[side] for side in sides]:
         rng = site.stream(*purpose, *group)
         stations = _stations(rng, placement, site.length)
-        half = rng.integers(len(group), size=len(stations))
+        half_number = rng.integers(len(group), size=len(stations))
         for number, side in enumerate(group):
-            section, at = site.sections[side], stations[half == number]
-            edge, room = _room(site, section, in_median, at, field, placement.distance.minimum)
-            distance = _draw_places(rng, placement.distance, len(at), np.minimum(placement.distance.maximum, room))
-            away = edge - distance if in_median else edge + distance
-            turn = _draw_places(rng, placement.rotation_deg, len(at), placement.rotation_deg.maximum)
-            turn += 0.0 if section.carriageway.traffic > 0 else 180.0
-            there = room >= placement.distance.minimum
-            offset = section.carriageway.sign * away
-            yield from zip(at[there], offset[there], ((turn + 180.0) % 360.0 - 180.0)[there], strict=True)
+            section, stations_here = site.sections[side], stations[half_number == number]
+            edge, room = _room(site, section, in_median, stations_here, field, placement.distance.minimum)
+            distance = _draw_places(
+                rng, placement.distance, len(stations_here), np.minimum(placement.distance.maximum, room)
+            )
+            axis_distance = edge - distance if in_median else edge + distance
+            rotation = _draw_places(rng, placement.rotation_deg, len(stations_here), placement.rotation_deg.maximum)
+            rotation += 0.0 if section.carriageway.traffic > 0 else 180.0
+            fits = room >= placement.distance.minimum
+            offset = section.carriageway.sign * axis_distance
+            yield from zip(stations_here[fits], offset[fits], ((rotation + 180.0) % 360.0 - 180.0)[fits], strict=True)
 
 
-def _draw_places(rng: np.random.Generator, limits: Interval, number: int, highest: Float | float) -> Float:
-    return limits.minimum + (highest - limits.minimum) * rng.random(number)
+def _draw_places(rng: np.random.Generator, limits: Interval, count: int, maximum: Float | float) -> Float:
+    """Return numbers (count,) drawn uniformly from an interval's minimum to a maximum, which may be one for each."""
+    return limits.minimum + (maximum - limits.minimum) * rng.random(count)
 
 
 def _stations(rng: np.random.Generator, placement: AssetPlacement, length: float) -> Float:
@@ -78,27 +81,32 @@ def _stations(rng: np.random.Generator, placement: AssetPlacement, length: float
         per_km = float(_draw_places(rng, placement.per_km, 1, placement.per_km.maximum)[0])
         return np.sort(rng.uniform(start, end, int(per_km * (end - start) / 1000.0 + rng.random())))
     assert placement.spacing is not None
-    number = int((end - start) / placement.spacing.minimum) + 1
-    steps = _draw_places(rng, placement.spacing, number, placement.spacing.maximum)
+    count = int((end - start) / placement.spacing.minimum) + 1
+    steps = _draw_places(rng, placement.spacing, count, placement.spacing.maximum)
     steps[0] *= rng.random()  # the first stands anywhere within a spacing
     stations = start + np.cumsum(steps)
     return stations[stations <= end]
 
 
 def _room(
-    site: PlacementSite, section: CarriagewaySection, in_median: bool, stations: Float, field: str, needed: float
+    site: PlacementSite,
+    section: CarriagewaySection,
+    in_median: bool,
+    stations: Float,
+    field: str,
+    needed_distance: float,
 ) -> tuple[Float, Float]:
     """Return the distances (N,) of the edge that an asset's distance counts from, and the room (N,) beyond it, m."""
 
-    def beside(at: Float) -> tuple[Float, Float]:
+    def beside(places: Float) -> tuple[Float, Float]:
         if in_median:
-            inner = section.distances(at)[:, 0]
+            inner = section.distances(places)[:, 0]
             return inner, inner
-        edge = section.road_edge(at)
+        edge = section.road_edge(places)
         return edge, min(site.terrain.half_width, FARTHEST) - edge
 
-    widest = float(beside(np.array([0.0, *section.kinks(), site.length]))[1].max())
-    if widest < needed:
-        where = "in this half of the median" if in_median else "between the verge and road.half_width"
-        raise InputError(field, needed, f"there are at most {max(widest, 0.0):g} m {where}")
+    widest_room = float(beside(np.array([0.0, *section.kinks(), site.length]))[1].max())
+    if widest_room < needed_distance:
+        area = "in this half of the median" if in_median else "between the verge and road.half_width"
+        raise InputError(field, needed_distance, f"there are at most {max(widest_room, 0.0):g} m {area}")
     return beside(stations)

@@ -97,15 +97,15 @@ def median_barriers(layout: Layout, rng: np.random.Generator) -> Iterator[tuple[
         return
     span = (0.0, round_value(layout.length))
     if median.has_obstacles:
-        for side, inner in median.inner.items():
+        for side, inner_edge in median.inner.items():
             sign = layout.sides[side].sign
-            yield f"guardrail-median-{side}", system.rail(span, sign * (inner - BARRIER_AXIS), side)
+            yield f"guardrail-median-{side}", system.rail(span, sign * (inner_edge - BARRIER_AXIS), side)
         return
-    profile, height, foot = system.concrete or CONCRETE_PROFILES[0]
-    foot = min(foot, 2.0 * (median.half_width - BARRIER_DISTANCE))
+    profile, height, foot_width = system.concrete or CONCRETE_PROFILES[0]
+    foot_width = min(foot_width, 2.0 * (median.half_width - BARRIER_DISTANCE))
     steel_fits = median.half_width >= _BEAM_REACH + BARRIER_DISTANCE
-    if foot >= _NARROWEST_FOOT and (system.concrete or not steel_fits):
-        yield "concrete-barrier-median", _concrete((profile, height, foot), span, 0.0, 0.0)
+    if foot_width >= _NARROWEST_FOOT and (system.concrete or not steel_fits):
+        yield "concrete-barrier-median", _concrete((profile, height, foot_width), span, 0.0, 0.0)
     elif steel_fits:
         yield "guardrail-median", system.rail(span, 0.0, "both")
 
@@ -134,16 +134,19 @@ def plan_noise_barrier(layout: Layout, roadside: Roadside, rng: np.random.Genera
     limits = layout.site.scenario.barriers
     if rng.random() >= limits.noise_barrier:
         return None
-    free = [
+    free_stretches = [
         stretch
         for segment in roadside.edge.segments
         for stretch in free_ranges(*_free_part(roadside, segment), roadside.far, roadside.crossed, roadside.restless)
     ]
-    longest = max((end - start for start, end in free), default=0.0)
-    least, most = limits.noise_barrier_length.minimum, min(limits.noise_barrier_length.maximum, longest)
-    length = round_value(least + max(0.0, most - least) * rng.random())
+    longest_stretch = max((end - start for start, end in free_stretches), default=0.0)
+    least_length, largest_length = (
+        limits.noise_barrier_length.minimum,
+        min(limits.noise_barrier_length.maximum, longest_stretch),
+    )
+    length = round_value(least_length + max(0.0, largest_length - least_length) * rng.random())
     panel, thickness = pick(rng, PANELS)
-    start = draw_start(rng, free, length)
+    start = draw_start(rng, free_stretches, length)
     if start is None:
         return None
     roadside.far.add(start, start + length)
@@ -178,8 +181,8 @@ def _stretches_at_random(roadside: Roadside, rng: np.random.Generator) -> Iterat
     for slot in range(slots):
         if rng.random() >= _IN_SLOT:
             continue
-        low, high = roadside.length * slot / slots, roadside.length * (slot + 1) / slots
-        if stretch := draw_stretch(rng, free_ranges(low, high, roadside.restless), SHORTEST_BARRIER):
+        slot_start, slot_end = roadside.length * slot / slots, roadside.length * (slot + 1) / slots
+        if stretch := draw_stretch(rng, free_ranges(slot_start, slot_end, roadside.restless), SHORTEST_BARRIER):
             yield stretch
 
 
@@ -192,13 +195,15 @@ def _free_part(roadside: Roadside, segment: Segment) -> Range:
 def _barrier_pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[BarrierPiece]:
     """Yield the barriers on stretches: one in each segment of the edge, lengthened to the least where there is room."""
     for segment in roadside.edge.segments:
-        low, high = segment.start, segment.end
-        inside = [
-            lengthen_range(max(start, low), min(end, high), SHORTEST_BARRIER, low, high)
+        segment_start, segment_end = segment.start, segment.end
+        clipped = [
+            lengthen_range(
+                max(start, segment_start), min(end, segment_end), SHORTEST_BARRIER, segment_start, segment_end
+            )
             for start, end in stretches
-            if start < high and end > low
+            if start < segment_end and end > segment_start
         ]
-        for start, end in merge_ranges(inside, _JOIN):
+        for start, end in merge_ranges(clipped, _JOIN):
             piece = _prolong_piece(roadside, segment, BarrierPiece(start, end, segment.base, segment.ramp))
             # Beside a gore no rule asks for a barrier: rather none than a stump.
             if not segment.ramp or piece.end - piece.start >= SHORTEST_BARRIER:
@@ -207,19 +212,25 @@ def _barrier_pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[Barr
 
 def _prolong_piece(roadside: Roadside, segment: Segment, piece: BarrierPiece) -> BarrierPiece:
     """Return a barrier too short for its segment made longer beside a neighbour that stands nearer to the road."""
-    lack = SHORTEST_BARRIER - (piece.end - piece.start)
-    if lack <= 0.0:
+    missing_length = SHORTEST_BARRIER - (piece.end - piece.start)
+    if missing_length <= 0.0:
         return piece
-    for longer in (piece._replace(start=max(0.0, piece.start - lack)), piece._replace(end=piece.end + lack)):
-        beside = [s for s in roadside.edge.segments if s != segment and s.start < longer.end and s.end > longer.start]
-        beyond = (longer.start, piece.start) if longer.start < piece.start else (piece.end, longer.end)
-        clear = roadside.edge.largest_paved(*beyond) <= segment.base
-        if clear and all(s.base <= segment.base - STEP_OF_BARRIERS for s in beside):
-            return longer._replace(end=min(longer.end, roadside.length))
+    for prolonged in (
+        piece._replace(start=max(0.0, piece.start - missing_length)),
+        piece._replace(end=piece.end + missing_length),
+    ):
+        neighbours = [
+            s for s in roadside.edge.segments if s != segment and s.start < prolonged.end and s.end > prolonged.start
+        ]
+        added_stretch = (prolonged.start, piece.start) if prolonged.start < piece.start else (piece.end, prolonged.end)
+        is_clear = roadside.edge.largest_paved(*added_stretch) <= segment.base
+        if is_clear and all(s.base <= segment.base - STEP_OF_BARRIERS for s in neighbours):
+            return prolonged._replace(end=min(prolonged.end, roadside.length))
     return piece
 
 
 def _concrete(shape: Profile, span: Range, offset: float, terminal: float) -> ConcreteBarrier:
+    """Return a concrete barrier of a profile between two stations, its ends ramped over a length; all m."""
     profile, height, foot = shape
     return ConcreteBarrier(
         instance=1,

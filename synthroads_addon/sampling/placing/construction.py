@@ -51,8 +51,8 @@ class Zone(NamedTuple):
 
     def distance(self, station: Float, depth: float) -> Float:
         """Return a line's distances (N,) from the centreline, ``depth`` (m) into the closed lane, and in the tapers."""
-        outer, inner = self.edge - EDGE_DISTANCE - (BEACON_DISTANCE - depth), self.boundary + depth
-        return np.interp(station, self.stations, (outer, inner, inner, outer))
+        outer_distance, inner_distance = self.edge - EDGE_DISTANCE - (BEACON_DISTANCE - depth), self.boundary + depth
+        return np.interp(station, self.stations, (outer_distance, inner_distance, inner_distance, outer_distance))
 
 
 def construction_zones(layout: Layout, rng: np.random.Generator) -> tuple[dict[Side, Range], dict[str, RoadObject]]:
@@ -75,25 +75,25 @@ def _draw_zone(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> 
     limits, length = layout.site.scenario.furniture.construction_length, roadside.length
     section = layout.site.sections[roadside.side]
     turnouts = ((start - _TURNOUT_ROOM, end + _TURNOUT_ROOM) for start, end in roadside.turnouts.stretches)
-    free = free_ranges(0.0, length, Reservations(turnouts), Reservations(_width_changes(section.carriageway)))
-    longest = max((end - start for start, end in free), default=0.0)
-    least = max(TAPERS_IN[0] + SHORTEST_ALONG + TAPER_OUT, limits.minimum)
-    most = min(longest, limits.maximum)
-    if most < least:
+    free_stretches = free_ranges(0.0, length, Reservations(turnouts), Reservations(_width_changes(section.carriageway)))
+    longest_stretch = max((end - start for start, end in free_stretches), default=0.0)
+    least_length = max(TAPERS_IN[0] + SHORTEST_ALONG + TAPER_OUT, limits.minimum)
+    largest_length = min(longest_stretch, limits.maximum)
+    if largest_length < least_length:
         return None
-    reach = round_value(least + (most - least) * rng.random())
-    start = draw_start(rng, free, reach)
+    zone_length = round_value(least_length + (largest_length - least_length) * rng.random())
+    start = draw_start(rng, free_stretches, zone_length)
     if start is None:
         return None
-    boundaries = section.lane_boundaries(start + reach / 2.0)[0].tolist()
+    boundaries = section.lane_boundaries(start + zone_length / 2.0)[0].tolist()
     widths = [outer - inner for outer, inner in pairwise(boundaries)]
     lane = next((i for i, width in enumerate(widths) if width >= _CLOSED_LANE), len(widths))
     edge = roadside.edge.largest_main(start, start)
     if max(widths[lane + 1 :], default=0.0) < CONSTRUCTION_LANE_WIDTH or edge > FARTHEST_LINE:
         return None
-    taper = min(pick(rng, TAPERS_IN), reach - SHORTEST_ALONG - TAPER_OUT)
+    taper = min(pick(rng, TAPERS_IN), zone_length - SHORTEST_ALONG - TAPER_OUT)
     tapers = (taper, TAPER_OUT) if roadside.traffic > 0 else (TAPER_OUT, taper)
-    end = start + reach
+    end = start + zone_length
     stations = (start, start + tapers[0], end - tapers[1], end)
     return Zone(stations, boundaries[lane + 1], edge)
 
@@ -125,8 +125,10 @@ def _equipment(
         yield f"beacon-{side}-{number:03d}", beacon
     if marks[2] - marks[1] >= SHORTEST_TEMPORARY_BARRIER + 2.0 * BARRIER_SETBACK:
         offset = round_value(sign * (zone.boundary + BARRIER_DISTANCE))
-        low, high = round_value(marks[1] + BARRIER_SETBACK), round_value(marks[2] - BARRIER_SETBACK)
-        barrier = TemporaryBarrier(instance=1, start_station=low, end_station=high, offset=offset, end_offset=offset)
+        barrier_start, barrier_end = round_value(marks[1] + BARRIER_SETBACK), round_value(marks[2] - BARRIER_SETBACK)
+        barrier = TemporaryBarrier(
+            instance=1, start_station=barrier_start, end_station=barrier_end, offset=offset, end_offset=offset
+        )
         yield f"temporary-barrier-{side}", barrier
     yield f"marking-construction-{side}", _line(side, zone, draw(rng, layout.site.scenario.markings.film_thickness))
 

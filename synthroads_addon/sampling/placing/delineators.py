@@ -24,8 +24,8 @@ def delineators(roadside: Roadside, stations: Float) -> Iterator[tuple[str, Deli
     """Yield (id, delineator) at stations (P,) along one side, behind the barrier where one stands."""
     distances = roadside.edge.line_beside(stations, _REACH) + DELINEATOR_DISTANCE
     for piece in roadside.pieces:
-        covered = (stations > piece.start - _REACH) & (stations < piece.end + _REACH)
-        distances[covered] = np.maximum(distances[covered], piece.base + DELINEATOR_BEHIND_BARRIER)
+        behind_barrier = (stations > piece.start - _REACH) & (stations < piece.end + _REACH)
+        distances[behind_barrier] = np.maximum(distances[behind_barrier], piece.base + DELINEATOR_BEHIND_BARRIER)
     facing = roadside.facing
     places = zip(np.round(stations, 9).tolist(), np.round(roadside.sign * distances, 9).tolist(), strict=True)
     for number, (station, offset) in enumerate(places, start=1):
@@ -39,12 +39,12 @@ def delineator_stations(elements: tuple[HorizontalElement, ...]) -> Float:
     Between two posts lies the spacing of the table at the tightest curvature within the next 50 m, so that the posts
     come closer before a curve begins.
     """
-    widest_radius, widest = DELINEATOR_SPACING[-1]
-    tightest = max(max(abs(e.curvature_start), abs(e.curvature_end)) for e in elements)
-    if tightest <= 1.0 / widest_radius:
+    widest_radius, widest_spacing = DELINEATOR_SPACING[-1]
+    largest_curvature = max(max(abs(e.curvature_start), abs(e.curvature_end)) for e in elements)
+    if largest_curvature <= 1.0 / widest_radius:
         length = math.fsum(e.length for e in elements)
-        first = min(widest, length) / 2.0
-        return first + widest * np.arange(int((length - first) / widest) + 1)
+        first_station = min(widest_spacing, length) / 2.0
+        return first_station + widest_spacing * np.arange(int((length - first_station) / widest_spacing) + 1)
     starts = [0.0, *accumulate(e.length for e in elements)]
     stations, station = [], min(_spacing_behind(elements, starts, 0.0), starts[-1]) / 2.0
     while station <= starts[-1]:
@@ -62,16 +62,18 @@ def _spacing_behind(elements: tuple[HorizontalElement, ...], starts: list[float]
         station: of the post, m.
     """
     end = station + DELINEATOR_SPACING[-1][1]
-    first, last = (min(bisect_right(starts, at) - 1, len(elements) - 1) for at in (station, end))
+    first_element, last_element = (min(bisect_right(starts, place) - 1, len(elements) - 1) for place in (station, end))
     # Curvature is linear along an element: its largest values stand at the ends of what lies ahead.
-    ahead = [_curvature(elements[i], at - starts[i]) for i, at in ((first, station), (last, end))]
-    ahead += [element.curvature_end for element in elements[first:last]]
-    ahead += [element.curvature_start for element in elements[first + 1 : last + 1]]
+    curvatures_ahead = [
+        _curvature(elements[i], place - starts[i]) for i, place in ((first_element, station), (last_element, end))
+    ]
+    curvatures_ahead += [element.curvature_end for element in elements[first_element:last_element]]
+    curvatures_ahead += [element.curvature_start for element in elements[first_element + 1 : last_element + 1]]
     radii, spacings = zip(*DELINEATOR_SPACING, strict=True)
-    return float(np.interp(1.0 / max(*map(abs, ahead), 1e-9), radii, spacings))
+    return float(np.interp(1.0 / max(*map(abs, curvatures_ahead), 1e-9), radii, spacings))
 
 
-def _curvature(element: HorizontalElement, along: float) -> float:
+def _curvature(element: HorizontalElement, distance: float) -> float:
     """Return the curvature (1/m) at a distance (m) from an element's begin; behind its end that of the end."""
-    share = min(along / element.length, 1.0)
+    share = min(distance / element.length, 1.0)
     return element.curvature_start + share * (element.curvature_end - element.curvature_start)

@@ -60,8 +60,8 @@ def gutters(layout: Layout) -> Iterator[tuple[str, Gutter]]:
     if not layout.site.scenario.furniture.gutters or len(layout.sides) < 2:
         return
     for side, carriageway in layout.site.carriageways.items():
-        inner = carriageway.inner_offset
-        if isinstance(inner, tuple) or inner < GUTTER:
+        inner_offset = carriageway.inner_offset
+        if isinstance(inner_offset, tuple) or inner_offset < GUTTER:
             continue
         stretches = [span for span in inward_stretches(carriageway, layout.length) if span[1] - span[0] >= _SHORTEST]
         for number, (start, end) in enumerate(stretches, 1):
@@ -71,7 +71,7 @@ def gutters(layout: Layout) -> Iterator[tuple[str, Gutter]]:
                     instance=1,
                     start_station=start,
                     end_station=end,
-                    offset=round_value(carriageway.sign * (inner - GUTTER / 2.0)),
+                    offset=round_value(carriageway.sign * (inner_offset - GUTTER / 2.0)),
                     kerb_side="right" if side == "left" else "left",
                     width=GUTTER,
                 ),
@@ -83,15 +83,15 @@ def inward_stretches(carriageway: Carriageway, length: float) -> list[Range]:
     points = [(point.station, carriageway.sign * point.crossfall_percent) for point in carriageway.crossfall]
     points = [(min(0.0, points[0][0]), points[0][1]), *points, (max(length, points[-1][0]), points[-1][1])]
     stretches: list[Range] = []
-    for (s0, a), (s1, b) in pairwise(points):
-        if max(a, b) <= 0.0 or s1 <= s0:
+    for (s0, fall_0), (s1, fall_1) in pairwise(points):
+        if max(fall_0, fall_1) <= 0.0 or s1 <= s0:
             continue
         # Where it passes through 0 between them.
-        low = s0 if a > 0.0 else s0 + (s1 - s0) * -a / (b - a)
-        high = s1 if b > 0.0 else s0 + (s1 - s0) * a / (a - b)
-        low, high = round_value(max(low, 0.0)), round_value(min(high, length))
-        if stretches and low <= stretches[-1][1]:
-            stretches[-1] = stretches[-1][0], high
-        elif high > low:
-            stretches.append((low, high))
+        start = s0 if fall_0 > 0.0 else s0 + (s1 - s0) * -fall_0 / (fall_1 - fall_0)
+        end = s1 if fall_1 > 0.0 else s0 + (s1 - s0) * fall_0 / (fall_0 - fall_1)
+        start, end = round_value(max(start, 0.0)), round_value(min(end, length))
+        if stretches and start <= stretches[-1][1]:
+            stretches[-1] = stretches[-1][0], end
+        elif end > start:
+            stretches.append((start, end))
     return stretches

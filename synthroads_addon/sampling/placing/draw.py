@@ -13,8 +13,8 @@ T = TypeVar("T")
 
 def draw(rng: np.random.Generator, limits: Interval) -> float:
     """Return a number drawn uniformly from an interval of the scenario, rounded."""
-    low, high = limits.minimum, limits.maximum
-    return min(max(round_value(low + (high - low) * rng.random()), low), high)
+    least, largest = limits.minimum, limits.maximum
+    return min(max(round_value(least + (largest - least) * rng.random()), least), largest)
 
 
 def draw_between(rng: np.random.Generator, limits: tuple[float, float]) -> float:

@@ -49,22 +49,22 @@ class EdgeProfile:
     """
 
     def __init__(self, section: CarriagewaySection, length: float) -> None:
-        marks, besides = [np.array([0.0, length, *section.kinks()])], []
+        marks, island_ranges = [np.array([0.0, length, *section.kinks()])], []
         for shape in section.turnouts:
             if shape.turnout.ramp:
                 grid, beside_island = _ramp_marks(shape, shape.turnout.ramp)
                 marks.append(grid)
-                besides.append(beside_island)
-        at = np.unique(np.clip(np.concatenate(marks), 0.0, length))
-        distances = section.distances(at)
-        self.stations, self.paved, self.main = at, distances[:, -2], section.main_edge(at)
-        self.island, self.line = np.zeros(at.shape), self.paved.copy()
-        if besides:
+                island_ranges.append(beside_island)
+        stations = np.unique(np.clip(np.concatenate(marks), 0.0, length))
+        distances = section.distances(stations)
+        self.stations, self.paved, self.main = stations, distances[:, -2], section.main_edge(stations)
+        self.island, self.line = np.zeros(stations.shape), self.paved.copy()
+        if island_ranges:
             self.island = np.diff(distances, axis=1)[:, section.kinds.index("island")]
-        for start, end in besides:
-            beside = (at > start) & (at < end)
-            self.line[beside] = self.main[beside]
-        self.segments = _segments(at, self.line, self.paved)
+        for start, end in island_ranges:
+            is_beside_island = (stations > start) & (stations < end)
+            self.line[is_beside_island] = self.main[is_beside_island]
+        self.segments = _segments(stations, self.line, self.paved)
 
     def largest_paved(self, start: float, end: float) -> float:
         """Return the largest distance of the paved edge between two stations, m."""
@@ -84,10 +84,10 @@ class EdgeProfile:
 
         Where the line passes from the ramp's outer side to the main road's, it is the ramp's.
         """
-        at = np.stack([station - reach, station, station + reach])
-        line, paved, main = (np.interp(at, self.stations, values) for values in (self.line, self.paved, self.main))
-        outside = (line > main + _LEVEL).any(axis=0)
-        return np.where(outside, paved.max(axis=0), line.max(axis=0))
+        samples = np.stack([station - reach, station, station + reach])
+        line, paved, main = (np.interp(samples, self.stations, values) for values in (self.line, self.paved, self.main))
+        is_on_ramp_side = (line > main + _LEVEL).any(axis=0)
+        return np.where(is_on_ramp_side, paved.max(axis=0), line.max(axis=0))
 
     def base_at(self, station: float) -> float:
         """Return the base (m) of the segment at a station: where barriers are placed from."""
@@ -95,14 +95,14 @@ class EdgeProfile:
 
     def _values(self, values: Float, start: float, end: float) -> Float:
         """Return the values at two stations, and at the profile's own between them."""
-        inside = values[(self.stations > start) & (self.stations < end)]
-        return np.append(inside, np.interp([start, end], self.stations, values))
+        inner_values = values[(self.stations > start) & (self.stations < end)]
+        return np.append(inner_values, np.interp([start, end], self.stations, values))
 
 
 def ramp_station(shape: TurnoutShape, x: float) -> float:
     """Return the station (m) at a distance x (m) from the gore's tip, away from the turnout's lane."""
-    ahead = shape.carriageway.traffic if shape.turnout.kind == "exit" else -shape.carriageway.traffic
-    return shape.gore_tip() + ahead * x
+    direction = shape.carriageway.traffic if shape.turnout.kind == "exit" else -shape.carriageway.traffic
+    return shape.gore_tip() + direction * x
 
 
 def island_begin(shape: TurnoutShape, ramp: Ramp, room: float) -> float:
@@ -113,32 +113,38 @@ def island_begin(shape: TurnoutShape, ramp: Ramp, room: float) -> float:
 
 def _ramp_marks(shape: TurnoutShape, ramp: Ramp) -> tuple[Float, tuple[float, float]]:
     """Return the stations (m) that follow a ramp's bend, and the range in which its island is wide enough."""
-    leaves = min(max(island_begin(shape, ramp, ISLAND_ROOM), shape.nose + STEP), ramp.length)
-    distances = np.concatenate([np.arange(0.0, ramp.length, _RAMP_GRID), [leaves, leaves + STEP]])
-    tip, ahead = ramp_station(shape, 0.0), ramp_station(shape, 1.0) - ramp_station(shape, 0.0)
-    border = (ramp_station(shape, leaves), ramp_station(shape, ramp.length + STEP))
-    return tip + ahead * distances, (min(border), max(border))
+    leaving_distance = min(max(island_begin(shape, ramp, ISLAND_ROOM), shape.nose + STEP), ramp.length)
+    distances = np.concatenate([np.arange(0.0, ramp.length, _RAMP_GRID), [leaving_distance, leaving_distance + STEP]])
+    tip, direction = ramp_station(shape, 0.0), ramp_station(shape, 1.0) - ramp_station(shape, 0.0)
+    range_ends = (ramp_station(shape, leaving_distance), ramp_station(shape, ramp.length + STEP))
+    return tip + direction * distances, (min(range_ends), max(range_ends))
 
 
 def _segments(stations: Float, line: Float, paved: Float) -> list[Segment]:
     """Return the segments, each of one base: where the line runs level, or lies farther out than on both sides."""
-    level = np.abs(np.diff(line)) < _LEVEL
+    is_level = np.abs(np.diff(line)) < _LEVEL
     # Where the line leaves a ramp's outer side, the ramp goes on to move away.
-    in_island = line < paved - _LEVEL
-    leaves = ~level & (in_island[1:] != in_island[:-1])
-    edge = np.where(np.append(leaves, False) | np.append(False, leaves), paved, line)
-    base = np.where(leaves, np.maximum(edge[:-1], edge[1:]), np.maximum(line[:-1], line[1:]))
-    begins = np.append(True, (level[1:] != level[:-1]) | (level[1:] & (np.abs(np.diff(base)) > _LEVEL)))
-    first = np.flatnonzero(begins)
-    borders = [*stations[first].tolist(), float(stations[-1])]
-    bases, levels = np.maximum.reduceat(base, first).tolist(), level[first].tolist()
+    is_beside_island = line < paved - _LEVEL
+    is_leaving = ~is_level & (is_beside_island[1:] != is_beside_island[:-1])
+    edges = np.where(np.append(is_leaving, False) | np.append(False, is_leaving), paved, line)
+    bases_of_intervals = np.where(is_leaving, np.maximum(edges[:-1], edges[1:]), np.maximum(line[:-1], line[1:]))
+    starts_segment = np.append(
+        True, (is_level[1:] != is_level[:-1]) | (is_level[1:] & (np.abs(np.diff(bases_of_intervals)) > _LEVEL))
+    )
+    first_intervals = np.flatnonzero(starts_segment)
+    borders = [*stations[first_intervals].tolist(), float(stations[-1])]
+    bases, levels = (
+        np.maximum.reduceat(bases_of_intervals, first_intervals).tolist(),
+        is_level[first_intervals].tolist(),
+    )
     runs = [Segment(borders[i], borders[i + 1], bases[i], not levels[i]) for i in range(len(bases))]
     # A taper belongs to its wider side; what is wider than both sides lies beside a gore.
-    around = [-np.inf, *bases, -np.inf]
+    bases_with_ends = [-np.inf, *bases, -np.inf]
     segments = [
-        run._replace(ramp=run.ramp and run.base > max(around[i], around[i + 2]) + _LEVEL) for i, run in enumerate(runs)
+        run._replace(ramp=run.ramp and run.base > max(bases_with_ends[i], bases_with_ends[i + 2]) + _LEVEL)
+        for i, run in enumerate(runs)
     ]
-    return _join_segments(_raise_short_segments(_join_segments(segments), stations[in_island].tolist()))
+    return _join_segments(_raise_short_segments(_join_segments(segments), stations[is_beside_island].tolist()))
 
 
 def _join_segments(segments: list[Segment]) -> list[Segment]:
@@ -147,14 +153,15 @@ def _join_segments(segments: list[Segment]) -> list[Segment]:
     for segment in segments:
         joined.append(segment)
         while len(joined) > 1 and _in_line(*joined[-2:]):
-            after, before = joined.pop(), joined.pop()
-            ramp = before.ramp and after.ramp
-            joined.append(Segment(before.start, after.end, max(before.base, after.base), ramp))
+            later, earlier = joined.pop(), joined.pop()
+            is_ramp = earlier.ramp and later.ramp
+            joined.append(Segment(earlier.start, later.end, max(earlier.base, later.base), is_ramp))
     return joined
 
 
-def _in_line(before: Segment, after: Segment) -> bool:
-    return before.end == after.start and abs(before.base - after.base) < STEP_OF_BARRIERS
+def _in_line(earlier: Segment, later: Segment) -> bool:
+    """Return whether two segments follow each other at bases so near that one line of barriers serves both."""
+    return earlier.end == later.start and abs(earlier.base - later.base) < STEP_OF_BARRIERS
 
 
 def _raise_short_segments(segments: list[Segment], beside_island: list[float]) -> list[Segment]:
@@ -162,15 +169,15 @@ def _raise_short_segments(segments: list[Segment], beside_island: list[float]) -
 
     Beside an island (stations, m) a barrier can't stand farther out: that part of the segment falls away.
     """
-    raised = segments[:1]
-    for before, segment, after in zip(segments, segments[1:], segments[2:], strict=False):
-        wider = [s.base for s in (before, after) if not s.ramp]
-        short = segment.end - segment.start < SHORTEST_BARRIER and segment.base < min(before.base, after.base)
-        if short and wider and not segment.ramp:
-            inside = [s for s in beside_island if segment.start <= s <= segment.end]
-            start = max(inside) + _BEHIND_RAMP if inside and before.ramp else segment.start
-            end = min(inside) - _BEHIND_RAMP if inside and after.ramp else segment.end
-            raised.append(Segment(start, max(start, end), min(wider)))
+    result = segments[:1]
+    for earlier, segment, later in zip(segments, segments[1:], segments[2:], strict=False):
+        wider_bases = [s.base for s in (earlier, later) if not s.ramp]
+        is_short = segment.end - segment.start < SHORTEST_BARRIER and segment.base < min(earlier.base, later.base)
+        if is_short and wider_bases and not segment.ramp:
+            island_stations = [s for s in beside_island if segment.start <= s <= segment.end]
+            start = max(island_stations) + _BEHIND_RAMP if island_stations and earlier.ramp else segment.start
+            end = min(island_stations) - _BEHIND_RAMP if island_stations and later.ramp else segment.end
+            result.append(Segment(start, max(start, end), min(wider_bases)))
         else:
-            raised.append(segment)
-    return [*raised, *segments[1:][-1:]]
+            result.append(segment)
+    return [*result, *segments[1:][-1:]]

@@ -43,13 +43,13 @@ def plan_periodic(layout: Layout, rng: np.random.Generator) -> None:
     furniture = layout.site.scenario.furniture
     board = KILOMETRE_BOARD_SPACING * rng.random()
     count = int(layout.length / KILOMETRE_BOARD_SPACING) + 1
-    begin = count + int(rng.random() * 2 * LARGEST_KILOMETRE)
+    first_number = count + int(rng.random() * 2 * LARGEST_KILOMETRE)
     step = pick(rng, (-1, 1))
-    between = BESIDE_BOARD + (KILOMETRE_BOARD_SPACING - 2.0 * BESIDE_BOARD) * rng.random()
-    phone = (board + between + pick(rng, range(4)) * KILOMETRE_BOARD_SPACING) % EMERGENCY_PHONE_SPACING
+    phone_shift = BESIDE_BOARD + (KILOMETRE_BOARD_SPACING - 2.0 * BESIDE_BOARD) * rng.random()
+    phone = (board + phone_shift + pick(rng, range(4)) * KILOMETRE_BOARD_SPACING) % EMERGENCY_PHONE_SPACING
     if furniture.kilometre_boards:
         stations = (board + KILOMETRE_BOARD_SPACING * np.arange(count)).tolist()
-        boards = [(station, begin + step * number) for number, station in enumerate(stations)]
+        boards = [(station, first_number + step * number) for number, station in enumerate(stations)]
         if layout.site.alignment.first_station is not None:
             boards = [row for row in layout.site.alignment.counts(KILOMETRE_BOARD_SPACING) if row[1] >= 0]
         for station, halves in boards:
@@ -65,15 +65,19 @@ def plan_periodic(layout: Layout, rng: np.random.Generator) -> None:
 def put_kilometre_board(roadside: Roadside, station: float, halves: int) -> None:
     """Place a kilometre board, its text given in half kilometres, at a station of a roadside."""
     fields = {"text": f"{halves // 2},{5 * (halves % 2)}"}
-    outer = _gore_is_taken(roadside, station)
-    roadside.put(PlacementRequest("kilometre-board", KilometreBoard, station, _HALF, _BOARD_WIDTH, fields, outer=outer))
+    must_be_outside = _gore_is_taken(roadside, station)
+    roadside.put(
+        PlacementRequest("kilometre-board", KilometreBoard, station, _HALF, _BOARD_WIDTH, fields, outer=must_be_outside)
+    )
 
 
 def put_phone(roadside: Roadside, station: float) -> None:
     """Place an emergency phone at a station of a roadside."""
-    outer = _gore_is_taken(roadside, station)
+    must_be_outside = _gore_is_taken(roadside, station)
     fields = {"kind": "emergency_phone"}
-    roadside.put(PlacementRequest("emergency-phone", Cabinet, station, _HALF, _PHONE_WIDTH, fields, outer=outer))
+    roadside.put(
+        PlacementRequest("emergency-phone", Cabinet, station, _HALF, _PHONE_WIDTH, fields, outer=must_be_outside)
+    )
 
 
 def _gore_is_taken(roadside: Roadside, station: float) -> bool:
@@ -103,11 +107,11 @@ def plan_lighting(layout: Layout, rng: np.random.Generator) -> None:
     spacing, height = draw(rng, limits.lighting_spacing), draw(rng, limits.lighting_height)
     arm = pick(rng, LIGHTING_ARMS)
     sides = list(layout.sides.values())
-    first = spacing * rng.random()
+    first_station = spacing * rng.random()
     for roadside in pick(rng, [sides, sides[:1], sides[-1:]]):
-        for station in (first + spacing * np.arange(int(layout.length / spacing) + 1)).tolist():
-            taken = (roadside.near, roadside.crossed, roadside.restless)
-            if station > layout.length or not all(t.is_free(station - _HALF, station + _HALF) for t in taken):
+        for station in (first_station + spacing * np.arange(int(layout.length / spacing) + 1)).tolist():
+            reservations = (roadside.near, roadside.crossed, roadside.restless)
+            if station > layout.length or not all(t.is_free(station - _HALF, station + _HALF) for t in reservations):
                 continue
             _put_pole(roadside, "lighting", station, height, LIGHTING_DIAMETER, arm)
 
@@ -119,8 +123,8 @@ def plan_surveillance(layout: Layout, rng: np.random.Generator) -> None:
     if rng.random() >= limits.surveillance:
         return
     roadside = pick(rng, list(layout.sides.values()))
-    free = free_ranges(0.0, layout.length, roadside.near, roadside.crossed, roadside.restless)
-    start = draw_start(rng, free, 2.0 * _HALF)
+    free_stretches = free_ranges(0.0, layout.length, roadside.near, roadside.crossed, roadside.restless)
+    start = draw_start(rng, free_stretches, 2.0 * _HALF)
     height, arm = draw(rng, limits.surveillance_height), pick(rng, SURVEILLANCE_ARMS)
     if start is not None:
         _put_pole(roadside, "surveillance", start + _HALF, height, SURVEILLANCE_DIAMETER, arm)

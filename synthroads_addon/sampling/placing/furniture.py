@@ -33,9 +33,9 @@ def place_furniture(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
     if by_rules:
         _plan_fixed(layout, streams)
     bridge = plan_overpass(layout, streams["structures"])
-    planned = plan_gantries(layout, streams["structures"])
-    zones, in_zones = construction_zones(layout, streams["structures"])
-    yield from in_zones.items()
+    gantry_plans = plan_gantries(layout, streams["structures"])
+    zones, zone_objects = construction_zones(layout, streams["structures"])
+    yield from zone_objects.items()
     for side, roadside in layout.sides.items():
         noise_barrier = plan_noise_barrier(layout, roadside, streams["barriers"])
         if noise_barrier:
@@ -53,7 +53,7 @@ def place_furniture(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
             streams[item.stream] = site.stream("furniture", item.stream)
         item.plan(layout, streams[item.stream])
     yield from _barriers_by_rules(layout, streams) if by_rules else _barriers_at_random(layout, streams)
-    yield from _objects_behind_barriers(layout, streams, planned, bridge)
+    yield from _objects_behind_barriers(layout, streams, gantry_plans, bridge)
 
 
 def _plan_fixed(layout: Layout, streams: Streams) -> None:
@@ -85,13 +85,13 @@ def _barriers_at_random(layout: Layout, streams: Streams) -> Iterator[tuple[str,
 
 
 def _objects_behind_barriers(
-    layout: Layout, streams: Streams, planned: list[GantryPlan], bridge: OverpassPlan | None
+    layout: Layout, streams: Streams, gantry_plans: list[GantryPlan], overpass_plan: OverpassPlan | None
 ) -> Iterator[tuple[str, RoadObject]]:
     """Yield (id, object) of what stands behind the barriers: requests, median signs, gantries, overpass."""
     for roadside in layout.sides.values():
         yield from roadside.objects()
     yield from median_signs(layout)
     yield from gutters(layout)
-    yield from gantries(layout, planned, streams["structures"])
-    if bridge:
-        yield "overpass", overpass(layout, bridge, streams["structures"])
+    yield from gantries(layout, gantry_plans, streams["structures"])
+    if overpass_plan:
+        yield "overpass", overpass(layout, overpass_plan, streams["structures"])

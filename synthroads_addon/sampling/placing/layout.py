@@ -127,10 +127,10 @@ class Roadside:
 
     def put(self, request: PlacementRequest) -> None:
         """Request a thing: reserve its stretch of the small zone, and ask for a barrier if it is an obstacle."""
-        low, high = request.station - request.half, request.station + request.half
-        self.near.add(low, high)
+        start, end = request.station - request.half, request.station + request.half
+        self.near.add(start, end)
         if request.obstacle:
-            self.protect(low, high)
+            self.protect(start, end)
         self.requests.append(request)
 
     def front(self, start: float, end: float, depth: float, outer: bool = False) -> float:
@@ -139,19 +139,21 @@ class Roadside:
         It is the largest of the paved edge and of the barriers' bases; beside an island that is deep enough (m) for the
         thing, the main road's.
         """
-        near = [p for p in self.pieces if p.start - _BESIDE_BARRIER < end and p.end + _BESIDE_BARRIER > start]
+        nearby_barriers = [
+            p for p in self.pieces if p.start - _BESIDE_BARRIER < end and p.end + _BESIDE_BARRIER > start
+        ]
         if not outer:
-            main = self.edge.largest_main(start, end)
-            beside_main = max(main, *(p.base for p in near if not p.ramp), 0.0)
-            if self.edge.is_clear_beside_main(start, end, beside_main - main + depth + _ISLAND_MARGIN):
-                return beside_main
-        return max(self.edge.largest_paved(start, end), *(p.base for p in near), 0.0)
+            main_edge = self.edge.largest_main(start, end)
+            distance_in_island = max(main_edge, *(p.base for p in nearby_barriers if not p.ramp), 0.0)
+            if self.edge.is_clear_beside_main(start, end, distance_in_island - main_edge + depth + _ISLAND_MARGIN):
+                return distance_in_island
+        return max(self.edge.largest_paved(start, end), *(p.base for p in nearby_barriers), 0.0)
 
     def front_of_obstacle(self, start: float, end: float, depth: float) -> float:
         """Return `front` (m) for an obstacle: behind all of the barrier before it."""
-        first, last = self._barrier_stretch(start, end)
-        along = [p.base for p in self.pieces if p.start < last and p.end > first and not p.ramp]
-        return max(self.front(start, end, depth), *along, 0.0)
+        barrier_start, barrier_end = self._barrier_stretch(start, end)
+        bases = [p.base for p in self.pieces if p.start < barrier_end and p.end > barrier_start and not p.ramp]
+        return max(self.front(start, end, depth), *bases, 0.0)
 
     def objects(self) -> Iterator[tuple[str, PointObject]]:
         """Yield (id, object) of the requested things in the order of their stations, with instance 1."""
@@ -167,9 +169,9 @@ class Roadside:
         if request.distance is not None:
             return request.distance
         reach = max(request.half, 1.0)
-        low, high, depth = request.station - reach, request.station + reach, SMALL_ZONE + request.width + request.shift
+        start, end, depth = request.station - reach, request.station + reach, SMALL_ZONE + request.width + request.shift
         obstacle, outer = request.obstacle, request.outer
-        front = self.front_of_obstacle(low, high, depth) if obstacle else self.front(low, high, depth, outer)
+        front = self.front_of_obstacle(start, end, depth) if obstacle else self.front(start, end, depth, outer)
         return front + SMALL_ZONE + request.width / 2.0 + request.shift
 
     def _barrier_stretch(self, start: float, end: float) -> Range:
@@ -220,29 +222,29 @@ class Layout:
         self.sides: dict[Side, Roadside] = {side: Roadside(site, side) for side in site.carriageways}
         self.median = MedianStrip({side: least_width(c.inner_offset) for side, c in site.carriageways.items()})
 
-    def reserve(self, low: float, high: float, sides: Iterable[Side], zones: Iterable[str], in_median: bool) -> None:
+    def reserve(self, start: float, end: float, sides: Iterable[Side], zones: Iterable[str], in_median: bool) -> None:
         """Reserve a stretch for an obstacle, and ask for barriers before it.
 
         Args:
-            low, high: stations, m.
+            start, end: stations, m.
             sides: of the carriageways beside which it stands.
             zones: that it stands in there: ``near``, ``far``, ``crossed``.
             in_median: whether it stands in the median as well.
         """
         for roadside in (self.sides[side] for side in sides):
             for zone in zones:
-                getattr(roadside, zone).add(low, high)
-            roadside.protect(low, high)
+                getattr(roadside, zone).add(start, end)
+            roadside.protect(start, end)
         if in_median:
-            self.median.taken.add(low, high)
+            self.median.taken.add(start, end)
             self.median.has_obstacles = True
 
     @cached_property
     def tight_arcs(self) -> list[tuple[float, float, float]]:
         """Return start and end (m) and curvature (1/m) of the arcs that are tight for the design class."""
-        arcs, start, tight = [], 0.0, 1.0 / (TIGHT_CURVE * self.site.limits.radius)
+        arcs, start, tight_curvature = [], 0.0, 1.0 / (TIGHT_CURVE * self.site.limits.radius)
         for element in self.site.alignment.horizontal:
-            if element.kind == "arc" and abs(element.curvature_start) > tight:
+            if element.kind == "arc" and abs(element.curvature_start) > tight_curvature:
                 arcs.append((start, start + element.length, element.curvature_start))
             start += element.length
         return arcs

@@ -81,29 +81,29 @@ def random_front(
     layout: Layout, roadside: Roadside, rng: np.random.Generator
 ) -> Iterator[tuple[str, LineObject | Delineator]]:
     """Yield (id, object) of one side's barriers and delineators at random stations and distances."""
-    limits, taken = layout.site.scenario.barriers, Reservations()
+    limits, reservations = layout.site.scenario.barriers, Reservations()
     system = BarrierSystem.draw(rng, limits, limits.concrete_roadside)
     for _ in range(_count(BARRIERS_PER_KM, layout, rng) if limits.roadside else 0):
         segment = pick(rng, roadside.edge.segments)
-        span = draw_stretch(rng, free_ranges(segment.start, segment.end, taken), *BARRIER_LENGTHS)
+        span = draw_stretch(rng, free_ranges(segment.start, segment.end, reservations), *BARRIER_LENGTHS)
         if span:
-            taken.add(*span)
+            reservations.add(*span)
             roadside.pieces.append(BarrierPiece(*span, segment.base, segment.ramp))
     for number, piece in enumerate(roadside.pieces, start=1):
-        moved = piece._replace(base=piece.base + pick(rng, BARRIER_SHIFTS))
-        yield f"{system.name}-{roadside.side}-{number}", system.beside(roadside, moved, TERMINAL)
+        shifted_piece = piece._replace(base=piece.base + pick(rng, BARRIER_SHIFTS))
+        yield f"{system.name}-{roadside.side}-{number}", system.beside(roadside, shifted_piece, TERMINAL)
     if layout.site.scenario.furniture.delineators:
-        yield from _delineators(layout, roadside, taken, rng)
+        yield from _delineators(layout, roadside, reservations, rng)
 
 
 def _delineators(
-    layout: Layout, roadside: Roadside, taken: Reservations, rng: np.random.Generator
+    layout: Layout, roadside: Roadside, reservations: Reservations, rng: np.random.Generator
 ) -> Iterator[tuple[str, Delineator]]:
     for number in range(1, _count(DELINEATORS_PER_KM, layout, rng) + 1):
-        start = draw_start(rng, free_ranges(0.0, layout.length, taken), 2.0 * _DELINEATOR_HALF)
+        start = draw_start(rng, free_ranges(0.0, layout.length, reservations), 2.0 * _DELINEATOR_HALF)
         if start is None:
             return
-        taken.add(start, start + 2.0 * _DELINEATOR_HALF)
+        reservations.add(start, start + 2.0 * _DELINEATOR_HALF)
         station = start + _DELINEATOR_HALF
         edge = roadside.edge.line_beside(np.array([station]), _DELINEATOR_HALF)[0]
         offset = round_value(roadside.sign * (edge + pick(rng, DELINEATOR_DISTANCES)))
@@ -120,4 +120,5 @@ def _stations(roadside: Roadside, per_km: float, layout: Layout, rng: np.random.
 
 
 def _count(per_km: float, layout: Layout, rng: np.random.Generator) -> int:
+    """Return a whole number of things along the road whose mean is the number per km times the length."""
     return int(per_km * layout.length / 1000.0 + rng.random())

@@ -40,6 +40,7 @@ def small_thing(stream: str, order: int = _LAST) -> Callable[[Plan], Plan]:
     """
 
     def register(plan: Plan) -> Plan:
+        """Add a plan to the registered ones, and return it unchanged."""
         _PLANS.append(SmallThing(order, stream, plan))
         return plan
 

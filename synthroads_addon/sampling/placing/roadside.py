@@ -102,71 +102,74 @@ class _Zones:
         self.paved = float(section.main_edge(marks).max())
         self.edge = self.paved + nominal_width(section.carriageway.verge_width)
         self.reach = min(site.terrain.half_width, FARTHEST) - 1.0
-        standing = [*objects.values(), *([power_line] if power_line else [])]
-        self._blocks = [block for item in standing if isinstance(item, Thing) for block in item.footprint()]
+        things = [*objects.values(), *([power_line] if power_line else [])]
+        self._blocks = [block for item in things if isinstance(item, Thing) for block in item.footprint()]
         turnouts = (shape.range() for shape in section.turnouts)
         self._crossing = Reservations([*crossing.stretches, *((a - _TURNOUT, b + _TURNOUT) for a, b in turnouts)])
 
-    def free(self, near: float, far: float) -> list[Range]:
+    def free(self, nearest: float, farthest: float) -> list[Range]:
         """Return the stretches of road (m) on which nothing stands between two distances (m) from the centreline."""
-        low, high = sorted((self.sign * near, self.sign * far))
-        taken = [(b.start - _GAP, b.end + _GAP) for b in self._blocks if b.low < high and b.high > low]
-        return free_ranges(0.0, self.site.length, self._crossing, Reservations(taken))
+        lowest_offset, highest_offset = sorted((self.sign * nearest, self.sign * farthest))
+        taken_stretches = [
+            (b.start - _GAP, b.end + _GAP) for b in self._blocks if b.low < highest_offset and b.high > lowest_offset
+        ]
+        return free_ranges(0.0, self.site.length, self._crossing, Reservations(taken_stretches))
 
     def count(self, per_km: float, rng: np.random.Generator) -> int:
         """Return a number of things along the road, from their number per km."""
         return int(per_km * self.site.length / 1000.0 + rng.random())
 
 
-def _crossings(site: PlacementSite, objects: Mapping[str, RoadObject], far: float = FARTHEST) -> Iterator[Range]:
+def _crossings(site: PlacementSite, objects: Mapping[str, RoadObject], distance: float = FARTHEST) -> Iterator[Range]:
     """Yield the stretches of road that the embankments of bridges take up to a distance (m) from the centreline."""
     for item in objects.values():
         if isinstance(item, Overpass):
-            turn = math.radians(item.rotation_deg)
-            wide = item.width / 2.0 + _EMBANKMENT * site.terrain.batter_slope
-            half = wide / math.cos(turn) + far * abs(math.tan(turn))
-            yield item.station - half, item.station + half
+            skew = math.radians(item.rotation_deg)
+            half_width = item.width / 2.0 + _EMBANKMENT * site.terrain.batter_slope
+            half_length = half_width / math.cos(skew) + distance * abs(math.tan(skew))
+            yield item.station - half_length, item.station + half_length
 
 
 def _power_line(site: PlacementSite, objects: Mapping[str, RoadObject]) -> PowerLine | None:
     """Return the drawn power line across the road, or None; its pylons stand clear of everything else."""
     limits, rng = site.scenario.roadside, site.stream("roadside", "power line")
     height = draw(rng, limits.pylon_height)
-    left, right = draw_between(rng, _PYLON_DISTANCES), draw_between(rng, _PYLON_DISTANCES)
+    left_distance, right_distance = draw_between(rng, _PYLON_DISTANCES), draw_between(rng, _PYLON_DISTANCES)
     turn, sag, chance = draw_between(rng, (-25.0, 25.0)), draw_between(rng, (3.0, 7.0)), rng.random()
     line = PowerLine(
         instance=1,
         station=0.0,
         offset=0.0,
         rotation_deg=turn,
-        left_distance=left,
-        right_distance=right,
+        left_distance=left_distance,
+        right_distance=right_distance,
         height=height,
         sag=round_value(min(sag, 0.2 * height)),
     )
-    taken = Reservations(_crossings(site, objects))
+    reservations = Reservations(_crossings(site, objects))
     for pylon in line.footprint():
-        for low, high in _crossings(site, objects, _PYLON_DISTANCES[1]):
-            taken.add(low - pylon.end, high - pylon.start)
-    start = draw_start(rng, free_ranges(0.0, site.length, taken), 10.0)
+        for crossing_start, crossing_end in _crossings(site, objects, _PYLON_DISTANCES[1]):
+            reservations.add(crossing_start - pylon.end, crossing_end - pylon.start)
+    start = draw_start(rng, free_ranges(0.0, site.length, reservations), 10.0)
     if chance >= limits.power_line or start is None:
         return None
     return line.model_copy(update={"station": round_value(start + 5.0)})
 
 
 def _hedges(zones: _Zones, rng: np.random.Generator) -> Iterator[tuple[str, Hedge]]:
+    """Yield (id, hedge) of one side's hedges; all numbers of a hedge are drawn, also where it finds no room."""
     limits, number = zones.site.scenario.roadside, 0
-    taken = Reservations()
+    reservations = Reservations()
     for _ in range(zones.count(draw(rng, limits.hedges_per_km), rng)):
         length, height, width = (draw(rng, getattr(limits, f"hedge_{name}")) for name in ("length", "height", "width"))
         distance = zones.edge + draw_between(rng, HEDGE_ZONE) + width / 2.0
-        near, far = distance - width / 2.0 - 0.5, distance + width / 2.0 + 0.5
-        ranges = [r for start, end in zones.free(near, far) for r in free_ranges(start, end, taken)]
+        nearest, farthest = distance - width / 2.0 - 0.5, distance + width / 2.0 + 0.5
+        ranges = [r for start, end in zones.free(nearest, farthest) for r in free_ranges(start, end, reservations)]
         start, seed = draw_start(rng, ranges, length), int(rng.integers(2**31))
-        if start is None or far > zones.reach:
+        if start is None or farthest > zones.reach:
             continue
         number += 1
-        taken.add(start - _GAP, start + length + _GAP)
+        reservations.add(start - _GAP, start + length + _GAP)
         hedge = Hedge(
             instance=1,
             start_station=round_value(start),
@@ -185,20 +188,20 @@ def _fences(zones: _Zones, rng: np.random.Generator) -> Iterator[tuple[str, Fenc
     height, distance = draw(rng, limits.fence_height), zones.edge + draw_between(rng, FENCE_ZONE)
     # Behind hedges, however wide they are.
     distance += limits.hedge_width.maximum if limits.hedges_per_km.maximum > 0.0 else 0.0
-    spacing, kind, presence = pick(rng, (4.0, 5.0, 6.0)), pick(rng, _FENCES), rng.random() < limits.fences
-    if not presence or distance + 1.0 > zones.reach:
+    spacing, kind, is_present = pick(rng, (4.0, 5.0, 6.0)), pick(rng, _FENCES), rng.random() < limits.fences
+    if not is_present or distance + 1.0 > zones.reach:
         return
     number = 0
     for start, end in zones.free(distance - 0.5, distance + 0.5):
         for piece in np.arange(start, end, _LONGEST_FENCE).tolist():
-            last = min(piece + _LONGEST_FENCE - _GATE, end)
-            if last - piece < spacing:
+            piece_end = min(piece + _LONGEST_FENCE - _GATE, end)
+            if piece_end - piece < spacing:
                 continue
             number += 1
             fence = Fence(
                 instance=1,
                 start_station=round_value(piece),
-                end_station=round_value(last),
+                end_station=round_value(piece_end),
                 offset=round_value(zones.sign * distance),
                 kind=kind,
                 height=height,
@@ -210,25 +213,27 @@ def _fences(zones: _Zones, rng: np.random.Generator) -> Iterator[tuple[str, Fenc
 def _yards(zones: _Zones, rng: np.random.Generator) -> Iterator[tuple[str, RoadObject]]:
     """Yield buildings, each with its wall and the vehicles parked before it."""
     limits = zones.site.scenario.roadside
-    first = max(zones.paved + BUILDING_DISTANCE, zones.edge + FENCE_ZONE[1] + limits.hedge_width.maximum + 2.0)
-    taken, number = Reservations(), 0
+    nearest_distance = max(
+        zones.paved + BUILDING_DISTANCE, zones.edge + FENCE_ZONE[1] + limits.hedge_width.maximum + 2.0
+    )
+    reservations, number = Reservations(), 0
     for _ in range(zones.count(draw(rng, limits.buildings_per_km), rng)):
         kind = pick(rng, list(_BUILDINGS))
         width, depth, height, roof = (draw_between(rng, sizes) for sizes in _BUILDINGS[kind])
         turn = draw_between(rng, (-12.0, 12.0)) + pick(rng, (90.0, 0.0))
-        width, depth = _fit(width, depth, zones.reach - first - _YARD)
-        half = math.hypot(width, depth) / 2.0 + OVERHANG
-        parked, walled = draw(rng, limits.parked_per_building), rng.random() < limits.walls
+        width, depth = _fit(width, depth, zones.reach - nearest_distance - _YARD)
+        plot_radius = math.hypot(width, depth) / 2.0 + OVERHANG
+        parked_count, has_wall = draw(rng, limits.parked_per_building), rng.random() < limits.walls
         wall_height, wall_kind = draw(rng, limits.wall_height), pick(rng, ("plaster", "brick", "concrete"))
-        near, far = first, first + _YARD + 2.0 * half
-        ranges = [r for start, end in zones.free(near, far) for r in free_ranges(start, end, taken)]
-        start = draw_start(rng, ranges, 2.0 * half)
+        nearest, farthest = nearest_distance, nearest_distance + _YARD + 2.0 * plot_radius
+        ranges = [r for start, end in zones.free(nearest, farthest) for r in free_ranges(start, end, reservations)]
+        start = draw_start(rng, ranges, 2.0 * plot_radius)
         if start is None or min(width, depth) < _SMALLEST:
             continue
         number += 1
-        taken.add(start - 4.0 * _GAP, start + 2.0 * half + 4.0 * _GAP)
+        reservations.add(start - 4.0 * _GAP, start + 2.0 * plot_radius + 4.0 * _GAP)
         facing = 90.0 if zones.sign > 0 else -90.0
-        middle, distance = start + half, first + _YARD + half
+        middle, distance = start + plot_radius, nearest_distance + _YARD + plot_radius
         building = {"kind": kind, "width": width, "depth": depth, "height": height, "roof_height": roof}
         yield (
             f"building-{zones.side}-{number}",
@@ -240,11 +245,13 @@ def _yards(zones: _Zones, rng: np.random.Generator) -> Iterator[tuple[str, RoadO
                 **building,
             ),
         )
-        if walled:
-            span = (start, start + 2.0 * half)
+        if has_wall:
+            span = (start, start + 2.0 * plot_radius)
             fields: dict[str, Any] = {"kind": wall_kind, "height": wall_height}
-            yield f"wall-{zones.side}-{number}", _wall(span, zones.sign * (first + 0.5), fields)
-        for place, vehicle in enumerate(_parked(rng, zones, (start, 2.0 * half), first + _YARD - 2.0, kind, parked), 1):
+            yield f"wall-{zones.side}-{number}", _wall(span, zones.sign * (nearest_distance + 0.5), fields)
+        for place, vehicle in enumerate(
+            _parked(rng, zones, (start, 2.0 * plot_radius), nearest_distance + _YARD - 2.0, kind, parked_count), 1
+        ):
             yield f"parked-{zones.side}-{number}-{place}", vehicle
 
 
@@ -265,24 +272,24 @@ def _wall(span: Range, offset: float, fields: Mapping[str, Any]) -> Wall:
 
 
 def _parked(
-    rng: np.random.Generator, zones: _Zones, plot: tuple[float, float], distance: float, kind: str, wanted: float
+    rng: np.random.Generator, zones: _Zones, plot: tuple[float, float], distance: float, kind: str, mean_count: float
 ) -> Iterator[ParkedVehicle]:
     """Yield vehicles in a row along the road before a building, as many as were drawn and as there is room for."""
     shares = np.array(list(COLORS.values()))
-    at, end = plot[0], plot[0] + plot[1]
-    for _ in range(int(wanted + rng.random())):
+    position, end = plot[0], plot[0] + plot[1]
+    for _ in range(int(mean_count + rng.random())):
         model = pick(rng, _MODELS[kind])
         color = list(COLORS)[int(rng.choice(len(COLORS), p=shares / shares.sum()))]
         length, turn = VEHICLE_TYPES[model].length, pick(rng, (0.0, 180.0))
         gap = draw_between(rng, (0.8, 2.5))
-        if at + gap + length > end:
+        if position + gap + length > end:
             return
         yield ParkedVehicle(
             instance=1,
-            station=round_value(at + gap + length / 2.0),
+            station=round_value(position + gap + length / 2.0),
             offset=round_value(zones.sign * distance),
             rotation_deg=turn,
             model=model,
             color=color,
         )
-        at += gap + length
+        position += gap + length

@@ -45,12 +45,12 @@ def plan_gore_signs(layout: Layout) -> None:
             station = _gore_station(layout.site.shape(turnout), sign.width)
             if not 0.0 <= station <= layout.length:
                 continue
-            inner, outer = (float(edge[0]) for edge in section.boundaries_of("island", station))
-            width = min(sign.width, outer - inner - 2.0 * (SIGN_DISTANCE + _GORE_MARGIN))
+            island_start, island_end = (float(edge[0]) for edge in section.boundaries_of("island", station))
+            width = min(sign.width, island_end - island_start - 2.0 * (SIGN_DISTANCE + _GORE_MARGIN))
             if width < _NARROWEST_GORE_SIGN:
                 continue
             fields = sign.fields() | {"width": round_value(width), "code": GORE_SIGN, "text": sign.text}
-            middle = (inner + outer) / 2.0
+            middle = (island_start + island_end) / 2.0
             board = PlacementRequest("sign-gore", TrafficSign, station, _LARGE_HALF, width, fields, distance=middle)
             roadside.put(board)
 
@@ -75,16 +75,16 @@ def plan_other_signs(layout: Layout, rng: np.random.Generator, zones: dict[Side,
         rng: the signs' random numbers.
         zones: the construction zone of a carriageway, by side: the lowest and highest station, m.
     """
-    urban = layout.site.design_class == "EKA3"
+    is_urban = layout.site.design_class == "EKA3"
     for side, roadside in layout.sides.items():
         if side in zones:
             _announce_construction(layout, roadside, zones[side])
         limit = URBAN_LIMITS[int(rng.integers(len(URBAN_LIMITS)))]
         begin = 0.0 if roadside.traffic > 0 else layout.length
-        if urban:
+        if is_urban:
             place_sign(roadside, limit, roadside.ahead(begin, LIMIT_BEHIND_BEGIN), _ROOM)
         for turnout in layout.site.turnouts_of_kind(side, "entry"):
-            _behind_entry(layout, roadside, turnout, limit if urban else None, rng)
+            _behind_entry(layout, roadside, turnout, limit if is_urban else None, rng)
         for code, station in _curve_signs(layout, roadside):
             place_sign_on_both_sides(layout, roadside, code, station)
 
@@ -105,17 +105,19 @@ def place_sign(
     if not 0.0 <= station <= roadside.length:
         return False
     sign = sign_catalogue().signs[code]
-    large = sign.post_diameter > OBSTACLE_POST  # so thick a post needs a barrier
-    zones = (roadside.near, roadside.far, roadside.crossed) if large else (roadside.near,)
-    half = _LARGE_HALF if large else _HALF
-    place = nearest_free(station, half, room, roadside.length, *zones)
+    is_large = sign.post_diameter > OBSTACLE_POST  # so thick a post needs a barrier
+    zones = (roadside.near, roadside.far, roadside.crossed) if is_large else (roadside.near,)
+    half_length = _LARGE_HALF if is_large else _HALF
+    place = nearest_free(station, half_length, room, roadside.length, *zones)
     if place is None:
         return False
     text = tuple(line.format(**values) for line in sign.text) if values else sign.text
     fields = sign.fields() | {"code": code, "text": text}
-    roadside.put(PlacementRequest("sign", TrafficSign, place, half, sign.width, fields, shift, obstacle=large))
-    if large:
-        roadside.far.add(place - half, place + half)
+    roadside.put(
+        PlacementRequest("sign", TrafficSign, place, half_length, sign.width, fields, shift, obstacle=is_large)
+    )
+    if is_large:
+        roadside.far.add(place - half_length, place + half_length)
     return True
 
 
@@ -148,8 +150,16 @@ def destination_values(rng: np.random.Generator, site: PlacementSite) -> dict[st
     """Return drawn values for the texts of boards: a number, a name, and names with growing distances."""
     names = _names(rng, 4)
     distances = np.cumsum(rng.integers(3, 60, 3)).tolist()
-    near, middle, far = (f"{name} {distance} km" for name, distance in zip(names[1:], distances, strict=True))
-    values = {"number": str(rng.integers(1, 100)), "exit": names[0], "near": near, "middle": middle, "far": far}
+    near_text, middle_text, far_text = (
+        f"{name} {distance} km" for name, distance in zip(names[1:], distances, strict=True)
+    )
+    values = {
+        "number": str(rng.integers(1, 100)),
+        "exit": names[0],
+        "near": near_text,
+        "middle": middle_text,
+        "far": far_text,
+    }
     return values | {"motorway": motorway_number(site)}
 
 
@@ -163,8 +173,8 @@ def _gore_station(shape: TurnoutShape, width: float) -> float:
     """Return the station (m) at which the island is wide enough for a sign, or else the last one on it."""
     ramp = shape.turnout.ramp
     assert ramp is not None
-    wide_enough = island_begin(shape, ramp, width + 2.0 * (SIGN_DISTANCE + _GORE_MARGIN))
-    return ramp_station(shape, min(max(wide_enough, shape.nose + NOSE_ROUND[-1]), ramp.length - STEP))
+    wide_enough_from = island_begin(shape, ramp, width + 2.0 * (SIGN_DISTANCE + _GORE_MARGIN))
+    return ramp_station(shape, min(max(wide_enough_from, shape.nose + NOSE_ROUND[-1]), ramp.length - STEP))
 
 
 def _behind_entry(
@@ -178,25 +188,30 @@ def _behind_entry(
 
 
 def _announce_construction(layout: Layout, roadside: Roadside, zone: Range) -> None:
-    first, last = zone if roadside.traffic > 0 else (zone[1], zone[0])
+    """Place the signs before a construction zone (stations, m) and the one behind it, on both sides."""
+    zone_begin, zone_end = zone if roadside.traffic > 0 else (zone[1], zone[0])
     for distance, code in CONSTRUCTION_SIGNS.items():
-        place_sign_on_both_sides(layout, roadside, code, roadside.ahead(first, -distance))
-    place_sign_on_both_sides(layout, roadside, "282", roadside.ahead(last, CONSTRUCTION_END))
+        place_sign_on_both_sides(layout, roadside, code, roadside.ahead(zone_begin, -distance))
+    place_sign_on_both_sides(layout, roadside, "282", roadside.ahead(zone_end, CONSTRUCTION_END))
 
 
 def _curve_signs(layout: Layout, roadside: Roadside) -> Iterator[tuple[str, float]]:
     """Yield code and station (m) of the danger signs before tight curves, in the direction of traffic."""
-    ahead = roadside.traffic
-    arcs = sorted((*sorted((ahead * start, ahead * end)), ahead * bend > 0.0) for start, end, bend in layout.tight_arcs)
-    announced = -np.inf
-    for (begin, end, left), (following, _, next_left) in pairwise([*arcs, (np.inf, np.inf, False)]):
-        if begin - announced >= SECOND_CURVE:
-            double = next_left != left and following - end < SECOND_CURVE
-            code = f"{'105' if double else '103'}-{10 if left else 20}"
-            yield from ((code, ahead * (begin - distance)) for distance in CURVE_SIGNS)
-        announced = end
+    traffic = roadside.traffic
+    arcs = sorted(
+        (*sorted((traffic * start, traffic * end)), traffic * curvature > 0.0)
+        for start, end, curvature in layout.tight_arcs
+    )
+    last_end = -np.inf
+    for (begin, end, is_left), (next_begin, _, is_next_left) in pairwise([*arcs, (np.inf, np.inf, False)]):
+        if begin - last_end >= SECOND_CURVE:
+            is_double = is_next_left != is_left and next_begin - end < SECOND_CURVE
+            code = f"{'105' if is_double else '103'}-{10 if is_left else 20}"
+            yield from ((code, traffic * (begin - distance)) for distance in CURVE_SIGNS)
+        last_end = end
 
 
 def _names(rng: np.random.Generator, count: int) -> list[str]:
+    """Return drawn names of places for boards, all different."""
     names = sign_catalogue().destinations
     return [names[i] for i in rng.choice(len(names), count, replace=False)]

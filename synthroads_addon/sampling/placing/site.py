@@ -75,5 +75,5 @@ class PlacementSite:
 
     def begin(self, turnout: Turnout) -> float:
         """Return the station (m) at which traffic meets a turnout first."""
-        ahead = self.shape(turnout).carriageway.traffic > 0
-        return turnout.start_station if ahead else turnout.end_station
+        is_with_stations = self.shape(turnout).carriageway.traffic > 0
+        return turnout.start_station if is_with_stations else turnout.end_station

@@ -73,8 +73,8 @@ def plan_gantries(layout: Layout, rng: np.random.Generator) -> list[GantryPlan]:
     spacing = limits.gantry_spacing
     if spacing is not None:
         stations = spacing * (0.5 + np.arange(int(layout.length / spacing + 0.5)))
-        half = min(_HALF, spacing / 2.0)
-        plans = (_gantry_at(layout, rng, station, half) for station in stations.tolist())
+        half_length = min(_HALF, spacing / 2.0)
+        plans = (_gantry_at(layout, rng, station, half_length) for station in stations.tolist())
         return [plan for plan in plans if plan]
     if rng.random() >= limits.gantries:
         return []
@@ -84,32 +84,41 @@ def plan_gantries(layout: Layout, rng: np.random.Generator) -> list[GantryPlan]:
 
 
 def gantries(layout: Layout, plans: list[GantryPlan], rng: np.random.Generator) -> Iterator[tuple[str, Gantry]]:
-    """Yield (id, gantry) of planned gantries, with their signs and instance 1."""
+    """Yield (id, gantry) of planned gantries, with their signs and instance 1.
+
+    The order of the draws (beam, post, displays, clearance, shade, signs) decides which gantry a seed gives. A post
+    that isn't a cantilever's may stand in the median and is no wider than that allows.
+
+    Args:
+        layout: the road, its barriers built: posts stand behind them.
+        plans: the gantries' places.
+        rng: of the structures.
+    """
     limits = layout.site.scenario.furniture
     for number, plan in enumerate(plans, start=1):
         beam, height, depth = pick(rng, BEAMS)
-        post = pick(rng, POST_WIDTHS)
+        post_width = pick(rng, POST_WIDTHS)
         if plan.kind != "cantilever":
-            post = min(post, layout.median.obstacle_half)
-        reaches = {side: _beam_reach(layout, plan, layout.sides[side], post) for side in plan.sides}
-        ends = [layout.sides[side].sign * distance for side in plan.sides for distance in reaches[side]]
-        displays = bool(rng.random() < 0.5)
-        left, right = round_value(max(ends)), round_value(min(ends))
+            post_width = min(post_width, layout.median.obstacle_half)
+        reaches = {side: _beam_reach(layout, plan, layout.sides[side], post_width) for side in plan.sides}
+        end_offsets = [layout.sides[side].sign * distance for side in plan.sides for distance in reaches[side]]
+        has_displays = bool(rng.random() < 0.5)
+        left_end, right_end = round_value(max(end_offsets)), round_value(min(end_offsets))
         gantry = Gantry(
             instance=1,
             station=round_value(plan.station),
-            offset=round_value((left + right) / 2.0),
+            offset=round_value((left_end + right_end) / 2.0),
             kind=plan.kind,
-            left_offset=left,
-            right_offset=right,
+            left_offset=left_end,
+            right_offset=right_end,
             post_side=plan.sides[0],
             clearance=draw(rng, limits.gantry_clearance),
             beam=beam,
             beam_height=height,
             beam_depth=round_value(min(depth, 0.6 * (limits.gantry_spacing or 10.0))),
-            post_width=round_value(post),
+            post_width=round_value(post_width),
             shade=pick(rng, SHADES),
-            signs=tuple(s for side in plan.sides for s in _signs(layout, plan, side, reaches[side], displays, rng)),
+            signs=tuple(s for side in plan.sides for s in _signs(layout, plan, side, reaches[side], has_displays, rng)),
         )
         yield f"gantry-{number}", gantry
 
@@ -132,27 +141,30 @@ def _obstructions(layout: Layout, kind: Kind, sides: tuple[Side, ...]) -> list[R
     return obstacles
 
 
-def _gantry_at(layout: Layout, rng: np.random.Generator, station: float, half: float) -> GantryPlan | None:
+def _gantry_at(layout: Layout, rng: np.random.Generator, station: float, half_length: float) -> GantryPlan | None:
     """Return the gantry at a station (m), its place reserved, or None where something is in the way."""
     kind, sides = _kind(layout, rng)
-    if all(item.is_free(station - half, station + half) for item in _obstructions(layout, kind, sides)):
-        return _reserve_place(layout, GantryPlan(kind, station, sides), half)
+    if all(item.is_free(station - half_length, station + half_length) for item in _obstructions(layout, kind, sides)):
+        return _reserve_place(layout, GantryPlan(kind, station, sides), half_length)
     return None
 
 
-def _reserve_place(layout: Layout, plan: GantryPlan, half: float) -> GantryPlan:
-    layout.reserve(plan.station - half, plan.station + half, plan.sides, ("near",), plan.kind != "cantilever")
+def _reserve_place(layout: Layout, plan: GantryPlan, half_length: float) -> GantryPlan:
+    """Reserve a gantry's stretch of the road, ask for barriers before its posts, and return its plan."""
+    layout.reserve(
+        plan.station - half_length, plan.station + half_length, plan.sides, ("near",), plan.kind != "cantilever"
+    )
     return plan
 
 
-def _beam_reach(layout: Layout, plan: GantryPlan, roadside: Roadside, post: float) -> tuple[float, float]:
+def _beam_reach(layout: Layout, plan: GantryPlan, roadside: Roadside, post_width: float) -> tuple[float, float]:
     """Return the distances (m) from the centreline between which the beam hangs over a carriageway."""
-    front = roadside.front_of_obstacle(plan.station - _HALF, plan.station + _HALF, SMALL_ZONE + post)
-    outer = front + SMALL_ZONE + post
+    front = roadside.front_of_obstacle(plan.station - _HALF, plan.station + _HALF, SMALL_ZONE + post_width)
+    outer_distance = front + SMALL_ZONE + post_width
     if plan.kind != "cantilever":
-        return 0.0, outer
+        return 0.0, outer_distance
     lanes = _lanes(layout, plan, roadside.side)[:LANES_OF_CANTILEVER]
-    return lanes[-1][0], outer
+    return lanes[-1][0], outer_distance
 
 
 def _lanes(layout: Layout, plan: GantryPlan, side: Side) -> list[tuple[float, float]]:
@@ -163,21 +175,26 @@ def _lanes(layout: Layout, plan: GantryPlan, side: Side) -> list[tuple[float, fl
 
 
 def _signs(
-    layout: Layout, plan: GantryPlan, side: Side, reach: tuple[float, float], displays: bool, rng: np.random.Generator
+    layout: Layout,
+    plan: GantryPlan,
+    side: Side,
+    reach: tuple[float, float],
+    has_displays: bool,
+    rng: np.random.Generator,
 ) -> Iterator[GantrySign]:
     """Yield a drawn display or destination sign over each lane below the beam."""
     names = sign_catalogue().destinations
     for inner, outer in _lanes(layout, plan, side):
         if inner < reach[0]:
             continue
-        width = min(DISPLAY_SIZE, outer - inner) if displays else outer - inner - 2.0 * _BESIDE_SIGN
+        width = min(DISPLAY_SIZE, outer - inner) if has_displays else outer - inner - 2.0 * _BESIDE_SIGN
         yield GantrySign(
             offset=round_value(layout.sides[side].sign * (inner + outer) / 2.0),
             width=round_value(width),
-            height=DISPLAY_SIZE if displays else pick(rng, DESTINATION_HEIGHTS),
-            kind="display" if displays else "destination",
+            height=DISPLAY_SIZE if has_displays else pick(rng, DESTINATION_HEIGHTS),
+            kind="display" if has_displays else "destination",
             text=(pick(rng, DISPLAY_TEXTS),)
-            if displays
+            if has_displays
             else (motorway_number(layout.site), pick(rng, names), pick(rng, names)),
         )
 
@@ -217,37 +234,37 @@ def plan_overpass(layout: Layout, rng: np.random.Generator) -> OverpassPlan | No
     width, skew = draw(rng, limits.overpass_width), round_value(LARGEST_SKEW * (2.0 * rng.random() - 1.0))
     room = 2.0 * layout.median.obstacle_half
     in_median = bool(rng.random() < 0.67) and room >= LEAST_PIER_WIDTH
-    beside = bool(rng.random() < 0.5) and in_median
-    pier = min(pick(rng, PIER_WIDTHS), room) if in_median else pick(rng, PIER_WIDTHS)
-    plan = OverpassPlan(0.0, 0.0, width, skew, pier, in_median, beside)
-    outermost = max(side.edge.largest_main(0.0, layout.length) for side in layout.sides.values())
-    reach = outermost + FARTHEST_ABUTMENT + plan.corner
-    half = width / 2.0 / cos(radians(skew)) + reach * abs(tan(radians(skew)))
-    taken = [layout.median.taken] if in_median else []
+    has_outer_piers = bool(rng.random() < 0.5) and in_median
+    pier_width = min(pick(rng, PIER_WIDTHS), room) if in_median else pick(rng, PIER_WIDTHS)
+    plan = OverpassPlan(0.0, 0.0, width, skew, pier_width, in_median, has_outer_piers)
+    outermost_edge = max(side.edge.largest_main(0.0, layout.length) for side in layout.sides.values())
+    reach = outermost_edge + FARTHEST_ABUTMENT + plan.corner
+    half_length = width / 2.0 / cos(radians(skew)) + reach * abs(tan(radians(skew)))
+    reservations = [layout.median.taken] if in_median else []
     for roadside in layout.sides.values():
-        taken += [roadside.far, roadside.restless, *([roadside.near] if beside else [])]
-    start = draw_start(rng, free_ranges(0.0, layout.length, *taken), 2.0 * half)
+        reservations += [roadside.far, roadside.restless, *([roadside.near] if has_outer_piers else [])]
+    start = draw_start(rng, free_ranges(0.0, layout.length, *reservations), 2.0 * half_length)
     if start is None:
         return None
-    zones = ("far", "crossed", "near") if beside else ("far", "crossed")
-    layout.reserve(start, start + 2.0 * half, layout.sides, zones, in_median)
-    return replace(plan, station=start + half, half=half)
+    zones = ("far", "crossed", "near") if has_outer_piers else ("far", "crossed")
+    layout.reserve(start, start + 2.0 * half_length, layout.sides, zones, in_median)
+    return replace(plan, station=start + half_length, half=half_length)
 
 
 def overpass(layout: Layout, plan: OverpassPlan, rng: np.random.Generator) -> Overpass:
     """Return a planned overpass as an object: piers behind the barriers, abutments behind verge and piers."""
     offsets, abutments = [0.0] if plan.in_median else [], {"left": 5.0, "right": -5.0}
     span = pick(rng, ABUTMENT_SPANS)
-    low, high = plan.station - plan.half, plan.station + plan.half
+    start, end = plan.station - plan.half, plan.station + plan.half
     for side, roadside in layout.sides.items():
-        front = roadside.front_of_obstacle(low, high, 0.0)
-        road_edge = float(layout.site.sections[side].road_edge(np.linspace(low, high, 9)).max())
-        nearest = max(road_edge + ABUTMENT_DISTANCE, front + SMALL_ZONE + _SMALL_THINGS)
+        front = roadside.front_of_obstacle(start, end, 0.0)
+        road_edge = float(layout.site.sections[side].road_edge(np.linspace(start, end, 9)).max())
+        abutment_distance = max(road_edge + ABUTMENT_DISTANCE, front + SMALL_ZONE + _SMALL_THINGS)
         if plan.beside:
             axis = front + SMALL_ZONE + plan.pier / 2.0
             offsets.append(round_value(roadside.sign * axis))
-            nearest = max(nearest, axis + plan.pier / 2.0 + ABUTMENT_DISTANCE)
-        abutments[side] = round_value(roadside.sign * (nearest + plan.corner + span))
+            abutment_distance = max(abutment_distance, axis + plan.pier / 2.0 + ABUTMENT_DISTANCE)
+        abutments[side] = round_value(roadside.sign * (abutment_distance + plan.corner + span))
     limits = layout.site.scenario.furniture
     return Overpass(
         instance=1,

@@ -73,6 +73,14 @@ class CityObject:
 
 @dataclass
 class _Shell:
+    """Polygons (or lines, or points) of one part of a geometry, as indices into the model's vertices.
+
+    Attributes:
+        corners: (C,) vertex indices, polygon by polygon.
+        sizes: (F,) number of corners of each polygon.
+        kept: mask over the polygons that the part had at first: False for those dropped when vertices were merged.
+    """
+
     corners: Int
     sizes: Int
     kept: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
@@ -98,9 +106,9 @@ class CityModel:
 
     def add(self, item: CityObject) -> None:
         """Add a city object; its points are quantized to multiples of `SCALE` and not kept otherwise."""
-        shells = [[self._shell(part) for part in shape.parts] for shape in item.geometry]
-        bare = tuple(replace(shape, parts=()) for shape in item.geometry)
-        self._objects.append((replace(item, geometry=bare), shells))
+        shells = [[self._shell(part) for part in geometry.parts] for geometry in item.geometry]
+        emptied_geometries = tuple(replace(geometry, parts=()) for geometry in item.geometry)
+        self._objects.append((replace(item, geometry=emptied_geometries), shells))
 
     def template_index(self, key: Hashable, make: Callable[[], CityGeometry]) -> int:
         """Return the index of the geometry template for a key; `make` is called once per key to create it."""
@@ -109,6 +117,7 @@ class CityModel:
         return self._templates[key][0]
 
     def _shell(self, faces: Faces) -> _Shell:
+        """Append the polygons' quantized points to the model's vertices; return the polygons with their indices."""
         shell = _Shell(faces.corners + self._count, faces.sizes)
         self._vertices.append(np.rint(faces.points / SCALE).astype(np.int64))
         self._count += len(faces.points)
@@ -123,22 +132,22 @@ class CityModel:
         """
         vertices = self._merge_vertices()
         extent = self._extent(vertices)
-        head = {
+        members = {
             "type": "CityJSON",
             "version": "2.0",
             "metadata": metadata | {"geographicalExtent": extent},
             "transform": {"scale": [SCALE] * 3, "translate": list(self.translate)},
         }
         with path.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(compact_json(head)[:-1] + ',\n"CityObjects":{')
-            before = "\n"
+            file.write(compact_json(members)[:-1] + ',\n"CityObjects":{')
+            separator = "\n"
             for item, shapes in self._objects:
-                file.write(f"{before}{compact_json(item.id)}:")
+                file.write(f"{separator}{compact_json(item.id)}:")
                 _write_object(file, item, shapes, self.trace)
-                before = ",\n"
+                separator = ",\n"
             file.write('},\n"vertices":[')
-            for first in range(0, len(vertices), _LINE):
-                file.write("," * bool(first) + "\n" + compact_json(vertices[first : first + _LINE].tolist())[1:-1])
+            for begin in range(0, len(vertices), _LINE):
+                file.write("," * bool(begin) + "\n" + compact_json(vertices[begin : begin + _LINE].tolist())[1:-1])
             file.write("]")
             if self._templates:
                 file.write(',\n"geometry-templates":')
@@ -147,32 +156,33 @@ class CityModel:
 
     def _merge_vertices(self) -> Int:
         """Merge equal vertices in place, drop collapsed polygons and unused vertices; return the vertices (V, 3)."""
-        raw = np.concatenate(self._vertices) if self._vertices else np.empty((0, 3), np.int64)
+        vertices = np.concatenate(self._vertices) if self._vertices else np.empty((0, 3), np.int64)
         self._vertices = []
-        same = _first_equal(raw)
-        used = np.zeros(len(raw), dtype=bool)
-        for shell, closed, solid in self._shells():
-            corners = same[shell.corners]
-            if closed:
+        canonical = _first_equal(vertices)
+        is_used = np.zeros(len(vertices), dtype=bool)
+        for shell, has_rings, is_solid in self._shells():
+            corners = canonical[shell.corners]
+            if has_rings:
                 shell.corners, shell.sizes, shell.kept = drop_collapsed(corners, shell.sizes)
-                if not solid:
-                    _drop_slivers(shell, raw)
+                if not is_solid:
+                    _drop_slivers(shell, vertices)
             else:
                 shell.corners, shell.kept = corners, np.ones(len(shell.sizes), dtype=bool)
-            used[shell.corners] = True
-        number = np.cumsum(used) - 1
+            is_used[shell.corners] = True
+        new_index = np.cumsum(is_used) - 1
         for shell, _, _ in self._shells():
-            shell.corners = number[shell.corners]
-        return raw[used]
+            shell.corners = new_index[shell.corners]
+        return vertices[is_used]
 
     def _shells(self) -> Iterator[tuple[_Shell, bool, bool]]:
         """Yield every shell with whether its corners are rings of polygons, not points or lines, and bound a body."""
         for item, shapes in self._objects:
             for shape, shells in zip(item.geometry, shapes, strict=True):
-                solid = "Solid" in shape.type
-                yield from ((shell, "Surface" in shape.type or solid, solid) for shell in shells)
+                is_solid = "Solid" in shape.type
+                yield from ((shell, "Surface" in shape.type or is_solid, is_solid) for shell in shells)
 
     def _extent(self, vertices: Int) -> list[float]:
+        """Return the bounding box of quantized vertices (V, 3) in map coordinates: three minima, three maxima, m."""
         ends = [vertices.min(axis=0), vertices.max(axis=0)] if len(vertices) else [np.zeros(3), np.zeros(3)]
         return [round(float(v) * SCALE + t, 4) for end in ends for v, t in zip(end, self.translate, strict=True)]
 
@@ -180,49 +190,50 @@ class CityModel:
 def _drop_slivers(shell: _Shell, vertices: Int) -> None:
     """Drop a surface's polygons smaller than `SLIVER`, in place: no reader can tell which way they look."""
     areas = polygon_areas(vertices * SCALE, shell.corners, shell.sizes)
-    large = areas >= SLIVER
-    if not large.all():
-        shell.corners, shell.sizes = drop_polygons(shell.corners, shell.sizes, large)
-        kept = shell.kept.copy()
-        kept[shell.kept] = large
-        shell.kept = kept
+    keep_mask = areas >= SLIVER
+    if not keep_mask.all():
+        shell.corners, shell.sizes = drop_polygons(shell.corners, shell.sizes, keep_mask)
+        kept_of_all = shell.kept.copy()
+        kept_of_all[shell.kept] = keep_mask
+        shell.kept = kept_of_all
 
 
 def _first_equal(vertices: Int) -> Int:
     """Return for each vertex (V, 3) the index (V,) of the first vertex equal to it."""
     order = np.lexsort((np.arange(len(vertices)), vertices[:, 2], vertices[:, 1], vertices[:, 0]))
-    ordered = vertices[order]
-    new = np.ones(len(vertices), dtype=bool)
-    new[1:] = np.any(ordered[1:] != ordered[:-1], axis=1)
-    same = np.empty(len(vertices), dtype=np.int64)
-    same[order] = order[new][np.cumsum(new) - 1]
-    return same
+    sorted_vertices = vertices[order]
+    starts_run = np.ones(len(vertices), dtype=bool)
+    starts_run[1:] = np.any(sorted_vertices[1:] != sorted_vertices[:-1], axis=1)
+    first_index = np.empty(len(vertices), dtype=np.int64)
+    first_index[order] = order[starts_run][np.cumsum(starts_run) - 1]
+    return first_index
 
 
 # --- text -------------------------------------------------------------------------------------------------------
 
 
 def _write_object(file: TextIO, item: CityObject, shapes: list[list[_Shell]], trace: Trace) -> None:
-    head: dict[str, Any] = {"type": item.type, "attributes": item.attributes}
+    """Write a city object as JSON without its id, and record the object and its semantic surfaces in the trace."""
+    members: dict[str, Any] = {"type": item.type, "attributes": item.attributes}
     if item.parent:
-        head["parents"] = [item.parent]
+        members["parents"] = [item.parent]
     if item.children or item.type == "CityObjectGroup":  # a group must say its members, also where it has none
-        head["children"] = list(item.children)
-    there = [
+        members["children"] = list(item.children)
+    nonempty = [
         (shape, shells)
         for shape, shells in zip(item.geometry, shapes, strict=True)
         if any(len(shell.sizes) for shell in shells)
     ]
     trace.record_entity(item.attributes["instance"], object=item.id)
-    if not there:
-        file.write(compact_json(head))
+    if not nonempty:
+        file.write(compact_json(members))
         return
-    file.write(compact_json(head)[:-1] + ',"geometry":[')
-    for number, (shape, shells) in enumerate(there):
+    file.write(compact_json(members)[:-1] + ',"geometry":[')
+    for number, (shape, shells) in enumerate(nonempty):
         file.write("," * bool(number))
         surfaces = _write_geometry(file, shape, [shell for shell in shells if len(shell.sizes)])
-        for index, about in enumerate(surfaces):
-            trace.record_entity(about["instance"], object=item.id, surface=index)
+        for index, surface in enumerate(surfaces):
+            trace.record_entity(surface["instance"], object=item.id, surface=index)
     file.write("]}")
 
 
@@ -246,18 +257,19 @@ def _write_geometry(file: TextIO, shape: CityGeometry, shells: list[_Shell]) -> 
         _write_many(file, shells[0], shape.type != "MultiLineString")
     if shape.values is not None:
         values = shape.values[shells[0].kept]
-        used, numbers = np.unique(values, return_inverse=True)
-        surfaces = [shape.semantics[index] for index in used.tolist()]
+        used_indices, numbers = np.unique(values, return_inverse=True)
+        surfaces = [shape.semantics[index] for index in used_indices.tolist()]
         file.write(',"semantics":' + compact_json({"surfaces": surfaces, "values": numbers.tolist()}))
     file.write("}")
     return surfaces
 
 
 def _write_instance(file: TextIO, shape: CityGeometry, shell: _Shell) -> None:
+    """Write a GeometryInstance as JSON: its template, the vertex at its foot, and a 4 x 4 scaling matrix by rows."""
     x, y, z = (round(factor, 6) for factor in shape.scale)
     matrix = [x, 0, 0, 0, 0, y, 0, 0, 0, 0, z, 0, 0, 0, 0, 1]
-    about = {"type": shape.type, "template": shape.template, "boundaries": shell.corners.tolist()}
-    file.write(compact_json(about | {"transformationMatrix": matrix}))
+    members = {"type": shape.type, "template": shape.template, "boundaries": shell.corners.tolist()}
+    file.write(compact_json(members | {"transformationMatrix": matrix}))
 
 
 def _write_templates(file: TextIO, shapes: Sequence[CityGeometry]) -> None:
@@ -274,29 +286,33 @@ def _write_templates(file: TextIO, shapes: Sequence[CityGeometry]) -> None:
     file.write('],"vertices-templates":' + compact_json(vertices) + "}")
 
 
-def _write_many(file: TextIO, shell: _Shell, surfaces: bool) -> None:
+def _write_many(file: TextIO, shell: _Shell, as_polygons: bool) -> None:
     """Write the rings of polygons, or lines, as JSON in blocks of `_LINE`, to save memory."""
     file.write("[")
-    for first in range(0, len(shell.sizes), _LINE):
-        text = compact_json(_rings(shell, first, first + _LINE, surfaces))[1:-1]
-        file.write("," * bool(first) + text)
+    for begin in range(0, len(shell.sizes), _LINE):
+        text = compact_json(_rings(shell, begin, begin + _LINE, as_polygons))[1:-1]
+        file.write("," * bool(begin) + text)
     file.write("]")
 
 
-def _rings(shell: _Shell, first: int, last: int, surfaces: bool) -> list[Any]:
-    sizes = shell.sizes[first:last]
-    start = int(shell.sizes[:first].sum())
+def _rings(shell: _Shell, begin: int, end: int, as_polygons: bool) -> list[Any]:
+    """Return polygons number `begin` to `end` - 1 as CityJSON boundaries: a list of vertex indices for each ring.
+
+    With `as_polygons` every ring is in a list of its own, as the exterior ring of a polygon without holes.
+    """
+    sizes = shell.sizes[begin:end]
+    start = int(shell.sizes[:begin].sum())
     ends = (start + np.cumsum(sizes)).tolist()
     corners = shell.corners[start : ends[-1] if ends else start].tolist()
     rings = [corners[a - start : b - start] for a, b in zip([start, *ends[:-1]], ends, strict=True)]
-    return [[ring] for ring in rings] if surfaces else rings
+    return [[ring] for ring in rings] if as_polygons else rings
 
 
-def line_faces(points: Iterable[Float]) -> Faces:
+def line_faces(polylines: Iterable[Float]) -> Faces:
     """Return polylines, (K, 3) points each, as the single part of a MultiLineString."""
-    listed = list(points)
-    sizes = np.array([len(line) for line in listed], dtype=np.int64)
-    return Faces(np.concatenate(listed), np.arange(int(sizes.sum())), sizes)
+    lines = list(polylines)
+    sizes = np.array([len(line) for line in lines], dtype=np.int64)
+    return Faces(np.concatenate(lines), np.arange(int(sizes.sum())), sizes)
 
 
 def solid_geometry(bodies: Iterable[Faces], lod: str) -> tuple[CityGeometry, ...]:

@@ -52,8 +52,8 @@ def road_objects(geometry: RoadGeometry, stations: Float, tolerance: float) -> I
         tolerance: chord error within damage, m.
     """
     parameters = geometry.parameters
-    plan = geometry.alignment.position(stations)
-    axis = line_faces([np.column_stack([plan, geometry.profile.elevation(stations)])])
+    xy = geometry.alignment.position(stations)
+    axis = line_faces([np.column_stack([xy, geometry.profile.elevation(stations)])])
     name = next(name for name, item in parameters.objects.items() if item is parameters.alignment)
     attributes = attributes_of(parameters.alignment) | {
         "class": "motorway",
@@ -69,6 +69,7 @@ def road_objects(geometry: RoadGeometry, stations: Float, tolerance: float) -> I
 
 
 def _road(geometry: RoadGeometry, name: str, item: RoadObject, surfaces: list[Surface]) -> CityObject:
+    """Return the CityJSON Road of a carriageway, median or turnout, with its semantic surfaces as one MultiSurface."""
     function = {Carriageway: "carriageway", Median: "median"}.get(type(item), "turnout")
     if isinstance(item, Turnout):
         function = item.kind.replace("_", " ")
@@ -79,10 +80,10 @@ def _road(geometry: RoadGeometry, name: str, item: RoadObject, surfaces: list[Su
             attributes["rut_instances"] = dict(geometry.numbers.part(name, number) for number in range(len(ruts)))
     if not surfaces:
         return CityObject(name, "Road", attributes)
-    faces = [part for _, part in surfaces]
-    values = np.repeat(np.arange(len(surfaces)), [len(part) for part in faces])
-    semantics = tuple(about for about, _ in surfaces)
-    shape = CityGeometry("MultiSurface", LOD, (join_faces(faces),), semantics, values)
+    faces_of_surfaces = [surface_faces for _, surface_faces in surfaces]
+    values = np.repeat(np.arange(len(surfaces)), [len(surface_faces) for surface_faces in faces_of_surfaces])
+    semantics = tuple(attributes_of_surface for attributes_of_surface, _ in surfaces)
+    shape = CityGeometry("MultiSurface", LOD, (join_faces(faces_of_surfaces),), semantics, values)
     return CityObject(name, "Road", attributes, (shape,))
 
 
@@ -99,17 +100,21 @@ def _surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> dict
         surfaces = by_road.setdefault(carriageway.instance, [])
         for number, pothole in enumerate(carriageway.pavement.potholes, len(carriageway.pavement.ruts)):
             part, instance = geometry.numbers.part(name, number)
-            about = {"type": "TransportationHole", "function": "pothole", "id": part, "instance": instance}
-            about |= pothole.model_dump()
-            surfaces.append((about, pothole_surface(geometry, pothole, tolerance)))
+            semantics = {"type": "TransportationHole", "function": "pothole", "id": part, "instance": instance}
+            semantics |= pothole.model_dump()
+            surfaces.append((semantics, pothole_surface(geometry, pothole, tolerance)))
         pavement = carriageway.pavement
-        first, films = len(pavement.ruts) + len(pavement.potholes), MarkingFilms(geometry, carriageway.side)
-        laid: list[Patch | Crack | RemovedMarking] = [*pavement.patches, *pavement.cracks, *pavement.removed_markings]
-        for number, damage in enumerate(laid, first):
+        first_number, films = len(pavement.ruts) + len(pavement.potholes), MarkingFilms(geometry, carriageway.side)
+        surface_damages: list[Patch | Crack | RemovedMarking] = [
+            *pavement.patches,
+            *pavement.cracks,
+            *pavement.removed_markings,
+        ]
+        for number, damage in enumerate(surface_damages, first_number):
             part, instance = geometry.numbers.part(name, number)
-            about = {"type": "+PavementDamage", "function": _DAMAGE_FUNCTIONS[type(damage)], "id": part}
-            about |= {"instance": instance} | damage.model_dump(exclude={"outline", "lines"})
-            surfaces.append((about, damaged_surface(geometry, damage, carriageway.side, stations, films)))
+            semantics = {"type": "+PavementDamage", "function": _DAMAGE_FUNCTIONS[type(damage)], "id": part}
+            semantics |= {"instance": instance} | damage.model_dump(exclude={"outline", "lines"})
+            surfaces.append((semantics, damaged_surface(geometry, damage, carriageway.side, stations, films)))
         surfaces += _joints(geometry, name, carriageway, stations)
     return {instance: [pair for pair in pairs if len(pair[1])] for instance, pairs in by_road.items()}
 
@@ -117,16 +122,16 @@ def _surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> dict
 def _joints(geometry: RoadGeometry, name: str, carriageway: Carriageway, stations: Float) -> Iterator[Surface]:
     """Yield the semantic surfaces of a carriageway's joints, one each."""
     section, pavement = geometry.sections[carriageway.side], carriageway.pavement
-    same = {"instance": carriageway.instance, "width": joint_width(section), "depth": pavement.joint_depth}
+    shared = {"instance": carriageway.instance, "width": joint_width(section), "depth": pavement.joint_depth}
     for number, joint in enumerate(joints_of(section, stations)):
-        about = {"type": "+PavementJoint", "function": f"{joint.kind} joint", "id": f"{name}/joint-{number}"}
-        yield about | same | {"sealed": pavement.is_concrete}, joint_surface(geometry, joint, stations)
+        semantics = {"type": "+PavementJoint", "function": f"{joint.kind} joint", "id": f"{name}/joint-{number}"}
+        yield semantics | shared | {"sealed": pavement.is_concrete}, joint_surface(geometry, joint, stations)
 
 
 def _strip_semantics(geometry: RoadGeometry, surface: StripSurface) -> dict[str, Any]:
     """Return the CityJSON semantics of a strip's surface: type, function, material, lane, instance number."""
     strip = surface.strip
-    about: dict[str, Any] = {
+    semantics: dict[str, Any] = {
         "type": "TrafficArea" if strip.kind in _DRIVEN else "AuxiliaryTrafficArea",
         "function": _FUNCTIONS[strip.kind],
         "surfaceMaterial": [strip.material if strip.class_name == "road" else "grass"],
@@ -134,14 +139,14 @@ def _strip_semantics(geometry: RoadGeometry, surface: StripSurface) -> dict[str,
         "instance": surface.instance,
     }
     if strip.side:
-        about["side"] = strip.side
+        semantics["side"] = strip.side
         section = geometry.sections[strip.side]
         if surface.lane is not None:
-            about |= {"lane": surface.lane, "lane_kind": section.carriageway.lanes[surface.lane].kind}
+            semantics |= {"lane": surface.lane, "lane_kind": section.carriageway.lanes[surface.lane].kind}
         for shape in section.turnouts if strip.kind == "turnout_lane" else ():
             if shape.turnout.instance == surface.instance:
-                about["function"] = _LANES.get(shape.turnout.kind, about["function"])
-    return about
+                semantics["function"] = _LANES.get(shape.turnout.kind, semantics["function"])
+    return semantics
 
 
 def _marking(
@@ -149,13 +154,13 @@ def _marking(
 ) -> Iterator[Surface]:
     """Yield the semantic surfaces of a marking: one for each dash of a line, one for a hatching or an arrow."""
     function = "line" if isinstance(item, LineMarking) else item.type.lower()
-    about = {"type": "TransportationMarking", "function": function, "id": name, "instance": item.instance}
-    about |= {"color": item.color, "film_thickness": item.film_thickness}
+    semantics = {"type": "TransportationMarking", "function": function, "id": name, "instance": item.instance}
+    semantics |= {"color": item.color, "film_thickness": item.film_thickness}
     if not isinstance(item, LineMarking):
         kind = {"kind": item.kind} if isinstance(item, Arrow) else {}
-        yield about | kind, painted_surface(geometry, item, stations)
+        yield semantics | kind, painted_surface(geometry, item, stations)
         return
-    about |= {"kind": item.kind, "width": item.width}
+    semantics |= {"kind": item.kind, "width": item.width}
     dashes, faces, owner = dash_surfaces(geometry, item, stations)
     starts = np.cumsum(faces.sizes) - faces.sizes
     for number, (start, end) in enumerate(dashes.tolist()):
@@ -163,12 +168,18 @@ def _marking(
         dash: dict[str, Any] = {"start_station": round(start, 6), "end_station": round(end, 6)}
         if item.dash_length:
             dash["id"], dash["instance"] = geometry.numbers.part(name, number)
-        yield about | dash, _polygon_range(faces, starts, polygons)
+        yield semantics | dash, _polygon_range(faces, starts, polygons)
 
 
-def _polygon_range(faces: Faces, starts: Int, chosen: Int) -> Faces:
-    """Return a contiguous range of polygons with only the points in the range of their indices."""
-    begin, end = int(starts[chosen[0]]), int(starts[chosen[-1]] + faces.sizes[chosen[-1]])
+def _polygon_range(faces: Faces, starts: Int, polygons: Int) -> Faces:
+    """Return a contiguous range of polygons with only the points in the range of their indices.
+
+    Args:
+        faces: all polygons.
+        starts: (F,) index of each polygon's first corner in ``faces.corners``.
+        polygons: the consecutive numbers of the wanted polygons.
+    """
+    begin, end = int(starts[polygons[0]]), int(starts[polygons[-1]] + faces.sizes[polygons[-1]])
     corners = faces.corners[begin:end]
-    low, high = int(corners.min()), int(corners.max()) + 1
-    return Faces(faces.points[low:high], corners - low, faces.sizes[chosen])
+    first_point, end_point = int(corners.min()), int(corners.max()) + 1
+    return Faces(faces.points[first_point:end_point], corners - first_point, faces.sizes[polygons])

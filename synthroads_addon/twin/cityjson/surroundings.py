@@ -46,11 +46,15 @@ def add_surroundings(model: CityModel, geometry: RoadGeometry, stations: Float, 
 
 
 def _terrain(name: str, terrain: Terrain, ground: GroundMesh) -> CityObject:
+    """Return the terrain as a TINRelief: the triangulated ground on both sides of the road as composite surfaces.
+
+    The file rounds vertices to multiples of `SCALE`, by which the thinnest triangles can turn over. So the triangles
+    are filtered after this rounding: only those whose corners still run anticlockwise from above are written.
+    """
     attributes = attributes_of(terrain) | {"class": terrain.points_class, "deviation": round(ground.deviation, 4)}
-    # Once more after the vertices were rounded, by which the thinnest triangles turn over.
-    rounded = ((np.rint(faces.points / SCALE) * SCALE, faces.corners.reshape(-1, 3)) for faces in ground.faces)
-    upward = (upward_triangles(points, corners) for points, corners in rounded)
-    shapes = (CityGeometry("CompositeSurface", _GROUND, (faces,)) for faces in upward if len(faces))
+    quantized = ((np.rint(faces.points / SCALE) * SCALE, faces.corners.reshape(-1, 3)) for faces in ground.faces)
+    faces_from_above = (upward_triangles(points, corners) for points, corners in quantized)
+    shapes = (CityGeometry("CompositeSurface", _GROUND, (faces,)) for faces in faces_from_above if len(faces))
     return CityObject(name, "TINRelief", attributes, tuple(shapes))
 
 
@@ -82,7 +86,8 @@ _SHAPE = "a plant is its trunk and its crown's outline, upright, without branche
 
 
 def _plant(model: CityModel, plant: PlacedPlant) -> CityObject:
-    key = plant.about.kind, plant.about.species, plant.variant
+    """Return a plant as a scaled instance of its species' template, standing at its foot."""
+    key = plant.vegetation.kind, plant.vegetation.species, plant.variant
     template = model.template_index(key, partial(_plant_template, plant.shape))
     foot = Faces(plant.foot[None], np.zeros(1, np.int64), np.ones(1, np.int64))
     shape = CityGeometry("GeometryInstance", _PLANTS, (foot,), template=template, scale=plant.scale)
@@ -90,11 +95,13 @@ def _plant(model: CityModel, plant: PlacedPlant) -> CityObject:
 
 
 def _plant_template(shape: PlantShape) -> CityGeometry:
+    """Return trunk and crown of a plant of height 1 as closed bodies, for a geometry template."""
     bodies = [loft(sections) for sections in (shape.trunk(), shape.crown()) if sections is not None]
     return solid_geometry(bodies, _PLANTS)[0]
 
 
 def _vehicles(geometry: RoadGeometry, model: CityModel) -> Iterator[CityObject]:
+    """Yield every vehicle at time 0 as its bounding box, and record the loss of detail in the model's trace."""
     for placed in placed_vehicles(geometry):
         model.trace.record_box(placed)
         attributes: dict[str, Any] = attributes_of(placed.vehicle) | {"class": placed.vehicle.points_class}

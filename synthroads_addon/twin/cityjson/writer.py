@@ -41,12 +41,12 @@ def write_cityjson(parameters: RoadParameters, path: Path, tolerance: float) -> 
     for item in furniture_objects(geometry, tolerance, trace):
         model.add(item)
     add_surroundings(model, geometry, stations, tolerance)
-    about = parameters.metadata
-    metadata = {"identifier": about.identifier, "referenceSystem": EPSG_URI.format(about.code)}
-    if about.heightReferenceSystem:
-        metadata["heightReferenceSystem"] = about.heightReferenceSystem
-    if about.title:
-        metadata["title"] = about.title
+    road_metadata = parameters.metadata
+    metadata = {"identifier": road_metadata.identifier, "referenceSystem": EPSG_URI.format(road_metadata.code)}
+    if road_metadata.heightReferenceSystem:
+        metadata["heightReferenceSystem"] = road_metadata.heightReferenceSystem
+    if road_metadata.title:
+        metadata["title"] = road_metadata.title
     model.write(path, metadata)
     return trace
 
@@ -74,9 +74,11 @@ def furniture_objects(geometry: RoadGeometry, tolerance: float, trace: Trace) ->
         names = {part: f"{placed.name}/{part}" for part in parts}
         yield CityObject(placed.name, types.cityjson, attributes, children=tuple(names.values()))
         for part, faces in parts.items():
-            about = {"instance": placed.thing.instance, "class": placed.thing.semantic_class}
-            about |= {"function": part.rstrip("-0123456789")}
-            yield CityObject(names[part], types.cityjson_part, about, solid_geometry(faces, _LOD), parent=placed.name)
+            part_attributes = {"instance": placed.thing.instance, "class": placed.thing.semantic_class}
+            part_attributes |= {"function": part.rstrip("-0123456789")}
+            yield CityObject(
+                names[part], types.cityjson_part, part_attributes, solid_geometry(faces, _LOD), parent=placed.name
+            )
 
 
 def _faces_of_parts(placed: PlacedThing) -> dict[str, list[Faces]]:

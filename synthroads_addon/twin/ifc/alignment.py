@@ -83,34 +83,40 @@ def plan_segments(alignment: Alignment) -> list[PlanSegment]:
     position, heading, _ = alignment.frame(starts)
     segments = []
     for element, (x, y), angle in zip(alignment.elements, position.tolist(), heading.tolist(), strict=True):
-        kind, mean = element.kind, element.mean_curvature
-        first, last = (element.curvature_start, element.curvature_end) if kind == "clothoid" else (mean, mean)
-        first, last = (0.0 if kind == "line" or abs(k) < _STRAIGHT else k for k in (first, last))
-        name = _HORIZONTAL[kind] if first or last else "LINE"
-        segments.append(PlanSegment(name, x, y, angle, element.length, first, last))
+        kind, mean_curvature = element.kind, element.mean_curvature
+        start_curvature, end_curvature = (
+            (element.curvature_start, element.curvature_end) if kind == "clothoid" else (mean_curvature, mean_curvature)
+        )
+        start_curvature, end_curvature = (
+            0.0 if kind == "line" or abs(k) < _STRAIGHT else k for k in (start_curvature, end_curvature)
+        )
+        name = _HORIZONTAL[kind] if start_curvature or end_curvature else "LINE"
+        segments.append(PlanSegment(name, x, y, angle, element.length, start_curvature, end_curvature))
     return segments
 
 
 def profile_segments(profile: Profile, length: float) -> list[ProfileSegment]:
     """Return the profile's segments of constant curvature from station 0 to the road's length."""
-    inside = profile.breakpoints[(profile.breakpoints > _SHORTEST) & (profile.breakpoints < length - _SHORTEST)]
-    borders = np.concatenate([[0.0], inside, [length]])
-    keep = np.append(np.diff(borders) > _SHORTEST, True)
-    borders = borders[keep]
-    middle = (borders[:-1] + borders[1:]) / 2.0
-    half, curvature = np.diff(borders) / 2.0, np.asarray(profile.curvature(middle))
-    grade = profile.grade(middle) - curvature * half
-    height = profile.elevation(middle) - half * (grade + 0.5 * curvature * half)
-    rows = np.column_stack([borders[:-1], 2.0 * half, height, grade, curvature]).tolist()
+    inner_breakpoints = profile.breakpoints[
+        (profile.breakpoints > _SHORTEST) & (profile.breakpoints < length - _SHORTEST)
+    ]
+    stations = np.concatenate([[0.0], inner_breakpoints, [length]])
+    keep_mask = np.append(np.diff(stations) > _SHORTEST, True)
+    stations = stations[keep_mask]
+    middle = (stations[:-1] + stations[1:]) / 2.0
+    half_length, curvature = np.diff(stations) / 2.0, np.asarray(profile.curvature(middle))
+    grade = profile.grade(middle) - curvature * half_length
+    height = profile.elevation(middle) - half_length * (grade + 0.5 * curvature * half_length)
+    rows = np.column_stack([stations[:-1], 2.0 * half_length, height, grade, curvature]).tolist()
     return [ProfileSegment(*row) for row in rows]
 
 
 def write_alignment(ifc: IfcFile, geometry: RoadGeometry) -> Axis:
     """Add the IfcAlignment with its layouts, curves and referents to the file; return it with its plan curve."""
     name, item = next((n, o) for n, o in geometry.parameters.objects.items() if o is geometry.parameters.alignment)
-    plan, gradient = _Plan(ifc, name), _Profile(ifc, name)
-    plan_curve = plan.write(geometry.alignment)
-    gradient_curve = gradient.write(geometry.profile, geometry.length, plan_curve)
+    horizontal, vertical = _Plan(ifc, name), _Profile(ifc, name)
+    plan_curve = horizontal.write(geometry.alignment)
+    gradient_curve = vertical.write(geometry.profile, geometry.length, plan_curve)
     shapes = [
         ifc.add("IfcShapeRepresentation", ifc.contexts["Axis"], "FootPrint", "Curve2D", [plan_curve]),
         ifc.add("IfcShapeRepresentation", ifc.contexts["Axis"], "Axis", "Curve3D", [gradient_curve]),
@@ -123,7 +129,7 @@ def write_alignment(ifc: IfcFile, geometry: RoadGeometry) -> Axis:
         Representation=ifc.add("IfcProductDefinitionShape", None, None, shapes),
     )
     ifc.note_relation("IfcRelAggregates", ifc.project, [alignment])
-    ifc.note_relation("IfcRelNests", alignment, [plan.layout, gradient.layout])
+    ifc.note_relation("IfcRelNests", alignment, [horizontal.layout, vertical.layout])
     values = {key: value for key, value in ifc.parameters_of(item).items() if key not in ("horizontal", "vertical")}
     ifc.add_properties(alignment, "SynthRoads", values | {"length": ifc.value(geometry.length, "m")})
     axis = Axis(alignment, plan_curve)
@@ -167,6 +173,8 @@ class _Layout:
 
 
 class _Plan(_Layout):
+    """Writer of the horizontal layout: lines, circular arcs and clothoids."""
+
     entity = "IfcAlignmentHorizontal"
 
     def write(self, alignment: Alignment) -> Entity:
@@ -180,6 +188,7 @@ class _Plan(_Layout):
         return self.ifc.add("IfcCompositeCurve", self.curves, False)
 
     def _write(self, number: int, segment: PlanSegment, transition: str) -> None:
+        """Add a horizontal segment: its design parameters and its piece of a line, circle or spiral."""
         ifc = self.ifc
         angle = rounded(math.remainder(segment.heading, 2.0 * math.pi), 12)
         radii = [1.0 / k if k else 0.0 for k in (segment.start_curvature, segment.end_curvature)]
@@ -198,36 +207,48 @@ class _Plan(_Layout):
 
     def _parent(self, segment: PlanSegment) -> tuple[Entity, float, float]:
         """Return a segment's parent curve, and the start and length of the piece along it, m."""
-        ifc, first, length = self.ifc, segment.start_curvature, segment.length
+        ifc, start_curvature, length = self.ifc, segment.start_curvature, segment.length
         if segment.kind == "LINE":
             return self.line, 0.0, length
         axes = ifc.axes_2d(0.0, 0.0, 0.0)
         if segment.kind == "CIRCULARARC":
-            return ifc.add("IfcCircle", axes, 1.0 / abs(first)), 0.0, math.copysign(length, first)
-        # From curvature 0 on: k(s) = s / (A |A|).
-        change = segment.end_curvature - first
-        constant = math.copysign(math.sqrt(length / abs(change)), change)
-        start = first * length / change
-        if abs(first * start) / 2.0 > _FAR_OUT:
-            return ifc.add("IfcSecondOrderPolynomialSpiral", axes, _NO_QUADRATIC, constant, 1.0 / first), 0.0, length
-        return ifc.add("IfcClothoid", axes, constant), start, length
+            return ifc.add("IfcCircle", axes, 1.0 / abs(start_curvature)), 0.0, math.copysign(length, start_curvature)
+        # IfcClothoid: curvature k(s) = s / (A |A|) at arc length s from the point of curvature 0. So |A| is the root of
+        # length over change of curvature, and the piece starts where the spiral's curvature is the segment's first.
+        curvature_change = segment.end_curvature - start_curvature
+        clothoid_constant = math.copysign(math.sqrt(length / abs(curvature_change)), curvature_change)
+        start_along_spiral = start_curvature * length / curvature_change
+        if abs(start_curvature * start_along_spiral) / 2.0 > _FAR_OUT:
+            return (
+                ifc.add(
+                    "IfcSecondOrderPolynomialSpiral", axes, _NO_QUADRATIC, clothoid_constant, 1.0 / start_curvature
+                ),
+                0.0,
+                length,
+            )
+        return ifc.add("IfcClothoid", axes, clothoid_constant), start_along_spiral, length
 
 
 class _Profile(_Layout):
+    """Writer of the vertical layout: constant grades and parabolas."""
+
     entity = "IfcAlignmentVertical"
 
     def write(self, profile: Profile, length: float, plan: Entity) -> Entity:
         """Add all vertical segments; return the IfcGradientCurve over the plan curve."""
         segments = profile_segments(profile, length)
-        last = segments[-1]
-        grade = last.grade + last.curvature * last.length
-        height = last.height + last.length * (last.grade + 0.5 * last.curvature * last.length)
+        last_segment = segments[-1]
+        grade = last_segment.grade + last_segment.curvature * last_segment.length
+        height = last_segment.height + last_segment.length * (
+            last_segment.grade + 0.5 * last_segment.curvature * last_segment.length
+        )
         segments.append(ProfileSegment(length, 0.0, height, grade, 0.0))
         for number, segment in enumerate(segments):
             self._write(number, segment, _profile_transition(*segments[number : number + 2]))
         return self.ifc.add("IfcGradientCurve", self.curves, False, plan, None)
 
     def _write(self, number: int, segment: ProfileSegment, transition: str) -> None:
+        """Add a vertical segment: its design parameters and its piece of a line or parabola over the plan."""
         ifc, curvature, grade, length = self.ifc, segment.curvature, segment.grade, segment.length
         design = ifc.add(
             "IfcAlignmentVerticalSegment",
@@ -239,10 +260,10 @@ class _Profile(_Layout):
             RadiusOfCurvature=1.0 / curvature if curvature else None,
             PredefinedType="PARABOLICARC" if curvature else "CONSTANTGRADIENT",
         )
-        place = ifc.add("IfcCartesianPoint", rounded([segment.station, segment.height], 9))
+        start = ifc.add("IfcCartesianPoint", rounded([segment.station, segment.height], 9))
         slope = ifc.direction(1.0 / math.hypot(1.0, grade), grade / math.hypot(1.0, grade))
-        placement = ifc.add("IfcAxis2Placement2D", place, slope)
-        along = _slope_length(grade, curvature, length)
+        placement = ifc.add("IfcAxis2Placement2D", start, slope)
+        slope_length = _slope_length(grade, curvature, length)
         parent = self.line
         if curvature:
             parent = ifc.add(
@@ -251,31 +272,31 @@ class _Profile(_Layout):
                 CoefficientsX=[0.0, 1.0],
                 CoefficientsY=[rounded(segment.height, 9), grade, curvature / 2.0],
             )
-        self.segment(number, design, self.curve(placement, (parent, 0.0, along), transition))
+        self.segment(number, design, self.curve(placement, (parent, 0.0, slope_length), transition))
 
 
-def _plan_transition(segment: PlanSegment, after: PlanSegment | None = None) -> str:
+def _plan_transition(segment: PlanSegment, next_segment: PlanSegment | None = None) -> str:
     """Return the IfcTransitionCode from a plan segment to the next; DISCONTINUOUS if there is none."""
-    if after is None:
+    if next_segment is None:
         return "DISCONTINUOUS"
-    same = segment.end_curvature == after.start_curvature
-    return "CONTSAMEGRADIENTSAMECURVATURE" if same else "CONTSAMEGRADIENT"
+    same_curvature = segment.end_curvature == next_segment.start_curvature
+    return "CONTSAMEGRADIENTSAMECURVATURE" if same_curvature else "CONTSAMEGRADIENT"
 
 
-def _profile_transition(segment: ProfileSegment, after: ProfileSegment | None = None) -> str:
+def _profile_transition(segment: ProfileSegment, next_segment: ProfileSegment | None = None) -> str:
     """Return the IfcTransitionCode from a profile segment to the next; CONTINUOUS where the grade jumps."""
-    if after is None:
+    if next_segment is None:
         return "DISCONTINUOUS"
     grade = segment.grade + segment.curvature * segment.length
-    if abs(grade - after.grade) > _SAME_GRADE:
+    if abs(grade - next_segment.grade) > _SAME_GRADE:
         return "CONTINUOUS"
-    return "CONTSAMEGRADIENTSAMECURVATURE" if segment.curvature == after.curvature else "CONTSAMEGRADIENT"
+    return "CONTSAMEGRADIENTSAMECURVATURE" if segment.curvature == next_segment.curvature else "CONTSAMEGRADIENT"
 
 
 def _slope_length(grade: float, curvature: float, length: float) -> float:
     """Return the arc length of a parabola or grade over a horizontal length, m, by Gauss-Legendre quadrature."""
-    at = (_NODES + 1.0) / 2.0 * length
-    return float(np.sqrt(1.0 + (grade + curvature * at) ** 2) @ _WEIGHTS * length / 2.0)
+    distances = (_NODES + 1.0) / 2.0 * length
+    return float(np.sqrt(1.0 + (grade + curvature * distances) ** 2) @ _WEIGHTS * length / 2.0)
 
 
 # --- referents ------------------------------------------------------------------------------------------------------
@@ -294,25 +315,27 @@ class _Referent:
 
 def _write_referents(ifc: IfcFile, geometry: RoadGeometry, axis: Axis) -> None:
     """Nest IfcReferents in the alignment by station: its start, crossfall points and width changes."""
-    count = geometry.parameters.alignment
-    begin = {"Station": ifc.add("IfcLengthMeasure", rounded(count.counted(0.0)))}
-    referents = [_Referent(0.0, "station-0", "STATION", "Pset_Stationing", begin)]
-    for number, equation in enumerate(count.equations):
-        back = count.counted(float(np.nextafter(equation.station, -np.inf)))
-        values = {"IncomingStation": back, "Station": equation.ahead}
+    stationing = geometry.parameters.alignment
+    start_values = {"Station": ifc.add("IfcLengthMeasure", rounded(stationing.counted(0.0)))}
+    referents = [_Referent(0.0, "station-0", "STATION", "Pset_Stationing", start_values)]
+    for number, equation in enumerate(stationing.equations):
+        incoming = stationing.counted(float(np.nextafter(equation.station, -np.inf)))
+        values = {"IncomingStation": incoming, "Station": equation.ahead}
         measures = {key: ifc.add("IfcLengthMeasure", rounded(value)) for key, value in values.items()}
         referents.append(_Referent(equation.station, f"equation-{number}", "STATION", "Pset_Stationing", measures))
     for name, carriageway in geometry.parameters.of_type(Carriageway).items():
         referents += _superelevation(ifc, name, carriageway)
         referents += _widths(ifc, geometry, name, carriageway)
     # What lies before or behind the road isn't on the curve.
-    inside = [item for item in referents if 0.0 <= item.station <= geometry.length]
-    for item in sorted(inside, key=lambda item: item.station):
-        named = {"Name": item.name, "ObjectPlacement": linear_placement(ifc, geometry, axis, item.station)}
-        referent = ifc.add_root("IfcReferent", item.name, **named, PredefinedType=item.kind)
+    on_road = [item for item in referents if 0.0 <= item.station <= geometry.length]
+    for item in sorted(on_road, key=lambda item: item.station):
+        attributes = {"Name": item.name, "ObjectPlacement": linear_placement(ifc, geometry, axis, item.station)}
+        referent = ifc.add_root("IfcReferent", item.name, **attributes, PredefinedType=item.kind)
         ifc.add_properties(referent, item.properties, item.values)
         if item.kind != "STATION":
-            ifc.add_properties(referent, "Pset_Stationing", {"Station": ifc.value(count.counted(item.station), "m")})
+            ifc.add_properties(
+                referent, "Pset_Stationing", {"Station": ifc.value(stationing.counted(item.station), "m")}
+            )
         ifc.note_relation("IfcRelNests", axis.alignment, [referent], "referents")
 
 
@@ -361,14 +384,14 @@ def linear_placement(
     angle = float(heading[0])
     z = float(geometry.profile.elevation(station)) if height is None else height
     x, y = (position[0] + offset * np.array([-math.sin(angle), math.cos(angle)])).tolist()
-    place = ifc.add(
+    point = ifc.add(
         "IfcPointByDistanceExpression",
         DistanceAlong=ifc.length_measure(station),
         OffsetLateral=rounded(offset, 9),
         OffsetVertical=rounded(z),
         BasisCurve=axis.plan,
     )
-    relative = ifc.add("IfcAxis2PlacementLinear", place, ifc.direction(0.0, 0.0, 1.0), None)
+    relative = ifc.add("IfcAxis2PlacementLinear", point, ifc.direction(0.0, 0.0, 1.0), None)
     return ifc.add("IfcLinearPlacement", None, relative, ifc.axes_3d((x, y, z), angle))
 
 

@@ -81,9 +81,9 @@ class IfcFile:
 
     # --- entities -------------------------------------------------------------------------------------------------
 
-    def add(self, entity: str, *values: Any, **named: Any) -> Entity:
+    def add(self, entity: str, *values: Any, **attributes: Any) -> Entity:
         """Add an entity of an IFC class with attributes by position or name, and return it."""
-        return self.file.create_entity(entity, *values, **named)
+        return self.file.create_entity(entity, *values, **attributes)
 
     def has_type(self, entity: str, kind: str) -> bool:
         """Return whether the schema has a concrete element or bridge class with this predefined type."""
@@ -91,10 +91,10 @@ class IfcFile:
             declaration = self._schema.declaration_by_name(entity)
         except RuntimeError:
             return False
-        classes, above = [], declaration
-        while above:
-            classes.append(above.name())
-            above = above.supertype()
+        classes, ancestor = [], declaration
+        while ancestor:
+            classes.append(ancestor.name())
+            ancestor = ancestor.supertype()
         if declaration.is_abstract() or not {"IfcElement", "IfcBridge"}.intersection(classes):
             return False
         for attribute in declaration.all_attributes():
@@ -108,26 +108,37 @@ class IfcFile:
             raise ValueError(f"two objects have the key {key!r}")
         self._keys.add(key)
         digest = hashlib.sha256(f"{self._namespace}\n{key}".encode()).digest()[:16]
-        # The bits that mark a UUID made of a name (RFC 9562, version 8: by a hash of one's own choice).
-        marked = bytearray(digest)
-        marked[6] = marked[6] & 0x0F | 0x80
-        marked[8] = marked[8] & 0x3F | 0x80
-        return str(self._compress(bytes(marked).hex()))
+        # The version and variant bits of a UUID by a hash of the application's choice (RFC 9562, version 8).
+        uuid_bytes = bytearray(digest)
+        uuid_bytes[6] = uuid_bytes[6] & 0x0F | 0x80
+        uuid_bytes[8] = uuid_bytes[8] & 0x3F | 0x80
+        return str(self._compress(bytes(uuid_bytes).hex()))
 
-    def add_root(self, entity: str, key: str, **named: Any) -> Entity:
+    def add_root(self, entity: str, key: str, **attributes: Any) -> Entity:
         """Add and return an entity with a GlobalId, which is hashed from its class and key."""
-        return self.add(entity, GlobalId=self.guid(f"{entity}/{key}"), **named)
+        return self.add(entity, GlobalId=self.guid(f"{entity}/{key}"), **attributes)
 
     def add_product(
-        self, entity: str, name: str, kind: str, about: str | None = None, placement: Entity = None, **named: Any
+        self,
+        entity: str,
+        name: str,
+        kind: str,
+        object_type: str | None = None,
+        placement: Entity = None,
+        **attributes: Any,
     ) -> Entity:
-        """Add and return an IfcProduct: `kind` is its predefined type, `about` its object type.
+        """Add and return an IfcProduct: `kind` is its predefined type, `object_type` its object type.
 
         Without a placement its coordinates are local. Its key is its name.
         """
         placement = self.local_frame if placement is None else placement
-        named = {"Name": name, "ObjectType": about, "ObjectPlacement": placement, "PredefinedType": kind} | named
-        return self.add_root(entity, name, **named)
+        attributes = {
+            "Name": name,
+            "ObjectType": object_type,
+            "ObjectPlacement": placement,
+            "PredefinedType": kind,
+        } | attributes
+        return self.add_root(entity, name, **attributes)
 
     # --- geometry -------------------------------------------------------------------------------------------------
 
@@ -168,17 +179,17 @@ class IfcFile:
             triangles: (M, 3) indices, counter-clockwise from outside or above.
             closed: whether it bounds a solid.
         """
-        places = np.round(vertices, LENGTH_DIGITS) + 0.0
-        unique, index = np.unique(places, axis=0, return_inverse=True)
-        merged = index.reshape(-1)[triangles]
-        first, second, third = merged.T
-        merged = merged[(first != second) & (second != third) & (third != first)]
-        if not len(merged):
+        rounded_vertices = np.round(vertices, LENGTH_DIGITS) + 0.0
+        unique_points, index = np.unique(rounded_vertices, axis=0, return_inverse=True)
+        corners = index.reshape(-1)[triangles]
+        a, b, c = corners.T
+        corners = corners[(a != b) & (b != c) & (c != a)]
+        if not len(corners):
             return None
-        used, numbers = np.unique(merged, return_inverse=True)
-        points = self.add("IfcCartesianPointList3D", unique[used].tolist())
-        numbered = (numbers.reshape(-1, 3) + 1).tolist()
-        return self.add("IfcTriangulatedFaceSet", Coordinates=points, Closed=closed, CoordIndex=numbered)
+        used_points, numbers = np.unique(corners, return_inverse=True)
+        points = self.add("IfcCartesianPointList3D", unique_points[used_points].tolist())
+        rows_from_1 = (numbers.reshape(-1, 3) + 1).tolist()
+        return self.add("IfcTriangulatedFaceSet", Coordinates=points, Closed=closed, CoordIndex=rows_from_1)
 
     def shape(self, items: Iterable[Entity | None], kind: str, key: object = None) -> Entity | None:
         """Add and return a product's body from items of one representation type; None if there are no items.
@@ -203,8 +214,8 @@ class IfcFile:
     def scaled_shape(self, key: object, make: Callable[[], list[Entity]], scale: tuple[float, float, float]) -> Entity:
         """Add and return a scaled copy of a mapped shape, which `make` creates once per key."""
         if key not in self._maps:
-            shared = self.add("IfcShapeRepresentation", self.contexts["Body"], "Body", "Tessellation", make())
-            self._maps[key] = self.add("IfcRepresentationMap", self.flat_axes, shared)
+            shape = self.add("IfcShapeRepresentation", self.contexts["Body"], "Body", "Tessellation", make())
+            self._maps[key] = self.add("IfcRepresentationMap", self.flat_axes, shape)
         x, y, z = rounded(scale)
         target = self.add(
             "IfcCartesianTransformationOperator3DnonUniform",
@@ -213,18 +224,18 @@ class IfcFile:
             Scale2=y,
             Scale3=z,
         )
-        mapped = self.add("IfcMappedItem", self._maps[key], target)
-        body = self.add("IfcShapeRepresentation", self.contexts["Body"], "Body", "MappedRepresentation", [mapped])
+        item = self.add("IfcMappedItem", self._maps[key], target)
+        body = self.add("IfcShapeRepresentation", self.contexts["Body"], "Body", "MappedRepresentation", [item])
         return self.add("IfcProductDefinitionShape", None, None, [body])
 
     # --- what is said of objects ----------------------------------------------------------------------------------
 
-    def note_relation(self, relation: str, of: Entity, members: Iterable[Entity], group: str = "") -> None:
+    def note_relation(self, relation: str, owner: Entity, members: Iterable[Entity], group: str = "") -> None:
         """Note members of a relation (``IfcRelAggregates``, ...) to an object; `relate` writes it at the end.
 
         Those of different groups become relations of their own.
         """
-        self._gathered.setdefault((relation, of.id(), group), (of, []))[1].extend(members)
+        self._gathered.setdefault((relation, owner.id(), group), (owner, []))[1].extend(members)
 
     def add_labels(self, item: Entity, instance: int, class_name: str, model: Model | None = None) -> None:
         """Give an entity the property set `SynthRoads`: instance number, class of its points, and a model's fields."""
@@ -243,9 +254,10 @@ class IfcFile:
         self.add_root("IfcRelDefinesByProperties", key, RelatedObjects=[item], RelatingPropertyDefinition=definition)
 
     def _property(self, name: str, value: Entity | list[str]) -> Entity:
+        """Add and return a property: an enumerated one for a list of labels, else one with a single value."""
         if isinstance(value, list):
-            chosen = [self.add("IfcLabel", label) for label in value]
-            return self.add("IfcPropertyEnumeratedValue", name, None, chosen, None)
+            labels = [self.add("IfcLabel", label) for label in value]
+            return self.add("IfcPropertyEnumeratedValue", name, None, labels, None)
         return self.add("IfcPropertySingleValue", name, None, value, None)
 
     def value(self, value: object, unit: str = "") -> Entity:
@@ -280,25 +292,25 @@ class IfcFile:
     def _material(self, name: str) -> Entity:
         """Add and return an IfcMaterial, its surface style in the table's base colour (or the unknown material's)."""
         entry = materials().get(name, materials()[UNKNOWN])
-        # Viewers take the colour as it is; linear base colours would look too dark.
+        # Viewers show the colour without converting it, so it has to be encoded for displays (gamma 2.2) here.
         red, green, blue = rounded([channel ** (1.0 / 2.2) for channel in entry.base_color], 4)
         material = self.add("IfcMaterial", Name=name)
         colour = self.add("IfcColourRgb", None, red, green, blue)
         shading = self.add("IfcSurfaceStyleShading", colour, None)
         style = self._styles[name] = self.add("IfcSurfaceStyle", name, "BOTH", [shading])
         item = self.add("IfcStyledItem", None, [style], None)
-        shown = self.add("IfcStyledRepresentation", self.contexts["Body"], "Style", "Material", [item])
-        self.add("IfcMaterialDefinitionRepresentation", None, None, [shown], material)
+        representation = self.add("IfcStyledRepresentation", self.contexts["Body"], "Style", "Material", [item])
+        self.add("IfcMaterialDefinitionRepresentation", None, None, [representation], material)
         return material
 
     # --- the end --------------------------------------------------------------------------------------------------
 
     def write_relations(self) -> None:
         """Write the gathered relations to the file, one entity each, and clear them."""
-        for (relation, _, group), (of, members) in self._gathered.items():
-            relating, related = _RELATIONS[relation]
-            key = f"{of.GlobalId if hasattr(of, 'GlobalId') else of.Name}/{group}"
-            self.add_root(relation, key, **{relating: of, related: members})
+        for (relation, _, group), (owner, members) in self._gathered.items():
+            owner_attribute, members_attribute = _RELATIONS[relation]
+            key = f"{owner.GlobalId if hasattr(owner, 'GlobalId') else owner.Name}/{group}"
+            self.add_root(relation, key, **{owner_attribute: owner, members_attribute: members})
         self._gathered.clear()
 
     def write(self, path: Path, title: str, program: str) -> None:

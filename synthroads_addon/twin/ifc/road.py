@@ -92,10 +92,10 @@ def write_carriageways(scene: Scene, progress: Progress) -> None:
 
 
 def _part(
-    scene: Scene, whole: Entity, name: str, kind: str, usage: str = "LATERAL", about: str | None = None
+    scene: Scene, whole: Entity, name: str, kind: str, usage: str = "LATERAL", object_type: str | None = None
 ) -> Entity:
     """Add and return an IfcRoadPart of the road or of one of its parts."""
-    part = scene.ifc.add_product("IfcRoadPart", name, kind, about, CompositionType="PARTIAL", UsageType=usage)
+    part = scene.ifc.add_product("IfcRoadPart", name, kind, object_type, CompositionType="PARTIAL", UsageType=usage)
     scene.ifc.note_relation("IfcRelAggregates", whole, [part])
     return part
 
@@ -149,8 +149,8 @@ class _CarriagewayWriter:
         scene.parts[f"carriageway-{carriageway.side}"] = self.part
         scene.add_parameters(self.part, carriageway)
         pieces = list(self._pieces())
-        kind = "RIGID" if carriageway.pavement.is_concrete else "FLEXIBLE"
-        self.pavement = self.ifc.add_product("IfcPavement", self.name, kind, Name=f"{self.name}/pavement")
+        pavement_type = "RIGID" if carriageway.pavement.is_concrete else "FLEXIBLE"
+        self.pavement = self.ifc.add_product("IfcPavement", self.name, pavement_type, Name=f"{self.name}/pavement")
         self.ifc.note_relation("IfcRelContainedInSpatialStructure", self.part, [self.pavement])
         self.ifc.add_labels(self.pavement, carriageway.instance, carriageway.points_class, carriageway.pavement)
         scene.parts[f"pavement-{carriageway.side}"] = self.pavement
@@ -160,6 +160,10 @@ class _CarriagewayWriter:
         self._write_joints()
 
     def _pieces(self) -> Iterator[_Piece]:
+        """Yield every strip of the carriageway as a piece of the road's length, and those of turnouts one per turnout.
+
+        Adds the turnouts' road parts first, because their pieces are aggregated by them.
+        """
         strips = [strip for strip in self.scene.geometry.strips if strip.side == self.carriageway.side]
         if self.carriageway.side == "left":
             strips = strips[::-1]
@@ -187,14 +191,18 @@ class _CarriagewayWriter:
         return part
 
     def _turnout_pieces(self, index: int, strip: SurfaceStrip, wholes: dict[int, Entity]) -> Iterator[_Piece]:
+        """Yield the pieces of one strip, each over the stations of a turnout in which the strip has any width."""
         for shape in self.section.turnouts:
             instance = shape.turnout.instance
-            low, high = _range(shape, self.scene.geometry.length)
-            if high > low and self._wide(index, self.scene.rows(low, high)):
+            start_station, end_station = _range(shape, self.scene.geometry.length)
+            if end_station > start_station and self._wide(index, self.scene.rows(start_station, end_station)):
                 name = f"{self.turnouts[instance]}/{strip.kind}"
-                yield _Piece(name, index, strip.kind, strip, wholes[instance], instance, low, high, None)
+                yield _Piece(
+                    name, index, strip.kind, strip, wholes[instance], instance, start_station, end_station, None
+                )
 
     def _wide(self, index: int, station: Float) -> bool:
+        """Return whether a strip is wider than `_NARROWEST` at any of the stations (R,)."""
         distances = self.section.distances(station)
         return bool((distances[:, index + 1] - distances[:, index] > _NARROWEST).any())
 
@@ -203,14 +211,14 @@ class _CarriagewayWriter:
         station = self.scene.rows(piece.start, piece.end)
         if not self._wide(piece.index, station):
             return
-        ifc, paved = self.ifc, piece.strip.class_name == "road"
+        ifc, is_paved = self.ifc, piece.strip.class_name == "road"
         kind = _PART_TYPES.get(piece.kind, "USERDEFINED")
-        part = _part(self.scene, piece.whole, piece.name, kind, about=piece.kind)
+        part = _part(self.scene, piece.whole, piece.name, kind, object_type=piece.kind)
         items = [ifc.mesh(*mesh, False) for mesh in self._meshes(piece, station)]
-        entity, kind = ("IfcCourse", "PAVEMENT") if paved else ("IfcEarthworksFill", "USERDEFINED")
+        entity, kind = ("IfcCourse", "PAVEMENT") if is_paved else ("IfcEarthworksFill", "USERDEFINED")
         shape = ifc.shape(items, "Tessellation")
         surface = ifc.add_product(entity, piece.name, kind, piece.kind, Representation=shape)
-        if paved:
+        if is_paved:
             ifc.note_relation("IfcRelAggregates", self.pavement, [surface])
             ifc.note_relation("IfcRelReferencedInSpatialStructure", part, [surface])
         else:
@@ -243,14 +251,14 @@ class _CarriagewayWriter:
 
     def _meshes(self, piece: _Piece, station: Float) -> Iterator[tuple[Float, NDArray[np.intp]]]:
         """Yield vertices (N, 3) and triangles (M, 3) of a strip's blocks, finer across where it is damaged."""
-        for first, last, damages in self._blocks(piece, station):
+        for first_row, last_row, damages in self._blocks(piece, station):
             shares, section = np.array([0.0, 1.0]), self.section
             if damages:
                 section = _with_damages(section, damages)
                 shares = damage_columns(section, piece.index, self.scene.tolerance)
             elif piece.index in self._damaged_strips:
                 section = self._bare
-            yield self._mesh(piece.index, station[first : last + 1], shares, section)
+            yield self._mesh(piece.index, station[first_row : last_row + 1], shares, section)
 
     def _mesh(
         self, index: int, station: Float, shares: Float, section: CarriagewaySection
@@ -259,33 +267,38 @@ class _CarriagewayWriter:
         geometry = self.scene.geometry
         inner, outer = section.distances(station)[:, index : index + 2].T
         crossfall = geometry.crossfall(self.carriageway, station)
-        low, high = section.elevations(station, crossfall)[:, index : index + 2].T
-        there = outer - inner > _POINTED
-        outer, high = np.where(there, outer, inner), np.where(there, high, low)
-        distance = inner[:, None] + (outer - inner)[:, None] * shares
-        height = geometry.profile.elevation(station)[:, None] + low[:, None] + (high - low)[:, None] * shares
-        every, offset = np.repeat(station, len(shares)), self.carriageway.sign * distance.ravel()
-        z = height.ravel() - damage_depth(section, every, offset)
-        points = np.column_stack([geometry.alignment.place(every, offset), z])
+        inner_height, outer_height = section.elevations(station, crossfall)[:, index : index + 2].T
+        is_wide = outer - inner > _POINTED
+        outer, outer_height = np.where(is_wide, outer, inner), np.where(is_wide, outer_height, inner_height)
+        distances = inner[:, None] + (outer - inner)[:, None] * shares
+        heights = (
+            geometry.profile.elevation(station)[:, None]
+            + inner_height[:, None]
+            + (outer_height - inner_height)[:, None] * shares
+        )
+        stations, offset = np.repeat(station, len(shares)), self.carriageway.sign * distances.ravel()
+        z = heights.ravel() - damage_depth(section, stations, offset)
+        points = np.column_stack([geometry.alignment.place(stations, offset), z])
         # On the left carriageway a row runs from right to left, on the right one from left to right.
-        return points, grid_triangles(len(station), len(shares), flip=self.carriageway.sign < 0)
+        return points, grid_triangles(len(station), len(shares), flipped=self.carriageway.sign < 0)
 
     def _blocks(self, piece: _Piece, station: Float) -> Iterator[tuple[int, int, list[Rut | Pothole]]]:
         """Yield (first row, last row, its ruts and potholes) of each stretch along which the same damage lies."""
         damages = self._damages if piece.index in self._damaged_strips else []
         ranges = np.array([_damage_range(damage) for damage in damages]).reshape(-1, 2)
-        # A damage lies in the cells from the first that ends behind its start to the last that begins before its end.
-        first = np.searchsorted(station[1:], ranges[:, 0], "right").tolist()
-        last = np.searchsorted(station[:-1], ranges[:, 1], "left").tolist()
-        starts, ended = defaultdict(list), defaultdict(list)
-        for number, (begin, end) in enumerate(zip(first, last, strict=True)):
-            if begin < end:
-                starts[begin].append(number)
-                ended[end].append(number)
-        here: set[int] = set()
-        for low, high in pairwise(sorted({0, len(station) - 1, *starts, *ended})):
-            here = (here - set(ended[low])) | set(starts[low])
-            yield low, high, [damages[number] for number in sorted(here)]
+        # Cell i lies between rows i and i + 1. A damage lies in the cells from the first that ends behind the damage's
+        # start to the last that begins before the damage's end.
+        first_cells = np.searchsorted(station[1:], ranges[:, 0], "right").tolist()
+        end_cells = np.searchsorted(station[:-1], ranges[:, 1], "left").tolist()
+        starts, ends = defaultdict(list), defaultdict(list)
+        for number, (first_cell, end_cell) in enumerate(zip(first_cells, end_cells, strict=True)):
+            if first_cell < end_cell:
+                starts[first_cell].append(number)
+                ends[end_cell].append(number)
+        active: set[int] = set()
+        for first_row, last_row in pairwise(sorted({0, len(station) - 1, *starts, *ends})):
+            active = (active - set(ends[first_row])) | set(starts[first_row])
+            yield first_row, last_row, [damages[number] for number in sorted(active)]
 
     def _write_damage(self) -> None:
         """Add a DEFECT for each damage; only patches and cracks get shapes: ruts and potholes are in the courses."""
@@ -300,9 +313,13 @@ class _CarriagewayWriter:
             defect = ifc.add_product("IfcSurfaceFeature", name, "DEFECT", kind, placement)
             ifc.add_labels(defect, instance, self.carriageway.points_class, damage)
             ifc.note_relation("IfcRelAdheresToElement", self.pavement, [defect])
-        laid: list[Patch | Crack | RemovedMarking] = [*pavement.patches, *pavement.cracks, *pavement.removed_markings]
+        surface_damages: list[Patch | Crack | RemovedMarking] = [
+            *pavement.patches,
+            *pavement.cracks,
+            *pavement.removed_markings,
+        ]
         films = MarkingFilms(self.scene.geometry, self.carriageway.side)
-        for number, item in enumerate(laid, len(damages)):
+        for number, item in enumerate(surface_damages, len(damages)):
             name, instance = self.scene.geometry.numbers.part(self.name, number)
             faces = damaged_surface(self.scene.geometry, item, self.carriageway.side, self.scene.stations, films)
             mesh = _triangles(faces)
@@ -339,6 +356,7 @@ class _CarriagewayWriter:
 
 
 def _damage_kind(item: Patch | Crack | RemovedMarking) -> str:
+    """Return the words for a damage's object type in IFC, such as ``transverse crack``."""
     if isinstance(item, Crack):
         return f"{item.kind} crack"
     return "patch" if isinstance(item, Patch) else "removed marking"
@@ -346,8 +364,8 @@ def _damage_kind(item: Patch | Crack | RemovedMarking) -> str:
 
 def _range(shape: TurnoutShape, length: float) -> tuple[float, float]:
     """Return the stations (m) between which a turnout changes the cross-section, clipped to the road."""
-    low, high = shape.range()
-    return max(low, 0.0), min(high, length)
+    start_station, end_station = shape.range()
+    return max(start_station, 0.0), min(end_station, length)
 
 
 def _damage_range(damage: Rut | Pothole) -> tuple[float, float]:
@@ -417,11 +435,12 @@ def write_markings(scene: Scene, progress: Progress) -> None:
 
 
 def _write_marking(scene: Scene, name: str, item: LineMarking | Hatching | Arrow, faces: Faces, bearer: Entity) -> None:
+    """Add a marking's polygons as an IfcSurfaceFeature that adheres to its bearer, the carriageway's pavement."""
     ifc = scene.ifc
     mesh = _triangles(faces)
     shape = ifc.shape([ifc.mesh(*mesh, False)], "Tessellation") if mesh else None
-    about = "hatching" if isinstance(item, Hatching) else item.kind
-    feature = ifc.add_product("IfcSurfaceFeature", name, _MARKINGS[type(item)], about, Representation=shape)
+    object_type = "hatching" if isinstance(item, Hatching) else item.kind
+    feature = ifc.add_product("IfcSurfaceFeature", name, _MARKINGS[type(item)], object_type, Representation=shape)
     ifc.note_relation("IfcRelAdheresToElement", bearer, [feature])
     ifc.assign_material(feature, f"paint_{item.color}")
     scene.add_parameters(feature, item)
@@ -438,7 +457,7 @@ def _triangles(faces: Faces) -> tuple[Float, NDArray[np.intp]] | None:
         return None
     starts = np.cumsum(faces.sizes) - faces.sizes
     counts = faces.sizes - 2
-    first = np.repeat(starts, counts)
-    number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    fans = np.column_stack([first, first + number + 1, first + number + 2])
+    fan_corners = np.repeat(starts, counts)
+    number_in_fan = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    fans = np.column_stack([fan_corners, fan_corners + number_in_fan + 1, fan_corners + number_in_fan + 2])
     return faces.points, faces.corners[fans]

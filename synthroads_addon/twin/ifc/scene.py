@@ -69,13 +69,13 @@ class Scene:
 
     def cache_surface(self, places: Iterable[tuple[float, float]]) -> None:
         """Compute and cache surface elevation and strip index at stations and offsets (m), all at once for speed."""
-        unknown = [place for place in dict.fromkeys(places) if place not in self._known]
-        if not unknown:
+        uncached = [place for place in dict.fromkeys(places) if place not in self._known]
+        if not uncached:
             return
-        station, offset = np.array(unknown).T
+        station, offset = np.array(uncached).T
         station = np.clip(station, 0.0, self.geometry.length)
         heights, strips = self.surface(station, offset), self.geometry.strip_index(station, offset)
-        self._known.update(zip(unknown, zip(heights.tolist(), strips.tolist(), strict=True), strict=True))
+        self._known.update(zip(uncached, zip(heights.tolist(), strips.tolist(), strict=True), strict=True))
 
     def surface_and_strip(self, station: float, offset: float) -> tuple[float, int]:
         """Return the surface's local elevation (m) and the strip's index, -1 beside the road; cached."""
@@ -86,27 +86,27 @@ class Scene:
         """Return the local elevations (N,) of road or ground at stations and offsets (N,), m."""
         return surface_points(self.geometry, station, offset)[:, 2]
 
-    def points(self, station: Float, offset: Float, above: float | Float = 0.0) -> Float:
-        """Return local points (N, 3) at stations and offsets, `above` (m) the surface of road or ground."""
+    def points(self, station: Float, offset: Float, height_above: float | Float = 0.0) -> Float:
+        """Return local points (N, 3) at stations and offsets, at a height (m) above the surface of road or ground."""
         points = surface_points(self.geometry, station, offset)
-        points[:, 2] += above
+        points[:, 2] += height_above
         return points
 
     def rows(self, start: float, end: float) -> Float:
         """Return a range's ends (m) and the scene's sampling stations between them, sorted (N,)."""
-        inside = self.stations[
+        inner_stations = self.stations[
             np.searchsorted(self.stations, start, "right") : np.searchsorted(self.stations, end, "left")
         ]
-        return np.unique(np.concatenate([[start], inside, [end]]))
+        return np.unique(np.concatenate([[start], inner_stations, [end]]))
 
-    def place(self, station: float, offset: float, above: float = 0.0) -> IfcPlace:
-        """Return an upright placement `above` (m) the surface; stations beyond the road are clipped to its ends."""
-        height = self.surface_and_strip(station, offset)[0] + above
+    def place(self, station: float, offset: float, height_above: float = 0.0) -> IfcPlace:
+        """Return an upright placement at a height (m) above the surface; stations are clipped to the road's ends."""
+        height = self.surface_and_strip(station, offset)[0] + height_above
         station = min(max(station, 0.0), self.geometry.length)
-        at = np.array([station])
-        position, heading, _ = self.geometry.alignment.frame(at)
-        left = np.array([-math.sin(heading[0]), math.cos(heading[0])])
-        origin = np.array([*(position[0] + offset * left), height])
+        station_array = np.array([station])
+        position, heading, _ = self.geometry.alignment.frame(station_array)
+        left_normal = np.array([-math.sin(heading[0]), math.cos(heading[0])])
+        origin = np.array([*(position[0] + offset * left_normal), height])
         if self.along_axis:
             placement = linear_placement(self.ifc, self.geometry, self.axis, station, offset, height)
         else:
@@ -137,15 +137,20 @@ class Scene:
         self.ifc.note_relation("IfcRelPositions", self.axis.alignment, [entity])
 
 
-def grid_triangles(rows: int, columns: int, closed: bool = False, flip: bool = False) -> NDArray[np.intp]:
-    """Return triangles (T, 3), anticlockwise from above, of a grid of points whose rows run from right to left.
+def grid_triangles(rows: int, columns: int, is_ring: bool = False, flipped: bool = False) -> NDArray[np.intp]:
+    """Return the triangles (T, 3) of a grid of points whose rows run from right to left and follow each other forwards.
 
-    Seen from above they run counter-clockwise. ``closed`` joins the last column to the first; ``flip`` turns them over.
+    Seen from above the triangles run anticlockwise.
+
+    Args:
+        rows, columns: of the grid, whose points are numbered row by row.
+        is_ring: whether the last column is joined to the first.
+        flipped: whether the triangles run clockwise instead.
     """
-    column = np.arange(columns if closed else columns - 1)
-    first = (np.arange(rows - 1)[:, None] * columns + column).ravel()
-    second = (np.arange(rows - 1)[:, None] * columns + (column + 1) % columns).ravel()
-    quads = np.column_stack([first, first + columns, second + columns, second])
-    if flip:
+    column = np.arange(columns if is_ring else columns - 1)
+    this_column = (np.arange(rows - 1)[:, None] * columns + column).ravel()
+    next_column = (np.arange(rows - 1)[:, None] * columns + (column + 1) % columns).ravel()
+    quads = np.column_stack([this_column, this_column + columns, next_column + columns, next_column])
+    if flipped:
         quads = quads[:, ::-1]
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])

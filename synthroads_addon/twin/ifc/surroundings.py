@@ -36,8 +36,9 @@ def write_surroundings(scene: Scene, progress: Progress) -> None:
         _write_vehicle(scene, placed)
 
 
-def _geographic(scene: Scene, name: str, kind: str, shape: Entity | None, about: str | None = None) -> Entity:
-    element = scene.ifc.add_product("IfcGeographicElement", name, kind, about, Representation=shape)
+def _geographic(scene: Scene, name: str, kind: str, shape: Entity | None, object_type: str | None = None) -> Entity:
+    """Add an IfcGeographicElement of a predefined type to the site, and return it."""
+    element = scene.ifc.add_product("IfcGeographicElement", name, kind, object_type, Representation=shape)
     scene.ifc.note_relation("IfcRelContainedInSpatialStructure", scene.site, [element])
     return element
 
@@ -93,16 +94,16 @@ def _write_plants(scene: Scene, ground: GroundMesh, progress: Progress) -> None:
 
 def _write_plant(scene: Scene, plant: PlacedPlant, stand: Entity) -> None:
     """Add a tree or shrub to its stand: the shared shape of its kind, scaled to its size."""
-    ifc, about = scene.ifc, plant.about
+    ifc, vegetation = scene.ifc, plant.vegetation
     # Readers want parts of a whole to be placed relative to it.
     axes = ifc.add("IfcAxis2Placement3D", ifc.point(*plant.foot), None, None)
     placement = ifc.add("IfcLocalPlacement", ifc.local_frame, axes)
     body = ifc.scaled_shape(
-        (about.kind, about.species, plant.variant),
-        lambda: _plant_items(scene, plant.shape, about.species),
+        (vegetation.kind, vegetation.species, plant.variant),
+        lambda: _plant_items(scene, plant.shape, vegetation.species),
         plant.scale,
     )
-    kind = f"{about.kind} {about.species}"
+    kind = f"{vegetation.kind} {vegetation.species}"
     element = ifc.add_product("IfcGeographicElement", plant.name, "VEGETATION", kind, placement, Representation=body)
     ifc.note_relation("IfcRelAggregates", stand, [element])
     _describe(scene, element, plant)
@@ -124,16 +125,17 @@ def _write_strip(scene: Scene, strip: GrassStrip, stand: Entity) -> None:
     """Add a strip of grass to its stand, as a surface at the grass's mean height."""
     ifc = scene.ifc
     shape = ifc.shape([_add_open_mesh(scene, strip.faces)], "Tessellation")
-    kind = f"grass {strip.about.species}"
+    kind = f"grass {strip.vegetation.species}"
     element = ifc.add_product("IfcGeographicElement", strip.name, "VEGETATION", kind, Representation=shape)
     ifc.note_relation("IfcRelAggregates", stand, [element])
-    ifc.assign_material(element, strip.about.species)
+    ifc.assign_material(element, strip.vegetation.species)
     _describe(scene, element, strip)
 
 
-def _describe(scene: Scene, made: Entity, plant: PlacedPlant | GrassStrip) -> None:
+def _describe(scene: Scene, element: Entity, plant: PlacedPlant | GrassStrip) -> None:
+    """Give an element the property set `SynthRoads` with the attributes of its plant or strip of grass."""
     values = {key: scene.ifc.value(value, "m" if key in _MEASURES else "") for key, value in plant.attributes().items()}
-    scene.ifc.add_properties(made, "SynthRoads", values)
+    scene.ifc.add_properties(element, "SynthRoads", values)
 
 
 # --- vehicles -------------------------------------------------------------------------------------------------------

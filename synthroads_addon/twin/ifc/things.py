@@ -41,31 +41,37 @@ class _Writer:
         self.name, self.thing = placed.name, placed.thing
         self.bodies = [body for body in placed.bodies if not body.detail]
         self.types = self.thing.twin()
-        self.station, self.offset, above = _foot_place(scene, self.thing)
-        self.place: IfcPlace = scene.place(self.station, self.offset, above)
+        self.station, self.offset, elevation = _foot_place(scene, self.thing)
+        self.place: IfcPlace = scene.place(self.station, self.offset, elevation)
 
     def write(self) -> None:
         """Add the thing with its properties, bodies and parts, and put it into its spatial container."""
-        entity, kind, *site = self.types.ifc.split(".")
+        entity, kind, *assembly_place = self.types.ifc.split(".")
         self._check(entity, kind)
-        bridge = entity == "IfcBridge"
-        named = {"AssemblyPlace": site[0]} if site else {"CompositionType": "ELEMENT"} if bridge else {}
-        about = self.types.kind or type(self.thing).__name__
-        made = self.ifc.add_product(entity, self.name, kind, about, self.place.placement, **named)
-        self.scene.add_parameters(made, self.thing)
-        if bridge:
-            self.ifc.note_relation("IfcRelAggregates", self.scene.site, [made])
-            self.ifc.note_relation("IfcRelPositions", self.scene.axis.alignment, [made])
+        is_bridge = entity == "IfcBridge"
+        attributes = (
+            {"AssemblyPlace": assembly_place[0]}
+            if assembly_place
+            else {"CompositionType": "ELEMENT"}
+            if is_bridge
+            else {}
+        )
+        object_type = self.types.kind or type(self.thing).__name__
+        element = self.ifc.add_product(entity, self.name, kind, object_type, self.place.placement, **attributes)
+        self.scene.add_parameters(element, self.thing)
+        if is_bridge:
+            self.ifc.note_relation("IfcRelAggregates", self.scene.site, [element])
+            self.ifc.note_relation("IfcRelPositions", self.scene.axis.alignment, [element])
         else:
             offset = self.thing.foot_offset if isinstance(self.thing, StandingThing) else self.offset
-            self.scene.contain(made, self.scene.container(self.station, offset))
-        self.ifc.add_properties(made, *self._common(entity))
-        self._give_bodies(made, [body for body in self.bodies if not body.ifc])
+            self.scene.contain(element, self.scene.container(self.station, offset))
+        self.ifc.add_properties(element, *self._common(entity))
+        self._give_bodies(element, [body for body in self.bodies if not body.ifc])
         parts: dict[str, list[Body]] = {}
         for body in self.bodies:
             if body.ifc:
                 parts.setdefault(body.part, []).append(body)
-        self._parts(made, parts, bridge)
+        self._parts(element, parts, is_bridge)
 
     def _check(self, entity: str, kind: str) -> None:
         """Raise an InputError if IFC 4.3 has no such type; record in the trace if it is only a proxy."""
@@ -75,52 +81,55 @@ class _Writer:
             allowed = "must be an element of IFC 4.3 and one of its predefined types, with a dot between them"
             raise InputError(f"objects.{self.name}.twin_types.ifc", self.types.ifc, allowed)
 
-    def _parts(self, whole: Entity, parts: dict[str, list[Body]], bridge: bool) -> None:
+    def _parts(self, whole: Entity, parts: dict[str, list[Body]], is_bridge: bool) -> None:
         """Add a thing's part elements; a bridge's go into its superstructure or substructure."""
         spatial: dict[str, Entity] = {}
         models = self.thing.part_models()
         for name, bodies in parts.items():
             entity, kind = bodies[0].ifc.split(".")
-            if bridge:
+            if is_bridge:
                 half = "substructure" if entity in _SUBSTRUCTURE else "superstructure"
                 if half not in spatial:
                     usage = {"CompositionType": "PARTIAL", "UsageType": "VERTICAL"}
                     spatial[half] = self._add_part(whole, "IfcBridgePart", half, half.upper(), **usage)
-                made = self.ifc.add_product(entity, f"{self.name}/{name}", kind, placement=self.place.frame(self.ifc))
-                self.ifc.note_relation("IfcRelContainedInSpatialStructure", spatial[half], [made])
+                element = self.ifc.add_product(
+                    entity, f"{self.name}/{name}", kind, placement=self.place.frame(self.ifc)
+                )
+                self.ifc.note_relation("IfcRelContainedInSpatialStructure", spatial[half], [element])
             else:
-                made = self._add_part(whole, entity, name, kind)
+                element = self._add_part(whole, entity, name, kind)
             if kind == "USERDEFINED":
-                made.ObjectType = name.rstrip("-0123456789").upper()
-            self._give_bodies(made, bodies)
-            self.ifc.add_labels(made, self.thing.instance, self.thing.semantic_class)
+                element.ObjectType = name.rstrip("-0123456789").upper()
+            self._give_bodies(element, bodies)
+            self.ifc.add_labels(element, self.thing.instance, self.thing.semantic_class)
             if name in models:
-                self.ifc.add_properties(made, "SynthRoads sign", self.ifc.parameters_of(models[name]))
+                self.ifc.add_properties(element, "SynthRoads sign", self.ifc.parameters_of(models[name]))
 
-    def _add_part(self, whole: Entity, entity: str, name: str, kind: str, **named: Any) -> Entity:
+    def _add_part(self, whole: Entity, entity: str, name: str, kind: str, **attributes: Any) -> Entity:
         """Add and return an element that the whole aggregates, placed at the thing's frame."""
         frame = self.place.frame(self.ifc)
-        part = self.ifc.add_product(entity, f"{self.name}/{name}", kind, placement=frame, **named)
+        part = self.ifc.add_product(entity, f"{self.name}/{name}", kind, placement=frame, **attributes)
         self.ifc.note_relation("IfcRelAggregates", whole, [part])
         return part
 
     def _common(self, entity: str) -> tuple[str, Values]:
         """Return the name and values of the standard property set for an entity class; empty if it has none."""
-        ifc, external = self.ifc, self.ifc.value(True)
+        ifc, is_external = self.ifc, self.ifc.value(True)
         status = ["TEMPORARY" if self.types.temporary else "EXISTING"]
         if entity == "IfcRailing":
             height = float(getattr(self.thing, "height", 0.0))
-            tall = {"Height": ifc.add("IfcPositiveLengthMeasure", height)} if height > 0.0 else {}
-            return "Pset_RailingCommon", {"Status": status, **tall, "IsExternal": external}
+            height_value = {"Height": ifc.add("IfcPositiveLengthMeasure", height)} if height > 0.0 else {}
+            return "Pset_RailingCommon", {"Status": status, **height_value, "IsExternal": is_external}
         if entity == "IfcWall":
-            return "Pset_WallCommon", {"Status": status, "IsExternal": external}
+            return "Pset_WallCommon", {"Status": status, "IsExternal": is_external}
         if entity != "IfcSign":
             return "", {}
-        category = {"IsExternal": external, "Category": ifc.add("IfcLabel", type(self.thing).__name__)}
+        category = {"IsExternal": is_external, "Category": ifc.add("IfcLabel", type(self.thing).__name__)}
         reference = self.types.reference
         return "Pset_SignCommon", category | ({"Reference": ifc.add("IfcIdentifier", reference)} if reference else {})
 
     def _give_bodies(self, product: Entity, bodies: list[Body]) -> None:
+        """Set a product's shape from bodies in the placement's frame; without bodies it gets none."""
         if bodies:
             assign_bodies(self.ifc, product, [(self._to_placement(body.sections), body.material) for body in bodies])
 

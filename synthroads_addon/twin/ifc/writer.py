@@ -51,7 +51,7 @@ def write_ifc(
         tolerance: largest chord error of the road's surfaces, m; their vertices are exact.
         placement: what says where an object stands: a place along the alignment (``linear``), which few viewers read,
             or coordinates (``local``).
-        progress: is told how far it is.
+        progress: receives the stage's name and the share of the work that is done.
 
     Raises:
         InputError: ifcopenshell isn't installed, the map coordinate system is unknown, the road is too long or too
@@ -79,13 +79,13 @@ def write_ifc(
         along_axis=placement == "linear",
     )
     scene.cache_surface((item.station, item.offset) for item in parameters.of_type(PointObject).values())
-    done = 0.0
+    done_share = 0.0
     for share, write in zip(
         _SHARES, (write_carriageways, write_markings, write_things, write_surroundings), strict=True
     ):
-        write(scene, part_of(progress, done, done + share))
-        done += share
-        progress(STAGE, done)
+        write(scene, part_of(progress, done_share, done_share + share))
+        done_share += share
+        progress(STAGE, done_share)
     ifc.write_relations()
     ifc.write(path, parameters.metadata.identifier, parameters.metadata.generator)
     return ifc.trace
@@ -118,7 +118,7 @@ def write_project(ifc: IfcFile, parameters: RoadParameters) -> Entity:
     _georeference(ifc, parameters, model, units[0])
     site = ifc.add_root("IfcSite", "site", Name="site", ObjectPlacement=ifc.local_frame, CompositionType="ELEMENT")
     ifc.note_relation("IfcRelAggregates", ifc.project, [site])
-    about = {
+    values = {
         "identifier": ifc.value(metadata.identifier),
         "seed": ifc.value(metadata.seed),
         "generator": ifc.value(metadata.generator),
@@ -128,8 +128,8 @@ def write_project(ifc: IfcFile, parameters: RoadParameters) -> Entity:
         "translate": ifc.value(parameters.transform.translate),
     }
     if metadata.heightReferenceSystem:
-        about["heightReferenceSystem"] = ifc.value(metadata.heightReferenceSystem)
-    ifc.add_properties(ifc.project, "SynthRoads", about)
+        values["heightReferenceSystem"] = ifc.value(metadata.heightReferenceSystem)
+    ifc.add_properties(ifc.project, "SynthRoads", values)
     return site
 
 

@@ -29,23 +29,24 @@ def trace_elements(root: Element, trace: Trace) -> None:
         _trace_element(road, {}, trace)
 
 
-def _trace_element(element: Element, above: Entity, trace: Trace) -> None:
-    here = _entity_keys(element, above)
+def _trace_element(element: Element, parent_keys: Entity, trace: Trace) -> None:
+    """Record an element and those below it that have an instance number, by the keys that identify them."""
+    keys = _entity_keys(element, parent_keys)
     for data in element.findall("userData"):
         if data.get("code") == "instance":
-            trace.record_entity(int(data.get("value", "0")), **here)
+            trace.record_entity(int(data.get("value", "0")), **keys)
     marks = 0
     for child in element:
         if child.tag == "roadMark":
-            _trace_element(child, {**here, "mark": marks}, trace)
+            _trace_element(child, {**keys, "mark": marks}, trace)
             marks += 1
         elif child.tag != "userData":
-            _trace_element(child, here, trace)
+            _trace_element(child, keys, trace)
 
 
-def _entity_keys(element: Element, above: Entity) -> Entity:
+def _entity_keys(element: Element, parent_keys: Entity) -> Entity:
     """Return the keys that identify an element in the report: its ancestors', its tag, and its id or section."""
-    entity = {**above, "element": element.tag}
+    entity = {**parent_keys, "element": element.tag}
     if element.tag == "laneSection":
         entity["section"] = float(element.get("s", "0"))
     elif element.tag in ("road", "lane"):

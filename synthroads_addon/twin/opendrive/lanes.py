@@ -51,8 +51,8 @@ def _add_side(parent: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadM
         return
     group = element(parent, side)
     sign = 1 if side == "left" else -1
-    numbered = list(enumerate(section.lanes[side], 1))
-    for lane_number, strip in reversed(numbered) if sign > 0 else numbered:
+    numbered_lanes = list(enumerate(section.lanes[side], 1))
+    for lane_number, strip in reversed(numbered_lanes) if sign > 0 else numbered_lanes:
         lane = element(group, "lane", {"id": sign * lane_number, "type": strip.type, "level": False})
         _links(lane, plan, number, side, strip)
         _widths(lane, plan, section, strip)
@@ -64,22 +64,24 @@ def _add_side(parent: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadM
 
 
 def _links(lane: Element, plan: LanePlan, number: int, side: Side, strip: LaneStrip) -> None:
+    """Add the links of a lane to the lanes that continue the same strip in the sections before and after."""
     sign = 1 if side == "left" else -1
     links = {
-        tag: plan.continuing_lane(number, other, side, strip.column)
-        for tag, other in (("predecessor", number - 1), ("successor", number + 1))
+        tag: plan.continuing_lane(number, neighbour, side, strip.column)
+        for tag, neighbour in (("predecessor", number - 1), ("successor", number + 1))
     }
     if any(links.values()):
         link = element(lane, "link")
-        for tag, other in links.items():
-            if other is not None:
-                element(link, tag, {"id": sign * other})
+        for tag, neighbour in links.items():
+            if neighbour is not None:
+                element(link, tag, {"id": sign * neighbour})
 
 
 def _widths(lane: Element, plan: LanePlan, section: LaneSection, strip: LaneStrip) -> None:
-    first, last = section.pieces
-    borders = plan.widths.borders[first : last + 1]
-    pieces = plan.widths.coefficients[first:last, strip.column]
+    """Add a lane's `width` elements: cubics over the distance from the lane section's start."""
+    first_piece, end_piece = section.pieces
+    borders = plan.widths.borders[first_piece : end_piece + 1]
+    pieces = plan.widths.coefficients[first_piece:end_piece, strip.column]
     rows = [(start - section.start, coefficients) for start, coefficients in join_cubics(borders, pieces)]
     for start, coefficients in merge_similar(rows, section.end - section.start):
         add_cubic(lane, "width", {"sOffset": start}, coefficients)
@@ -98,14 +100,15 @@ def _heights(lane: Element, plan: LanePlan, section: LaneSection, strip: LaneStr
     """Add the `height` elements of a lane whose edges leave the carriageway's plane: verge, median, a ramp's."""
 
     def heights(station: Float) -> Float:
+        """Return the heights (N, 2) of the lane's inner and outer edge above the carriageway's plane, m."""
         if strip.kind == "median":
             falls = np.column_stack([np.zeros(len(station)), plan.median_fall(station)])
         else:
             falls = plan.falls(station)[:, strip.index : strip.index + 2]
         return np.column_stack([plan.frame.h_coordinate(station, fall) for fall in falls.T])
 
-    first, last = section.pieces
-    stations = chord_stations(heights, plan.widths.borders[first : last + 1], HEIGHT_TOLERANCE)
+    first_piece, end_piece = section.pieces
+    stations = chord_stations(heights, plan.widths.borders[first_piece : end_piece + 1], HEIGHT_TOLERANCE)
     values = heights(stations)
     if np.ptp(values, axis=0).max() <= HEIGHT_TOLERANCE / 10.0:
         stations, values = stations[:1], values[:1]
@@ -117,6 +120,7 @@ def _heights(lane: Element, plan: LanePlan, section: LaneSection, strip: LaneStr
 
 
 def _notes(lane: Element, plan: LanePlan, side: Side, strip: LaneStrip) -> None:
+    """Add to a lane as user data what OpenDRIVE has no place for: instance number, kind of strip, turnout, lane."""
     add_user_data(lane, "instance", strip.instance)
     add_user_data(lane, "strip", strip.kind)
     if strip.kind in TURNOUT_STRIPS:

@@ -53,13 +53,16 @@ class LocalProjection:
             raise InputError("transform.translate", [x, y], f"must lie within EPSG:{epsg}")
         longitude, latitude = round(longitude, 12), round(latitude, 12)
         text = _text(latitude, longitude, 1.0)
-        into = Transformer.from_crs(epsg, text, always_xy=True)
-        east, north = into.transform([x + _ARM, x - _ARM, x, x], [y, y, y + _ARM, y - _ARM])
-        # Where the axes of the map point to in the projection: of both the mean, for what little they differ.
-        along = np.array([east[0] - east[1], north[0] - north[1]])
-        across = np.array([north[2] - north[3], -(east[2] - east[3])])
-        mean = (along + across) / (4.0 * _ARM)
-        return cls(latitude, longitude, 1.0 / float(np.hypot(*mean)), float(np.arctan2(mean[1], mean[0])), z)
+        transformer = Transformer.from_crs(epsg, text, always_xy=True)
+        east, north = transformer.transform([x + _ARM, x - _ARM, x, x], [y, y, y + _ARM, y - _ARM])
+        # The map's x axis in the projection, and its y axis turned back by 90 degrees: equal for conformal projections
+        # but for the finite arm, so their mean is taken.
+        x_axis = np.array([east[0] - east[1], north[0] - north[1]])
+        y_axis = np.array([north[2] - north[3], -(east[2] - east[3])])
+        mean_axis = (x_axis + y_axis) / (4.0 * _ARM)
+        return cls(
+            latitude, longitude, 1.0 / float(np.hypot(*mean_axis)), float(np.arctan2(mean_axis[1], mean_axis[0])), z
+        )
 
     @property
     def text(self) -> str:
@@ -85,22 +88,25 @@ class LocalProjection:
             piece.set("hdg", f"{float(piece.attrib['hdg']) + self.turn + 0.0:.13g}")
         for piece in _elevations(root):
             piece.set("a", attribute_text(float(piece.attrib["a"]) + self.height))
-        turned = self.turned(corners)
-        low, high = np.floor(turned.min(axis=0)) - 1.0, np.ceil(turned.max(axis=0)) + 1.0
-        bounds = {"north": high[1], "south": low[1], "east": high[0], "west": low[0]}
+        turned_corners = self.turned(corners)
+        lower, upper = np.floor(turned_corners.min(axis=0)) - 1.0, np.ceil(turned_corners.max(axis=0)) + 1.0
+        bounds = {"north": upper[1], "south": lower[1], "east": upper[0], "west": lower[0]}
         for header in root.iter("header"):
             for name, value in bounds.items():
                 header.set(name, attribute_text(float(value)))
 
 
 def _elevations(root: Element) -> Iterable[Element]:
+    """Return the `elevation` elements of all roads in a file."""
     return (piece for profile in root.iter("elevationProfile") for piece in profile.iter("elevation"))
 
 
 def _plan_text(value: float) -> str:
+    """Return the text of a plan coordinate (m), rounded to `PLAN_DIGITS` decimals and without a negative zero."""
     return attribute_text(round(float(value), PLAN_DIGITS) + 0.0)
 
 
 def _text(latitude: float, longitude: float, scale: float) -> str:
+    """Return the PROJ string of a transverse Mercator about a place (degrees, WGS 84) with a scale there."""
     place = f"+lat_0={latitude:.12f} +lon_0={longitude:.12f}"
     return f"+proj=tmerc {place} +k={scale:.12f} +x_0=0 +y_0=0 +ellps=WGS84 +units=m +vunits=m +no_defs"

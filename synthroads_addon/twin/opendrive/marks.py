@@ -36,10 +36,10 @@ class _Stretch:
         period = line.dash_length + line.gap_length
         if period == 0.0:
             return self.end - self.start, 0.0
-        within = (self.start - line.start_station) % period
-        if period - within < CLOSE or within < CLOSE:
+        position_in_period = (self.start - line.start_station) % period
+        if period - position_in_period < CLOSE or position_in_period < CLOSE:
             return 0.0, 0.0
-        return max(0.0, line.dash_length - within), period - within
+        return max(0.0, line.dash_length - position_in_period), period - position_in_period
 
 
 class RoadMarks:
@@ -60,17 +60,18 @@ class RoadMarks:
             stretches.sort(key=lambda item: item.start)
 
     def _place(self, name: str, line: LineMarking) -> None:
+        """Divide a line among the lane sections, each stretch to the lane it borders or else to the loose lines."""
         start, end = line.start_station, min(line.end_station, self._plan.geometry.length)
         if end - start <= CLOSE:
             return
         side = self._plan.side
         index = _border_strip(self._plan.geometry, side, line)
         for number, section in enumerate(self._plan.sections):
-            low, high = max(start, section.start), min(end, section.end)
-            if high - low <= CLOSE:
+            stretch_start, stretch_end = max(start, section.start), min(end, section.end)
+            if stretch_end - stretch_start <= CLOSE:
                 continue
-            if index is None or not self._assign(_Stretch(name, line, low, high, side), number, index):
-                self._let_loose(name, line, low, high)
+            if index is None or not self._assign(_Stretch(name, line, stretch_start, stretch_end, side), number, index):
+                self._let_loose(name, line, stretch_start, stretch_end)
 
     def _assign(self, stretch: _Stretch, number: int, index: int) -> bool:
         """Assign a stretch to the outer border of a strip; return False if another line is there already."""
@@ -83,6 +84,7 @@ class RoadMarks:
         return True
 
     def _let_loose(self, name: str, line: LineMarking, start: float, end: float) -> None:
+        """Add a stretch (stations, m) to the loose lines, joined to the stretch of the same line that ends there."""
         if self.loose and self.loose[-1][0] == name and start - self.loose[-1][3] <= CLOSE:
             start = self.loose.pop()[2]
         self.loose.append((name, line, start, end))
@@ -90,14 +92,14 @@ class RoadMarks:
     def write(self, lane: Element, number: int, lane_id: int) -> None:
         """Add the `roadMark` elements of one lane in a lane section, with type `none` in gaps between lines."""
         section = self._plan.sections[number]
-        reached = section.start
+        end_so_far = section.start
         for stretch in self._of.get((number, lane_id), []):
-            if stretch.start - reached > CLOSE and reached > section.start:
-                _nothing(lane, reached - section.start)
+            if stretch.start - end_so_far > CLOSE and end_so_far > section.start:
+                _nothing(lane, end_so_far - section.start)
             _write_stretch(lane, stretch, section.start)
-            reached = stretch.end
-        if section.start < reached < section.end - CLOSE:
-            _nothing(lane, reached - section.start)
+            end_so_far = stretch.end
+        if section.start < end_so_far < section.end - CLOSE:
+            _nothing(lane, end_so_far - section.start)
 
 
 def _border_strip(geometry: RoadGeometry, side: Side, line: LineMarking) -> int | None:
@@ -113,6 +115,7 @@ def _border_strip(geometry: RoadGeometry, side: Side, line: LineMarking) -> int 
 
 
 def _nothing(lane: Element, offset: float) -> None:
+    """Add a `roadMark` of type none at an offset (m) in the lane section, which ends the mark before it."""
     element(lane, "roadMark", {"sOffset": offset, "type": "none", "color": "white", "width": 0.0})
 
 
@@ -122,26 +125,26 @@ def _write_stretch(lane: Element, stretch: _Stretch, section_start: float) -> No
     if line.dash_length == 0.0:
         _mark(lane, stretch, start, (stretch.end - stretch.start, 0.0, 0.0))
         return
-    rest, following = stretch.cut_dash
-    if rest > CLOSE:
-        _mark(lane, stretch, start, (min(rest, stretch.end - stretch.start), 0.0, 0.0))
-    if stretch.start + rest < stretch.end - CLOSE:
-        pattern = (line.dash_length, line.gap_length, following - rest)
-        _mark(lane, stretch, start + rest, pattern)
+    cut_length, next_dash = stretch.cut_dash
+    if cut_length > CLOSE:
+        _mark(lane, stretch, start, (min(cut_length, stretch.end - stretch.start), 0.0, 0.0))
+    if stretch.start + cut_length < stretch.end - CLOSE:
+        pattern = (line.dash_length, line.gap_length, next_dash - cut_length)
+        _mark(lane, stretch, start + cut_length, pattern)
 
 
 def _mark(lane: Element, stretch: _Stretch, offset: float, pattern: tuple[float, float, float]) -> None:
     """Add one `roadMark` at an offset (m) in its lane section; the pattern is dash, gap and first gap (m)."""
     line = stretch.line
-    dash, gap, first = pattern
-    broken = line.dash_length > 0.0
+    dash, gap, first_gap = pattern
+    is_broken = line.dash_length > 0.0
     weight = "bold" if line.width > 0.2 else "standard"
     attributes = {"sOffset": offset, "type": "broken" if gap > 0.0 else "solid", "weight": weight, "color": line.color}
-    attributes |= {"width": line.width, "height": line.film_thickness, "laneChange": "both" if broken else "none"}
+    attributes |= {"width": line.width, "height": line.film_thickness, "laneChange": "both" if is_broken else "none"}
     mark = element(lane, "roadMark", attributes)
     kind = element(mark, "type", {"name": line.kind, "width": line.width})
     sign = 1.0 if stretch.side == "left" else -1.0
-    rule = "none" if broken else "no passing"
+    rule = "none" if is_broken else "no passing"
     shape = {"length": dash, "space": gap, "tOffset": sign * _OUTWARDS.get(line.kind, 0.0) * line.width}
-    element(kind, "line", {**shape, "sOffset": first, "rule": rule, "width": line.width, "color": line.color})
+    element(kind, "line", {**shape, "sOffset": first_gap, "rule": rule, "width": line.width, "color": line.color})
     add_object_data(mark, stretch.name, line.instance)

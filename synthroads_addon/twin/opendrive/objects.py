@@ -53,8 +53,8 @@ class Objects:
     def write(self, loose: Iterable[tuple[str, LineMarking, float, float]]) -> None:
         """Add all things and painted areas of this carriageway, then the line markings that follow no lane."""
         for name, item in self.ground.geometry.parameters.objects.items():
-            written = isinstance(item, LengthwiseThing | StandingThing | Hatching | Arrow)
-            if not written or side_of(self.ground.geometry, item) != self.frame.side:
+            is_written = isinstance(item, LengthwiseThing | StandingThing | Hatching | Arrow)
+            if not is_written or side_of(self.ground.geometry, item) != self.frame.side:
                 continue
             if isinstance(item, LengthwiseThing):
                 self.barrier(name, item)
@@ -71,9 +71,9 @@ class Objects:
 
     def barrier(self, name: str, item: LengthwiseThing) -> None:
         """Add a thing that runs along the road as one object with continuous `repeat` elements, linear in between."""
-        right, left = item.reach()
-        width, (kind, subtype) = right + left, _types(item)
-        rows = self.ground.sample_along(item, self.frame, (left - right) / 2.0)
+        right_reach, left_reach = item.reach()
+        width, (kind, subtype) = right_reach + left_reach, _types(item)
+        rows = self.ground.sample_along(item, self.frame, (left_reach - right_reach) / 2.0)
         if not len(rows):
             return
         attributes: dict[str, Value] = {"type": kind, "subtype": subtype, "hdg": 0.0}
@@ -100,22 +100,28 @@ class Objects:
         outlines = element(entry, "outlines") if bodies else entry
         for number, body in enumerate(bodies):
             outline = element(outlines, "outline", {"id": number, "outer": True, "closed": True})
-            for corner, (u, v, low, high) in enumerate(_upright_outline(body).tolist()):
-                where: dict[str, Value] = {"id": corner, "u": u, "v": v, "z": _fine(low), "height": _fine(high - low)}
-                element(outline, "cornerLocal", where)
+            for corner, (u, v, bottoms, tops) in enumerate(_upright_outline(body).tolist()):
+                attributes_of_corner: dict[str, Value] = {
+                    "id": corner,
+                    "u": u,
+                    "v": v,
+                    "z": _fine(bottoms),
+                    "height": _fine(tops - bottoms),
+                }
+                element(outline, "cornerLocal", attributes_of_corner)
         _describe(entry, name, item)
 
     def underpasses(self) -> None:
         """Add a `tunnel` of type underpass, open to the sides, for every stretch of the road below a bridge."""
-        first = self.frame.side == next(iter(self.ground.geometry.sections))
+        owns_instance_number = self.frame.side == next(iter(self.ground.geometry.sections))
         for name, item in self.ground.geometry.parameters.of_type(Thing).items():
             for block in item.footprint() if item.twin().cityjson == "Bridge" else ():
                 if block.part != "beam":
                     continue
                 start, end = max(block.start, 0.0), min(block.end, self.ground.geometry.length)
-                number = item.instance if first else self.numbers.take()
-                about: dict[str, Value] = {"id": number, "name": name, "s": start, "length": end - start}
-                entry = element(self.parent, "tunnel", {**about, "type": "underpass", "daylight": 1.0, "lighting": 0.0})
+                number = item.instance if owns_instance_number else self.numbers.take()
+                ids: dict[str, Value] = {"id": number, "name": name, "s": start, "length": end - start}
+                entry = element(self.parent, "tunnel", {**ids, "type": "underpass", "daylight": 1.0, "lighting": 0.0})
                 add_object_data(entry, name, item.instance)
 
     # --- plants -----------------------------------------------------------------------------------------------------
@@ -123,21 +129,21 @@ class Objects:
     def plants(self, plants: Sequence[PlacedPlant]) -> None:
         """Add the trees and shrubs on this carriageway's side as upright cylinders with the crown's radius."""
         geometry = self.ground.geometry
-        mine = [plant for plant in plants if side_at(geometry, plant.offset) == self.frame.side]
-        if not mine:
+        plants_on_side = [plant for plant in plants if side_at(geometry, plant.offset) == self.frame.side]
+        if not plants_on_side:
             return
-        station, offset = np.array([(plant.station, plant.offset) for plant in mine]).T
-        heights = np.array([plant.foot[2] for plant in mine]) - geometry.profile.elevation(station)
+        station, offset = np.array([(plant.station, plant.offset) for plant in plants_on_side]).T
+        heights = np.array([plant.foot[2] for plant in plants_on_side]) - geometry.profile.elevation(station)
         place = self.frame.road_coordinates(station, offset, heights)
-        for plant, row in zip(mine, np.column_stack([place.s, place.t, place.h]), strict=True):
+        for plant, row in zip(plants_on_side, np.column_stack([place.s, place.t, place.h]), strict=True):
             kind: tuple[str, str] = ("vegetation", "bush")
-            if plant.about.kind == "tree":
-                kind = ("tree", "needle" if plant.about.species in NEEDLES else "leaf")
+            if plant.vegetation.kind == "tree":
+                kind = ("tree", "needle" if plant.vegetation.species in NEEDLES else "leaf")
             attributes: dict[str, Value] = {"type": kind[0], "subtype": kind[1], "hdg": 0.0}
             attributes |= {"radius": round(plant.breadth * plant.shape.crown_radius, 6)}
             attributes["height"] = round(plant.height, 6)
-            entry = self._placed(plant.name, plant.about, attributes, row, plant.instance)
-            add_object_data(entry, plant.name, plant.instance, species=plant.about.species)
+            entry = self._placed(plant.name, plant.vegetation, attributes, row, plant.instance)
+            add_object_data(entry, plant.name, plant.instance, species=plant.vegetation.species)
 
     # --- painted ----------------------------------------------------------------------------------------------------
 
@@ -150,13 +156,13 @@ class Objects:
         corners = np.concatenate(parts)
         corners[:, 0] = np.clip(corners[:, 0], 0.0, geometry.length)
         heights = self.ground.height(corners[:, 0], corners[:, 1])
-        at = (item.station, item.offset) if isinstance(item, Arrow) else tuple(corners.mean(axis=0).tolist())
-        z = float(self.ground.height(np.array(at[:1]), np.array(at[1:]))[0])
+        position = (item.station, item.offset) if isinstance(item, Arrow) else tuple(corners.mean(axis=0).tolist())
+        z = float(self.ground.height(np.array(position[:1]), np.array(position[1:]))[0])
         subtype = "hatching" if isinstance(item, Hatching) else f"arrow_{item.kind}"
         turn = item.rotation_deg if isinstance(item, Arrow) else 0.0
         heading = math.radians((turn + 180.0) % 360.0 - 180.0)
         attributes: dict[str, Value] = {"type": "roadMark", "subtype": subtype, "hdg": heading}
-        entry = self._object(name, item, {**attributes, "height": item.film_thickness}, (*at, z))
+        entry = self._object(name, item, {**attributes, "height": item.film_thickness}, (*position, z))
         place = self.frame.road_coordinates(corners[:, 0], corners[:, 1], heights)
         rows = np.column_stack([place.s, place.t, place.h])
         outlines = element(entry, "outlines")
@@ -172,13 +178,13 @@ class Objects:
         attributes: dict[str, Value] = {"type": "roadMark", "subtype": f"line_{line.kind}", "hdg": 0.0}
         attributes |= {"length": span[1] - span[0], "width": line.width, "height": line.film_thickness}
         entry = self._placed(name, line, attributes, corners[0], None if part == 1 else self.numbers.take())
-        _road_outline(element(entry, "outlines"), 0, corners, 0.0, closed=False)
+        _road_outline(element(entry, "outlines"), 0, corners, 0.0, is_closed=False)
         marking: dict[str, Value] = {"color": line.color, "width": line.width, "zOffset": line.film_thickness}
         dash = line.dash_length or geometry.length
         period = line.dash_length + line.gap_length
-        within = (span[0] - line.start_station) % period if period else 0.0
-        first = period - within if CLOSE < within < period - CLOSE else 0.0
-        marking |= {"lineLength": dash, "spaceLength": line.gap_length, "startOffset": first, "stopOffset": 0.0}
+        position_in_period = (span[0] - line.start_station) % period if period else 0.0
+        first_gap = period - position_in_period if CLOSE < position_in_period < period - CLOSE else 0.0
+        marking |= {"lineLength": dash, "spaceLength": line.gap_length, "startOffset": first_gap, "stopOffset": 0.0}
         item = element(element(entry, "markings"), "marking", marking)
         for number in range(len(corners)):
             element(item, "cornerReference", {"id": number})
@@ -187,14 +193,16 @@ class Objects:
     def _axis(self, line: LineMarking, start: float, end: float) -> Float:
         """Return (N, 3) s, t and h of points along a line marking's axis, m, sampled within the chord tolerance."""
         geometry = self.ground.geometry
-        bend = np.abs(geometry.alignment.curvature(np.linspace(start, end, 50))).max()
-        step = min(math.sqrt(8.0 * self.ground.tolerance / max(float(bend), 1e-9)), 50.0)
+        largest_curvature = np.abs(geometry.alignment.curvature(np.linspace(start, end, 50))).max()
+        # Sagitta of an arc over a chord s: s^2 / (8 R), solved for s. 50 m at most: chosen.
+        step = min(math.sqrt(8.0 * self.ground.tolerance / max(float(largest_curvature), 1e-9)), 50.0)
         count = max(2, math.ceil((end - start) / step) + 1)
+        # The offset is a number, or points (station, offset) at which the line bends.
         points = getattr(line.offset, "__iter__", None) and [point.station for point in line.offset]  # type: ignore[union-attr]
-        inside = [s for s in points or [] if start < s < end]
-        stations = np.unique(np.concatenate([np.linspace(start, end, count), inside]))
-        left, right = geometry.marking_edges(line, stations)
-        middle = (left + right) / 2.0
+        inner_stations = [s for s in points or [] if start < s < end]
+        stations = np.unique(np.concatenate([np.linspace(start, end, count), inner_stations]))
+        left_edge, right_edge = geometry.marking_edges(line, stations)
+        middle = (left_edge + right_edge) / 2.0
         place = self.frame.road_coordinates(stations, middle, self.ground.height(stations, middle))
         return np.column_stack([place.s, place.t, place.h])
 
@@ -209,8 +217,10 @@ class Objects:
         """Add and return an `object` element at s, t and h; its id is `number`, or the instance number if None."""
         s, t, h = place.tolist()
         ids: dict[str, Value] = {"id": item.instance if number is None else number, "name": name}
-        about = {**ids, "s": s, "t": t, "zOffset": _fine(h)}
-        return element(self.parent, "object", {**about, "orientation": "none", "dynamic": "no", **attributes})
+        attributes_of_place = {**ids, "s": s, "t": t, "zOffset": _fine(h)}
+        return element(
+            self.parent, "object", {**attributes_of_place, "orientation": "none", "dynamic": "no", **attributes}
+        )
 
 
 def _types(item: Thing) -> tuple[str, str]:
@@ -224,7 +234,7 @@ _SAID = ("instance", "type", "station", "rotation_deg", "start_station", "end_st
 _SAME_TURN = 1e-9  # rad
 
 
-def _describe(made: Element, name: str, item: RoadObject) -> None:
+def _describe(entry: Element, name: str, item: RoadObject) -> None:
     """Add an object's parameters as user data, lists as JSON, without those that its element's attributes say."""
     values = {key: value for key, value in item.to_dict().items() if key not in _SAID and value is not None}
     if not values.get("elevation"):
@@ -233,21 +243,21 @@ def _describe(made: Element, name: str, item: RoadObject) -> None:
         values["rotation_deg"] = item.rotation_deg  # it turns something else than the object
     if isinstance(item, Asset):
         values["asset"] = values.pop("name")
-    shown = {
+    texts = {
         key: value if isinstance(value, str | int | float) else compact_json(value) for key, value in values.items()
     }
-    add_object_data(made, name, item.instance, object_type=type(item).__name__, **shown)
+    add_object_data(entry, name, item.instance, object_type=type(item).__name__, **texts)
 
 
 def _upright_outline(body: Body) -> Float:
     """Return a body's outline in plan (K, 4): u ahead, v to the left, lowest and highest z at each corner, m."""
-    first, last = body.sections[0], body.sections[-1]
-    if len(body.sections) > 2 or np.abs(first[:, :2] - last[:, :2]).max() > CLOSE:
+    first_section, last_section = body.sections[0], body.sections[-1]
+    if len(body.sections) > 2 or np.abs(first_section[:, :2] - last_section[:, :2]).max() > CLOSE:
         (x0, y0, z0), (x1, y1, z1) = body.sections.min(axis=(0, 1)), body.sections.max(axis=(0, 1))
         corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
         return np.column_stack([corners[:, 1], -corners[:, 0], np.full(4, z0), np.full(4, z1)])
-    low, high = np.sort(np.stack([first[:, 2], last[:, 2]]), axis=0)
-    return np.column_stack([first[:, 1], -first[:, 0], low, high])
+    lowest, highest = np.sort(np.stack([first_section[:, 2], last_section[:, 2]]), axis=0)
+    return np.column_stack([first_section[:, 1], -first_section[:, 0], lowest, highest])
 
 
 def _fine(value: float) -> float:
@@ -255,9 +265,9 @@ def _fine(value: float) -> float:
     return round(value, 6)
 
 
-def _road_outline(parent: Element, number: int, corners: Float, height: float, closed: bool = True) -> None:
+def _road_outline(parent: Element, number: int, corners: Float, height: float, is_closed: bool = True) -> None:
     """Add an outline with corners (N, 3: s, t, height above the reference line) in road coordinates."""
-    attributes: dict[str, Value] = {"id": number, "outer": True, "closed": closed}
-    outline = element(parent, "outline", {**attributes, "fillType": "paint" if closed else None})
+    attributes: dict[str, Value] = {"id": number, "outer": True, "closed": is_closed}
+    outline = element(parent, "outline", {**attributes, "fillType": "paint" if is_closed else None})
     for corner, (s, t, z) in enumerate(corners.tolist()):
         element(outline, "cornerRoad", {"id": corner, "s": s, "t": t, "dz": _fine(z), "height": height})

@@ -46,6 +46,7 @@ class Cubics:
         return np.asarray(b + u * (2.0 * c + 3.0 * d * u))
 
     def _piece(self, station: Float) -> NDArray[np.intp]:
+        """Return the index (N,) of the piece at each station, the first or last piece beyond the ends."""
         return np.clip(np.searchsorted(self.borders, station, side="right") - 1, 0, len(self.borders) - 2)
 
     def at_end(self, piece: int) -> Float:
@@ -55,9 +56,9 @@ class Cubics:
 
 def merged_stations(stations: Iterable[float], start: float, end: float) -> Float:
     """Return `start`, `end` and the stations between, sorted, without those closer than `CLOSE` to another."""
-    inside = sorted(s for s in stations if start + CLOSE < s < end - CLOSE)
+    inner_stations = sorted(s for s in stations if start + CLOSE < s < end - CLOSE)
     merged = [start]
-    for station in inside:
+    for station in inner_stations:
         if station - merged[-1] > CLOSE:
             merged.append(station)
     return np.array([*merged, end])
@@ -71,24 +72,24 @@ def fit_cubics(function: Function, borders: Float) -> Cubics:
         borders: (P + 1,) stations, increasing, between which it is expected to be smooth.
     """
     while True:
-        length = np.diff(borders)
-        values = function((borders[:-1, None] + length[:, None] * _SHARES).ravel())
-        values = values.reshape(len(length), len(_SHARES), -1)
-        coefficients = _fit_lowest_degree(values, length)
-        faults = np.abs(_sample_cubics(coefficients, length) - values).max(axis=(1, 2)) > _EXACT
-        faults &= length > _SHORTEST
-        if not faults.any():
+        lengths = np.diff(borders)
+        values = function((borders[:-1, None] + lengths[:, None] * _SHARES).ravel())
+        values = values.reshape(len(lengths), len(_SHARES), -1)
+        coefficients = _fit_lowest_degree(values, lengths)
+        is_off = np.abs(_sample_cubics(coefficients, lengths) - values).max(axis=(1, 2)) > _EXACT
+        is_off &= lengths > _SHORTEST
+        if not is_off.any():
             return Cubics(borders, coefficients)
-        borders = np.sort(np.append(borders, (borders[:-1] + length / 2.0)[faults]))
+        borders = np.sort(np.append(borders, (borders[:-1] + lengths / 2.0)[is_off]))
 
 
 def fit_pieces(function: Callable[[Float, NDArray[np.intp]], Float], borders: Float) -> Cubics:
     """Fit one cubic per piece to a function that may jump at borders (P + 1,) and is told the piece's number."""
-    length = np.diff(borders)
-    stations = borders[:-1, None] + length[:, None] * _SHARES
-    piece = np.repeat(np.arange(len(length)), len(_SHARES))
-    values = function(stations.ravel(), piece).reshape(len(length), len(_SHARES), 1)
-    return Cubics(borders, _fit_lowest_degree(values, length))
+    lengths = np.diff(borders)
+    stations = borders[:-1, None] + lengths[:, None] * _SHARES
+    piece = np.repeat(np.arange(len(lengths)), len(_SHARES))
+    values = function(stations.ravel(), piece).reshape(len(lengths), len(_SHARES), 1)
+    return Cubics(borders, _fit_lowest_degree(values, lengths))
 
 
 def _fit_lowest_degree(values: Float, length: Float) -> Float:
@@ -96,20 +97,24 @@ def _fit_lowest_degree(values: Float, length: Float) -> Float:
     f = values[:, :4].transpose(0, 2, 1)
     f0, f1, f2, f3 = (f[..., i] for i in range(4))
     h = length[:, None]
-    line = (f3 - f0) / h
-    none = np.zeros(f0.shape)
-    best = _cubic_through(values, length)
-    # A parabola: the third differences vanish.
-    bend = 4.5 * (f0 - f1 - f2 + f3) / (2.0 * h**2)
-    for lower in ((f0, line - bend * h, bend, none), (f0, line, none, none), (f0, none, none, none)):
-        trial = np.stack(lower, axis=-1)
-        fits = np.abs(_sample_cubics(trial, length) - values).max(axis=1) <= _EXACT / 10.0
-        best = np.where(fits[..., None], trial, best)
-    return _round_coefficients(best, length)
+    slope = (f3 - f0) / h
+    zero = np.zeros(f0.shape)
+    cubics = _cubic_through(values, length)
+    # From the highest degree to the lowest, so that the lowest that fits is left: parabola, line, constant. The
+    # parabola's quadratic term is the mean of the second differences of the values at 0, 1/3, 2/3 and 1.
+    quadratic = 4.5 * (f0 - f1 - f2 + f3) / (2.0 * h**2)
+    for candidate in ((f0, slope - quadratic * h, quadratic, zero), (f0, slope, zero, zero), (f0, zero, zero, zero)):
+        trials = np.stack(candidate, axis=-1)
+        fits = np.abs(_sample_cubics(trials, length) - values).max(axis=1) <= _EXACT / 10.0
+        cubics = np.where(fits[..., None], trials, cubics)
+    return _round_coefficients(cubics, length)
 
 
 def _cubic_through(values: Float, length: Float) -> Float:
-    """Return the coefficients (P, F, 4) of the cubics through the values (P, S, F) at each piece's first 4 shares."""
+    """Return the coefficients (P, F, 4) of the cubics through the values (P, S, F) at each piece's first 4 shares.
+
+    The shares are 0, 1/3, 2/3 and 1 of the piece's length h; the formula is Lagrange's interpolation written out.
+    """
     f = values[:, :4].transpose(0, 2, 1)
     f0, f1, f2, f3 = (f[..., i] for i in range(4))
     h = length[:, None]
@@ -138,6 +143,7 @@ def _sample_cubics(coefficients: Float, length: Float) -> Float:
 
 
 def _value(coefficients: Float, u: Float | float) -> Float:
+    """Return a + b u + c u^2 + d u^3 for coefficients (..., 4), by Horner's scheme."""
     a, b, c, d = (coefficients[..., i] for i in range(4))
     return np.asarray(a + u * (b + u * (c + u * d)))
 
@@ -149,19 +155,21 @@ def join_cubics(borders: Float, coefficients: Float) -> list[tuple[float, list[f
     """
     length = np.diff(borders)
     joined: list[tuple[float, list[float]]] = []
-    first = 0
-    while first < len(length):
-        last = first + 1
-        run = coefficients[first]
-        while last < len(length):
-            longest = first + int(np.argmax(length[first : last + 1]))
-            trial = _shift_cubic(coefficients[longest], borders[first] - borders[longest])
-            if not _continues(trial, borders, coefficients, (first, last + 1)):
+    first_piece = 0
+    while first_piece < len(length):
+        end_piece = first_piece + 1
+        joined_cubic = coefficients[first_piece]
+        while end_piece < len(length):
+            longest_piece = first_piece + int(np.argmax(length[first_piece : end_piece + 1]))
+            candidate = _shift_cubic(coefficients[longest_piece], borders[first_piece] - borders[longest_piece])
+            if not _continues(candidate, borders, coefficients, (first_piece, end_piece + 1)):
                 break
-            run, last = trial, last + 1
-        whole = np.array([borders[last] - borders[first]])
-        joined.append((float(borders[first]), _round_coefficients(run[None, None], whole)[0, 0].tolist()))
-        first = last
+            joined_cubic, end_piece = candidate, end_piece + 1
+        joined_length = np.array([borders[end_piece] - borders[first_piece]])
+        joined.append(
+            (float(borders[first_piece]), _round_coefficients(joined_cubic[None, None], joined_length)[0, 0].tolist())
+        )
+        first_piece = end_piece
     return joined
 
 
@@ -177,32 +185,42 @@ def merge_similar(rows: list[tuple[float, list[float]]], end: float) -> list[tup
     """
     merged = rows[:1]
     ends = [start for start, _ in rows[1:]] + [end]
-    for (start, coefficients), until in zip(rows[1:], ends[1:], strict=True):
-        before_start, before = merged[-1]
-        difference = _shift_cubic(np.array(before), -before_start) - _shift_cubic(np.array(coefficients), -start)
+    for (start, coefficients), end_station in zip(rows[1:], ends[1:], strict=True):
+        previous_start, previous = merged[-1]
+        difference = _shift_cubic(np.array(previous), -previous_start) - _shift_cubic(np.array(coefficients), -start)
         if np.abs(difference).max() >= _TAKEN_FOR_ONE:
             merged.append((start, coefficients))
             continue
-        at = before_start + (until - before_start) * _SHARES[:4]
-        first, second = _value(np.array(before), at - before_start), _value(np.array(coefficients), at - start)
-        values = np.where(at < start, first, second)[None, :, None]
-        merged[-1] = (before_start, _cubic_through(values, np.array([until - before_start]))[0, 0].tolist())
+        places = previous_start + (end_station - previous_start) * _SHARES[:4]
+        previous_values, own_values = (
+            _value(np.array(previous), places - previous_start),
+            _value(np.array(coefficients), places - start),
+        )
+        values = np.where(places < start, previous_values, own_values)[None, :, None]
+        merged[-1] = (previous_start, _cubic_through(values, np.array([end_station - previous_start]))[0, 0].tolist())
     return merged
 
 
 def _continues(cubic: Float, borders: Float, coefficients: Float, pieces: tuple[int, int]) -> bool:
     """Return whether one cubic, counted from the first piece's start, reproduces a range of pieces within 5e-7."""
-    first, end = pieces
-    within = np.diff(borders[first : end + 1])[:, None] * np.array([0.0, 0.3, 0.7, 1.0])
-    values = _value(coefficients[first:end, None], within)
-    ahead = borders[first:end, None] - borders[first] + within
-    return bool(np.abs(_value(cubic, ahead) - values).max() <= _SAME)
+    first_piece, end = pieces
+    places = np.diff(borders[first_piece : end + 1])[:, None] * np.array([0.0, 0.3, 0.7, 1.0])
+    values = _value(coefficients[first_piece:end, None], places)
+    places_from_start = borders[first_piece:end, None] - borders[first_piece] + places
+    return bool(np.abs(_value(cubic, places_from_start) - values).max() <= _SAME)
 
 
-def _shift_cubic(cubic: Float, by: float) -> Float:
+def _shift_cubic(cubic: Float, distance: float) -> Float:
     """Return the coefficients (4,) of a cubic whose origin is moved ahead by a distance (m)."""
     a, b, c, d = cubic.tolist()
-    return np.array([a + by * (b + by * (c + by * d)), b + by * (2.0 * c + 3.0 * by * d), c + 3.0 * by * d, d])
+    return np.array(
+        [
+            a + distance * (b + distance * (c + distance * d)),
+            b + distance * (2.0 * c + 3.0 * distance * d),
+            c + 3.0 * distance * d,
+            d,
+        ]
+    )
 
 
 def chord_stations(function: Function, borders: Float, tolerance: float, shortest: float = 1e-3) -> Float:
@@ -216,15 +234,15 @@ def chord_stations(function: Function, borders: Float, tolerance: float, shortes
     """
     shares = np.array([0.0, 0.23, 0.5, 0.71, 1.0])
     borders = _divide_long(borders, _LONGEST)
-    stations_so_far, begin, length = [borders], borders[:-1], np.diff(borders)
-    while len(begin):
-        values = function((begin[:, None] + length[:, None] * shares).ravel()).reshape(len(begin), 5, -1)
+    stations_so_far, starts, lengths = [borders], borders[:-1], np.diff(borders)
+    while len(starts):
+        values = function((starts[:, None] + lengths[:, None] * shares).ravel()).reshape(len(starts), 5, -1)
         on_chord = values[:, :1] + shares[:, None] * (values[:, -1:] - values[:, :1])
-        faults = (np.abs(values - on_chord).max(axis=(1, 2)) > tolerance) & (length > 2.0 * shortest)
-        half = length[faults] / 2.0
-        begin = np.concatenate([begin[faults], begin[faults] + half])
-        length = np.concatenate([half, half])
-        stations_so_far.append(begin[len(half) :])
+        is_off = (np.abs(values - on_chord).max(axis=(1, 2)) > tolerance) & (lengths > 2.0 * shortest)
+        half_lengths = lengths[is_off] / 2.0
+        starts = np.concatenate([starts[is_off], starts[is_off] + half_lengths])
+        lengths = np.concatenate([half_lengths, half_lengths])
+        stations_so_far.append(starts[len(half_lengths) :])
     stations = np.sort(np.concatenate(stations_so_far))
     return _drop_straight_stations(stations, function(stations))
 
@@ -232,17 +250,19 @@ def chord_stations(function: Function, borders: Float, tolerance: float, shortes
 def _divide_long(borders: Float, longest: float) -> Float:
     """Return the borders with intervals longer than `longest` (m) divided evenly."""
     count = np.maximum(1, np.ceil(np.diff(borders) / longest)).astype(np.int64)
-    nth = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    return np.append(np.repeat(borders[:-1], count) + nth * np.repeat(np.diff(borders) / count, count), borders[-1])
+    number_in_interval = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    return np.append(
+        np.repeat(borders[:-1], count) + number_in_interval * np.repeat(np.diff(borders) / count, count), borders[-1]
+    )
 
 
 def _drop_straight_stations(stations: Float, values: Float) -> Float:
     """Return the stations without those at which the values are linear between their neighbours."""
     indices = [0]
     for i in range(1, len(stations) - 1):
-        before, after = indices[-1], i + 1
-        share = (stations[i] - stations[before]) / (stations[after] - stations[before])
-        chord = values[before] + share * (values[after] - values[before])
+        previous, following = indices[-1], i + 1
+        share = (stations[i] - stations[previous]) / (stations[following] - stations[previous])
+        chord = values[previous] + share * (values[following] - values[previous])
         if np.abs(values[i] - chord).max() > _EXACT:
             indices.append(i)
     return stations[[*indices, len(stations) - 1]]

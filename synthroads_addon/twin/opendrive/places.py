@@ -53,8 +53,8 @@ class Ground:
                 raise InputError(f"objects.{name}.station", item.station, allowed)
         places = np.array([(item.station, item.offset) for item in points.values()]).reshape(-1, 2)
         heights = self.height(places[:, 0], places[:, 1])
-        raised = heights + np.array([item.elevation for item in points.values()])
-        self._feet = dict(zip(points, raised.tolist(), strict=True))
+        feet = heights + np.array([item.elevation for item in points.values()])
+        self._feet = dict(zip(points, feet.tolist(), strict=True))
 
     def foot(self, name: str) -> float:
         """Return the height of a point object's foot above the profile, m, by the object's id."""
@@ -62,18 +62,18 @@ class Ground:
 
     def height(self, station: Float, offset: Float) -> Float:
         """Return the heights (N,) of road or ground above the profile, m; the road edge's without terrain data."""
-        along = np.clip(station, 0.0, self.geometry.length)
-        return known_elevation(self.geometry, along, offset) - self.geometry.profile.elevation(along)
+        clipped = np.clip(station, 0.0, self.geometry.length)
+        return known_elevation(self.geometry, clipped, offset) - self.geometry.profile.elevation(clipped)
 
-    def sample_along(self, item: LengthwiseThing, frame: RoadFrame, beside: float) -> Float:
+    def sample_along(self, item: LengthwiseThing, frame: RoadFrame, middle_offset: float) -> Float:
         """Return rows (N, 4) of s, t, h and object height (m) along a lengthwise thing, linear in between.
 
-        Between two of them all is linear within the tolerance.
+        Between two rows all four are linear within the tolerance.
 
         Args:
             item: the object; it stands on the ground below its axis.
             frame: the carriageway that is its road.
-            beside: how far its middle lies to the left of its axis, m.
+            middle_offset: how far its middle lies to the left of its axis, m.
         """
         start, end = item.start_station, min(item.end_station, self.geometry.length)
         if end - start <= CLOSE:
@@ -82,13 +82,14 @@ class Ground:
         bends = [s for section in sections for s in section.kinks()]
         bends += [point.station for section in sections for point in section.carriageway.crossfall]
         bends += [start + item.ramp_length(end), end - item.ramp_length(end)]
-        tall: Any = getattr(item, "height", 0.0)
+        full_height: Any = getattr(item, "height", 0.0)
 
         def rows(station: Float) -> Float:
+            """Return s minus station, t, h and height (N, 4) at stations, m: functions that are nearly linear."""
             offset = item.offset_at(station)
-            place = frame.road_coordinates(station, offset + beside, self.height(station, offset))
+            place = frame.road_coordinates(station, offset + middle_offset, self.height(station, offset))
             share = item.height_share(end, station)
-            return np.column_stack([place.s - station, place.t, place.h, tall * share])
+            return np.column_stack([place.s - station, place.t, place.h, full_height * share])
 
         stations = chord_stations(rows, merged_stations(bends, start, end), self.tolerance, shortest=0.05)
         samples = rows(stations)

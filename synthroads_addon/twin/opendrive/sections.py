@@ -35,13 +35,13 @@ _BESIDE = {"exit": "exit", "entry": "entry"}
 _RAMP = {"exit": "offRamp", "entry": "onRamp"}
 
 
-def _changing_columns(before: set[int], after: set[int], count: int) -> list[list[int]]:
+def _changing_columns(columns_before: set[int], columns_after: set[int], count: int) -> list[list[int]]:
     """Return runs of adjacent columns that exist on one side of a border only, before or after it."""
     runs: list[list[int]] = [[]]
     for column in range(count):
-        if column in before and column in after:
+        if column in columns_before and column in columns_after:
             runs.append([])
-        elif column in before or column in after:
+        elif column in columns_before or column in columns_after:
             runs[-1].append(column)
     return [run for run in runs if run]
 
@@ -116,9 +116,9 @@ class LanePlan:
     def offsets(self, station: Float) -> Float:
         """Return t (N, M) of the carriageway's strip borders, from the inside out, at stations (N,), m."""
         sign = self.frame.section.carriageway.sign
-        distances, below = sign * self.frame.section.distances(station), self.falls(station)
+        distances, falls = sign * self.frame.section.distances(station), self.falls(station)
         columns = range(distances.shape[1])
-        return np.stack([self.frame.t_coordinate(station, distances[:, i], below[:, i]) for i in columns], axis=1)
+        return np.stack([self.frame.t_coordinate(station, distances[:, i], falls[:, i]) for i in columns], axis=1)
 
     def falls(self, station: Float) -> Float:
         """Return how far (N, M) the strips' borders, from the inside out, lie below the carriageway's plane, m.
@@ -143,12 +143,13 @@ class LanePlan:
         return np.asarray(other.carriageway.sign * other.distances(station)[:, 0])
 
     def _widths(self, station: Float) -> Float:
+        """Return the widths (N, F) of the columns in the carriageway's plane at stations (N,), m; the median's last."""
         offsets = self.offsets(station)
         sign = self.frame.section.carriageway.sign
         widths = sign * (offsets[:, 1:] - offsets[:, :-1])
         if self.frame.has_median:
-            far = self.frame.t_coordinate(station, self._far_edge(station), self.median_fall(station))
-            widths = np.column_stack([widths, sign * (offsets[:, 0] - far)])
+            far_edge = self.frame.t_coordinate(station, self._far_edge(station), self.median_fall(station))
+            widths = np.column_stack([widths, sign * (offsets[:, 0] - far_edge)])
         return np.asarray(widths, dtype=np.float64)
 
     def width_at_start(self, piece: int) -> Float:
@@ -160,12 +161,14 @@ class LanePlan:
         borders = self.widths.borders
         rows = [self._lanes(piece) for piece in range(len(borders) - 1)]
         sections: list[LaneSection] = []
-        first = 0
+        first_piece = 0
         for piece in range(1, len(rows) + 1):
             if piece < len(rows) and rows[piece] == rows[piece - 1] and not self._pinched(piece, rows[piece]):
                 continue
-            sections.append(LaneSection(float(borders[first]), float(borders[piece]), (first, piece), rows[first]))
-            first = piece
+            sections.append(
+                LaneSection(float(borders[first_piece]), float(borders[piece]), (first_piece, piece), rows[first_piece])
+            )
+            first_piece = piece
         return sections
 
     def _merge_short(self, sections: list[LaneSection]) -> list[LaneSection]:
@@ -174,55 +177,64 @@ class LanePlan:
         A short one is part of the next (or the last), in which what it has begins at once, with its width there.
         """
         sections_kept: list[LaneSection] = []
-        waiting: LaneSection | None = None
+        short_section: LaneSection | None = None
         for section in sections:
             if section.end - section.start < SHORTEST_SECTION and section is not sections[-1]:
-                waiting = waiting or section
+                short_section = short_section or section
                 continue
-            sections_kept.append(section if waiting is None else self._begin_earlier(section, waiting))
-            waiting = None
+            sections_kept.append(section if short_section is None else self._begin_earlier(section, short_section))
+            short_section = None
         return sections_kept
 
-    def _begin_earlier(self, section: LaneSection, short: LaneSection) -> LaneSection:
+    def _begin_earlier(self, section: LaneSection, short_section: LaneSection) -> LaneSection:
         """Return a section extended back over a short one before it; adjusts the plan's widths there, in place."""
-        first, last = short.pieces[0], section.pieces[0]
-        before = self._columns_of(self._lanes(first - 1) if first > 0 else section.lanes)
-        after = self._columns_of(section.lanes)
-        for run in _changing_columns(before, after, len(self._columns)):
-            self._hand_over_width(run, [column for column in run if column in after], (first, last))
-        return replace(section, start=short.start, pieces=(first, section.pieces[1]))
+        first_piece, end_piece = short_section.pieces[0], section.pieces[0]
+        columns_before = self._columns_of(self._lanes(first_piece - 1) if first_piece > 0 else section.lanes)
+        columns_after = self._columns_of(section.lanes)
+        for run in _changing_columns(columns_before, columns_after, len(self._columns)):
+            self._hand_over_width(run, [column for column in run if column in columns_after], (first_piece, end_piece))
+        return replace(section, start=short_section.start, pieces=(first_piece, section.pieces[1]))
 
     @staticmethod
     def _columns_of(lanes: Mapping[Side, Iterable[LaneStrip]]) -> set[int]:
         return {lane.column for strips in lanes.values() for lane in strips}
 
-    def _hand_over_width(self, columns: list[int], new: list[int], pieces: tuple[int, int]) -> None:
-        """Give the width of adjacent columns, on a range of pieces, to the new ones among them, in place."""
-        if not new:
+    def _hand_over_width(self, columns: list[int], new_columns: list[int], pieces: tuple[int, int]) -> None:
+        """Give the width of adjacent columns, on a range of pieces, to those among them that are new, in place.
+
+        All new columns but the last get the constant width that they have right behind the range; the last one gets
+        what is left, so that the sum of the widths stays the same.
+        """
+        if not new_columns:
             return
-        first, last = pieces
+        first_piece, end_piece = pieces
         coefficients = self.widths.coefficients
-        room = coefficients[first:last, columns].sum(axis=1)
-        for column in new[:-1]:
-            coefficients[first:last, column] = (coefficients[last, column, 0], 0.0, 0.0, 0.0)
-        coefficients[first:last, new[-1]] = room - coefficients[first:last, new[:-1]].sum(axis=1)
+        total_width = coefficients[first_piece:end_piece, columns].sum(axis=1)
+        for column in new_columns[:-1]:
+            coefficients[first_piece:end_piece, column] = (coefficients[end_piece, column, 0], 0.0, 0.0, 0.0)
+        coefficients[first_piece:end_piece, new_columns[-1]] = total_width - coefficients[
+            first_piece:end_piece, new_columns[:-1]
+        ].sum(axis=1)
 
     def _pinched(self, piece: int, lanes: dict[Side, tuple[LaneStrip, ...]]) -> bool:
+        """Return whether any of the lanes has no width at the start of a piece."""
         widths = self.width_at_start(piece)
         return any(widths[lane.column] < CLOSE for side in lanes.values() for lane in side)
 
     def _lanes(self, piece: int) -> dict[Side, tuple[LaneStrip, ...]]:
+        """Return each side's lanes on a piece, from the inside out: the columns that have a width anywhere on it."""
         borders = self.widths.borders
         samples = np.linspace(borders[piece], borders[piece + 1], 5)
-        there = self._widths(samples).max(axis=0) > CLOSE
+        has_width = self._widths(samples).max(axis=0) > CLOSE
         middle = float(samples[2])
         lanes: dict[Side, list[LaneStrip]] = {side: [] for side in SIDES}
         for column, (side, *_) in enumerate(self._columns):
-            if there[column]:
+            if has_width[column]:
                 lanes[side].append(self._lane(column, middle))
         return {side: tuple(strips) for side, strips in lanes.items()}
 
     def _lane(self, column: int, station: float) -> LaneStrip:
+        """Return a column as a lane with the type and the owner's instance number that it has at a station (m)."""
         side, index, kind = self._columns[column]
         section = self.frame.section
         instance = section.carriageway.instance
@@ -240,25 +252,26 @@ class LanePlan:
         return LaneStrip(column, index, kind, types[shape.turnout.kind], shape.turnout.instance)
 
     def _left_instance(self) -> int:
+        """Return the left carriageway's instance number, which a median without an object of its own has."""
         return self.geometry.sections["left"].carriageway.instance
 
     def _turnout(self, side: Side, station: float) -> TurnoutShape | None:
         """Return the turnout at a station on a side, or None; of several the last, as in `RoadGeometry.instances`."""
-        last = None
+        turnout_here = None
         for shape in self.geometry.sections[side].turnouts:
-            low, high = shape.range()
-            if low <= station <= high:
-                last = shape
-        return last
+            start_station, end_station = shape.range()
+            if start_station <= station <= end_station:
+                turnout_here = shape
+        return turnout_here
 
-    def continuing_lane(self, section: int, other: int, side: Side, column: int) -> int | None:
+    def continuing_lane(self, section: int, neighbour: int, side: Side, column: int) -> int | None:
         """Return the unsigned number of the lane that continues a column in a neighbouring section, or None.
 
         A lane without width at the border begins or ends there.
         """
-        if not 0 <= other < len(self.sections):
+        if not 0 <= neighbour < len(self.sections):
             return None
-        border = self.sections[max(section, other)].pieces[0]
+        border = self.sections[max(section, neighbour)].pieces[0]
         if self.width_at_start(border)[column] < CLOSE or self.widths.at_end(border - 1)[column] < CLOSE:
             return None
-        return self.sections[other].find(side, column)
+        return self.sections[neighbour].find(side, column)

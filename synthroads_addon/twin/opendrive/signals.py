@@ -45,12 +45,12 @@ def signal_faces(standing: Iterable[PlacedThing], numbers: FreeIds) -> list[Face
         for place, (part, signal) in enumerate(placed.thing.signals().items(), 1):
             bodies = [body for body in placed.bodies if body.part == part and not body.detail]
             corners = np.concatenate([body.sections.reshape(-1, 3) for body in bodies])
-            low, size = corners.min(axis=0), np.ptp(corners, axis=0)
+            lower, size = corners.min(axis=0), np.ptp(corners, axis=0)
             separate_number = bool(bodies[0].ifc)
             number, name = (
                 (numbers.take(), f"{placed.name}-{place}") if separate_number else (placed.thing.instance, placed.name)
             )
-            middle = placed.frame.to_local(np.array([low[0] + size[0] / 2.0, 0.0, low[2]]))
+            middle = placed.frame.to_local(np.array([lower[0] + size[0] / 2.0, 0.0, lower[2]]))
             faces.append(Face(placed, number, name, signal, middle, float(size[0]), float(size[2])))
     return faces
 
@@ -70,16 +70,16 @@ def write_signals(parent: Element, ground: Ground, frame: RoadFrame, faces: Iter
             _signal(parent, ground, frame, (face, min(max(station, 0.0), ground.geometry.length), offset))
 
 
-def _signal(parent: Element, ground: Ground, frame: RoadFrame, located: tuple[Face, float, float]) -> None:
+def _signal(parent: Element, ground: Ground, frame: RoadFrame, face_and_place: tuple[Face, float, float]) -> None:
     """Add one `signal` element with a reference to its thing, placed at the lower edge of its face."""
-    face, station, offset = located
+    face, station, offset = face_and_place
     signal, thing = face.signal, face.placed.thing
     assert isinstance(thing, StandingThing)
     turn = math.remainder(thing.turn + (0.0 if signal.facing > 0.0 else math.pi), math.tau)
     with_stations = abs(turn) <= math.pi / 2.0 + 1e-12
     height = float(face.middle[2]) - float(ground.geometry.profile.elevation(np.array([station]))[0])
     place = frame.road_coordinates(np.array([station]), np.array([offset]), np.array([height]))
-    about: dict[str, Value] = {
+    attributes: dict[str, Value] = {
         "id": face.number,
         "name": face.name,
         "s": float(place.s[0]),
@@ -95,8 +95,8 @@ def _signal(parent: Element, ground: Ground, frame: RoadFrame, located: tuple[Fa
         "subtype": signal.subtype,
     }
     if signal.speed is not None:
-        about |= {"value": signal.speed, "unit": "km/h"}
-    entry = element(parent, "signal", about | ({"text": signal.text} if signal.text else {}))
+        attributes |= {"value": signal.speed, "unit": "km/h"}
+    entry = element(parent, "signal", attributes | ({"text": signal.text} if signal.text else {}))
     kind = thing.twin().opendrive.partition(".")[0]
     element(entry, "reference", {"elementType": "object", "elementId": thing.instance, "type": kind})
     add_object_data(entry, face.placed.name, thing.instance, object_type=type(thing).__name__)

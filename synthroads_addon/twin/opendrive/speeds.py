@@ -25,37 +25,41 @@ class SpeedLimits:
     """
 
     def __init__(self, geometry: RoadGeometry, side: Side) -> None:
-        urban = geometry.parameters.design_class == _URBAN_CLASS
-        self.without = _URBAN if urban else ADVISORY
-        ahead = geometry.sections[side].carriageway.traffic > 0
-        changes = _changes(geometry, ahead, self.without)
-        if not ahead:
+        is_urban = geometry.parameters.design_class == _URBAN_CLASS
+        self.without = _URBAN if is_urban else ADVISORY
+        is_with_stations = geometry.sections[side].carriageway.traffic > 0
+        changes = _changes(geometry, is_with_stations, self.without)
+        if not is_with_stations:
             changes = changes[::-1]
         # With the stations a sign holds from its place on, against them up to it.
         borders = [0.0, *(station for station, _ in changes), geometry.length]
-        speeds = [self.without, *(speed for _, speed in changes)] if ahead else [*(v for _, v in changes), self.without]
+        speeds = (
+            [self.without, *(speed for _, speed in changes)]
+            if is_with_stations
+            else [*(v for _, v in changes), self.without]
+        )
         rows = zip(borders[:-1], borders[1:], speeds, strict=True)
         self.stretches = [(start, end, speed) for start, end, speed in rows if end - start > CLOSE]
 
     def limits_between(self, start: float, end: float) -> list[tuple[float, float]]:
         """Return (station in m, limit in km/h) where each limit begins between two stations, the first at the start."""
         limits: list[tuple[float, float]] = []
-        for first, last, speed in self.stretches:
-            low, high = max(first, start), min(last, end)
-            if high - low > CLOSE and (not limits or limits[-1][1] != speed):
-                limits.append((low, speed))
+        for stretch_start, stretch_end, speed in self.stretches:
+            limit_start, limit_end = max(stretch_start, start), min(stretch_end, end)
+            if limit_end - limit_start > CLOSE and (not limits or limits[-1][1] != speed):
+                limits.append((limit_start, speed))
         return limits
 
 
-def _changes(geometry: RoadGeometry, ahead: bool, without: float) -> list[tuple[float, float]]:
+def _changes(geometry: RoadGeometry, is_with_stations: bool, usual_speed: float) -> list[tuple[float, float]]:
     """Return (station in m, limit in km/h) of the signs that change the limit, in driving order."""
     speeds: dict[float, float] = {}
     for item in geometry.parameters.of_type(TrafficSign).values():
         with_stations = abs((item.rotation_deg + 180.0) % 360.0 - 180.0) <= 90.0
-        if with_stations != ahead or not 0.0 < item.station < geometry.length:
+        if with_stations != is_with_stations or not 0.0 < item.station < geometry.length:
             continue
         if match := _LIMIT.fullmatch(item.code):
             speeds[item.station] = float(match[1])
         elif _ENDS.match(item.code):
-            speeds[item.station] = without
-    return sorted(speeds.items(), reverse=not ahead)
+            speeds[item.station] = usual_speed
+    return sorted(speeds.items(), reverse=not is_with_stations)

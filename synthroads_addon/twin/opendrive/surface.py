@@ -27,14 +27,14 @@ def plan_view(road: Element, geometry: RoadGeometry) -> None:
     starts = alignment.element_starts
     position, heading, _ = alignment.frame(starts)
     parent = element(road, "planView")
-    for first, last in _joined_lines(geometry, position, heading):
-        item = alignment.elements[first]
+    for first_element, last_element in _joined_lines(geometry, position, heading):
+        item = alignment.elements[first_element]
         attributes: dict[str, Value] = {
-            "s": float(starts[first]),
-            "x": _plan(position[first, 0]),
-            "y": _plan(position[first, 1]),
-            "hdg": f"{heading[first] + 0.0:.13g}",
-            "length": float(starts[last + 1] - starts[first]),
+            "s": float(starts[first_element]),
+            "x": _plan(position[first_element, 0]),
+            "y": _plan(position[first_element, 1]),
+            "hdg": f"{heading[first_element] + 0.0:.13g}",
+            "length": float(starts[last_element + 1] - starts[first_element]),
         }
         kind = element(parent, "geometry", attributes)
         if item.kind == "line":
@@ -47,10 +47,12 @@ def plan_view(road: Element, geometry: RoadGeometry) -> None:
 
 
 def _plan(value: float) -> str:
+    """Return the text of a plan coordinate (m), rounded to `PLAN_DIGITS` decimals and without a negative zero."""
     return repr(round(float(value), PLAN_DIGITS) + 0.0)
 
 
 def _curvature(value: float) -> str:
+    """Return the text of a curvature (1/m) with 15 significant digits and without a negative zero."""
     return f"{value + 0.0:.15g}"
 
 
@@ -59,11 +61,11 @@ def _joined_lines(geometry: RoadGeometry, position: Float, heading: Float) -> li
     joined: list[tuple[int, int]] = []
     for number, item in enumerate(geometry.alignment.elements):
         if joined and item.kind == "line" and geometry.alignment.elements[joined[-1][0]].kind == "line":
-            first = joined[-1][0]
-            forth = position[number + 1] - position[first]
-            aside = abs(forth[1] * np.cos(heading[first]) - forth[0] * np.sin(heading[first]))
-            if abs(heading[number] - heading[first]) < _LINE_TURN and aside < _LINE_APART:
-                joined[-1] = (first, number)
+            first_element = joined[-1][0]
+            vector = position[number + 1] - position[first_element]
+            distance = abs(vector[1] * np.cos(heading[first_element]) - vector[0] * np.sin(heading[first_element]))
+            if abs(heading[number] - heading[first_element]) < _LINE_TURN and distance < _LINE_APART:
+                joined[-1] = (first_element, number)
                 continue
         joined.append((number, number))
     return joined
@@ -120,43 +122,50 @@ class RoadFrame:
         pivot = section.carriageway.sign * section.pivot(station)
         return np.asarray(geometry.profile.elevation(station) + rise * (offset - pivot))
 
-    def t_coordinate(self, station: Float, offset: Float, below: Float | float = 0.0) -> Float:
-        """Return the coordinate t (N,) of points at offsets (N,) that lie ``below`` the plane vertically, m."""
+    def t_coordinate(self, station: Float, offset: Float, depth: Float | float = 0.0) -> Float:
+        """Return the coordinate t (N,) of points at offsets (N,) that lie ``depth`` the plane vertically, m."""
         rise = self.crossfall(station)
-        return np.asarray(offset * np.sqrt(1.0 + rise**2) - below * rise / np.sqrt(1.0 + rise**2))
+        return np.asarray(offset * np.sqrt(1.0 + rise**2) - depth * rise / np.sqrt(1.0 + rise**2))
 
-    def h_coordinate(self, station: Float, below: Float) -> Float:
-        """Return the coordinate h (N,), normal to the plane, of points that lie ``below`` it vertically, m."""
-        return np.asarray(-below * np.cos(np.arctan(self.crossfall(station))) * self._cosine(station))
+    def h_coordinate(self, station: Float, depth: Float) -> Float:
+        """Return the coordinate h (N,), normal to the plane, of points that lie ``depth`` it vertically, m."""
+        return np.asarray(-depth * np.cos(np.arctan(self.crossfall(station))) * self._cosine(station))
 
     def road_coordinates(self, station: Float, offset: Float, height: Float) -> RoadCoordinates:
         """Convert stations, offsets and heights above the profile (N,) to OpenDRIVE road coordinates s, t, h, m."""
         geometry = self.geometry
         station, offset, height = (np.asarray(values, dtype=np.float64) for values in (station, offset, height))
         station = np.clip(station, 0.0, geometry.length)
-        level = height + geometry.profile.elevation(station)
+        elevation = height + geometry.profile.elevation(station)
         origin, heading, _ = geometry.alignment.frame(station)
-        plan = origin + offset[:, None] * left_vectors(heading)
+        xy = origin + offset[:, None] * left_vectors(heading)
         s = station
         # A point above the line lies at right angles to a place of it farther on, where it climbs.
         for _ in range(_APPROXIMATIONS):
-            ahead, _, above = self._line_coordinates(s, plan, level)
-            bend = 1.0 - geometry.alignment.curvature(s) * offset
-            s = np.clip(s + ahead * self._cosine(s) / bend, 0.0, geometry.length)
-        _, left, above = self._line_coordinates(s, plan, level)
+            ahead_distance, _, normal_distance = self._line_coordinates(s, xy, elevation)
+            stretch_factor = 1.0 - geometry.alignment.curvature(s) * offset
+            s = np.clip(s + ahead_distance * self._cosine(s) / stretch_factor, 0.0, geometry.length)
+        _, left_distance, normal_distance = self._line_coordinates(s, xy, elevation)
         tilt = self.superelevation.at(s)
         cos, sin = np.cos(tilt), np.sin(tilt)
-        return RoadCoordinates(s, left * cos + above * sin, above * cos - left * sin)
+        return RoadCoordinates(
+            s, left_distance * cos + normal_distance * sin, normal_distance * cos - left_distance * sin
+        )
 
-    def _line_coordinates(self, s: Float, plan: Float, level: Float) -> tuple[Float, Float, Float]:
+    def _line_coordinates(self, s: Float, xy: Float, elevation: Float) -> tuple[Float, Float, Float]:
         """Return distances (N,) of points from the line at s: ahead along it, to its left, and normal above it, m."""
         origin, heading, _ = self.geometry.alignment.frame(s)
-        away, left = plan - origin, left_vectors(heading)
-        forwards = away[:, 0] * left[:, 1] - away[:, 1] * left[:, 0]
-        rise, grade, cosine = level - self.elevation.at(s), self.elevation.slope(s), self._cosine(s)
-        return (forwards + grade * rise) * cosine, (away * left).sum(axis=1), (rise - grade * forwards) * cosine
+        vectors, left_normals = xy - origin, left_vectors(heading)
+        ahead_distance = vectors[:, 0] * left_normals[:, 1] - vectors[:, 1] * left_normals[:, 0]
+        height_above, grade, cosine = elevation - self.elevation.at(s), self.elevation.slope(s), self._cosine(s)
+        return (
+            (ahead_distance + grade * height_above) * cosine,
+            (vectors * left_normals).sum(axis=1),
+            (height_above - grade * ahead_distance) * cosine,
+        )
 
     def _cosine(self, station: Float) -> Float:
+        """Return the cosine (N,) of the reference line's slope angle at stations (N,)."""
         return np.asarray(1.0 / np.sqrt(1.0 + self.elevation.slope(station) ** 2))
 
     def _fit_superelevation(self) -> Cubics:
@@ -164,6 +173,7 @@ class RoadFrame:
         levels = self.elevation
 
         def tilt(station: Float, piece: NDArray[np.intp]) -> Float:
+            """Return the tilt (N,) at stations on pieces of given numbers: arctan of the crossfall times cos(slope)."""
             _, b, c, d = levels.coefficients[piece, 0].T
             u = station - levels.borders[piece]
             grade = b + u * (2.0 * c + 3.0 * d * u)
@@ -183,6 +193,7 @@ def lateral_profile(road: Element, frame: RoadFrame) -> None:
 
 
 def _cubics(parent: Element, tag: str, function: Cubics) -> None:
+    """Add an element for each cubic of a function of the station, neighbours that continue each other as one."""
     rows = join_cubics(function.borders, function.coefficients[:, 0])
     for start, coefficients in merge_similar(rows, float(function.borders[-1])):
         add_cubic(parent, tag, {"s": start}, coefficients)
@@ -198,5 +209,5 @@ def edge_points(geometry: RoadGeometry) -> Float:
 def header_bounds(geometry: RoadGeometry) -> dict[str, float]:
     """Return the header's bounding box of the road: north, south, east, west in local coordinates, whole metres."""
     points = edge_points(geometry)
-    low, high = np.floor(points.min(axis=0)) - 1.0, np.ceil(points.max(axis=0)) + 1.0
-    return {"north": float(high[1]), "south": float(low[1]), "east": float(high[0]), "west": float(low[0])}
+    lower, upper = np.floor(points.min(axis=0)) - 1.0, np.ceil(points.max(axis=0)) + 1.0
+    return {"north": float(upper[1]), "south": float(lower[1]), "east": float(upper[0]), "west": float(lower[0])}

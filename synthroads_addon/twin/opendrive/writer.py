@@ -64,12 +64,12 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float, lo
     numbers = FreeIds(parameters)
     trace = Trace(geometry, within=("dash",), reasons=LOST)
     plants = list(placed_plants(geometry))
-    standing = {placed.name: placed for placed in standing_things(geometry)}
-    faces = signal_faces(standing.values(), numbers)
+    things_by_name = {placed.name: placed for placed in standing_things(geometry)}
+    faces = signal_faces(things_by_name.values(), numbers)
     for name, item in parameters.of_type(Carriageway).items():
         road = element(root, "road", {"name": name, "id": item.instance, **_attributes(geometry)})
         frame = RoadFrame(geometry, item.side)
-        objects = Objects(element(None, "objects"), ground, frame, numbers, standing)
+        objects = Objects(element(None, "objects"), ground, frame, numbers, things_by_name)
         _road(road, objects, faces, plants)
         trace.record_entity(parameters.alignment.instance, element="planView", road=item.instance)
     trace_elements(root, trace)
@@ -87,6 +87,7 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float, lo
 
 
 def _attributes(geometry: RoadGeometry) -> dict[str, Value]:
+    """Return the attributes that the `road` elements of all carriageways have in common."""
     return {"junction": "-1", "length": geometry.length, "rule": "RHT"}
 
 
@@ -162,13 +163,15 @@ def geo_reference(epsg: int) -> str:
         InputError: the code is unknown.
     """
     text = wkt(epsg)
-    number = dict(re.findall(r'PARAMETER\["(\w+)",([-0-9.]+)\]', text))
+    parameter_texts = dict(re.findall(r'PARAMETER\["(\w+)",([-0-9.]+)\]', text))
     spheroid = re.search(r'SPHEROID\["([^"]+)"', text)
     datum = re.search(r'DATUM\["([^"]+)"', text)
-    plain = text.startswith("PROJCS") and 'PROJECTION["Transverse_Mercator"]' in text and set(number) == set(_PROJ)
-    if not (plain and spheroid and datum and datum[1] in _PLAIN_DATUMS):
+    is_transverse_mercator = (
+        text.startswith("PROJCS") and 'PROJECTION["Transverse_Mercator"]' in text and set(parameter_texts) == set(_PROJ)
+    )
+    if not (is_transverse_mercator and spheroid and datum and datum[1] in _PLAIN_DATUMS):
         return text
-    values = " ".join(f"+{key}={number[name]}" for name, key in _PROJ.items())
+    values = " ".join(f"+{key}={parameter_texts[name]}" for name, key in _PROJ.items())
     return f"+proj=tmerc {values} +ellps={_ELLIPSOIDS[spheroid[1]]} +units=m +vunits=m +no_defs"
 
 
@@ -179,9 +182,9 @@ def _list_unwritten(root: Element, parameters: RoadParameters) -> None:
     for name, item in parameters.objects.items():
         if isinstance(item, kinds):
             entry = element(root, "userData", {"code": "instance", "value": item.instance})
-            first = numbers.part_attributes(item.instance)
+            part_numbers = numbers.part_attributes(item.instance)
             element(
                 entry,
                 "parameterObject",
-                {"id": name, "type": type(item).__name__, "instance": item.instance, **first},
+                {"id": name, "type": type(item).__name__, "instance": item.instance, **part_numbers},
             )

@@ -38,8 +38,8 @@ def add_cubic(parent: Element, tag: str, where: Mapping[str, Value], coefficient
 
     Coefficients have 12 significant digits: at 100 m a d of 12 digits is exact to less than a nanometre.
     """
-    a, *higher = coefficients
-    texts = {name: f"{value + 0.0:.12g}" for name, value in zip("bcd", higher, strict=True)}
+    a, *higher_coefficients = coefficients
+    texts = {name: f"{value + 0.0:.12g}" for name, value in zip("bcd", higher_coefficients, strict=True)}
     return element(parent, tag, {**where, "a": float(a), **texts})
 
 
@@ -48,9 +48,9 @@ def add_user_data(parent: Element, code: str, value: Value) -> None:
     element(parent, "userData", {"code": code, "value": value})
 
 
-def add_object_data(parent: Element, name: str, instance: int, **more: Value) -> None:
+def add_object_data(parent: Element, name: str, instance: int, **further_values: Value) -> None:
     """Add `userData` elements with an object's instance number, id and further values; None is left out."""
-    for code, value in {"instance": instance, "id": name, **more}.items():
+    for code, value in {"instance": instance, "id": name, **further_values}.items():
         if value is not None:
             add_user_data(parent, code, value)
 
@@ -69,5 +69,9 @@ def write_xml(root: Element, path: Path) -> None:
 
 
 def _as_cdata(match: re.Match[str]) -> str:
+    """Return an element's marked text as a CDATA section, with the XML escapes undone.
+
+    ``]]>`` would end the section, so it is split over two of them.
+    """
     content = match[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&").replace("]]>", "]]]]><![CDATA[>")
     return f"><![CDATA[{content}]]><"

@@ -225,7 +225,7 @@ def requested_visible_scan(context: bpy.types.Context) -> VisibleScan:
     """Return the request to scan a scene without a road; `InputError` if a setting is wrong."""
     settings, choices = context.scene.synthroads, context.scene.synthroads_scene_scan
     scenario = with_preferences(settings.scenario())
-    inputs = check_scan(scenario, foreign=True)
+    inputs = check_scan(scenario, is_foreign=True)
     platform = scenario.scan.platform
     follows_file = platform.kind == "trajectory"
     guide = None if follows_file else choices.guide
