@@ -77,10 +77,10 @@ def run(arguments: argparse.Namespace) -> Outcome:
         add_scaling(figures["runs"])
         return {TABLE: markdown(figures)}
 
-    with ExitStack() as opened:
+    with ExitStack() as stack:
         folder = None
         if arguments.output:
-            folder = opened.enter_context(
+            folder = stack.enter_context(
                 output_folder(arguments.output, _FILES, arguments.overwrite or arguments.resume)
             )
         table = put_tables(arguments.document, [TABLE], measure)[TABLE]
@@ -107,24 +107,25 @@ def _check(arguments: argparse.Namespace) -> None:
 
 def _measure_all(arguments: argparse.Namespace) -> dict[str, Any]:
     """Measure the wanted parts on each requested number of cores; return the results for the tables."""
-    about = {"quick": arguments.quick, "scenario": arguments.scenario, "changes": arguments.changes}
+    request = {"quick": arguments.quick, "scenario": arguments.scenario, "changes": arguments.changes}
     with tempfile.TemporaryDirectory(prefix="synthroads-") as text:
         folder = Path(text)
         write_waves(folder / "waves.obj", _QUICK_CELLS if arguments.quick else CELLS)
         write_waves(folder / "start.obj", _QUICK_CELLS)
         if "road" in arguments.parts:
-            _measure_in_process({**about, "part": "road file", "scene": str(folder / "road.obj")}, arguments.cores[0])
-        return _runs(arguments, about, folder)
+            _measure_in_process({**request, "part": "road file", "scene": str(folder / "road.obj")}, arguments.cores[0])
+        return _runs(arguments, request, folder)
 
 
-def _runs(arguments: argparse.Namespace, about: dict[str, Any], folder: Path) -> dict[str, Any]:
+def _runs(arguments: argparse.Namespace, request: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Measure the parts on each number of cores; return the machine and the figures of each run."""
     progress, runs = progress_bar(arguments), []
     measured_parts = [part for part in arguments.parts if part != "start"]
     for number, cores in enumerate(arguments.cores):
         run: dict[str, Any] = {"cores": cores, "lines": {}, "floors": [], "stages": {}, "scans": {}, "beside": []}
         for step, part in enumerate(measured_parts):
             progress(f"{part}, {cores}", (number + step / len(arguments.parts)) / len(arguments.cores))
-            figures = _measure_in_process({**about, "part": part, "scene": str(folder / f"{part}.obj")}, cores)
+            figures = _measure_in_process({**request, "part": part, "scene": str(folder / f"{part}.obj")}, cores)
             run["floors"] += figures["floors"]
             for name in ("lines", "stages", "scans"):
                 run[name] |= figures.get(name, {})
@@ -156,10 +157,12 @@ def _read_kept(arguments: argparse.Namespace) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     former_figures: dict[str, Any] = read_json(path)
-    for name, now in (("machine", _machine()), ("quick", arguments.quick)):
-        if former_figures.get(name) != now:
+    for name, current_value in (("machine", _machine()), ("quick", arguments.quick)):
+        if former_figures.get(name) != current_value:
             raise InputError(
-                f"{path}: {name}", former_figures.get(name), f"must be {now!r}, as now; --overwrite replaces it"
+                f"{path}: {name}",
+                former_figures.get(name),
+                f"must be {current_value!r}, as now; --overwrite replaces it",
             )
     return former_figures
 
@@ -193,21 +196,22 @@ def _measure_beside(
     versions = {"ours": root, "other": arguments.beside.resolve()}
     rows = []
     for name, scene, changes in scans_beside(arguments.parts, arguments.quick):
-        several: dict[str, list[dict[str, Any]]] = {side: [] for side in versions}
+        scans: dict[str, list[dict[str, Any]]] = {side: [] for side in versions}
         for turn in range(1 if arguments.quick else _PAIRS):
             for side in list(versions)[:: -1 if turn % 2 else 1]:
                 progress(f"{name}, {side}, {cores}", 0.0)
                 command = [sys.executable, script, str(folder / f"{scene}.obj"), *changes]
-                several[side].append(_json_of(command, f"{name} by {versions[side]}", cores, versions[side]))
-        rows.append(
-            {"name": name, "scene": scene} | {side: _medians(side_scans) for side, side_scans in several.items()}
-        )
+                scans[side].append(_json_of(command, f"{name} by {versions[side]}", cores, versions[side]))
+        rows.append({"name": name, "scene": scene} | {side: _medians(side_scans) for side, side_scans in scans.items()})
     return rows
 
 
-def _medians(several: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def _medians(measurements: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return each figure's median over several measurements, of an odd number."""
-    return {name: sorted(one[name] or 0.0 for one in several)[len(several) // 2] for name in several[0]}
+    return {
+        name: sorted(measurement[name] or 0.0 for measurement in measurements)[len(measurements) // 2]
+        for name in measurements[0]
+    }
 
 
 def _measure_part(part: dict[str, Any]) -> dict[str, Any]:
@@ -226,14 +230,16 @@ def _measure_part(part: dict[str, Any]) -> dict[str, Any]:
 
 
 def _scenario(name: str, changes: list[str], quick: bool) -> Scenario:
+    """Return the scenario to measure on: the demo's changes, those of a quick run, and the user's."""
     return load_scenario(name, [*DEMO, *(QUICK if quick else ()), *changes])
 
 
 def _verdict(result: dict[str, Any]) -> str:
+    """Return a line on the limits that aren't kept; empty for a quick run."""
     if result["quick"]:
         return ""
-    missed = [name for name, _, kept in judge_lines(result) if not kept]
-    return f"\nmissed: {', '.join(missed)}" if missed else "\nall limits that were measured are kept"
+    missed_names = [name for name, _, is_kept in judge_lines(result) if not is_kept]
+    return f"\nmissed: {', '.join(missed_names)}" if missed_names else "\nall limits that were measured are kept"
 
 
 if __name__ == "__main__":

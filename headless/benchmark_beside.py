@@ -40,9 +40,9 @@ def measure(scene: Path, changes: list[str]) -> dict[str, Any]:
             durations[name] = time.process_time() - begin_times[name]
 
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
-        plain = Path(folder) / "scenario.json"
-        plain.write_text(json.dumps(Scenario().to_dict()), encoding="utf-8")
-        job = SceneScan(load_scenario(str(plain), changes), Path(folder) / "out", scene, up="z")
+        scenario_file = Path(folder) / "scenario.json"
+        scenario_file.write_text(json.dumps(Scenario().to_dict()), encoding="utf-8")
+        job = SceneScan(load_scenario(str(scenario_file), changes), Path(folder) / "out", scene, up="z")
         counts = scan_scene(job, note)["counts"]
     return {
         "scan": sum(durations.get(stage, 0.0) for stage in _STAGES),

@@ -93,32 +93,34 @@ def beside_lines(rows: list[dict[str, Any]]) -> dict[str, float]:
     return lines
 
 
-def _pulse_rate(measured: dict[str, Any]) -> float:
-    return float(measured["pulses"]) / measured["scan"] / 1e6
+def _pulse_rate(figures: dict[str, Any]) -> float:
+    """Return a scan's rate, million pulses per processor second."""
+    return float(figures["pulses"]) / figures["scan"] / 1e6
 
 
-def join_runs(kept: list[dict[str, Any]], measured: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def join_runs(runs_before: list[dict[str, Any]], new_runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return runs by cores in which what was measured now takes the place of what was kept under the same names."""
-    joined = {run["cores"]: run for run in kept}
-    for run in measured:
-        before = joined.get(run["cores"], {})
-        both = {name: before.get(name, {}) | run[name] for name in ("lines", "stages", "scans")}
-        rows = {name: _join_rows(before.get(name, []), run[name]) for name in ("floors", "beside")}
-        joined[run["cores"]] = {"cores": run["cores"]} | both | rows
-    return [joined[cores] for cores in sorted(joined)]
+    run_of_cores = {run["cores"]: run for run in runs_before}
+    for run in new_runs:
+        run_before = run_of_cores.get(run["cores"], {})
+        parts = {name: run_before.get(name, {}) | run[name] for name in ("lines", "stages", "scans")}
+        rows = {name: _join_rows(run_before.get(name, []), run[name]) for name in ("floors", "beside")}
+        run_of_cores[run["cores"]] = {"cores": run["cores"]} | parts | rows
+    return [run_of_cores[cores] for cores in sorted(run_of_cores)]
 
 
-def _join_rows(kept: list[dict[str, Any]], measured: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    return list(({row["name"]: row for row in kept} | {row["name"]: row for row in measured}).values())
+def _join_rows(rows_before: list[dict[str, Any]], new_rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return rows in which new ones take the place of earlier ones of the same name."""
+    return list(({row["name"]: row for row in rows_before} | {row["name"]: row for row in new_rows}).values())
 
 
 def add_scaling(runs: list[dict[str, Any]]) -> None:
     """Add to the run on `CORES` cores how much faster its slowest-growing scan of a mesh is than on one, in place."""
     by_cores = {run["cores"]: run for run in runs}
     if {1, CORES} <= by_cores.keys():
-        one, several = by_cores[1]["scans"], by_cores[CORES]["scans"]
-        both = one.keys() & several.keys()
-        gains = [several[name]["pulses_per_second"] / one[name]["pulses_per_second"] for name in both]
+        scans_on_one, scans_on_more = by_cores[1]["scans"], by_cores[CORES]["scans"]
+        names = scans_on_one.keys() & scans_on_more.keys()
+        gains = [scans_on_more[name]["pulses_per_second"] / scans_on_one[name]["pulses_per_second"] for name in names]
         if gains:
             by_cores[CORES]["lines"]["scaling"] = min(gains)
 
@@ -142,9 +144,10 @@ def judge_lines(result: dict[str, Any]) -> Iterator[tuple[str, float, bool]]:
 
 
 def _limits(result: dict[str, Any]) -> list[str]:
+    """Return the table of the lines with their limits, and whether they are kept."""
     runs = result["runs"]
     titles = ["", *(f"{run['cores']} core{'s' * (run['cores'] > 1)}" for run in runs), "limit", f"on {CORES} cores"]
-    verdicts = {} if result["quick"] else {name: good for name, _, good in judge_lines(result)}
+    verdicts = {} if result["quick"] else {name: is_kept for name, _, is_kept in judge_lines(result)}
     rows = []
     for name, limit in LIMITS.items():
         values = [_number(run["lines"].get(name), limit.digits) for run in runs]
@@ -155,12 +158,13 @@ def _limits(result: dict[str, Any]) -> list[str]:
 
 
 def _stages(result: dict[str, Any]) -> list[str]:
+    """Return the table of the demo job's stages: seconds by number of cores, and memory."""
     runs = result["runs"]
     rows = []
     for name in max((run["stages"] for run in runs), key=len):
-        several = [run["stages"].get(name, {}) for run in runs]
-        memory = next((stage["peak_memory_mb"] for stage in reversed(several) if stage), None)
-        rows.append([name, *(_number(stage.get("seconds"), 2) for stage in several), _number(memory, 0)])
+        stages_by_run = [run["stages"].get(name, {}) for run in runs]
+        memory = next((stage["peak_memory_mb"] for stage in reversed(stages_by_run) if stage), None)
+        rows.append([name, *(_number(stage.get("seconds"), 2) for stage in stages_by_run), _number(memory, 0)])
     titles = ["stage of the demo job (s)", *(str(run["cores"]) for run in runs), "peak memory (MB)"]
     return markdown_table(titles, rows) if rows else []
 
@@ -182,11 +186,11 @@ def _cores(result: dict[str, Any]) -> list[str]:
     rows = []
     for name in max((run["scans"] for run in result["runs"]), key=len):
         runs = [run for run in result["runs"] if name in run["scans"]]
-        first = runs[0]["scans"][name]
+        first_scan = runs[0]["scans"][name]
         for run in runs:
             scan = run["scans"][name]
-            gain = scan["pulses_per_second"] / first["pulses_per_second"]
-            growth = first["processor_rate"] / scan["processor_rate"]
+            gain = scan["pulses_per_second"] / first_scan["pulses_per_second"]
+            growth = first_scan["processor_rate"] / scan["processor_rate"]
             cells = [_number(value, 2) for value in (scan["pulses_per_second"], gain, growth)]
             rows.append([_scan_title(name), str(run["cores"]), *cells, f"{100.0 * scan['busy']:.0f}"])
     titles = ["scan", "cores", "million pulses/s", "times as fast", "processor time, times", "cores busy (%)"]
@@ -199,11 +203,11 @@ def _beside(result: dict[str, Any]) -> list[str]:
     for run in result["runs"]:
         for row in run["beside"]:
             ours, other = row["ours"], row["other"]
-            start = row["name"] == "start"
-            cells = [one["whole"] if start else _pulse_rate(one) for one in (ours, other)]
-            memory = [_number(one["memory_mb"], 0) for one in (ours, other)]
-            unit = "processor seconds" if start else _PROCESSOR_RATE
-            title = "first scan of a new process" if start else _scan_title(row["name"])
+            is_start = row["name"] == "start"
+            cells = [figures["whole"] if is_start else _pulse_rate(figures) for figures in (ours, other)]
+            memory = [_number(figures["memory_mb"], 0) for figures in (ours, other)]
+            unit = "processor seconds" if is_start else _PROCESSOR_RATE
+            title = "first scan of a new process" if is_start else _scan_title(row["name"])
             rows.append([title, str(run["cores"]), unit, *(_number(cell, 2) for cell in cells), *memory])
     titles = ["beside another version", "cores", "unit", "ours", "the other's", "memory (MB)", "the other's"]
     return markdown_table(titles, rows) if rows else []
@@ -216,4 +220,5 @@ def _scan_title(name: str) -> str:
 
 
 def _number(value: float | None, digits: int) -> str:
+    """Return a number with digits after its point, as text; a dash for None."""
     return "–" if value is None else f"{value:,.{digits}f}"

@@ -61,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _cloud_arguments(group: argparse._ArgumentGroup) -> None:
+    """Add the arguments that say where the real cloud's classes are."""
     group.add_argument("--real", type=Path, metavar="CLOUD", help="compare with this cloud (.laz, .las, .ply, ...)")
     text = "extra attribute of the cloud that holds the classes (its classification)"
     group.add_argument("--class-field", metavar="NAME", help=text)
@@ -74,6 +75,7 @@ def _cloud_arguments(group: argparse._ArgumentGroup) -> None:
 
 
 def _view_arguments(group: argparse._ArgumentGroup) -> None:
+    """Add the arguments on device, angles, ranges and reflection."""
     group.add_argument("--device", metavar="NAME", help="preset or file with the beam divergence (0)")
     text = "incidence angles, degrees (0)"
     group.add_argument("--incidence-deg", type=_numbers, default=(0.0,), metavar="D,D,...", help=text)
@@ -93,6 +95,7 @@ def _view_arguments(group: argparse._ArgumentGroup) -> None:
 
 
 def _fit_arguments(group: argparse._ArgumentGroup) -> None:
+    """Add the arguments on what is fitted."""
     group.add_argument("--no-fit", action="store_true", help="compare only; fit nothing but the gain")
     text = f"fit these besides the brightness: {', '.join(PARTS)}, or none (spread,wavelength)"
     group.add_argument("--fit", metavar="PART,...", default="spread,wavelength", help=text)
@@ -124,8 +127,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
     sensor = fit_sensor(result, not arguments.formulas) if arguments.save_device else None
     if arguments.save:
         # Scans by the recipe have the sensor's noise beside the materials' own spread.
-        fitted = sensor.materials if sensor and arguments.save_recipe else None
-        save_fitted(result, arguments.save, arguments.overwrite, fitted)
+        fitted_materials = sensor.materials if sensor and arguments.save_recipe else None
+        save_fitted(result, arguments.save, arguments.overwrite, fitted_materials)
     if arguments.plot:
         from synthroads_addon.calibration.plot import save_plot
 
@@ -146,18 +149,18 @@ def job_of(arguments: argparse.Namespace) -> CalibrationJob:
     """Return the calibration job that the command line's arguments describe."""
     textures = dict(_texture(text) for text in arguments.texture)
     targets = [_parse_target(text, textures) for text in arguments.material]
-    unknown = set(textures) - {one.material for one in targets}
-    if unknown:
-        raise InputError("--texture", sorted(unknown)[0], "must be one of the materials asked for")
+    unknown_names = set(textures) - {target.material for target in targets}
+    if unknown_names:
+        raise InputError("--texture", sorted(unknown_names)[0], "must be one of the materials asked for")
     if arguments.axis is None and (arguments.paved or arguments.line):
         raise InputError("--axis", None, "is needed with --paved and --line")
     road = None
     if arguments.axis is not None:
         lines = tuple(offset for (offset,) in arguments.line)
         road = RoadClasses(arguments.axis, tuple(arguments.paved), lines, arguments.line_width)
-    same = {name: getattr(arguments, name) for name in _SAME}
+    copied_values = {name: getattr(arguments, name) for name in _SAME}
     parts = frozenset(_parts(arguments.fit))
-    return CalibrationJob(targets=tuple(targets), road=road, fit=not arguments.no_fit, parts=parts, **same)
+    return CalibrationJob(targets=tuple(targets), road=road, fit=not arguments.no_fit, parts=parts, **copied_values)
 
 
 def summary(result: Calibration) -> list[str]:
@@ -169,13 +172,14 @@ def summary(result: Calibration) -> list[str]:
         if "real" in row:
             lines.append(f"  {row['points']:,} points, {row['zeros_left_out']:,} zeros left out; {row['told_by']}")
         lines += _table(row)
-        changed = {name: value for name, value in row["after"].items() if row["before"].get(name) != value}
-        if changed:
-            lines.append(f"  fitted: {', '.join(f'{name} {value}' for name, value in changed.items())}")
+        changed_values = {name: value for name, value in row["after"].items() if row["before"].get(name) != value}
+        if changed_values:
+            lines.append(f"  fitted: {', '.join(f'{name} {value}' for name, value in changed_values.items())}")
     return lines
 
 
 def _table(row: dict[str, Any]) -> list[str]:
+    """Return lines of text with a class's percentiles, real and expected, and those of its views."""
     lines = ["  percentile" + "".join(f"{name:>12}" for name in row["expected"])]
     for name in ("real", "expected"):
         if name in row:
@@ -194,6 +198,7 @@ def _table(row: dict[str, Any]) -> list[str]:
 
 
 def _parts(text: str) -> list[Any]:
+    """Return the parts to fit that a text names, separated by commas."""
     parts = [] if text == "none" else [part.strip() for part in text.split(",")]
     for part in parts:
         if part not in PARTS:
@@ -202,12 +207,14 @@ def _parts(text: str) -> list[Any]:
 
 
 def _parse_target(text: str, textures: dict[str, tuple[Path, float]]) -> MaterialTarget:
+    """Return the material and the class that a text NAME or NAME=CLASS names."""
     name, _, real_class = text.partition("=")
     image, width = textures.get(name, (None, 1.0))
     return MaterialTarget(name, real_class or None, image, width)
 
 
 def _texture(text: str) -> tuple[str, tuple[Path, float]]:
+    """Return the material, image and width (m) of a text NAME=IMAGE or NAME=IMAGE@WIDTH."""
     name, equals, image = text.partition("=")
     file, _, width = image.rpartition("@") if "@" in image else (image, "", "1")
     try:
@@ -220,6 +227,7 @@ def _texture(text: str) -> tuple[str, tuple[Path, float]]:
 
 
 def _numbers(text: str) -> tuple[float, ...]:
+    """Return the numbers of a text, separated by commas: a type for argparse."""
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:

@@ -16,6 +16,7 @@ from synthroads_addon.scenario.scenario import SCENARIOS, load_scenario, scenari
 
 
 def _scenario(name: str) -> Entry:
+    """Return the entry of a scenario in the catalogue."""
     scenario = load_scenario(name)
     section = scenario.road.cross_section
     figures_by_name = {
@@ -30,6 +31,7 @@ def _scenario(name: str) -> Entry:
 
 
 def _device(name: str) -> Entry:
+    """Return the entry of a laser scanner in the catalogue."""
     device = load_device(name)
     figures_by_name = {
         "pattern": device.pattern.name,
@@ -51,6 +53,7 @@ def _device(name: str) -> Entry:
 
 
 def _recipe(name: str) -> Entry:
+    """Return the entry of a recipe in the catalogue."""
     recipe = load_recipe(name)
     splits = Counter(split for group in recipe.groups for split in group.splits())
     figures_by_name = {
@@ -64,8 +67,11 @@ def _recipe(name: str) -> Entry:
 
 
 def _classes(name: str) -> Entry:
+    """Return the entry of a scheme of classes in the catalogue."""
     rows = class_scheme(name).rows
-    table = [{"id": row.id, "name": row.name, "las": row.las, "of": [_member(one) for one in row.of]} for row in rows]
+    table = [
+        {"id": row.id, "name": row.name, "las": row.las, "of": [_member(member) for member in row.of]} for row in rows
+    ]
     return Entry(name, f"{len(rows)} classes", scheme_file(name), {"classes": table})
 
 
@@ -78,11 +84,13 @@ def _member(member: Member) -> str | int:
 
 
 def _assets(name: str) -> Entry:
+    """Return the entry of a library of assets in the catalogue."""
     classes = {key: asset.class_name for key, asset in read_asset_library(name).assets.items()}
     return Entry(name, f"{len(classes)} assets", library_file(name), {"assets": classes})
 
 
 def _materials(name: str) -> Entry:
+    """Return the entry of a table of materials in the catalogue."""
     table = read_material_table(name)
     figures_by_name = {"materials": {key: round(row.reflectivity, 3) for key, row in table.items()}}
     return Entry(name, f"{len(table)} materials in place of the usual ones", material_table_path(name), figures_by_name)

@@ -94,6 +94,7 @@ def _network(arguments: argparse.Namespace) -> tuple[Predictor | None, dict[str,
 
 
 def _options(arguments: argparse.Namespace, cloud: RoadCloud, network: Predictor | None) -> Options:
+    """Return the options of the search for the centreline that the arguments ask for."""
     from synthroads_addon.reconstruction.axis import Options
     from synthroads_addon.road.axes.centerline import read_axis
 

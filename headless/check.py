@@ -57,6 +57,7 @@ def table(violations: list[Violation], axis: AlignmentObject) -> str:
 
 
 def _number(value: float, unit: str) -> str:
+    """Return a value with its unit as text."""
     return f"{value:.6g}" + (f" {unit}" if unit != "1" else "")
 
 

@@ -17,27 +17,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads cloud` and its tools to the parser."""
     tools = parser.add_subparsers(dest="tool", required=True, metavar="TOOL")
     _info_arguments(tools.add_parser("info", help="print figures of all points and of each class"))
-    thin = tools.add_parser("subsample", help="keep one point per cell of a grid")
-    _file_arguments(thin)
-    thin.add_argument("--grid", type=float, default=0.04, metavar="M", help="edge of a cell, m (0.04)")
+    subsampling = tools.add_parser("subsample", help="keep one point per cell of a grid")
+    _file_arguments(subsampling)
+    subsampling.add_argument("--grid", type=float, default=0.04, metavar="M", help="edge of a cell, m (0.04)")
     mapping = tools.add_parser("map-intensity", help="map intensities to the distribution of another cloud")
     _file_arguments(mapping)
     mapping.add_argument("--target", required=True, type=Path, metavar="FILE", help="cloud with the distribution")
     mapping.add_argument("--per-class", action="store_true", help="map each class to the target's of the same name")
-    change = tools.add_parser("convert", help="write another format, or merge classes")
-    _file_arguments(change)
+    conversion = tools.add_parser("convert", help="write another format, or merge classes")
+    _file_arguments(conversion)
     _preview_arguments(tools.add_parser("preview", help="draw the cloud from above and in cross-section"))
     merging = tools.add_parser("merge", help="put several clouds into one")
     merging.add_argument("files", type=Path, nargs="+", metavar="FILE", help="clouds, in the order of their points")
     merging.add_argument("--output", required=True, type=Path, metavar="FILE", help="file to write")
-    part = tools.add_parser("crop", help="keep the points within a box, heights or a polygon")
-    _file_arguments(part)
-    _crop_arguments(part)
+    cropping = tools.add_parser("crop", help="keep the points within a box, heights or a polygon")
+    _file_arguments(cropping)
+    _crop_arguments(cropping)
     tiles = tools.add_parser("tile", help="cut into square tiles, thinned out on request")
     _tile_arguments(tiles)
-    for tool in (thin, change):
+    for tool in (subsampling, conversion):
         tool.add_argument("--classes", metavar="NAME_OR_FILE", help="5, or a .json file of classes (as in the cloud)")
-    for tool in (thin, mapping, change, merging, part, tiles):
+    for tool in (subsampling, mapping, conversion, merging, cropping, tiles):
         tool.add_argument("--overwrite", action="store_true", help="replace a file that is already there")
 
 
@@ -49,12 +49,14 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 
 def _file_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the cloud to read and the file to write."""
     parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
     text = "file to write; its ending gives the format"
     parser.add_argument("--output", required=True, type=Path, metavar="FILE", help=text)
 
 
 def _info_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `cloud info`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
     text = "radius of the neighbourhood for the roughness, m (0.5)"
     parser.add_argument("--radius", type=_positive, default=0.5, metavar="M", help=text)
@@ -64,6 +66,7 @@ def _info_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _preview_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `cloud preview`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
     text = "folder for the pictures; with --picture a .png file"
     parser.add_argument("--output", required=True, type=Path, metavar="DIR_OR_FILE", help=text)
@@ -78,6 +81,7 @@ def _preview_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _crop_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `cloud crop`."""
     names = ("X1", "Y1", "X2", "Y2")
     parser.add_argument("--box", type=float, nargs=4, metavar=names, help="smallest x and y, then largest, m")
     parser.add_argument("--heights", type=float, nargs=2, metavar=("LOW", "HIGH"), help="smallest and largest z, m")
@@ -85,6 +89,7 @@ def _crop_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _tile_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `cloud tile`."""
     parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the tiles")
     parser.add_argument("--size", type=float, default=60.0, metavar="M", help="edge of a tile, m (60)")
@@ -97,6 +102,7 @@ def _tile_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _merge(arguments: argparse.Namespace) -> Outcome:
+    """Run `cloud merge`; return its outcome."""
     from synthroads_addon.cloud.tools.divide import merge
 
     result = merge(arguments.files, arguments.output, arguments.overwrite, progress_bar(arguments))
@@ -104,15 +110,17 @@ def _merge(arguments: argparse.Namespace) -> Outcome:
 
 
 def _crop(arguments: argparse.Namespace) -> Outcome:
+    """Run `cloud crop`; return its outcome."""
     from synthroads_addon.cloud.tools.divide import crop
 
     box, heights = (None if part is None else tuple(part) for part in (arguments.box, arguments.heights))
-    where = (box, heights, arguments.polygon)
-    result = crop(arguments.file, arguments.output, *where, arguments.overwrite, progress_bar(arguments))
+    limits = (box, heights, arguments.polygon)
+    result = crop(arguments.file, arguments.output, *limits, arguments.overwrite, progress_bar(arguments))
     return 0, result, f"{result['points']:,} of {result['points_read']:,} points written to {arguments.output}"
 
 
 def _tile(arguments: argparse.Namespace) -> Outcome:
+    """Run `cloud tile`; return its outcome."""
     from synthroads_addon.cloud.tools.divide import tile
 
     settings = (arguments.size, arguments.grid, arguments.fewest, arguments.format, arguments.overwrite)
@@ -122,6 +130,7 @@ def _tile(arguments: argparse.Namespace) -> Outcome:
 
 
 def _info(arguments: argparse.Namespace) -> Outcome:
+    """Run `cloud info`; return its outcome."""
     from synthroads_addon.cloud.formats.registry import open_cloud
     from synthroads_addon.cloud.tools.statistics import cloud_statistics
 
@@ -131,6 +140,7 @@ def _info(arguments: argparse.Namespace) -> Outcome:
 
 
 def _subsample(arguments: argparse.Namespace) -> Outcome:
+    """Run `cloud subsample`; return its outcome."""
     from synthroads_addon.cloud.tools.convert import subsample
 
     settings = (arguments.grid, arguments.classes, arguments.overwrite)
@@ -139,6 +149,7 @@ def _subsample(arguments: argparse.Namespace) -> Outcome:
 
 
 def _map_intensity(arguments: argparse.Namespace) -> Outcome:
+    """Run `cloud map-intensity`; return its outcome."""
     from synthroads_addon.cloud.tools.convert import map_intensity
 
     files = (arguments.file, arguments.target, arguments.output)
@@ -154,6 +165,7 @@ def _map_intensity(arguments: argparse.Namespace) -> Outcome:
 
 
 def _convert(arguments: argparse.Namespace) -> Outcome:
+    """Run `cloud convert`; return its outcome."""
     from synthroads_addon.cloud.tools.convert import convert
 
     result = convert(arguments.file, arguments.output, arguments.classes, arguments.overwrite, progress_bar(arguments))
@@ -164,6 +176,7 @@ def _convert(arguments: argparse.Namespace) -> Outcome:
 
 
 def _preview(arguments: argparse.Namespace) -> Outcome:
+    """Run `cloud preview`; return its outcome."""
     from synthroads_addon.cloud.formats.registry import open_cloud
     from synthroads_addon.cloud.tools.convert import draw_previews, read_centerline
 
@@ -187,6 +200,7 @@ def _preview(arguments: argparse.Namespace) -> Outcome:
 
 
 def _positive(text: str) -> float:
+    """Return a length above 0 and up to 1000 m: a type for argparse."""
     try:
         value = float(text)
     except ValueError:

@@ -20,22 +20,22 @@ _COLUMNS = (
 def table(figures: dict[str, Any]) -> str:
     """Return a cloud's statistics as text: extent, attributes, and a table of figures by class."""
     lines = [f"{figures['file']}: {figures['kind']}, {figures['points']:,} points"]
-    named = figures["coordinate_system"]
-    lines.append(f"coordinate system {named or 'not named: coordinates are read as metres'}")
-    if named and figures["height_epsg"] is None:
+    system = figures["coordinate_system"]
+    lines.append(f"coordinate system {system or 'not named: coordinates are read as metres'}")
+    if system and figures["height_epsg"] is None:
         lines.append("vertical coordinate system not named")
     if figures["bounds"]:
-        low, high = figures["bounds"]["low"], figures["bounds"]["high"]
-        spans = " x ".join(f"{b - a:.1f}" for a, b in zip(low, high, strict=True))
-        lines.append(f"from {low} to {high}: {spans} m")
+        lowest, highest = figures["bounds"]["low"], figures["bounds"]["high"]
+        spans = " x ".join(f"{b - a:.1f}" for a, b in zip(lowest, highest, strict=True))
+        lines.append(f"from {lowest} to {highest}: {spans} m")
     lines.append(f"further attributes: {', '.join(figures['attributes']) or 'none'}")
     if figures["left_out"]:
         lines.append(f"not read: {', '.join(figures['left_out'])}")
     rows = [("", *(title for _, title, _ in _COLUMNS))]
     for name, values in {"all": figures["all"], **figures["classes"]}.items():
         if values:
-            shown = (form.format(values[key]) if values[key] is not None else "-" for key, _, form in _COLUMNS)
-            rows.append((name, *shown))
+            cells = (form.format(values[key]) if values[key] is not None else "-" for key, _, form in _COLUMNS)
+            rows.append((name, *cells))
     lines += text_table(rows[0], rows[1:], range(1, len(rows[0])))
     return "\n".join([*lines, *_predicted_lines(figures)])
 

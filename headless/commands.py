@@ -144,7 +144,7 @@ def _silent_standard_output() -> Iterator[None]:
     """Context in which whatever Blender prints to standard output is dropped; standard error still shows."""
     sys.stdout.flush()
     try:
-        saved = os.dup(1)
+        terminal = os.dup(1)
     except OSError:  # no standard output at all
         yield
         return
@@ -155,5 +155,5 @@ def _silent_standard_output() -> Iterator[None]:
         yield
     finally:
         sys.stdout.flush()
-        os.dup2(saved, 1)
-        os.close(saved)
+        os.dup2(terminal, 1)
+        os.close(terminal)

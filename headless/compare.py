@@ -45,14 +45,14 @@ def run(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.comparison.classifier import has_classifier
     from synthroads_addon.comparison.job import compare
 
-    drawn = can_draw(PICTURE)
+    has_picture = can_draw(PICTURE)
     if not has_classifier():
         logger.info(_NO_CLASSIFIER)
     with output_folder(arguments.output, [REPORT, PICTURE], arguments.overwrite) as folder:
         result = compare(arguments.synthetic, arguments.real, arguments.seed, progress_bar(arguments))
         data = result.to_dict() | {"remarks": remarks_so_far()}
         (folder / REPORT).write_text(canonical_json(data), encoding="utf-8")
-        if drawn:
+        if has_picture:
             from synthroads_addon.comparison.picture import save_picture
 
             save_picture(result, folder / PICTURE, overwrite=True)
@@ -64,15 +64,15 @@ def summary(data: dict[str, Any], output: Path) -> str:
     lines = []
     for side in ("synthetic", "real"):
         for row in data[side]:
-            told = f"told from {'the' if side == 'synthetic' else 'the other'} real ones by "
-            told += ", ".join(f"{group} {value:.2f}" for group, value in row["auc"].items())
-            lines.append(f"{side} {row['cloud']}: {told if row['auc'] else str(row['patches']) + ' patches'}")
+            figures_text = f"told from {'the' if side == 'synthetic' else 'the other'} real ones by "
+            figures_text += ", ".join(f"{group} {value:.2f}" for group, value in row["auc"].items())
+            lines.append(f"{side} {row['cloud']}: {figures_text if row['auc'] else str(row['patches']) + ' patches'}")
     if shares := ", ".join(f"{group} {value:.2f}" for group, value in data["realism"].items()):
         lines.append(f"realism, 1 where a real cloud is told apart as surely: {shares}")
     lines.append(f"density-aware Chamfer distance of patches, over that of real ones: {data['chamfer']:.2f}")
-    for name, (told, real) in list(data["giveaways"].items())[:_GIVEAWAYS]:
+    for name, (figures_text, real) in list(data["giveaways"].items())[:_GIVEAWAYS]:
         medians = [", ".join(f"{row['medians'][name]:.3g}" for row in data[side]) for side in ("synthetic", "real")]
-        lines.append(f"  {name} gives away {told:.2f} (real {real:.2f}): {medians[0]} against {medians[1]}")
+        lines.append(f"  {name} gives away {figures_text:.2f} (real {real:.2f}): {medians[0]} against {medians[1]}")
     return "\n".join([*lines, f"written to {output}"])
 
 

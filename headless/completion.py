@@ -55,8 +55,8 @@ def _set_completions(parser: argparse.ArgumentParser, file: Any, directory: Any)
             for its_parser in action.choices.values():
                 _set_completions(its_parser, file, directory)
             continue
-        called: Sequence[str] = action.option_strings or [action.dest]
-        kind = next((name for name in called if name in _NAMES_OR_FILES), None)
+        names: Sequence[str] = action.option_strings or [action.dest]
+        kind = next((name for name in names if name in _NAMES_OR_FILES), None)
         takes_files = action.type is Path or action.metavar == "FILE"
         if action.metavar == "DIR":
             action.complete = directory  # type: ignore[attr-defined] # an attribute of shtab's
@@ -64,8 +64,8 @@ def _set_completions(parser: argparse.ArgumentParser, file: Any, directory: Any)
             action.complete = file  # type: ignore[attr-defined]
         elif kind is not None:
             action.complete = _names_or_files(kind, sorted(KINDS[_NAMES_OR_FILES[kind]].names()))  # type: ignore[attr-defined]
-        elif called[-1] in _NAMES:
-            action.choices = sorted(_NAMES[called[-1]])
+        elif names[-1] in _NAMES:
+            action.choices = sorted(_NAMES[names[-1]])
 
 
 def _names_or_files(kind: str, names: Sequence[str]) -> dict[str, Any]:

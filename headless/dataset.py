@@ -23,9 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     names = ", ".join(recipe_names())
     parser.add_argument("recipe", metavar="RECIPE", help=f"{names}, or a .yaml or .json file")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the data set")
-    where = parser.add_mutually_exclusive_group()
-    where.add_argument("--jobs", type=int, metavar="N", help="scenes made at the same time on this machine (1)")
-    where.add_argument(
+    place_group = parser.add_mutually_exclusive_group()
+    place_group.add_argument("--jobs", type=int, metavar="N", help="scenes made at the same time on this machine (1)")
+    place_group.add_argument(
         "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers make the scenes (none), tcp://HOST:PORT"
     )
     parser.add_argument(
@@ -42,8 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads dataset`; return exit code (3 if scenes failed), manifest as JSON data and printed text."""
-    for name, keeps in (("--resume", arguments.resume), ("--verify", arguments.verify)):
-        if keeps and arguments.overwrite:
+    for name, is_given in (("--resume", arguments.resume), ("--verify", arguments.verify)):
+        if is_given and arguments.overwrite:
             raise InputError("--overwrite", None, f"can't be given with {name}, which keeps existing scenes")
     if arguments.verify:
         return _verify(arguments.output)
@@ -61,8 +61,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
         splits=arguments.splits,
         progress=progress_bar(arguments),
     )
-    failed = [scene for scene in manifest.scenes if scene.status == "failed"]
-    return 3 if failed else 0, manifest.to_dict(), summary(manifest, arguments.output)
+    has_failures = [scene for scene in manifest.scenes if scene.status == "failed"]
+    return 3 if has_failures else 0, manifest.to_dict(), summary(manifest, arguments.output)
 
 
 def _workers(arguments: argparse.Namespace) -> int | Cluster:
@@ -76,11 +76,16 @@ def _workers(arguments: argparse.Namespace) -> int | Cluster:
 
 
 def _verify(folder: Path) -> Outcome:
+    """Compare a data set's files with its manifest; return the outcome."""
     manifest = read_manifest(folder)
-    faulty = faults(folder, manifest.scenes)
+    fault_texts = faults(folder, manifest.scenes)
     files = sum(len(scene.files or {}) for scene in manifest.scenes)
-    text = "\n".join(faulty) if faulty else f"{files:,} files of {len(manifest.scenes)} scenes are as the manifest says"
-    return 3 if faulty else 0, {"files": files, "faults": faulty}, text
+    text = (
+        "\n".join(fault_texts)
+        if fault_texts
+        else f"{files:,} files of {len(manifest.scenes)} scenes are as the manifest says"
+    )
+    return 3 if fault_texts else 0, {"files": files, "faults": fault_texts}, text
 
 
 def summary(manifest: Manifest, folder: Path) -> str:

@@ -57,8 +57,8 @@ def _name_fault(error: Exception) -> str | None:
 def _shortage_reason(error: Exception) -> str | None:
     """Return the reason if an error means that memory, disk space or file handles ran out, else None."""
     text = " ".join(str(error).split())
-    full = isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM
-    if full or any(sign in text for sign in _MEMORY_SIGNS):
+    is_full = isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM
+    if is_full or any(sign in text for sign in _MEMORY_SIGNS):
         return f"too little memory ({text[:200] or 'it is full'}); nothing was left half-written"
     if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
         return f"{error.filename or 'a file'} cannot be opened ({error.strerror}); ulimit -n raises the limit"

@@ -49,19 +49,20 @@ def run(arguments: argparse.Namespace) -> Outcome:
             raise InputError("--leave-out", ",".join(arguments.leave_out[0]), "is for experiments with centrelines")
         data = experiment.data.model_copy(update={"left_out": tuple(arguments.leave_out)})
         experiment = experiment.model_copy(update={"data": data})
-    configured = configurations(experiment, dict(arguments.data), arguments.changes)
+    configuration_of_name = configurations(experiment, dict(arguments.data), arguments.changes)
     seeds = arguments.seeds or experiment.seeds
     for seed in seeds:
         if not 0 <= seed < 2**63:
             raise InputError("--seeds", seed, "must be whole numbers from 0")
     note_at_interrupt(lambda: f"what is trained and tested is kept in {arguments.output}; the same command goes on")
-    results = work.run_experiment(experiment, configured, arguments.output, seeds, progress_bar(arguments))
-    table = work.table(experiment.title, results, list(configured))
+    results = work.run_experiment(experiment, configuration_of_name, arguments.output, seeds, progress_bar(arguments))
+    table = work.table(experiment.title, results, list(configuration_of_name))
     text = f"{table}\nwritten to {arguments.output}: {TABLE}, {RESULTS} and the runs"
     return 0, {"title": experiment.title, "results": results}, text
 
 
 def _folder(text: str) -> tuple[str, str]:
+    """Return the name and folder of a text NAME=FOLDER: a type for argparse."""
     name, _, folder = text.partition("=")
     if not name or not folder:
         raise argparse.ArgumentTypeError(f"is '{text}': must be NAME=FOLDER, e.g. real=out/standin")
@@ -69,6 +70,7 @@ def _folder(text: str) -> tuple[str, str]:
 
 
 def _names(text: str) -> tuple[str, ...]:
+    """Return the names of a text, separated by commas: a type for argparse."""
     return tuple(filter(None, text.split(",")))
 
 

@@ -29,16 +29,16 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
     check_folder_target(arguments.output)
     quality = Quality((arguments.width, arguments.width * 9 // 16), arguments.samples)
-    planned, progress = planned_pictures(arguments.only), progress_bar(arguments)
-    if not planned:
+    picture_count, progress = planned_pictures(arguments.only), progress_bar(arguments)
+    if not picture_count:
         raise InputError("--only", arguments.only, "is part of no picture's name, e.g. scene-, object-tree, materials-")
-    done = 0
+    picture_number = 0
 
     def say(path: str) -> None:
-        nonlocal done
-        done += 1
+        nonlocal picture_number
+        picture_number += 1
         logger.info(path)
-        progress("pictures", min(1.0, done / planned))
+        progress("pictures", min(1.0, picture_number / picture_count))
 
     progress("pictures", 0.0)
     with ended_promptly():

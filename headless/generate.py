@@ -107,8 +107,8 @@ def _check_road_changes(arguments: argparse.Namespace) -> None:
 def _road_fields(change: str) -> list[str]:
     """Return the names of the road's fields that ``path=value`` sets."""
     path, value = parse_change(change, Scenario)
-    first, _, rest = path.partition(".")
-    if first != "road":
+    part, _, rest = path.partition(".")
+    if part != "road":
         return []
     return [rest.partition(".")[0]] if rest else list(value) if isinstance(value, dict) else []
 

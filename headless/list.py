@@ -60,10 +60,10 @@ def run(arguments: argparse.Namespace) -> Outcome:
         kinds = [*KINDS, _FIELDS]
         raise InputError("KIND", name, f"must be one of {', '.join(kinds)}{nearest_name(name, kinds)}")
     kind = KINDS[name]
-    listed = entries(kind, names)
-    rows = [(one.name, *row) for one in listed for row in kind.rows(one)]
+    listed_entries = entries(kind, names)
+    rows = [(entry.name, *row) for entry in listed_entries for row in kind.rows(entry)]
     lines = [*text_table(("name", *kind.head), rows), "", f"use: {kind.use}"]
-    return 0, {name: [one.to_dict() for one in listed]}, "\n".join(lines)
+    return 0, {name: [entry.to_dict() for entry in listed_entries]}, "\n".join(lines)
 
 
 def _kinds() -> Outcome:
@@ -77,32 +77,46 @@ def _kinds() -> Outcome:
 
 
 def _fields(owner: str, prefixes: Sequence[str]) -> Outcome:
+    """Return the outcome of `list fields`: all fields of an owner whose paths begin with one of the prefixes."""
     fields = list(fields_of(_OWNERS[owner]()))
     for text in prefixes:
-        if not any(one.path.startswith(text) for one in fields):
+        if not any(field.path.startswith(text) for field in fields):
             raise InputError(_FIELDS, text, f"no field of the {owner} begins so; `synthroads list fields` has them all")
-    listed = [one for one in fields if not prefixes or one.path.startswith(tuple(prefixes))]
-    intervals = tuple(f"{one.path}." for one in listed if one.interval)
-    rest = [one for one in listed if not (intervals and one.path.startswith(intervals))]
-    rows = [_row(one) for one in rest]
-    return 0, {_FIELDS: [one.to_dict() for one in listed]}, "\n".join(text_table(("path", "default", "meaning"), rows))
+    listed_fields = [field for field in fields if not prefixes or field.path.startswith(tuple(prefixes))]
+    intervals = tuple(f"{field.path}." for field in listed_fields if field.interval)
+    rows_of_fields = [field for field in listed_fields if not (intervals and field.path.startswith(intervals))]
+    rows = [_row(field) for field in rows_of_fields]
+    return (
+        0,
+        {_FIELDS: [field.to_dict() for field in listed_fields]},
+        "\n".join(text_table(("path", "default", "meaning"), rows)),
+    )
 
 
-def _row(one: FieldEntry) -> tuple[str, str, str]:
+def _row(field: FieldEntry) -> tuple[str, str, str]:
     """Return the table cells (path, default, meaning) of a field; an interval's two fields share one row."""
-    if one.interval:
-        range_text = f"{one.default['minimum']:g} to {one.default['maximum']:g} {one.unit}" if one.default else ""
-        return f"{one.path}.{{minimum,maximum}}", range_text.strip(), f"{one.description} [two numbers{_in(one.unit)}]"
-    text = "" if one.default is None or isinstance(one.default, dict) else json.dumps(one.default).strip('"')
-    value_text = f"{'one of ' if one.allowed else ''}{one.value}{_in(one.unit)}{', required' if one.required else ''}"
+    if field.interval:
+        range_text = (
+            f"{field.default['minimum']:g} to {field.default['maximum']:g} {field.unit}" if field.default else ""
+        )
+        return (
+            f"{field.path}.{{minimum,maximum}}",
+            range_text.strip(),
+            f"{field.description} [two numbers{_in(field.unit)}]",
+        )
+    text = "" if field.default is None or isinstance(field.default, dict) else json.dumps(field.default).strip('"')
+    value_text = (
+        f"{'one of ' if field.allowed else ''}{field.value}{_in(field.unit)}{', required' if field.required else ''}"
+    )
     if len(text) > _LONGEST_DEFAULT:
         text, value_text = "...", f"{value_text}; by default {text}"
-    elif text and one.unit:
-        text = f"{text} {one.unit}"
-    return one.path, text, f"{one.description} [{value_text}]"
+    elif text and field.unit:
+        text = f"{text} {field.unit}"
+    return field.path, text, f"{field.description} [{value_text}]"
 
 
 def _in(unit: str) -> str:
+    """Return a unit as the end of a description; empty without a unit."""
     return f", in {unit}" if unit else ""
 
 

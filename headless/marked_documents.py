@@ -50,6 +50,7 @@ def put_tables(document: Path | None, names: Iterable[str], make: Callable[[], M
 
 
 def _read_document(document: Path) -> str:
+    """Return a document's text; InputError if it can't be read."""
     try:
         return document.read_text(encoding="utf-8")
     except OSError as error:

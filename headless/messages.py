@@ -67,6 +67,7 @@ class _Remarks(logging.Filter):
         self._assumed: list[logging.LogRecord] = []
 
     def filter(self, record: logging.LogRecord) -> bool:
+        """Return whether a message is shown now: each remark once, and assumptions only at the end."""
         if record.levelno < logging.WARNING and not hasattr(record, ASSUMPTION):
             return True
         text = record.getMessage()
@@ -99,6 +100,7 @@ def detail(name: str, data: Mapping[str, Any]) -> None:
 
 
 def _versions() -> Iterator[str]:
+    """Yield name and version of the packages that results depend on."""
     import importlib.metadata
 
     for name in _PACKAGES:

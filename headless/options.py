@@ -25,12 +25,12 @@ def add_changes_argument(
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=text)
 
 
-def all_changes(arguments: argparse.Namespace, short: Mapping[str, str]) -> list[str]:
+def all_changes(arguments: argparse.Namespace, path_of_option: Mapping[str, str]) -> list[str]:
     """Return the scenario changes (``path=value``) of ``--set`` and of options that are short for fields.
 
     Args:
         arguments: of the command.
-        short: name of an option's argument -> path of its field; options that aren't given are None or empty.
+        path_of_option: name of an option's argument -> path of its field; options that aren't given are None or empty.
 
     Raises:
         InputError: an option and ``--set`` contradict each other.
@@ -38,20 +38,20 @@ def all_changes(arguments: argparse.Namespace, short: Mapping[str, str]) -> list
     from synthroads_addon.base.changes import apply_change
     from synthroads_addon.scenario.scenario import Scenario
 
-    given: Any = {}
+    changed_data: Any = {}
     for change in arguments.changes:
-        given = apply_change(given, change, Scenario)
+        changed_data = apply_change(changed_data, change, Scenario)
     changes = list(arguments.changes)
-    for name, path in short.items():
+    for name, path in path_of_option.items():
         value = getattr(arguments, name)
         if value in (None, []):
             continue
-        other = given
+        set_value = changed_data
         for key in path.split("."):
-            other = other.get(key, value) if isinstance(other, dict) else value
-        if other != value:
+            set_value = set_value.get(key, value) if isinstance(set_value, dict) else value
+        if set_value != value:
             option = f"--{name.replace('_', '-')}"
-            raise InputError(option, value, f"contradicts --set {path}={other}; leave one of the two out")
+            raise InputError(option, value, f"contradicts --set {path}={set_value}; leave one of the two out")
         changes.append(f"{path}={json.dumps(value)}")
     return changes
 

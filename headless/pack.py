@@ -43,11 +43,11 @@ def run(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.base.classes import class_scheme
 
     scheme = class_scheme(arguments.classes)
-    every = packed_tiles(arguments.source, arguments.split, scheme, arguments.voxel, arguments.corridor)
-    tiles = choose_tiles(every, int(arguments.limit_mb * 1e6), arguments.seed)
+    all_tiles = packed_tiles(arguments.source, arguments.split, scheme, arguments.voxel, arguments.corridor)
+    tiles = choose_tiles(all_tiles, int(arguments.limit_mb * 1e6), arguments.seed)
     size = write_pack(arguments.output, tiles, scheme, arguments.voxel, arguments.overwrite)
-    packed = pack_summary([tile.notes for tile in tiles], size)
-    return 0, packed, f"written {arguments.output}: {contents(packed)}"
+    figures = pack_summary([tile.notes for tile in tiles], size)
+    return 0, figures, f"written {arguments.output}: {contents(figures)}"
 
 
 def _check(arguments: argparse.Namespace) -> None:
@@ -60,11 +60,12 @@ def _check(arguments: argparse.Namespace) -> None:
             raise InputError(f"--{name.replace('_', '-')}", getattr(arguments, name), f"must be {low} to {high:g}")
 
 
-def contents(packed: dict[str, Any]) -> str:
+def contents(figures: dict[str, Any]) -> str:
     """Return a line of text on a packed file: size, tiles, scenes, points and crops."""
     return (
-        f"{packed['bytes'] / 1e6:.1f} MB with {packed['tiles']:,} tiles of {packed['scenes']:,} scenes, "
-        f"{packed['points']:,} points ({packed['bytes_per_point']:.2f} bytes each), which are {packed['crops']:,} crops"
+        f"{figures['bytes'] / 1e6:.1f} MB with {figures['tiles']:,} tiles of {figures['scenes']:,} scenes, "
+        f"{figures['points']:,} points ({figures['bytes_per_point']:.2f} bytes each), "
+        f"which are {figures['crops']:,} crops"
     )
 
 

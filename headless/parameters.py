@@ -30,8 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads parameters` to its parser."""
     parser.add_argument("--seed", type=int, metavar="N", help=f"seed of the first set ({Scenario().seed})")
     parser.add_argument("--count", type=int, metavar="K", help="write K sets of consecutive seeds, one per line")
-    usual, sections = next(iter(USUAL_SECTION)), ", ".join(STANDARD_CROSS_SECTIONS)
-    text = f"design class of the RAA ({usual}, or the first that has the cross-section)"
+    usual_class, sections = next(iter(USUAL_SECTION)), ", ".join(STANDARD_CROSS_SECTIONS)
+    text = f"design class of the RAA ({usual_class}, or the first that has the cross-section)"
     parser.add_argument("--design-class", choices=DESIGN_CLASSES, help=text)
     text = ", ".join(f"{section} for {name}" for name, section in USUAL_SECTION.items())
     parser.add_argument("--cross-section", metavar="RQ", help=f"one of {sections} (that of the design class: {text})")
@@ -46,14 +46,15 @@ def run(arguments: argparse.Namespace) -> Outcome:
     for change in all_changes(arguments, _FIELDS):
         data = apply_change(data, change, Scenario)
     scenario = Scenario.from_dict(data)
-    first = sample_road(scenario.road, scenario.seed)
+    parameters = sample_road(scenario.road, scenario.seed)
     if arguments.count is None:
-        return 0, first.to_dict(), first.to_json().rstrip("\n")
+        return 0, parameters.to_dict(), parameters.to_json().rstrip("\n")
     seeds = range(scenario.seed, scenario.seed + arguments.count)
     return 0, {"count": arguments.count}, (_line(sample_road(scenario.road, seed)) for seed in seeds)
 
 
 def _line(parameters: RoadParameters) -> str:
+    """Return parameters as a line of JSON."""
     return parameters.model_dump_json(exclude_none=True, by_alias=True)  # twice as fast as by way of a dictionary
 
 

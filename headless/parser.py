@@ -40,11 +40,11 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Return the namespace and unknown arguments; words after options go to the argument named by `words`."""
         self._refuse_unknown_option(sys.argv[1:] if args is None else args)
-        parsed, rest = super().parse_known_args(args, namespace)
-        if self.words and not any(word.startswith("-") for word in rest):
-            setattr(parsed, self.words, [*(getattr(parsed, self.words) or ()), *rest])
-            rest = []
-        return parsed, rest
+        parsed_arguments, unknown_words = super().parse_known_args(args, namespace)
+        if self.words and not any(word.startswith("-") for word in unknown_words):
+            setattr(parsed_arguments, self.words, [*(getattr(parsed_arguments, self.words) or ()), *unknown_words])
+            unknown_words = []
+        return parsed_arguments, unknown_words
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """Refuse a value that is none of an argument's choices, and name the one most like it."""
@@ -61,19 +61,20 @@ class Parser(argparse.ArgumentParser):
         for word in words:
             name = word.partition("=")[0]
             is_option = name.startswith("--") and " " not in name
-            if is_option and not any(one.startswith(name) for one in self._option_string_actions):
+            if is_option and not any(option.startswith(name) for option in self._option_string_actions):
                 self.error(f"unrecognized arguments: {word}{nearest_name(name, names)}")
 
     def error(self, message: str) -> Any:
+        """End the command with exit code 2 and one line."""
         self.exit(2, f"{self.prog}: {message}\n")
 
 
 def add_shared_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that all commands share, and `SHORT_OPTIONS`, to a parser and its sub-parsers, in place."""
-    inner = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
-    if not inner:
+    sub_commands = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+    if not sub_commands:
         _add_common_arguments(parser)
-    for its_parser in (its_parser for action in inner for its_parser in action.choices.values()):
+    for its_parser in (its_parser for action in sub_commands for its_parser in action.choices.values()):
         add_shared_options(its_parser)
     for action in parser._actions:
         letters = [SHORT_OPTIONS[name] for name in action.option_strings if name in SHORT_OPTIONS]

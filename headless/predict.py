@@ -37,20 +37,20 @@ def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads predict`; return exit code (3 if doubtful), metrics as JSON data and printed text."""
     if not 1 <= len(arguments.files) <= 2:
         raise InputError("CLOUD", " ".join(arguments.files), "one cloud is needed, perhaps with a RUN before it")
-    *given, cloud = map(Path, arguments.files)
+    *run_folders, cloud = map(Path, arguments.files)
     from headless.train import summary
     from ml.prediction import predict
 
-    predicted = predict(
+    prediction = predict(
         cloud,
         arguments.output,
-        given[0] if given else None,
+        run_folders[0] if run_folders else None,
         path=arguments.path,
         classification=arguments.classification,
         overwrite=arguments.overwrite,
         progress=progress_bar(arguments),
     )
-    metrics, output, name, choice = predicted.metrics, predicted.output, predicted.task, predicted.choice
+    metrics, output, name, choice = prediction.metrics, prediction.output, prediction.task, prediction.choice
     metrics |= {"output": str(output), "next": next_step(cloud, output, name)}
     text = f"written {output}: {summary(metrics)}" if name == "centerline" else labelled(metrics)
     text += f"\nnext: {metrics['next']}"
@@ -70,13 +70,15 @@ def next_step(cloud: Path, output: Path, task: str) -> str:
 
 def labelled(metrics: dict[str, Any]) -> str:
     """Return what a segmentation did to a cloud as text: file, attribute, points and share of each class, time."""
-    count, left = metrics["points"], metrics["left_out"]
-    rows = [(name, f"{points:,}", f"{points / (count - left):.1%}") for name, points in metrics["classes"].items()]
+    count, left_out_count = metrics["points"], metrics["left_out"]
+    rows = [
+        (name, f"{points:,}", f"{points / (count - left_out_count):.1%}") for name, points in metrics["classes"].items()
+    ]
     time = f"{metrics['seconds']:.1f} s, {metrics['points_per_second']:,} points/s"
     lines = [f"written {metrics['output']}: {count:,} points with the attribute {metrics['attribute']} ({time})"]
-    if left:
+    if left_out_count:
         text = f"{metrics['attribute']} {UNLABELLED}, all else as in the file"
-        lines.append(f"  {left:,} of them withheld or noise, which aren't labelled: {text}")
+        lines.append(f"  {left_out_count:,} of them withheld or noise, which aren't labelled: {text}")
     return "\n".join([*lines, *(f"  {line}" for line in text_table(("class", "points", "share"), rows, (1, 2)))])
 
 

@@ -46,8 +46,8 @@ def progress_bar(arguments: argparse.Namespace) -> Progress:
         return silent
     set_up(arguments)  # for those that aren't run by `headless.commands.run`
     verbose = logger.isEnabledFor(logging.DEBUG)
-    shown = _bar() if _in_a_terminal() else _lines(arguments)
-    return _StageTimeProgress(shown) if verbose else shown
+    display = _bar() if _in_a_terminal() else _lines(arguments)
+    return _StageTimeProgress(display) if verbose else display
 
 
 def _in_a_terminal() -> bool:
@@ -84,13 +84,13 @@ class _LineProgress:
 
     Args:
         patience: seconds until the first line.
-        working: what is at work while no stage is told.
+        first_stage: what is at work while no stage is told.
     """
 
-    def __init__(self, patience: float, working: str) -> None:
+    def __init__(self, patience: float, first_stage: str) -> None:
         self._seen: set[str] = set()
         self._begun = self._last = time.perf_counter()
-        self._stage, self._share = working, 0.0
+        self._stage, self._share = first_stage, 0.0
         self._rate = _Rate()
         self._lock = threading.RLock()
         self._held: list[str] | None = []
@@ -111,10 +111,10 @@ class _LineProgress:
         """Log a line on the stage that is at work."""
         self._seen.add(self._stage)
         self._last = now
-        after = f"after {now - self._begun:.0f} s"
-        state = f"{100.0 * self._share:.0f} % {after}" if self._rate.began else f"at work {after}"
-        left = self._rate.left(now)
-        state += "" if left is None else f", about {duration(left)} left"
+        time_text = f"after {now - self._begun:.0f} s"
+        state = f"{100.0 * self._share:.0f} % {time_text}" if self._rate.began else f"at work {time_text}"
+        seconds_left = self._rate.left(now)
+        state += "" if seconds_left is None else f", about {duration(seconds_left)} left"
         detail = getattr(self._stage, "detail", "")
         line = f"{self._stage}: {state}{f' ({detail})' if detail else ''}"
         if self._held is None:
@@ -133,12 +133,14 @@ class _LineProgress:
                     self._tell(now)
 
     def _show_held(self) -> None:
+        """Log the lines held back so far; from now on lines are logged at once."""
         with self._lock:
             for line in self._held or ():
                 logger.info(line)
             self._held = None
 
     def _end(self) -> None:
+        """End the thread, so that no more lines come."""
         with self._lock:
             self._over.set()
 
@@ -158,8 +160,8 @@ class _Rate:
 
     def add(self, now: float, stage: str, share: float) -> None:
         """Take a report into account. Shares may be of a stage, or of all stages one after the other."""
-        begins = share < self._share or self._share >= 1.0 or (share == 0.0 and stage != self._stage)
-        if self.began is None or begins:
+        is_new_work = share < self._share or self._share >= 1.0 or (share == 0.0 and stage != self._stage)
+        if self.began is None or is_new_work:
             self.began = now, share
         self._at, self._stage, self._share = now, stage, share
 
@@ -170,17 +172,17 @@ class _Rate:
         """
         if self.began is None:
             return None
-        spent, done = self._at - self.began[0], self._share - self.began[1]
-        if spent < _FIRST or done < _LEAST or self._share >= 1.0:
+        seconds_spent, share_done = self._at - self.began[0], self._share - self.began[1]
+        if seconds_spent < _FIRST or share_done < _LEAST or self._share >= 1.0:
             return None
-        return max(0.0, spent * (1.0 - self._share) / done - (now - self._at))
+        return max(0.0, seconds_spent * (1.0 - self._share) / share_done - (now - self._at))
 
 
 class _StageTimeProgress:
     """Progress callback that logs each stage's beginning and duration, and calls another one."""
 
-    def __init__(self, shown: Progress) -> None:
-        self._shown = shown
+    def __init__(self, display: Progress) -> None:
+        self._shown = display
         self._stage: str | None = None
         self._since = 0.0
         _endings.append(self._end)
@@ -193,12 +195,14 @@ class _StageTimeProgress:
         self._shown(stage, share)
 
     def _end(self) -> None:
+        """Log how long the stage took, if there is one."""
         if self._stage is not None:
             logger.debug("stage %s: took %.2f s", self._stage, time.perf_counter() - self._since)
         self._stage = None
 
 
 def _bar() -> Progress:
+    """Return a progress callback that draws a bar in the terminal."""
     from tqdm import tqdm
 
     class AboveTheBar(logging.StreamHandler):
@@ -211,14 +215,14 @@ def _bar() -> Progress:
     logger.handlers[:] = [AboveTheBar(sys.stderr)]
     form = "{desc:<12} {bar:40} {n:3.0f} %  {elapsed}{postfix}"
     bar = tqdm(total=100, bar_format=form, file=sys.stderr, leave=False)
-    rate, over = _Rate(), threading.Event()
+    rate, is_over = _Rate(), threading.Event()
 
     def refresh() -> None:
-        while not over.wait(1.0):
+        while not is_over.wait(1.0):
             bar.refresh()
 
     def end() -> None:
-        over.set()
+        is_over.set()
         thread.join(2.0)
         bar.close()
 
@@ -228,8 +232,8 @@ def _bar() -> Progress:
             bar.set_description(stage)
         now = time.perf_counter()
         rate.add(now, stage, share)
-        left = rate.left(now)
-        notes = ["" if left is None else f"about {duration(left)} left", getattr(stage, "detail", "")]
+        seconds_left = rate.left(now)
+        notes = ["" if seconds_left is None else f"about {duration(seconds_left)} left", getattr(stage, "detail", "")]
         bar.set_postfix_str(", ".join(filter(None, notes)), refresh=False)
         bar.update(100 * share - bar.n)
 

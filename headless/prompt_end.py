@@ -24,27 +24,27 @@ def ended_promptly() -> Iterator[None]:
     if sys.platform == "win32" or threading.current_thread() is not threading.main_thread():
         yield
         return
-    hear, say = os.pipe()
-    os.set_blocking(say, False)
-    over = threading.Event()
-    before = signal.set_wakeup_fd(say, warn_on_full_buffer=False)
-    threading.Thread(target=_wait_for_signal, args=(hear, over), daemon=True).start()
+    read_end, write_end = os.pipe()
+    os.set_blocking(write_end, False)
+    is_over = threading.Event()
+    former_descriptor = signal.set_wakeup_fd(write_end, warn_on_full_buffer=False)
+    threading.Thread(target=_wait_for_signal, args=(read_end, is_over), daemon=True).start()
     try:
         yield
     finally:
-        over.set()
-        signal.set_wakeup_fd(before)
-        os.close(say)  # the thread ends with the pipe
+        is_over.set()
+        signal.set_wakeup_fd(former_descriptor)
+        os.close(write_end)  # the thread ends with the pipe
 
 
-def _wait_for_signal(hear: int, over: threading.Event) -> None:
+def _wait_for_signal(read_end: int, is_over: threading.Event) -> None:
     """End the process if a signal comes that ends it and the work isn't over a while later."""
     signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)  # the main thread is to hear them
-    while heard := os.read(hear, 1):
-        ends = heard[0] in ENDS and signal.getsignal(heard[0]) not in (signal.SIG_IGN, signal.SIG_DFL)
-        if ends and not over.wait(GRACE):
+    while signal_byte := os.read(read_end, 1):
+        is_end = signal_byte[0] in ENDS and signal.getsignal(signal_byte[0]) not in (signal.SIG_IGN, signal.SIG_DFL)
+        if is_end and not is_over.wait(GRACE):
             _leave()
-    os.close(hear)
+    os.close(read_end)
 
 
 def _leave() -> None:

@@ -74,11 +74,11 @@ def run(arguments: argparse.Namespace) -> Outcome:
     with output_folder(arguments.output, [*names, *twin_file_names(arguments.twin)], arguments.overwrite) as folder:
         progress = progress_bar(arguments)
         road = run_reconstruction(_job(arguments), progress)
-        compared = _comparison(arguments.truth, road.cloud.place)
+        compare_with_truth = _comparison(arguments.truth, road.cloud.place)
         _write(road, folder, arguments.no_picture)
         result, parameters = road.report, road.found.parameters
-        if compared is not None:
-            result["comparison"] = compared(parameters)
+        if compare_with_truth is not None:
+            result["comparison"] = compare_with_truth(parameters)
         result["remarks"] = remarks_so_far()
         (folder / REPORT).write_text(canonical_json(result), encoding="utf-8")
         write_twin(parameters, folder, arguments.twin, progress=in_stage(progress, "twin"))
@@ -114,6 +114,7 @@ def _comparison(truth: Path | None, place: Placement) -> Callable[[RoadParameter
 
 
 def _job(arguments: argparse.Namespace) -> ReconstructionJob:
+    """Return the reconstruction that the arguments ask for."""
     from synthroads_addon.reconstruction.report import ReconstructionJob
 
     predictor = None

@@ -69,14 +69,14 @@ def run(arguments: argparse.Namespace) -> Outcome:
         from synthroads_addon.road.geometry import RoadGeometry
         from synthroads_addon.road.tessellation import sample_stations
 
-        whole = has_whole_road(arguments.file) and not arguments.only_axis
+        has_all = has_whole_road(arguments.file) and not arguments.only_axis
         source = RoadSource(
             scenario,
-            axis=None if whole else arguments.file,
+            axis=None if has_all else arguments.file,
             axis_name=arguments.axis_name,
             axis_place=axis_place(arguments),
             pictures=arguments.output,
-            road=arguments.file if whole else None,
+            road=arguments.file if has_all else None,
             round_kinks=arguments.round_kinks,
             deviations=folder / PICTURE,
         )
@@ -108,11 +108,16 @@ def _compare(arguments: argparse.Namespace) -> Outcome:
 
     scenario = load_scenario(arguments.scenario, all_changes(arguments, _FIELDS))
     differences, _ = differences_from(arguments.file, arguments.against, scenario, arguments.axis_name)
-    rows = [one._asdict() for one in differences]
+    rows = [difference._asdict() for difference in differences]
     report = {"file": str(arguments.file), "against": str(arguments.against), "differences": rows}
     cells = [
-        (one.field, str(one.old), str(one.new), "" if one.station is None else f"at station {one.station:.1f} m")
-        for one in differences
+        (
+            difference.field,
+            str(difference.old),
+            str(difference.new),
+            "" if difference.station is None else f"at station {difference.station:.1f} m",
+        )
+        for difference in differences
     ]
     if not cells:
         return 0, report, "no field differs"
@@ -131,11 +136,14 @@ def _distance(text: str) -> float:
 
 
 def _table(rows: list[dict[str, Any]]) -> str:
+    """Return a file's roads as a table of text."""
     cells = []
     for row in rows:
         labels = [("no heights", not row["heights"]), ("in a junction", row["junction"])]
         labels += [("one carriageway", row["carriageway"])]
-        notes = row["fault"] or ", ".join([*filter(None, [row["kind"]]), *(text for text, so in labels if so)])
+        notes = row["fault"] or ", ".join(
+            [*filter(None, [row["kind"]]), *(text for text, applies in labels if applies)]
+        )
         lanes = "" if row["lanes"] is None else str(row["lanes"])
         length = "" if row["fault"] else f"{row['length']:,.1f} m"
         of_what = f"{row['points']} points" if row["points"] else str(row["elements"])

@@ -47,13 +47,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=Path, metavar="SCENE", help="file with the scene")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
     add_device_argument(parser)
-    where = parser.add_mutually_exclusive_group()
+    path_group = parser.add_mutually_exclusive_group()
     text = "line to follow, CSV (x, y, z) or GeoJSON (the scene's road, else straight over its middle)"
-    where.add_argument("--path", type=Path, metavar="FILE", help=text)
-    where.add_argument("--trajectory", metavar="FILE", help="recorded path, CSV: time, x, y, z, roll, pitch, heading")
+    path_group.add_argument("--path", type=Path, metavar="FILE", help=text)
+    path_group.add_argument(
+        "--trajectory", metavar="FILE", help="recorded path, CSV: time, x, y, z, roll, pitch, heading"
+    )
     text = "place of a tripod on the surface, or of its scanner if Z is given (can be repeated; X < 0: --tripod=-4,7)"
     place = numbers((2, 3), "X,Y or X,Y,Z")
-    where.add_argument("--tripod", type=place, action="append", default=[], metavar="X,Y[,Z]", help=text)
+    path_group.add_argument("--tripod", type=place, action="append", default=[], metavar="X,Y[,Z]", help=text)
     text = "height of the scanner above ground, in flight or on a tripod, m (the platform's usual one)"
     parser.add_argument("--height", type=float, metavar="M", help=text)
     parser.add_argument("--speed", type=float, metavar="M/S", help="speed over ground, m/s (the platform's usual one)")
@@ -82,6 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _origin(text: str) -> tuple[float, ...] | str:
+    """Return the scene's origin, or "auto": a type for argparse."""
     return text if text == "auto" else numbers((3,), "X,Y,Z, or auto,")(text)
 
 
@@ -92,9 +95,13 @@ def run(arguments: argparse.Namespace) -> Outcome:
     detail("scenario", scenario.to_dict())
     from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 
-    same = {name: getattr(arguments, name) for name in _SAME}
+    copied_values = {name: getattr(arguments, name) for name in _SAME}
     job = SceneScan(
-        scenario=scenario, tripods=tuple(arguments.tripod), also_from=tuple(arguments.also_from), begun=start, **same
+        scenario=scenario,
+        tripods=tuple(arguments.tripod),
+        also_from=tuple(arguments.also_from),
+        begun=start,
+        **copied_values,
     )
     report = scan_scene(job, progress_bar(arguments))
     return 0, report, summary(report, arguments.output)

@@ -47,17 +47,17 @@ def supervise() -> None:
     """
     if "bpy" in sys.modules or threading.active_count() > 1:
         return
-    journal, opened = os.memfd_create("synthroads"), os.memfd_create("synthroads-opened")
-    spoken = _ErrorPipe()
+    journal, opened_file = os.memfd_create("synthroads"), os.memfd_create("synthroads-opened")
+    error_pipe = _ErrorPipe()
     handlers = {number: signal.getsignal(number) for number in ENDS}
     signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)
     child = os.fork()
     if child:
-        _wait_and_exit(child, spoken, journal, opened)
+        _wait_and_exit(child, error_pipe, journal, opened_file)
     _die_with_parent(os.getppid())
-    spoken.redirect()
+    error_pipe.redirect()
     record_folders_in(journal)
-    note_opened_file_in(opened)
+    note_opened_file_in(opened_file)
     for number, handler in handlers.items():
         signal.signal(number, handler)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDS)
@@ -70,7 +70,7 @@ def _die_with_parent(parent: int) -> None:
         os._exit(130)
 
 
-def _wait_and_exit(child: int, spoken: _ErrorPipe, journal: int, opened: int) -> NoReturn:
+def _wait_and_exit(child: int, error_pipe: _ErrorPipe, journal: int, opened_file: int) -> NoReturn:
     """Wait for the child, passing on signals and errors, and end this process with the child's exit code."""
 
     def hand_on(number: int, _: object) -> None:
@@ -81,46 +81,48 @@ def _wait_and_exit(child: int, spoken: _ErrorPipe, journal: int, opened: int) ->
         if signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, hand_on)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDS)
-    listening = threading.Thread(target=spoken.pass_on, daemon=True)
-    listening.start()
+    listener = threading.Thread(target=error_pipe.pass_on, daemon=True)
+    listener.start()
     _, status = os.waitpid(child, 0)
-    listening.join(1.0)  # a process that the work has begun may still hold the other end
+    listener.join(1.0)  # a process that the work has begun may still hold the other end
     code = os.waitstatus_to_exitcode(status)
-    short = code < 0 and _memory_is_short(-code, spoken.held)
+    is_short = code < 0 and _memory_is_short(-code, error_pipe.held)
     remove_recorded_folders(journal)  # those that are still there
     if code < 0:
-        message = None if short else crash_line(-code, noted_file(opened))
-        _say(message or _line(-code, short))
-        code = 2 if short or message else 1
+        message = None if is_short else crash_line(-code, noted_file(opened_file))
+        _say(message or _line(-code, is_short))
+        code = 2 if is_short or message else 1
     elif code != 2:  # else a line says it all
-        _say(spoken.held)
+        _say(error_pipe.held)
     os._exit(code)
 
 
-def _memory_is_short(number: int, said: str) -> bool:
+def _memory_is_short(number: int, error_text: str) -> bool:
     """Return whether a process that a signal ended probably lacked memory, by signal, limits and output."""
     limits = [resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA)]
-    limited = any(limit != resource.RLIM_INFINITY for limit in limits)
-    return number == signal.SIGKILL or limited or any(sign in said for sign in LOSSES)
+    is_limited = any(limit != resource.RLIM_INFINITY for limit in limits)
+    return number == signal.SIGKILL or is_limited or any(sign in error_text for sign in LOSSES)
 
 
 def crash_line(number: int, file: str) -> str | None:
     """Return the line on a file that Blender crashed on, by the signal and the file's name; None if it wasn't one."""
     if not file or number not in _CRASHES:
         return None
-    what = f"Blender crashed as it opened it ({signal.Signals(number).name})"
+    fault = f"Blender crashed as it opened it ({signal.Signals(number).name})"
     remedy = "the file is damaged, or of another Blender: save it anew"
-    return f"error: {InputError(file, None, f'{what}; {remedy}')}; nothing was left half-written\n"
+    return f"error: {InputError(file, None, f'{fault}; {remedy}')}; nothing was left half-written\n"
 
 
-def _line(number: int, short: bool) -> str:
+def _line(number: int, is_short: bool) -> str:
+    """Return the line on work that a signal ended, by its number."""
     name = signal.Signals(number).name
-    if short:
+    if is_short:
         return f"error: too little memory (the work was ended by {name}); nothing was left half-written\n"
     return f"error: a defect of a library ended the work ({name}); nothing was left half-written\n"
 
 
 def _say(text: str) -> None:
+    """Write a text to standard error, without Python's buffers."""
     with suppress(OSError):  # the terminal is gone
         os.write(2, text.encode(errors="backslashreplace"))
 

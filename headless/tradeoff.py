@@ -60,8 +60,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
         return 0, result, json.dumps(result)
     scenes = list(dict.fromkeys(arguments.scenario or SCENES))
     titles = _check_request(arguments, scenes)
-    filled = _filled_tables(arguments)
-    progress, drawn = progress_bar(arguments), can_draw("the plot")
+    filled_tables = _filled_tables(arguments)
+    progress, has_plots = progress_bar(arguments), can_draw("the plot")
     results = {}
 
     def measure() -> dict[str, str]:
@@ -70,14 +70,14 @@ def run(arguments: argparse.Namespace) -> Outcome:
             results[title] = _measure_all(arguments, scene, title, _part(progress, number, len(titles)))
             texts = table_texts(results[title], scene)
             tables |= {_TABLE.format(title, table): text for table, text in texts.items()}
-            _write(arguments, title, results[title], "\n".join(texts.values()), drawn=drawn)
-        printed.update(tables)
+            _write(arguments, title, results[title], "\n".join(texts.values()), has_plots=has_plots)
+        text_of_table.update(tables)
         return {name: text for name, text in tables.items() if name in names}
 
-    printed: dict[str, str] = {}
-    names = [_TABLE.format(title, table) for title in titles.values() for table in filled]
+    text_of_table: dict[str, str] = {}
+    names = [_TABLE.format(title, table) for title in titles.values() for table in filled_tables]
     put_tables(arguments.document, names, measure)
-    return 0, {"scenes": results}, "\n".join([*printed.values(), f"written to {arguments.output}"])
+    return 0, {"scenes": results}, "\n".join([*text_of_table.values(), f"written to {arguments.output}"])
 
 
 def _check_request(arguments: argparse.Namespace, scenes: Sequence[str]) -> dict[str, str]:
@@ -94,11 +94,13 @@ def _check_request(arguments: argparse.Namespace, scenes: Sequence[str]) -> dict
         check_drawable("--pictures", arguments.pictures)
     if arguments.resume and arguments.overwrite:
         raise InputError("--resume", None, "can't be given with --overwrite, which keeps nothing")
-    there = [name for title in titles.values() for name in (_ROWS + "/" + title, f"{title}.json")]
-    present = next((name for name in there if (arguments.output / name).exists()), None)
-    if present and not arguments.overwrite and not arguments.resume:
+    file_names = [name for title in titles.values() for name in (_ROWS + "/" + title, f"{title}.json")]
+    present_name = next((name for name in file_names if (arguments.output / name).exists()), None)
+    if present_name and not arguments.overwrite and not arguments.resume:
         target = str(arguments.output)
-        raise OutputError("--output", target, f"already holds {present}; --resume keeps it, --overwrite replaces it")
+        raise OutputError(
+            "--output", target, f"already holds {present_name}; --resume keeps it, --overwrite replaces it"
+        )
     check_folder_target(arguments.output)
     if arguments.pictures:
         check_folder_target(arguments.pictures, "--pictures")
@@ -115,15 +117,17 @@ def _filled_tables(arguments: argparse.Namespace) -> list[str]:
         return []
     filled = []
     for table in TABLES:
-        its = [name for name, knob in KNOBS.items() if knob.table == table]
-        absent = [name for name in its if name not in arguments.knobs]
-        if 0 < len(absent) < len(its):
-            raise InputError("--knobs", arguments.knobs, f"the table of {table} has {', '.join(absent)} as well")
-        filled += [] if absent else [table]
+        table_knobs = [name for name, knob in KNOBS.items() if knob.table == table]
+        absent_knobs = [name for name in table_knobs if name not in arguments.knobs]
+        if 0 < len(absent_knobs) < len(table_knobs):
+            raise InputError("--knobs", arguments.knobs, f"the table of {table} has {', '.join(absent_knobs)} as well")
+        filled += [] if absent_knobs else [table]
     return filled
 
 
 def _part(progress: Progress, number: int, count: int) -> Progress:
+    """Return a callback for a part of the work, of so many equal ones."""
+
     def show(stage: str, share: float) -> None:
         progress(stage, (number + share) / count)
 
@@ -148,13 +152,14 @@ def _measure_all(arguments: argparse.Namespace, scene: str, title: str, progress
 
 
 def _file_name(value: Any) -> str:
+    """Return a setting's value as a part of a file's name."""
     return str(value).replace(", ", "-").replace("=", "-")
 
 
 def _fingerprint(scene: str, knob: str, value: Any) -> str:
     """Return a hash of a row's scenario and the program's version, to recognise rows measured for the same job."""
-    changed = row_scenario(scene, knob, value).to_json()
-    return hashlib.sha256(f"{generator()} {changed}".encode()).hexdigest()
+    scenario_text = row_scenario(scene, knob, value).to_json()
+    return hashlib.sha256(f"{generator()} {scenario_text}".encode()).hexdigest()
 
 
 def _read_kept_row(path: Path, job: str, knob: str, value: Any) -> dict[str, Any] | None:
@@ -178,13 +183,14 @@ def _read_kept_row(path: Path, job: str, knob: str, value: Any) -> dict[str, Any
 
 def _measure_row(scene: str, knob: str, value: Any) -> dict[str, Any]:
     """Measure a row, as often as `REPEATED` says; return the fastest, with the seconds of all in `all_seconds`."""
-    several = [_measured_once(scene, knob, value) for _ in range(REPEATED.get(knob, 1))]
-    if len(several) == 1 or "left_out" in several[0]:
-        return several[0]
-    return min(several, key=lambda row: row["seconds"]) | {"all_seconds": [row["seconds"] for row in several]}
+    measurements = [_measured_once(scene, knob, value) for _ in range(REPEATED.get(knob, 1))]
+    if len(measurements) == 1 or "left_out" in measurements[0]:
+        return measurements[0]
+    return min(measurements, key=lambda row: row["seconds"]) | {"all_seconds": [row["seconds"] for row in measurements]}
 
 
 def _measured_once(scene: str, knob: str, value: Any) -> dict[str, Any]:
+    """Measure a row in a process of its own, and return it."""
     request = json.dumps({"scenario": scene, "knob": knob, "value": value})
     line = [sys.executable, str(Path(__file__).resolve()), "--output", ".", _ROW, request, "--json"]
     process = subprocess.run(line, capture_output=True, text=True, check=False)
@@ -195,12 +201,13 @@ def _measured_once(scene: str, knob: str, value: Any) -> dict[str, Any]:
 
 
 def _write(
-    arguments: argparse.Namespace, title: str, results: Sequence[dict[str, Any]], table: str, *, drawn: bool
+    arguments: argparse.Namespace, title: str, results: Sequence[dict[str, Any]], table: str, *, has_plots: bool
 ) -> None:
+    """Write a scene's rows as JSON, its tables, and its plots if they can be drawn."""
     folder: Path = arguments.output
     write_file(folder / f"{title}.json", canonical_json({"rows": results}).encode(), overwrite=True)
     write_file(folder / f"{title}.md", table.encode(), overwrite=True)
-    if not drawn:
+    if not has_plots:
         return
     from headless.tradeoff_plot import plot
 

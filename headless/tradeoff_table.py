@@ -55,17 +55,17 @@ def row_fault(row: Any, knob: str, value: Any) -> str | None:
     if not isinstance(row, dict) or (row.get("knob"), row.get("value")) != (knob, value):
         return f"must be an object with the knob {knob} and the value {value}"
     numbers = {name: form.endswith("d") for name, (_, form) in _COSTS.items() if name in TABLES[KNOBS[knob].table]}
-    for name, whole in numbers.items():
+    for name, is_whole in numbers.items():
         cost = row.get(name, "")
-        unknown = cost is None and name != "seconds"
-        if not unknown and not (is_number(cost) and cost >= 0.0 and not (whole and isinstance(cost, float))):
-            return f"{name} must be a {'whole ' if whole else ''}number from 0"
+        is_unknown = cost is None and name != "seconds"
+        if not is_unknown and not (is_number(cost) and cost >= 0.0 and not (is_whole and isinstance(cost, float))):
+            return f"{name} must be a {'whole ' if is_whole else ''}number from 0"
     for name, names in (("errors", tuple(ROW_TITLES)), ("shares", _SHARES)):
         part = row.get(name, {} if name == "shares" else None)
         if not isinstance(part, dict) or not all(key in names and is_number(part[key]) for key in part):
             return f"{name} must be numbers by name: {', '.join(names)}"
-    several = row.get("all_seconds", [1.0])
-    if not isinstance(several, list) or not all(is_number(one) and one > 0.0 for one in several):
+    all_seconds = row.get("all_seconds", [1.0])
+    if not isinstance(all_seconds, list) or not all(is_number(one) and one > 0.0 for one in all_seconds):
         return "all_seconds must be a list of numbers above 0"
     faulty_field = next((name for name in ("machine", "colour_truth") if not isinstance(row.get(name, ""), str)), None)
     return faulty_field and f"{faulty_field} must be a text"
@@ -81,8 +81,8 @@ def time_noise(results: Iterable[Mapping[str, Any]]) -> float | None:
 
     The largest such spread of the rows that were measured `REPEATED` times; None if there is none.
     """
-    several = [row["all_seconds"] for row in measured_rows(results) if len(row.get("all_seconds", ())) > 1]
-    return max(((max(times) - min(times)) * len(times) / sum(times) for times in several), default=None)
+    times_of_rows = [row["all_seconds"] for row in measured_rows(results) if len(row.get("all_seconds", ())) > 1]
+    return max(((max(times) - min(times)) * len(times) / sum(times) for times in times_of_rows), default=None)
 
 
 def better_row(row: Mapping[str, Any], others: Iterable[Mapping[str, Any]], noise: float) -> Mapping[str, Any] | None:
@@ -98,28 +98,30 @@ def better_row(row: Mapping[str, Any], others: Iterable[Mapping[str, Any]], nois
             for name, error in row["errors"].items()
         )
 
-    faster = [other for other in others if other["seconds"] < row["seconds"] * (1.0 - noise) and as_accurate(other)]
-    return min(faster, key=lambda other: other["seconds"], default=None)
+    faster_rows = [
+        other for other in others if other["seconds"] < row["seconds"] * (1.0 - noise) and as_accurate(other)
+    ]
+    return min(faster_rows, key=lambda other: other["seconds"], default=None)
 
 
 def front_lines(results: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return a Markdown table of which presets lie on the Pareto front; empty without presets."""
-    job = [row for row in measured_rows(results) if KNOBS[row["knob"]].table == "presets"]
-    presets = [row for row in job if row["knob"] == "fidelity"]
+    job_rows = [row for row in measured_rows(results) if KNOBS[row["knob"]].table == "presets"]
+    presets = [row for row in job_rows if row["knob"] == "fidelity"]
     if not presets:
         return []
     noise = time_noise(results)
     rows = []
     for row in presets:
-        other = better_row(row, [one for one in job if one is not row], noise or 0.0)
+        other = better_row(row, [job_row for job_row in job_rows if job_row is not row], noise or 0.0)
         faster_row = "-" if other is None else f"{other['value']}: {other['seconds']:.1f} s for {row['seconds']:.1f} s"
         rows.append([str(row["value"]), "yes" if other is None else "no", faster_row])
     lines = markdown_table(["preset", "on the front", "faster, and as accurate in all errors"], rows)
     text = "times weren't measured twice, so every difference of time counts"
     if noise is not None:
         text = f"times of the same settings differ by up to {100.0 * noise:.0f} %: only what is faster by more counts"
-    alike = f"errors that are larger by less than {100.0 * ALIKE:.0f} % count as equal"
-    return [*lines, "", f"Each is compared with {len(job) - 1} others of the same job; {alike}; {text}."]
+    alike_text = f"errors that are larger by less than {100.0 * ALIKE:.0f} % count as equal"
+    return [*lines, "", f"Each is compared with {len(job_rows) - 1} others of the same job; {alike_text}; {text}."]
 
 
 def markdown(results: Sequence[Mapping[str, Any]], scenario: str) -> str:
@@ -157,17 +159,17 @@ def _table_text(results: Sequence[Mapping[str, Any]], table: str, scenario: str)
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
-def _table(measured: Sequence[Mapping[str, Any]], costs: tuple[str, ...]) -> list[str]:
+def _table(rows_with_figures: Sequence[Mapping[str, Any]], costs: tuple[str, ...]) -> list[str]:
     """Return the lines of a Markdown table of rows, with columns for costs and for each error that a row has."""
-    errors = [name for name in ROW_TITLES if any(name in row["errors"] for row in measured)]
-    shares = [name for name in costs if name in _SHARES and any(name in row["shares"] for row in measured)]
-    plain = [name for name in costs if name in _COSTS]
-    titles = ["knob", "value", *(_COSTS[name][0] for name in plain), *(f"{name} (%)" for name in shares)]
+    errors = [name for name in ROW_TITLES if any(name in row["errors"] for row in rows_with_figures)]
+    shares = [name for name in costs if name in _SHARES and any(name in row["shares"] for row in rows_with_figures)]
+    plain_costs = [name for name in costs if name in _COSTS]
+    titles = ["knob", "value", *(_COSTS[name][0] for name in plain_costs), *(f"{name} (%)" for name in shares)]
     titles += [ROW_TITLES[name] for name in errors]
     rows = []
-    for row in measured:
+    for row in rows_with_figures:
         cells = [row["knob"], str(row["value"])]
-        cells += ["-" if row[name] is None else format(row[name], _COSTS[name][1]) for name in plain]
+        cells += ["-" if row[name] is None else format(row[name], _COSTS[name][1]) for name in plain_costs]
         cells += [f"{100.0 * row['shares'].get(name, 0.0):.2f}" for name in shares]
         cells += [f"{row['errors'][name]:.3g}" if name in row["errors"] else "-" for name in errors]
         rows.append(cells)

@@ -57,37 +57,43 @@ def run(arguments: argparse.Namespace) -> Outcome:
     deviation = arguments.max_deviation
     if not _LIMITS[0] <= deviation <= _LIMITS[1]:
         raise InputError("--max-deviation", deviation, f"must be from {_LIMITS[0]:g} to {_LIMITS[1]:g} m")
-    formats, local = arguments.twin, arguments.local_projection
+    formats, has_local_projection = arguments.twin, arguments.local_projection
     check_formats(formats)
-    if local and "opendrive" not in formats:
+    if has_local_projection and "opendrive" not in formats:
         raise InputError("--local-projection", None, f"is for opendrive, which isn't among {', '.join(formats)}")
     parameters = read_parameters(arguments.parameters)
     names = twin_file_names(formats)
     with output_folder(arguments.output, names, arguments.overwrite) as folder:
-        if told := forecast(parameters.alignment.length, formats):
-            logger.info(told)
+        if forecast_text := forecast(parameters.alignment.length, formats):
+            logger.info(forecast_text)
         ifc = IfcSettings(placement=arguments.ifc_placement)
-        write_twin(parameters, folder, formats, deviation, ifc, local, progress_bar(arguments))
+        write_twin(parameters, folder, formats, deviation, ifc, has_local_projection, progress_bar(arguments))
     files = {name: arguments.output / FORMATS[name].file for name in formats}
     reports = {name: arguments.output / report_file_name(name) for name in formats}
-    lost = {name: _read_losses(path) for name, path in reports.items()}
-    result = {"files": _texts(files), "reports": _texts(reports), "lost": lost}
-    return 0, result, "\n".join(f"{_written(path)}\n{_line(reports[name], lost[name])}" for name, path in files.items())
+    losses = {name: _read_losses(path) for name, path in reports.items()}
+    result = {"files": _texts(files), "reports": _texts(reports), "lost": losses}
+    return (
+        0,
+        result,
+        "\n".join(f"{_written(path)}\n{_line(reports[name], losses[name])}" for name, path in files.items()),
+    )
 
 
 def forecast(length: float, formats: Sequence[str]) -> str:
     """Return a line on what models of a road of a length (m) roughly take; empty for less than `_LONG` seconds."""
     entries = [FORMATS[name] for name in formats]
-    seconds, megabytes = (sum(getattr(one, of) for one in entries) * length / 1e3 for of in ("seconds", "megabytes"))
+    seconds, megabytes = (
+        sum(getattr(entry, of) for entry in entries) * length / 1e3 for of in ("seconds", "megabytes")
+    )
     if seconds < _LONG:
         return ""
-    takes = f"take about {duration(seconds)} and {megabytes:,.0f} MB"
-    return (
-        f"models of {length / 1e3:,.0f} km ({', '.join(formats)}) {takes}, with what stands beside the demo's motorway"
-    )
+    need_text = f"take about {duration(seconds)} and {megabytes:,.0f} MB"
+    models = f"models of {length / 1e3:,.0f} km ({', '.join(formats)})"
+    return f"{models} {need_text}, with what stands beside the demo's motorway"
 
 
 def _texts(paths: dict[str, Path]) -> dict[str, str]:
+    """Return paths as texts, by the same names."""
     return {name: str(path) for name, path in paths.items()}
 
 
@@ -97,13 +103,14 @@ def _read_losses(report: Path) -> dict[str, int]:
 
 
 def _written(path: Path) -> str:
+    """Return a line on a file that was written, with its size."""
     return f"written {path} ({path.stat().st_size / 1e6:.2f} MB)"
 
 
 def _line(report: Path, reasons: dict[str, int]) -> str:
     """Return a line of text on a format's report: its file name, and how many instances are missing and why."""
-    nothing = "; ".join(f"{count} not: {reason}" for reason, count in reasons.items())
-    return f"        {report.name}: what became of each instance number{f'; {nothing}' if nothing else ''}"
+    losses_text = "; ".join(f"{count} not: {reason}" for reason, count in reasons.items())
+    return f"        {report.name}: what became of each instance number{f'; {losses_text}' if losses_text else ''}"
 
 
 if __name__ == "__main__":

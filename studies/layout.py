@@ -54,14 +54,14 @@ def read_rules() -> Rules:
     """Read the layers and forbidden imports from the import contracts in pyproject.toml."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     contracts: list[dict[str, Any]] = settings["tool"]["importlinter"]["contracts"]
-    layers = next(one["layers"] for one in contracts if one.get("containers") == [ADDON])
-    forbidden = [one for one in contracts if one["type"] == "forbidden"]
-    learning = next(one for one in forbidden if one["source_modules"] == ["ml"])
-    blender = next(one for one in forbidden if "bpy" in one["forbidden_modules"])
+    layers = next(contract["layers"] for contract in contracts if contract.get("containers") == [ADDON])
+    forbidding_contracts = [contract for contract in contracts if contract["type"] == "forbidden"]
+    learning_contract = next(contract for contract in forbidding_contracts if contract["source_modules"] == ["ml"])
+    blender_contract = next(contract for contract in forbidding_contracts if "bpy" in contract["forbidden_modules"])
     return Rules(
         [[name.strip() for name in layer.split("|")] for layer in layers],
-        frozenset(name.rpartition(".")[2] for name in learning["forbidden_modules"]),
-        frozenset(name.rpartition(".")[2] for name in blender["source_modules"]),
+        frozenset(name.rpartition(".")[2] for name in learning_contract["forbidden_modules"]),
+        frozenset(name.rpartition(".")[2] for name in blender_contract["source_modules"]),
     )
 
 
@@ -108,20 +108,20 @@ class Box:
             axes.text(self.left + GAP, top - GAP - 0.02 - LINE * number, line, size=8.5, va="top")
 
 
-def make_box(folder: Path, color: str, left: float, width: float, more: Sequence[str] = ()) -> Box:
-    """Return a package's box from its docstring, folders and number of files; `more` are lines below."""
+def make_box(folder: Path, color: str, left: float, width: float, further_lines: Sequence[str] = ()) -> Box:
+    """Return a package's box from its docstring, folders and number of files; `further_lines` are lines below."""
     tree = ast.parse((folder / "__init__.py").read_text(encoding="utf-8"))
     lines = [(ast.get_docstring(tree) or "").split("\n\n")[0].replace("`", "")]
     if parts := sorted(path.parent.name for path in folder.glob("*/__init__.py")):
         lines.append(f"Folders: {', '.join(parts)}")
-    return Box(folder.name, "\n".join([*lines, *more]), len(list(folder.rglob("*.py"))), color, left, width)
+    return Box(folder.name, "\n".join([*lines, *further_lines]), len(list(folder.rglob("*.py"))), color, left, width)
 
 
 def floor_boxes(rules: Rules) -> Iterator[list[Box]]:
     """Yield the boxes of each floor, from top to bottom; `ml` stands beside those that it may import."""
     for names in rules.floors:
-        beside = 0.0 if set(names) <= rules.hidden else SIDE + GAP
-        width = (WIDTH - beside - (len(names) - 1) * GAP) / len(names)
+        side_width = 0.0 if set(names) <= rules.hidden else SIDE + GAP
+        width = (WIDTH - side_width - (len(names) - 1) * GAP) / len(names)
         yield [
             make_box(
                 ROOT / ADDON / name,
@@ -139,18 +139,18 @@ def draw(axes: Axes, rules: Rules) -> float:
     head.draw(axes, 0.0, head.height)
     top = -head.height - GAP - LINE
     axes.text(0.0, top + 0.03, f"{ADDON}, floor by floor: each imports only those below it", size=8.5, va="bottom")
-    beside = None
+    side_top = None
     for boxes in floor_boxes(rules):
         height = max(box.height for box in boxes)
         for box in boxes:
             box.draw(axes, top, height)
-        if beside is None and boxes[-1].left + boxes[-1].width < WIDTH - GAP:
-            beside = top
+        if side_top is None and boxes[-1].left + boxes[-1].width < WIDTH - GAP:
+            side_top = top
         top -= height + GAP
-    if beside is not None:
-        unseen = ("", f"It stands on the floors beside it and imports none of {', '.join(sorted(rules.hidden))}.")
-        learning = make_box(ROOT / "ml", COLORS["learning"], WIDTH - SIDE, SIDE, unseen)
-        learning.draw(axes, beside, beside - top - GAP)
+    if side_top is not None:
+        side_lines = ("", f"It stands on the floors beside it and imports none of {', '.join(sorted(rules.hidden))}.")
+        side_box = make_box(ROOT / "ml", COLORS["learning"], WIDTH - SIDE, SIDE, side_lines)
+        side_box.draw(axes, side_top, side_top - top - GAP)
     for number, (name, meaning) in enumerate({"Blender": "imports bpy", "plain": "doesn't import bpy itself"}.items()):
         left = 1.6 * number
         axes.add_patch(FancyBboxPatch((left, top - 0.17), 0.2, 0.12, boxstyle="square,pad=0", facecolor=COLORS[name]))

@@ -84,6 +84,7 @@ def draw_pictures(names: set[str]) -> None:
 
 
 def _studio() -> bpy.types.Scene:
+    """Return the open file's scene with camera, sun and settings for the pictures."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.cycles.samples, scene.cycles.use_denoising = _SAMPLES, False
@@ -113,13 +114,14 @@ def _example(catalogue: str, group: bpy.types.NodeTree) -> bpy.types.Object:
     for name, value in _SHOWN.get(group.name, {}).items():
         set_modifier_input(modifier, name, value)
     if group.name in _FOLLOWED_BY:
-        more = item.modifiers.new("Shown", "NODES")
-        more.node_group = _FOLLOWED_BY[group.name]()
-        give_usual_materials(more.node_group)
+        following_modifier = item.modifiers.new("Shown", "NODES")
+        following_modifier.node_group = _FOLLOWED_BY[group.name]()
+        give_usual_materials(following_modifier.node_group)
     return item
 
 
 def _curve(length: float) -> bpy.types.Curve:
+    """Return a slightly bent curve of a length (m) to show groups along."""
     curve = bpy.data.curves.new("Curve", "CURVE")
     curve.dimensions = "3D"
     points = curve.splines.new("BEZIER").bezier_points
@@ -131,6 +133,7 @@ def _curve(length: float) -> bpy.types.Curve:
 
 
 def _point() -> bpy.types.Mesh:
+    """Return a mesh of one vertex, to show groups on a point."""
     mesh = bpy.data.meshes.new("Point")
     mesh.vertices.add(1)
     return mesh
@@ -140,20 +143,20 @@ def _aim(scene: bpy.types.Scene, item: bpy.types.Object) -> None:
     """Place the scene's camera so that the object fills the picture, seen from its front on the right."""
     graph = bpy.context.evaluated_depsgraph_get()
     corners = []
-    for shown in graph.object_instances:
-        if shown.object.original == item and shown.object.type == "MESH":
-            places = np.empty(3 * len(shown.object.data.vertices))
-            shown.object.data.vertices.foreach_get("co", places)
+    for instance in graph.object_instances:
+        if instance.object.original == item and instance.object.type == "MESH":
+            places = np.empty(3 * len(instance.object.data.vertices))
+            instance.object.data.vertices.foreach_get("co", places)
             corners.append(places.reshape(-1, 3))
     places = np.concatenate(corners)
     places = places[places[:, 2] > -0.05]  # what is buried isn't looked at
-    low, high = places.min(axis=0), places.max(axis=0)
-    away = Vector((0.75, -1.0, 0.55)).normalized()
+    lowest, highest = places.min(axis=0), places.max(axis=0)
+    towards_camera = Vector((0.75, -1.0, 0.55)).normalized()
     camera = scene.camera
-    camera.rotation_euler = away.to_track_quat("Z", "Y").to_euler()
-    camera.location = Vector(((low + high) / 2.0).tolist()) + away * 10.0
+    camera.rotation_euler = towards_camera.to_track_quat("Z", "Y").to_euler()
+    camera.location = Vector(((lowest + highest) / 2.0).tolist()) + towards_camera * 10.0
     bpy.context.view_layer.update()
-    box = [value for corner in product(*zip(low, high, strict=True)) for value in corner]
+    box = [value for corner in product(*zip(lowest, highest, strict=True)) for value in corner]
     place, _ = camera.camera_fit_coords(graph, box)
     camera.location = place
 

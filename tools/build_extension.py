@@ -147,10 +147,10 @@ def blender_tool() -> Path:
     spec = importlib.util.find_spec("bpy")
     if spec is None or spec.origin is None:
         raise BuildError("the bpy package is needed for its extension tool: pip install 'synthroads[blender]'")
-    found = sorted(Path(spec.origin).parent.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py"))
-    if not found:
+    tools = sorted(Path(spec.origin).parent.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py"))
+    if not tools:
         raise BuildError(f"no extension tool in {Path(spec.origin).parent}")
-    return found[-1]
+    return tools[-1]
 
 
 # --- wheels ----------------------------------------------------------------------------------------------------------
@@ -173,11 +173,11 @@ def fetch_wheels(extension: Extension, target: str, release: Release, cache: Pat
     folder = cache / extension.name / target / f"cp{release.python.replace('.', '')}"
     stamp = folder / "complete.json"
     if not stamp.exists() or json.loads(stamp.read_text(encoding="utf-8")) != lock:
-        part = folder.with_name(f"{folder.name}.part-{os.getpid()}")
-        download(extension.lock, release.python, target, part)
-        (part / stamp.name).write_text(json.dumps(lock), encoding="utf-8")
+        partial_folder = folder.with_name(f"{folder.name}.part-{os.getpid()}")
+        download(extension.lock, release.python, target, partial_folder)
+        (partial_folder / stamp.name).write_text(json.dumps(lock), encoding="utf-8")
         shutil.rmtree(folder, ignore_errors=True)
-        part.rename(folder)
+        partial_folder.rename(folder)
     return sorted(folder.glob("*.whl"))
 
 
@@ -209,13 +209,13 @@ def wheel_metadata(wheel: Path) -> Message:
 def check_complete(extension: Extension, wheels: list[Path]) -> None:
     """Raise BuildError if a wheel needs a package that is neither bundled nor in Blender."""
     metadata = [wheel_metadata(wheel) for wheel in wheels]
-    present = {normal_name(fields["Name"]) for fields in metadata} | NOT_BUNDLED
+    names_present = {normal_name(fields["Name"]) for fields in metadata} | NOT_BUNDLED
     for fields in metadata:
         for requirement in fields.get_all("Requires-Dist", []):
             if "extra ==" in requirement:
                 continue
-            needed = normal_name(re.split(r"[^A-Za-z0-9._-]", requirement, maxsplit=1)[0])
-            if needed not in present:
+            needed_name = normal_name(re.split(r"[^A-Za-z0-9._-]", requirement, maxsplit=1)[0])
+            if needed_name not in names_present:
                 raise BuildError(f"{fields['Name']} needs {requirement}: add it to {extension.wheel_list.name}")
 
 
@@ -329,18 +329,18 @@ def project_version() -> str:
 
 def complete_manifest(extension: Extension, target: str, release: Release, wheels: list[str]) -> str:
     """Return the text of an extension's manifest with version, releases, platform and wheels before its first table."""
-    committed = extension.manifest.read_text(encoding="utf-8")
-    oldest = f'blender_version_min = "{RELEASES[0].first}"'
-    if oldest not in committed:
-        raise BuildError(f"{extension.manifest} must name the oldest release that there is a zip for: {oldest}")
-    span = f'blender_version_min = "{release.first}"'
-    span += f'\nblender_version_max = "{release.before}"' if release.before else ""
-    committed = committed.replace(oldest, span)
-    tables = re.search(r"^\[", committed, flags=re.MULTILINE)
-    split = tables.start() if tables else len(committed)
-    own = "" if extension.manifest == MANIFEST else f"version = {json.dumps(project_version())}\n"
-    added = f"{own}platforms = {toml_list([target])}\nwheels = {toml_list(wheels)}\n\n"
-    return committed[:split] + added + committed[split:]
+    text = extension.manifest.read_text(encoding="utf-8")
+    oldest_line = f'blender_version_min = "{RELEASES[0].first}"'
+    if oldest_line not in text:
+        raise BuildError(f"{extension.manifest} must name the oldest release that there is a zip for: {oldest_line}")
+    releases_text = f'blender_version_min = "{release.first}"'
+    releases_text += f'\nblender_version_max = "{release.before}"' if release.before else ""
+    text = text.replace(oldest_line, releases_text)
+    tables = re.search(r"^\[", text, flags=re.MULTILINE)
+    insert_at = tables.start() if tables else len(text)
+    version_text = "" if extension.manifest == MANIFEST else f"version = {json.dumps(project_version())}\n"
+    added_lines = f"{version_text}platforms = {toml_list([target])}\nwheels = {toml_list(wheels)}\n\n"
+    return text[:insert_at] + added_lines + text[insert_at:]
 
 
 def toml_list(items: list[str]) -> str:
@@ -379,12 +379,12 @@ def write_index(output_dir: Path) -> Path:
     run_tool("server-generate", "--repo-dir", str(output_dir))
     path = output_dir / INDEX
     index = json.loads(path.read_text(encoding="utf-8"))
-    known = {
+    archive_names = {
         archive_name(extension, target, release)
         for extension, target, release in product(EXTENSIONS, PLATFORM_TAGS, RELEASES)
     }
-    listed = [entry for entry in index["data"] if Path(entry["archive_url"]).name in known]
-    index["data"] = sorted(listed, key=lambda entry: str(entry["archive_url"]))
+    entries = [entry for entry in index["data"] if Path(entry["archive_url"]).name in archive_names]
+    index["data"] = sorted(entries, key=lambda entry: str(entry["archive_url"]))
     path.write_text(json.dumps(index, indent=2) + "\n", encoding="utf-8", newline="\n")
     return path
 
@@ -395,14 +395,14 @@ def pack(folder: Path, archive: Path) -> None:
     Wheels are stored as they are: Blender's own tool would compress them a second time, at ten times the cost of all
     else, to no effect.
     """
-    part = archive.with_suffix(".part")
-    with zipfile.ZipFile(part, "w") as target:
+    partial_file = archive.with_suffix(".part")
+    with zipfile.ZipFile(partial_file, "w") as target:
         for path in sorted(path for path in folder.rglob("*") if path.is_file()):
             entry = zipfile.ZipInfo(path.relative_to(folder).as_posix(), ZIP_DATE)
             entry.external_attr = 0o644 << 16
             entry.compress_type = zipfile.ZIP_STORED if path.suffix == ".whl" else zipfile.ZIP_DEFLATED
             target.writestr(entry, path.read_bytes())
-    part.replace(archive)
+    partial_file.replace(archive)
 
 
 def run_tool(*arguments: str) -> None:

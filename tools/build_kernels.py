@@ -59,14 +59,14 @@ def this_platform() -> str:
     return f"{system}-{ {'x86_64': 'x64', 'amd64': 'x64', 'aarch64': 'arm64'}.get(machine, machine) }"
 
 
-def build_kernels(target: str, folder: Path = KERNELS, kept: Path | None = None) -> list[Path]:
+def build_kernels(target: str, folder: Path = KERNELS, kept_folder: Path | None = None) -> list[Path]:
     """Compile all kernels for a platform into a folder; return the paths of their libraries.
 
     Args:
         target: name of the platform, as in `TARGETS`.
         folder: for the libraries.
-        kept: folder of libraries that were compiled before, of which those of the same source, options and compiler are
-            taken, and where new ones are added; None compiles all.
+        kept_folder: of libraries that were compiled before, of which those of the same source, options and compiler
+            are taken, and where new ones are added; None compiles all.
 
     Raises:
         KernelError: the compiler isn't installed, or fails.
@@ -75,25 +75,26 @@ def build_kernels(target: str, folder: Path = KERNELS, kept: Path | None = None)
         raise KernelError("the compiler isn't installed: pip install 'ziglang>=0.17,<0.18'")
     triple, suffix = TARGETS[target]
     sources = sorted(KERNELS.glob("*.c"))
-    return [_library(source, triple, folder / f"{source.stem}-{target}.{suffix}", kept) for source in sources]
+    return [_library(source, triple, folder / f"{source.stem}-{target}.{suffix}", kept_folder) for source in sources]
 
 
-def _library(source: Path, triple: str, library: Path, kept: Path | None) -> Path:
+def _library(source: Path, triple: str, library: Path, kept_folder: Path | None) -> Path:
     """Write a source's library, compiled now or before, and return its path."""
-    if kept is None:
+    if kept_folder is None:
         return _write(library, _compile(source, triple, library.name))
-    made_from = (source_digest(source), source.name, triple, *_OPTIONS, library.name, version("ziglang"))
-    known = kept / f"{hashlib.sha256(repr(made_from).encode()).hexdigest()}-{library.name}"
-    if not known.is_file():
-        _write(known, _compile(source, triple, library.name))
-    return _write(library, known.read_bytes())
+    ingredients = (source_digest(source), source.name, triple, *_OPTIONS, library.name, version("ziglang"))
+    kept_file = kept_folder / f"{hashlib.sha256(repr(ingredients).encode()).hexdigest()}-{library.name}"
+    if not kept_file.is_file():
+        _write(kept_file, _compile(source, triple, library.name))
+    return _write(library, kept_file.read_bytes())
 
 
 def _write(path: Path, content: bytes) -> Path:
+    """Write a file so that it is there whole or not at all, in place of one that may be loaded; return its path."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f"{path.name}.part-{os.getpid()}")
-    part.write_bytes(content)
-    part.replace(path)  # where the old one is loaded, it stays as it is
+    partial_file = path.with_name(f"{path.name}.part-{os.getpid()}")
+    partial_file.write_bytes(content)
+    partial_file.replace(path)  # where the old one is loaded, it stays as it is
     return path
 
 
@@ -101,14 +102,14 @@ def _compile(source: Path, triple: str, name: str) -> bytes:
     """Return the library of a source for one of Zig's platforms, under a name, as bytes."""
     digest = source_digest(source)
     with tempfile.TemporaryDirectory(prefix="synthroads-") as cache:
-        made = Path(cache) / name
+        library = Path(cache) / name
         command = [sys.executable, "-m", "ziglang", "cc", "-target", triple, *_OPTIONS, f'-DSOURCE="{digest}"']
         if name.endswith(".dylib"):  # its name is written into it, else with the folder where it was made
             command.append(f"-Wl,-install_name,@rpath/{name}")
         environment = {**os.environ, "ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache}
         # By a relative path, so that no path of this machine gets in.
         answer = subprocess.run(
-            [*command, source.name, "-o", str(made)],
+            [*command, source.name, "-o", str(library)],
             cwd=source.parent,
             env=environment,
             capture_output=True,
@@ -117,19 +118,19 @@ def _compile(source: Path, triple: str, name: str) -> bytes:
         )
         if answer.returncode != 0:
             raise KernelError(f"{source.name} wasn't compiled for {triple}:\n{answer.stdout}{answer.stderr}")
-        return made.read_bytes()
+        return library.read_bytes()
 
 
 def source_digest(source: Path) -> str:
     """Return the SHA-256 of a source and of what it includes of its own, as `scanning.kernels.library` has it."""
-    waiting, seen = [source], list[Path]()
-    while waiting:
-        path = waiting.pop(0)
-        if path not in seen:
-            seen.append(path)
+    files_to_read, files_read = [source], list[Path]()
+    while files_to_read:
+        path = files_to_read.pop(0)
+        if path not in files_read:
+            files_read.append(path)
             names = _INCLUDED.findall(path.read_text(encoding="utf-8"))
-            waiting += [(path.parent / name).resolve() for name in names]
-    return hashlib.sha256(b"".join(path.read_bytes() for path in seen)).hexdigest()
+            files_to_read += [(path.parent / name).resolve() for name in names]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files_read)).hexdigest()
 
 
 class KernelHook(BuildHookInterface):
@@ -147,7 +148,7 @@ class KernelHook(BuildHookInterface):
             if target not in TARGETS:
                 continue
             try:
-                build_kernels(target, kept=KEPT)
+                build_kernels(target, kept_folder=KEPT)
             except KernelError as error:
                 self.app.display_warning(f"SynthRoads works without its kernels, and slower: {error}")
 
@@ -155,8 +156,8 @@ class KernelHook(BuildHookInterface):
 def main() -> int:
     """Compile for the chosen platforms; return 0, or 1 if that failed."""
     parser = argparse.ArgumentParser(description="Compile the scan's kernels.")
-    platforms, here = [*TARGETS, "all"], this_platform()
-    parser.add_argument("--platform", choices=platforms, default=here, help="default: the current one")
+    platforms, own_platform = [*TARGETS, "all"], this_platform()
+    parser.add_argument("--platform", choices=platforms, default=own_platform, help="default: the current one")
     parser.add_argument("--output-dir", type=Path, default=KERNELS, metavar="DIR", help="default: beside the source")
     options = parser.parse_args()
     try:

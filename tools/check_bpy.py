@@ -72,8 +72,8 @@ def main() -> int:
     spec = importlib.util.find_spec("bpy")
     binary = Path(spec.origin).with_suffix(".so") if spec and spec.origin else None
     if binary and binary.exists() and sys.platform.startswith("linux"):
-        found = subprocess.run(["ldd", str(binary)], capture_output=True, text=True, check=False)
-        if libraries := missing_libraries(found.stdout):
+        answer = subprocess.run(["ldd", str(binary)], capture_output=True, text=True, check=False)
+        if libraries := missing_libraries(answer.stdout):
             print(install_advice(libraries))
             return 1
     print(f"bpy does not load: {error}")

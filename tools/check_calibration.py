@@ -50,6 +50,7 @@ def build() -> None:
 
 
 def _rectangle(kind: str, name: str, spans: list[tuple[float, float, float, float]], height: float) -> None:
+    """Add level rectangles at a height (m) to the scene, as one object of a class and a material."""
     mesh = bpy.data.meshes.new(kind)
     corners = [(x, y, height) for a, b, c, d in spans for x, y in ((a, c), (b, c), (b, d), (a, d))]
     mesh.from_pydata(corners, [], [tuple(range(4 * i, 4 * i + 4)) for i in range(len(spans))])

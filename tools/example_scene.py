@@ -42,8 +42,8 @@ def ground(x: Float, y: Float) -> Float:
 
 def street(x: Float) -> Float:
     """Return y (m) of the street's middle at x (m), both (N,)."""
-    smooth = np.linspace(-6.0, 6.0, 13)[:, None]
-    return np.asarray(np.interp(x[None] + smooth, _STREET[:, 0], _STREET[:, 1]).mean(axis=0))
+    shifts = np.linspace(-6.0, 6.0, 13)[:, None]
+    return np.asarray(np.interp(x[None] + shifts, _STREET[:, 0], _STREET[:, 1]).mean(axis=0))
 
 
 def add(name: str, vertices: Float, faces: list[list[int]], material: str) -> None:
@@ -54,20 +54,22 @@ def add(name: str, vertices: Float, faces: list[list[int]], material: str) -> No
     bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))
 
 
-def sheet(name: str, x: Float, y: Float, lift: float, material: str) -> None:
-    """Add a surface ``lift`` (m) above the ground to the scene, from grids x and y (R, C), m."""
+def sheet(name: str, x: Float, y: Float, height_above: float, material: str) -> None:
+    """Add a surface ``height_above`` (m) above the ground to the scene, from grids x and y (R, C), m."""
     rows, columns = x.shape
-    vertices = np.stack([x, y, ground(x, y) + lift], axis=-1).reshape(-1, 3)
+    vertices = np.stack([x, y, ground(x, y) + height_above], axis=-1).reshape(-1, 3)
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     faces = np.stack([corner, corner + 1, corner + columns + 1, corner + columns], axis=-1)
     add(name, vertices, faces.tolist(), material)
 
 
-def strip(name: str, low: float, high: float, offset: float, width: float, lift: float, material: str) -> None:
+def strip(
+    name: str, first_x: float, last_x: float, offset: float, width: float, height_above: float, material: str
+) -> None:
     """Add a strip along the street to the scene, between two x, `offset` and `width` (m) from its middle."""
-    x = np.arange(low, high + 0.25, 0.5)
-    across = np.linspace(offset - width / 2.0, offset + width / 2.0, max(2, int(width * 2)))
-    sheet(name, np.repeat(x[None], len(across), axis=0), street(x)[None] + across[:, None], lift, material)
+    x = np.arange(first_x, last_x + 0.25, 0.5)
+    offsets = np.linspace(offset - width / 2.0, offset + width / 2.0, max(2, int(width * 2)))
+    sheet(name, np.repeat(x[None], len(offsets), axis=0), street(x)[None] + offsets[:, None], height_above, material)
 
 
 def house(number: int, x: float, y: float, size: tuple[float, float, float], turn: float) -> None:
@@ -77,6 +79,7 @@ def house(number: int, x: float, y: float, size: tuple[float, float, float], tur
     base = float(ground(np.array(x), np.array(y))) - 0.5
 
     def place(points: list[tuple[float, float, float]]) -> Float:
+        """Return points (m) of the house's own frame in the scene."""
         local = np.array(points)
         return np.column_stack(
             [
@@ -92,9 +95,9 @@ def house(number: int, x: float, y: float, size: tuple[float, float, float], tur
     sides = [[i, (i + 1) % 4, 4 + (i + 1) % 4, 4 + i] for i in range(4)]
     add(f"House.{number:02}", walls, sides, "Plaster")
     eave = [(-a - 0.4, -b - 0.5, height - 0.4), (a + 0.4, -b - 0.5, height - 0.4)]
-    other = [(a + 0.4, b + 0.5, height - 0.4), (-a - 0.4, b + 0.5, height - 0.4)]
+    opposite_eave = [(a + 0.4, b + 0.5, height - 0.4), (-a - 0.4, b + 0.5, height - 0.4)]
     ridge = [(-a - 0.4, 0.0, top), (a + 0.4, 0.0, top)]
-    add(f"Roof.{number:02}", place([*eave, *other, *ridge]), [[0, 1, 5, 4], [2, 3, 4, 5]], "Tiles")
+    add(f"Roof.{number:02}", place([*eave, *opposite_eave, *ridge]), [[0, 1, 5, 4], [2, 3, 4, 5]], "Tiles")
 
 
 def column(name: str, x: float, y: float, radius: float, height: float, material: str) -> None:
@@ -111,19 +114,19 @@ def tree(number: int, x: float, y: float, height: float, random: np.random.Gener
     """Add a trunk and a crown of 900 random triangles as leaves to the scene."""
     column(f"Trunk.{number:02}", x, y, 0.16, 0.5 * height, "Bark")
     count = 900
-    way = random.normal(size=(count, 3))
-    way /= np.linalg.norm(way, axis=1)[:, None]
-    reach = random.uniform(0.5, 1.0, (count, 1)) ** 0.5
+    directions = random.normal(size=(count, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    distances = random.uniform(0.5, 1.0, (count, 1)) ** 0.5
     top = float(ground(np.array(x), np.array(y))) + 0.65 * height
-    middle = [x, y, top] + reach * way * [0.3 * height, 0.3 * height, 0.36 * height]
-    leaf = middle[:, None] + random.normal(0.0, 0.16, (count, 3, 3))
-    add(f"Crown.{number:02}", leaf.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3).tolist(), "Leaves")
+    middles = [x, y, top] + distances * directions * [0.3 * height, 0.3 * height, 0.36 * height]
+    leaves = middles[:, None] + random.normal(0.0, 0.16, (count, 3, 3))
+    add(f"Crown.{number:02}", leaves.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3).tolist(), "Leaves")
 
 
-def box(name: str, x: float, y: float, size: tuple[float, float, float], lift: float, material: str) -> None:
-    """Add a box of (length, width, height), m, standing ``lift`` (m) above the ground, to the scene."""
+def box(name: str, x: float, y: float, size: tuple[float, float, float], height_above: float, material: str) -> None:
+    """Add a box of (length, width, height), m, standing ``height_above`` (m) above the ground, to the scene."""
     length, width, height = size
-    base = float(ground(np.array(x), np.array(y))) + lift
+    base = float(ground(np.array(x), np.array(y))) + height_above
     corners = [[x + i * length / 2, y + j * width / 2] for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     vertices = np.array([[*corner, base + z] for z in (0.0, height) for corner in corners])
     sides = [[i, (i + 1) % 4, 4 + (i + 1) % 4, 4 + i] for i in range(4)]
@@ -134,28 +137,28 @@ def village() -> None:
     """Add the whole village, with its materials, to the open file."""
     random = stream(3, "village")
     for name, colour in COLOURS.items():
-        made = bpy.data.materials.new(name)
-        made.diffuse_color = (*colour, 1.0)
-        if made.node_tree is None:
-            made.use_nodes = True
-        made.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (*colour, 1.0)
+        new_material = bpy.data.materials.new(name)
+        new_material.diffuse_color = (*colour, 1.0)
+        if new_material.node_tree is None:
+            new_material.use_nodes = True
+        new_material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (*colour, 1.0)
     x, y = np.meshgrid(np.arange(-75.0, 75.5, 1.0), np.arange(-50.0, 50.5, 1.0))
     sheet("Meadow", x, y, 0.0, "Grass")
     strip("Street", -75.0, 75.0, 0.0, 7.0, 0.06, "Tar")
-    for number, along in enumerate(np.arange(-73.0, 73.0, 9.0)):
-        strip(f"Line.{number:02}", along, along + 3.0, 0.0, 0.15, 0.075, "Paint")
-    for number, along in enumerate(np.arange(-66.0, 70.0, 17.0)):
-        middle = float(street(np.array([along]))[0])
-        house(number, along, middle + (21.0 if number % 2 else -20.0), (13.0, 9.0, 5.5), 0.25 * random.normal())
-        column(f"Lamp.{number:02}", along + 8.0, middle + (4.6 if number % 2 else -4.6), 0.09, 6.5, "Steel")
+    for number, x_along in enumerate(np.arange(-73.0, 73.0, 9.0)):
+        strip(f"Line.{number:02}", x_along, x_along + 3.0, 0.0, 0.15, 0.075, "Paint")
+    for number, x_along in enumerate(np.arange(-66.0, 70.0, 17.0)):
+        middle = float(street(np.array([x_along]))[0])
+        house(number, x_along, middle + (21.0 if number % 2 else -20.0), (13.0, 9.0, 5.5), 0.25 * random.normal())
+        column(f"Lamp.{number:02}", x_along + 8.0, middle + (4.6 if number % 2 else -4.6), 0.09, 6.5, "Steel")
     for number, place in enumerate(random.uniform([-72.0, -47.0], [72.0, 47.0], (80, 2))):
         if abs(place[1] - float(street(place[:1])[0])) > 31.0:
             east, north = place.tolist()
             tree(number, east, north, float(random.uniform(6.0, 12.0)), random)
-    for number, along in enumerate((-52.0, -20.0, 13.0, 47.0)):
-        middle = float(street(np.array([along]))[0]) + (1.75 if number % 2 else -1.75)
-        box(f"Car.{number}.body", along, middle, (4.4, 1.8, 0.75), 0.35, "Lacquer")
-        box(f"Car.{number}.cabin", along - 0.3, middle, (2.3, 1.6, 0.6), 1.1, "Lacquer")
+    for number, x_along in enumerate((-52.0, -20.0, 13.0, 47.0)):
+        middle = float(street(np.array([x_along]))[0]) + (1.75 if number % 2 else -1.75)
+        box(f"Car.{number}.body", x_along, middle, (4.4, 1.8, 0.75), 0.35, "Lacquer")
+        box(f"Car.{number}.cabin", x_along - 0.3, middle, (2.3, 1.6, 0.6), 1.1, "Lacquer")
 
 
 def main() -> None:

@@ -195,10 +195,12 @@ def run_job(tree: Path, side: Path, name: str) -> None:
     environment["PWD"] = str(folder)  # where Blender looks for relative names
     for number, words in enumerate(JOBS[name].commands):
         line = [sys.executable, "-P", "-c", RUN, *words, "--quiet"]
-        done = subprocess.run(line, cwd=folder, env=environment, capture_output=True, text=True, check=False)
-        said = done.stderr if done.returncode else ""
-        printed = f"exit code {done.returncode}\n{said}{done.stdout}".replace(str(tree), "TREE").replace(str(side), "")
-        (folder / f"printed-{number}.txt").write_text(printed, encoding="utf-8")
+        process = subprocess.run(line, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+        error_text = process.stderr if process.returncode else ""
+        output_text = f"exit code {process.returncode}\n{error_text}{process.stdout}".replace(
+            str(tree), "TREE"
+        ).replace(str(side), "")
+        (folder / f"printed-{number}.txt").write_text(output_text, encoding="utf-8")
 
 
 def content(path: Path) -> bytes:
@@ -246,13 +248,13 @@ SCENE_DUMP = Path("tests", "helpers", "scenes", "scene_hash.py")
 def differences(base: Path, head: Path) -> list[str]:
     """Return a line for each file below two folders that one side lacks or whose compared content differs."""
     names = sorted({str(path.relative_to(side)) for side in (base, head) for path in side.rglob("*") if path.is_file()})
-    found = []
+    lines = []
     for name in names:
         if not (base / name).exists() or not (head / name).exists():
-            found.append(f"{name}: only in {'HEAD' if (head / name).exists() else 'the base'}")
+            lines.append(f"{name}: only in {'HEAD' if (head / name).exists() else 'the base'}")
         elif content(base / name) != content(head / name):
-            found.append(f"{name}: differs")
-    return found
+            lines.append(f"{name}: differs")
+    return lines
 
 
 def main() -> int:
@@ -263,38 +265,38 @@ def main() -> int:
     parser.add_argument("--keep", type=Path, metavar="DIR", help="keep the files there")
     parser.add_argument("-v", "--verbose", action="store_true", help="print what each command came to")
     arguments = parser.parse_args()
-    with tempfile.TemporaryDirectory() as temporary:
-        tree = Path(temporary, "tree")
+    with tempfile.TemporaryDirectory() as scratch_folder:
+        tree = Path(scratch_folder, "tree")
         subprocess.run(["git", "worktree", "add", "--quiet", "--detach", tree, arguments.base], cwd=ROOT, check=True)
         try:
-            return compare(tree, (arguments.keep or Path(temporary, "files")).resolve(), arguments)
+            return compare(tree, (arguments.keep or Path(scratch_folder, "files")).resolve(), arguments)
         finally:
             subprocess.run(["git", "worktree", "remove", "--force", tree], cwd=ROOT, check=True)
 
 
 def compare(tree: Path, files: Path, arguments: argparse.Namespace) -> int:
     """Run the jobs in the base's tree and in this one, print what differs; return 0 if nothing does, else 1."""
-    failed = False
+    has_failed = False
     with ThreadPoolExecutor(2) as pool:
         for name in arguments.jobs:
             list(pool.map(run_job, (tree, ROOT), (files / "base", files / "head"), (name, name)))
             base, head = files / "base" / name, files / "head" / name
-            found = differences(base, head)
-            printed = [text.read_text(encoding="utf-8") for text in sorted(head.glob("printed-*.txt"))]
-            codes = [text.partition("\n")[0] for text in printed]
-            lacking = JOBS[name].lacking
-            lacks = bool(lacking) and lacking in printed[0]
-            if not lacks:
-                found += [f"command {number}: {code}" for number, code in enumerate(codes) if code != "exit code 0"]
-            failed |= bool(found)
+            faults = differences(base, head)
+            outputs = [text.read_text(encoding="utf-8") for text in sorted(head.glob("printed-*.txt"))]
+            codes = [text.partition("\n")[0] for text in outputs]
+            lacking_text = JOBS[name].lacking
+            can_not_run = bool(lacking_text) and lacking_text in outputs[0]
+            if not can_not_run:
+                faults += [f"command {number}: {code}" for number, code in enumerate(codes) if code != "exit code 0"]
+            has_failed |= bool(faults)
             count = sum(path.is_file() for path in head.rglob("*"))
-            verdict = f"{len(found)} FAULTS" if found else f"not here: {lacking}" if lacks else "equal"
+            verdict = f"{len(faults)} FAULTS" if faults else f"not here: {lacking_text}" if can_not_run else "equal"
             print(f"{name}: {count} files, {verdict}", flush=True)
-            for line in found:
+            for line in faults:
                 print(f"  {line}")
             if arguments.verbose:
                 print("  " + ", ".join(codes))
-    return int(failed)
+    return int(has_failed)
 
 
 if __name__ == "__main__":

@@ -17,15 +17,15 @@ ROOT = Path(__file__).resolve().parent.parent
 def print_what_docstrings() -> bool:
     """Print where a docstring begins with "What"; return whether one does."""
     print("-- docstrings", flush=True)
-    found = [
+    lines = [
         f"{path.relative_to(ROOT)}:{number}: a docstring begins with What: say in one sentence what is done or returned"
         for folder in ("synthroads_addon", "headless", "ml", "tests", "tools", "studies")
         for path in sorted((ROOT / folder).rglob("*.py"))
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
         if line.lstrip().startswith('"""What ')
     ]
-    print("\n".join(found) or "no docstring begins with What")
-    return bool(found)
+    print("\n".join(lines) or "no docstring begins with What")
+    return bool(lines)
 
 
 def print_late_imports() -> bool:
@@ -35,35 +35,35 @@ def print_late_imports() -> bool:
     commands load what they need when they run, so that ``--help`` and completion come at once.
     """
     print("-- imports within functions", flush=True)
-    found = [
+    lines = [
         f"{path.relative_to(ROOT)}:{number}: an import within a function says why, in a comment beside or above it"
         for folder in ("synthroads_addon", "ml")
         for path in sorted((ROOT / folder).rglob("*.py"))
         for number in late_imports(path.read_text(encoding="utf-8"))
     ]
-    print("\n".join(found) or "each import within a function says why")
-    return bool(found)
+    print("\n".join(lines) or "each import within a function says why")
+    return bool(lines)
 
 
 def late_imports(source: str) -> list[int]:
     """Return the first import's line number of each function whose imports all lack a comment with a reason."""
-    lines, found = source.splitlines(), []
+    lines, first_numbers = source.splitlines(), []
     functions = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef)]
     for function in functions:
-        tried = {
-            id(inner)
+        optional_imports = {
+            id(statement)
             for node in ast.walk(function)
             if isinstance(node, ast.Try) and any("Error" in ast.unparse(handler) for handler in node.handlers)
-            for inner in node.body
+            for statement in node.body
         }
         numbers = sorted(
             node.lineno
             for node in ast.walk(function)
-            if isinstance(node, ast.Import | ast.ImportFrom) and id(node) not in tried
+            if isinstance(node, ast.Import | ast.ImportFrom) and id(node) not in optional_imports
         )
         if numbers and not any("#" in line for number in numbers for line in lines[number - 2 : number]):
-            found.append(numbers[0])
-    return found
+            first_numbers.append(numbers[0])
+    return first_numbers
 
 
 def commands() -> dict[str, list[str]]:
@@ -91,20 +91,20 @@ def run_together(checks: dict[str, list[str]]) -> list[str]:
     """Run programs in parallel, print their output in order; return the names of those that failed."""
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
         answers = pool.map(partial(subprocess.run, cwd=ROOT, text=True, stdout=PIPE, stderr=STDOUT), checks.values())
-        failed = []
+        failed_names = []
         for name, answer in zip(checks, answers, strict=True):
             print(f"-- {name}\n{answer.stdout}", end="", flush=True)
-            failed += [name] if answer.returncode != 0 else []
-    return failed
+            failed_names += [name] if answer.returncode != 0 else []
+    return failed_names
 
 
 def main() -> int:
     """Run every check, also after one has failed; return 0 if all passed, else 1."""
-    own = {"docstrings": print_what_docstrings, "imports within functions": print_late_imports}
-    failed = [name for name, print_faults in own.items() if print_faults()]
-    failed += run_together(commands())
-    print(f"lint: failed: {'; '.join(failed)}" if failed else "lint: all checks passed")
-    return 1 if failed else 0
+    own_checks = {"docstrings": print_what_docstrings, "imports within functions": print_late_imports}
+    failed_names = [name for name, print_faults in own_checks.items() if print_faults()]
+    failed_names += run_together(commands())
+    print(f"lint: failed: {'; '.join(failed_names)}" if failed_names else "lint: all checks passed")
+    return 1 if failed_names else 0
 
 
 if __name__ == "__main__":

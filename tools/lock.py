@@ -46,30 +46,35 @@ def environment_inputs(name: str) -> list[str]:
     """Return an environment's requirements from pyproject.toml, with those of the package's build."""
     settings = tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))
     extras = settings["project"]["optional-dependencies"]
-    chosen = [requirement for extra in EXTRAS[name].split(",") for requirement in extras[extra]]
-    return [*settings["project"]["dependencies"], *chosen, *settings["build-system"]["requires"], "editables"]
+    extra_requirements = [requirement for extra in EXTRAS[name].split(",") for requirement in extras[extra]]
+    return [
+        *settings["project"]["dependencies"],
+        *extra_requirements,
+        *settings["build-system"]["requires"],
+        "editables",
+    ]
 
 
-def resolve(requirements: list[str], python: str, present: Path, *options: str) -> str:
-    """Resolve requirements with uv; return the lock's text for one Python on all systems, keeping `present` versions.
+def resolve(requirements: list[str], python: str, present_lock: Path, *options: str) -> str:
+    """Resolve requirements with uv, keeping `present_lock`'s versions; return a lock for one Python on all systems.
 
     Raises:
         subprocess.CalledProcessError: there is no such set of packages; uv has said why.
     """
     with tempfile.TemporaryDirectory() as folder:
-        asked, answer = Path(folder, "requirements.in"), Path(folder, "lock.txt")
-        asked.write_text("\n".join(requirements) + "\n", encoding="utf-8")
-        if present.exists():
-            answer.write_text(present.read_text(encoding="utf-8"), encoding="utf-8")
+        requirements_file, lock_file = Path(folder, "requirements.in"), Path(folder, "lock.txt")
+        requirements_file.write_text("\n".join(requirements) + "\n", encoding="utf-8")
+        if present_lock.exists():
+            lock_file.write_text(present_lock.read_text(encoding="utf-8"), encoding="utf-8")
         subprocess.run(
             [
                 *(sys.executable, "-m", "uv", "pip", "compile", "--quiet", "--universal", "--python-version", python),
                 *("--generate-hashes", "--no-header", "--no-annotate", "--no-emit-index-url", "--no-emit-find-links"),
-                *(*options, str(asked), "--output-file", str(answer)),
+                *(*options, str(requirements_file), "--output-file", str(lock_file)),
             ],
             check=True,
         )
-        return HEAD + "".join(blocks_for(python, answer.read_text(encoding="utf-8")))
+        return HEAD + "".join(blocks_for(python, lock_file.read_text(encoding="utf-8")))
 
 
 def blocks_for(python: str, lock: str) -> Iterator[str]:
@@ -103,12 +108,12 @@ def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Write the locks of the environments and of the extensions.")
     parser.add_argument("--check", action="store_true", help="write nothing; 1 if one would change")
     options = parser.parse_args(argv)
-    changed = [(path, text) for path, text in all_locks() if not path.exists() or path.read_text("utf-8") != text]
-    for path, text in changed:
+    new_texts = [(path, text) for path, text in all_locks() if not path.exists() or path.read_text("utf-8") != text]
+    for path, text in new_texts:
         print(f"{path.relative_to(ROOT)}: {'would change' if options.check else 'written'}")
         if not options.check:
             path.write_text(text, encoding="utf-8", newline="\n")
-    return 1 if changed and options.check else 0
+    return 1 if new_texts and options.check else 0
 
 
 if __name__ == "__main__":

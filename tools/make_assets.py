@@ -44,9 +44,9 @@ class Model:
         self.vertices.append(corners)
         self.faces.setdefault(material, []).append(list(range(first, first + len(corners))))
 
-    def box(self, material: str, low: tuple[float, float, float], high: tuple[float, float, float]) -> None:
+    def box(self, material: str, lowest: tuple[float, float, float], highest: tuple[float, float, float]) -> None:
         """Add an axis-aligned box between its lowest and highest corner, m."""
-        (a, b, c), (d, e, f) = low, high
+        (a, b, c), (d, e, f) = lowest, highest
         for corners in (
             [(a, b, c), (a, e, c), (d, e, c), (d, b, c)],
             [(a, b, f), (d, b, f), (d, e, f), (a, e, f)],
@@ -60,17 +60,17 @@ class Model:
     def tube(self, material: str, begin: Float, end: Float, radii: tuple[float, float], sides: int = 12) -> None:
         """Add a closed tube or cone between two points (3,) with a radius at each, m."""
         axis = (end - begin) / np.linalg.norm(end - begin)
-        across = np.cross(axis, [0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0])
-        across /= np.linalg.norm(across)
-        up = np.cross(axis, across)
+        first_side = np.cross(axis, [0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0])
+        first_side /= np.linalg.norm(first_side)
+        second_side = np.cross(axis, first_side)
         angle = 2.0 * np.pi * np.arange(sides) / sides
-        ring = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * up
-        low, high = begin + radii[0] * ring, end + radii[1] * ring
+        ring = np.cos(angle)[:, None] * first_side + np.sin(angle)[:, None] * second_side
+        first_ring, second_ring = begin + radii[0] * ring, end + radii[1] * ring
         for i in range(sides):
             j = (i + 1) % sides
-            self.face(material, np.array([low[i], low[j], high[j], high[i]]))
-        self.face(material, low[::-1])
-        self.face(material, high)
+            self.face(material, np.array([first_ring[i], first_ring[j], second_ring[j], second_ring[i]]))
+        self.face(material, first_ring[::-1])
+        self.face(material, second_ring)
 
     def write(self, path: Path) -> None:
         """Write the model as an OBJ file, y up and -z to the north, and its materials as an MTL file beside it."""
@@ -126,14 +126,14 @@ def grit_bin() -> Model:
     model = Model()
     model.box("grit_bin_yellow", (-0.62, -0.42, 0.05), (0.62, 0.42, 0.62))
     lid = np.array([(-0.68, -0.49, 0.62), (0.68, -0.49, 0.62), (0.68, 0.49, 0.95), (-0.68, 0.49, 0.95)])
-    low = lid - [0.0, 0.0, 0.06]
+    lower_lid = lid - [0.0, 0.0, 0.06]
     model.face("grit_bin_yellow", lid)
-    model.face("grit_bin_yellow", low[::-1])
+    model.face("grit_bin_yellow", lower_lid[::-1])
     for i in range(4):
         j = (i + 1) % 4
-        model.face("grit_bin_yellow", np.array([low[i], low[j], lid[j], lid[i]]))
-    back = [(0.62, 0.42, 0.62), (-0.62, 0.42, 0.62), (-0.62, 0.42, 0.88), (0.62, 0.42, 0.88)]
-    model.face("grit_bin_yellow", np.array(back))
+        model.face("grit_bin_yellow", np.array([lower_lid[i], lower_lid[j], lid[j], lid[i]]))
+    back_wall = [(0.62, 0.42, 0.62), (-0.62, 0.42, 0.62), (-0.62, 0.42, 0.88), (0.62, 0.42, 0.88)]
+    model.face("grit_bin_yellow", np.array(back_wall))
     for x in (-0.55, 0.4):
         model.box("roof", (x, -0.4, 0.0), (x + 0.15, 0.4, 0.05))
     return model

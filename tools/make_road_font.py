@@ -86,10 +86,10 @@ class Stroke:
         for line, trim in ((points, self.trim[0]), (points[::-1], self.trim[1])):
             if trim:
                 area = area.difference(_beginning(line, trim, self.width))
-        for (inner, end), level in zip(ends, self.level, strict=True):
-            if level and inner[1] != end[1]:
-                low, high = (end[1], _FAR) if inner[1] > end[1] else (-_FAR, end[1])
-                area = area.intersection(box(-_FAR, low, _FAR, high))
+        for (point_before, end), is_level in zip(ends, self.level, strict=True):
+            if is_level and point_before[1] != end[1]:
+                lowest, highest = (end[1], _FAR) if point_before[1] > end[1] else (-_FAR, end[1])
+                area = area.intersection(box(-_FAR, lowest, _FAR, highest))
         return area
 
     def moved(self, across: float, up: float) -> Stroke:
@@ -102,28 +102,28 @@ class Stroke:
         return replace(self, points=points)
 
 
-def _beside(points: Sequence[Point], distance: float, closed: bool) -> list[Point]:
+def _beside(points: Sequence[Point], distance: float, is_closed: bool) -> list[Point]:
     """Return the corners of the line that runs at a distance on the left of another one; on its right if negative."""
-    found: list[Point] = []
+    corners: list[Point] = []
     count = len(points)
     for number, (x, y, *rounding) in enumerate(points):
         ends = [_direction(points[i % count], points[(i + 1) % count]) for i in (number - 1, number)]
-        if not closed and number in (0, count - 1):
+        if not is_closed and number in (0, count - 1):
             ends = ends[1:] * 2 if number == 0 else ends[:1] * 2
         (ax, ay), (bx, by) = ends
         share = distance / (1.0 + ax * bx + ay * by)
         turn = math.copysign(1.0, ax * by - ay * bx)
         radius = rounding[0] - turn * distance if rounding else 0.0
-        found.append((x - (ay + by) * share, y + (ax + bx) * share, max(radius, 0.0)))
-    return found
+        corners.append((x - (ay + by) * share, y + (ax + bx) * share, max(radius, 0.0)))
+    return corners
 
 
 def _beginning(points: Sequence[Point], length: float, width: float) -> BaseGeometry:
     """Return a polygon over a line's beginning of a length and what is before it, wider than the stroke."""
-    line = LineString(_rounded(points, closed=False, tolerance=_FINE))
+    line = LineString(_rounded(points, is_closed=False, tolerance=_FINE))
     (x, y), (ax, ay) = points[0][:2], _direction(points[0], points[1])
-    start = LineString([(x - 0.1 * ax, y - 0.1 * ay), *substring(line, 0.0, length).coords])
-    return start.buffer(width * 0.6, cap_style="flat", join_style="mitre")
+    first_part = LineString([(x - 0.1 * ax, y - 0.1 * ay), *substring(line, 0.0, length).coords])
+    return first_part.buffer(width * 0.6, cap_style="flat", join_style="mitre")
 
 
 def _beyond(inner: Point, end: Point) -> Point:
@@ -131,52 +131,58 @@ def _beyond(inner: Point, end: Point) -> Point:
     across, up = end[0] - inner[0], end[1] - inner[1]
     if not across or not up:
         return end
-    more = 1.5 / math.hypot(across, up)
-    return (end[0] + across * more, end[1] + up * more)
+    factor = 1.5 / math.hypot(across, up)
+    return (end[0] + across * factor, end[1] + up * factor)
 
 
-def _rounded(points: Sequence[Point], closed: bool, tolerance: float = _TOLERANCE) -> list[tuple[float, float]]:
+def _rounded(points: Sequence[Point], is_closed: bool, tolerance: float = _TOLERANCE) -> list[tuple[float, float]]:
     """Return the points of a line whose corners with a radius are arcs of straight pieces."""
-    found: list[tuple[float, float]] = []
+    line_points: list[tuple[float, float]] = []
     count = len(points)
-    taken = [0.0] * count
+    lengths_taken = [0.0] * count
     for number, point in enumerate(points):
         radius = point[2] if len(point) > 2 else 0.0
-        before, after = points[number - 1], points[(number + 1) % count]
-        ends = not closed and number in (0, count - 1)
-        if ends or not radius:
-            found.append((point[0], point[1]))
+        point_before, point_after = points[number - 1], points[(number + 1) % count]
+        is_end = not is_closed and number in (0, count - 1)
+        if is_end or not radius:
+            line_points.append((point[0], point[1]))
             continue
-        arc, taken[number] = _arc(before, point, after, radius, tolerance)
-        found += arc
+        arc, lengths_taken[number] = _arc(point_before, point, point_after, radius, tolerance)
+        line_points += arc
     for number, point in enumerate(points):
-        room = math.dist(points[number - 1][:2], point[:2]) if number or closed else math.inf
-        assert taken[number - 1] + taken[number] < room + 1e-6, f"no room for the arcs beside {point}"
-    if closed:
-        found.append(found[0])
-    return found
+        room = math.dist(points[number - 1][:2], point[:2]) if number or is_closed else math.inf
+        assert lengths_taken[number - 1] + lengths_taken[number] < room + 1e-6, f"no room for the arcs beside {point}"
+    if is_closed:
+        line_points.append(line_points[0])
+    return line_points
 
 
 def _arc(
-    before: Point, corner: Point, after: Point, radius: float, tolerance: float
+    point_before: Point, corner: Point, point_after: Point, radius: float, tolerance: float
 ) -> tuple[list[tuple[float, float]], float]:
     """Return the points of the arc that rounds a corner between two others, and what it takes of either side."""
-    (ax, ay), (bx, by) = _direction(before, corner), _direction(corner, after)
+    (ax, ay), (bx, by) = _direction(point_before, corner), _direction(corner, point_after)
     turn = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
-    long = radius * math.tan(abs(turn) / 2.0)
+    tangent_length = radius * math.tan(abs(turn) / 2.0)
     side = math.copysign(1.0, turn)
-    centre = (corner[0] - ax * long - ay * radius * side, corner[1] - ay * long + ax * radius * side)
+    centre = (
+        corner[0] - ax * tangent_length - ay * radius * side,
+        corner[1] - ay * tangent_length + ax * radius * side,
+    )
     start = math.atan2(-ax * side, ay * side)
-    widest = 2.0 * math.acos(radius / (radius + tolerance))
-    pieces = max(1, round(math.ceil(math.pi / 2.0 / widest) * abs(turn) / (math.pi / 2.0)))
+    widest_angle = 2.0 * math.acos(radius / (radius + tolerance))
+    pieces = max(1, round(math.ceil(math.pi / 2.0 / widest_angle) * abs(turn) / (math.pi / 2.0)))
     # The pieces touch the arc in their middles: so the first and the last lie on the lines that it joins.
     step = turn / pieces
     reach = radius / math.cos(step / 2.0)
     angles = [start + step * (number + 0.5) for number in range(pieces)]
-    return [(centre[0] + reach * math.cos(angle), centre[1] + reach * math.sin(angle)) for angle in angles], long
+    return [
+        (centre[0] + reach * math.cos(angle), centre[1] + reach * math.sin(angle)) for angle in angles
+    ], tangent_length
 
 
 def _direction(start: Point, end: Point) -> tuple[float, float]:
+    """Return the unit vector from one point to another."""
     across, up = end[0] - start[0], end[1] - start[1]
     length = math.hypot(across, up)
     return across / length, up / length
@@ -559,20 +565,20 @@ They are 1 high: those above capitals and the descenders end the box by whose he
 
 def glyphs() -> dict[str, Glyph]:
     """Return all glyphs by their characters, letters with marks included."""
-    found = {**_CAPITALS, **_SMALL_LETTERS, **_FIGURES, **_SIGNS}
-    bare = found | {"i": Glyph(_UPRIGHT, _UPRIGHT, (_SMALL_STEM,))}
+    glyph_of_character = {**_CAPITALS, **_SMALL_LETTERS, **_FIGURES, **_SIGNS}
+    letters = glyph_of_character | {"i": Glyph(_UPRIGHT, _UPRIGHT, (_SMALL_STEM,))}
     for character in map(chr, range(0xC0, 0x180)):
         letter, mark = (*unicodedata.normalize("NFD", character), "", "")[:2]
-        if letter in bare and mark in _MARKS | _BELOW:
-            found[character] = _with_mark(bare[letter], mark)
-    return found
+        if letter in letters and mark in _MARKS | _BELOW:
+            glyph_of_character[character] = _with_mark(letters[letter], mark)
+    return glyph_of_character
 
 
 def _with_mark(glyph: Glyph, mark: str) -> Glyph:
     """Return a letter with a mark above or below its middle."""
-    low, _, high, top = union_all([stroke.area() for stroke in glyph.strokes]).bounds
+    left_edge, _, right_edge, top = union_all([stroke.area() for stroke in glyph.strokes]).bounds
     up = 0.0 if mark in _BELOW else _ABOVE_SMALL if top < _ABOVE_SMALL else _ABOVE_CAPITALS
-    marks = [stroke.moved((low + high) / 2.0, up) for stroke in (_MARKS | _BELOW)[mark]]
+    marks = [stroke.moved((left_edge + right_edge) / 2.0, up) for stroke in (_MARKS | _BELOW)[mark]]
     return replace(glyph, strokes=(*glyph.strokes, *marks))
 
 
@@ -581,50 +587,53 @@ def outlines(glyph: Glyph) -> tuple[list[list[tuple[int, int]]], int]:
     if not glyph.strokes:
         return [], round(glyph.advance * UNIT)
     area = union_all([stroke.area() for stroke in glyph.strokes])
-    low, _, high, _ = area.bounds
-    advance = glyph.advance or glyph.left + high - low + glyph.right
-    left = (glyph.advance - (high - low)) / 2.0 if glyph.advance else glyph.left
+    left_edge, _, right_edge, _ = area.bounds
+    advance = glyph.advance or glyph.left + right_edge - left_edge + glyph.right
+    left = (glyph.advance - (right_edge - left_edge)) / 2.0 if glyph.advance else glyph.left
     polygons: Sequence[Polygon] = getattr(area, "geoms", [area])
     contours = []
     for polygon in polygons:
         for ring, clockwise in ((polygon.exterior, True), *((hole, False) for hole in polygon.interiors)):
-            points = [(round((x - low + left) * UNIT), round(y * UNIT)) for x, y in ring.coords[:-1]]
+            points = [(round((x - left_edge + left) * UNIT), round(y * UNIT)) for x, y in ring.coords[:-1]]
             contours.append(_in_order(_without_straight(points), clockwise))
     return sorted(contours), round(advance * UNIT)
 
 
 def _without_straight(points: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Return the points of a ring without those within a font unit of the line between their neighbours."""
-    kept = list(points)
+    corners = list(points)
     number = 0
-    while number < len(kept):
-        (ax, ay), (bx, by), (cx, cy) = kept[number - 1], kept[number], kept[(number + 1) % len(kept)]
-        long = math.hypot(cx - ax, cy - ay)
-        if abs((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)) <= long:
-            del kept[number]
+    while number < len(corners):
+        (ax, ay), (bx, by), (cx, cy) = corners[number - 1], corners[number], corners[(number + 1) % len(corners)]
+        base_length = math.hypot(cx - ax, cy - ay)
+        if abs((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)) <= base_length:
+            del corners[number]
             number = max(number - 1, 0)
         else:
             number += 1
-    return kept
+    return corners
 
 
-def _in_order(points: list[tuple[int, int]], clockwise: bool) -> list[tuple[int, int]]:
+def _in_order(points: list[tuple[int, int]], is_clockwise: bool) -> list[tuple[int, int]]:
     """Return a ring's points the way round that is asked for, from the lowest of those furthest left on."""
-    following = zip(points, [*points[1:], points[0]], strict=True)
-    area = sum(ax * by - bx * ay for (ax, ay), (bx, by) in following)
-    if (area < 0.0) != clockwise:
+    edges = zip(points, [*points[1:], points[0]], strict=True)
+    area = sum(ax * by - bx * ay for (ax, ay), (bx, by) in edges)
+    if (area < 0.0) != is_clockwise:
         points = points[::-1]
-    first = points.index(min(points))
-    return points[first:] + points[:first]
+    first_number = points.index(min(points))
+    return points[first_number:] + points[:first_number]
 
 
 def make_font(path: Path) -> None:
     """Write the typeface to a TrueType file."""
-    drawn = glyphs()
-    names = {character: f"uni{ord(character):04X}" for character in sorted(drawn)}
-    blank = Glyph(_UPRIGHT, _UPRIGHT, (Stroke(((0.5, 0.5), (3.5, 0.5), (3.5, 6.5), (0.5, 6.5)), closed=True),))
+    glyph_of_character = glyphs()
+    names = {character: f"uni{ord(character):04X}" for character in sorted(glyph_of_character)}
+    missing_glyph = Glyph(_UPRIGHT, _UPRIGHT, (Stroke(((0.5, 0.5), (3.5, 0.5), (3.5, 6.5), (0.5, 6.5)), closed=True),))
     shapes, widths = {}, {}
-    for name, glyph in ((".notdef", blank), *((names[character], drawn[character]) for character in names)):
+    for name, glyph in (
+        (".notdef", missing_glyph),
+        *((names[character], glyph_of_character[character]) for character in names),
+    ):
         pen = TTGlyphPen(None)
         contours, advance = outlines(glyph)
         for contour in contours:

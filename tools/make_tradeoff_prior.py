@@ -58,10 +58,12 @@ PREVIEWS = 0.1
 
 
 def _short(value: float) -> float:
+    """Return a number with three digits."""
     return float(f"{value:.3g}")
 
 
 def _expected(errors: Mapping[str, tuple[float, float]]) -> dict[str, float]:
+    """Return the expected errors, the first of each pair, with three digits, by name."""
     return {name: _short(pair[0]) for name, pair in errors.items()}
 
 
@@ -70,36 +72,36 @@ def measure_platform(platform: str) -> dict[str, Any]:
     name, changes = SCENES[platform]
     scenario = load_scenario(name, [*changes, "cloud.point_spacing=null"])
     empty_file()
-    shown = RoadScene.of(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
-    builds, few = [], None
+    scene = RoadScene.of(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
+    build_times, few_plants_points = [], None
     trial = None
     models = model_knobs(scenario, {})
-    shown.rebuild(models[0].changes)  # untimed: the first build pays for what Blender loads once
+    scene.rebuild(models[0].changes)  # untimed: the first build pays for what Blender loads once
     for model in models:
         begin = time.process_time()
-        trial = Trial.of(shown.site, shown.rebuild(model.changes))
+        trial = Trial.of(scene.site, scene.rebuild(model.changes))
         trial.clock = time.process_time
-        builds.append(1e6 * (time.process_time() - begin) / shown.area)
-        few = few or trial.points(RINGS[1])
+        build_times.append(1e6 * (time.process_time() - begin) / scene.area)
+        few_plants_points = few_plants_points or trial.points(RINGS[1])
     assert trial is not None
-    assert few is not None
+    assert few_plants_points is not None
     truth = trial.points()
     seconds = {rays: trial.time_scan(rings)[0] for rays, rings in RINGS.items()}
-    colours = colour_choices(scenario, shown.site.path.typical_range, has_return_camera=False)
+    colours = colour_choices(scenario, scene.site.path.typical_range, has_return_camera=False)
     sources = {key: _expected(pair) for key, pair in trial.colour_errors(colours, WANTED).items()}
-    relief = {str(octaves): _short(found["relief"][0]) for octaves, found in trial.relief_errors(OCTAVES).items()}
-    first, each, pixel = image_seconds(trial, colours["standard"])
+    relief = {str(octaves): _short(errors["relief"][0]) for octaves, errors in trial.relief_errors(OCTAVES).items()}
+    first_seconds, seconds_per_image, seconds_per_megapixel = image_seconds(trial, colours["standard"])
     return {
         "beam": {str(rays): _expected(beam_errors(trial.points(rings), truth)) for rays, rings in RINGS.items()},
-        "few_plants": _expected(beam_errors(few, truth)),
+        "few_plants": _expected(beam_errors(few_plants_points, truth)),
         "relief": relief,
         "colour": sources | {"returns": {"colour": 0.0, "layers": 0.0}},
         "pulse": {str(rays): _short(1e6 * value / trial.pulses / CORES) for rays, value in seconds.items()},
-        "model": [_short(value) for value in builds],
+        "model": [_short(value) for value in build_times],
         "octave": {str(octaves): _short(octave_seconds(trial, octaves)) for octaves in OCTAVES},
-        "image": [_short(first), _short(each / CORES), _short(pixel / CORES)],
+        "image": [_short(first_seconds), _short(seconds_per_image / CORES), _short(seconds_per_megapixel / CORES)],
         "sample": SAMPLE,
-        "scene_file": _short(_saving_time(shown.area)),
+        "scene_file": _short(_saving_time(scene.area)),
         "previews": PREVIEWS,
     }
 
@@ -117,10 +119,13 @@ def image_seconds(trial: Trial, changes: Mapping[str, Any]) -> tuple[float, floa
     sizes: list[float] = []
 
     def pick(views: list[View]) -> list[View]:
-        middle = [views[len(views) * (2 * number + 1) // (2 * TIMED)] for number in range(TIMED)]
-        small = [replace(view, size=(max(view.size[0] // 4, 1), max(view.size[1] // 4, 1))) for view in middle[1:]]
-        sizes.extend(view.pixels / 1e6 for view in [*middle, *small])
-        return [*middle, *small]
+        """Return views in the middles of equal parts of all, and all but the first of them in a quarter of the size."""
+        middle_views = [views[len(views) * (2 * number + 1) // (2 * TIMED)] for number in range(TIMED)]
+        small_views = [
+            replace(view, size=(max(view.size[0] // 4, 1), max(view.size[1] // 4, 1))) for view in middle_views[1:]
+        ]
+        sizes.extend(view.pixels / 1e6 for view in [*middle_views, *small_views])
+        return [*middle_views, *small_views]
 
     stamps = [trial.clock()]
     request = replace(trial.layer_request(changes), wanted=WANTED, pick=pick)
@@ -128,9 +133,16 @@ def image_seconds(trial: Trial, changes: Mapping[str, Any]) -> tuple[float, floa
         pass
     times = np.diff(stamps)
     table = np.stack([np.ones(len(sizes) - 1), np.array(sizes[1:])], axis=1)
-    (each, pixel), *_ = np.linalg.lstsq(table, times[1:], rcond=None)
-    each, pixel = max(float(each), 0.0), max(float(pixel), 0.0)
-    return max(float(times[0]) - each - pixel * sizes[0], 0.0), each, pixel
+    (seconds_per_image, seconds_per_megapixel), *_ = np.linalg.lstsq(table, times[1:], rcond=None)
+    seconds_per_image, seconds_per_megapixel = (
+        max(float(seconds_per_image), 0.0),
+        max(float(seconds_per_megapixel), 0.0),
+    )
+    return (
+        max(float(times[0]) - seconds_per_image - seconds_per_megapixel * sizes[0], 0.0),
+        seconds_per_image,
+        seconds_per_megapixel,
+    )
 
 
 def _saving_time(area: float) -> float:
@@ -146,14 +158,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("platforms", nargs="*", metavar="PLATFORM", help=f"{', '.join(SCENES)}; without any, all")
     platforms = parser.parse_args().platforms or list(SCENES)
-    if unknown := set(platforms) - set(SCENES):
-        parser.error(f"no such platform: {', '.join(sorted(unknown))}; there are {', '.join(SCENES)}")
+    if unknown_names := set(platforms) - set(SCENES):
+        parser.error(f"no such platform: {', '.join(sorted(unknown_names))}; there are {', '.join(SCENES)}")
     if not HAS_RETURN_CAMERA:
         raise SystemExit("needs Blender 5.0 or newer: true colours are those of a pixel per return")
-    found = read_json(FILE)["platforms"] if FILE.exists() else {}
+    rows = read_json(FILE)["platforms"] if FILE.exists() else {}
     for platform in platforms:
-        found[platform] = measure_platform(platform)
-        data = {"command": "python tools/make_tradeoff_prior.py", "cores": CORES, "platforms": found}
+        rows[platform] = measure_platform(platform)
+        data = {"command": "python tools/make_tradeoff_prior.py", "cores": CORES, "platforms": rows}
         FILE.write_text(canonical_json(data), encoding="utf-8")
         print(platform, round(time.process_time(), 1), "s")
 

@@ -133,17 +133,19 @@ def main() -> None:
     parser.add_argument("--real", type=Path, help="folder of real scans to measure on; without it those figures stay")
     parser.add_argument("--jobs", type=int, default=2, help="scenes at a time")
     arguments = parser.parse_args()
-    if unknown := [name for name in arguments.names if name not in PLANS]:
-        parser.error(f"NAME is {unknown[0]}: must be one of {', '.join(PLANS)}")
+    if unknown_names := [name for name in arguments.names if name not in PLANS]:
+        parser.error(f"NAME is {unknown_names[0]}: must be one of {', '.join(PLANS)}")
     for name in arguments.names or PLANS:
         make(name, PLANS[name], arguments)
 
 
 def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
     """Make one model: its data set, training, figures, weights and card."""
-    data, folder = arguments.work / RECIPE, arguments.work / name
-    run_command("dataset", RECIPE, "--output", str(data), "--jobs", str(arguments.jobs), *resumption(data))
-    options = [word for change in (*plan.changes, *data_changes(plan, data)) for word in ("--set", change)]
+    data_folder, folder = arguments.work / RECIPE, arguments.work / name
+    run_command(
+        "dataset", RECIPE, "--output", str(data_folder), "--jobs", str(arguments.jobs), *resumption(data_folder)
+    )
+    options = [word for change in (*plan.changes, *data_changes(plan, data_folder)) for word in ("--set", change)]
     minutes, machine = train(plan, folder, options)
     run: Run[Any] = Run.open(folder)
     figures = [
@@ -159,12 +161,12 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
         task=plan.task,
         domain=plan.domain,
         recipe=(
-            f"synthroads dataset {RECIPE} --output {data}",
+            f"synthroads dataset {RECIPE} --output {data_folder}",
             f"synthroads train {plan.configuration} --output {folder} {shlex.join(options)}",
         ),
         commit=commit(),
         seed=run.configuration.seed,
-        scenes=training_roads(plan, data),
+        scenes=training_roads(plan, data_folder),
         epochs=run.configuration.schedule.epochs,
         minutes=round(minutes, 1),
         machine=machine,
@@ -186,9 +188,9 @@ def train(plan: Plan, folder: Path, options: list[str]) -> tuple[float, str]:
 
     On a GPU that is time by the clock, else processor time.
     """
-    kept = folder / "minutes.json"
-    told = read_json(kept) if kept.is_file() else {}
-    minutes, machine = float(told.get("minutes", 0.0)), str(told.get("machine", "one core"))
+    minutes_file = folder / "minutes.json"
+    minutes_data = read_json(minutes_file) if minutes_file.is_file() else {}
+    minutes, machine = float(minutes_data.get("minutes", 0.0)), str(minutes_data.get("machine", "one core"))
     if not (folder / METRICS).is_file():
         graphics = torch.cuda.get_device_name() if torch.cuda.is_available() else None
         begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.perf_counter()
@@ -196,7 +198,7 @@ def train(plan: Plan, folder: Path, options: list[str]) -> tuple[float, str]:
         end = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.perf_counter()
         minutes += (end[1] - begin[1] if graphics else end[0] - begin[0]) / 60.0
         machine = graphics or "one core"
-        write_file(kept, canonical_json({"minutes": minutes, "machine": machine}).encode(), overwrite=True)
+        write_file(minutes_file, canonical_json({"minutes": minutes, "machine": machine}).encode(), overwrite=True)
     return minutes, machine
 
 
@@ -213,68 +215,68 @@ def data_changes(plan: Plan, data: Path) -> list[str]:
     return [f"data.synthetic={json.dumps(sources)}"]
 
 
-def measured(plan: Plan, name: str, split: str, where: str, arguments: argparse.Namespace) -> list[Figure]:
+def measured(plan: Plan, name: str, split: str, place_text: str, arguments: argparse.Namespace) -> list[Figure]:
     """Return the figures on a split of the data set's roads."""
     words = [str(arguments.work / RECIPE), "--split", split]
     scores = evaluate(arguments.work / name, words, arguments.work / f"{name}-scores" / split)
-    return figures_of(plan, scores, where, inside=split in plan.inside)
+    return figures_of(plan, scores, place_text, is_inside=split in plan.inside)
 
 
 def foreign(plan: Plan, name: str, folder: Path, arguments: argparse.Namespace) -> list[Figure]:
     """Return the figures on real scans; those of the card that is there where no folder of them is given."""
-    before = arguments.weights / f"{name}.json"
+    card_file = arguments.weights / f"{name}.json"
     if arguments.real is None:
-        told = ModelCard.from_dict(read_json(before)).figures if before.is_file() else ()
-        return [figure for figure in told if REAL in figure.name]
-    found = []
+        figures_before = ModelCard.from_dict(read_json(card_file)).figures if card_file.is_file() else ()
+        return [figure for figure in figures_before if REAL in figure.name]
+    figures = []
     for cloud, mapping in plan.mapping.items():
         words = [str(arguments.real / cloud), *(["--mapping", mapping] if mapping else [])]
         scores = evaluate(folder, words, arguments.work / f"{name}-scores" / Path(cloud).stem)
-        found += figures_of(plan, scores, f"{REAL}, {Path(cloud).stem}", inside=False)
-    return found
+        figures += figures_of(plan, scores, f"{REAL}, {Path(cloud).stem}", is_inside=False)
+    return figures
 
 
-def figures_of(plan: Plan, scores: dict[str, Any], where: str, *, inside: bool) -> list[Figure]:
+def figures_of(plan: Plan, scores: dict[str, Any], place_text: str, *, is_inside: bool) -> list[Figure]:
     """Return an evaluation's figures for a card, of centrelines beside the best of the rules that learn nothing."""
     if plan.task == "segmentation":
-        return segmentation_figures(scores, where, inside=inside)
+        return segmentation_figures(scores, place_text, is_inside=is_inside)
     means = {name: rows["all"] for name, rows in scores["tables"].items()}
     errors = {name: row["mae"]["mean"] for name, row in means.items()}
-    own = next(name for name in errors if not name.startswith((*RULES, "the displaced")))
-    together = next(name for name in errors if name.startswith("views with"))
-    alone = [error for name, error in errors.items() if name.startswith(RULES) and name != together]
-    best = round(min(error for error in alone if error is not None), 3)
+    network_name = next(name for name in errors if not name.startswith((*RULES, "the displaced")))
+    fused_name = next(name for name in errors if name.startswith("views with"))
+    rule_errors = [error for name, error in errors.items() if name.startswith(RULES) and name != fused_name]
+    best_rule = round(min(error for error in rule_errors if error is not None), 3)
 
     def figure(text: str, value: float, unit: str, rule: float | None = None) -> Figure:
-        return Figure(name=f"{text}, {where}", value=round(value, 3), rule=rule, unit=unit, inside=inside)
+        return Figure(name=f"{text}, {place_text}", value=round(value, 3), rule=rule, unit=unit, inside=is_inside)
 
-    covered = [(share, means[together][f"coverage_{share}"]["mean"]) for share in (68, 95)]
+    shares = [(share, means[fused_name][f"coverage_{share}"]["mean"]) for share in (68, 95)]
     return [
-        figure("mean error, the network by itself", errors[own], "m", best),
-        figure("mean error, fused with the views", errors[together], "m", best),
-        *(figure(f"in the {share} % interval, fused", round(100.0 * value, 1), "%") for share, value in covered),
+        figure("mean error, the network by itself", errors[network_name], "m", best_rule),
+        figure("mean error, fused with the views", errors[fused_name], "m", best_rule),
+        *(figure(f"in the {share} % interval, fused", round(100.0 * value, 1), "%") for share, value in shares),
     ]
 
 
-def segmentation_figures(scores: dict[str, Any], where: str, *, inside: bool) -> list[Figure]:
+def segmentation_figures(scores: dict[str, Any], place_text: str, *, is_inside: bool) -> list[Figure]:
     """Return mean IoU and that of each class which the truth has."""
-    ((_, told),) = scores["tests"].items()
-    by_class = {name: row["iou"] for name, row in told["classes"].items() if row["support"]}
-    named = {"mean IoU": told["mean_iou"], **{f"IoU of {name}": value for name, value in by_class.items()}}
+    ((_, test),) = scores["tests"].items()
+    by_class = {name: row["iou"] for name, row in test["classes"].items() if row["support"]}
+    value_of_name = {"mean IoU": test["mean_iou"], **{f"IoU of {name}": value for name, value in by_class.items()}}
     return [
-        Figure(name=f"{name}, {where}", value=round(100.0 * value, 1), unit="%", inside=inside)
-        for name, value in named.items()
+        Figure(name=f"{name}, {place_text}", value=round(100.0 * value, 1), unit="%", inside=is_inside)
+        for name, value in value_of_name.items()
         if value is not None
     ]
 
 
 def evaluate(folder: Path, words: list[str], output: Path) -> dict[str, Any]:
     """Return the scores of `synthroads evaluate` as JSON data, measured once for each training."""
-    kept = output / "scores.json"
-    if not kept.is_file() or kept.stat().st_mtime < (folder / METRICS).stat().st_mtime:
-        told = run_command("evaluate", str(folder), *words, "--output", str(output), "--json")
-        write_file(kept, told.encode(), overwrite=True)
-    return dict(read_json(kept))
+    scores_file = output / "scores.json"
+    if not scores_file.is_file() or scores_file.stat().st_mtime < (folder / METRICS).stat().st_mtime:
+        scores_text = run_command("evaluate", str(folder), *words, "--output", str(output), "--json")
+        write_file(scores_file, scores_text.encode(), overwrite=True)
+    return dict(read_json(scores_file))
 
 
 def run_command(name: str, *words: str) -> str:
@@ -289,27 +291,31 @@ def run_command(name: str, *words: str) -> str:
 
 def commit() -> str:
     """Return the commit of the source that the models are made with."""
-    told = subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False)
-    return told.stdout.strip()[:12] or "unknown"
+    answer = subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False)
+    return answer.stdout.strip()[:12] or "unknown"
 
 
 def card_text(card: ModelCard) -> str:
     """Return a card as a page for people."""
-    low, high = card.domain.density
-    rows = [
-        f"| {one.name} | {one.value:g} {one.unit} | {'-' if one.rule is None else f'{one.rule:g} {one.unit}'} |"
-        for one in card.figures
-    ]
-    made = f"{card.title}. {card.parameters:,} weights in half precision, seed {card.seed}, {card.epochs} epochs of "
-    made += f"{card.minutes:g} minutes in all on {card.machine}, {card.scenes} synthetic roads, source {card.commit}."
-    needed = f", with {' and '.join(card.domain.needs)}" if card.domain.needs else ""
-    use = f"For clouds of {low:g} to {high:g} points/m2, {' or '.join(card.domain.platforms)}{needed}."
+    lowest, highest = card.domain.density
+    rows = []
+    for figure in card.figures:
+        rule = "-" if figure.rule is None else f"{figure.rule:g} {figure.unit}"
+        rows.append(f"| {figure.name} | {figure.value:g} {figure.unit} | {rule} |")
+    made_text = (
+        f"{card.title}. {card.parameters:,} weights in half precision, seed {card.seed}, {card.epochs} epochs of "
+    )
+    made_text += (
+        f"{card.minutes:g} minutes in all on {card.machine}, {card.scenes} synthetic roads, source {card.commit}."
+    )
+    needs_text = f", with {' and '.join(card.domain.needs)}" if card.domain.needs else ""
+    use_text = f"For clouds of {lowest:g} to {highest:g} points/m2, {' or '.join(card.domain.platforms)}{needs_text}."
     lines = [
         f"# {card.name}",
         "",
-        made,
+        made_text,
         "",
-        use,
+        use_text,
         "",
         "| measured | model | best rule that learns nothing |",
         "|---|--:|--:|",

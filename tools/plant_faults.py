@@ -77,27 +77,28 @@ class Fault:
 
     def planted(self, code: str) -> str | None:
         """Return a file's source code with the fault in it; None where the operator changes nothing."""
-        changed = mutate_code(code, get_operator(self.operator)(), self.occurrence)
-        return changed if changed != code else None
+        new_code = mutate_code(code, get_operator(self.operator)(), self.occurrence)
+        return new_code if new_code != code else None
 
 
-def draw_faults(each: int, seed: int) -> list[Fault]:
-    """Return `each` random faults of every area: a line is drawn first, then one of its faults."""
+def draw_faults(count: int, seed: int) -> list[Fault]:
+    """Return `count` random faults of every area: a line is drawn first, then one of its faults."""
     rng = random.Random(seed)
     names = [name for name in sorted(operator_names()) if not any(part in name for part in (*HARMLESS, "NoOp"))]
-    drawn = []
+    faults = []
     for area, patterns in AREAS.items():
         lines: dict[tuple[str, int], list[Fault]] = defaultdict(list)
         for file in sorted(str(path.relative_to(ROOT)) for pattern in patterns for path in ROOT.glob(pattern)):
             for fault in _faults(area, file, names):
                 lines[file, fault.line].append(fault)
         candidates = (rng.choice(lines[place]) for place in rng.sample(sorted(lines), len(lines)))
-        real = (fault for fault in candidates if fault.planted((ROOT / fault.file).read_text(encoding="utf-8")))
-        drawn += [fault for _, fault in zip(range(each), real, strict=False)]
-    return drawn
+        real_faults = (fault for fault in candidates if fault.planted((ROOT / fault.file).read_text(encoding="utf-8")))
+        faults += [fault for _, fault in zip(range(count), real_faults, strict=False)]
+    return faults
 
 
 def _faults(area: str, file: str, names: list[str]) -> Iterator[Fault]:
+    """Yield all faults that Cosmic-ray's operators can plant in a file."""
     tree = get_ast((ROOT / file).read_text(encoding="utf-8"))
     for name in names:
         try:
@@ -120,8 +121,8 @@ def marked_places(code: str, line: int) -> list[int]:
     uses = [number for number, text in enumerate(lines, 1) if name and re.search(rf"\b{name[1]}\b", text)]
     functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
     bodies = [node.body[1:] if ast.get_docstring(node) else node.body for node in functions]
-    for wanted in ([line], uses, [body[0].lineno for body in bodies if body]):
-        if places := {place for number in wanted if (place := _statement_of(number, functions, lines)) is not None}:
+    for numbers in ([line], uses, [body[0].lineno for body in bodies if body]):
+        if places := {place for number in numbers if (place := _statement_of(number, functions, lines)) is not None}:
             return sorted(places)
     return []
 
@@ -141,11 +142,11 @@ def put_marks(faults: list[Fault], marks: Path) -> None:
     """Change the source so that each test that reaches a fault's place is noted in a file."""
     helper = MARKS.format(path=str(marks.resolve()))
     (ROOT / ADDON / "marks.py").write_text(helper, encoding="utf-8")
-    by_file: dict[str, list[tuple[int, int]]] = defaultdict(list)
+    places_of_file: dict[str, list[tuple[int, int]]] = defaultdict(list)
     for number, fault in enumerate(faults):
         code = (ROOT / fault.file).read_text(encoding="utf-8")
-        by_file[fault.file] += [(place, number) for place in marked_places(code, fault.line)]
-    for file, places in by_file.items():
+        places_of_file[fault.file] += [(place, number) for place in marked_places(code, fault.line)]
+    for file, places in places_of_file.items():
         lines = (ROOT / file).read_text(encoding="utf-8").splitlines()
         for place, number in sorted(places, reverse=True):
             indent = lines[place - 1][: -len(lines[place - 1].lstrip())]
@@ -178,15 +179,15 @@ def run_tests(tests: list[str], options: list[str]) -> tuple[bool, str]:
     for part in ([test for test in tests if test not in blender], blender):
         if not part:
             continue
-        fixed = ["-x", "-q", "-p", "no:cacheprovider", "--tb=no", "--no-header"]
-        command = [sys.executable, "-m", "pytest", *fixed, *options, *part]
+        fixed_options = ["-x", "-q", "-p", "no:cacheprovider", "--tb=no", "--no-header"]
+        command = [sys.executable, "-m", "pytest", *fixed_options, *options, *part]
         try:
-            done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=SECONDS, check=False)
+            answer = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=SECONDS, check=False)
         except subprocess.TimeoutExpired:
             return True, "does not end"
-        if done.returncode not in (0, 5):
-            words = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
-            return True, words[0] if words else f"pytest's code {done.returncode}: {done.stdout[-200:]}"
+        if answer.returncode not in (0, 5):
+            words = [line for line in answer.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+            return True, words[0] if words else f"pytest's code {answer.returncode}: {answer.stdout[-200:]}"
     return False, ""
 
 
@@ -194,16 +195,16 @@ def judge(fault: Fault, tests: list[str], options: list[str]) -> dict[str, objec
     """Plant a fault, run the tests that reach it and restore the file; return the outcome as JSON data."""
     path = ROOT / fault.file
     code = path.read_text(encoding="utf-8")
-    changed = fault.planted(code)
-    assert changed is not None, f"{fault.file}:{fault.line} has another source than when the faults were drawn"
-    begun = time.perf_counter()
-    path.write_text(changed, encoding="utf-8")
+    new_code = fault.planted(code)
+    assert new_code is not None, f"{fault.file}:{fault.line} has another source than when the faults were drawn"
+    begin = time.perf_counter()
+    path.write_text(new_code, encoding="utf-8")
     try:
-        found, by = run_tests(tests, options)
+        is_found, first_failure = run_tests(tests, options)
     finally:
         path.write_text(code, encoding="utf-8")
-    seconds = round(time.perf_counter() - begun, 1)
-    return {**asdict(fault), "tests": len(tests), "found": found, "by": by, "seconds": seconds}
+    seconds = round(time.perf_counter() - begin, 1)
+    return {**asdict(fault), "tests": len(tests), "found": is_found, "by": first_failure, "seconds": seconds}
 
 
 def main() -> int:

@@ -31,11 +31,12 @@ def changed_files(root: Path, base: str) -> list[str]:
     """Return the paths, relative to the root, of files that differ from where this branch left another, or are new."""
 
     def git(*words: str) -> list[str]:
-        done = subprocess.run(["git", *words], cwd=root, check=True, capture_output=True, text=True)
-        return done.stdout.split("\n")[:-1]
+        """Return the lines that a command of git prints."""
+        answer = subprocess.run(["git", *words], cwd=root, check=True, capture_output=True, text=True)
+        return answer.stdout.split("\n")[:-1]
 
-    start = git("merge-base", base, "HEAD")[0]
-    return sorted({*git("diff", "--name-only", start), *git("ls-files", "--others", "--exclude-standard")})
+    common_commit = git("merge-base", base, "HEAD")[0]
+    return sorted({*git("diff", "--name-only", common_commit), *git("ls-files", "--others", "--exclude-standard")})
 
 
 def module_name(path: str) -> str:
@@ -60,26 +61,26 @@ def mirrored_test(path: str) -> str:
     return f"tests/{folder}/test_{name}".replace("//", "/")
 
 
-def distances(changed: Iterable[str], importers: Mapping[str, Iterable[str]]) -> dict[str, int]:
+def distances(changed_modules: Iterable[str], importers: Mapping[str, Iterable[str]]) -> dict[str, int]:
     """Return for each module the number of imports between it and the nearest changed module."""
-    found = dict.fromkeys(changed, 0)
-    queue = deque(found)
+    distance_of_module = dict.fromkeys(changed_modules, 0)
+    queue = deque(distance_of_module)
     while queue:
         module = queue.popleft()
         for importer in importers.get(module, ()):
-            if importer not in found:
-                found[importer] = found[module] + 1
+            if importer not in distance_of_module:
+                distance_of_module[importer] = distance_of_module[module] + 1
                 queue.append(importer)
-    return found
+    return distance_of_module
 
 
 def nearest_tests(
-    changed: Sequence[str], texts: Mapping[str, str], importers: Mapping[str, Iterable[str]]
+    changed_paths: Sequence[str], texts: Mapping[str, str], importers: Mapping[str, Iterable[str]]
 ) -> list[str]:
     """Return the test files that changed files can reach, nearest first.
 
     Args:
-        changed: paths of changed files, relative to the root.
+        changed_paths: paths of changed files, relative to the root.
         texts: source by path of every test file and of the tests' helpers.
         importers: for each module of the product the modules that import it.
     """
@@ -87,16 +88,18 @@ def nearest_tests(
     for path, text in texts.items():
         for name in imported_names(text):
             graph.setdefault(name, set()).add(module_name(path))
-    modules = [module_name(path) for path in changed if path.endswith(".py")]
-    found = distances(modules, graph)
-    near = {path: found[module_name(path)] for path in texts if module_name(path) in found}
-    named = [Path(path).name for path in changed if not path.endswith(".py")]
-    beside = {path for path, text in texts.items() if any(name in text for name in named)}
-    for path in beside | (set(map(mirrored_test, changed)) & set(texts)):
-        near[path] = min(near.get(path, 1), 1)
-    homes = {str(Path(mirrored_test(path)).parent) for path in changed if path.endswith(".py")}
-    tests = [path for path in near if Path(path).name.startswith("test_")]
-    return sorted(tests, key=lambda path: (near[path], str(Path(path).parent) not in homes, path))
+    modules = [module_name(path) for path in changed_paths if path.endswith(".py")]
+    distance_of_module = distances(modules, graph)
+    distance_of_file = {
+        path: distance_of_module[module_name(path)] for path in texts if module_name(path) in distance_of_module
+    }
+    file_names = [Path(path).name for path in changed_paths if not path.endswith(".py")]
+    naming_files = {path for path, text in texts.items() if any(name in text for name in file_names)}
+    for path in naming_files | (set(map(mirrored_test, changed_paths)) & set(texts)):
+        distance_of_file[path] = min(distance_of_file.get(path, 1), 1)
+    home_folders = {str(Path(mirrored_test(path)).parent) for path in changed_paths if path.endswith(".py")}
+    tests = [path for path in distance_of_file if Path(path).name.startswith("test_")]
+    return sorted(tests, key=lambda path: (distance_of_file[path], str(Path(path).parent) not in home_folders, path))
 
 
 def pytest_runtest_setup() -> None:
@@ -114,22 +117,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--list", action="store_true", help="only print the test files, nearest first")
     options = parser.parse_args(arguments)
     until = time.time() + options.seconds
-    changed = changed_files(ROOT, options.base)
+    changed_paths = changed_files(ROOT, options.base)
     graph = grimp.build_graph(*PACKAGES)
     importers = {module: graph.find_modules_that_directly_import(module) for module in graph.modules}
     files = sorted((ROOT / "tests").rglob("*.py"))
     texts = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in files}
-    reached = nearest_tests(changed, texts, importers)
-    tests = reached[: options.files]
-    print(f"{len(changed)} files changed against {options.base}; the nearest {len(tests)} of {len(reached)} test files")
+    all_tests = nearest_tests(changed_paths, texts, importers)
+    tests = all_tests[: options.files]
+    nearest = f"the nearest {len(tests)} of {len(all_tests)} test files"
+    print(f"{len(changed_paths)} files changed against {options.base}; {nearest}")
     sys.stdout.flush()
     if options.list or not tests:
         print("\n".join(tests))
         return 0
     words = ["-q", "-n", "2", "--dist", "loadfile", "-p", "tools.quick_tests", "-m", MARKERS, *tests]
     environment = {**os.environ, UNTIL: str(until), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run([sys.executable, "-m", "pytest", *words], cwd=ROOT, env=environment, check=False)
-    return done.returncode
+    answer = subprocess.run([sys.executable, "-m", "pytest", *words], cwd=ROOT, env=environment, check=False)
+    return answer.returncode
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ Choices = tuple[dict[str, str], dict[str, argparse.ArgumentParser]]
 
 def _split(parser: argparse.ArgumentParser) -> tuple[list[argparse.Action], Choices]:
     """Return a parser's own visible arguments, and (summaries, parsers) of its sub-commands by name."""
-    own: list[argparse.Action] = []
+    arguments: list[argparse.Action] = []
     summaries: dict[str, str] = {}
     parsers: dict[str, argparse.ArgumentParser] = {}
     for action in parser._actions:
@@ -32,8 +32,8 @@ def _split(parser: argparse.ArgumentParser) -> tuple[list[argparse.Action], Choi
             parsers = dict(action.choices)
             summaries = {choice.dest: choice.help or "" for choice in action._choices_actions}
         elif not isinstance(action, argparse._HelpAction) and action.help != argparse.SUPPRESS:
-            own.append(action)
-    return own, (summaries, parsers)
+            arguments.append(action)
+    return arguments, (summaries, parsers)
 
 
 def _command(name: str, parser: argparse.ArgumentParser, level: str, summary: str = "") -> Iterator[str]:
@@ -64,12 +64,14 @@ def _usage(parser: argparse.ArgumentParser) -> str:
 
 
 def _names(action: argparse.Action) -> str:
+    """Return an argument's names with their value, or the value's name alone, as Markdown code."""
     value = "" if action.nargs == 0 else f" {_metavar(action)}"
-    shown = [f"{name}{value}" for name in action.option_strings] or [_metavar(action)]
-    return ", ".join(f"`{text}`" for text in shown).replace("|", "\\|")
+    forms = [f"{name}{value}" for name in action.option_strings] or [_metavar(action)]
+    return ", ".join(f"`{text}`" for text in forms).replace("|", "\\|")
 
 
 def _metavar(action: argparse.Action) -> str:
+    """Return the name of an argument's value, as the help shows it."""
     if isinstance(action.metavar, tuple):
         return " ".join(action.metavar)
     if action.metavar is None and action.choices is not None:

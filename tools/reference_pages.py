@@ -68,6 +68,7 @@ def fields(classes: Sequence[str]) -> str:
 
 
 def _model(module: str, name: str) -> type[Model]:
+    """Return a class of a module, both by name."""
     model: type[Model] = getattr(import_module(module), name)
     return model
 
@@ -78,8 +79,8 @@ def _section(name: str, parts: dict[str, dict[str, Any]]) -> str:
     text = schema.get("description", "").split("\n\nAttributes:")[0]
     rows = []
     for field, rule in schema["properties"].items():
-        same = parts[class_of(rule)].get("description", "") if "$ref" in rule else ""  # pydantic says it once
-        cells = {"description": same.partition("\n")[0], **rule}
+        class_text = parts[class_of(rule)].get("description", "") if "$ref" in rule else ""  # pydantic says it once
+        cells = {"description": class_text.partition("\n")[0], **rule}
         rows.append(_row(field, cells, field in schema.get("required", ())))
     head = ["| field | value | default | meaning |", "|---|---|---|---|"]
     return "\n".join([f"# {name}", "", _plain(text), "", *head, *rows])
@@ -90,9 +91,10 @@ def _plain(docstring: str) -> str:
     return docstring.replace("``", "`").replace("<", "\\<")
 
 
-def _row(field: str, rule: dict[str, Any], required: bool) -> str:
+def _row(field: str, rule: dict[str, Any], is_required: bool) -> str:
+    """Return the row of a field in a table of Markdown."""
     unit = "" if rule.get("unit") in (None, "1") else f" ({rule['unit']})"
-    default = "**required**" if required else _default(rule)
+    default = "**required**" if is_required else _default(rule)
     cells = [f"`{field}`", f"{_WORDING.value(rule)}{unit}", default, _plain(rule.get("description", ""))]
     return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
 
@@ -114,19 +116,20 @@ def presets() -> str:
 
 
 def _table(kind: Kind) -> str:
-    files = ((one, one.file.relative_to(ROOT).as_posix()) for one in entries(kind))
-    rows = [f"| [`{one.name}`](../../{file}) | {_what(one)} |" for one, file in files]
+    """Return a kind's shipped entries as a table of Markdown."""
+    files = ((entry, entry.file.relative_to(ROOT).as_posix()) for entry in entries(kind))
+    rows = [f"| [`{entry.name}`](../../{file}) | {_what(entry)} |" for entry, file in files]
     return "\n".join([f"# {kind.title}", "", f"By name: `{kind.use}`", "", "| name | what it is |", "|---|---|", *rows])
 
 
-def _what(one: Entry) -> str:
+def _what(entry: Entry) -> str:
     """Return a catalogue entry's description: its title, with the key figures of those made of others."""
-    if "scenes" in one.figures:
-        return f"{one.title}: {one.figures['scenes']} scenes. {one.note}"
+    if "scenes" in entry.figures:
+        return f"{entry.title}: {entry.figures['scenes']} scenes. {entry.note}"
     for parts in ("assets", "materials"):
-        if parts in one.figures:
-            return f"{one.title}: {', '.join(one.figures[parts])}"
-    return one.title
+        if parts in entry.figures:
+            return f"{entry.title}: {', '.join(entry.figures[parts])}"
+    return entry.title
 
 
 GENERATED: dict[str, Callable[[], str]] = {
@@ -157,19 +160,19 @@ def filled(page: str) -> str:
 def stale_pages() -> dict[Path, str]:
     """Return the pages of the reference that aren't what the code says, with the text that they should have."""
     pages = {path: path.read_text(encoding="utf-8") for path in sorted(PAGES.glob("*.md"))}
-    return {path: new for path, text in pages.items() if (new := filled(text)) != text}
+    return {path: new_text for path, text in pages.items() if (new_text := filled(text)) != text}
 
 
 def main() -> int:
     """Write the pages anew, or with ``--check`` name those that would change and return 1."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", action="store_true", help="write nothing: fail if a page isn't current")
-    arguments, stale = parser.parse_args(), stale_pages()
-    for path, text in stale.items():
+    arguments, new_texts = parser.parse_args(), stale_pages()
+    for path, text in new_texts.items():
         print(f"{path.relative_to(ROOT)} is not current" if arguments.check else f"written {path.relative_to(ROOT)}")
         if not arguments.check:
             path.write_text(text, encoding="utf-8")
-    return 1 if arguments.check and stale else 0
+    return 1 if arguments.check and new_texts else 0
 
 
 if __name__ == "__main__":

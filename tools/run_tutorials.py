@@ -87,12 +87,12 @@ def demo_points(folder: Path) -> str:
     return f"{report['counts']['points'] / 1e6:.1f}"
 
 
-def broken_rules(when: int) -> Callable[[Path], str]:
+def broken_rules(which: int) -> Callable[[Path], str]:
     """Return what says how many rules a road of 300 m breaks before (0) and after (1) a lane was made 4.5 m wide."""
 
     def value(folder: Path) -> str:
-        printed = _once(folder, _WIDER_LANE, [sys.executable, "-c", _WIDER_LANE])
-        return _NUMBERS[int(printed.split("broken:")[1].split()[when])]
+        output = _once(folder, _WIDER_LANE, [sys.executable, "-c", _WIDER_LANE])
+        return _NUMBERS[int(output.split("broken:")[1].split()[which])]
 
     return value
 
@@ -122,9 +122,9 @@ def _once(folder: Path, text: str, words: Sequence[str]) -> str:
     file = folder / _PRINTED / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.txt"
     if not file.exists():
         print(f"{text.strip().splitlines()[0]} ...", flush=True)
-        printed = _run(folder, words)
+        output = _run(folder, words)
         file.parent.mkdir(exist_ok=True)
-        file.write_text(printed, encoding="utf-8")
+        file.write_text(output, encoding="utf-8")
     return file.read_text(encoding="utf-8")
 
 
@@ -144,29 +144,35 @@ def _run(folder: Path, words: Sequence[str]) -> str:
     return answer.stdout.rstrip("\n")
 
 
-def renewed(line: Documented, printed: Sequence[str]) -> tuple[str, ...]:
+def renewed(line: Documented, printed_lines: Sequence[str]) -> tuple[str, ...]:
     """Return what a page should show of what a line printed: what it shows, where that is the same."""
-    shown = line.shown
-    gap = shown.index(_GAP) if _GAP in shown else None
-    cut = gap is not None and (*printed[:gap], _GAP, *printed[len(printed) - (len(shown) - gap - 1) :])
-    new = cut or tuple(printed)
-    if len(shown) == len(new) and all(map(_same(line.text.startswith(_LEARNED)), shown, new)):
-        return shown
-    same = _same(learned=False)
-    return tuple(next((old for old in shown if same(old, row)), row) for row in new)
+    shown_lines = line.shown
+    gap_number = shown_lines.index(_GAP) if _GAP in shown_lines else None
+    shortened_lines = gap_number is not None and (
+        *printed_lines[:gap_number],
+        _GAP,
+        *printed_lines[len(printed_lines) - (len(shown_lines) - gap_number - 1) :],
+    )
+    new_lines = shortened_lines or tuple(printed_lines)
+    if len(shown_lines) == len(new_lines) and all(map(_same(line.text.startswith(_LEARNED)), shown_lines, new_lines)):
+        return shown_lines
+    are_same = _same(is_learned=False)
+    return tuple(
+        next((shown_line for shown_line in shown_lines if are_same(shown_line, row)), row) for row in new_lines
+    )
 
 
-def _same(learned: bool) -> Callable[[str, str], bool]:
+def _same(is_learned: bool) -> Callable[[str, str], bool]:
     """Return what says whether two lines are the same, but for the machine's figures and scores a little apart."""
 
-    def same(old: str, new: str) -> bool:
-        old, new = (_MACHINE.sub("#", line) for line in (old, new))
-        if not learned:
-            return _spaced(old) == _spaced(new)
-        pairs = list(zip(_SCORE.findall(old), _SCORE.findall(new), strict=False))
+    def same(shown_line: str, printed_line: str) -> bool:
+        shown_line, printed_line = (_MACHINE.sub("#", line) for line in (shown_line, printed_line))
+        if not is_learned:
+            return _spaced(shown_line) == _spaced(printed_line)
+        pairs = list(zip(_SCORE.findall(shown_line), _SCORE.findall(printed_line), strict=False))
         largest = 100.0 if any(float(number) > 1.0 for pair in pairs for number in pair) else 1.0
-        near = all(abs(float(a) - float(b)) <= SCORES * largest for a, b in pairs)
-        return near and _spaced(_SCORE.sub("#", old)) == _spaced(_SCORE.sub("#", new))
+        are_near = all(abs(float(a) - float(b)) <= SCORES * largest for a, b in pairs)
+        return are_near and _spaced(_SCORE.sub("#", shown_line)) == _spaced(_SCORE.sub("#", printed_line))
 
     return same
 
@@ -179,9 +185,9 @@ def _spaced(line: str) -> str:
 def with_outputs(text: str, outputs: Sequence[tuple[Documented, Sequence[str]]]) -> str:
     """Return a page's text with the outputs of its lines replaced; they stand in indented blocks."""
     lines = text.splitlines()
-    for line, new in sorted(outputs, key=lambda pair: -pair[0].output):
-        first = line.output - 1
-        lines[first : first + len(line.shown)] = [f"    {row}".rstrip() for row in new]
+    for line, new_lines in sorted(outputs, key=lambda pair: -pair[0].output):
+        first_number = line.output - 1
+        lines[first_number : first_number + len(line.shown)] = [f"    {row}".rstrip() for row in new_lines]
     return "\n".join(lines) + "\n"
 
 
@@ -189,10 +195,10 @@ def with_figures(page: str, text: str, folder: Path) -> str:
     """Return a page's text with the figures in its sentences made anew; ValueError where one has no place."""
     for figure in FIGURES:
         if figure.page == page:
-            found = re.search(figure.pattern, " ".join(text.split("\n")))
-            if not found:
+            match = re.search(figure.pattern, " ".join(text.split("\n")))
+            if not match:
                 raise ValueError(f"{page}: nothing there like {figure.pattern}")
-            text = text[: found.start(1)] + figure.value(folder) + text[found.end(1) :]
+            text = text[: match.start(1)] + figure.value(folder) + text[match.end(1) :]
     return text
 
 
@@ -202,15 +208,15 @@ def pages_anew(folder: Path, pages: Sequence[Path] = PAGES) -> dict[Path, str]:
         page.relative_to(ROOT).as_posix(): [] for page in pages
     }
     _once(folder, " ".join(_DEMO), [sys.executable, *_DEMO])
-    for line, printed in run_lines(documented_lines(pages), folder):
-        outputs[line.page].append((line, renewed(line, printed)))
-    changed = {}
+    for line, printed_lines in run_lines(documented_lines(pages), folder):
+        outputs[line.page].append((line, renewed(line, printed_lines)))
+    new_texts = {}
     for page, rows in outputs.items():
-        old = (ROOT / page).read_text(encoding="utf-8")
-        new = with_figures(page, with_outputs(old, rows), folder)
-        if new != old:
-            changed[ROOT / page] = new
-    return changed
+        old_text = (ROOT / page).read_text(encoding="utf-8")
+        new_text = with_figures(page, with_outputs(old_text, rows), folder)
+        if new_text != old_text:
+            new_texts[ROOT / page] = new_text
+    return new_texts
 
 
 def main() -> int:
@@ -226,22 +232,22 @@ def main() -> int:
         folder = arguments.folder.absolute() if arguments.folder else Path(scratch)
         folder.mkdir(parents=True, exist_ok=True)
         names = [page.stem for page in PAGES]
-        changed = pages_anew(folder, PAGES[: names.index(arguments.until) + 1])
-        for path, text in changed.items():
+        new_texts = pages_anew(folder, PAGES[: names.index(arguments.until) + 1])
+        for path, text in new_texts.items():
             print(f"{path.relative_to(ROOT)}: {'is not what its lines print' if arguments.check else 'written'}")
             print("\n".join(_difference(path.read_text(encoding="utf-8"), text)))
             if not arguments.check:
                 path.write_text(text, encoding="utf-8")
-        if changed and not arguments.check:
-            for made, picture in _PICTURES.items():
-                if (folder / made).exists():
-                    (ROOT / picture).write_bytes((folder / made).read_bytes())
-    return 1 if arguments.check and changed else 0
+        if new_texts and not arguments.check:
+            for file, picture in _PICTURES.items():
+                if (folder / file).exists():
+                    (ROOT / picture).write_bytes((folder / file).read_bytes())
+    return 1 if arguments.check and new_texts else 0
 
 
-def _difference(old: str, new: str) -> Iterator[str]:
+def _difference(old_text: str, new_text: str) -> Iterator[str]:
     """Yield the lines that differ between two texts."""
-    yield from difflib.unified_diff(old.splitlines(), new.splitlines(), "page", "printed", lineterm="", n=0)
+    yield from difflib.unified_diff(old_text.splitlines(), new_text.splitlines(), "page", "printed", lineterm="", n=0)
 
 
 if __name__ == "__main__":

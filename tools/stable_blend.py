@@ -41,17 +41,17 @@ class _File:
     def blocks(self) -> list[_Block]:
         """All blocks of the file in their order; cached."""
         layout, old_at = ("<4sIQQQ", 8) if self._long else ("<4siQii", 8)
-        found, position = [], self._begin
+        blocks, position = [], self._begin
         while position < len(self.content):
             values = struct.unpack_from(layout, self.content, position)
             code, old = values[0], values[2]
             number, size = (values[1], values[3]) if self._long else (values[3], values[1])
             data = position + struct.calcsize(layout)
-            found.append(_Block(code, number, old, position + old_at, data, size))
+            blocks.append(_Block(code, number, old, position + old_at, data, size))
             position = data + size
             if code == b"ENDB":
                 break
-        return found
+        return blocks
 
     def groups(self) -> Iterator[list[_Block]]:
         """Yield the list of blocks of each data-block: its own first, then its data."""
@@ -100,18 +100,21 @@ class _Structs:
             self._known[number] = list(self._find_pointers(number))
         return self._known[number]
 
-    def field(self, number: int, way: tuple[str, ...]) -> tuple[int, int]:
+    def field(self, number: int, names_on_path: tuple[str, ...]) -> tuple[int, int]:
         """Return byte offset and size of a struct's field, given by the names on the path to it; KeyError if none."""
         position = 0
         for kind, index in self._structs[number][1]:
             length = self._length(kind, self._names[index])
-            if self._names[index] == way[0]:
-                within, size = self.field(self._of_type[kind], way[1:]) if way[1:] else (0, length)
-                return position + within, size
+            if self._names[index] == names_on_path[0]:
+                inner_position, size = (
+                    self.field(self._of_type[kind], names_on_path[1:]) if names_on_path[1:] else (0, length)
+                )
+                return position + inner_position, size
             position += length
-        raise KeyError(way[0])
+        raise KeyError(names_on_path[0])
 
     def _find_pointers(self, number: int) -> Iterator[int]:
+        """Yield the byte offsets of all pointers in a struct, those of nested structs included."""
         position = 0
         for kind, index in self._structs[number][1]:
             name = self._names[index]
@@ -119,29 +122,32 @@ class _Structs:
             if name.startswith(("*", "(*")):
                 yield from range(position, position + length, _POINTER)
             elif kind in self._of_type:
-                inner = self.pointers(self._of_type[kind])
-                for first in range(position, position + length, self._sizes[kind] or 1):
-                    yield from (first + within for within in inner)
+                inner_offsets = self.pointers(self._of_type[kind])
+                for first_position in range(position, position + length, self._sizes[kind] or 1):
+                    yield from (first_position + inner_offset for inner_offset in inner_offsets)
             position += length
 
     def _length(self, kind: int, name: str) -> int:
+        """Return the bytes that a field takes, by its type and name, which has arrays' sizes and pointers' stars."""
         count = 1
         for size in re.findall(r"\[(\d+)\]", name):
             count *= int(size)
         return count * (_POINTER if name.startswith(("*", "(*")) else int(self._sizes[kind]))
 
     def _after(self, tag: bytes, start: int) -> int:
+        """Return the position behind the next tag from a position on."""
         return self._data.index(tag, start) + len(tag)
 
     def _strings(self, position: int) -> tuple[list[str], int]:
+        """Return the texts of a list that ends each with a null byte, and the position behind it."""
         (count,) = struct.unpack_from("<I", self._data, position)
         position += 4
-        found = []
+        texts = []
         for _ in range(count):
             end = self._data.index(b"\0", position)
-            found.append(self._data[position:end].decode())
+            texts.append(self._data[position:end].decode())
             position = end + 1
-        return found, position
+        return texts, position
 
 
 _CHANGING: dict[str, list[tuple[str, ...]]] = {
@@ -161,17 +167,17 @@ def make_stable(content: bytes) -> bytes:
         ValueError: the file is compressed, or none of Blender's.
     """
     file = _File(content)
-    (described,) = (block for block in file.blocks if block.code == b"DNA1")
-    structs = _Structs(content[described.data : described.data + described.size])
+    (struct_block,) = (block for block in file.blocks if block.code == b"DNA1")
+    structs = _Structs(content[struct_block.data : struct_block.data + struct_block.size])
     result = bytearray(content)
     places = {block.old: _STEP * number for number, block in enumerate(file.blocks, 1) if block.code != _DATA}
     number, nodes = 0, 0
     for group in file.groups():
         # The blocks of a data-block are its own: others may have had their addresses before.
-        own = {block.old: _STEP * (number + place) for place, block in enumerate(group, 1)}
+        places_in_group = {block.old: _STEP * (number + place) for place, block in enumerate(group, 1)}
         number += len(group)
         for block in group:
-            nodes = _rewrite(result, structs, block, places | own, nodes)
+            nodes = _rewrite(result, structs, block, places | places_in_group, nodes)
     return bytes(result)
 
 
@@ -184,23 +190,25 @@ def _rewrite(result: bytearray, structs: _Structs, block: _Block, places: dict[i
     size, end = structs.size(block.struct), block.data + block.size
     if block.struct == 0 or not size or block.size % size:
         # Arrays of pointers, or bare numbers: of these none is an address.
-        _readdress(result, places, range(block.data, end - _POINTER + 1, _POINTER), keep=True)
+        _readdress(result, places, range(block.data, end - _POINTER + 1, _POINTER), keeps_unknown=True)
         return nodes
-    for first in range(block.data, end, size):
-        _readdress(result, places, (first + place for place in structs.pointers(block.struct)), keep=False)
+    for struct_position in range(block.data, end, size):
+        _readdress(
+            result, places, (struct_position + place for place in structs.pointers(block.struct)), keeps_unknown=False
+        )
         name = structs.name(block.struct)
         if name == "bNode":
             nodes += 1
-            struct.pack_into("<i", result, first + structs.field(block.struct, ("identifier",))[0], nodes)
-        for way in _CHANGING.get(name, ()):
-            place, length = structs.field(block.struct, way)
-            result[first + place : first + place + length] = bytes(length)
+            struct.pack_into("<i", result, struct_position + structs.field(block.struct, ("identifier",))[0], nodes)
+        for names_on_path in _CHANGING.get(name, ()):
+            place, length = structs.field(block.struct, names_on_path)
+            result[struct_position + place : struct_position + place + length] = bytes(length)
     return nodes
 
 
-def _readdress(result: bytearray, places: dict[int, int], where: Iterable[int], *, keep: bool) -> None:
-    """Replace the addresses at some byte positions, in place; unknown ones stay if `keep`, else become 0."""
-    for position in where:
-        (old,) = struct.unpack_from("<Q", result, position)
-        if old:
-            struct.pack_into("<Q", result, position, places.get(old, old if keep else 0))
+def _readdress(result: bytearray, places: dict[int, int], positions: Iterable[int], *, keeps_unknown: bool) -> None:
+    """Replace the addresses at some byte positions, in place; unknown ones stay if `keeps_unknown`, else become 0."""
+    for position in positions:
+        (address,) = struct.unpack_from("<Q", result, position)
+        if address:
+            struct.pack_into("<Q", result, position, places.get(address, address if keeps_unknown else 0))

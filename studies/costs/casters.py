@@ -120,17 +120,17 @@ def survey_rays(
     groups = -(-count // (per_pulse * len(angle) * LINES_TOGETHER))
     begin = np.linspace(0, len(axis) - 1 - LINES_TOGETHER, groups).astype(int)
     line = (begin[:, None] + np.arange(LINES_TOGETHER)).ravel()
-    ahead = axis[line + 1] - axis[line]
-    ahead /= np.linalg.norm(ahead, axis=1)[:, None]
-    right = np.cross(ahead, [0.0, 0.0, 1.0])
-    turn = np.linspace(0.0, 2.0 * np.pi, per_pulse, endpoint=False)[None, None, :]
-    across = angle[None, :, None] + DIVERGENCE_MRAD[0] / 4e3 * np.cos(turn)
-    along = DIVERGENCE_MRAD[1] / 4e3 * np.sin(turn) + 0.0 * across
-    down = -np.cos(across)
+    forward = axis[line + 1] - axis[line]
+    forward /= np.linalg.norm(forward, axis=1)[:, None]
+    rightward = np.cross(forward, [0.0, 0.0, 1.0])
+    ring_angles = np.linspace(0.0, 2.0 * np.pi, per_pulse, endpoint=False)[None, None, :]
+    across = angle[None, :, None] + DIVERGENCE_MRAD[0] / 4e3 * np.cos(ring_angles)
+    along_angles = DIVERGENCE_MRAD[1] / 4e3 * np.sin(ring_angles) + 0.0 * across
+    vertical = -np.cos(across)
     directions = (
-        np.sin(across)[..., None] * right[:, None, None]
-        + along[..., None] * ahead[:, None, None]
-        + down[..., None] * [0.0, 0.0, 1.0]
+        np.sin(across)[..., None] * rightward[:, None, None]
+        + along_angles[..., None] * forward[:, None, None]
+        + vertical[..., None] * [0.0, 0.0, 1.0]
     )
     directions /= np.linalg.norm(directions, axis=-1)[..., None]
     origins = np.broadcast_to((axis[line] + [0.0, 0.0, height])[:, None, None], directions.shape)
@@ -143,20 +143,20 @@ def measure(caster_name: str, files: Path) -> dict[str, Any]:
     mesh = bare_mesh(np.load(files / "vertices.npy"), np.load(files / "triangles.npy"))
     origins, directions = np.load(files / "origins.npy"), np.load(files / "directions.npy")
     order = stream(0, "order of rays").permutation(len(origins))
-    shuffled = origins[order], directions[order]
-    before, clock, processor = peak_memory_mb(), time.perf_counter(), time.process_time()
+    shuffled_rays = origins[order], directions[order]
+    memory_before, clock, processor = peak_memory_mb(), time.perf_counter(), time.process_time()
     caster = CASTERS[caster_name](mesh)
     faces = caster.cast(origins[:CHUNK], directions[:CHUNK], RANGE)  # Raycast builds its tree with the first rays
     row: dict[str, Any] = {
         "caster": caster_name,
         "build_seconds": time.perf_counter() - clock,
         "build_processor_seconds": time.process_time() - processor,
-        "bytes_per_triangle": 1e6 * ((peak_memory_mb() or np.nan) - (before or np.nan)) / len(mesh),
+        "bytes_per_triangle": 1e6 * ((peak_memory_mb() or np.nan) - (memory_before or np.nan)) / len(mesh),
     }
     faces = np.concatenate([faces, caster.cast(origins[CHUNK:], directions[CHUNK:], RANGE)])
     np.save(files / f"faces {caster_name}.npy", faces)
     threads = (1, 2) if caster_name in THREADED else (1,)
-    for name, rays in (("coherent", (origins, directions)), ("random", shuffled)):
+    for name, rays in (("coherent", (origins, directions)), ("random", shuffled_rays)):
         row[name] = {count: vars(bare_rate(caster, *rays, RANGE, count)) for count in threads}
     if caster_name == "embree":
         row["chunks"] = {size: vars(bare_rate(caster, origins, directions, RANGE, 2, size)) for size in CHUNKS}
@@ -167,9 +167,9 @@ def compare(files: Path, row: dict[str, Any]) -> None:
     """Add the agreement of a row's caster with the reference caster, and the share of hits, to the row, in place."""
     mesh = bare_mesh(np.load(files / "vertices.npy"), np.load(files / "triangles.npy"))
     origins, directions = np.load(files / "origins.npy"), np.load(files / "directions.npy")
-    found, expected = (np.load(files / f"faces {name}.npy") for name in (row["caster"], REFERENCE))
-    row["agreement"] = vars(agreement(mesh, origins, directions, found, expected))
-    row["hits"] = float((expected >= 0).mean())
+    caster_faces, reference_faces = (np.load(files / f"faces {name}.npy") for name in (row["caster"], REFERENCE))
+    row["agreement"] = vars(agreement(mesh, origins, directions, caster_faces, reference_faces))
+    row["hits"] = float((reference_faces >= 0).mean())
 
 
 def table(rows: list[dict[str, Any]]) -> Iterator[str]:
@@ -184,8 +184,8 @@ def table(rows: list[dict[str, Any]]) -> Iterator[str]:
             cells = [row["caster"], "its own" if row["caster"] == "raycast nodes" else threads]
             cells += [_rate(row[name][threads]) for name in ("coherent", "random")]
             cells += [f"{row['build_seconds']:.2f}", f"{row['bytes_per_triangle']:.0f}"]
-            same = row["agreement"]
-            cells += [f"{100.0 * same['same']:.4f}", f"{1e3 * same['gap']:.3f}"]
+            agreement_figures = row["agreement"]
+            cells += [f"{100.0 * agreement_figures['same']:.4f}", f"{1e3 * agreement_figures['gap']:.3f}"]
             yield "| " + " | ".join(cells) + " |"
     for row in rows:
         if "chunks" in row:
@@ -196,10 +196,12 @@ def table(rows: list[dict[str, Any]]) -> Iterator[str]:
 
 
 def _rate(rate: dict[str, float]) -> str:
+    """Return a rate as text: by the clock and, in brackets, by processor time."""
     return f"{rate['rays_per_second'] / 1e6:.2f} ({rate['rays_per_processor_second'] / 1e6:.2f})"
 
 
 def _rows(scene: str, count: int) -> Iterator[dict[str, Any]]:
+    """Yield the row of each caster, measured in a process of its own."""
     with tempfile.TemporaryDirectory() as folder:
         files = Path(folder)
         _in_own_process("--prepare", scene, files, count)
@@ -210,12 +212,14 @@ def _rows(scene: str, count: int) -> Iterator[dict[str, Any]]:
 
 
 def _in_own_process(step: str, name: str, files: Path, count: int) -> dict[str, Any]:
+    """Run a step of this program in a process of its own; return its result."""
     command = [sys.executable, __file__, step, name, "--files", str(files), "--rays", str(count)]
     result = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
     return json.loads(result.stdout.splitlines()[-1])
 
 
 def _prepare(scene: str, files: Path, count: int) -> dict[str, Any]:
+    """Write the scene's mesh and its rays into a folder; return the number of triangles."""
     mesh, flight = SCENES[scene]()
     origins, directions = survey_rays(flight, count)
     arrays = {"vertices": mesh.vertices, "triangles": mesh.triangles, "origins": origins, "directions": directions}
@@ -227,14 +231,14 @@ def _prepare(scene: str, files: Path, count: int) -> dict[str, Any]:
 def compare_packets(scene: str, count: int) -> None:
     """Print a table of packets beside single rays, cast in turn: millions per second of one thread's processor time."""
     mesh, flight = SCENES[scene]()
-    spent = [time.process_time()]
-    packed = packet_caster(mesh)
-    spent.append(time.process_time())
-    single = EmbreeCaster(mesh)
-    spent.append(time.process_time())
-    built = [f"{one:.2f}" for one in np.diff(spent)]
-    print(f"\n{scene}, {len(mesh):,} triangles; built in {built[0]} and {built[1]} processor seconds\n")
-    heads = ["rays", packed.kernels, "single rays"]
+    stamps = [time.process_time()]
+    packet_rays = packet_caster(mesh)
+    stamps.append(time.process_time())
+    single_rays = EmbreeCaster(mesh)
+    stamps.append(time.process_time())
+    build_times = [f"{seconds:.2f}" for seconds in np.diff(stamps)]
+    print(f"\n{scene}, {len(mesh):,} triangles; built in {build_times[0]} and {build_times[1]} processor seconds\n")
+    heads = ["rays", packet_rays.kernels, "single rays"]
     print("| " + " | ".join([*heads, f"ratio of times, {PAIRS} pairs", "other faces"]) + " |")
     print("|---" * 5 + "|")
     kinds = {f"{per_pulse} per pulse": survey_rays(flight, count, per_pulse) for per_pulse in (1, 7, 19)}
@@ -243,17 +247,16 @@ def compare_packets(scene: str, count: int) -> None:
     for name, (origins, directions) in kinds.items():
         times, faces = [], []
         for _ in range(PAIRS):
-            for caster in (packed, single):
+            for caster in (packet_rays, single_rays):
                 start = time.thread_time()
                 faces.append(caster.cast(origins, directions, RANGE))
                 times.append(time.thread_time() - start)
-        ours, theirs = np.array(times[::2]), np.array(times[1::2])
-        ratio, found = ours / theirs, agreement(mesh, origins, directions, *faces[:2])
-        rates = [f"{len(origins) / np.median(one) / 1e6:.2f}" for one in (ours, theirs)]
+        packet_times, single_times = np.array(times[::2]), np.array(times[1::2])
+        ratio, agreement_figures = packet_times / single_times, agreement(mesh, origins, directions, *faces[:2])
+        rates = [f"{len(origins) / np.median(seconds) / 1e6:.2f}" for seconds in (packet_times, single_times)]
         spread = f"{np.median(ratio):.2f} ({ratio.min():.2f} to {ratio.max():.2f})"
-        print(
-            f"| {name} | {' | '.join(rates)} | {spread} | {round(count * (1 - found.same))}, {1e3 * found.gap:.3f} mm |"
-        )
+        others = f"{round(count * (1 - agreement_figures.same))}, {1e3 * agreement_figures.gap:.3f} mm"
+        print(f"| {name} | {' | '.join(rates)} | {spread} | {others} |")
 
 
 def main() -> None:

@@ -77,8 +77,8 @@ class KeptCaster(PacketScene):
 class KeptServices:
     """Services of a scan without Blender: Embree's packets, and the means of the materials."""
 
-    def __init__(self, kept: KeptScene, packets: Packets) -> None:
-        self._rows, self._packets = kept.materials, packets
+    def __init__(self, kept_scene: KeptScene, packets: Packets) -> None:
+        self._rows, self._packets = kept_scene.materials, packets
 
     def caster(self, name: str, mesh: SceneMesh, kernels: str) -> Caster:
         """Return the caster of packets over a mesh, whatever its name."""
@@ -115,13 +115,13 @@ def save(path: Path, scenario: Scenario) -> None:
 
     empty_file()
     parameters = sample_road(scenario.road, scenario.seed)
-    shown = RoadScene.of(scenario, RoadGeometry(parameters))
-    shown.build()
-    scene = shown.read()
-    kept = KeptScene(scenario.to_dict(), parameters.to_dict(), scene, constants(scene.static.materials))
+    road_scene = RoadScene.of(scenario, RoadGeometry(parameters))
+    road_scene.build()
+    scene = road_scene.read()
+    kept_scene = KeptScene(scenario.to_dict(), parameters.to_dict(), scene, constants(scene.static.materials))
     path.parent.mkdir(parents=True, exist_ok=True)
     with gzip.open(path, "wb", compresslevel=3) as file:
-        pickle.dump(tuple(kept), file)
+        pickle.dump(tuple(kept_scene), file)
     print(f"{path}: {len(scene.static):,} triangles, {path.stat().st_size / 1e6:.1f} MB")
 
 
@@ -136,36 +136,39 @@ def scan(path: Path) -> dict[str, Any]:
     if isinstance(packets, NoKernelError):
         raise SystemExit(f"rays can't be cast in packets, as {packets}: python tools/build_kernels.py")
     with gzip.open(path, "rb") as file:
-        kept = KeptScene(*pickle.load(file))  # nosec B301 # as above
-    scenario, timer = Scenario.from_dict(kept.scenario), StageTimer()
-    geometry = RoadGeometry(RoadParameters.from_dict(kept.road))
+        kept_scene = KeptScene(*pickle.load(file))  # nosec B301 # as above
+    scenario, timer = Scenario.from_dict(kept_scene.scenario), StageTimer()
+    geometry = RoadGeometry(RoadParameters.from_dict(kept_scene.road))
     processor = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
         site = Site.of_road(scenario, geometry, ScenarioInputs.read(scenario))
-        counts = site.scan(kept.scene, KeptServices(kept, packets), Path(folder), timer)
-        spent = time.process_time() - processor
-        cloud = hashlib.sha256((Path(folder) / "cloud.laz").read_bytes()).hexdigest()
+        counts = site.scan(kept_scene.scene, KeptServices(kept_scene, packets), Path(folder), timer)
+        processor_seconds = time.process_time() - processor
+        cloud_digest = hashlib.sha256((Path(folder) / "cloud.laz").read_bytes()).hexdigest()
     return {
         "cores": available_cores(),
         "seconds": sum(timer.stages[name]["seconds"] or 0.0 for name in ("scan", "files")),
-        "processor_seconds": spent,
+        "processor_seconds": processor_seconds,
         "kernels": counts["kernels"],
         "points": counts["points"],
         "memory_mb": peak_memory_mb(),
         "stages": timer.stages,
-        "sha256": cloud,
+        "sha256": cloud_digest,
     }
 
 
 def in_process(path: Path, cores: int) -> dict[str, Any]:
     """Scan a kept scene in a new process that may use so many cores; return what `scan` does."""
     with cores_of_children(cores):
-        done = subprocess.run([sys.executable, __file__, "scan", str(path)], check=True, capture_output=True, text=True)
-    result: dict[str, Any] = json.loads(done.stdout)
+        process = subprocess.run(
+            [sys.executable, __file__, "scan", str(path)], check=True, capture_output=True, text=True
+        )
+    result: dict[str, Any] = json.loads(process.stdout)
     return result
 
 
 def _seconds(run: dict[str, Any]) -> float:
+    """Return a run's seconds."""
     return float(run["seconds"])
 
 
@@ -186,17 +189,17 @@ def main() -> None:
         print(json.dumps(scan(arguments.file)))
         return
     runs = [in_process(arguments.file, cores) for _ in range(arguments.turns) for cores in arguments.cores]
-    fastest = [min(runs[number :: len(arguments.cores)], key=_seconds) for number in range(len(arguments.cores))]
-    best = dict(zip(arguments.cores, fastest, strict=True))
-    first = best[arguments.cores[0]]
+    fastest_runs = [min(runs[number :: len(arguments.cores)], key=_seconds) for number in range(len(arguments.cores))]
+    run_of_cores = dict(zip(arguments.cores, fastest_runs, strict=True))
+    first_run = run_of_cores[arguments.cores[0]]
     print("| cores | scan, s | processor time, s | million points/s | against one core | memory, MB | the same bytes |")
     print("|---|---|---|---|---|---|---|")
-    for cores, run in best.items():
-        rate, gain = run["points"] / run["seconds"] / 1e6, first["seconds"] / run["seconds"]
-        same = "yes" if run["sha256"] == first["sha256"] else "NO"
+    for cores, run in run_of_cores.items():
+        rate, gain = run["points"] / run["seconds"] / 1e6, first_run["seconds"] / run["seconds"]
+        has_same_bytes = "yes" if run["sha256"] == first_run["sha256"] else "NO"
         memory = f"{run['memory_mb']:,.0f}"
         cells = [f"{cores}", f"{run['seconds']:.1f}", f"{run['processor_seconds']:.1f}", f"{rate:.2f}", f"{gain:.2f}"]
-        print(f"| {' | '.join([*cells, memory, same])} |", flush=True)
+        print(f"| {' | '.join([*cells, memory, has_same_bytes])} |", flush=True)
     print(json.dumps(runs), file=sys.stderr)
 
 

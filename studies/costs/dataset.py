@@ -37,23 +37,26 @@ def rows(folder: Path) -> list[tuple[str, ...]]:
 
 
 def _row(name: str, members: list[SceneEntry], logs: dict[str, Any]) -> tuple[str, ...]:
+    """Return the cells of a group's row."""
     points = [sum((scene.classes or {}).values()) for scene in members]
-    present = {label for scene in members for label, count in (scene.classes or {}).items() if count}
+    classes_present = {label for scene in members for label, count in (scene.classes or {}).items() if count}
     stages = [logs[scene.name]["stages"] for scene in members]
     images, scan = (_times(stages, stage) for stage in ("images", "scan"))
-    whole = [sum(stage["seconds"] for stage in one.values()) for one in stages]
-    memory = [max(stage["peak_memory_mb"] for stage in one.values()) for one in stages]
-    ranges = (_range(values) for values in (images, scan, whole, memory))
-    return (name, str(len(members)), f"{sum(points):,}", str(len(present)), *ranges)
+    seconds_of_scenes = [sum(stage["seconds"] for stage in scene_stages.values()) for scene_stages in stages]
+    memory = [max(stage["peak_memory_mb"] for stage in scene_stages.values()) for scene_stages in stages]
+    ranges = (_range(values) for values in (images, scan, seconds_of_scenes, memory))
+    return (name, str(len(members)), f"{sum(points):,}", str(len(classes_present)), *ranges)
 
 
 def _times(stages: list[dict[str, Any]], name: str) -> list[float]:
-    return [one[name]["seconds"] if name in one else 0.0 for one in stages]
+    """Return the seconds of a stage in each scene; 0 where it wasn't run."""
+    return [scene_stages[name]["seconds"] if name in scene_stages else 0.0 for scene_stages in stages]
 
 
 def _range(values: list[float]) -> str:
-    low, high = min(values), max(values)
-    return f"{low:,.0f}" if round(low) == round(high) else f"{low:,.0f} to {high:,.0f}"
+    """Return the range of values as text, one number where both ends are alike."""
+    lowest, highest = min(values), max(values)
+    return f"{lowest:,.0f}" if round(lowest) == round(highest) else f"{lowest:,.0f} to {highest:,.0f}"
 
 
 def costs(folder: Path, scenes: int, cores: int) -> list[tuple[str, str, str]]:
@@ -75,15 +78,16 @@ def costs(folder: Path, scenes: int, cores: int) -> list[tuple[str, str, str]]:
     hours = (_changed(folder / "manifest.json") - _changed(folder / "recipe.json")) / 3600.0 * cores / count
     files = [(name, entry.bytes) for scene in manifest.scenes for name, entry in (scene.files or {}).items()]
     table = [("core hours", f"{hours:,.3f}", f"{hours * scenes:,.0f}")]
-    for top in sorted({name.partition("/")[0] for name, _ in files}):
-        size = sum(each for name, each in files if name.startswith(f"{top}/")) / count
-        table.append((f"`{top}/`", f"{size / 1e6:,.0f} MB", f"{size * scenes / 1e9:,.0f} GB"))
+    for top_folder in sorted({name.partition("/")[0] for name, _ in files}):
+        size = sum(each for name, each in files if name.startswith(f"{top_folder}/")) / count
+        table.append((f"`{top_folder}/`", f"{size / 1e6:,.0f} MB", f"{size * scenes / 1e9:,.0f} GB"))
     table.append(("files", f"{len(files) / count:,.0f}", f"{len(files) / count * scenes:,.0f}"))
     size = (folder / "manifest.json").stat().st_size / count
     return [*table, ("`manifest.json`", f"{size / 1e3:,.0f} kB", f"{size * scenes / 1e9:,.2f} GB")]
 
 
 def _changed(path: Path) -> float:
+    """Return the time at which a file was written last, s."""
     return path.stat().st_mtime
 
 

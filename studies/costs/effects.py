@@ -55,19 +55,19 @@ class ScanCost:
 
 def with_sensor_of(scenario: Scenario, recipe: str) -> Scenario:
     """Return a scenario with the sensor's effects, and their intensities, of a recipe's first scene."""
-    drawn = scene_jobs(load_recipe(recipe))[0].scenario.to_dict()
-    values = {f"scan.{name}": drawn["scan"][name] for name in _OF_SENSOR if name in drawn["scan"]}
-    if "intensity_from_layers" in drawn.get("colour", {}):
-        values["colour.intensity_from_layers"] = drawn["colour"]["intensity_from_layers"]
+    scene_data = scene_jobs(load_recipe(recipe))[0].scenario.to_dict()
+    values = {f"scan.{name}": scene_data["scan"][name] for name in _OF_SENSOR if name in scene_data["scan"]}
+    if "intensity_from_layers" in scene_data.get("colour", {}):
+        values["colour.intensity_from_layers"] = scene_data["colour"]["intensity_from_layers"]
     return Scenario.from_dict(apply_values(scenario.to_dict(), values))
 
 
-def kinds(scenario: Scenario, each: bool) -> list[ScanCost]:
+def kinds(scenario: Scenario, leave_out_each: bool) -> list[ScanCost]:
     """Return the kinds of scans: without any effect, with all, and, if wanted, without one each that there is."""
-    found = [effect for effect in EFFECTS if scenario_without(scenario, [effect]) != scenario]
-    result = [ScanCost(NONE, scenario_without(scenario, found)), ScanCost(ALL, scenario)]
-    if each:
-        result += [ScanCost(f"without {effect}", scenario_without(scenario, [effect])) for effect in found]
+    effects = [effect for effect in EFFECTS if scenario_without(scenario, [effect]) != scenario]
+    result = [ScanCost(NONE, scenario_without(scenario, effects)), ScanCost(ALL, scenario)]
+    if leave_out_each:
+        result += [ScanCost(f"without {effect}", scenario_without(scenario, [effect])) for effect in effects]
     return result
 
 
@@ -82,21 +82,21 @@ def measure(rows: Sequence[ScanCost], repeats: int) -> None:
         # The first scan loads what later ones find loaded.
         for number in range(repeats + 1):
             for row in rows if number % 2 else rows[:1] if not number else rows[::-1]:
-                here = Path(folder) / f"{number} {row.name}"
-                here.mkdir()
-                begun = time.process_time()
-                counts = scene.with_settings(row.scenario, model_stays=True).scan(here, timer)
+                scan_folder = Path(folder) / f"{number} {row.name}"
+                scan_folder.mkdir()
+                begin = time.process_time()
+                counts = scene.with_settings(row.scenario, model_stays=True).scan(scan_folder, timer)
                 if number:
-                    row.seconds.append(time.process_time() - begun)
+                    row.seconds.append(time.process_time() - begin)
                 row.points = int(counts["points"])
 
 
 def table(rows: Sequence[ScanCost]) -> str:
     """Return the costs as a Markdown table; ratios are those to the first kind, of all and by the point."""
-    least = min(rows[0].seconds)
+    least_seconds = min(rows[0].seconds)
     lines = ["| scan | points | CPU s | ratio | ratio by the point |", "|---|--:|--:|--:|--:|"]
     for row in rows:
-        ratio = min(row.seconds) / least
+        ratio = min(row.seconds) / least_seconds
         by_point = ratio * rows[0].points / row.points
         lines.append(f"| {row.name} | {row.points:,} | {min(row.seconds):.2f} | {ratio:.2f} | {by_point:.2f} |")
     return "\n".join(lines)

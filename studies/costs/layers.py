@@ -59,16 +59,16 @@ def compare_sources(name: str, length: float, stretches: int, seconds: float, *c
     """
     empty_file()
     scenario = load_scenario(name, [f"road.length={length}", 'outputs=["cloud"]', *changes])
-    shown = RoadScene.of(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
-    shown.build()
-    plan = shown.plan()
+    scene = RoadScene.of(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
+    scene.build()
+    plan = scene.plan()
     assert plan.layers.request is not None
     emission = replace(plan.emission, path=spread_stretches(plan.path, stretches, seconds))
-    seen = join_results(record_as_measured(replace(plan, emission=emission))).seen
-    assert seen is not None
+    points = join_results(record_as_measured(replace(plan, emission=emission))).seen
+    assert points is not None
     request = replace(plan.layers.request, wanted=LAYERS)
-    nodes, nodes_seconds = sampled(request, seen, "nodes")
-    truth, truth_seconds = sampled(request, seen, "returns")
+    nodes, nodes_seconds = sampled(request, points, "nodes")
+    truth, truth_seconds = sampled(request, points, "returns")
     rows = truth.source == FROM_RETURN
     count = int(rows.sum())
     figures: dict[str, float] = {"points": count}
@@ -77,15 +77,15 @@ def compare_sources(name: str, length: float, stretches: int, seconds: float, *c
         figures[layer] = float(np.sqrt(squares[: int(KEPT * count)].mean()))
     difference = colour_difference(nodes, truth, rows)
     figures |= {"colour median": float(np.median(difference)), "colour 95 %": float(np.quantile(difference, 0.95))}
-    return figures | {"s/M nodes": 1e6 * nodes_seconds / len(seen), "s/M returns": 1e6 * truth_seconds / len(seen)}
+    return figures | {"s/M nodes": 1e6 * nodes_seconds / len(points), "s/M returns": 1e6 * truth_seconds / len(points)}
 
 
-def sampled(request: LayerRequest, seen: SeenPoints, source: ColourSource) -> tuple[LayerValues, float]:
+def sampled(request: LayerRequest, points: SeenPoints, source: ColourSource) -> tuple[LayerValues, float]:
     """Return the layers of points by a source, and the processor seconds that they take once the scene is known."""
     with layer_source(replace(request, settings=replace(request.settings, source=source))) as layers:
-        sample_points(layers, seen.select(slice(0, FEW)), LAYERS)
+        sample_points(layers, points.select(slice(0, FEW)), LAYERS)
         start = time.process_time()
-        values = sample_points(layers, seen, LAYERS)
+        values = sample_points(layers, points, LAYERS)
         return values, time.process_time() - start
 
 
@@ -96,9 +96,9 @@ def main() -> int:
     parser.add_argument("--length", type=float, default=100.0, help="of the roads, m")
     parser.add_argument("--stretches", type=int, default=16, help="of each strip")
     parser.add_argument("--seconds", type=float, default=0.2, help="duration of each stretch, s")
-    chosen = parser.parse_args()
-    for name in chosen.scenarios:
-        figures = compare_sources(name, chosen.length, chosen.stretches, chosen.seconds)
+    options = parser.parse_args()
+    for name in options.scenarios:
+        figures = compare_sources(name, options.length, options.stretches, options.seconds)
         print(name, " ".join(f"{key}: {value:.6g};" for key, value in figures.items()), flush=True)
     return 0
 

@@ -37,9 +37,9 @@ _SPREAD, _PROBES = 10, 3
 def plan_of(scenario: str, changes: list[str]) -> ScanPlan:
     """Return the plan of a scenario's scan, for which its model is built."""
     job = load_scenario(scenario, ['outputs=["cloud"]', *changes])
-    shown = RoadScene.of(job, RoadGeometry(sample_road(job.road, job.seed)))
-    shown.build()
-    return RoadScene(job, shown.road, shown.inputs, shown.model, shown.read()).plan()
+    scene = RoadScene.of(job, RoadGeometry(sample_road(job.road, job.seed)))
+    scene.build()
+    return RoadScene(job, scene.road, scene.inputs, scene.model, scene.read()).plan()
 
 
 def times(plan: ScanPlan) -> tuple[float, float]:
@@ -52,24 +52,24 @@ def times(plan: ScanPlan) -> tuple[float, float]:
         count, scan = min(count, PULSES), BlockScan(plan)
         poses = scan.poses_between(strip, *(plan.cut.time(strip, pulse) for pulse in (first, first + count - 1)))
         pulses = scan.emit(strip, poses, None, first, count)
-        spent: tuple[list[float], list[float]] = ([], [])
+        times_by_plan: tuple[list[float], list[float]] = ([], [])
         for _ in range(RUNS):
-            for one, taken in zip((plan, by_numpy), spent, strict=True):
+            for timed_plan, run_times in zip((plan, by_numpy), times_by_plan, strict=True):
                 begin = time.thread_time()
-                BlockScan(one).traced_echoes(strip, pulses, poses.motions, 0)
-                taken.append(time.thread_time() - begin)
-        result = [total + min(taken) for total, taken in zip(result, spent, strict=True)]
+                BlockScan(timed_plan).traced_echoes(strip, pulses, poses.motions, 0)
+                run_times.append(time.thread_time() - begin)
+        result = [total + min(run_times) for total, run_times in zip(result, times_by_plan, strict=True)]
     return result[0], result[1]
 
 
-def shortest(work: Callable[..., object], *given: object) -> float:
+def shortest(work: Callable[..., object], *arguments: object) -> float:
     """Return the least processor time, s, that some runs of a function with what it is given take in this thread."""
-    spent = []
+    run_times = []
     for _ in range(RUNS):
         begin = time.thread_time()
-        work(*given)
-        spent.append(time.thread_time() - begin)
-    return min(spent)
+        work(*arguments)
+        run_times.append(time.thread_time() - begin)
+    return min(run_times)
 
 
 def faces(plan: ScanPlan) -> dict[str, float]:
@@ -82,33 +82,40 @@ def faces(plan: ScanPlan) -> dict[str, float]:
         (``pulses``), and of blocks as a whole (``blocks``).
     """
     blocks, scan, pattern = list(plan.blocks()), BlockScan(plan), plan.emission.pattern
-    chosen = np.unique(np.linspace(0, len(blocks) - 1, _SPREAD).astype(int)[1:-1])
-    outer = sum(plan.emission.rings[:-1]) + 1 + np.arange(_PROBES) * plan.emission.rings[-1] // _PROBES
-    probes = [0, *outer.tolist()]
+    block_indices = np.unique(np.linspace(0, len(blocks) - 1, _SPREAD).astype(int)[1:-1])
+    outer_rays = sum(plan.emission.rings[:-1]) + 1 + np.arange(_PROBES) * plan.emission.rings[-1] // _PROBES
+    probes = [0, *outer_rays.tolist()]
     counts = dict.fromkeys(("hits", "one face", "believed", "wrong"), 0)
     seconds = dict.fromkeys(("cast", "four", "axis", "pulses", "blocks"), 0.0)
-    for strip, number in (blocks[i] for i in chosen):
+    for strip, number in (blocks[i] for i in block_indices):
         first, count = plan.cut.pulse_span(strip, number)
         count = min(count, PULSES)
         poses = scan.poses_between(strip, *(plan.cut.time(strip, pulse) for pulse in (first, first + count - 1)))
         pulses = scan.emit(strip, poses, None, first, count)
         if plan.emission.outline is not None:
-            there = ~plan.emission.outline.passed_by(pulses.origin, pulses.direction, plan.setting.maximum_range)
-            pulses = pulses.select(np.flatnonzero(there))
+            is_near = ~plan.emission.outline.passed_by(pulses.origin, pulses.direction, plan.setting.maximum_range)
+            pulses = pulses.select(np.flatnonzero(is_near))
         assert pulses.in_plane is not None
         assert pulses.across is not None
         frame = (pulses.in_plane, pulses.across, pattern, plan.setting.divergence)
         rows = np.ascontiguousarray(conical_directions(pulses.direction, *frame).transpose(2, 1, 0), np.float32)
         begins = np.ascontiguousarray(np.broadcast_to(pulses.origin.T[:, None], rows.shape), np.float32)
-        found = {}
-        for name, which in (("cast", [*range(len(pattern))]), ("four", probes), ("axis", [0])):
-            origins, directions = (np.ascontiguousarray(part[:, which].reshape(-1, 3)) for part in (begins, rows))
+        faces_of_rays = {}
+        for name, ray_indices in (("cast", [*range(len(pattern))]), ("four", probes), ("axis", [0])):
+            origins, directions = (np.ascontiguousarray(part[:, ray_indices].reshape(-1, 3)) for part in (begins, rows))
             rays = (origins, directions, plan.setting.maximum_range)
             seconds[name] += shortest(plan.target.caster.cast, *rays)
-            found[name] = plan.target.caster.cast(*rays).reshape(len(rows), -1)
-        hits = found["axis"][:, 0] >= 0
-        one, believed = ((found[name] == found["axis"]).all(axis=1) & hits for name in ("cast", "four"))
-        for name, mask in (("hits", hits), ("one face", one), ("believed", believed), ("wrong", believed & ~one)):
+            faces_of_rays[name] = plan.target.caster.cast(*rays).reshape(len(rows), -1)
+        hits = faces_of_rays["axis"][:, 0] >= 0
+        meets_one_face, is_believed = (
+            (faces_of_rays[name] == faces_of_rays["axis"]).all(axis=1) & hits for name in ("cast", "four")
+        )
+        for name, mask in (
+            ("hits", hits),
+            ("one face", meets_one_face),
+            ("believed", is_believed),
+            ("wrong", is_believed & ~meets_one_face),
+        ):
             counts[name] += int(mask.sum())
         seconds["pulses"] += shortest(scan.traced_echoes, strip, pulses, poses.motions, 0)
         seconds["blocks"] += shortest(scan.scan_pulses, strip, first, count, number)

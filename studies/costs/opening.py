@@ -37,27 +37,29 @@ def held_mb() -> float:
 
 def measure(path: Path, triangles: int) -> None:
     """Open a scene in this process; print a Markdown table of seconds and memory per triangle, a row per stage."""
-    before, last = held_mb(), (time.perf_counter(), time.process_time())
-    begin = last
+    memory_before, last_stamps = held_mb(), (time.perf_counter(), time.process_time())
+    begin = last_stamps
     print(f"\nBlender {bpy.app.version_string}\n")
     print("| stage | seconds | memory (B/triangle) | peak (B/triangle) |\n|---|---|---|---|")
 
     def stage(name: str, work: Callable[[], Any]) -> Any:
-        nonlocal last
+        """Run a stage, print its row and return its result."""
+        nonlocal last_stamps
         result = work()
-        row(name, last)
-        last = (time.perf_counter(), time.process_time())
+        row(name, last_stamps)
+        last_stamps = (time.perf_counter(), time.process_time())
         return result
 
-    def row(name: str, since: tuple[float, float]) -> None:
-        seconds, processor = time.perf_counter() - since[0], time.process_time() - since[1]
-        memory = [1e6 * (value - before) / triangles for value in (held_mb(), peak_memory_mb() or np.nan)]
+    def row(name: str, first_stamps: tuple[float, float]) -> None:
+        """Print a row: what was taken since some stamps."""
+        seconds, processor = time.perf_counter() - first_stamps[0], time.process_time() - first_stamps[1]
+        memory = [1e6 * (value - memory_before) / triangles for value in (held_mb(), peak_memory_mb() or np.nan)]
         print(f"| {name} | {seconds:.2f} ({processor:.2f}) | {memory[0]:.0f} | {memory[1]:.0f} |", flush=True)
 
     stage("Blender's importer", lambda: open_scene(path, "z"))
     scene = stage("triangles and labels as arrays", scanned_scene)
-    kept = [stage("Embree: its copy of the mesh, and the tree", lambda: EmbreeCaster(scene.static))]
-    kept.append(stage("planes of the faces", lambda: FacePlanes(scene.static)))
+    objects_to_keep = [stage("Embree: its copy of the mesh, and the tree", lambda: EmbreeCaster(scene.static))]
+    objects_to_keep.append(stage("planes of the faces", lambda: FacePlanes(scene.static)))
     row("in all", begin)
 
 
@@ -69,8 +71,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "waves.obj"
         command = [sys.executable, __file__, str(path)]
-        done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
-        measure(path, int(done.stdout.split()[-1]))
+        process = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+        measure(path, int(process.stdout.split()[-1]))
     sys.stdout.flush()
     os._exit(0)
 

@@ -70,20 +70,20 @@ def tile_cloud(source: Path, target: Path, points: int) -> int:
     copies = math.ceil(points / count)
     columns = math.ceil(math.sqrt(copies))
     step = np.ceil((header.maxs - header.mins)[:2] / header.scales[:2] + _GAP / header.scales[:2]).astype(np.int64)
-    highest = np.abs((np.array([header.maxs, header.mins]) - header.offsets) / header.scales)[:, :2].max()
-    if highest + columns * step.max() >= 2**31:
+    highest_number = np.abs((np.array([header.maxs, header.mins]) - header.offsets) / header.scales)[:, :2].max()
+    if highest_number + columns * step.max() >= 2**31:
         raise InputError("--points", points, "needs more copies than LAS has room for: give a larger cloud")
-    left = points
+    points_left = points
     with laspy.open(target, "w", header=header, do_compress=target.suffix.lower() == ".laz") as writer:
         for copy in range(copies):
             with laspy.open(source) as reader:
                 for record in reader.chunk_iterator(BLOCK):
-                    part = record[: min(left, len(record))]
+                    part = record[: min(points_left, len(record))]
                     part.array["X"] += (copy % columns) * step[0]
                     part.array["Y"] += (copy // columns) * step[1]
                     writer.write_points(part)
-                    left -= len(part)
-                    if not left:
+                    points_left -= len(part)
+                    if not points_left:
                         return copies
     return copies
 
@@ -94,27 +94,31 @@ def differences(before: Path, after: Path) -> list[str]:
     The attribute for the class is looked at only if the first file has it not: it must be there.
     """
     found: set[str] = set()
-    with laspy.open(before) as one, laspy.open(after) as other:
-        if one.header.point_count != other.header.point_count:
+    with laspy.open(before) as reader_before, laspy.open(after) as reader_after:
+        if reader_before.header.point_count != reader_after.header.point_count:
             return ["number of points"]
         for name in _HEADER_FIELDS:
-            was, now = (getattr(each.header, name) for each in (one, other))
-            if not np.array_equal(getattr(was, "value", was), getattr(now, "value", now)):
+            field_before, field_after = (getattr(reader.header, name) for reader in (reader_before, reader_after))
+            if not np.array_equal(
+                getattr(field_before, "value", field_before), getattr(field_after, "value", field_after)
+            ):
                 found.add(f"header: {name}")
-        found |= {f"record {owner} {number}" for owner, number, _ in _records(one) - _records(other)}
-        if PREDICTED not in other.header.point_format.dimension_names:
+        found |= {f"record {owner} {number}" for owner, number, _ in _records(reader_before) - _records(reader_after)}
+        if PREDICTED not in reader_after.header.point_format.dimension_names:
             found.add(PREDICTED)
-        for old, new in zip(one.chunk_iterator(BLOCK), other.chunk_iterator(BLOCK), strict=True):
-            names = [name for name in old.array.dtype.names if name != PREDICTED]
-            found |= {name for name in names if not np.array_equal(old.array[name], new.array[name])}
+        for block_before, block_after in zip(
+            reader_before.chunk_iterator(BLOCK), reader_after.chunk_iterator(BLOCK), strict=True
+        ):
+            names = [name for name in block_before.array.dtype.names if name != PREDICTED]
+            found |= {name for name in names if not np.array_equal(block_before.array[name], block_after.array[name])}
     return sorted(found)
 
 
 def _records(file: laspy.LasReader) -> Counter[tuple[str, int, bytes]]:
     """Return a multiset of a LAS file's records, without the extra-attribute list and LAZ's own, which grow."""
-    every = [*file.header.vlrs, *(file.evlrs or [])]
-    kept = [record for record in every if (record.user_id, record.record_id) not in _GROWING]
-    return Counter((record.user_id, record.record_id, record.record_data_bytes()) for record in kept)
+    all_records = [*file.header.vlrs, *(file.evlrs or [])]
+    fixed_records = [record for record in all_records if (record.user_id, record.record_id) not in _GROWING]
+    return Counter((record.user_id, record.record_id, record.record_data_bytes()) for record in fixed_records)
 
 
 def measure(run: Path, source: Path, folder: Path, points: int) -> dict[str, Any]:
@@ -124,26 +128,26 @@ def measure(run: Path, source: Path, folder: Path, points: int) -> dict[str, Any
         SynthRoadsError: the labelling failed, with its message.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    large, labelled = folder / "large.laz", folder / "labelled.laz"
-    copies = tile_cloud(source, large, points)
-    command = [sys.executable, "-m", "headless.predict", str(run.resolve()), str(large.resolve())]
-    command += ["--output", str(labelled.resolve()), "--overwrite", "--json"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise SynthRoadsError(done.stderr.strip())
-    told = json.loads(done.stdout)
-    with laspy.open(large) as reader:
+    large_cloud, labelled_cloud = folder / "large.laz", folder / "labelled.laz"
+    copies = tile_cloud(source, large_cloud, points)
+    command = [sys.executable, "-m", "headless.predict", str(run.resolve()), str(large_cloud.resolve())]
+    command += ["--output", str(labelled_cloud.resolve()), "--overwrite", "--json"]
+    process = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    if process.returncode:
+        raise SynthRoadsError(process.stderr.strip())
+    report = json.loads(process.stdout)
+    with laspy.open(large_cloud) as reader:
         attributes = len(list(reader.header.point_format.dimension_names))
     return {
-        "points": told["points"],
+        "points": report["points"],
         "copies": copies,
-        "seconds": told["seconds"],
-        "points_per_second": told["points_per_second"],
-        "peak_memory_mb": told["peak_memory_mb"],
+        "seconds": report["seconds"],
+        "points_per_second": report["points_per_second"],
+        "peak_memory_mb": report["peak_memory_mb"],
         "attributes": attributes,
-        "changed": differences(large, labelled),
-        "classes": told["classes"],
-        "bytes": large.stat().st_size,
+        "changed": differences(large_cloud, labelled_cloud),
+        "classes": report["classes"],
+        "bytes": large_cloud.stat().st_size,
     }
 
 

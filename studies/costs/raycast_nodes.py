@@ -70,6 +70,7 @@ class RaycastNodesCaster:
         bpy.data.scenes.remove(self._scene)
 
     def _object(self, name: str, mesh: bpy.types.Mesh) -> bpy.types.Object:
+        """Add an object with a mesh to the caster's scene."""
         item = bpy.data.objects.new(name, mesh)
         self._scene.collection.objects.link(item)
         return item
@@ -90,6 +91,7 @@ def _target_mesh(mesh: SceneMesh) -> bpy.types.Mesh:
 
 
 def _store(mesh: bpy.types.Mesh, name: str, kind: str, domain: str, field: str, values: NDArray[Any]) -> None:
+    """Store values as an attribute of a mesh."""
     attribute = mesh.attributes.get(name) or mesh.attributes.new(name, kind, domain)
     attribute.data.foreach_set(field, values.ravel())
 

@@ -50,32 +50,32 @@ def job(cores: int, settings: dict[str, Any]) -> dict[str, Any]:
         process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
         assert process.stdout is not None
         report = json.loads(process.stdout.read())
-        _, status, used = os.wait4(process.pid, 0)
+        _, status, usage = os.wait4(process.pid, 0)
         if status:
             raise SystemExit(f"failed: {' '.join(command)}")
         seconds = time.perf_counter() - begin
     return {
         "cores": cores,
         "seconds": seconds,
-        "processor": used.ru_utime + used.ru_stime,
-        "memory_mb": used.ru_maxrss / 1024.0,
+        "processor": usage.ru_utime + usage.ru_stime,
+        "memory_mb": usage.ru_maxrss / 1024.0,
         "points": report.get("counts", {}).get("points", 0),
     }
 
 
 def measure(lengths: Sequence[int], speeds: Sequence[int], cores: Sequence[int]) -> dict[str, Any]:
     """Return results by what varies: ``begin``, and lists of ``length``, ``points`` and ``cores``."""
-    most = cores[-1]
+    most_cores = cores[-1]
     results: dict[str, Any] = {
         "machine": machine({}),
-        "begin": {"length": TINY, **job(most, {**THIN, "road.length": TINY})},
+        "begin": {"length": TINY, **job(most_cores, {**THIN, "road.length": TINY})},
     }
-    varied = {
-        "length": [(length, most, {"road.length": length}) for length in lengths],
-        "points": [(SHORT, most, {"road.length": SHORT, "scan.platform.speed": speed}) for speed in speeds],
+    jobs_of_name = {
+        "length": [(length, most_cores, {"road.length": length}) for length in lengths],
+        "points": [(SHORT, most_cores, {"road.length": SHORT, "scan.platform.speed": speed}) for speed in speeds],
         "cores": [(SHORT, number, {"road.length": SHORT}) for number in cores],
     }
-    for name, jobs in varied.items():
+    for name, jobs in jobs_of_name.items():
         results[name] = []
         for length, number, changes in jobs:
             results[name].append({"length": length, **job(number, {**THIN, **changes})})
@@ -91,17 +91,17 @@ def per_metre(results: dict[str, Any], row: dict[str, Any], name: str = "process
 
 def tables(results: dict[str, Any]) -> str:
     """Return the results as Markdown."""
-    shown = []
+    texts = []
     for name, title in (("length", "road, km"), ("points", "points/m"), ("cores", "cores")):
         rows = []
         for row in results[name]:
-            first = {"length": f"{row['length'] / 1e3:g}", "points": f"{row['points'] / row['length']:,.0f}"}
-            begin = first.get(name, str(row["cores"]))
+            first_cells = {"length": f"{row['length'] / 1e3:g}", "points": f"{row['points'] / row['length']:,.0f}"}
+            begin = first_cells.get(name, str(row["cores"]))
             costs = [f"{per_metre(results, row, unit):.2f}" for unit in ("processor", "seconds")]
             rows.append([begin, f"{row['points']:,}", *costs, f"{row['memory_mb']:,.0f}"])
         heads = [title, "points", "processor time, ms/m", "time, ms/m", "memory, MB"]
-        shown.append("\n".join(markdown_table(heads, rows)))
-    return f"Machine: {results['machine']}\n\n" + "\n\n".join(shown) + "\n"
+        texts.append("\n".join(markdown_table(heads, rows)))
+    return f"Machine: {results['machine']}\n\n" + "\n\n".join(texts) + "\n"
 
 
 def draw(results: dict[str, Any], path: Path) -> None:
@@ -135,11 +135,13 @@ def main() -> None:
     parser.add_argument("--cores", nargs="+", type=int, default=sorted({1, min(2, available_cores())}), metavar="N")
     parser.add_argument("--drawn", action="store_true", help="only draw what was measured before")
     arguments = parser.parse_args()
-    kept = arguments.output / "scale.json"
+    result_file = arguments.output / "scale.json"
     if not arguments.drawn:
         arguments.output.mkdir(parents=True, exist_ok=True)
-        kept.write_text(json.dumps(measure(arguments.lengths, arguments.speeds, arguments.cores), indent=1) + "\n")
-    results = json.loads(kept.read_text())
+        result_file.write_text(
+            json.dumps(measure(arguments.lengths, arguments.speeds, arguments.cores), indent=1) + "\n"
+        )
+    results = json.loads(result_file.read_text())
     print(tables(results))
     draw(results, TARGET)
 

@@ -110,16 +110,17 @@ def main() -> None:
     names = list(dict.fromkeys(case.table for case in cases))
 
     def tables() -> dict[str, str]:
+        """Train and score all cases, and return the tables' texts by name."""
         with ThreadPoolExecutor(arguments.jobs) as pool:
             scores = list(pool.map(lambda case: score(case, arguments.output), cases))
         pairs = list(zip(cases, scores, strict=True))
-        return {name: table([(case, found) for case, found in pairs if case.table == name]) for name in names}
+        return {name: table([(case, texts) for case, texts in pairs if case.table == name]) for name in names}
 
     try:
-        found = put_tables(arguments.document, names, tables)
+        texts = put_tables(arguments.document, names, tables)
     except SynthRoadsError as error:
         raise SystemExit(str(error)) from None
-    for name, text in found.items():
+    for name, text in texts.items():
         print(f"{name}\n\n{text}\n")
 
 
@@ -142,19 +143,19 @@ def few_labels(halves: tuple[Path, Path], arguments: argparse.Namespace) -> list
     votes = load_configuration(FEW_LABELS).votes
     epochs = f"schedule.epochs={arguments.epochs}"
     synthetic = sources("synthetic", {"path": str(arguments.synthetic)})
-    for learned, test in (halves, halves[::-1]):
-        real = sources("real", {"path": str(learned), "mapping": "semantickitti", "tile": 1000})
-        alone = ("set_up=real", "crops_per_tile=60", "balanced=false", epochs, real)
-        both = (*LEARNING, epochs, real, synthetic)
+    for learning_half, test in (halves, halves[::-1]):
+        real = sources("real", {"path": str(learning_half), "mapping": "semantickitti", "tile": 1000})
+        real_changes = ("set_up=real", "crops_per_tile=60", "balanced=false", epochs, real)
+        mixed_changes = (*LEARNING, epochs, real, synthetic)
         trainings = {
-            "and one half of a sweep": (ANY_SCANNER, (*SWEEPS, *LEARNING, *alone)),
-            "and one half, with synthetic sweeps": (FEW_LABELS, both),
-            "and the same without offsets": (FEW_LABELS, (*both, "fitted_offsets=false")),
+            "and one half of a sweep": (ANY_SCANNER, (*SWEEPS, *LEARNING, *real_changes)),
+            "and one half, with synthetic sweeps": (FEW_LABELS, mixed_changes),
+            "and the same without offsets": (FEW_LABELS, (*mixed_changes, "fitted_offsets=false")),
         }
-        tested = ("segmentation-sweeps", "", (), test, "semantickitti", arguments.seeds[0])
+        test_arguments = ("segmentation-sweeps", "", (), test, "semantickitti", arguments.seeds[0])
         cases += [
-            Case("few-labels", "the model as it comes", *tested),
-            Case("few-labels", f"the same, by {votes} views", *tested, votes=votes),
+            Case("few-labels", "the model as it comes", *test_arguments),
+            Case("few-labels", f"the same, by {votes} views", *test_arguments, votes=votes),
             *(
                 Case("few-labels", title, "segmentation-sweeps", *training, test, "semantickitti", seed)
                 for title, training in trainings.items()
@@ -175,11 +176,11 @@ def self_training(
     """Return the cases that learn from a whole cloud without its labels, and the model by itself."""
     target = sources("target", {"path": str(cloud), "tile": 1000})
     rounds = ("set_up=self_trained", "crops_per_tile=3", f"fine_tuning.epochs={arguments.epochs // 2}")
-    learned = (*changes, *LEARNING, *rounds, target, sources("synthetic", {"path": str(synthetic)}))
+    learning_changes = (*changes, *LEARNING, *rounds, target, sources("synthetic", {"path": str(synthetic)}))
     return [
-        Case("self-training", f"{model}{words}", model, configuration, told, cloud, mapping, seed)
-        for words, configuration, told in (("", "", ()), (", self-trained", ANY_SCANNER, learned))
-        for seed in (arguments.seeds if told else arguments.seeds[:1])
+        Case("self-training", f"{model}{words}", model, configuration, case_changes, cloud, mapping, seed)
+        for words, configuration, case_changes in (("", "", ()), (", self-trained", ANY_SCANNER, learning_changes))
+        for seed in (arguments.seeds if case_changes else arguments.seeds[:1])
     ]
 
 
@@ -200,44 +201,46 @@ def score(case: Case, output: Path) -> dict[str, float]:
             changes = (*case.changes, f"start={case.model}", f"seed={case.seed}")
             options = [word for change in changes for word in ("--set", change)]
             command("train", case.configuration, "--output", str(folder), "--resume", "--quiet", *options)
-    kept = scores / "told.json"
-    if not kept.is_file():
+    scores_file = scores / "told.json"
+    if not scores_file.is_file():
         words = ("--mapping", case.mapping, "--output", str(scores), "--json", "--quiet")
-        told = command("evaluate", run, str(case.test), *words)
-        kept.write_text(told, encoding="utf-8")
-    ((_, found),) = read_json(kept)["tests"].items()
-    ious = {name: 100.0 * row["iou"] for name, row in found["classes"].items() if row["iou"] is not None}
-    return {"mean": 100.0 * found["mean_iou"], **ious}
+        scores_text = command("evaluate", run, str(case.test), *words)
+        scores_file.write_text(scores_text, encoding="utf-8")
+    ((_, test),) = read_json(scores_file)["tests"].items()
+    ious = {name: 100.0 * row["iou"] for name, row in test["classes"].items() if row["iou"] is not None}
+    return {"mean": 100.0 * test["mean_iou"], **ious}
 
 
 def write_with_votes(model: str, votes: int, folder: Path) -> Path:
     """Write a model of the package as a run that labels by so many views; return the run's folder."""
-    given = open_run(Path(model))
-    run = Run.start(folder, given.configuration.model_copy(update={"votes": votes}), overwrite=True)
-    run.save(given.last_checkpoint() or {})
+    shipped_run = open_run(Path(model))
+    run = Run.start(folder, shipped_run.configuration.model_copy(update={"votes": votes}), overwrite=True)
+    run.save(shipped_run.last_checkpoint() or {})
     return folder
 
 
 def command(name: str, *words: str) -> str:
     """Run a sub-command of `synthroads` and return what it prints; its faults end this program."""
-    told = subprocess.run(
+    answer = subprocess.run(
         [sys.executable, "-m", f"headless.{name}", *words], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False
     )
-    if told.returncode:
-        raise SystemExit(f"synthroads {name} {' '.join(words)}: exit code {told.returncode}")
-    return told.stdout
+    if answer.returncode:
+        raise SystemExit(f"synthroads {name} {' '.join(words)}: exit code {answer.returncode}")
+    return answer.stdout
 
 
 def table(rows: Sequence[tuple[Case, dict[str, float]]]) -> str:
     """Return a Markdown table with a row for each title and test: mean over the seeds, and each seed's mean IoU."""
-    columns = list(dict.fromkeys(name for _, found in rows for name in found))
+    columns = list(dict.fromkeys(name for _, row_scores in rows for name in row_scores))
     lines = [f"| {' | '.join(['', 'tested on', *columns, 'each seed'])} |", f"|---|---|{'--:|' * len(columns)}---|"]
     for title, test in dict.fromkeys((case.title, case.test.stem) for case, _ in rows):
-        found = [told for case, told in rows if (case.title, case.test.stem) == (title, test)]
-        columns_of = [[told[name] for told in found if name in told] for name in columns]
-        cells = [f"{statistics.mean(values):.1f}" if values else "–" for values in columns_of]
-        each = ", ".join(f"{told['mean']:.1f}" for told in found)
-        lines.append(f"| {' | '.join([title, test, *cells, each])} |")
+        row_scores = [case_scores for case, case_scores in rows if (case.title, case.test.stem) == (title, test)]
+        values_of_columns = [
+            [case_scores[name] for case_scores in row_scores if name in case_scores] for name in columns
+        ]
+        cells = [f"{statistics.mean(values):.1f}" if values else "–" for values in values_of_columns]
+        means_text = ", ".join(f"{case_scores['mean']:.1f}" for case_scores in row_scores)
+        lines.append(f"| {' | '.join([title, test, *cells, means_text])} |")
     return "\n".join(lines)
 
 

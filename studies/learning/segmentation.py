@@ -51,8 +51,8 @@ def run_table(folder: Path) -> str:
         raise InputError(str(folder), None, "has no test")
     name, scores = next(iter(metrics["tests"].items()))
     seconds = sum(epoch["seconds"] for epoch in read_json(folder / HISTORY))
-    told = f"{metrics['parameters']:,} weights, trained in {seconds:,.0f} s on {metrics['device']}, scored on: {name}."
-    return f"{table_by_class([scores])}\n\n{told}"
+    note = f"{metrics['parameters']:,} weights, trained in {seconds:,.0f} s on {metrics['device']}, scored on: {name}."
+    return f"{table_by_class([scores])}\n\n{note}"
 
 
 def experiment_tables(folder: Path) -> str:
@@ -75,47 +75,54 @@ def training_seconds(run: Path) -> float:
 
 def real_tables(folder: Path, pictures: Path) -> dict[str, str]:
     """Score the package's models on the labelled real clouds and write pictures; return Markdown tables."""
-    found: dict[str, str] = {}
-    for name, (file, shipped) in REAL_CLOUDS.items():
-        run = open_shipped(shipped)
+    texts: dict[str, str] = {}
+    for name, (file, model_name) in REAL_CLOUDS.items():
+        run = open_shipped(model_name)
         source = Source(path=str(folder / file), mapping=name, tile=_WHOLE)
-        confusion, shown = score(trained_model(run), run.configuration, [source])
+        confusion, test_points = score(trained_model(run), run.configuration, [source])
         scores = confusion.to_dict()
         note = f"{scores['ignored']:,} points without such a class don't count."
-        found[f"real-{name}"] = f"{table_by_class([scores])}\n\n{note}"
-        if shown is not None:
-            picture = comparison(*shown, source.targets(run.configuration.scheme()))
+        texts[f"real-{name}"] = f"{table_by_class([scores])}\n\n{note}"
+        if test_points is not None:
+            picture = comparison(*test_points, source.targets(run.configuration.scheme()))
             write_file(pictures / f"segmentation-{name}.png", picture, overwrite=True)
-    return found
+    return texts
 
 
 def prediction_table(file: Path) -> str:
     """Return a Markdown table of the result file of `studies/costs/prediction.py`."""
-    told = read_json(file)
-    changed = ", ".join(told["changed"]) or "none"
+    report = read_json(file)
+    changed_text = ", ".join(report["changed"]) or "none"
     head = ("points", "LAZ (MB)", "points/s", "seconds", "peak memory (MB)", "attributes", "changed")
-    row = (told["points"], told["bytes"] / 1e6, told["points_per_second"], told["seconds"], told["peak_memory_mb"])
-    return _table(head, [*(f"{value:,.0f}" for value in row), str(told["attributes"]), changed])
+    row = (
+        report["points"],
+        report["bytes"] / 1e6,
+        report["points_per_second"],
+        report["seconds"],
+        report["peak_memory_mb"],
+    )
+    return _table(head, [*(f"{value:,.0f}" for value in row), str(report["attributes"]), changed_text])
 
 
 def packed_table(file: Path) -> str:
     """Return a Markdown table of a packed file's size, roads, tiles and points."""
-    told = pack_summary(PackReader(file).notes, file.stat().st_size)
+    summary = pack_summary(PackReader(file).notes, file.stat().st_size)
     head = ("file (MB)", "roads", "tiles", "points", "bytes per point", f"crops of {CROP:,} points")
-    cells = (f"{told['bytes'] / 1e6:.1f}", *(f"{told[name]:,}" for name in ("scenes", "tiles", "points")))
-    return _table(head, [*cells, f"{told['bytes_per_point']:.2f}", f"{told['crops']:,}"])
+    cells = (f"{summary['bytes'] / 1e6:.1f}", *(f"{summary[name]:,}" for name in ("scenes", "tiles", "points")))
+    return _table(head, [*cells, f"{summary['bytes_per_point']:.2f}", f"{summary['crops']:,}"])
 
 
 def forecast_table(file: Path) -> str:
     """Return a Markdown table of the result file of `synthroads forecast`."""
-    told = read_json(file)
+    report = read_json(file)
     head = ("tiles", "points of a batch", "s per step", "threads", "steps", "hours in all", "peak memory (MB)")
-    numbers = (told["threads"], told["steps"], told["hours"], told["peak_memory_mb"])
-    cells = [f"{told['tiles']:,}", f"{told['batch_points']:,}", f"{told['seconds_per_step']:.1f}"]
+    numbers = (report["threads"], report["steps"], report["hours"], report["peak_memory_mb"])
+    cells = [f"{report['tiles']:,}", f"{report['batch_points']:,}", f"{report['seconds_per_step']:.1f}"]
     return _table(head, [*cells, *(f"{value:,.0f}" for value in numbers)])
 
 
 def _table(head: Sequence[str], row: Sequence[str]) -> str:
+    """Return a Markdown table of one row."""
     return f"| {' | '.join(head)} |\n|{'--:|' * len(head)}\n| {' | '.join(row)} |"
 
 
@@ -138,8 +145,8 @@ def expected_tables(arguments: argparse.Namespace) -> list[str]:
 
 def tables(arguments: argparse.Namespace) -> Mapping[str, str]:
     """Make the document's Markdown tables that the arguments ask for, by name."""
-    found = {name: read(getattr(arguments, name)) for name, read in READERS.items() if getattr(arguments, name)}
-    return found | (real_tables(arguments.real, arguments.pictures) if arguments.real else {})
+    texts = {name: read(getattr(arguments, name)) for name, read in READERS.items() if getattr(arguments, name)}
+    return texts | (real_tables(arguments.real, arguments.pictures) if arguments.real else {})
 
 
 def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
@@ -163,10 +170,10 @@ def main(words: Sequence[str] | None = None) -> None:
     """Make the tables that the command line asks for, fill the document's and print them."""
     arguments = arguments_of(words)
     try:
-        found = put_tables(arguments.document, expected_tables(arguments), lambda: tables(arguments))
+        texts = put_tables(arguments.document, expected_tables(arguments), lambda: tables(arguments))
     except SynthRoadsError as error:
         raise SystemExit(str(error)) from None
-    for name, text in found.items():
+    for name, text in texts.items():
         print(f"{name}\n\n{text}\n")
 
 

@@ -36,14 +36,14 @@ GIVES_GAIN = "als_dual4lane_t338-369"
 
 def command(folder: Path, name: str, gain: float | None, tables: Path, pictures: Path) -> list[str]:
     """Return the words of the command `synthroads calibrate` for one of `CLOUDS`."""
-    beside = name.startswith("als_")
+    is_airborne = name.startswith("als_")
     words = ["calibrate", "--real", str(folder / f"{name}.laz")]
-    words += ["--axis", str(folder / f"{name}_axis.csv")] if beside else []
-    classes = ("paved", "line") if beside else ("40", "60")
-    for material, told in zip(("asphalt", "paint_white"), classes, strict=True):
-        words += ["--material", f"{material}={told}"]
+    words += ["--axis", str(folder / f"{name}_axis.csv")] if is_airborne else []
+    classes = ("paved", "line") if is_airborne else ("40", "60")
+    for material, class_name in zip(("asphalt", "paint_white"), classes, strict=True):
+        words += ["--material", f"{material}={class_name}"]
     words += shlex.split(CLOUDS[name])
-    words += ["--gain", f"{gain:g}"] if gain is not None and beside else []
+    words += ["--gain", f"{gain:g}"] if gain is not None and is_airborne else []
     words += ["--save", str(tables / f"{name}.json")]
     words += ["--plot", str(pictures / PICTURES[name])] if name in PICTURES else []
     return words
@@ -51,12 +51,12 @@ def command(folder: Path, name: str, gain: float | None, tables: Path, pictures:
 
 def run_command(words: list[str]) -> dict[str, Any]:
     """Run a `synthroads` command; return its JSON report, or exit with its code if it fails."""
-    said = io.StringIO()
-    with contextlib.redirect_stdout(said):
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
         code = synthroads([*words, "--overwrite", "--json"])
     if code:
         raise SystemExit(code)
-    report: dict[str, Any] = json.loads(said.getvalue())
+    report: dict[str, Any] = json.loads(output.getvalue())
     return report
 
 

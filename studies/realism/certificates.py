@@ -87,14 +87,17 @@ def _spread(values: list[float]) -> list[float]:
 def _statistics(data: dict[str, Any]) -> dict[str, Any]:
     """Return each statistic's medians, real and synthetic, and how many clouds lie within the real ones' range."""
     names = data["synthetic"][0]["medians"]
-    return {name: _beside(*([row["medians"][name] for row in data[side]] for side in _SIDES)) for name in names}
+    return {name: _spreads(*([row["medians"][name] for row in data[side]] for side in _SIDES)) for name in names}
 
 
-def _beside(ours: list[float], theirs: list[float]) -> dict[str, Any]:
+def _spreads(synthetic_values: list[float], real_values: list[float]) -> dict[str, Any]:
     """Return the spread of synthetic and real clouds' values, and how many of the first are within the real range."""
-    middle, half = (max(theirs) + min(theirs)) / 2.0, _RANGE * (max(theirs) - min(theirs)) / 2.0
-    inside = sum(abs(value - middle) <= half for value in ours)
-    return {"synthetic": _spread(ours), "real": _spread(theirs), "within": inside}
+    middle, half_range = (
+        (max(real_values) + min(real_values)) / 2.0,
+        _RANGE * (max(real_values) - min(real_values)) / 2.0,
+    )
+    count_inside = sum(abs(value - middle) <= half_range for value in synthetic_values)
+    return {"synthetic": _spread(synthetic_values), "real": _spread(real_values), "within": count_inside}
 
 
 def sweep_certificate(
@@ -113,15 +116,21 @@ def sweep_certificate(
     """
     if len(real) < 2:
         raise InputError("--real", len(real), "must be two real sweeps or parts of one, or more: one has no range")
-    ours, theirs = ([named_figures(one) for one in side] for side in (synthetic, real))
-    names = [name for name in ours[0] if np.isfinite([row[name] for row in [*ours, *theirs]]).all()]
-    figures = {name: _beside([row[name] for row in ours], [row[name] for row in theirs]) for name in names}
+    synthetic_rows, real_rows = (
+        [named_figures(figures_of_sweep) for figures_of_sweep in side] for side in (synthetic, real)
+    )
+    names = [
+        name for name in synthetic_rows[0] if np.isfinite([row[name] for row in [*synthetic_rows, *real_rows]]).all()
+    ]
+    figures = {
+        name: _spreads([row[name] for row in synthetic_rows], [row[name] for row in real_rows]) for name in names
+    }
     return {
         "type": _BY_FIGURES,
         "recipe": recipe,
         "title": load_recipe(recipe).title,
         "real": words,
-        "clouds": len(ours),
+        "clouds": len(synthetic_rows),
         "statistics": figures,
     }
 
@@ -132,9 +141,9 @@ def pages(rows: list[dict[str, Any]], folder: str) -> str:
     text = table(by_patches, folder)
     if by_figures:
         text += sweep_table(by_figures, folder)
-    certified = {row["recipe"] for row in rows}
-    without = {name: reason for name, reason in WITHOUT.items() if name not in certified}
-    lines = ["", "## Without a certificate", "", *(f"- `{name}`: {reason}." for name, reason in without.items())]
+    certified_names = {row["recipe"] for row in rows}
+    reason_of_name = {name: reason for name, reason in WITHOUT.items() if name not in certified_names}
+    lines = ["", "## Without a certificate", "", *(f"- `{name}`: {reason}." for name, reason in reason_of_name.items())]
     return text + "\n".join([*lines, ""])
 
 
@@ -157,14 +166,14 @@ def sweep_table(rows: list[dict[str, Any]], folder: str) -> str:
     ]
     for row in rows:
         total = row["clouds"] * len(row["statistics"])
-        within = sum(one["within"] for one in row["statistics"].values())
-        never = "; ".join(
-            f"{name}: {one['synthetic'][1]:g} (real {one['real'][0]:g} to {one['real'][2]:g})"
-            for name, one in row["statistics"].items()
-            if not one["within"]
+        count_within = sum(statistic["within"] for statistic in row["statistics"].values())
+        never_text = "; ".join(
+            f"{name}: {statistic['synthetic'][1]:g} (real {statistic['real'][0]:g} to {statistic['real'][2]:g})"
+            for name, statistic in row["statistics"].items()
+            if not statistic["within"]
         )
         name = f"[`{row['recipe']}`]({folder}/{row['recipe']}.json)"
-        lines.append(f"| {name} | {row['clouds']} | {within} of {total} | {never} | {row['real']} |")
+        lines.append(f"| {name} | {row['clouds']} | {count_within} of {total} | {never_text} | {row['real']} |")
     return "\n".join([*lines, ""])
 
 
@@ -187,16 +196,15 @@ def table(rows: list[dict[str, Any]], folder: str) -> str:
     for row in rows:
         cells = [f"{row['auc'][group][1]:.2f} ({row['realism'][group]:.2f})" for group in groups]
         total = row["clouds"] * len(row["statistics"])
-        within = sum(one["within"] for one in row["statistics"].values())
-        told = ", ".join(f"{name} {told:.2f}" for name, (told, _) in row["giveaways"].items())
+        count_within = sum(statistic["within"] for statistic in row["statistics"].values())
+        giveaways_text = ", ".join(f"{name} {auc:.2f}" for name, (auc, _) in row["giveaways"].items())
         name = f"[`{row['recipe']}`]({folder}/{row['recipe']}.json)"
-        lines.append(
-            f"| {name} | {row['clouds']} | {' | '.join(cells)} | {within} of {total} | {told} | {row['real']} |"
-        )
+        cells += [f"{count_within} of {total}", giveaways_text, row["real"]]
+        lines.append(f"| {name} | {row['clouds']} | {' | '.join(cells)} |")
     return "\n".join([*lines, ""])
 
 
-def certify(folder: Path, real: Path, words: str, sweeps: bool = False) -> dict[str, Any]:
+def certify(folder: Path, real: Path, words: str, are_sweeps: bool = False) -> dict[str, Any]:
     """Compare the clouds of a data set, or its single sweeps, with real ones; return its certificate.
 
     Raises:
@@ -205,9 +213,11 @@ def certify(folder: Path, real: Path, words: str, sweeps: bool = False) -> dict[
     clouds = folder / "scenes"
     if not clouds.is_dir():
         raise InputError(str(folder), None, "must be a data set that synthroads dataset has made")
-    if sweeps:
-        ours, theirs = ([sweep_figures(*found) for found in find_clouds(path)] for path in (clouds, real))
-        return sweep_certificate(folder.name, ours, theirs, words)
+    if are_sweeps:
+        synthetic_figures, real_figures = (
+            [sweep_figures(*cloud_and_row) for cloud_and_row in find_clouds(path)] for path in (clouds, real)
+        )
+        return sweep_certificate(folder.name, synthetic_figures, real_figures, words)
     result = exhaust(compare_steps(clouds, real), lambda share: None)
     return certificate(folder.name, result, words)
 

@@ -94,10 +94,14 @@ class Outcome:
 def variants(scenario: Scenario) -> Iterator[tuple[str, Scenario]]:
     """Yield the scenario itself, without each effect that it has, by name, and without all of these."""
     yield NOTHING, scenario
-    others = {effect: scenario_without(scenario, [effect]) for effect in EFFECTS}
-    found = {effect: other for effect, other in others.items() if other != scenario}
-    yield from found.items()
-    yield EVERYTHING, scenario_without(scenario, found)
+    scenario_of_effect = {effect: scenario_without(scenario, [effect]) for effect in EFFECTS}
+    changed_scenarios = {
+        effect: changed_scenario
+        for effect, changed_scenario in scenario_of_effect.items()
+        if changed_scenario != scenario
+    }
+    yield from changed_scenarios.items()
+    yield EVERYTHING, scenario_without(scenario, changed_scenarios)
 
 
 def study(scenario: Scenario, real: Path | None, output: Path, repeats: int = 1) -> Iterator[Outcome]:
@@ -117,19 +121,21 @@ def study(scenario: Scenario, real: Path | None, output: Path, repeats: int = 1)
     scene = RoadScene.of(scenario, road)
     scene.build()
     scene.read()
-    known = [] if real is None else [read_compared(path, row) for path, row in find_clouds(real)]
-    others = join_patches([make_patches(cloud.classes[ROAD], cloud.name) for cloud in known]) if known else None
-    asked = [points_of(cloud) for cloud in known if MARKING in cloud.classes]
+    real_clouds = [] if real is None else [read_compared(path, row) for path, row in find_clouds(real)]
+    real_patches = (
+        join_patches([make_patches(cloud.classes[ROAD], cloud.name) for cloud in real_clouds]) if real_clouds else None
+    )
+    real_points = [points_of(cloud) for cloud in real_clouds if MARKING in cloud.classes]
     # The first scan loads what later ones find loaded.
     scene.scan(new_folder(output / "warm-up"), timer)
-    for effect, changed in variants(scenario):
-        spent, name = [], effect.partition(":")[0]
+    for effect, changed_scenario in variants(scenario):
+        run_times, name = [], effect.partition(":")[0]
         for number in range(repeats):
             folder = new_folder(output / (f"{name} {number}" if number else name))
-            begun = time.process_time()
-            scene.with_settings(changed, model_stays=True).scan(folder, timer)
-            spent.append(time.process_time() - begun)
-        yield outcome(effect, output / name / "cloud.laz", others, asked, min(spent))
+            begin = time.process_time()
+            scene.with_settings(changed_scenario, model_stays=True).scan(folder, timer)
+            run_times.append(time.process_time() - begin)
+        yield outcome(effect, output / name / "cloud.laz", real_patches, real_points, min(run_times))
 
 
 def new_folder(path: Path) -> Path:
@@ -139,16 +145,20 @@ def new_folder(path: Path) -> Path:
 
 
 def outcome(
-    effect: str, cloud: Path, others: Patches | None, asked: Sequence[tuple[Float, Index]], seconds: float
+    effect: str, cloud: Path, real_patches: Patches | None, real_points: Sequence[tuple[Float, Index]], seconds: float
 ) -> Outcome:
     """Return what a scan's cloud is like, against the patches and the points of real ones if there are any."""
-    read = read_compared(cloud, UnlistedCloud(cloud=cloud.name))
-    if others is None:
-        return Outcome(effect, {}, None, len(read.classes[ROAD].intensity), round(seconds, 2))
-    patches = make_patches(read.classes[ROAD], effect)
-    auc = distinguish(patches, others, _SEED, effect).auc
-    score = network_score(points_of(read), asked) if MARKING in read.classes and asked else None
-    return Outcome(effect, auc, score, len(read.classes[ROAD].intensity), round(seconds, 2))
+    compared_cloud = read_compared(cloud, UnlistedCloud(cloud=cloud.name))
+    if real_patches is None:
+        return Outcome(effect, {}, None, len(compared_cloud.classes[ROAD].intensity), round(seconds, 2))
+    patches = make_patches(compared_cloud.classes[ROAD], effect)
+    auc = distinguish(patches, real_patches, _SEED, effect).auc
+    score = (
+        network_score(points_of(compared_cloud), real_points)
+        if MARKING in compared_cloud.classes and real_points
+        else None
+    )
+    return Outcome(effect, auc, score, len(compared_cloud.classes[ROAD].intensity), round(seconds, 2))
 
 
 def points_of(cloud: ComparedCloud) -> tuple[Float, Index]:
@@ -162,22 +172,27 @@ def points_of(cloud: ComparedCloud) -> tuple[Float, Index]:
     level = 10.0 * np.log10(np.concatenate([part.intensity for part in parts]))
     label = np.repeat([0, 1], [len(part.intensity) for part in parts])
     level -= np.median(level[label == 0])
-    near = cKDTree(place[:, :2]).query(place[:, :2], k=_NEIGHBOURS + 1)[1][:, 1:]
-    around, height = level[near], place[:, 2] - place[near, 2].mean(axis=1)
-    seen = np.column_stack([level, around.mean(axis=1), around.min(axis=1), around.max(axis=1), height])
-    chosen = np.concatenate([_some(np.flatnonzero(label == kind)) for kind in (0, 1)])
-    return seen[chosen], label[chosen]
+    neighbours = cKDTree(place[:, :2]).query(place[:, :2], k=_NEIGHBOURS + 1)[1][:, 1:]
+    neighbour_levels, height = level[neighbours], place[:, 2] - place[neighbours, 2].mean(axis=1)
+    features = np.column_stack(
+        [level, neighbour_levels.mean(axis=1), neighbour_levels.min(axis=1), neighbour_levels.max(axis=1), height]
+    )
+    rows = np.concatenate([_some(np.flatnonzero(label == kind)) for kind in (0, 1)])
+    return features[rows], label[rows]
 
 
 def _some(rows: Index) -> Index:
+    """Return some of the rows, at random."""
     return np.asarray(np.random.default_rng(_SEED).permutation(rows)[:_MOST])
 
 
-def network_score(learned: tuple[Float, Index], asked: Sequence[tuple[Float, Index]]) -> float:
+def network_score(training_points: tuple[Float, Index], test_points: Sequence[tuple[Float, Index]]) -> float:
     """Return the mean balanced accuracy on other clouds of a network of 32 and 16 units that learned on one cloud."""
     network = MLPClassifier((32, 16), early_stopping=True, max_iter=200, random_state=_SEED)
-    trained = make_pipeline(StandardScaler(), network).fit(*learned)
-    return float(np.mean([balanced_accuracy_score(label, trained.predict(seen)) for seen, label in asked]))
+    trained_network = make_pipeline(StandardScaler(), network).fit(*training_points)
+    return float(
+        np.mean([balanced_accuracy_score(label, trained_network.predict(features)) for features, label in test_points])
+    )
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
@@ -187,10 +202,12 @@ def table(outcomes: Sequence[Outcome]) -> str:
         " | ".join(["| without", *(f"AUC {group}" for group in groups), "network's score", "points", "CPU s |"]),
         "|---|" + "--:|" * (len(groups) + 3),
     ]
-    for one in outcomes:
-        score = "-" if one.score is None else f"{one.score:.3f}"
-        auc = (f"{one.auc[group]:.2f}" for group in groups)
-        lines.append(" | ".join([f"| {one.effect}", *auc, score, f"{one.points:,}", f"{one.seconds:.2f} |"]))
+    for outcome in outcomes:
+        score = "-" if outcome.score is None else f"{outcome.score:.3f}"
+        auc = (f"{outcome.auc[group]:.2f}" for group in groups)
+        lines.append(
+            " | ".join([f"| {outcome.effect}", *auc, score, f"{outcome.points:,}", f"{outcome.seconds:.2f} |"])
+        )
     return "\n".join(lines) + "\n"
 
 
@@ -205,9 +222,9 @@ def draw(names: Sequence[str], folder: Path, path: Path) -> None:
     for number, (name, cloud) in enumerate(zip(names, clouds, strict=True)):
         row, column = divmod(number, columns)
         draw_square(axes[2 * row, column], axes[2 * row + 1, column], name, cloud, middle)
-    for empty in range(len(names), rows * columns):
+    for panel in range(len(names), rows * columns):
         for part in (0, 1):
-            axes[2 * (empty // columns) + part, empty % columns].set_axis_off()
+            axes[2 * (panel // columns) + part, panel % columns].set_axis_off()
     figure.tight_layout()
     save_figure(figure, path, dpi=90)
 
@@ -221,26 +238,26 @@ def blocks_of(path: Path) -> Iterator[PointBlock]:
 def densest_square(cloud: PointBlock) -> Float:
     """Return the middle (2,) of the square of pavement and markings with the most points of both."""
     scheme = {row.name: row.id for row in class_scheme("5").rows}
-    cell = np.floor(cloud.xyz[:, :2] / _SQUARE).astype(np.int64)
-    cells, owner = np.unique(cell, axis=0, return_inverse=True)
+    cell_of_point = np.floor(cloud.xyz[:, :2] / _SQUARE).astype(np.int64)
+    cells, owner = np.unique(cell_of_point, axis=0, return_inverse=True)
     road, paint = (np.bincount(owner.ravel(), cloud.class_id == scheme[name]) for name in (ROAD, "road_marking"))
     return np.asarray((cells[int(np.argmax(np.minimum(road, 8.0 * paint)))] + 0.5) * _SQUARE)
 
 
-def draw_square(above: Any, beside: Any, name: str, cloud: PointBlock, middle: Float) -> None:
+def draw_square(top_axes: Any, side_axes: Any, name: str, cloud: PointBlock, middle: Float) -> None:
     """Draw one cloud's points in a square from above, by brightness in dB, and from the side."""
-    apart = cloud.xyz[:, :2] - middle
-    inside = np.flatnonzero(np.abs(apart).max(axis=1) < _SQUARE / 2.0)
-    x, y = apart[inside].T
-    level = 10.0 * np.log10(np.maximum(cloud.intensity[inside], 1e-12))
-    height = cloud.xyz[inside, 2]
+    position = cloud.xyz[:, :2] - middle
+    rows_inside = np.flatnonzero(np.abs(position).max(axis=1) < _SQUARE / 2.0)
+    x, y = position[rows_inside].T
+    level = 10.0 * np.log10(np.maximum(cloud.intensity[rows_inside], 1e-12))
+    height = cloud.xyz[rows_inside, 2]
     plane = np.column_stack([np.ones_like(x), x, y])
     height = height - plane @ np.linalg.lstsq(plane, height, rcond=None)[0]
-    above.scatter(x, y, c=level - np.median(level), s=5, vmin=-4, vmax=6, cmap="viridis")
-    above.set(aspect="equal", xticks=[], yticks=[])
-    above.set_title(name if name == NOTHING else f"without {name}", fontsize=9)
-    beside.scatter(x, 1e3 * height, c="#444444", s=2)
-    beside.set(ylim=(-120, 120), xticks=[], ylabel="mm")
+    top_axes.scatter(x, y, c=level - np.median(level), s=5, vmin=-4, vmax=6, cmap="viridis")
+    top_axes.set(aspect="equal", xticks=[], yticks=[])
+    top_axes.set_title(name if name == NOTHING else f"without {name}", fontsize=9)
+    side_axes.scatter(x, 1e3 * height, c="#444444", s=2)
+    side_axes.set(ylim=(-120, 120), xticks=[], ylabel="mm")
 
 
 def scenario_of(recipe: str, scene: str | None, changes: Sequence[str]) -> Scenario:
@@ -269,11 +286,11 @@ def main() -> None:
     arguments = parser.parse_args()
     scenario = scenario_of(arguments.recipe, arguments.scene, arguments.set)
     outcomes = []
-    for one in study(scenario, arguments.real, arguments.output, arguments.repeats):
-        outcomes.append(one)
-        print(json.dumps(one.to_dict()), flush=True)
-    (arguments.output / "effects.json").write_text(json.dumps([one.to_dict() for one in outcomes], indent=1))
-    draw([one.effect for one in outcomes], arguments.output, arguments.output / "effects.png")
+    for outcome in study(scenario, arguments.real, arguments.output, arguments.repeats):
+        outcomes.append(outcome)
+        print(json.dumps(outcome.to_dict()), flush=True)
+    (arguments.output / "effects.json").write_text(json.dumps([outcome.to_dict() for outcome in outcomes], indent=1))
+    draw([outcome.effect for outcome in outcomes], arguments.output, arguments.output / "effects.png")
     (arguments.output / "effects.md").write_text(table(outcomes), encoding="utf-8")
 
 

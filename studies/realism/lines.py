@@ -59,8 +59,8 @@ class LineFigures:
         off_mm: off the straight line.
         along_mm: off even steps along it.
         step: m.
-        apart: to the next line, m.
-        apart_variation: of that distance.
+        gap: to the next line, m.
+        gap_variation: of that distance.
         turned_deg: between neighbouring lines.
     """
 
@@ -68,8 +68,8 @@ class LineFigures:
     off_mm: float
     along_mm: float
     step: float
-    apart: float
-    apart_variation: float
+    gap: float
+    gap_variation: float
     turned_deg: float
 
 
@@ -86,82 +86,95 @@ def line_figures(place: Float, name: str) -> LineFigures:
     for rows in blocks:
         if len(rows) < _FEWEST_OF_BLOCK:
             continue
-        found = _lines_of(place[rows] - place[rows].mean(axis=0))
-        lines.append(found)
-        gaps.append(_next_ones(found))
+        block_lines = _lines_of(place[rows] - place[rows].mean(axis=0))
+        lines.append(block_lines)
+        gaps.append(_next_ones(block_lines))
     if not lines or not sum(map(len, gaps)):
         raise InputError(name, len(place), f"has no two scan lines of {FEWEST} points side by side")
-    every, (apart, turned) = np.concatenate(lines), np.concatenate(gaps).T
-    spread = [float(np.subtract(*np.quantile(values, (0.75, 0.25)))) / _NORMAL for values in (apart, turned)]
-    off, along, step = np.median(every[:, 4:], axis=0)
-    middle = float(np.median(apart))
-    return LineFigures(len(every), 1e3 * off, 1e3 * along, step, middle, spread[0] / middle, spread[1])
+    all_lines, (distances, angles) = np.concatenate(lines), np.concatenate(gaps).T
+    spread = [float(np.subtract(*np.quantile(values, (0.75, 0.25)))) / _NORMAL for values in (distances, angles)]
+    off_line, along, step = np.median(all_lines[:, 4:], axis=0)
+    middle = float(np.median(distances))
+    return LineFigures(len(all_lines), 1e3 * off_line, 1e3 * along, step, middle, spread[0] / middle, spread[1])
 
 
 def _lines_of(place: Float) -> Float:
     """Return a block's lines (M, 7): slope over the block's direction, place across at 0, both ends, and figures."""
     along, across = _turned(place)
     pairs = cKDTree(place).query_pairs(_FARTHEST, output_type="ndarray")
-    ahead = along[pairs[:, 1]] > along[pairs[:, 0]]
-    first, second = np.where(ahead, pairs.T, pairs.T[::-1])
-    step, aside = along[second] - along[first], np.abs(across[second] - across[first])
-    near = (step > _NEAREST) & (aside < _AWAY)
-    order = np.argsort(aside[near], kind="stable")
-    links = _one_each(first[near][order], second[near][order])
+    is_forward = along[pairs[:, 1]] > along[pairs[:, 0]]
+    first_points, second_points = np.where(is_forward, pairs.T, pairs.T[::-1])
+    step, sideways = along[second_points] - along[first_points], np.abs(across[second_points] - across[first_points])
+    is_link = (step > _NEAREST) & (sideways < _AWAY)
+    order = np.argsort(sideways[is_link], kind="stable")
+    links = _one_each(first_points[is_link][order], second_points[is_link][order])
     owner = connected_components(coo_matrix((np.ones(len(links)), links.T), (len(place),) * 2), directed=False)[1]
     rows = np.split(np.argsort(owner, kind="stable"), np.cumsum(np.bincount(owner))[:-1])
-    found = [_described(along[line], across[line]) for line in rows if len(line) >= FEWEST]
-    return np.array(found).reshape(-1, 7)
+    rows_of_lines = [_described(along[line], across[line]) for line in rows if len(line) >= FEWEST]
+    return np.array(rows_of_lines).reshape(-1, 7)
 
 
-def _one_each(first: Index, second: Index) -> Index:
+def _one_each(first_points: Index, second_points: Index) -> Index:
     """Return the links (K, 2) that are kept, the best first: each point has one before it and one behind it at most."""
     ends: tuple[set[int], set[int]] = (set(), set())
-    kept = []
-    for one, other in zip(first.tolist(), second.tolist(), strict=True):
-        if one not in ends[0] and other not in ends[1]:
-            ends[0].add(one)
-            ends[1].add(other)
-            kept.append((one, other))
-    return np.array(kept, dtype=np.int64).reshape(-1, 2)
+    links = []
+    for first_point, second_point in zip(first_points.tolist(), second_points.tolist(), strict=True):
+        if first_point not in ends[0] and second_point not in ends[1]:
+            ends[0].add(first_point)
+            ends[1].add(second_point)
+            links.append((first_point, second_point))
+    return np.array(links, dtype=np.int64).reshape(-1, 2)
 
 
 def _turned(place: Float) -> tuple[AnyArray, AnyArray]:
     """Return places along and across a block's lines: the direction in which most pairs of points follow each other."""
     pairs = cKDTree(place).query_pairs(_FARTHEST, output_type="ndarray")
-    apart = place[pairs[:, 1]] - place[pairs[:, 0]]
-    apart = apart[np.hypot(*apart.T) > _NEAREST]
+    vectors = place[pairs[:, 1]] - place[pairs[:, 0]]
+    vectors = vectors[np.hypot(*vectors.T) > _NEAREST]
     angle = np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS
-    inside = np.abs(np.outer(apart[:, 0], -np.sin(angle)) + np.outer(apart[:, 1], np.cos(angle))) < _AWAY
-    best = angle[int(inside.sum(axis=0).argmax())]
-    return place @ [np.cos(best), np.sin(best)], place @ [-np.sin(best), np.cos(best)]
+    is_along = np.abs(np.outer(vectors[:, 0], -np.sin(angle)) + np.outer(vectors[:, 1], np.cos(angle))) < _AWAY
+    best_angle = angle[int(is_along.sum(axis=0).argmax())]
+    return place @ [np.cos(best_angle), np.sin(best_angle)], place @ [-np.sin(best_angle), np.cos(best_angle)]
 
 
 def _described(along: AnyArray, across: AnyArray) -> list[float]:
     """Return a line's slope, place across at 0, ends, and root mean squares off it and along it, m, and its step."""
     order = np.argsort(along)
     along, across = along[order], across[order]
-    slope, at = np.polyfit(along, across, 1)
-    off = across - slope * along - at
+    slope, place_at_0 = np.polyfit(along, across, 1)
+    off_line = across - slope * along - place_at_0
     # Of independent errors of the places second differences have six times the variance.
-    uneven = np.diff(along, 2).std() / np.sqrt(6.0)
-    return [slope, at, along[0], along[-1], float(off.std()), float(uneven), float(np.median(np.diff(along)))]
+    unevenness = np.diff(along, 2).std() / np.sqrt(6.0)
+    return [
+        slope,
+        place_at_0,
+        along[0],
+        along[-1],
+        float(off_line.std()),
+        float(unevenness),
+        float(np.median(np.diff(along))),
+    ]
 
 
 def _next_ones(lines: Float) -> Float:
     """Return distance, m, and angle, deg, (K, 2) from each line to the next one of its strip beside it."""
-    found = []
+    rows = []
     lines = lines[np.argsort(lines[:, 1])]
     for number, line in enumerate(lines):
-        others = lines[number + 1 :]
-        low, high = np.maximum(others[:, 2], line[2]), np.minimum(others[:, 3], line[3])
-        middle, angle = (low + high) / 2.0, np.rad2deg(others[:, 0] - line[0])
-        apart = others[:, 1] - line[1] + (others[:, 0] - line[0]) * middle
-        beside = (high - low > _OVERLAP) & (np.abs(angle) < SAME_DEG) & (apart > 0.0) & (apart < _NEXT)
-        if beside.any():
-            nearest = int(np.where(beside, apart, np.inf).argmin())
-            found.append((apart[nearest], angle[nearest]))
-    return np.array(found).reshape(-1, 2)
+        later_lines = lines[number + 1 :]
+        overlap_start, overlap_end = np.maximum(later_lines[:, 2], line[2]), np.minimum(later_lines[:, 3], line[3])
+        middle, angle = (overlap_start + overlap_end) / 2.0, np.rad2deg(later_lines[:, 0] - line[0])
+        distances = later_lines[:, 1] - line[1] + (later_lines[:, 0] - line[0]) * middle
+        is_beside = (
+            (overlap_end - overlap_start > _OVERLAP)
+            & (np.abs(angle) < SAME_DEG)
+            & (distances > 0.0)
+            & (distances < _NEXT)
+        )
+        if is_beside.any():
+            nearest = int(np.where(is_beside, distances, np.inf).argmin())
+            rows.append((distances[nearest], angle[nearest]))
+    return np.array(rows).reshape(-1, 2)
 
 
 def main() -> int:

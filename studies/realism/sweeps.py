@@ -93,37 +93,37 @@ def sweep_figures(path: Path, row: ListedCloud) -> SweepFigures:
         InputError: it can't be read, has too little road, or nobody says from where it was seen.
     """
     cloud = between_azimuths(read_real_cloud(path, row.class_field), row)
-    found: dict[str, RealClass] = {}
+    points_of_class: dict[str, RealClass] = {}
     for name in CLASSES:
         code = getattr(row, name)
         try:
             if code is not None:
-                found[name] = class_by_label(cloud, code, f"{path.name}: {name}")
+                points_of_class[name] = class_by_label(cloud, code, f"{path.name}: {name}")
         except InputError:
             if name == ROAD:
                 raise
-    ranges = {name: _ranges(points, row, path.name) for name, points in found.items()}
-    road, distance = found[ROAD], ranges[ROAD]
+    ranges = {name: _ranges(points, row, path.name) for name, points in points_of_class.items()}
+    road, distance = points_of_class[ROAD], ranges[ROAD]
     rings = [(distance >= low) & (distance < high) for low, high in pairwise(RINGS)]
-    enough = [int(ring.sum()) >= _FEWEST for ring in rings]
+    has_enough = [int(ring.sum()) >= _FEWEST for ring in rings]
     # Lost numbers are points all the same, alike many at all ranges.
     share = len(road.intensity) / (len(road.intensity) + road.zeros)
     azimuth = _azimuth(road, row)
     density = [
-        _density(distance[ring], azimuth[ring], low, high) / share if some else np.nan
-        for ring, some, (low, high) in zip(rings, enough, pairwise(RINGS), strict=True)
+        _density(distance[ring], azimuth[ring], low, high) / share if is_enough else np.nan
+        for ring, is_enough, (low, high) in zip(rings, has_enough, pairwise(RINGS), strict=True)
     ]
     level = [
-        10.0 * np.log10(np.median(road.intensity[ring])) if some else np.nan
-        for ring, some in zip(rings, enough, strict=True)
+        10.0 * np.log10(np.median(road.intensity[ring])) if is_enough else np.nan
+        for ring, is_enough in zip(rings, has_enough, strict=True)
     ]
-    numbers = {name: points.intensity for name, points in found.items()}
+    numbers = {name: points.intensity for name, points in points_of_class.items()}
     values: dict[str, float] = {}
     for name in CLASSES[1:]:
         values[f"{name} over road"] = _ratio(numbers.get(name), numbers[ROAD])
-    near = (distance >= NEAR[0]) & (distance < NEAR[1])
-    place = road.place[near]
-    values["noise"] = number_noise(place, road.intensity[near])
+    is_near = (distance >= NEAR[0]) & (distance < NEAR[1])
+    place = road.place[is_near]
+    values["noise"] = number_noise(place, road.intensity[is_near])
     values["zeros"] = 1.0 - share
     values["thickness, mm"] = 1e3 * thickness(place)
     for name in CLASSES[1:]:
@@ -145,8 +145,8 @@ def _ranges(points: RealClass, row: ListedCloud, file: str) -> Float:
 def _azimuth(road: RealClass, row: ListedCloud) -> Float:
     """Return the azimuth (N,) of points about the scanner, rad: about the one place that the ranges agree with."""
     middle = np.asarray(row.scanner) if row.scanner is not None else scanner_place(road.place, road.distance)
-    away = road.place - middle
-    return np.asarray(np.arctan2(away[:, 1], away[:, 0]))
+    from_scanner = road.place - middle
+    return np.asarray(np.arctan2(from_scanner[:, 1], from_scanner[:, 0]))
 
 
 def scanner_place(place: Float, distance: Float) -> Float:
@@ -156,23 +156,23 @@ def scanner_place(place: Float, distance: Float) -> Float:
     either side of a level road the upper one is taken.
     """
     origin = place.mean(axis=0)
-    local = place - origin
-    plane = np.linalg.svd(local[:: max(len(local) // 5000, 1)], full_matrices=False)[2]
+    local_place = place - origin
+    plane = np.linalg.svd(local_place[:: max(len(local_place) // 5000, 1)], full_matrices=False)[2]
     plane[2] *= np.sign(plane[2, 2]) or 1.0
-    flat = local @ plane[:2].T
-    terms = np.column_stack([2.0 * flat, -np.ones(len(flat))])
-    found = np.linalg.lstsq(terms, (local**2).sum(axis=1) - distance**2, rcond=None)[0]
-    height = np.sqrt(max(found[2] - found[:2] @ found[:2], 0.0))
-    return np.asarray(origin + found[:2] @ plane[:2] + height * plane[2])
+    plane_coordinates = local_place @ plane[:2].T
+    terms = np.column_stack([2.0 * plane_coordinates, -np.ones(len(plane_coordinates))])
+    solution = np.linalg.lstsq(terms, (local_place**2).sum(axis=1) - distance**2, rcond=None)[0]
+    height = np.sqrt(max(solution[2] - solution[:2] @ solution[:2], 0.0))
+    return np.asarray(origin + solution[:2] @ plane[:2] + height * plane[2])
 
 
-def _density(distance: Float, azimuth: Float, low: float, high: float) -> float:
+def _density(distance: Float, azimuth: Float, nearest: float, farthest: float) -> float:
     """Return points to the square metre of the cells, by range and azimuth, that hold any.
 
     Cells are as long as lasers' rings on the road lie apart there: with the range by equal factors.
     """
-    parts = int(np.ceil(np.log(high / low) / np.log(_LENGTHENS)))
-    edges = np.geomspace(low, high, parts + 1)
+    parts = int(np.ceil(np.log(farthest / nearest) / np.log(_LENGTHENS)))
+    edges = np.geomspace(nearest, farthest, parts + 1)
     part = np.clip(np.searchsorted(edges, distance, side="right") - 1, 0, parts - 1)
     sector = np.floor((azimuth / (2.0 * np.pi) + 0.5) * _SECTORS).astype(np.int64) % _SECTORS
     cells = np.unique(part * _SECTORS + sector) // _SECTORS
@@ -180,37 +180,39 @@ def _density(distance: Float, azimuth: Float, low: float, high: float) -> float:
     return len(distance) / float(area.sum())
 
 
-def _ratio(of: Float | None, to: Float) -> float:
+def _ratio(numerators: Float | None, denominators: Float) -> float:
     """Return the ratio of the medians of two classes' numbers; NaN of too few."""
-    few = of is None or len(of) < _FEWEST or len(to) < _FEWEST
-    return float("nan") if few or of is None else float(np.median(of) / np.median(to))
+    is_sparse = numerators is None or len(numerators) < _FEWEST or len(denominators) < _FEWEST
+    return float("nan") if is_sparse or numerators is None else float(np.median(numerators) / np.median(denominators))
 
 
 def number_noise(place: Float, number: Float) -> float:
     """Return by how much the logarithms of numbers (N,) of neighbours closer than `CLOSE` differ on average."""
     distance, nearest = cKDTree(place).query(place, k=2)
-    close = distance[:, 1] < CLOSE
-    apart = np.abs(np.log(number[close] / number[nearest[close, 1]]))
-    return float(apart.mean()) if len(apart) >= _FEWEST else float("nan")
+    is_close = distance[:, 1] < CLOSE
+    log_ratios = np.abs(np.log(number[is_close] / number[nearest[is_close, 1]]))
+    return float(log_ratios.mean()) if len(log_ratios) >= _FEWEST else float("nan")
 
 
 def thickness(place: Float) -> float:
     """Return the median root of the least eigenvalue of the covariance of `NEAREST` neighbours of points (N, 3), m."""
     if len(place) < NEAREST:
         return float("nan")
-    around = cKDTree(place).query(place, k=NEAREST)[1]
-    groups = place[around] - place[around].mean(axis=1, keepdims=True)
+    neighbours = cKDTree(place).query(place, k=NEAREST)[1]
+    groups = place[neighbours] - place[neighbours].mean(axis=1, keepdims=True)
     covariance = np.einsum("nki,nkj->nij", groups, groups) / NEAREST
     return float(np.median(np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[:, 0], 0.0))))
 
 
-def best_accuracy(one: Float, other: Float | None) -> float:
+def best_accuracy(numbers: Float, other_numbers: Float | None) -> float:
     """Return the best balanced accuracy with which a threshold parts numbers (N,) from (M,), whichever way."""
-    if other is None or len(other) < _FEWEST or len(one) < _FEWEST:
+    if other_numbers is None or len(other_numbers) < _FEWEST or len(numbers) < _FEWEST:
         return float("nan")
-    levels = np.quantile(np.concatenate([one, other]), np.linspace(0.0, 1.0, _LEVELS))
-    below = [np.searchsorted(np.sort(values), levels, side="right") / len(values) for values in (one, other)]
-    return float(0.5 + 0.5 * np.abs(below[0] - below[1]).max())
+    levels = np.quantile(np.concatenate([numbers, other_numbers]), np.linspace(0.0, 1.0, _LEVELS))
+    shares_below = [
+        np.searchsorted(np.sort(values), levels, side="right") / len(values) for values in (numbers, other_numbers)
+    ]
+    return float(0.5 + 0.5 * np.abs(shares_below[0] - shares_below[1]).max())
 
 
 def named_figures(figures: SweepFigures) -> dict[str, float]:
@@ -219,9 +221,9 @@ def named_figures(figures: SweepFigures) -> dict[str, float]:
     Densities are those from `NEAR` on: nearer the car hides the road in part.
     """
     result = {}
-    for (low, high), density, level in zip(pairwise(RINGS), figures.density, figures.level, strict=True):
-        ring = f"{low:g} to {high:g} m"
-        if low >= NEAR[0]:
+    for (nearest, farthest), density, level in zip(pairwise(RINGS), figures.density, figures.level, strict=True):
+        ring = f"{nearest:g} to {farthest:g} m"
+        if nearest >= NEAR[0]:
             result[f"road points/m², {ring}"] = float(density)
         result[f"median road number, {ring}, dB"] = float(level)
     return result | figures.values
@@ -229,39 +231,42 @@ def named_figures(figures: SweepFigures) -> dict[str, float]:
 
 def misses(figures: SweepFigures, real: SweepFigures) -> list[str]:
     """Return what of a synthetic sweep's figures is beyond its limit, in words."""
-    found = []
-    for (low, high), ours, theirs in zip(pairwise(RINGS), figures.density, real.density, strict=True):
-        factor = next(value for reach, value in _DENSITY_FACTORS.items() if high <= reach)
-        if low >= NEAR[0] and np.isfinite(theirs) and not 1.0 / factor <= ours / theirs <= factor:
-            found.append(f"density at {low:g} to {high:g} m: {ours:.3g} against {theirs:.3g}")
-    for low, ours, theirs in zip(RINGS, figures.level, real.level, strict=False):
-        if np.isfinite(theirs) and not abs(ours - theirs) <= _DECIBELS:
-            found.append(f"median from {low:g} m on: {ours - theirs:+.1f} dB")
-    for name, (low, high) in LIMITS.items():
+    texts = []
+    for (lowest, highest), synthetic_value, real_value in zip(
+        pairwise(RINGS), figures.density, real.density, strict=True
+    ):
+        factor = next(value for reach, value in _DENSITY_FACTORS.items() if highest <= reach)
+        if lowest >= NEAR[0] and np.isfinite(real_value) and not 1.0 / factor <= synthetic_value / real_value <= factor:
+            texts.append(f"density at {lowest:g} to {highest:g} m: {synthetic_value:.3g} against {real_value:.3g}")
+    for lowest, synthetic_value, real_value in zip(RINGS, figures.level, real.level, strict=False):
+        if np.isfinite(real_value) and not abs(synthetic_value - real_value) <= _DECIBELS:
+            texts.append(f"median from {lowest:g} m on: {synthetic_value - real_value:+.1f} dB")
+    for name, (lowest, highest) in LIMITS.items():
         value = figures.values[name]
-        if np.isfinite(value) and not low <= value <= high:
-            found.append(f"{name}: {value:.3g}, {low:g} to {high:g} allowed")
+        if np.isfinite(value) and not lowest <= value <= highest:
+            texts.append(f"{name}: {value:.3g}, {lowest:g} to {highest:g} allowed")
     for name, value in figures.values.items():
-        theirs = real.values[name]
-        if name.startswith("threshold") and value > theirs + _ACCURACY:
-            found.append(f"{name}: {value:.2f} against {theirs:.2f}")
-    return found
+        real_value = real.values[name]
+        if name.startswith("threshold") and value > real_value + _ACCURACY:
+            texts.append(f"{name}: {value:.2f} against {real_value:.2f}")
+    return texts
 
 
 def table(rows: list[SweepFigures], real: SweepFigures) -> str:
     """Return a Markdown table of figures, a column for each cloud."""
     lines = [f"| | {' | '.join(row.name for row in rows)} |", "|---|" + "--:|" * len(rows)]
-    for number, (low, high) in enumerate(pairwise(RINGS)):
+    for number, (nearest, farthest) in enumerate(pairwise(RINGS)):
         cells = [_cell(row.density[number]) for row in rows]
-        lines.append(f"| road points/m², {low:g} to {high:g} m | {' | '.join(cells)} |")
-    for number, (low, high) in enumerate(pairwise(RINGS)):
+        lines.append(f"| road points/m², {nearest:g} to {farthest:g} m | {' | '.join(cells)} |")
+    for number, (nearest, farthest) in enumerate(pairwise(RINGS)):
         cells = [_cell(row.level[number] - real.level[number], "+.1f") for row in rows]
-        lines.append(f"| median road number, {low:g} to {high:g} m, dB | {' | '.join(cells)} |")
+        lines.append(f"| median road number, {nearest:g} to {farthest:g} m, dB | {' | '.join(cells)} |")
     lines += [f"| {name} | {' | '.join(_cell(row.values[name]) for row in rows)} |" for name in rows[0].values]
     return "\n".join(lines)
 
 
 def _cell(value: float, form: str = ".3g") -> str:
+    """Return a number as text; a dash where it isn't finite."""
     return format(value, form) if np.isfinite(value) else "–"
 
 
@@ -273,12 +278,13 @@ def main() -> int:
     parser.add_argument("--limits", action="store_true", help="exit with 3 if a figure is beyond its limit")
     arguments = parser.parse_args()
     real, synthetic = (
-        [sweep_figures(*found) for found in find_clouds(path)] for path in (arguments.real, arguments.synthetic)
+        [sweep_figures(*cloud_and_row) for cloud_and_row in find_clouds(path)]
+        for path in (arguments.real, arguments.synthetic)
     )
     print(table([*real, *synthetic], real[0]))
-    beyond = [f"{row.name}: {miss}" for row in synthetic for miss in misses(row, real[0])]
-    print("\n".join(beyond) or "all within limits", file=sys.stderr)
-    return 3 if beyond and arguments.limits else 0
+    misses_texts = [f"{row.name}: {miss}" for row in synthetic for miss in misses(row, real[0])]
+    print("\n".join(misses_texts) or "all within limits", file=sys.stderr)
+    return 3 if misses_texts and arguments.limits else 0
 
 
 if __name__ == "__main__":

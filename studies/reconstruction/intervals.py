@@ -49,13 +49,13 @@ class Figures:
     error: float
 
 
-def cut(cloud: RoadCloud, offset: Float, station: Float, half: float, seed: str) -> RoadCloud:
+def cut(cloud: RoadCloud, offset: Float, station: Float, half_width: float, seed: str) -> RoadCloud:
     """Return the surface's points of a cloud between sides that are cut at random."""
     part = (np.maximum(station, 0.0) // _LENGTH).astype(np.int64)
     rng = stream(1, "cut sides", seed)
-    left, right = half * (1.0 - _SHARE * rng.random((2, int(part.max()) + 1)))
-    keep: Bool = cloud.of(*SURFACE) & (offset < left[part]) & (offset > -right[part])
-    return replace(cloud, xyz=cloud.xyz[keep], intensity=cloud.intensity[keep], kind=cloud.kind[keep])
+    left, right = half_width * (1.0 - _SHARE * rng.random((2, int(part.max()) + 1)))
+    is_kept: Bool = cloud.of(*SURFACE) & (offset < left[part]) & (offset > -right[part])
+    return replace(cloud, xyz=cloud.xyz[is_kept], intensity=cloud.intensity[is_kept], kind=cloud.kind[is_kept])
 
 
 def measure(folder: Path) -> Figures:
@@ -67,24 +67,27 @@ def measure(folder: Path) -> Figures:
     truth = read_parameters(folder / "truth.json")
     road = RoadGeometry(truth)
     cloud = without_classes(read_road_cloud(folder / "cloud.laz"))
-    moved = np.array(truth.transform.translate[:2]) - cloud.origin[:2]
-    station, offset = road.alignment.project(cloud.xyz[:, :2] - moved)
+    shift = np.array(truth.transform.translate[:2]) - cloud.origin[:2]
+    station, offset = road.alignment.project(cloud.xyz[:, :2] - shift)
     edges = [float(section.paved_edge(np.array([0.5 * road.length]))[0]) for section in road.sections.values()]
     cloud = cut(cloud, offset, station, max(edges) + _BESIDE, folder.name)
-    path, half = straighten_path(cloud, Options())
-    return _figures(find_axis(cloud, path, half, Options()), road, moved)
+    path, half_width = straighten_path(cloud, Options())
+    return _figures(find_axis(cloud, path, half_width, Options()), road, shift)
 
 
-def _figures(found: FoundRoad, road: RoadGeometry, moved: Float) -> Figures:
-    axis = found.axis
-    _, beside = road.alignment.project(found.path.place(axis.stations, np.zeros(len(axis.stations))) - moved)
-    _, left = road.alignment.project(found.path.place(axis.stations, np.ones(len(axis.stations))) - moved)
-    true = -beside * np.sign(np.median(left - beside))
-    error = np.abs(axis.offsets - true)
-    seen = np.array([np.isfinite(view.offsets) for view in axis.views])
-    slipped = np.array([np.abs(view.offsets - true) > _SLIPPED * view.std for view in axis.views])
+def _figures(found_road: FoundRoad, road: RoadGeometry, shift: Float) -> Figures:
+    """Return the figures of an axis that was found, beside the true road."""
+    axis = found_road.axis
+    _, axis_offset = road.alignment.project(found_road.path.place(axis.stations, np.zeros(len(axis.stations))) - shift)
+    _, offset_to_left = road.alignment.project(
+        found_road.path.place(axis.stations, np.ones(len(axis.stations))) - shift
+    )
+    true_offsets = -axis_offset * np.sign(np.median(offset_to_left - axis_offset))
+    error = np.abs(axis.offsets - true_offsets)
+    is_seen = np.array([np.isfinite(view.offsets) for view in axis.views])
+    has_slipped = np.array([np.abs(view.offsets - true_offsets) > _SLIPPED * view.std for view in axis.views])
     return Figures(
-        slipped=float(slipped[seen].mean()),
+        slipped=float(has_slipped[is_seen].mean()),
         in_68=float((error < half_width(axis, 0.68, 1.0)).mean()),
         in_95=float((error < half_width(axis, 0.95, 1.96)).mean()),
         in_95_alone=float((error < 1.96 * axis.std).mean()),
@@ -103,20 +106,21 @@ def main() -> None:
         rows = []
         for name in names:
             try:
-                found = measure(arguments.folder / name)
+                figures = measure(arguments.folder / name)
             except InputError as error:
                 print(f"{name}: {error}")
                 continue
-            rows.append(list(vars(found).values()))
+            rows.append(list(vars(figures).values()))
             print(f"{name}: {_text(rows[-1])}", flush=True)
         print(f"{group}: {_text(np.mean(rows, axis=0))}")
 
 
 def _text(row: list[float] | Float) -> str:
-    slipped, in_68, in_95, alone, error = (float(value) for value in row)
+    """Return a row of figures in words."""
+    slip_share, share_in_68, share_in_95, share_alone, error = (float(value) for value in row)
     return (
-        f"{100.0 * slipped:.1f} % slipped, {100.0 * in_68:.0f} % in 68 %, {100.0 * in_95:.0f} % in 95 % "
-        f"({100.0 * alone:.0f} % by the deviation alone), {error:.3f} m off"
+        f"{100.0 * slip_share:.1f} % slipped, {100.0 * share_in_68:.0f} % in 68 %, {100.0 * share_in_95:.0f} % in 95 % "
+        f"({100.0 * share_alone:.0f} % by the deviation alone), {error:.3f} m off"
     )
 
 

@@ -78,9 +78,9 @@ def _roads(sections: list[Any], lengths: float, **limits: Any) -> tuple[dict[str
     """Return limits of roads with these cross-sections, of a design class that has them, curved and flat by turns."""
     result = []
     for number, section in enumerate(sections):
-        fast = section in ("RQ31", "RQ36", "RQ43.5")
-        quick, slow = (("EKA1A", CURVED), ("EKA3", TIGHT))
-        design_class, radius = quick if fast else slow
+        is_motorway = section in ("RQ31", "RQ36", "RQ43.5")
+        motorway_limits, slow_limits = (("EKA1A", CURVED), ("EKA3", TIGHT))
+        design_class, radius = motorway_limits if is_motorway else slow_limits
         if section == "RQ28":
             design_class, radius = "EKA1B", CURVED
         data = {"cross_section": section, "design_class": design_class, "length": lengths}
@@ -173,9 +173,12 @@ def _single(road: RoadParameters, lane: float, middle: tuple[float, float] | Non
     data = json.loads(road.to_json())
     objects: dict[str, dict[str, Any]] = {}
     for name, item in data["objects"].items():
-        beside = item.get("offset", 100.0)
+        item_offset = item.get("offset", 100.0)
         if item["type"] in ("Median", "Gutter", "Vehicle") or (
-            isinstance(beside, float) and abs(beside) < 1.5 and "offset" in item and item["type"] != "LineMarking"
+            isinstance(item_offset, float)
+            and abs(item_offset) < 1.5
+            and "offset" in item
+            and item["type"] != "LineMarking"
         ):
             continue
         if item["type"] == "Carriageway":
@@ -227,74 +230,78 @@ def without_classes(cloud: RoadCloud) -> RoadCloud:
 
 def measure(cloud: RoadCloud, truth: RoadParameters) -> dict[str, Any]:
     """Return how a road's reconstruction differs from the truth, as JSON data."""
-    found = reconstruct(cloud)
-    widths = compare_widths(found, truth)
-    off = compare(found.parameters, truth)
+    reconstruction = reconstruct(cloud)
+    widths = compare_widths(reconstruction, truth)
+    differences = compare(reconstruction.parameters, truth)
     return {
-        "covered": off["covered"],
-        "axis": off["centreline"],
-        "elements": len(found.parameters.alignment.horizontal),
+        "covered": differences["covered"],
+        "axis": differences["centreline"],
+        "elements": len(reconstruction.parameters.alignment.horizontal),
         "true_elements": len(truth.alignment.horizontal),
-        "trusted": found.judgement.trusted,
-        "doubts": [one.reasons for one in found.judgement.doubts],
-        "sections": [one.reasons for one in found.judgement.sections],
-        "marked": _marked(found, widths),
-        "widths": [_width(one) for one in widths],
+        "trusted": reconstruction.judgement.trusted,
+        "doubts": [stretch.reasons for stretch in reconstruction.judgement.doubts],
+        "sections": [stretch.reasons for stretch in reconstruction.judgement.sections],
+        "marked": _marked(reconstruction, widths),
+        "widths": [_width(stretch) for stretch in widths],
     }
 
 
-def _marked(found: Reconstruction, widths: list[WidthErrors]) -> float:
+def _marked(reconstruction: Reconstruction, widths: list[WidthErrors]) -> float:
     """Return the share of all sections, by side, that are marked or doubted."""
-    by_side = {one.side: one.marked for one in widths}
-    return float(np.mean([by_side[side] for side in found.measured.section.sides]))
+    by_side = {width_errors.side: width_errors.marked for width_errors in widths}
+    return float(np.mean([by_side[side] for side in reconstruction.measured.section.sides]))
 
 
-def _width(one: WidthErrors) -> dict[str, Any]:
+def _width(width_errors: WidthErrors) -> dict[str, Any]:
     """Return as JSON data one width's errors in the sections that aren't marked: number, how many are off, medians.
 
     What is said to be a guess is counted by itself, unless the number of lanes is another than the true one.
     """
-    known = ~np.isnan(one.off) & ~one.marked
-    guess = np.isinf(one.std) & np.isfinite(one.error)
-    kept = known & ~guess
-    finite = np.where(np.isfinite(one.error) & kept, one.error, np.nan)
+    is_known = ~np.isnan(width_errors.off) & ~width_errors.marked
+    is_guess = np.isinf(width_errors.std) & np.isfinite(width_errors.error)
+    is_measured = is_known & ~is_guess
+    finite_errors = np.where(np.isfinite(width_errors.error) & is_measured, width_errors.error, np.nan)
     return {
-        "side": one.side,
-        "name": one.name,
-        "sections": int(kept.sum()),
-        "off": int((one.off[kept] > 3.0).sum()),
-        "in_68": int((one.off[kept] <= 1.0).sum()),
-        "in_95": int((one.off[kept] <= 1.96).sum()),
-        "guesses": int((known & guess).sum()),
-        "error": float(np.nanmedian(finite)) if np.isfinite(finite).any() else None,
-        "std": float(np.median(one.std[kept])) if kept.any() and np.isfinite(one.std[kept]).all() else None,
+        "side": width_errors.side,
+        "name": width_errors.name,
+        "sections": int(is_measured.sum()),
+        "off": int((width_errors.off[is_measured] > 3.0).sum()),
+        "in_68": int((width_errors.off[is_measured] <= 1.0).sum()),
+        "in_95": int((width_errors.off[is_measured] <= 1.96).sum()),
+        "guesses": int((is_known & is_guess).sum()),
+        "error": float(np.nanmedian(finite_errors)) if np.isfinite(finite_errors).any() else None,
+        "std": float(np.median(width_errors.std[is_measured]))
+        if is_measured.any() and np.isfinite(width_errors.std[is_measured]).all()
+        else None,
     }
 
 
 def measured_roads(arguments: argparse.Namespace) -> Iterator[tuple[Kind, str, dict[str, Any]]]:
     """Yield (kind, name, measurements) of each road, made and measured unless that was done before."""
-    what = "-".join(word for word in ("thrown", "without_classes") if getattr(arguments, word))
+    suffix = "-".join(word for word in ("thrown", "without_classes") if getattr(arguments, word))
     for number in range(min(arguments.roads, max(len(kind.roads) for kind in KINDS))):
         for index, kind in enumerate(KINDS):
             name = f"{index}-{number}"
-            place = arguments.folder / name
-            place.mkdir(parents=True, exist_ok=True)
-            report = place / f"measured{what}.json"
+            road_folder = arguments.folder / name
+            road_folder.mkdir(parents=True, exist_ok=True)
+            report = road_folder / f"measured{suffix}.json"
             if arguments.again or not report.exists():
-                result = _measured_road(kind, number, place, arguments)
+                result = _measured_road(kind, number, road_folder, arguments)
                 report.write_text(json.dumps(result, indent=1), encoding="utf-8")
                 print(f"{name} {kind.name}: {summary(result)}", file=sys.stderr, flush=True)
             yield kind, name, json.loads(report.read_text(encoding="utf-8"))
 
 
-def _measured_road(kind: Kind, number: int, place: Path, arguments: argparse.Namespace) -> dict[str, Any]:
+def _measured_road(kind: Kind, number: int, road_folder: Path, arguments: argparse.Namespace) -> dict[str, Any]:
     """Return the measurements of a road, made unless its cloud is there; why, where it is refused."""
-    parameters = place / "truth.json"
+    parameters = road_folder / "truth.json"
     if not parameters.exists():
         parameters.write_text(sample(kind, number).to_json(), encoding="utf-8")
     truth = read_parameters(parameters)
     settings = UNEVEN if number % 2 else SURVEY
-    cloud = read_road_cloud(throw(truth, number, place) if arguments.thrown else scan(parameters, settings, place))
+    cloud = read_road_cloud(
+        throw(truth, number, road_folder) if arguments.thrown else scan(parameters, settings, road_folder)
+    )
     try:
         return measure(without_classes(cloud) if arguments.without_classes else cloud, truth)
     except SynthRoadsError as error:
@@ -305,15 +312,15 @@ def summary(result: dict[str, Any]) -> str:
     """Return one road's measurements in a line."""
     if "refused" in result:
         return f"refused: {result['refused']}"
-    wrong = [
-        f"{one['side']} {one['name']} {one['error']} +- {one['std']} in {one['off']} of {one['sections']}"
-        for one in result["widths"]
-        if one["off"]
+    wrong_widths = [
+        f"{width['side']} {width['name']} {width['error']} +- {width['std']} in {width['off']} of {width['sections']}"
+        for width in result["widths"]
+        if width["off"]
     ]
     axis = result["axis"].get("mae"), result["axis"].get("largest")
     return (
         f"{result['elements']} elements of {result['true_elements']}, axis {axis[0]} m, at most {axis[1]} m, "
-        f"trusted {result['trusted']:.2f}, marked {result['marked']:.2f}; off: {'; '.join(wrong) or 'none'}"
+        f"trusted {result['trusted']:.2f}, marked {result['marked']:.2f}; off: {'; '.join(wrong_widths) or 'none'}"
     )
 
 
@@ -333,31 +340,40 @@ HEAD = (
 
 def row(name: str, results: list[dict[str, Any]]) -> tuple[str, ...]:
     """Return the table's row of some roads' measurements."""
-    found = [one for one in results if "refused" not in one]
-    widths = [width for one in found for width in one["widths"]]
+    reconstructed = [result for result in results if "refused" not in result]
+    widths = [width for result in reconstructed for width in result["widths"]]
     total = max(sum(width["sections"] for width in widths), 1)
-    near = sum(abs(one["elements"] - one["true_elements"]) <= 1 for one in found)
-    axes = [one["axis"] for one in found if one["axis"]]
+    count_near = sum(abs(result["elements"] - result["true_elements"]) <= 1 for result in reconstructed)
+    axes = [result["axis"] for result in reconstructed if result["axis"]]
 
-    def share(what: str) -> str:
-        return f"{100.0 * sum(width[what] for width in widths) / total:.1f}"
+    def share(name: str) -> str:
+        """Return the percentage of widths of a kind."""
+        return f"{100.0 * sum(width[name] for width in widths) / total:.1f}"
 
     def guessed() -> str:
+        """Return the percentage of widths that are guesses."""
         number = sum(width["guesses"] for width in widths)
         return f"{100.0 * number / max(total + number, 1):.1f}"
 
-    def mean(what: str) -> str:
-        return f"{100.0 * float(np.mean([one[what] for one in found])):.1f}" if found else "–"
+    def mean(name: str) -> str:
+        """Return the mean percentage of a figure over the roads."""
+        return f"{100.0 * float(np.mean([result[name] for result in reconstructed])):.1f}" if reconstructed else "–"
 
-    axis = f"{np.mean([one['mae'] for one in axes]):.3f}, {max(one['largest'] for one in axes):.3f}" if axes else "–"
-    doubted = f"{100.0 * float(np.mean([1.0 - one['trusted'] for one in found])):.1f}" if found else "–"
+    axis = (
+        f"{np.mean([result['mae'] for result in axes]):.3f}, {max(result['largest'] for result in axes):.3f}"
+        if axes
+        else "–"
+    )
+    doubted = (
+        f"{100.0 * float(np.mean([1.0 - result['trusted'] for result in reconstructed])):.1f}" if reconstructed else "–"
+    )
     cells = (
         share("off"),
         share("in_68"),
         share("in_95"),
         guessed(),
         mean("marked"),
-        f"{near} of {len(results)}",
+        f"{count_near} of {len(results)}",
         axis,
         doubted,
     )

@@ -34,20 +34,27 @@ def read_points(folder: Path) -> tuple[laspy.LasData, np.ndarray]:
 
 def comparison(folders: tuple[Path, Path]) -> dict[str, Any]:
     """Return how many points both clouds have, how many differ in each dimension, and by how much at most."""
-    (one, keys), (other, others) = (read_points(folder) for folder in folders)
-    _, mine, theirs = np.intersect1d(keys, others, return_indices=True)
-    result: dict[str, Any] = {"points": len(keys), "in one cloud alone": len(keys) + len(others) - 2 * len(mine)}
-    moved = np.sqrt(sum(np.square(np.asarray(one[i])[mine] - np.asarray(other[i])[theirs]) for i in PLACE))
+    (first_cloud, keys), (second_cloud, second_keys) = (read_points(folder) for folder in folders)
+    _, first_rows, second_rows = np.intersect1d(keys, second_keys, return_indices=True)
+    result: dict[str, Any] = {
+        "points": len(keys),
+        "in one cloud alone": len(keys) + len(second_keys) - 2 * len(first_rows),
+    }
+    distances = np.sqrt(
+        sum(np.square(np.asarray(first_cloud[i])[first_rows] - np.asarray(second_cloud[i])[second_rows]) for i in PLACE)
+    )
     scenario = json.loads((folders[0] / "report.json").read_text(encoding="utf-8"))["scenario"]
-    width = scanner_setting(Scenario.model_validate(scenario).scan).beam_angle * np.asarray(one.range)[mine]
-    result["place"] = int(np.count_nonzero(moved))
-    result["place, by at most, m"] = float(moved.max(initial=0.0))
-    result["outside of the footprint"] = int(np.count_nonzero(moved > np.maximum(width, 1e-3)))
-    for name in one.point_format.dimension_names:
-        a, b = np.asarray(one[name])[mine], np.asarray(other[name])[theirs]
-        if name.lower() not in PLACE and (apart := a != b).any():
-            result[name] = int(np.count_nonzero(apart))
-            result[f"{name}, by at most"] = float(np.abs(a[apart].astype(float) - b[apart]).max())
+    width = (
+        scanner_setting(Scenario.model_validate(scenario).scan).beam_angle * np.asarray(first_cloud.range)[first_rows]
+    )
+    result["place"] = int(np.count_nonzero(distances))
+    result["place, by at most, m"] = float(distances.max(initial=0.0))
+    result["outside of the footprint"] = int(np.count_nonzero(distances > np.maximum(width, 1e-3)))
+    for name in first_cloud.point_format.dimension_names:
+        a, b = np.asarray(first_cloud[name])[first_rows], np.asarray(second_cloud[name])[second_rows]
+        if name.lower() not in PLACE and (differs := a != b).any():
+            result[name] = int(np.count_nonzero(differs))
+            result[f"{name}, by at most"] = float(np.abs(a[differs].astype(float) - b[differs]).max())
     return result
 
 

@@ -85,8 +85,8 @@ def draw_path(axes: Axes, guide: RoadGuide, platform: Platform) -> None:
         color = COLORS[strip.index % 2]
         axes.plot(*position[:, :2].T, color=color, lw=1.4)
         for share in (0.22, 0.5, 0.78):
-            at = int(share * 1200)
-            (x0, y0, _), (x1, y1, _) = position[[at, at + 6]].tolist()
+            arrow_row = int(share * 1200)
+            (x0, y0, _), (x1, y1, _) = position[[arrow_row, arrow_row + 6]].tolist()
             axes.annotate("", (x1, y1), (x0, y0), arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.4})
 
 
@@ -96,8 +96,8 @@ def draw_tripods(axes: Axes, guide: RoadGuide) -> None:
     place = np.array([path.pose(strip, np.array([strip.start_time]))[0][0] for strip in path.strips])
     axes.plot(*place[:, :2].T, ls="", marker="^", color="#222222", ms=6)
     for number, (x, y) in enumerate(place[:, :2]):
-        above = 7 if number % 2 else -14
-        axes.annotate(str(number), (x, y), (0, above), textcoords="offset points", ha="center", size=8)
+        label_shift = 7 if number % 2 else -14
+        axes.annotate(str(number), (x, y), (0, label_shift), textcoords="offset points", ha="center", size=8)
 
 
 def main() -> None:

@@ -26,7 +26,9 @@ Float = NDArray[np.float64]
 TARGET = ROOT / "docs" / "pictures" / "scan-patterns.png"
 
 
-def generic(pattern: dict[str, object], rate_khz: float, view_deg: float, lines: float, **other: object) -> Device:
+def generic(
+    pattern: dict[str, object], rate_khz: float, view_deg: float, lines: float, **further_fields: object
+) -> Device:
     """Return a device with a scan pattern, few pulses per line so that they can be told apart in a picture."""
     return Device.from_dict(
         load_device("generic-polygon").to_dict()
@@ -35,7 +37,7 @@ def generic(pattern: dict[str, object], rate_khz: float, view_deg: float, lines:
             "modes": [{"pulse_rate_khz": rate_khz, "field_of_view_deg": view_deg, "maximum_range": 100.0}],
             "lines_per_second": [lines, lines],
         }
-        | other
+        | further_fields
     )
 
 
@@ -108,10 +110,10 @@ def on_ground(panel: Panel) -> tuple[Float, Float]:
     """Return where a panel's pulses hit flat ground: offsets to the right and ahead, both (N,), m."""
     setting = setting_of(panel.device, ScanScenario())
     shot = shots(setting, 0, shot_count(setting, panel.duration))
-    forward, left, up = shot.direction
-    down = up < -1e-6
-    distance = -panel.height / up[down]
-    return -distance * left[down], panel.speed * shot.time[down] + distance * forward[down]
+    forward, leftward, upward = shot.direction
+    is_downward = upward < -1e-6
+    distance = -panel.height / upward[is_downward]
+    return -distance * leftward[is_downward], panel.speed * shot.time[is_downward] + distance * forward[is_downward]
 
 
 def main(target: Path = TARGET) -> None:
@@ -119,9 +121,11 @@ def main(target: Path = TARGET) -> None:
     figure = new_figure(16, 7.4)
     axes = figure.subplots(2, 5)
     for axis, panel in zip(axes.flat, PANELS, strict=True):
-        right, ahead = on_ground(panel)
-        ahead -= (ahead.max() + ahead.min()) / 2.0 if "tilted" in panel.title else panel.speed * panel.duration / 2.0
-        axis.scatter(right, ahead, s=1.2, c=np.arange(len(right)), cmap="viridis", linewidths=0)
+        rightward, forward = on_ground(panel)
+        forward -= (
+            (forward.max() + forward.min()) / 2.0 if "tilted" in panel.title else panel.speed * panel.duration / 2.0
+        )
+        axis.scatter(rightward, forward, s=1.2, c=np.arange(len(rightward)), cmap="viridis", linewidths=0)
         axis.set(xlim=(-panel.half, panel.half), ylim=(-panel.half, panel.half), aspect="equal")
         axis.set_title(panel.title, fontsize=10)
         axis.tick_params(labelsize=8)

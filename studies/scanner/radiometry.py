@@ -79,13 +79,13 @@ def main() -> None:
 def beam_patterns() -> Any:
     """Return a figure of the beam patterns' rays across the beam, and of a conical and a cylindrical beam on a step."""
     figure = new_figure(10.5, 6.4)
-    upper, lower = figure.subfigures(2, 1, height_ratios=[1.0, 1.35])
-    chosen = {rays: rings for rays, rings in RINGS.items() if rays > 1} | {21: (10, 10)}
-    for axes, (rays, rings) in zip(upper.subplots(1, len(chosen)), chosen.items(), strict=True):
+    upper_part, lower_part = figure.subfigures(2, 1, height_ratios=[1.0, 1.35])
+    rings_of_rays = {rays: rings for rays, rings in RINGS.items() if rays > 1} | {21: (10, 10)}
+    for axes, (rays, rings) in zip(upper_part.subplots(1, len(rings_of_rays)), rings_of_rays.items(), strict=True):
         _pattern(axes, rings)
         axes.set_title(f"{rays} rays: 1 + {' + '.join(map(str, rings))}", fontsize=9)
-    upper.suptitle("Rays across the beam; area: share of energy; circle: 1/e² of the peak", fontsize=10)
-    sides = lower.subplots(1, 2, sharey=True)
+    upper_part.suptitle("Rays across the beam; area: share of energy; circle: 1/e² of the peak", fontsize=10)
+    sides = lower_part.subplots(1, 2, sharey=True)
     for axes, beam in zip(sides, ("conical", "cylindrical"), strict=True):
         _step(axes, beam)
         axes.set_title(f"{beam}, at a step 40 and 60 m below the scanner", fontsize=10)
@@ -94,6 +94,7 @@ def beam_patterns() -> Any:
 
 
 def _pattern(axes: Any, rings: tuple[int, ...]) -> None:
+    """Draw a beam pattern's rays on its energy into the axes."""
     pattern = beam_pattern(rings)
     grid = np.linspace(-2.6, 2.6, 200)
     energy = np.exp(-2.0 * (grid[:, None] ** 2 + grid**2))
@@ -110,12 +111,12 @@ def _step(axes: Any, beam: str) -> None:
     """Draw one pulse's rays, 150 mrad wide, from 60 m above the ground beside a roof at 20 m, into the axes."""
     divergence, height, roof = (0.15, 0.15), 60.0, 20.0
     east, north, up = (np.eye(3)[axis][:, None] for axis in range(3))
-    down = -up
+    downward = -up
     pattern = beam_pattern((6, 12))
     origin = np.zeros((3, len(pattern)))
-    direction = np.repeat(down, len(pattern), axis=1)
+    direction = np.repeat(downward, len(pattern), axis=1)
     if beam == "conical":
-        direction = conical_directions(down, east, north, pattern, divergence)[..., 0]
+        direction = conical_directions(downward, east, north, pattern, divergence)[..., 0]
     else:
         origin = cylindrical_offsets(east, north, pattern, divergence, np.array([height - roof]))[..., 0]
     edge = 0.9
@@ -124,87 +125,91 @@ def _step(axes: Any, beam: str) -> None:
     reach = np.where(on_roof, height - roof, height)
     ends = origin[0] + slope * reach
     axes.fill_between([-9, edge, edge, 9], [roof, roof, 0, 0], -4, color="#d8d4cc", linewidth=0)
-    for start, end, length, roofed in zip(origin[0], ends, reach, on_roof, strict=True):
-        color = ORANGE if roofed else BLUE
+    for start, end, length, is_on_roof in zip(origin[0], ends, reach, on_roof, strict=True):
+        color = ORANGE if is_on_roof else BLUE
         axes.plot([start, end], [height, height - length], color=color, linewidth=0.7, alpha=0.8)
     axes.scatter(ends, height - reach, s=300 * pattern.weights, color=np.where(on_roof, ORANGE, BLUE), zorder=3)
     axes.scatter([0], [height], marker="v", s=60, color="black", zorder=4)
     for distance, level in ((height - roof, roof), (height, 0.0)):
-        half = math.tan(divergence[0] / 2) * (distance if beam == "conical" else height - roof)
-        axes.annotate("", (-half, level - 1.6), (half, level - 1.6), arrowprops={"arrowstyle": "<->", "lw": 0.9})
-        axes.text(0, level - 2.4, f"{2 * half:.1f} m at 1/e²", ha="center", va="top", fontsize=8)
+        half_width = math.tan(divergence[0] / 2) * (distance if beam == "conical" else height - roof)
+        axes.annotate(
+            "", (-half_width, level - 1.6), (half_width, level - 1.6), arrowprops={"arrowstyle": "<->", "lw": 0.9}
+        )
+        axes.text(0, level - 2.4, f"{2 * half_width:.1f} m at 1/e²", ha="center", va="top", fontsize=8)
     axes.set(xlim=(-9, 9), ylim=(-7, 64), xlabel="across (m)")
 
 
 def weather() -> Any:
     """Return a figure of the light left over the range by weather, and of the extinction over the visibility."""
     figure = new_figure(10.5, 4.4)
-    left, right = figure.subplots(1, 2)
+    left_axes, right_axes = figure.subplots(1, 2)
     ranges = np.linspace(0.0, 250.0, 300)
     for label, condition, color in CONDITIONS:
-        back = np.exp(-condition.attenuation(905.0) * ranges)
-        left.plot(ranges, 100 * back, color=color, linewidth=1.6, label=label)
-    left.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
-    left.set(xlabel="range (m)", ylabel="light left, there and back (%)", ylim=(0, 102), xlim=(0, 250))
-    left.set_title("What is left of the light, 905 nm", fontsize=10)
+        returned_light = np.exp(-condition.attenuation(905.0) * ranges)
+        left_axes.plot(ranges, 100 * returned_light, color=color, linewidth=1.6, label=label)
+    left_axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
+    left_axes.set(xlabel="range (m)", ylabel="light left, there and back (%)", ylim=(0, 102), xlim=(0, 250))
+    left_axes.set_title("What is left of the light, 905 nm", fontsize=10)
     visibility = np.geomspace(50, 60_000, 400)
     for wavelength, color in ((905.0, BLUE), (1550.0, ORANGE)):
         for exponent, style, name in ((kim_exponent, "-", "Kim"), (kruse_exponent, "--", "Kruse")):
             values = [1e3 * visibility_extinction(v, wavelength, exponent(v)) for v in visibility]
             label = f"{name}, {wavelength:.0f} nm"
-            right.loglog(visibility / 1e3, values, style, color=color, linewidth=1.4, label=label)
+            right_axes.loglog(visibility / 1e3, values, style, color=color, linewidth=1.4, label=label)
     drops = [1e3 * visibility_extinction(v, 905.0, 0.0) for v in visibility]
-    right.loglog(visibility / 1e3, drops, ":", color=GREY, linewidth=1.4, label="fog, rain, snow")
-    right.legend(frameon=False, fontsize=8)
-    right.set(xlabel="visibility (km)", ylabel="extinction, one way (1/km)")
-    right.set_title("Extinction by visibility", fontsize=10)
-    right.grid(which="major", color="#e4e4e4", linewidth=0.6)
+    right_axes.loglog(visibility / 1e3, drops, ":", color=GREY, linewidth=1.4, label="fog, rain, snow")
+    right_axes.legend(frameon=False, fontsize=8)
+    right_axes.set(xlabel="visibility (km)", ylabel="extinction, one way (1/km)")
+    right_axes.set_title("Extinction by visibility", fontsize=10)
+    right_axes.grid(which="major", color="#e4e4e4", linewidth=0.6)
     return figure
 
 
 def reflection_models() -> Any:
     """Return a figure of brightness over incidence angle, of Oren-Nayar facets and of the table's materials."""
     figure = new_figure(10.5, 4.4)
-    left, right = figure.subplots(1, 2)
+    left_axes, right_axes = figure.subplots(1, 2)
     cosine = np.cos(np.deg2rad(ANGLES))
     shades = mpl.colormaps["viridis"](np.linspace(0.0, 0.85, 6))
     for slope, color in zip((0.0, 0.1, 0.2, 0.3, 0.5, 1.0), shades, strict=True):
         a, b = facet_terms(slope)
         label = "0 (Lambert)" if slope == 0.0 else f"{slope:g}"
-        left.plot(ANGLES, returned_share(cosine, 1.0, float(a), float(b)), color=color, linewidth=1.5, label=label)
-    left.legend(title="facet slope (rad)", frameon=False, fontsize=8)
-    left.set(xlabel="incidence angle (deg)", ylabel="brightness of R = 1", xlim=(0, 90), ylim=(0, 1.02))
-    left.set_title("Oren and Nayar", fontsize=10)
+        left_axes.plot(ANGLES, returned_share(cosine, 1.0, float(a), float(b)), color=color, linewidth=1.5, label=label)
+    left_axes.legend(title="facet slope (rad)", frameon=False, fontsize=8)
+    left_axes.set(xlabel="incidence angle (deg)", ylabel="brightness of R = 1", xlim=(0, 90), ylim=(0, 1.02))
+    left_axes.set_title("Oren and Nayar", fontsize=10)
     for label, material, color, style in _shown_materials():
-        right.semilogy(ANGLES, _brightness(material, cosine), style, color=color, linewidth=1.5, label=label)
-    right.legend(frameon=False, fontsize=8, ncols=2, loc="lower left")
-    right.set(xlabel="incidence angle (deg)", ylabel="brightness", xlim=(0, 90), ylim=(3e-3, 1.5e3))
-    right.set_title("Materials, with facets and retro-reflection", fontsize=10)
-    right.grid(which="major", axis="y", color="#e4e4e4", linewidth=0.6)
+        right_axes.semilogy(ANGLES, _brightness(material, cosine), style, color=color, linewidth=1.5, label=label)
+    right_axes.legend(frameon=False, fontsize=8, ncols=2, loc="lower left")
+    right_axes.set(xlabel="incidence angle (deg)", ylabel="brightness", xlim=(0, 90), ylim=(3e-3, 1.5e3))
+    right_axes.set_title("Materials, with facets and retro-reflection", fontsize=10)
+    right_axes.grid(which="major", axis="y", color="#e4e4e4", linewidth=0.6)
     return figure
 
 
 def _shown_materials() -> list[tuple[str, Material, str, str]]:
+    """Return name, material, colour and line style of each material that is drawn."""
     table = materials()
-    wet = vary_material("paint_white", MaterialVariation(), Environment(wetness=1.0))
-    worn = vary_material("paint_white", MaterialVariation(paint_wear=0.8), Environment())
+    wet_paint = vary_material("paint_white", MaterialVariation(), Environment(wetness=1.0))
+    worn_paint = vary_material("paint_white", MaterialVariation(paint_wear=0.8), Environment())
     return [
         ("reflector", table["reflector"], RED, "-"),
         ("white sheeting", table["sheeting_white"], ORANGE, "-"),
         ("blue sheeting", table["sheeting_blue"], BLUE, "-"),
         ("white paint", table["paint_white"], VIOLET, "-"),
-        ("white paint, wet", wet, VIOLET, "--"),
-        ("white paint, 80 % worn", worn, VIOLET, ":"),
+        ("white paint, wet", wet_paint, VIOLET, "--"),
+        ("white paint, 80 % worn", worn_paint, VIOLET, ":"),
         ("concrete", table["concrete"], GREEN, "-"),
         ("asphalt", table["asphalt"], GREY, "-"),
     ]
 
 
 def _brightness(material: Material, cosine: Any) -> Any:
+    """Return a material's brightness by the cosine of the incidence angle."""
     a, b = facet_terms(material.slope)
     lobe = 1.0 / math.radians(material.retro_lobe_deg) ** 2
-    reflected = (1.0 - material.transmission) * material.reflectivity
-    return returned_share(cosine, reflected, float(a), float(b), material.retroreflection, lobe)
+    reflected_share = (1.0 - material.transmission) * material.reflectivity
+    return returned_share(cosine, reflected_share, float(a), float(b), material.retroreflection, lobe)
 
 
 def print_tables() -> None:
@@ -227,24 +232,26 @@ def print_tables() -> None:
 
 
 def _print_weather(weather: Weather) -> None:
-    usual = weather.usual["visibility"] if weather.visibility is None else weather.visibility
+    """Print the row of a weather's extinction."""
+    usual_visibility = weather.usual["visibility"] if weather.visibility is None else weather.visibility
     rate = weather.rate_mm_h if isinstance(weather, Precipitation) else None
-    measure = f"{usual:,.0f} m" if rate is None else f"{rate:g} mm/h"
-    there_and_back = weather.attenuation(905.0)
+    measure = f"{usual_visibility:,.0f} m" if rate is None else f"{rate:g} mm/h"
+    attenuation = weather.attenuation(905.0)
     extinctions = [500.0 * weather.attenuation(wavelength) for wavelength in (905.0, 1550.0)]
-    left = [100.0 * math.exp(-there_and_back * distance) for distance in (50.0, 100.0)]
+    percents_left = [100.0 * math.exp(-attenuation * distance) for distance in (50.0, 100.0)]
     print(
         f"| {weather.condition} | {measure} | {extinctions[0]:.3g} | {extinctions[1]:.3g} "
-        f"| {left[0]:.3g} % | {left[1]:.3g} % |"
+        f"| {percents_left[0]:.3g} % | {percents_left[1]:.3g} % |"
     )
 
 
 def _print_material(name: str, row: Material) -> None:
-    bright = _brightness(row, np.cos(np.deg2rad([0.0, 30.0, 60.0, 85.0])))
+    """Print the row of a material's reflection."""
+    brightness = _brightness(row, np.cos(np.deg2rad([0.0, 30.0, 60.0, 85.0])))
     lobe = f"{row.retro_lobe_deg:g}" if row.retroreflection else "–"
     print(
         f"| `{name}` | {row.reflectivity:.2f} | {row.slope:.2g} | {row.transmission or '–'} "
-        f"| {row.retroreflection or '–'} | {lobe} | {' | '.join(f'{value:.3g}' for value in bright)} |"
+        f"| {row.retroreflection or '–'} | {lobe} | {' | '.join(f'{value:.3g}' for value in brightness)} |"
     )
 
 

@@ -52,8 +52,8 @@ def main() -> None:
 
 def scan(scenario: str, changes: list[str], folder: Path) -> laspy.LasData:
     """Generate a scenario's cloud in draft fidelity into a folder; return its points."""
-    wanted = ["fidelity=draft", 'outputs=["cloud"]', *changes]
-    generate(Job(load_scenario(scenario, wanted), folder, overwrite=True, new_file=True))
+    scan_changes = ["fidelity=draft", 'outputs=["cloud"]', *changes]
+    generate(Job(load_scenario(scenario, scan_changes), folder, overwrite=True, new_file=True))
     return laspy.read(folder / "cloud.laz")
 
 
@@ -92,25 +92,25 @@ def _draw(axis: Any, cloud: laspy.LasData, title: str) -> None:
     colors = np.full((256, 3), 128, dtype=np.uint8)
     for row in classes():
         colors[row.id] = row.color
-    everything = np.ones(len(cloud), dtype=bool)
-    _draw_colors(axis, cloud, everything, colors[np.asarray(cloud["class_id"])], f"{title}: {len(cloud):,} points")
+    all_points = np.ones(len(cloud), dtype=bool)
+    _draw_colors(axis, cloud, all_points, colors[np.asarray(cloud["class_id"])], f"{title}: {len(cloud):,} points")
 
 
 def _draw_colors(
-    axis: Any, cloud: laspy.LasData, which: NDArray[np.bool_], color: NDArray[np.uint8], title: str
+    axis: Any, cloud: laspy.LasData, mask: NDArray[np.bool_], color: NDArray[np.uint8], title: str
 ) -> None:
     """Draw a mask's points from above along the cloud's longer side into the axes, the highest on top.
 
     Args:
-        which: mask of the cloud's points.
+        mask: mask of the cloud's points.
         color: (N, 3) of those chosen.
     """
     plan = np.column_stack([cloud.x, cloud.y])
     plan = plan - plan.mean(axis=0)
     _, _, turn = np.linalg.svd(plan[:: max(1, len(plan) // 10_000)], full_matrices=False)
-    along, across = (plan[which] @ turn.T).T
-    keep = np.flatnonzero((np.abs(along) < REACH) & (np.abs(across) < ASIDE))
-    order = keep[np.argsort(np.asarray(cloud.z)[which][keep], kind="stable")]
+    along, across = (plan[mask] @ turn.T).T
+    rows_inside = np.flatnonzero((np.abs(along) < REACH) & (np.abs(across) < ASIDE))
+    order = rows_inside[np.argsort(np.asarray(cloud.z)[mask][rows_inside], kind="stable")]
     picture = np.full((int(2 * ASIDE / PIXEL) + 1, int(2 * REACH / PIXEL) + 1, 3), 255, dtype=np.uint8)
     place = ((across[order] + ASIDE) / PIXEL).astype(int), ((along[order] + REACH) / PIXEL).astype(int)
     picture[place] = color[order]
@@ -130,10 +130,10 @@ def draw_cloud_shadows(output: Path) -> None:
     time = np.asarray(cloud.gps_time)
     strips = np.asarray(cloud.point_source_id)
     for axis, strip in zip(axes, (1, 2), strict=True):
-        mine = strips == strip
-        title = f"strip {strip}, {time[mine].min():.0f} to {time[mine].max():.0f} s"
-        rgb = np.column_stack([cloud.red, cloud.green, cloud.blue])[mine] >> 8
-        _draw_colors(axis, cloud, mine, rgb.astype(np.uint8), title)
+        is_in_strip = strips == strip
+        title = f"strip {strip}, {time[is_in_strip].min():.0f} to {time[is_in_strip].max():.0f} s"
+        rgb = np.column_stack([cloud.red, cloud.green, cloud.blue])[is_in_strip] >> 8
+        _draw_colors(axis, cloud, is_in_strip, rgb.astype(np.uint8), title)
     save_figure(figure, output / "cloud-shadows.png", dpi=100)
 
 
@@ -149,9 +149,9 @@ def intensity_histograms(output: Path) -> None:
     names = {row.name: row.id for row in classes()}
     for axis, name in zip(axes, ("road", "road_marking", "vegetation"), strict=True):
         for model, cloud in clouds.items():
-            chosen = np.asarray(cloud["class_id"]) == names[name]
+            is_of_class = np.asarray(cloud["class_id"]) == names[name]
             # Times the squared range: what is left is the surface and the angle.
-            value = cloud.intensity[chosen] * np.asarray(cloud["range"])[chosen] ** 2 / cloud_scale(cloud)
+            value = cloud.intensity[is_of_class] * np.asarray(cloud["range"])[is_of_class] ** 2 / cloud_scale(cloud)
             axis.hist(value, bins=120, range=(0.0, np.quantile(value, 0.999) * 1.3), histtype="step", label=model)
         axis.set(title=name.replace("_", " "), xlabel="intensity x range squared", ylabel="points")
         axis.legend()

@@ -50,34 +50,34 @@ def row(seed: int, rays: int) -> str:
     local = points.xyz - parameters.transform.translate
     station, offset = geometry.alignment.project(local[:, :2])
     height, level = local[:, 2] - geometry.elevation(station, offset), 10.0 * np.log10(points.intensity)
-    road, paint = (points.class_id == class_id(name) for name in ("road", "road_marking"))
-    spread, reach, waves = [], [], []
+    is_road, is_paint = (points.class_id == class_id(name) for name in ("road", "road_marking"))
+    spreads, reaches, waves = [], [], []
     for side in ("left", "right"):
         section = geometry.sections[side]
         distance, edges = section.carriageway.sign * offset, section.distances(100.0)[0, [0, -2]]
-        on = road & (station > 2.0) & (station < 198.0)
-        profile = _medians(distance[on], level[on], *edges)
-        spread.append(f"{np.nanstd(profile):.2f}")
-        reach.append(f"{np.nanmax(profile) - np.nanmin(profile):.1f}")
+        is_on_road = is_road & (station > 2.0) & (station < 198.0)
+        profile = _medians(distance[is_on_road], level[is_on_road], *edges)
+        spreads.append(f"{np.nanstd(profile):.2f}")
+        reaches.append(f"{np.nanmax(profile) - np.nanmin(profile):.1f}")
         lanes = section.lane_boundaries(100.0)[0]
-        profile = 1e3 * _medians(distance[on], height[on], lanes.min(), lanes.max())
-        there = np.flatnonzero(~np.isnan(profile))
-        line = np.polyval(np.polyfit(there, profile[there], 1), there)
-        waves.append(f"{(profile[there] - line).std():.2f}")
-    over = np.median(level[paint]) - np.median(level[road])
+        profile = 1e3 * _medians(distance[is_on_road], height[is_on_road], lanes.min(), lanes.max())
+        filled_bins = np.flatnonzero(~np.isnan(profile))
+        line = np.polyval(np.polyfit(filled_bins, profile[filled_bins], 1), filled_bins)
+        waves.append(f"{(profile[filled_bins] - line).std():.2f}")
+    paint_over_road = np.median(level[is_paint]) - np.median(level[is_road])
     cells = [
         str(seed),
-        *(" / ".join(both) for both in (spread, reach, waves)),
-        f"{over:.1f}",
-        f"{level[paint].std():.2f}",
+        *(" / ".join(side_texts) for side_texts in (spreads, reaches, waves)),
+        f"{paint_over_road:.1f}",
+        f"{level[is_paint].std():.2f}",
     ]
     return f"| {' | '.join(cells)} |"
 
 
-def _medians(distance: Float, values: Float, low: float, high: float) -> Float:
+def _medians(distance: Float, values: Float, first_distance: float, last_distance: float) -> Float:
     """Return the medians of values by bins of distances between two; NaN where there are none."""
-    number = np.floor((distance - low) / _STEP)
-    bins = [values[number == place] for place in range(int((high - low) / _STEP + 1e-9))]
+    number = np.floor((distance - first_distance) / _STEP)
+    bins = [values[number == place] for place in range(int((last_distance - first_distance) / _STEP + 1e-9))]
     return np.array([np.median(values) if len(values) else np.nan for values in bins])
 
 
@@ -86,9 +86,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, nargs="+", default=[5, 6, 7])
     parser.add_argument("--rays", type=int, default=1, help="rays per pulse")
-    given = parser.parse_args()
-    for seed in given.seeds:
-        print(row(seed, given.rays), flush=True)
+    options = parser.parse_args()
+    for seed in options.seeds:
+        print(row(seed, options.rays), flush=True)
 
 
 if __name__ == "__main__":

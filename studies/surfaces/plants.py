@@ -76,17 +76,18 @@ def measure_canopy(species: str, season: str, seed: int) -> CanopyFigures:
     record(scene.plan(), blocks)
     points = concatenate([block.points for block in blocks.results])
     station, offset = geometry.alignment.project(points.xyz[:, :2] - parameters.transform.translate[:2])
-    inside = (np.abs(offset) > _STAND) & (np.abs(offset) < 66.0) & (station > 6.0) & (station < 114.0)
-    tree = points.class_id == class_id("vegetation")
-    first = inside & (points.return_number == 1)
-    last = inside & (points.return_number == points.number_of_returns)
-    returns = points.number_of_returns[first & tree]
+    is_inside = (np.abs(offset) > _STAND) & (np.abs(offset) < 66.0) & (station > 6.0) & (station < 114.0)
+    is_tree = points.class_id == class_id("vegetation")
+    is_first = is_inside & (points.return_number == 1)
+    is_last = is_inside & (points.return_number == points.number_of_returns)
+    returns = points.number_of_returns[is_first & is_tree]
     shares = np.bincount(np.minimum(returns, 4), minlength=5)[1:] / max(1, len(returns))
-    to_ground = float((last & ~tree).sum()) / float(last.sum())
-    return CanopyFigures(to_ground, float(returns.mean()), shares, int(first.sum()))
+    to_ground = float((is_last & ~is_tree).sum()) / float(is_last.sum())
+    return CanopyFigures(to_ground, float(returns.mean()), shares, int(is_first.sum()))
 
 
 def _row(species: str, season: str, seed: int) -> str:
+    """Return a line of the table."""
     figures = measure_canopy(species, season, seed)
     shares = " / ".join(f"{100.0 * share:.0f}" for share in figures.return_shares)
     cells = (f"{100.0 * figures.to_ground:.0f}", f"{figures.returns_per_pulse:.2f}", shares, str(figures.pulses))
@@ -98,12 +99,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--species", nargs="+", default=["maple", "birch", "spruce"], choices=list(_TREES))
     parser.add_argument("--seed", type=int, default=5)
-    given = parser.parse_args()
+    options = parser.parse_args()
     print("| species | season | pulses to the ground (%) | returns per pulse into trees | 1, 2, 3, more (%) | pulses |")
     print("|---|---|---|---|---|---|")
-    for species in given.species:
+    for species in options.species:
         for season in ("summer", "winter"):
-            print(_row(species, season, given.seed), flush=True)
+            print(_row(species, season, options.seed), flush=True)
 
 
 if __name__ == "__main__":

@@ -59,11 +59,11 @@ class Cloud:
     asphalt: Float = field(default_factory=lambda: np.empty((0, 3)))
 
 
-def strip_points(low: tuple[float, float], high: tuple[float, float], density: float) -> Cloud:
+def strip_points(lowest: tuple[float, float], highest: tuple[float, float], density: float) -> Cloud:
     """Return uniform random points on a smooth, level strip of several surfaces; density in points/m2."""
     random = stream(SEED, "points", round(density))
-    count = round(density * (high[0] - low[0]) * (high[1] - low[1]))
-    plan = random.uniform(low, high, (count, 2))
+    count = round(density * (highest[0] - lowest[0]) * (highest[1] - lowest[1]))
+    plan = random.uniform(lowest, highest, (count, 2))
     surface = np.searchsorted([end for _, end, _ in STRIP], plan[:, 1])
     return Cloud(np.column_stack([plan, np.zeros(count)]), surface)
 
@@ -80,16 +80,16 @@ def with_relief(cloud: Cloud, strength: float, noise: float = 0.0, octaves: int 
 def thinned(xyz: Float, size: float = GRID) -> Float:
     """Return the first point of each occupied cell of a cubic grid, in order, (K, 3)."""
     cell = np.floor((xyz - xyz.min(axis=0)) / size).astype(np.int64)
-    _, first = np.unique(cell, axis=0, return_index=True)
-    return xyz[np.sort(first)]
+    _, first_rows = np.unique(cell, axis=0, return_index=True)
+    return xyz[np.sort(first_rows)]
 
 
 def measure(xyz: Float) -> dict[str, float]:
     """Return one surface's medians of residual about planes (mm) and surface variation, with points and patches."""
     xyz = thinned(xyz)
     residual, _ = plane_residuals(xyz, PATCH)
-    chosen = stream(SEED, "chosen").choice(len(xyz), min(SAMPLE, len(xyz)), replace=False)
-    variation = surface_variation(xyz, RADIUS, chosen)
+    sample_rows = stream(SEED, "chosen").choice(len(xyz), min(SAMPLE, len(xyz)), replace=False)
+    variation = surface_variation(xyz, RADIUS, sample_rows)
     return {
         "points": len(xyz),
         "patches": len(residual),
@@ -108,10 +108,10 @@ def semivariogram(xyz: Float) -> Float:
     height = residuals(xyz, 2.0)
     pairs = cKDTree(xyz[:, :2]).query_pairs(LAGS[-1], output_type="ndarray")
     step = np.linalg.norm(xyz[pairs[:, 0], :2] - xyz[pairs[:, 1], :2], axis=1)
-    half = 0.5 * (height[pairs[:, 0]] - height[pairs[:, 1]]) ** 2
-    fits = np.isfinite(half)
-    sums, _ = np.histogram(step[fits], LAGS, weights=half[fits])
-    number, _ = np.histogram(step[fits], LAGS)
+    semivariances = 0.5 * (height[pairs[:, 0]] - height[pairs[:, 1]]) ** 2
+    is_finite = np.isfinite(semivariances)
+    sums, _ = np.histogram(step[is_finite], LAGS, weights=semivariances[is_finite])
+    number, _ = np.histogram(step[is_finite], LAGS)
     return 1e3 * np.sqrt(sums / np.maximum(number, 1))
 
 
@@ -127,16 +127,17 @@ def residuals(xyz: Float, size: float) -> Float:
     return result
 
 
-def above_surface(xyz: Float, base: Float) -> Float:
-    """Return the points' heights (N,), m, above the quadratic surface fitted to the points `base` by least squares."""
-    centre = base.mean(axis=0)
+def above_surface(xyz: Float, base_points: Float) -> Float:
+    """Return points' heights (N,), m, above the quadratic surface that fits the points `base_points` best."""
+    centre = base_points.mean(axis=0)
 
     def terms(points: Float) -> Float:
+        """Return the terms of the quadratic surface at points."""
         x, y = (points - centre)[:, :2].T
         return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
 
-    fit = np.linalg.lstsq(terms(base), base[:, 2], rcond=None)[0]
-    return xyz[:, 2] - terms(xyz) @ fit
+    coefficients = np.linalg.lstsq(terms(base_points), base_points[:, 2], rcond=None)[0]
+    return xyz[:, 2] - terms(xyz) @ coefficients
 
 
 def read_real(arguments: argparse.Namespace) -> Cloud:
@@ -149,19 +150,19 @@ def read_real(arguments: argparse.Namespace) -> Cloud:
 
     las = laspy.read(arguments.real)
     xyz, intensity = np.array(las.xyz), np.asarray(las.intensity, dtype=np.float64)
-    keep = intensity > 0
+    is_kept = intensity > 0
     for name, value in arguments.select:
-        keep &= np.asarray(las[name]) == float(value)
+        is_kept &= np.asarray(las[name]) == float(value)
     if arguments.axis:
         xyz[:, :2] = along_axis(xyz[:, :2], arguments.axis)
-        beside = np.abs(xyz[:, 1]) if arguments.both_sides else xyz[:, 1]
+        distances = np.abs(xyz[:, 1]) if arguments.both_sides else xyz[:, 1]
     else:
-        beside = np.hypot(*xyz[:, :2].T)
-    inside = keep & (beside >= arguments.across[0]) & (beside <= arguments.across[1])
-    if not inside.any():
+        distances = np.hypot(*xyz[:, :2].T)
+    is_asphalt = is_kept & (distances >= arguments.across[0]) & (distances <= arguments.across[1])
+    if not is_asphalt.any():
         raise SystemExit(f"{arguments.real}: no points selected")
-    inside &= intensity <= np.median(intensity[inside]) * (13.0 / 12.0)
-    return Cloud(xyz[keep], np.full(int(keep.sum()), -1), xyz[inside])
+    is_asphalt &= intensity <= np.median(intensity[is_asphalt]) * (13.0 / 12.0)
+    return Cloud(xyz[is_kept], np.full(int(is_kept.sum()), -1), xyz[is_asphalt])
 
 
 def along_axis(plan: Float, file: Path) -> Float:
@@ -170,60 +171,60 @@ def along_axis(plan: Float, file: Path) -> Float:
     axis = np.column_stack([table["x"], table["y"]])
     start, run = axis[:-1], np.diff(axis, axis=0)
     length = np.hypot(*run.T)
-    start, run, length, s = (part[length > 0] for part in (start, run, length, table["s"][:-1]))
-    result, best = np.zeros_like(plan), np.full(len(plan), np.inf)
-    for a, d, size, station in zip(start, run / length[:, None], length, s, strict=True):
+    start, run, length, stations = (part[length > 0] for part in (start, run, length, table["s"][:-1]))
+    result, nearest_distance = np.zeros_like(plan), np.full(len(plan), np.inf)
+    for a, d, size, station in zip(start, run / length[:, None], length, stations, strict=True):
         shift = plan - a
-        forward = shift @ d
-        outside = np.maximum(np.maximum(-forward, forward - size), 0.0)
+        along = shift @ d
+        beyond_ends = np.maximum(np.maximum(-along, along - size), 0.0)
         offset = d[0] * shift[:, 1] - d[1] * shift[:, 0]
-        nearer = np.hypot(outside, offset) < best
-        best[nearer] = np.hypot(outside, offset)[nearer]
-        result[nearer] = np.column_stack([station + forward, offset])[nearer]
+        is_nearer = np.hypot(beyond_ends, offset) < nearest_distance
+        nearest_distance[is_nearer] = np.hypot(beyond_ends, offset)[is_nearer]
+        result[is_nearer] = np.column_stack([station + along, offset])[is_nearer]
     return result
 
 
-def hillshade(axes: Any, xyz: Float, low: Float, high: Float, cell: float, exaggeration: float) -> None:
+def hillshade(axes: Any, xyz: Float, lowest: Float, highest: Float, cell: float, exaggeration: float) -> None:
     """Draw a hillshade of the mean height per cell into the axes, lit from the upper left at 45 degrees."""
-    shape = np.round((high - low) / cell).astype(int)
-    place = np.floor((xyz[:, :2] - low) / cell).astype(int)
-    inside = ((place >= 0) & (place < shape)).all(axis=1)
-    flat = np.ravel_multi_index(tuple(place[inside].T), tuple(shape))
-    number = np.bincount(flat, minlength=shape.prod())
+    shape = np.round((highest - lowest) / cell).astype(int)
+    place = np.floor((xyz[:, :2] - lowest) / cell).astype(int)
+    is_inside = ((place >= 0) & (place < shape)).all(axis=1)
+    cell_numbers = np.ravel_multi_index(tuple(place[is_inside].T), tuple(shape))
+    number = np.bincount(cell_numbers, minlength=shape.prod())
     with np.errstate(invalid="ignore"):
-        height = filled((np.bincount(flat, xyz[inside, 2], shape.prod()) / number).reshape(shape))
-    along, across = np.gradient(exaggeration * height, cell)
+        height = filled((np.bincount(cell_numbers, xyz[is_inside, 2], shape.prod()) / number).reshape(shape))
+    along_slopes, across_slopes = np.gradient(exaggeration * height, cell)
     # One light for all panels, without a stretch by panel: a smooth surface is one grey, a rough one isn't.
-    light = (along - across + 2.0**0.5) / (2.0 * np.sqrt(along**2 + across**2 + 1.0))
-    extent = (low[0], high[0], low[1], high[1])
+    light = (along_slopes - across_slopes + 2.0**0.5) / (2.0 * np.sqrt(along_slopes**2 + across_slopes**2 + 1.0))
+    extent = (lowest[0], highest[0], lowest[1], highest[1])
     axes.imshow(light.T, cmap="gray", vmin=0, vmax=1, extent=extent, origin="lower", aspect="equal")
 
 
 def filled(raster: Float) -> Float:
     """Return the raster with NaN cells set to the mean of their 8 neighbours; larger holes stay NaN inside."""
-    padded = np.pad(raster, 1, constant_values=np.nan)
-    around = np.lib.stride_tricks.sliding_window_view(padded, (3, 3)).reshape(*raster.shape, 9)
-    number = np.isfinite(around).sum(axis=2)
-    mean = np.nansum(around, axis=2) / np.maximum(number, 1)
+    padded_raster = np.pad(raster, 1, constant_values=np.nan)
+    neighbours = np.lib.stride_tricks.sliding_window_view(padded_raster, (3, 3)).reshape(*raster.shape, 9)
+    number = np.isfinite(neighbours).sum(axis=2)
+    mean = np.nansum(neighbours, axis=2) / np.maximum(number, 1)
     return np.where(np.isnan(raster) & (number > 0), mean, raster)
 
 
 def section(axes: Any, cloud: Cloud, station: float, depth: float) -> None:
     """Draw the heights (mm) across the road of the points within `depth` (m) about a station into the axes."""
-    near = np.abs(cloud.xyz[:, 0] - station) < 0.5 * depth
-    colors = np.array([color for _, _, color in STRIP] + ["#c9c9c9"])[cloud.surface[near]]
-    axes.scatter(cloud.xyz[near, 1], 1e3 * cloud.xyz[near, 2], s=5, c=colors, linewidths=0)
+    is_near = np.abs(cloud.xyz[:, 0] - station) < 0.5 * depth
+    colors = np.array([color for _, _, color in STRIP] + ["#c9c9c9"])[cloud.surface[is_near]]
+    axes.scatter(cloud.xyz[is_near, 1], 1e3 * cloud.xyz[is_near, 2], s=5, c=colors, linewidths=0)
 
 
 def print_statistics(real: Cloud | None) -> Rows:
     """Print the roughness by relief strength and of the real asphalt; return it without and with range noise."""
-    plain = strip_points((0.0, -1.6), (400.0, 4.0), 18.0)
-    plain = Cloud(plain.xyz, np.full(len(plain.xyz), 2))
+    asphalt_cloud = strip_points((0.0, -1.6), (400.0, 4.0), 18.0)
+    asphalt_cloud = Cloud(asphalt_cloud.xyz, np.full(len(asphalt_cloud.xyz), 2))
     rows: Rows = ([], [])
     print(f"asphalt, 18 points/m2: residual about planes of {PATCH:g} m patches, surface variation within {RADIUS:g} m")
     for strength in STRENGTHS:
         for column, noise in zip(rows, (0.0, DEVICE_NOISE), strict=True):
-            column.append(measure(with_relief(plain, strength, noise).xyz))
+            column.append(measure(with_relief(asphalt_cloud, strength, noise).xyz))
             values = column[-1]
             print(
                 f"  strength {strength:4g}  noise {1e3 * noise:4.0f} mm:"
@@ -231,11 +232,11 @@ def print_statistics(real: Cloud | None) -> Rows:
             )
     for name in dict.fromkeys(name for name, _, _ in STRIP):
         index = [row[0] for row in STRIP].index(name)
-        values = measure(with_relief(Cloud(plain.xyz, np.full(len(plain.xyz), index)), 1.0).xyz)
+        values = measure(with_relief(Cloud(asphalt_cloud.xyz, np.full(len(asphalt_cloud.xyz), index)), 1.0).xyz)
         print(f"  strength 1, {name:12s}: {values['residual']:6.2f} mm  {values['variation']:.6f}")
     print(f"  root semivariance at lags up to {LAGS[1:]} m, mm:")
-    print("   relief, strength 30 ", semivariogram(with_relief(plain, 30.0).xyz).round(1))
-    print("   noise, 25 mm        ", semivariogram(with_relief(plain, 0.0, 0.025).xyz).round(1))
+    print("   relief, strength 30 ", semivariogram(with_relief(asphalt_cloud, 30.0).xyz).round(1))
+    print("   noise, 25 mm        ", semivariogram(with_relief(asphalt_cloud, 0.0, 0.025).xyz).round(1))
     if real is not None:
         values = measure(real.asphalt)
         print(f"  real, {values['points']} points, {values['patches']} patches:", end="")
@@ -254,8 +255,9 @@ def print_footprints() -> None:
             spread = random.normal(0.0, 0.25, (1500, 400, 3)) * (*diameters, 0.0)
             place = (centres[:, None] + spread).reshape(-1, 3)
             height = relief.amplitude * noise_field(place, relief.wavelength, SEED, 6)
-            seen = height.reshape(1500, 400).mean(axis=1).std()
-            text.append(f"{1e3 * diameters[0]:.0f} x {1e3 * diameters[1]:.0f} mm {100 * seen / relief.amplitude:.0f} %")
+            seen_deviation = height.reshape(1500, 400).mean(axis=1).std()
+            percent = 100 * seen_deviation / relief.amplitude
+            text.append(f"{1e3 * diameters[0]:.0f} x {1e3 * diameters[1]:.0f} mm {percent:.0f} %")
         print(f"  of the relief of {name}, a footprint sees: " + ", ".join(text))
 
 
@@ -267,15 +269,17 @@ def print_timing(count: int = 1_000_000) -> None:
         for part in range(count // size)
     ]
     relief = MicroRelief(np.array([RELIEF["asphalt"].amplitude]), np.array([RELIEF["asphalt"].wavelength]))
-    towards = np.tile([0.0, 0.0, 1.0], (size, 1))
+    directions = np.tile([0.0, 0.0, 1.0], (size, 1))
     for fidelity, octaves in OCTAVES.items():
-        best = np.inf
+        best_seconds = np.inf
         for _ in range(3):
             begin = time.process_time()
             for block in blocks:
-                shift_by_relief(block, BeamEnds(block.xyz, towards), relief, 1.0, SEED, octaves)
-            best = min(best, (time.process_time() - begin) * 1e6 / (size * len(blocks)))
-        print(f"{fidelity}: {octaves} octaves, {best:.3f} s of one core per million points, all on rough surfaces")
+                shift_by_relief(block, BeamEnds(block.xyz, directions), relief, 1.0, SEED, octaves)
+            best_seconds = min(best_seconds, (time.process_time() - begin) * 1e6 / (size * len(blocks)))
+        print(
+            f"{fidelity}: {octaves} octaves, {best_seconds:.3f} s of one core per million points, all on rough surfaces"
+        )
 
 
 def point_block(position: Float) -> PointBlock:
@@ -304,16 +308,16 @@ def draw(output: Path, real: Cloud | None, station: float | None, rows: Rows) ->
     noise = DEVICE_NOISE if real is None else 1e-3 * measure(real.asphalt)["residual"]
     figure = new_figure(18, 11.5)
     axes = figure.subplots(3, 4)
-    low, high = np.array([0.0, -2.8]), np.array([2.0, -1.0])
-    dense = strip_points((0.0, -2.8), (2.0, -1.0), 120_000)
+    lowest, highest = np.array([0.0, -2.8]), np.array([2.0, -1.0])
+    dense_cloud = strip_points((0.0, -2.8), (2.0, -1.0), 120_000)
     for panel, strength in zip(axes[0, :3], (0.0, 1.0, 4.0), strict=True):
-        hillshade(panel, with_relief(dense, strength, octaves=6).xyz, low, high, 0.005, 2.0)
+        hillshade(panel, with_relief(dense_cloud, strength, octaves=6).xyz, lowest, highest, 0.005, 2.0)
         panel.set_title(f"close-up, no noise, strength {strength:g} (heights × 2)")
         panel.set(xlabel="along, m", ylabel="across, m")
-        for (name, end, color), start in zip(STRIP, (low[1], *(row[1] for row in STRIP)), strict=False):
+        for (name, end, color), start in zip(STRIP, (lowest[1], *(row[1] for row in STRIP)), strict=False):
             label = "paint" if name == "paint_white" else name.split("_")[0]
-            where = 0.5 * (max(start, low[1]) + min(end, high[1]))
-            panel.text(1.97, where, label, color=color, va="center", ha="right", fontsize=8, backgroundcolor="w")
+            label_place = 0.5 * (max(start, lowest[1]) + min(end, highest[1]))
+            panel.text(1.97, label_place, label, color=color, va="center", ha="right", fontsize=8, backgroundcolor="w")
     draw_residuals(axes[0, 3], rows, None if real is None else measure(real.asphalt)["residual"])
     columns = sparse_columns(real, noise, station)
     for column in range(4):
@@ -334,11 +338,11 @@ def draw(output: Path, real: Cloud | None, station: float | None, rows: Rows) ->
 
 def sparse_columns(real: Cloud | None, noise: float, station: float | None) -> list[tuple[str, Cloud]]:
     """Return (title, cloud) of 18 points/m2: smooth, with relief, with relief and noise, and the real one if given."""
-    sparse = strip_points((0.0, -4.0), (8.0, 4.0), 18.0)
+    sparse_cloud = strip_points((0.0, -4.0), (8.0, 4.0), 18.0)
     columns = [
-        ("18 points/m², smooth, no noise", sparse),
-        ("18 points/m², strength 1, no noise", with_relief(sparse, 1.0)),
-        (f"18 points/m², strength 1, noise {1e3 * noise:.0f} mm", with_relief(sparse, 1.0, noise)),
+        ("18 points/m², smooth, no noise", sparse_cloud),
+        ("18 points/m², strength 1, no noise", with_relief(sparse_cloud, 1.0)),
+        (f"18 points/m², strength 1, noise {1e3 * noise:.0f} mm", with_relief(sparse_cloud, 1.0, noise)),
     ]
     if real is not None:
         columns.append(("real scan, its range noise included", window(real, station)))
@@ -347,14 +351,14 @@ def sparse_columns(real: Cloud | None, noise: float, station: float | None) -> l
 
 def window(real: Cloud, station: float | None) -> Cloud:
     """Return 8 m x 8 m of a real road about a station, asphalt in the middle, heights above its asphalt's surface."""
-    along = real.asphalt[:, 0]
-    middle = np.array([np.median(along) if station is None else station, np.median(real.asphalt[:, 1])])
-    part, base = (xyz[(np.abs(xyz[:, :2] - middle) < 4.0).all(axis=1)] for xyz in (real.xyz, real.asphalt))
-    if len(base) < 20:
+    stations = real.asphalt[:, 0]
+    middle = np.array([np.median(stations) if station is None else station, np.median(real.asphalt[:, 1])])
+    part, asphalt = (xyz[(np.abs(xyz[:, :2] - middle) < 4.0).all(axis=1)] for xyz in (real.xyz, real.asphalt))
+    if len(asphalt) < 20:
         raise SystemExit("too few points of asphalt about --at")
-    known = (part[:, None, :2] == base[None, :, :2]).all(axis=2).any(axis=1)
-    local = np.column_stack([part[:, :2] - middle + (4.0, 0.0), above_surface(part, base)])
-    return Cloud(local, np.where(known, [row[0] for row in STRIP].index("asphalt"), -1))
+    is_asphalt = (part[:, None, :2] == asphalt[None, :, :2]).all(axis=2).any(axis=1)
+    local_points = np.column_stack([part[:, :2] - middle + (4.0, 0.0), above_surface(part, asphalt)])
+    return Cloud(local_points, np.where(is_asphalt, [row[0] for row in STRIP].index("asphalt"), -1))
 
 
 def draw_residuals(axes: Any, rows: Rows, real: float | None) -> None:

@@ -12,7 +12,7 @@ _QUERIES = 2048
 """Points whose neighbours are gathered at once; what keeps memory bounded."""
 
 
-def surface_variation(xyz: Float, radius: float, at: Index | None = None, least: int = 8) -> Float:
+def surface_variation(xyz: Float, radius: float, rows: Index | None = None, fewest: int = 8) -> Float:
     """Return the surface variation l0 / (l0 + l1 + l2) (K,) around points (Pauly, Gross, Kobbelt 2002), 0 to 1/3.
 
     l0 <= l1 <= l2 are the eigenvalues of the covariance of all points within a sphere. A plane with noise of standard
@@ -21,29 +21,30 @@ def surface_variation(xyz: Float, radius: float, at: Index | None = None, least:
     Args:
         xyz: (N, 3) coordinates, m.
         radius: of the sphere, m.
-        at: (K,) indices of the points in whose places to measure; all if None.
-        least: neighbours, the point itself included, that it takes; 4 or more.
+        rows: (K,) indices of the points in whose places to measure; all if None.
+        fewest: neighbours, the point itself included, that it takes; 4 or more.
 
     Returns:
         (K,) 0 to 1/3; NaN where there are too few neighbours.
     """
-    centres = np.arange(len(xyz)) if at is None else np.asarray(at)
+    centres = np.arange(len(xyz)) if rows is None else np.asarray(rows)
     result = np.full(len(centres), np.nan)
     if len(xyz) == 0:
         return result
     grid = _Grid(xyz, radius)
-    for first in range(0, len(centres), _QUERIES):
-        chosen = centres[first : first + _QUERIES]
-        query, neighbour = grid.pairs(chosen)
-        shift = xyz[neighbour] - xyz[chosen][query]
-        near = np.einsum("ij,ij->i", shift, shift) <= radius * radius
-        result[first : first + _QUERIES] = _variation(query[near], shift[near], len(chosen), least)
+    for first_row in range(0, len(centres), _QUERIES):
+        query_rows = centres[first_row : first_row + _QUERIES]
+        query, neighbour = grid.pairs(query_rows)
+        shift = xyz[neighbour] - xyz[query_rows][query]
+        is_near = np.einsum("ij,ij->i", shift, shift) <= radius * radius
+        result[first_row : first_row + _QUERIES] = _variation(query[is_near], shift[is_near], len(query_rows), fewest)
     return result
 
 
-def _variation(query: Index, shift: Float, count: int, least: int) -> Float:
+def _variation(query: Index, shift: Float, count: int, fewest: int) -> Float:
+    """Return the surface variation of each query from the vectors to its neighbours."""
     number = np.bincount(query, minlength=count).astype(np.float64)
-    enough = number >= max(least, 4)
+    has_enough = number >= max(fewest, 4)
     divisor = np.maximum(number, 1.0)
     mean = np.stack([np.bincount(query, shift[:, i], count) for i in range(3)], axis=1) / divisor[:, None]
     shift = shift - mean[query]
@@ -54,7 +55,7 @@ def _variation(query: Index, shift: Float, count: int, least: int) -> Float:
             covariance[:, i, j] = covariance[:, j, i] = moment
     values = np.clip(np.linalg.eigvalsh(covariance), 0.0, None)
     total = values.sum(axis=1)
-    return np.where(enough & (total > 0.0), values[:, 0] / np.where(total > 0.0, total, 1.0), np.nan)
+    return np.where(has_enough & (total > 0.0), values[:, 0] / np.where(total > 0.0, total, 1.0), np.nan)
 
 
 class _Grid:
@@ -67,19 +68,19 @@ class _Grid:
         self.order = np.argsort(self.key, kind="stable")
         self.sorted = self.key[self.order]
 
-    def pairs(self, chosen: Index) -> tuple[Index, Index]:
-        """Return candidate pairs: positions in `chosen` and indices of all points in the nine columns around each."""
+    def pairs(self, query_rows: Index) -> tuple[Index, Index]:
+        """Return candidate pairs: positions in `query_rows`, and rows of all points in the nine columns around each."""
         steps = np.array([row * self.stride for row in (-1, 0, 1)])
-        low = (self.key[chosen][:, None] + steps - 1).ravel()
-        start = np.searchsorted(self.sorted, low, "left")
-        length = np.searchsorted(self.sorted, low + 2, "right") - start
+        first_keys = (self.key[query_rows][:, None] + steps - 1).ravel()
+        start = np.searchsorted(self.sorted, first_keys, "left")
+        length = np.searchsorted(self.sorted, first_keys + 2, "right") - start
         ends = np.cumsum(length)
         run = np.repeat(np.arange(len(length)), length)
         place = np.arange(int(ends[-1]) if len(ends) else 0) - (ends - length)[run] + start[run]
         return run // len(steps), self.order[place]
 
 
-def plane_residuals(xyz: Float, size: float, least: int = 10) -> tuple[Float, Float]:
+def plane_residuals(xyz: Float, size: float, fewest: int = 10) -> tuple[Float, Float]:
     """Return per square patch the standard deviation of heights about its least-squares plane, m, and its points.
 
     Patches are squares of a level grid; the deviation has n - 3 degrees of freedom. Left out are patches with too few
@@ -89,7 +90,7 @@ def plane_residuals(xyz: Float, size: float, least: int = 10) -> tuple[Float, Fl
     Args:
         xyz: (N, 3) coordinates of one surface, m.
         size: of a patch, m.
-        least: points of a patch; 4 or more.
+        fewest: points of a patch; 4 or more.
 
     Returns:
         (P,) standard deviations, m; (P,) numbers of points.
@@ -102,9 +103,11 @@ def plane_residuals(xyz: Float, size: float, least: int = 10) -> tuple[Float, Fl
     x, y, z = (xyz - mean[patch]).T
     products = (x * x, x * y, y * y, x * z, y * z, z * z)
     xx, xy, yy, xz, yz, zz = (np.bincount(patch, product, count) for product in products)
-    half, spread = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
-    good = (number >= max(least, 4)) & (half - spread >= number * (size / 8.0) ** 2)
-    xx, xy, yy, xz, yz, zz = (moment[good] for moment in (xx, xy, yy, xz, yz, zz))
+    half_trace, spread = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+    is_usable = (number >= max(fewest, 4)) & (half_trace - spread >= number * (size / 8.0) ** 2)
+    xx, xy, yy, xz, yz, zz = (moment[is_usable] for moment in (xx, xy, yy, xz, yz, zz))
     determinant = xx * yy - xy * xy
-    explained = (yy * xz * xz - 2.0 * xy * xz * yz + xx * yz * yz) / determinant
-    return np.sqrt(np.clip(zz - explained, 0.0, None) / (number[good] - 3.0)), number[good].astype(np.float64)
+    explained_squares = (yy * xz * xz - 2.0 * xy * xz * yz + xx * yz * yz) / determinant
+    return np.sqrt(np.clip(zz - explained_squares, 0.0, None) / (number[is_usable] - 3.0)), number[is_usable].astype(
+        np.float64
+    )

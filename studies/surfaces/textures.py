@@ -41,39 +41,39 @@ def main() -> None:
     parser.add_argument("--output", type=Path, required=True)
     parser.add_argument("--width", type=int, default=800)
     parser.add_argument("--samples", type=int, default=12)
-    words = parser.parse_args()
+    options = parser.parse_args()
     empty_file()
     with tempfile.TemporaryDirectory() as folder:
         for layer, pixels in setts().items():
             save_image(Path(folder) / "asphalt" / f"{layer}.png", pixels)
-        render(folder, words.output, words.width, words.samples)
+        render(folder, options.output, options.width, options.samples)
 
 
 def setts() -> dict[str, Float]:
     """Return images (SIZE, SIZE, 3) of stones by layer, 0 to 1, the lowest row first."""
     height, width = np.mgrid[:SIZE, :SIZE] / SIZE
     row = np.floor(height * ROWS)
-    along = width * STONES + 0.5 * (row % 2)
-    stone = (row * 7 + np.floor(along) % STONES * 3) % 5
-    along, across = along % 1.0, height * ROWS % 1.0
-    to_end, to_side = 2.0 * np.minimum(along, 1.0 - along), np.minimum(across, 1.0 - across)
+    along_stone = width * STONES + 0.5 * (row % 2)
+    stone_shades = (row * 7 + np.floor(along_stone) % STONES * 3) % 5
+    along_stone, across_stone = along_stone % 1.0, height * ROWS % 1.0
+    to_end, to_side = 2.0 * np.minimum(along_stone, 1.0 - along_stone), np.minimum(across_stone, 1.0 - across_stone)
     edge = np.minimum(to_end, to_side)
-    joint = (edge < 0.07)[..., None]
-    shade = np.stack([0.35 + 0.055 * stone, 0.345 + 0.047 * stone, 0.33 + 0.047 * stone], axis=-1)
-    round_ = 0.5 * (edge < 0.2)
-    lean = np.stack(
+    is_joint = (edge < 0.07)[..., None]
+    shades = np.stack([0.35 + 0.055 * stone_shades, 0.345 + 0.047 * stone_shades, 0.33 + 0.047 * stone_shades], axis=-1)
+    tilt = 0.5 * (edge < 0.2)
+    normals = np.stack(
         [
-            round_ * (to_end < to_side) * np.sign(along - 0.5),
-            round_ * (to_end >= to_side) * np.sign(across - 0.5),
-            np.sqrt(1.0 - round_**2),
+            tilt * (to_end < to_side) * np.sign(along_stone - 0.5),
+            tilt * (to_end >= to_side) * np.sign(across_stone - 0.5),
+            np.sqrt(1.0 - tilt**2),
         ],
         axis=-1,
     )
-    rough = np.where(joint, 0.94, 0.55 + 0.04 * stone[..., None])
+    roughness = np.where(is_joint, 0.94, 0.55 + 0.04 * stone_shades[..., None])
     return {
-        "base_color": np.where(joint, 0.15, shade),
-        "roughness": np.repeat(rough, 3, axis=-1),
-        "normal": lean * 0.5 + 0.5,
+        "base_color": np.where(is_joint, 0.15, shades),
+        "roughness": np.repeat(roughness, 3, axis=-1),
+        "normal": normals * 0.5 + 0.5,
     }
 
 

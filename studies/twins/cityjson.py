@@ -58,9 +58,9 @@ def surfaces(data: dict[str, Any]) -> Iterator[tuple[str, Float]]:
         for shape in item.get("geometry", ()):
             boundaries = shape["boundaries"]
             if "semantics" in shape:
-                about = shape["semantics"]
-                for (ring,), value in zip(boundaries, about["values"], strict=True):
-                    yield about["surfaces"][value]["function"], vertices[ring]
+                semantics = shape["semantics"]
+                for (ring,), value in zip(boundaries, semantics["values"], strict=True):
+                    yield semantics["surfaces"][value]["function"], vertices[ring]
             elif "Solid" in shape["type"]:
                 for solid in [boundaries] if shape["type"] == "Solid" else boundaries:
                     yield from ((kind, vertices[ring]) for (ring,) in solid[0])
@@ -78,51 +78,64 @@ def axis_of(data: dict[str, Any]) -> Float:
 
 def along_road(points: Float, middle: Float, heading: float) -> Float:
     """Return points (..., 3) in a frame at a point of the road: x along `heading` (rad), y to the left, m."""
-    moved = points - middle
+    shifted = points - middle
     c, s = np.cos(heading), np.sin(heading)
-    plan = np.stack([moved[..., 0] * c + moved[..., 1] * s, moved[..., 1] * c - moved[..., 0] * s], axis=-1)
-    return np.concatenate([plan, moved[..., 2:]], axis=-1)
+    plan = np.stack([shifted[..., 0] * c + shifted[..., 1] * s, shifted[..., 1] * c - shifted[..., 0] * s], axis=-1)
+    return np.concatenate([plan, shifted[..., 2:]], axis=-1)
 
 
 def draw(data: dict[str, Any], station: float, target: Path) -> None:
     """Write a picture of 220 m of the road about a station from above, and of the view ahead."""
     axis = axis_of(data)
-    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(axis[:, :2], axis=0), axis=1))])
-    at = int(np.searchsorted(run, station))
-    step = axis[min(at + 1, len(axis) - 1)] - axis[max(at - 1, 0)]
-    placed = [(k, along_road(r, axis[at], float(np.arctan2(step[1], step[0])))) for k, r in surfaces(data)]
+    stations = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(axis[:, :2], axis=0), axis=1))])
+    axis_row = int(np.searchsorted(stations, station))
+    step = axis[min(axis_row + 1, len(axis) - 1)] - axis[max(axis_row - 1, 0)]
+    placed_polygons = [
+        (k, along_road(r, axis[axis_row], float(np.arctan2(step[1], step[0])))) for k, r in surfaces(data)
+    ]
     figure = new_figure(14, 11, layout=None)
-    above, ahead = figure.subplots(2, 1, height_ratios=(1, 1.25))
-    _from_above(above, [(k, r) for k, r in placed if np.abs(r[:, 0]).max() < 115 and np.abs(r[:, 1]).max() < SPAN])
-    _ahead(ahead, placed)
-    there = {kind for kind, _ in placed}
-    patches = [Patch(facecolor=c, edgecolor="#999999", label=k) for k, c in COLOURS.items() if k in there]
+    top_axes, front_axes = figure.subplots(2, 1, height_ratios=(1, 1.25))
+    _from_above(
+        top_axes, [(k, r) for k, r in placed_polygons if np.abs(r[:, 0]).max() < 115 and np.abs(r[:, 1]).max() < SPAN]
+    )
+    _ahead(front_axes, placed_polygons)
+    kinds_drawn = {kind for kind, _ in placed_polygons}
+    patches = [Patch(facecolor=c, edgecolor="#999999", label=k) for k, c in COLOURS.items() if k in kinds_drawn]
     figure.legend(handles=patches, loc="lower center", ncols=8, frameon=False, fontsize=9)
     figure.subplots_adjust(left=0.05, right=0.99, top=0.99, bottom=0.09, hspace=0.06)
     save_figure(figure, target, dpi=100)
 
 
-def _from_above(axes: Any, placed: list[tuple[str, Float]]) -> None:
-    placed.sort(key=lambda pair: pair[1][:, 2].mean() + 50.0 * (pair[0] in ("furniture", "bridge")))
+def _from_above(axes: Any, placed_polygons: list[tuple[str, Float]]) -> None:
+    """Draw the polygons from above, the lowest first, things on top."""
+    placed_polygons.sort(key=lambda pair: pair[1][:, 2].mean() + 50.0 * (pair[0] in ("furniture", "bridge")))
     axes.add_collection(
-        PolyCollection([r[:, :2] for _, r in placed], facecolors=[COLOURS[k] for k, _ in placed], edgecolors="none")
+        PolyCollection(
+            [r[:, :2] for _, r in placed_polygons],
+            facecolors=[COLOURS[k] for k, _ in placed_polygons],
+            edgecolors="none",
+        )
     )
     axes.set(xlim=(-110, 110), ylim=(-32, 32), aspect="equal", facecolor="#e9efe0", ylabel="left of the centreline, m")
 
 
-def _ahead(axes: Any, placed: list[tuple[str, Float]]) -> None:
+def _ahead(axes: Any, placed_polygons: list[tuple[str, Float]]) -> None:
     """Draw the polygons before a camera 9 m above the road, the farthest first; markings after what they lie on."""
     eye = np.array([-110.0, -8.0, 9.0])
-    shown = []
-    for kind, ring in placed:
-        seen = ring - eye
-        if seen[:, 0].min() > 3.0 and seen[:, 0].max() < 520.0:
-            depth = np.linalg.norm(seen, axis=1).mean() - 3.0 * (kind in ("line", "arrow", "hatching", "pothole"))
-            upright = kind in ("furniture", "bridge")
-            shown.append((upright, -depth, kind, np.stack([-seen[:, 1], seen[:, 2]], axis=1) / seen[:, :1]))
-    shown.sort(key=lambda entry: entry[:2])
-    colours, edges = [COLOURS[e[2]] for e in shown], ["#00000044" if e[0] else "none" for e in shown]
-    axes.add_collection(PolyCollection([e[3] for e in shown], facecolors=colours, edgecolors=edges, linewidths=0.4))
+    drawn_polygons = []
+    for kind, ring in placed_polygons:
+        from_eye = ring - eye
+        if from_eye[:, 0].min() > 3.0 and from_eye[:, 0].max() < 520.0:
+            depth = np.linalg.norm(from_eye, axis=1).mean() - 3.0 * (kind in ("line", "arrow", "hatching", "pothole"))
+            is_upright = kind in ("furniture", "bridge")
+            drawn_polygons.append(
+                (is_upright, -depth, kind, np.stack([-from_eye[:, 1], from_eye[:, 2]], axis=1) / from_eye[:, :1])
+            )
+    drawn_polygons.sort(key=lambda entry: entry[:2])
+    colours, edges = [COLOURS[e[2]] for e in drawn_polygons], ["#00000044" if e[0] else "none" for e in drawn_polygons]
+    axes.add_collection(
+        PolyCollection([e[3] for e in drawn_polygons], facecolors=colours, edgecolors=edges, linewidths=0.4)
+    )
     axes.set(xlim=(-0.62, 0.62), ylim=(-0.32, 0.14), aspect="equal", facecolor="#dfe9f3", xticks=[], yticks=[])
 
 

@@ -56,8 +56,8 @@ _BIAS = {"IfcGeographicElement": 12.0, "IfcEarthworksFill": 6.0, "IfcCourse": 6.
 def main(folder: Path) -> None:
     """Write an IFC file of a sampled road and draw it to twin-ifc.png in the folder."""
     parameters = sample_road(RoadScenario.from_dict(SCENARIO), SEED)
-    with tempfile.TemporaryDirectory() as temporary:
-        path = Path(temporary) / "twin.ifc"
+    with tempfile.TemporaryDirectory() as folder_name:
+        path = Path(folder_name) / "twin.ifc"
         write_ifc(parameters, path)
         file = ifcopenshell.open(str(path))
         triangles, colours, bias = _triangles(file)
@@ -77,38 +77,49 @@ def _triangles(file: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         key = _ALIKE.get(item.is_a(), item.is_a())
         if item.Representation is None or key not in COLOURS:
             continue
-        mesh = item.Representation.Representations[0].RepresentationType == "Tessellation"
-        kernel: Any = "manifold" if mesh else "opencascade"
+        is_mesh = item.Representation.Representations[0].RepresentationType == "Tessellation"
+        kernel: Any = "manifold" if is_mesh else "opencascade"
         shape: Any = ifcopenshell.geom.create_shape(settings, item, geometry_library=kernel)
-        own = np.array(shape.geometry.verts).reshape(-1, 3)[np.array(shape.geometry.faces).reshape(-1, 3)]
-        normal = np.cross(own[:, 1] - own[:, 0], own[:, 2] - own[:, 0])
+        triangles = np.array(shape.geometry.verts).reshape(-1, 3)[np.array(shape.geometry.faces).reshape(-1, 3)]
+        normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         shade = 0.6 + 0.4 * np.abs(normal @ _LIGHT)
         colour = np.array(mpl.colors.to_rgb(COLOURS[key][0]))
-        corners.append(own)
+        corners.append(triangles)
         colours.append(np.clip(shade[:, None] * colour, 0.0, 1.0))
-        bias.append(np.full(len(own), _BIAS.get(key, 0.0)))
+        bias.append(np.full(len(triangles), _BIAS.get(key, 0.0)))
     return np.concatenate(corners), np.concatenate(colours), np.concatenate(bias)
 
 
 def _draw(mesh: tuple[np.ndarray, np.ndarray, np.ndarray], eye: np.ndarray, target: np.ndarray, path: Path) -> None:
     """Write a picture of triangles in perspective from `eye` to `target`, sorted by depth, the farthest first."""
     triangles, colours, bias = mesh
-    ahead = (target - eye) / np.linalg.norm(target - eye)
-    right = np.cross(ahead, (0.0, 0.0, 1.0))
-    right /= np.linalg.norm(right)
-    seen = (triangles - eye) @ np.column_stack([right, np.cross(right, ahead), ahead])
-    depth = seen[:, :, 2]
-    keep = (depth > _NEAR).all(axis=1) & (depth.min(axis=1) < 420.0)
-    seen, colours, depth, bias = seen[keep], colours[keep], depth[keep], bias[keep]
-    flat = seen[:, :, :2] / depth[:, :, None]
-    inside = (np.abs(flat[:, :, 0]) < 1.2).any(axis=1) & (np.abs(flat[:, :, 1]) < 0.8).any(axis=1)
-    order = np.argsort(-(depth[inside].mean(axis=1) + bias[inside]))
-    haze = np.clip((depth[inside].mean(axis=1) - 60.0) / 500.0, 0.0, 0.6)[:, None]
-    shown = (colours[inside] * (1.0 - haze) + haze * np.array([0.86, 0.91, 0.96]))[order]
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    rightward = np.cross(forward, (0.0, 0.0, 1.0))
+    rightward /= np.linalg.norm(rightward)
+    view_corners = (triangles - eye) @ np.column_stack([rightward, np.cross(rightward, forward), forward])
+    depth = view_corners[:, :, 2]
+    is_in_front = (depth > _NEAR).all(axis=1) & (depth.min(axis=1) < 420.0)
+    view_corners, colours, depth, bias = (
+        view_corners[is_in_front],
+        colours[is_in_front],
+        depth[is_in_front],
+        bias[is_in_front],
+    )
+    picture_corners = view_corners[:, :, :2] / depth[:, :, None]
+    is_in_picture = (np.abs(picture_corners[:, :, 0]) < 1.2).any(axis=1) & (np.abs(picture_corners[:, :, 1]) < 0.8).any(
+        axis=1
+    )
+    order = np.argsort(-(depth[is_in_picture].mean(axis=1) + bias[is_in_picture]))
+    haze = np.clip((depth[is_in_picture].mean(axis=1) - 60.0) / 500.0, 0.0, 0.6)[:, None]
+    shown_colours = (colours[is_in_picture] * (1.0 - haze) + haze * np.array([0.86, 0.91, 0.96]))[order]
     figure = new_figure(12, 5.6, layout=None)
     axes = figure.add_subplot()
-    axes.add_collection(PolyCollection(flat[inside][order], facecolors=shown, edgecolors=shown, linewidths=0.15))
+    axes.add_collection(
+        PolyCollection(
+            picture_corners[is_in_picture][order], facecolors=shown_colours, edgecolors=shown_colours, linewidths=0.15
+        )
+    )
     axes.set(xlim=(-0.56, 0.56), ylim=(-0.33, 0.18), aspect="equal")
     axes.set_facecolor("#dbe8f5")
     axes.set_xticks([])

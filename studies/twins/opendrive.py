@@ -99,12 +99,12 @@ def paint(axes: Axes, map_: Turned, span: tuple[float, float]) -> None:
         s = np.linspace(max(mark.start, span[0]), min(mark.end, span[1]), 40)
         section = next(item for item in road.sections if item.start - 1e-6 <= s.mean() <= item.end + 1e-6)
         t = section.borders(s, road.lane_offset(s))[mark.lane] + mark.aside
-        left, right = (map_.at(s, t + side * mark.width / 2.0) for side in (1, -1))
-        faces.append(np.concatenate([left, right[::-1]]))
+        left_edge, right_edge = (map_.at(s, t + side * mark.width / 2.0) for side in (1, -1))
+        faces.append(np.concatenate([left_edge, right_edge[::-1]]))
         colours.append({"white": "white", "yellow": "#ffd21f"}[mark.color])
     for item in road.objects().values():
         if item.get("type") == "roadMark" and span[0] < number(item, "s") < span[1]:
-            faces += [map_.at(own[:, 0], own[:, 1]) for own in corners_road(item)]
+            faces += [map_.at(corners[:, 0], corners[:, 1]) for corners in corners_road(item)]
             colours += ["white"] * (len(faces) - len(colours))
     axes.add_collection(PolyCollection(faces, facecolor=colours, edgecolor="none", zorder=3))
 
@@ -126,7 +126,7 @@ def furniture(axes: Axes, map_: Turned, span: tuple[float, float]) -> None:
         place, heading = map_.place(item)
         heading += number(item, "hdg")
         turn = np.array([[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]])
-        outlines = [own[:, :2] @ turn.T + place for own in corners_local(item)]
+        outlines = [corners[:, :2] @ turn.T + place for corners in corners_local(item)]
         axes.add_collection(PolyCollection(outlines, facecolor="#b0303040", edgecolor="#8c1c1c", lw=0.8, zorder=5))
         if not outlines:
             axes.plot(*place, "o", ms=2.4, color="#8c1c1c", zorder=5)
@@ -135,11 +135,11 @@ def furniture(axes: Axes, map_: Turned, span: tuple[float, float]) -> None:
         if span[0] <= number(item, "s") <= span[1]:
             place, heading = map_.place(item)
             heading += number(item, "hOffset") + (np.pi if item.get("orientation") == "+" else 0.0)
-            way = 2.6 * np.array([np.cos(heading), np.sin(heading)])
+            direction = 2.6 * np.array([np.cos(heading), np.sin(heading)])
             arrow = {"arrowstyle": "-|>", "color": "#c2185b"}
-            axes.annotate("", tuple(place + way), tuple(place), arrowprops=arrow, zorder=6)
+            axes.annotate("", tuple(place + direction), tuple(place), arrowprops=arrow, zorder=6)
             text = item.get("type", "") + ("" if item.get("subtype") == "-1" else f"-{item.get('subtype')}")
-            side = 1.0 if way[0] > 0.0 else -1.0
+            side = 1.0 if direction[0] > 0.0 else -1.0
             style: dict[str, Any] = {"fontsize": 7, "color": "#c2185b", "va": "center", "zorder": 6}
             axes.text(place[0] + 3.4 * side, place[1], text, ha="left" if side > 0.0 else "right", **style)
 
@@ -155,10 +155,10 @@ def main() -> None:
     types: set[str] = set()
     for axes, stretch in zip(panels, STRETCHES, strict=True):
         for road in roads:
-            turned = Turned(road, stretch)
-            types |= lanes(axes, turned, stretch)
-            paint(axes, turned, stretch)
-            furniture(axes, turned, stretch)
+            view = Turned(road, stretch)
+            types |= lanes(axes, view, stretch)
+            paint(axes, view, stretch)
+            furniture(axes, view, stretch)
         axes.set_aspect("equal")
         axes.autoscale_view()
         axes.set(xlabel="along, m", ylabel="across, m", title=f"Station {stretch[0]:g} m to {stretch[1]:g} m")

@@ -77,8 +77,8 @@ class NameClasses:
         ids = {row.name: row.id for row in classes()} if ids is None else ids
         rows: Mapping[str, dict[str, str]] = {kind: getattr(mapping, kind) if mapping else {} for kind in KINDS}
         self._rows = {kind: [(pattern, ids[name]) for pattern, name in rows[kind].items() if name] for kind in KINDS}
-        self._found: dict[tuple[str, str], int | None] = {}
-        self._used: set[tuple[str, str]] = set()
+        self._class_of_name: dict[tuple[str, str], int | None] = {}
+        self._matched_patterns: set[tuple[str, str]] = set()
 
     def find(self, kind: str, *names: str) -> int | None:
         """Return the ``class_id`` of the first of these names that has one; None if none has."""
@@ -88,14 +88,14 @@ class NameClasses:
     def unmatched_patterns(self) -> tuple[str, ...]:
         """Return the patterns that no name fitted so far, each as ``kind: pattern``."""
         rows = ((kind, pattern) for kind in KINDS for pattern, _ in self._rows[kind])
-        return tuple(f"{kind}: {pattern}" for kind, pattern in rows if (kind, pattern) not in self._used)
+        return tuple(f"{kind}: {pattern}" for kind, pattern in rows if (kind, pattern) not in self._matched_patterns)
 
     def _find(self, kind: str, name: str) -> int | None:
         """Return the ``class_id`` that the first fitting pattern gives a name; None without; remembered by name."""
         if not self._rows[kind]:
             return None
-        if (kind, name) not in self._found:
+        if (kind, name) not in self._class_of_name:
             fits = [(pattern, number) for pattern, number in self._rows[kind] if fits_pattern(name, pattern)]
-            self._used |= {(kind, pattern) for pattern, _ in fits}
-            self._found[kind, name] = fits[0][1] if fits else None
-        return self._found[kind, name]
+            self._matched_patterns |= {(kind, pattern) for pattern, _ in fits}
+            self._class_of_name[kind, name] = fits[0][1] if fits else None
+        return self._class_of_name[kind, name]

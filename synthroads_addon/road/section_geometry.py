@@ -145,7 +145,7 @@ class CarriagewaySection:
             on_ramp = surface.lift[:, None] + tilt[:, None] * (
                 plane_distances[:, ramp_start:] - distances[:, ramp_start, None]
             )
-            heights[:, ramp_start:] += surface.there[:, None] * on_ramp
+            heights[:, ramp_start:] += surface.presence[:, None] * on_ramp
             heights[:, -1] += lift_behind
         return heights
 
@@ -157,12 +157,14 @@ class CarriagewaySection:
         distances, outward_slope = self.distances(station), self.carriageway.sign * crossfall
         fields = RampFields(*(np.zeros(station.shape) for _ in range(3)))
         for surface, tilt, lift_behind in self._ramps(station, outward_slope):
-            is_behind_ramp = surface.there < 0.5
+            is_behind_ramp = surface.presence < 0.5
             width = np.where(
                 is_behind_ramp, 0.0, self._plane_edge(station, distances) - distances[:, self._beyond_island]
             )
             lift = np.where(is_behind_ramp, lift_behind, surface.lift)
-            is_of_ramp = np.where(is_behind_ramp, surface.behind > 0.0, (surface.lift != 0.0) | (surface.own > 0.0))
+            is_of_ramp = np.where(
+                is_behind_ramp, surface.verge_share > 0.0, (surface.lift != 0.0) | (surface.crossfall_share > 0.0)
+            )
             fields = RampFields(
                 np.where(is_of_ramp, width, fields.width),
                 np.where(is_of_ramp, lift, fields.lift),
@@ -181,8 +183,10 @@ class CarriagewaySection:
         for shape in self._turnouts_near(station):
             ramp, surface = shape.turnout.ramp, shape.ramp_surface(station)
             if ramp is not None and surface is not None:
-                tilt = surface.own * (self.carriageway.sign * (ramp.crossfall_percent or 0.0) / 100.0 - outward_slope)
-                yield surface, tilt, surface.behind * (surface.lift + tilt * ramp_width(ramp))
+                tilt = surface.crossfall_share * (
+                    self.carriageway.sign * (ramp.crossfall_percent or 0.0) / 100.0 - outward_slope
+                )
+                yield surface, tilt, surface.verge_share * (surface.lift + tilt * ramp_width(ramp))
 
     def _turnouts_near(self, station: Float) -> list[TurnoutShape]:
         """Return the turnouts that may change a width at any station (N,); of a long road's many only a few are."""

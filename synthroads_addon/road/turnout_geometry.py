@@ -58,16 +58,16 @@ class RampSurface:
     """How a ramp lies against the main road's plane, (N,).
 
     Attributes:
-        there: 1 up to the ramp's end, 0 behind it; over the step between in between.
-        behind: share of what it has at its end that the verge behind it still has; 0 up to there.
+        presence: 1 up to the ramp's end, 0 behind it; over the step between in between.
+        verge_share: share of what it has at its end that the verge behind it still has; 0 up to there.
         lift: height of its inner edge above the plane, m.
-        own: share of its own crossfall that it has.
+        crossfall_share: share of its own crossfall that it has.
     """
 
-    there: Float
-    behind: Float
+    presence: Float
+    verge_share: Float
     lift: Float
-    own: Float
+    crossfall_share: Float
 
 
 class TurnoutShape:

@@ -66,22 +66,22 @@ class Feature:
         kind: what it is.
         share: probability that a carriageway has it.
         lengths: least and largest length of each part that is drawn, m.
-        fixed: what it needs besides, m.
-        apart: least distance between two of its kind, m.
-        every: a road may have another one for each such length, m.
+        fixed_length: what it needs besides, m.
+        spacing: least distance between two of its kind, m.
+        length_of_another: a road may have another one for each such length, m.
     """
 
     kind: FeatureKind
     share: float
     lengths: tuple[tuple[float, float], ...]
-    fixed: float = 0.0
-    apart: float = 0.0
-    every: float = math.inf
+    fixed_length: float = 0.0
+    spacing: float = 0.0
+    length_of_another: float = math.inf
 
     @property
     def least(self) -> float:
         """Return the shortest length that it takes along the carriageway, m."""
-        return self.fixed + math.fsum(low for low, _ in self.lengths)
+        return self.fixed_length + math.fsum(low for low, _ in self.lengths)
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def features_of(scenario: RoadScenario, section: StandardCrossSection, ramps: Ra
     if ramps.room_for_bay:
         bay_tapers = bounds(limits.bay_taper_length, EMERGENCY_BAY_TAPER)
         bay_lengths = (bay_tapers, bounds(limits.bay_length, EMERGENCY_BAY_LENGTH), bay_tapers)
-        features.append(Feature("emergency_bay", limits.emergency_bays, bay_lengths, every=_BAY_EVERY))
+        features.append(Feature("emergency_bay", limits.emergency_bays, bay_lengths, length_of_another=_BAY_EVERY))
     if may_change_lanes(scenario, section):
         lane_changes = scenario.lane_changes
         tapers = (bounds(lane_changes.taper_length, LANE_TAPER_LENGTH[design_class]),)
@@ -182,7 +182,7 @@ def arrange_features(features: tuple[Feature, ...], length: float, rng: np.rando
     candidates = [
         (feature.share < 1.0, slot, rng.random(), feature)
         for feature in features
-        for slot in range(1 + int(length / feature.every))
+        for slot in range(1 + int(length / feature.length_of_another))
         if rng.random() < feature.share
     ]
     order: list[tuple[float, Feature]] = []
@@ -200,7 +200,9 @@ def arrange_features(features: tuple[Feature, ...], length: float, rng: np.rando
         )
         for feature, parts in zip(chosen_features, extras, strict=True)
     ]
-    begins = pack_features([(f, f.fixed + math.fsum(parts)) for f, parts in zip(chosen_features, lengths, strict=True)])
+    begins = pack_features(
+        [(f, f.fixed_length + math.fsum(parts)) for f, parts in zip(chosen_features, lengths, strict=True)]
+    )
     spare_length = max(0.0, length - begins.pop())
     shifts = sorted(spare_length * rng.random() for _ in chosen_features)
     return [
@@ -214,7 +216,7 @@ def pack_features(stretches: Sequence[tuple[Feature, float]]) -> list[float]:
     begins: list[float] = []
     end_so_far, ends = -TURNOUT_GAP, dict[FeatureKind, float]()
     for feature, length in stretches:
-        begins.append(max(end_so_far + TURNOUT_GAP, ends.get(feature.kind, -math.inf) + feature.apart))
+        begins.append(max(end_so_far + TURNOUT_GAP, ends.get(feature.kind, -math.inf) + feature.spacing))
         end_so_far = ends[feature.kind] = begins[-1] + length
     return [*begins, max(end_so_far, 0.0)]
 

@@ -19,12 +19,12 @@ def test_a_scenario_gets_the_sensor_of_a_recipe_and_nothing_else() -> None:
 
 
 def test_scans_with_all_effects_none_and_without_one_each() -> None:
-    rows = kinds(with_sensor_of(load_scenario("rq31-600m"), "centerline-uav"), each=True)
+    rows = kinds(with_sensor_of(load_scenario("rq31-600m"), "centerline-uav"), leave_out_each=True)
     assert [row.name for row in rows[:2]] == [NONE, ALL]
     assert {"without speckle", "without relief", "without motion"} <= {row.name for row in rows}
     calm = rows[0].scenario.scan
     assert (calm.noise.speckle, calm.relief, calm.motion.position_sigma) == (0.0, 0.0, 0.0)
-    assert len(kinds(rows[1].scenario, each=False)) == 2
+    assert len(kinds(rows[1].scenario, leave_out_each=False)) == 2
 
 
 def test_ratios_are_of_the_least_times() -> None:

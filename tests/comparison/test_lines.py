@@ -34,8 +34,8 @@ def test_errors_of_known_lines_are_found(turn_deg: float) -> None:
     assert found.off_mm == pytest.approx(3.0, rel=0.1)
     assert found.along_mm == pytest.approx(15.0, rel=0.1)
     assert found.step == pytest.approx(STEP, rel=0.01)
-    assert found.apart == pytest.approx(APART, rel=0.05)
-    assert found.apart_variation == pytest.approx(0.06 / APART, rel=0.2)
+    assert found.gap == pytest.approx(APART, rel=0.05)
+    assert found.gap_variation == pytest.approx(0.06 / APART, rel=0.2)
     assert found.turned_deg < 0.05
 
 

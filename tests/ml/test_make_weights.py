@@ -46,7 +46,7 @@ def test_a_centrelines_figures_stand_beside_the_best_rule() -> None:
         "middle of the bright": means(0.25),
         "the displaced path": means(0.01),
     }
-    found = figures_of(PLANS["centerline-airborne"], {"tables": tables}, "a road", inside=True)
+    found = figures_of(PLANS["centerline-airborne"], {"tables": tables}, "a road", is_inside=True)
     assert [(one.value, one.rule, one.unit) for one in found] == [
         (0.4, 0.25, "m"),
         (0.2, 0.25, "m"),
@@ -62,6 +62,6 @@ def test_a_segmentations_figures_leave_out_classes_without_points() -> None:
         "vegetation": {"iou": 0.0, "support": 0},
     }
     scores = {"tests": {"cloud": {"classes": classes, "mean_iou": 0.375}}}
-    found = figures_of(PLANS["segmentation-overhead"], scores, "a scan", inside=False)
+    found = figures_of(PLANS["segmentation-overhead"], scores, "a scan", is_inside=False)
     assert [one.name for one in found] == ["mean IoU, a scan", "IoU of ground, a scan", "IoU of road, a scan"]
     assert [one.value for one in found] == [37.5, 50.0, 25.0]

@@ -66,5 +66,5 @@ def test_residuals_leave_out_single_scan_lines_and_small_patches() -> None:
     line = np.column_stack([rng.uniform(0, 1, 50), rng.normal(0.5, 0.01, 50), rng.normal(0, 0.01, 50)])
     few = np.column_stack([rng.uniform((3.1, 3.6), (3.9, 4.4), (9, 2)), np.zeros(9)])
     assert len(plane_residuals(np.vstack([line, few]), 1.0)[0]) == 0
-    assert len(plane_residuals(np.vstack([line, few]), 1.0, least=9)[0]) == 1
+    assert len(plane_residuals(np.vstack([line, few]), 1.0, fewest=9)[0]) == 1
     assert len(plane_residuals(np.empty((0, 3)), 1.0)[0]) == 0
