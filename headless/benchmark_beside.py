@@ -33,6 +33,7 @@ def measure(scene: Path, changes: list[str]) -> dict[str, Any]:
     durations: dict[str, float] = {}
 
     def note(stage: str, share: float) -> None:
+        """Note when a stage begins, and how long it took."""
         name = str(stage)
         if share == 0.0:
             begin_times.setdefault(name, time.process_time())

@@ -35,6 +35,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     picture_number = 0
 
     def say(path: str) -> None:
+        """Tell a picture's path and the progress."""
         nonlocal picture_number
         picture_number += 1
         logger.info(path)

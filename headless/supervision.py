@@ -74,6 +74,7 @@ def _wait_and_exit(child: int, error_pipe: _ErrorPipe, journal: int, opened_file
     """Wait for the child, passing on signals and errors, and end this process with the child's exit code."""
 
     def hand_on(number: int, _: object) -> None:
+        """Pass a signal on to the child."""
         with suppress(ProcessLookupError):
             os.kill(child, number)
 

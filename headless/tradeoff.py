@@ -65,6 +65,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     results = {}
 
     def measure() -> dict[str, str]:
+        """Measure all scenes, write their files, and return the document's tables by name."""
         tables: dict[str, str] = {}
         for number, (scene, title) in enumerate(titles.items()):
             results[title] = _measure_all(arguments, scene, title, _part(progress, number, len(titles)))

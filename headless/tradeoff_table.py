@@ -92,6 +92,7 @@ def better_row(row: Mapping[str, Any], others: Iterable[Mapping[str, Any]], nois
     """
 
     def as_accurate(other: Mapping[str, Any]) -> bool:
+        """Return whether another row has all errors of the row, and none that is larger."""
         other_errors = other["errors"]
         return all(
             name in other_errors and abs(other_errors[name]) <= (1.0 + ALIKE) * abs(error)

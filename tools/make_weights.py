@@ -248,6 +248,7 @@ def figures_of(plan: Plan, scores: dict[str, Any], place_text: str, *, is_inside
     best_rule = round(min(error for error in rule_errors if error is not None), 3)
 
     def figure(text: str, value: float, unit: str, rule: float | None = None) -> Figure:
+        """Return a figure of the card, rounded."""
         return Figure(name=f"{text}, {place_text}", value=round(value, 3), rule=rule, unit=unit, inside=is_inside)
 
     shares = [(share, means[fused_name][f"coverage_{share}"]["mean"]) for share in (68, 95)]

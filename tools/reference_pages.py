@@ -150,6 +150,7 @@ def filled(page: str) -> str:
     """Return a page with the text between its marks made anew, headings one level below the one before each mark."""
 
     def text(mark: re.Match[str]) -> str:
+        """Return a mark with its text made anew, headings one level below those before it."""
         levels = re.findall(r"^(#+) ", page[: mark.start()], re.MULTILINE) or [""]
         part = re.sub("^#", f"{levels[-1]}#", generated(mark[1]), flags=re.MULTILINE)
         return f"<!-- generated: {mark[1]} -->\n\n{part}\n\n<!-- end: {mark[1]} -->"

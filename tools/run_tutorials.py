@@ -91,6 +91,7 @@ def broken_rules(which: int) -> Callable[[Path], str]:
     """Return what says how many rules a road of 300 m breaks before (0) and after (1) a lane was made 4.5 m wide."""
 
     def value(folder: Path) -> str:
+        """Return the number of broken rules in words; Blender counts them once for each folder."""
         output = _once(folder, _WIDER_LANE, [sys.executable, "-c", _WIDER_LANE])
         return _NUMBERS[int(output.split("broken:")[1].split()[which])]
 
@@ -166,6 +167,7 @@ def _same(is_learned: bool) -> Callable[[str, str], bool]:
     """Return what says whether two lines are the same, but for the machine's figures and scores a little apart."""
 
     def same(shown_line: str, printed_line: str) -> bool:
+        """Return whether two lines say the same."""
         shown_line, printed_line = (_MACHINE.sub("#", line) for line in (shown_line, printed_line))
         if not is_learned:
             return _spaced(shown_line) == _spaced(printed_line)

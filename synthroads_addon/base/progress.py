@@ -41,6 +41,7 @@ def part_of(progress: Progress, first_share: float, last_share: float) -> Progre
     """Return a callback for a part of some work: its shares 0 to 1 are `first_share` to `last_share` of the whole."""
 
     def report(stage: str, share: float) -> None:
+        """Report a share of the part as one of the whole."""
         progress(stage, first_share + share * (last_share - first_share))
 
     return report
@@ -50,6 +51,7 @@ def in_stage(progress: Progress, name: str) -> Progress:
     """Return a callback for work that is one stage of a job, whose own stages become the details of that one."""
 
     def report(stage: str, share: float) -> None:
+        """Report a share under the stage's name."""
         progress(Stage(name, stage), share)
 
     return report

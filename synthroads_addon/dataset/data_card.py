@@ -42,6 +42,7 @@ def _how(recipe: Recipe, jobs: Sequence[SceneJob]) -> list[str]:
     """Return the lines about how the set was made: fidelity, scanner, platform and what is drawn."""
 
     def count_names(values: Iterable[str]) -> str:
+        """Return names with how often each is there, as text."""
         return ", ".join(f"{name} ({count})" for name, count in sorted(Counter(values).items()))
 
     return [

@@ -93,6 +93,7 @@ def surfaces_of(
     rows = list(rows)
 
     def column(name: str) -> Float:
+        """Return a property of all materials as an array."""
         return np.array([getattr(row, name) for row in rows], dtype=np.float64)
 
     slope = np.zeros(len(rows)) if reflection == "lambert" else column("slope")

@@ -112,6 +112,7 @@ def _mix_materials(mean: Material, other: Material, share: float) -> Material:
     """
 
     def between(name: str) -> float:
+        """Return a property between those of the two materials."""
         return float((1.0 - share) * getattr(mean, name) + share * getattr(other, name))
 
     color = np.clip(np.array(mean.base_color) * (1.0 - share) + np.array(other.base_color) * share, 0.0, 1.0)

@@ -172,6 +172,7 @@ class Alignment:
         tangent_series[1] = np.exp(1j * headings[[0, -1]])
 
         def framed(first_value: float, piece_values: Float, last_value: float) -> Float:
+            """Return the pieces' values between one for what lies before the axis and one for what lies behind."""
             return np.concatenate(([first_value], piece_values, [last_value]))
 
         series = np.concatenate((tangent_series[:, :1], series, tangent_series[:, 1:]), axis=1)

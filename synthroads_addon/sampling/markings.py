@@ -138,6 +138,7 @@ class _Painter:
     def _arrows(
         self, name: str, kind: Any, stations: list[float], distances: np.ndarray
     ) -> Iterator[tuple[str, Arrow]]:
+        """Yield an arrow with its name for each station, at its distance from the axis."""
         for number, (station, distance) in enumerate(zip(stations, distances.tolist(), strict=True), start=1):
             arrow = Arrow(
                 instance=1,

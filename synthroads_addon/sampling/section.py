@@ -402,10 +402,8 @@ class CarriagewaySampler:
         steady_widths = steady_widths[first_steady:]
         # A lane that begins or ends is the outermost or the innermost one: the latter moves nothing outside of it.
         if not steady_widths[-1]:
-            innermost_edge, steady_widths = (
-                innermost_edge + max(point.width for point in lanes[-1].width),
-                steady_widths[:-1],
-            )  # type: ignore[union-attr]
+            innermost_edge += max(point.width for point in lanes[-1].width)  # type: ignore[union-attr]
+            steady_widths = steady_widths[:-1]
         return tuple(innermost_edge + sum(steady_widths[i:]) for i in range(len(steady_widths) + 1))
 
     def _ruts(self, lanes: tuple[Lane, ...], rng: np.random.Generator) -> tuple[Rut, ...]:

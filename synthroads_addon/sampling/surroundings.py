@@ -180,6 +180,7 @@ def _shrub_belts(site: PlacementSite, room: float) -> Iterator[tuple[str, Vegeta
 def _plants(
     rng: np.random.Generator, kind: Kind, species: str, density: float, band: tuple[float, float], heights: Interval
 ) -> tuple[str, Vegetation]:
+    """Return the plants of a species in a band beside the road, with heights drawn within limits, and their name."""
     least_height, largest_height = sorted((draw(rng, heights), draw(rng, heights)))
     plants = Vegetation(
         instance=1,

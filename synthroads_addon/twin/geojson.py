@@ -235,4 +235,5 @@ class _Writer:
 
 
 def _feature(properties: Feature, kind: str, coordinates: list[Any]) -> Feature:
+    """Return a GeoJSON feature with a geometry of a kind."""
     return {"type": "Feature", "properties": properties, "geometry": {"type": kind, "coordinates": coordinates}}

@@ -154,6 +154,7 @@ def triangulate_twisted(faces: Faces) -> Faces:
 
 
 def _flat_fans(points: Float, fans: Int) -> NDArray[np.bool_]:
+    """Return a mask of the fans whose corners lie in a plane, within half of `FLAT`."""
     return quad_twist(points, fans) <= FLAT / 2.0
 
 
@@ -164,6 +165,7 @@ def _stations_between(stations: Float, start: float, end: float) -> Float:
 
 
 def _inside(stations: Float, outline: Float) -> Float:
+    """Return the stations that lie between the ends of an outline."""
     return _stations_between(stations, float(outline[:, 0].min()), float(outline[:, 0].max()))
 
 

@@ -172,6 +172,7 @@ def run_in_caller(function: Callable[[], R]) -> R:
     errors: list[BaseException] = []
 
     def run() -> None:
+        """Run the function and keep its result or its error."""
         try:
             results.append(function())
         except BaseException as error:

@@ -164,6 +164,7 @@ def main() -> int:
     threads = max(1, available_cores() // producers)
 
     def make(folder: Path, plan: StreamPlan, number: int, stopping: Stop) -> None:
+        """Make a scene; what is wrong with input or disk becomes the scene's failure."""
         try:
             make_scene(folder, plan, number, stopping, threads)
         except (InputError, OSError) as error:

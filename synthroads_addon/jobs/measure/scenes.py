@@ -71,6 +71,7 @@ def rays_of_blocks(plan: ScanPlan, blocks: Sequence[Block]) -> Rays:
     caster = part.caster
 
     def cast_and_keep(origins: Float32, directions: Float32, maximum_range: float) -> NDArray[np.int32]:
+        """Cast rays, of which a copy is recorded."""
         recorded_rays.append((origins.copy(), directions.copy()))
         return caster.cast(origins, directions, maximum_range)
 

@@ -232,6 +232,7 @@ class Gantry(StandingThing):
         depth = self.beam_depth + 2.0 * POST_ENCLOSES if is_at_end else self.beam_depth * POST_SHARE
 
         def block(margin: float, bottom: float, block_top: float) -> Float:
+            """Return a block around the post, wider by a margin (m) on all sides, from a height to another."""
             size = (self.post_width + 2.0 * margin, depth + 2.0 * margin, block_top - bottom)
             return box(size, (x, 0.0, (bottom + block_top) / 2.0))
 

@@ -99,6 +99,7 @@ def _room(
     """Return the distances (N,) of the edge that an asset's distance counts from, and the room (N,) beyond it, m."""
 
     def beside(places: Float) -> tuple[Float, Float]:
+        """Return, at places along the road, the distance of the edge from the axis and the room behind it, m."""
         if in_median:
             inner = section.distances(places)[:, 0]
             return inner, inner

@@ -99,6 +99,7 @@ def random_front(
 def _delineators(
     layout: Layout, roadside: Roadside, reservations: Reservations, rng: np.random.Generator
 ) -> Iterator[tuple[str, Delineator]]:
+    """Yield delineators with their names at random free stations of a roadside."""
     for number in range(1, _count(DELINEATORS_PER_KM, layout, rng) + 1):
         start = draw_start(rng, free_ranges(0.0, layout.length, reservations), 2.0 * _DELINEATOR_HALF)
         if start is None:

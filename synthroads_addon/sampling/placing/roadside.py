@@ -262,6 +262,7 @@ def _fit(width: float, depth: float, room: float) -> tuple[float, float]:
 
 
 def _wall(span: Range, offset: float, fields: Mapping[str, Any]) -> Wall:
+    """Return a wall along a range of stations, with rounded lengths."""
     return Wall(
         instance=1,
         start_station=round_value(span[0]),

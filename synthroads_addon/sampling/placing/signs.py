@@ -180,6 +180,7 @@ def _gore_station(shape: TurnoutShape, width: float) -> float:
 def _behind_entry(
     layout: Layout, roadside: Roadside, turnout: Turnout, limit: str | None, rng: np.random.Generator
 ) -> None:
+    """Place the signs behind an entry: the speed limit, if there is one, and the table of destinations."""
     end = roadside.ahead(layout.site.begin(turnout), turnout.length)
     if limit:
         place_sign(roadside, limit, roadside.ahead(end, LIMIT_BEHIND_ENTRY), _ROOM)

@@ -197,6 +197,7 @@ class LanePlan:
 
     @staticmethod
     def _columns_of(lanes: Mapping[Side, Iterable[LaneStrip]]) -> set[int]:
+        """Return the columns of the lanes of both sides."""
         return {lane.column for strips in lanes.values() for lane in strips}
 
     def _hand_over_width(self, columns: list[int], new_columns: list[int], pieces: tuple[int, int]) -> None:
