@@ -99,8 +99,10 @@ def _check_road_changes(arguments: argparse.Namespace) -> None:
     for change in arguments.changes:
         for name in _road_fields(change):
             if arguments.parameters or name in fields:
-                what = "course and place of the road" if arguments.axis else "the whole road"
-                text = f"road.{name} has no effect with {option}, whose file says {what}; leave one of the two out"
+                file_content = "course and place of the road" if arguments.axis else "the whole road"
+                text = (
+                    f"road.{name} has no effect with {option}, whose file says {file_content}; leave one of the two out"
+                )
                 raise InputError("--set", change, text)
 
 

@@ -55,9 +55,11 @@ def _check(arguments: argparse.Namespace) -> None:
     check_file_target(arguments.output, overwrite=arguments.overwrite, ending=".npz")
     if not 0 <= arguments.seed < 2**63:
         raise InputError("--seed", arguments.seed, "must be a whole number from 0")
-    for name, (low, high) in _LIMITS.items():
-        if not low <= getattr(arguments, name) <= high:
-            raise InputError(f"--{name.replace('_', '-')}", getattr(arguments, name), f"must be {low} to {high:g}")
+    for name, (smallest, largest) in _LIMITS.items():
+        if not smallest <= getattr(arguments, name) <= largest:
+            raise InputError(
+                f"--{name.replace('_', '-')}", getattr(arguments, name), f"must be {smallest} to {largest:g}"
+            )
 
 
 def contents(figures: dict[str, Any]) -> str:

@@ -65,7 +65,7 @@ def row_fault(row: Any, knob: str, value: Any) -> str | None:
         if not isinstance(part, dict) or not all(key in names and is_number(part[key]) for key in part):
             return f"{name} must be numbers by name: {', '.join(names)}"
     all_seconds = row.get("all_seconds", [1.0])
-    if not isinstance(all_seconds, list) or not all(is_number(one) and one > 0.0 for one in all_seconds):
+    if not isinstance(all_seconds, list) or not all(is_number(number) and number > 0.0 for number in all_seconds):
         return "all_seconds must be a list of numbers above 0"
     faulty_field = next((name for name in ("machine", "colour_truth") if not isinstance(row.get(name, ""), str)), None)
     return faulty_field and f"{faulty_field} must be a text"

@@ -108,7 +108,7 @@ def measure_platform(platform: str) -> dict[str, Any]:
 
 def octave_seconds(trial: Trial, octaves: int) -> float:
     """Return the processor microseconds per point that the micro-relief takes with a number of octaves."""
-    results = [one for one in trial.scan_lines(RINGS[1]) if len(one.points)]
+    results = [result for result in trial.scan_lines(RINGS[1]) if len(result.points)]
     begin = trial.clock()
     places = shift_points(results, trial.plan, octaves)
     return 1e6 * (trial.clock() - begin) / max(1, sum(map(len, places)))

@@ -149,8 +149,16 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
     minutes, machine = train(plan, folder, options)
     run: Run[Any] = Run.open(folder)
     figures = [
-        *(figure for split, where in plan.inside.items() for figure in measured(plan, name, split, where, arguments)),
-        *(figure for split, where in plan.outside.items() for figure in measured(plan, name, split, where, arguments)),
+        *(
+            figure
+            for split, place_text in plan.inside.items()
+            for figure in measured(plan, name, split, place_text, arguments)
+        ),
+        *(
+            figure
+            for split, place_text in plan.outside.items()
+            for figure in measured(plan, name, split, place_text, arguments)
+        ),
         *foreign(plan, name, folder, arguments),
     ]
     arguments.weights.mkdir(parents=True, exist_ok=True)

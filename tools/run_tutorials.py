@@ -87,13 +87,13 @@ def demo_points(folder: Path) -> str:
     return f"{report['counts']['points'] / 1e6:.1f}"
 
 
-def broken_rules(which: int) -> Callable[[Path], str]:
+def broken_rules(before_or_after: int) -> Callable[[Path], str]:
     """Return what says how many rules a road of 300 m breaks before (0) and after (1) a lane was made 4.5 m wide."""
 
     def value(folder: Path) -> str:
         """Return the number of broken rules in words; Blender counts them once for each folder."""
         output = _once(folder, _WIDER_LANE, [sys.executable, "-c", _WIDER_LANE])
-        return _NUMBERS[int(output.split("broken:")[1].split()[which])]
+        return _NUMBERS[int(output.split("broken:")[1].split()[before_or_after])]
 
     return value
 

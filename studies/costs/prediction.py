@@ -93,7 +93,7 @@ def differences(before: Path, after: Path) -> list[str]:
 
     The attribute for the class is looked at only if the first file has it not: it must be there.
     """
-    found: set[str] = set()
+    changed_names: set[str] = set()
     with laspy.open(before) as reader_before, laspy.open(after) as reader_after:
         if reader_before.header.point_count != reader_after.header.point_count:
             return ["number of points"]
@@ -102,16 +102,20 @@ def differences(before: Path, after: Path) -> list[str]:
             if not np.array_equal(
                 getattr(field_before, "value", field_before), getattr(field_after, "value", field_after)
             ):
-                found.add(f"header: {name}")
-        found |= {f"record {owner} {number}" for owner, number, _ in _records(reader_before) - _records(reader_after)}
+                changed_names.add(f"header: {name}")
+        changed_names |= {
+            f"record {owner} {number}" for owner, number, _ in _records(reader_before) - _records(reader_after)
+        }
         if PREDICTED not in reader_after.header.point_format.dimension_names:
-            found.add(PREDICTED)
+            changed_names.add(PREDICTED)
         for block_before, block_after in zip(
             reader_before.chunk_iterator(BLOCK), reader_after.chunk_iterator(BLOCK), strict=True
         ):
             names = [name for name in block_before.array.dtype.names if name != PREDICTED]
-            found |= {name for name in names if not np.array_equal(block_before.array[name], block_after.array[name])}
-    return sorted(found)
+            changed_names |= {
+                name for name in names if not np.array_equal(block_before.array[name], block_after.array[name])
+            }
+    return sorted(changed_names)
 
 
 def _records(file: laspy.LasReader) -> Counter[tuple[str, int, bytes]]:

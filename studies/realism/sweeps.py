@@ -104,14 +104,14 @@ def sweep_figures(path: Path, row: ListedCloud) -> SweepFigures:
                 raise
     ranges = {name: _ranges(points, row, path.name) for name, points in points_of_class.items()}
     road, distance = points_of_class[ROAD], ranges[ROAD]
-    rings = [(distance >= low) & (distance < high) for low, high in pairwise(RINGS)]
+    rings = [(distance >= nearest) & (distance < farthest) for nearest, farthest in pairwise(RINGS)]
     has_enough = [int(ring.sum()) >= _FEWEST for ring in rings]
     # Lost numbers are points all the same, alike many at all ranges.
     share = len(road.intensity) / (len(road.intensity) + road.zeros)
     azimuth = _azimuth(road, row)
     density = [
-        _density(distance[ring], azimuth[ring], low, high) / share if is_enough else np.nan
-        for ring, is_enough, (low, high) in zip(rings, has_enough, pairwise(RINGS), strict=True)
+        _density(distance[ring], azimuth[ring], nearest, farthest) / share if is_enough else np.nan
+        for ring, is_enough, (nearest, farthest) in zip(rings, has_enough, pairwise(RINGS), strict=True)
     ]
     level = [
         10.0 * np.log10(np.median(road.intensity[ring])) if is_enough else np.nan

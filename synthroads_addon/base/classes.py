@@ -342,7 +342,7 @@ def _merging_table(rows: Sequence[ClassRow], fine: Mapping[int, PointClass], sou
     return table
 
 
-def _known_class(name: Member | None, ids: Mapping[str, int], where: str) -> None:
+def _known_class(name: Member | None, ids: Mapping[str, int], field: str) -> None:
     """Raise InputError if a member is the name of a class that the full table doesn't have."""
     if isinstance(name, str) and name not in ids:
-        raise InputError(where, name, f"must be a class of {', '.join(ids)}{nearest_name(name, ids)}")
+        raise InputError(field, name, f"must be a class of {', '.join(ids)}{nearest_name(name, ids)}")

@@ -36,7 +36,7 @@ class StreamPlan(ClosedModel):
     generator: str = Field(description="Program and version that makes them.")
 
     def job(self, number: int) -> SceneJob:
-        """Return the scene of a number from 0.
+        """Return the scene of a number from 0: which one of the recipe it is follows from its round and place in that.
 
         Raises:
             InputError: the recipe has no scene of the split, or a scenario is wrong.
@@ -44,8 +44,8 @@ class StreamPlan(ClosedModel):
         places = [place for place, (_, _, split) in enumerate(scene_places(self.recipe)) if split == self.split]
         if not places:
             raise InputError("split", self.split, f"the recipe {self.recipe.title} has no scene of it")
-        turn, place = divmod(number, len(places))
-        seed = int(stream(self.seed, "streamed scenes", self.recipe.seed, turn).integers(LARGEST_SEED))
+        round_number, place = divmod(number, len(places))
+        seed = int(stream(self.seed, "streamed scenes", self.recipe.seed, round_number).integers(LARGEST_SEED))
         order = stream(seed, "order of scenes").permutation(len(places))
         return scene_job(self.recipe.model_copy(update={"seed": seed}), places[int(order[place])])
 

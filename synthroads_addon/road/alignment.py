@@ -171,18 +171,18 @@ class Alignment:
         tangent_series[0] = 0.0, piece_starts[-1]
         tangent_series[1] = np.exp(1j * headings[[0, -1]])
 
-        def framed(first_value: float, piece_values: Float, last_value: float) -> Float:
+        def with_ends(first_value: float, piece_values: Float, last_value: float) -> Float:
             """Return the pieces' values between one for what lies before the axis and one for what lies behind."""
             return np.concatenate(([first_value], piece_values, [last_value]))
 
         series = np.concatenate((tangent_series[:, :1], series, tangent_series[:, 1:]), axis=1)
         self._series_x, self._series_y = np.ascontiguousarray(series.real), np.ascontiguousarray(series.imag)
-        self._middles = framed(
+        self._middles = with_ends(
             0.0, self.element_starts[:-1][element_of_piece] + middle_share * lengths[element_of_piece], self.length
         )
-        self._halves = framed(1.0, half_length, 1.0)
-        self._headings = framed(headings[0], heading, headings[-1])
-        self._bends, self._slopes = framed(0.0, curvature, 0.0), framed(0.0, curvature_rate, 0.0)
+        self._halves = with_ends(1.0, half_length, 1.0)
+        self._headings = with_ends(headings[0], heading, headings[-1])
+        self._bends, self._slopes = with_ends(0.0, curvature, 0.0), with_ends(0.0, curvature_rate, 0.0)
         borders = (
             self.element_starts[:-1][element_of_piece]
             + lengths[element_of_piece] * number_in_element / count[element_of_piece]
@@ -470,6 +470,6 @@ def finite_array(name: str, values: ArrayLike) -> Float:
         raise InputError(name, values, "numbers are needed") from None
     if not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        where = "".join(f"[{i}]" for i in place)
-        raise InputError(f"{name}{where}", float(array[place]), "a finite number is needed")
+        index_text = "".join(f"[{i}]" for i in place)
+        raise InputError(f"{name}{index_text}", float(array[place]), "a finite number is needed")
     return array

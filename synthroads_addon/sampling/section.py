@@ -81,7 +81,7 @@ class Feature:
     @property
     def least(self) -> float:
         """Return the shortest length that it takes along the carriageway, m."""
-        return self.fixed_length + math.fsum(low for low, _ in self.lengths)
+        return self.fixed_length + math.fsum(least_length for least_length, _ in self.lengths)
 
 
 @dataclass(frozen=True)

@@ -102,7 +102,7 @@ def bring(name: str, points: Float, declared: MapSystem | None, place: Placement
 
 
 def bring_plan(name: str, lines: list[Float], document: Any, place: Placement) -> list[Float]:
-    """Return lines (N, 2) of a GeoJSON document in the system that they are wanted in; see `bring`."""
+    """Return a GeoJSON document's lines (N, 2) transformed to the coordinate system of a placement; see `bring`."""
     points = np.concatenate(lines)
     target_points = bring(
         name, np.column_stack([points, np.zeros(len(points))]), geojson_system(name, document), place, True

@@ -180,12 +180,12 @@ def _ranges(road: Road) -> Iterator[tuple[str, float, float]]:
 def _object_on_pavement(road: Road) -> Iterator[Finding]:
     """Yield a finding for each object, or stand of plants, that reaches over the pavement."""
     allowed_objects = road.of(ConstructionBeacon)
-    clearance, where = road.positions.nearest, road.positions.where
+    clearance, stations = road.positions.nearest, road.positions.where
     worst_places: dict[str, tuple[float, float]] = {}
     for i in np.flatnonzero(clearance < -TOLERANCE).tolist():
         name = road.bodies.names[i]
         if road.bodies.items[i].part in ("foot", "barrier", "wall") and name not in allowed_objects:
-            worst_places[name] = min(worst_places.get(name, (0.0, 0.0)), (float(clearance[i]), float(where[i])))
+            worst_places[name] = min(worst_places.get(name, (0.0, 0.0)), (float(clearance[i]), float(stations[i])))
     places = [(name, station, distance) for name, (distance, station) in worst_places.items()]
     for name, plants in road.of(Vegetation).items():
         verge = min(edges.verge for edges in road.sides.values())

@@ -37,11 +37,15 @@ class Knob:
     whole_paths: bool = False
 
 
-def _read_knob(
-    table: str, errors: list[str], common_changes: list[str], rows: list[Any], whole_paths: bool = False
-) -> Knob:
-    """Return a `Knob` from its entry in the shipped file; ``common_changes`` are changes that apply to every row."""
-    return Knob(table, {value: (*common_changes, *changes) for value, changes in rows}, tuple(errors), whole_paths)
+def _read_knob(table: str, errors: list[str], always: list[str], rows: list[Any], whole_paths: bool = False) -> Knob:
+    """Return a `Knob` from its entry in the shipped file, whose keys the parameters are.
+
+    Args:
+        table, errors, whole_paths: see `Knob`.
+        always: changes that apply to every row.
+        rows: pairs of a value and its changes.
+    """
+    return Knob(table, {value: (*always, *changes) for value, changes in rows}, tuple(errors), whole_paths)
 
 
 KNOBS = {name: _read_knob(**data) for name, data in read_json(PRESETS / "tradeoff_rows.json").items()}

@@ -79,7 +79,7 @@ def plane_waves(xy: Float, seed: int, purpose: str, shortest_wavelength: float) 
     Args:
         xy: local points, m.
         seed, purpose: of its random numbers.
-        shortest_wavelength: wavelength, m; they spread over two and a half octaves above it.
+        shortest_wavelength: of the field's waves, m; the others are up to two and a half octaves longer.
     """
     rng = stream(seed, "landscape", purpose)
     octaves, directions = rng.uniform(0.0, _OCTAVES, _WAVES), rng.uniform(0.0, 2.0 * np.pi, _WAVES)

@@ -105,7 +105,10 @@ class PavementSurface:
         return unevenness(place, pavement.unevenness, self._seed)
 
     def _lay_damage(self, side: Side, station: Float, offset: Float, rows: Index, result: Float) -> None:
-        """Give the rows on damage its heights: later ones lie over earlier ones, patches over cracks and markings."""
+        """Set, in place, the heights of the points (rows) that lie on damage; of several the last one counts.
+
+        Patches come after cracks and removed markings.
+        """
         cell = np.floor(station[rows] / _CELL).astype(np.int64)
         for number in np.unique(cell).tolist():
             rows_of_cell = rows[cell == number]

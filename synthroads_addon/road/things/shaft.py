@@ -48,7 +48,7 @@ class Shaft(StandingThing):
         return TwinTypes(entity, f"obstacle.{self.kind}", kind=self.kind)
 
     def bodies(self, place: Place) -> list[Body]:
-        """Return the closed solid of its concrete in its frame; grating, slots or cover on it are details."""
+        """Return the shaft's bodies in its own frame: its concrete, and grating and slots, or the cover, as details."""
         lid_width, concrete_height, top = self.size * LID, self.height + BURIED, self.height + LID_RISE
         if self.kind == "manhole":
             concrete, cover = (

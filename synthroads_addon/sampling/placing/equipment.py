@@ -146,6 +146,6 @@ def plan_cabinets(layout: Layout, rng: np.random.Generator) -> None:
 
 
 def _put_pole(roadside: Roadside, kind: str, station: float, height: float, diameter: float, arm: float) -> None:
-    """Put a pole of a kind at a station, if there is room."""
+    """Request a pole of a kind at a station of a roadside."""
     fields = {"kind": kind, "height": height, "diameter": diameter, "arm_length": arm}
     roadside.put(PlacementRequest(f"pole-{kind}", Pole, station, _HALF, diameter, fields, obstacle=True))

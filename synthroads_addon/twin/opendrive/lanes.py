@@ -43,9 +43,11 @@ def _add_lane_offset(parent: Element, plan: LanePlan) -> None:
         add_cubic(parent, "laneOffset", {"s": start}, coefficients)
 
 
-def _add_side(parent: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadMarks, where: tuple[int, Side]) -> None:
+def _add_side(
+    parent: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadMarks, section_and_side: tuple[int, Side]
+) -> None:
     """Add the lanes of one side of a lane section, ordered from left to right."""
-    number, side = where
+    number, side = section_and_side
     section = plan.sections[number]
     if not section.lanes[side]:
         return

@@ -33,14 +33,14 @@ def attribute_text(value: str | int | float | bool) -> str:
     return _FORBIDDEN.sub("", str(value))
 
 
-def add_cubic(parent: Element, tag: str, where: Mapping[str, Value], coefficients: Sequence[float]) -> Element:
-    """Add and return an element with the coefficients of a cubic a + b u + c u^2 + d u^3, which begins at `where`.
+def add_cubic(parent: Element, tag: str, position: Mapping[str, Value], coefficients: Sequence[float]) -> Element:
+    """Add and return an element with the coefficients of a cubic a + b u + c u^2 + d u^3, which begins at `position`.
 
     Coefficients have 12 significant digits: at 100 m a d of 12 digits is exact to less than a nanometre.
     """
     a, *higher_coefficients = coefficients
     texts = {name: f"{value + 0.0:.12g}" for name, value in zip("bcd", higher_coefficients, strict=True)}
-    return element(parent, tag, {**where, "a": float(a), **texts})
+    return element(parent, tag, {**position, "a": float(a), **texts})
 
 
 def add_user_data(parent: Element, code: str, value: Value) -> None:
