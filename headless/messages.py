@@ -63,25 +63,25 @@ class _Remarks(logging.Filter):
 
     def __init__(self) -> None:
         super().__init__()
-        self._seen: set[str] = set()
-        self._assumed: list[logging.LogRecord] = []
+        self._texts_seen: set[str] = set()
+        self._assumptions: list[logging.LogRecord] = []
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Return whether a message is shown now: each remark once, and assumptions only at the end."""
         if record.levelno < logging.WARNING and not hasattr(record, ASSUMPTION):
             return True
         text = record.getMessage()
-        if text in self._seen:
+        if text in self._texts_seen:
             return False
-        self._seen.add(text)
+        self._texts_seen.add(text)
         if hasattr(record, ASSUMPTION):
-            self._assumed.append(record)
+            self._assumptions.append(record)
             return False
         return True
 
     def tell_assumptions(self) -> None:
         """Log what was assumed."""
-        for record in self._assumed:
+        for record in self._assumptions:
             logger.info(record.getMessage())
 
 

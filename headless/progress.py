@@ -88,13 +88,13 @@ class _LineProgress:
     """
 
     def __init__(self, patience: float, first_stage: str) -> None:
-        self._seen: set[str] = set()
-        self._begun = self._last = time.perf_counter()
+        self._stages_told: set[str] = set()
+        self._begin_time = self._last_time = time.perf_counter()
         self._stage, self._share = first_stage, 0.0
         self._rate = _Rate()
         self._lock = threading.RLock()
         self._held: list[str] | None = []
-        self._over = threading.Event()
+        self._is_over = threading.Event()
         self._patience = patience
         _start_thread(self._beat)
         _endings.append(self._end)
@@ -104,14 +104,14 @@ class _LineProgress:
             now = time.perf_counter()
             self._stage, self._share = stage, share
             self._rate.add(now, stage, share)
-            if stage not in self._seen or now - self._last >= INTERVAL:
+            if stage not in self._stages_told or now - self._last_time >= INTERVAL:
                 self._tell(now)
 
     def _tell(self, now: float) -> None:
         """Log a line on the stage that is at work."""
-        self._seen.add(self._stage)
-        self._last = now
-        time_text = f"after {now - self._begun:.0f} s"
+        self._stages_told.add(self._stage)
+        self._last_time = now
+        time_text = f"after {now - self._begin_time:.0f} s"
         state = f"{100.0 * self._share:.0f} % {time_text}" if self._rate.began else f"at work {time_text}"
         seconds_left = self._rate.left(now)
         state += "" if seconds_left is None else f", about {duration(seconds_left)} left"
@@ -124,12 +124,12 @@ class _LineProgress:
 
     def _beat(self) -> None:
         """Log a line whenever none was logged for `INTERVAL` seconds, until the end: work may tell nothing for long."""
-        if not self._over.wait(self._patience):
+        if not self._is_over.wait(self._patience):
             self._show_held()
-        while not self._over.wait(max(0.01, self._last + INTERVAL - time.perf_counter())):
+        while not self._is_over.wait(max(0.01, self._last_time + INTERVAL - time.perf_counter())):
             with self._lock:
                 now = time.perf_counter()
-                if now - self._last >= INTERVAL and not self._over.is_set():
+                if now - self._last_time >= INTERVAL and not self._is_over.is_set():
                     self._tell(now)
 
     def _show_held(self) -> None:
@@ -142,7 +142,7 @@ class _LineProgress:
     def _end(self) -> None:
         """End the thread, so that no more lines come."""
         with self._lock:
-            self._over.set()
+            self._is_over.set()
 
 
 class _Rate:
@@ -182,7 +182,7 @@ class _StageTimeProgress:
     """Progress callback that logs each stage's beginning and duration, and calls another one."""
 
     def __init__(self, display: Progress) -> None:
-        self._shown = display
+        self._display = display
         self._stage: str | None = None
         self._since = 0.0
         _endings.append(self._end)
@@ -192,7 +192,7 @@ class _StageTimeProgress:
             self._end()
             logger.debug("stage %s: begins", stage)
             self._stage, self._since = stage, time.perf_counter()
-        self._shown(stage, share)
+        self._display(stage, share)
 
     def _end(self) -> None:
         """Log how long the stage took, if there is one."""

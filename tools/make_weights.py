@@ -268,7 +268,7 @@ def figures_of(plan: Plan, scores: dict[str, Any], place_text: str, *, is_inside
 
 
 def segmentation_figures(scores: dict[str, Any], place_text: str, *, is_inside: bool) -> list[Figure]:
-    """Return mean IoU and that of each class which the truth has."""
+    """Return the figures of a segmentation: mean IoU, and the IoU of each class that occurs in the truth."""
     ((_, test),) = scores["tests"].items()
     by_class = {name: row["iou"] for name, row in test["classes"].items() if row["support"]}
     value_of_name = {"mean IoU": test["mean_iou"], **{f"IoU of {name}": value for name, value in by_class.items()}}

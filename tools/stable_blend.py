@@ -34,18 +34,18 @@ class _File:
             raise ValueError("not a .blend file, or a compressed one")
         self.content = content
         # "BLENDER-v405" or "BLENDER17-01v0502": the latter says how long the header is.
-        self._long = content[7:9].isdigit()
-        self._begin = int(content[7:9]) if self._long else 12
+        self._has_long_header = content[7:9].isdigit()
+        self._begin = int(content[7:9]) if self._has_long_header else 12
 
     @cached_property
     def blocks(self) -> list[_Block]:
         """All blocks of the file in their order; cached."""
-        layout, old_at = ("<4sIQQQ", 8) if self._long else ("<4siQii", 8)
+        layout, old_at = ("<4sIQQQ", 8) if self._has_long_header else ("<4siQii", 8)
         blocks, position = [], self._begin
         while position < len(self.content):
             values = struct.unpack_from(layout, self.content, position)
             code, old = values[0], values[2]
-            number, size = (values[1], values[3]) if self._long else (values[3], values[1])
+            number, size = (values[1], values[3]) if self._has_long_header else (values[3], values[1])
             data = position + struct.calcsize(layout)
             blocks.append(_Block(code, number, old, position + old_at, data, size))
             position = data + size
@@ -84,7 +84,7 @@ class _Structs:
             self._structs.append((kind, list(zip(values[::2], values[1::2], strict=True))))
             position += 4 + 4 * number
         self._of_type = {kind: number for number, (kind, _) in enumerate(self._structs)}
-        self._known: dict[int, list[int]] = {}
+        self._pointers_of_struct: dict[int, list[int]] = {}
 
     def size(self, number: int) -> int:
         """Return the size of the struct of a number, bytes."""
@@ -96,9 +96,9 @@ class _Structs:
 
     def pointers(self, number: int) -> list[int]:
         """Return the byte offsets of all pointers in a struct, nested ones included; cached."""
-        if number not in self._known:
-            self._known[number] = list(self._find_pointers(number))
-        return self._known[number]
+        if number not in self._pointers_of_struct:
+            self._pointers_of_struct[number] = list(self._find_pointers(number))
+        return self._pointers_of_struct[number]
 
     def field(self, number: int, names_on_path: tuple[str, ...]) -> tuple[int, int]:
         """Return byte offset and size of a struct's field, given by the names on the path to it; KeyError if none."""

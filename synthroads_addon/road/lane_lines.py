@@ -38,11 +38,11 @@ class LaneLine:
         self._section = CarriagewaySection(carriageway.model_copy(update={"pavement": pavement}))
         widths_inside = [carriageway.inner_offset, carriageway.inner_edge_strip_width]
         self._width = carriageway.lanes[lane].width
-        self._inside = [*widths_inside, *(item.width for item in carriageway.lanes[lane + 1 :])]
+        self._inner_widths = [*widths_inside, *(item.width for item in carriageway.lanes[lane + 1 :])]
 
     def offset(self, station: Float) -> Float:
         """Return the offset of the lane's centre at stations of any shape, m."""
-        distance = sum((width_at(width, station) for width in self._inside), width_at(self._width, station) / 2.0)
+        distance = sum((width_at(width, station) for width in self._inner_widths), width_at(self._width, station) / 2.0)
         return np.asarray(self.carriageway.sign * distance)
 
     def turn(self, station: Float, reach: float) -> Float:
@@ -117,7 +117,7 @@ class LaneLine:
     def _table(self) -> tuple[Float, Float, tuple[Float, Float]]:
         """Return stations of the panels' borders (P + 1,), distances there, and metres per station at panels' ends."""
         road = self.geometry
-        kinks = [s for width in (self._width, *self._inside) for s in width_kinks(width)]
+        kinks = [s for width in (self._width, *self._inner_widths) for s in width_kinks(width)]
         panel_borders = np.clip(
             np.concatenate([road.alignment.element_starts, kinks, [0.0, road.length]]), 0.0, road.length
         )

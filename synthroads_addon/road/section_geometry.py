@@ -48,7 +48,9 @@ class CarriagewaySection:
     def __init__(self, carriageway: Carriageway, turnouts: Iterable[Turnout] = ()) -> None:
         self.carriageway = carriageway
         self.turnouts = tuple(TurnoutShape(turnout, carriageway) for turnout in turnouts)
-        self._first, self._last = np.array([shape.range() for shape in self.turnouts]).reshape(-1, 2).T
+        self._first_stations, self._last_stations = (
+            np.array([shape.range() for shape in self.turnouts]).reshape(-1, 2).T
+        )
         widths = [
             ("inner_edge_strip", carriageway.inner_edge_strip_width),
             *(("lane", lane.width) for lane in reversed(carriageway.lanes)),
@@ -193,7 +195,7 @@ class CarriagewaySection:
         if not self.turnouts or not len(station):
             return []
         # As a negation, so that a NaN among the stations, with which all comparisons are false, is near all turnouts.
-        is_near = ~((self._first > station.max()) | (self._last < station.min()))
+        is_near = ~((self._first_stations > station.max()) | (self._last_stations < station.min()))
         return [self.turnouts[number] for number in np.flatnonzero(is_near) if self.turnouts[number].reaches(station)]
 
     @property

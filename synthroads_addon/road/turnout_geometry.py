@@ -84,7 +84,7 @@ class TurnoutShape:
     def __init__(self, turnout: Turnout, carriageway: Carriageway) -> None:
         self.turnout = turnout
         self.carriageway = carriageway
-        self._forward = (carriageway.traffic > 0) != (turnout.kind == "entry")
+        self._runs_forward = (carriageway.traffic > 0) != (turnout.kind == "entry")
         self._taper = turnout.taper_out_length if turnout.kind == "entry" else turnout.taper_in_length
         self._tip = self._taper + turnout.lane_length
         self.nose = np.inf
@@ -97,7 +97,7 @@ class TurnoutShape:
 
     def station(self, w: float) -> float:
         """Return the station at a distance w along the turnout (both m), for an entry backwards from its end."""
-        return self.turnout.start_station + w if self._forward else self.turnout.end_station - w
+        return self.turnout.start_station + w if self._runs_forward else self.turnout.end_station - w
 
     def kinks(self) -> list[float]:
         """Return the stations (m, unsorted) at which a width's rate of change, or a width, jumps."""
@@ -230,7 +230,7 @@ class TurnoutShape:
 
     def _w(self, station: Float) -> Float:
         """Return the distances (N,) along the turnout from its beginning, m, at stations (N,)."""
-        return station - self.turnout.start_station if self._forward else self.turnout.end_station - station
+        return station - self.turnout.start_station if self._runs_forward else self.turnout.end_station - station
 
     def _x(self, station: Float) -> Float:
         """Return the distances (N,) along the turnout from the gore's tip, m, at stations (N,)."""

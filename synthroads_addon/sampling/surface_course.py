@@ -34,14 +34,14 @@ class SurfaceCourses:
         limits = scenario.pavement
         concrete = stream(seed, "pavement").random() < limits.concrete
         self._kinds: tuple[SurfaceCourse, ...] = limits.concretes if concrete else limits.asphalts
-        self._first = pick(stream(seed, "surface course"), self._kinds)
+        self._first_kind = pick(stream(seed, "surface course"), self._kinds)
         self._age = draw_materials(scenario.materials, seed)["asphalt_age"]
         self._scenario, self._seed, self._length = scenario, seed, length
 
     def draw(self, side: Side, lanes: int) -> dict[str, Any]:
         """Return the kind and ages of a carriageway with a number of lanes, as fields of its pavement."""
         rng = stream(self._seed, "surface course", side)
-        kind = pick(rng, self._kinds) if side == "left" and rng.random() < _OTHER_KIND else self._first
+        kind = pick(rng, self._kinds) if side == "left" and rng.random() < _OTHER_KIND else self._first_kind
         fields: dict[str, Any] = {"kind": kind}
         if rng.random() >= self._scenario.pavement.renewed:
             return fields

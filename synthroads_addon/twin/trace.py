@@ -54,10 +54,10 @@ class Trace:
     ) -> None:
         self.level = level
         self._geometry = geometry
-        self._grown: dict[int, list[int]] = {}
-        self._within, self._reasons = frozenset(within), {**_NOWHERE, **(reasons or {})}
+        self._plants_of_stand: dict[int, list[int]] = {}
+        self._kinds_within_others, self._reasons = frozenset(within), {**_NOWHERE, **(reasons or {})}
         self._entities: dict[int, list[Entity]] = {}
-        self._reduced: list[tuple[str, str]] = []
+        self._reductions: list[tuple[str, str]] = []
 
     def record_entity(self, instance: int, **entity: str | int) -> None:
         """Record that an instance number became an entity of the file, given by keys to find it with."""
@@ -65,11 +65,11 @@ class Trace:
 
     def record_plant(self, plant: PlacedPlant) -> None:
         """Record that a plant exists, so that the report lists its instance number."""
-        self._grown.setdefault(self._geometry.numbers.parts[plant.stand].first, []).append(plant.instance)
+        self._plants_of_stand.setdefault(self._geometry.numbers.parts[plant.stand].first, []).append(plant.instance)
 
     def record_loss(self, name: str, reason: str) -> None:
         """Record why the file shows an object in less detail than the parameter set has it."""
-        self._reduced.append((name, reason))
+        self._reductions.append((name, reason))
 
     def record_omissions(self, placed: PlacedThing) -> None:
         """Record the details of a thing that every format omits: fittings, an unknown shape, what the thing names."""
@@ -100,7 +100,7 @@ class Trace:
         members |= {"identifier": parameters.metadata.identifier, "level_of_detail": self.level}
         instance_rows, losses = self._rows()
         instances = {key: item.instance for key, item in parameters.objects.items()}
-        reduced = [{"id": key, "instance": instances[key], "reason": reason} for key, reason in self._reduced]
+        reduced = [{"id": key, "instance": instances[key], "reason": reason} for key, reason in self._reductions]
         passes = [
             {
                 "id": key,
@@ -118,13 +118,13 @@ class Trace:
     def _rows(self) -> tuple[list[Entity], list[Entity]]:
         """Return the report's rows for instance numbers with entities, and for those that are missing with reasons."""
         objects = self._geometry.parameters.objects
-        if not self._grown:  # the format has no plants, but the report lists them all the same
+        if not self._plants_of_stand:  # the format has no plants, but the report lists them all the same
             for plant in placed_plants(self._geometry):
                 self.record_plant(plant)
         instance_rows, losses = [], []
         for number, name, kinds in self._numbers():
             entities = self._entities.get(number)
-            if not entities and self._within.intersection(kinds):
+            if not entities and self._kinds_within_others.intersection(kinds):
                 # A part without entities of its own lies in those of its object, whose id is before the slash.
                 entities = self._entities.get(objects[name.partition("/")[0]].instance)
             if entities:
@@ -154,6 +154,6 @@ class Trace:
         if isinstance(item, LineMarking):
             return range(len(self._geometry.dashes(item)) if item.dash_length else 0)
         if isinstance(item, Vegetation) and item.kind != "grass":
-            places = self._grown.get(parts.first, ())
+            places = self._plants_of_stand.get(parts.first, ())
             return [number - parts.first for number in places]
         return range(parts.count)

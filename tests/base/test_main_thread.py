@@ -34,7 +34,7 @@ def test_nobody_waits_after_the_end() -> None:
     calls = MainThreadCalls()
     with ThreadPoolExecutor(2) as pool:
         early = pool.submit(calls.call, where)
-        while not calls._waiting.qsize():
+        while not calls._queue.qsize():
             pass
         calls.close()
         late = pool.submit(calls.call, where)

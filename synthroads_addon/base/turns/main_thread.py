@@ -33,7 +33,7 @@ class MainThreadCalls:
     """Calls that threads have the main thread make, one after the other in the order in which they were asked for."""
 
     def __init__(self) -> None:
-        self._waiting: SimpleQueue[_Call | None] = SimpleQueue()
+        self._queue: SimpleQueue[_Call | None] = SimpleQueue()
         self._lock = Lock()
         self._open = True
 
@@ -50,14 +50,14 @@ class MainThreadCalls:
         with self._lock:
             if not self._open:
                 raise Cancelled("the main thread makes no more calls")
-            self._waiting.put(waiting_call)
+            self._queue.put(waiting_call)
         result: T = waiting_call.result.result()
         return result
 
     def make_next(self) -> bool:
         """Make the call that has waited longest; return whether one has waited. In the main thread only."""
         try:
-            waiting_call = self._waiting.get_nowait()
+            waiting_call = self._queue.get_nowait()
         except Empty:
             return False
         if waiting_call is not None:
@@ -67,9 +67,9 @@ class MainThreadCalls:
     def result_of(self, future: Future[T]) -> T:
         """Return the result of a future; the main thread makes the calls of others while it waits."""
         if current_thread() is main_thread():
-            future.add_done_callback(lambda _: self._waiting.put(None))
+            future.add_done_callback(lambda _: self._queue.put(None))
             while not future.done():
-                waiting_call = self._waiting.get()
+                waiting_call = self._queue.get()
                 if waiting_call is not None:
                     waiting_call.make()
         return future.result()
@@ -83,7 +83,7 @@ class MainThreadCalls:
         """Take no more calls: who waits for one gets `Cancelled`."""
         with self._lock:
             self._open = False
-            while not self._waiting.empty():
-                waiting_call = self._waiting.get_nowait()
+            while not self._queue.empty():
+                waiting_call = self._queue.get_nowait()
                 if waiting_call is not None:
                     waiting_call.result.set_exception(Cancelled("the main thread makes no more calls"))

@@ -57,7 +57,7 @@ class Stepper(Generic[T]):
         self._work = work
         self._result: T | None = None
         self._error: BaseException | None = None
-        self._asked: Callable[[], None] | None = None
+        self._call_to_make: Callable[[], None] | None = None
         self._stopping = False
         self._deadline = 0.0
         self._state = _State.WAITING
@@ -77,8 +77,8 @@ class Stepper(Generic[T]):
             if self._state is _State.ASIDE:
                 self._change.wait_for(lambda: self._state is not _State.ASIDE, timeout=min(seconds, _SHORT))
             self._give_turn()
-            while self._asked is not None:
-                function, self._asked = self._asked, None
+            while self._call_to_make is not None:
+                function, self._call_to_make = self._call_to_make, None
                 function()
                 self._give_turn()
         if self._error is not None:
@@ -178,7 +178,7 @@ def run_in_caller(function: Callable[[], R]) -> R:
         except BaseException as error:
             errors.append(error)
 
-    stepper._asked = run
+    stepper._call_to_make = run
     stepper._wait()
     if errors:
         raise errors[0]

@@ -93,7 +93,7 @@ class TurnoutEdges:
     def __init__(self, name: str, turnout: Turnout, traffic: int, shoulder: WidthByStation) -> None:
         self.name, self.turnout = name, turnout
         ramp = turnout.ramp
-        self._forward = (traffic > 0) != (turnout.kind == "entry")
+        self._runs_forward = (traffic > 0) != (turnout.kind == "entry")
         self.taper = turnout.taper_out_length if turnout.kind == "entry" else turnout.taper_in_length
         self.tip = self.taper + turnout.lane_length
         self.natural_nose = 0.0
@@ -114,7 +114,7 @@ class TurnoutEdges:
 
     def station(self, w: float) -> float:
         """Return the station at a distance w along the turnout (both m), for an entry backwards from its end."""
-        return self.turnout.start_station + w if self._forward else self.turnout.end_station - w
+        return self.turnout.start_station + w if self._runs_forward else self.turnout.end_station - w
 
     def span(self, first_distance: float, last_distance: float) -> tuple[float, float]:
         """Return the stations of two distances w along the turnout, the lower one first, m."""
@@ -138,7 +138,7 @@ class TurnoutEdges:
     def widen(self, station: Float, edges: _WidthSums) -> None:
         """Add the turnout's widths at N stations to the carriageway's sums, in place."""
         start, end = self.turnout.start_station, self.turnout.end_station
-        w = station - start if self._forward else end - station
+        w = station - start if self._runs_forward else end - station
         rows = np.flatnonzero((w > 0.0) & (w <= self.end))
         if not len(rows):
             return
@@ -193,13 +193,13 @@ class Edges:
     def __init__(self, name: str, carriageway: Carriageway, turnouts: dict[str, Turnout], length: float) -> None:
         self.name, self.carriageway = name, carriageway
         self.sign, self.traffic = carriageway.sign, carriageway.traffic
-        self._inner = WidthByStation(carriageway.inner_offset)
+        self._inner_offset = WidthByStation(carriageway.inner_offset)
         self._shoulder = WidthByStation(carriageway.hard_shoulder_width)
         self._inner_strip = WidthByStation(carriageway.inner_edge_strip_width)
         self._outer_strip = WidthByStation(carriageway.outer_edge_strip_width)
         self.lane_widths = [WidthByStation(lane.width) for lane in carriageway.lanes]
         self.verge = float(WidthByStation(carriageway.verge_width).width.min())
-        widths = (self._inner, self._shoulder, self._inner_strip, self._outer_strip, *self.lane_widths)
+        widths = (self._inner_offset, self._shoulder, self._inner_strip, self._outer_strip, *self.lane_widths)
         self.turnouts = [TurnoutEdges(key, item, self.traffic, self._shoulder) for key, item in turnouts.items()]
         bends = [width.station for width in widths if not width.constant] + [t.marks() for t in self.turnouts]
         inner_bends = np.concatenate(bends) if bends else np.zeros(0)
@@ -226,7 +226,7 @@ class Edges:
 
     def inner(self, station: Float) -> Float:
         """Return the distance (N,), m, of the inner paved edge from the centreline at N stations."""
-        return self._inner(station)
+        return self._inner_offset(station)
 
     def between(self, start: float, end: float) -> Float:
         """Return the stations (K,), m: the begin, the marks between it and the end, and the end."""
@@ -239,7 +239,7 @@ class Edges:
 
     def _main(self, station: Float) -> list[Float]:
         """Return inner edge, lane boundaries, outer edge of the outer edge strip, and width of the hard shoulder, m."""
-        inner = self._inner(station)
+        inner = self._inner_offset(station)
         widths = [inner + self._inner_strip(station), *(width(station) for width in reversed(self.lane_widths))]
         lanes = np.array(list(accumulate(widths))).T[:, ::-1]
         return [inner, lanes, lanes[:, 0] + self._outer_strip(station), self._shoulder(station)]

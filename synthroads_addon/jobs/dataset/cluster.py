@@ -149,7 +149,7 @@ class WorkerAbsence:
     def __init__(self, address: str, patience: float) -> None:
         self._address, self._patience = address, patience
         self._since: float | None = None
-        self._said = False
+        self._is_told = False
 
     def update(self, workers: int, now: float) -> None:
         """Update the timer with the number of workers at a time, s.
@@ -158,16 +158,16 @@ class WorkerAbsence:
             InputError: there has been none for too long.
         """
         if workers:
-            if self._said:
+            if self._is_told:
                 _logger.warning("%s has workers again: %d", self._address, workers)
-            self._since, self._said = None, False
+            self._since, self._is_told = None, False
             return
         self._since = now if self._since is None else self._since
         if now - self._since >= self._patience:
             allowed = f"had no worker for {self._patience:g} s (--worker-timeout); --resume continues with what is done"
             raise InputError("--scheduler", self._address, allowed)
-        if now - self._since >= min(_SOON, 0.5 * self._patience) and not self._said:
-            self._said = True
+        if now - self._since >= min(_SOON, 0.5 * self._patience) and not self._is_told:
+            self._is_told = True
             _logger.warning(
                 "warning: %s has no worker; waiting for one, up to %g s in all", self._address, self._patience
             )

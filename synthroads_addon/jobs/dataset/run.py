@@ -90,7 +90,7 @@ class DatasetRun:
         self._sequences = {f"{job.number:02d}" for job in self.jobs}
         self._recipe_text = self.recipe.to_json()
         self._generator = generator()
-        self._described: set[str] = set()
+        self._description_names: set[str] = set()
 
     def run(self, submit: Submit) -> Manifest:
         """Make all scenes that are missing, write the data set's descriptions, and return the manifest.
@@ -262,7 +262,7 @@ class DatasetRun:
         """Write the manifest, layout descriptions and data card of the data set, and remove the work folder."""
         manifest = self._manifest()
         write_manifest(self.folder, manifest)
-        self._described.clear()
+        self._description_names.clear()
         self._describe_layouts()
         write_atomically(self.folder / "DATA_CARD.md", data_card(self.recipe, manifest, self.jobs))
         shutil.rmtree(self.folder / WORK, ignore_errors=True)
@@ -270,9 +270,9 @@ class DatasetRun:
     def _describe_layouts(self) -> None:
         """Write the description of each layout that has a scene by now, unless this run has written it already."""
         for name, text in self._layout_texts.items():
-            if name not in self._described and (self.folder / name).parent.is_dir():
+            if name not in self._description_names and (self.folder / name).parent.is_dir():
                 write_atomically(self._place(name), text)
-                self._described.add(name)
+                self._description_names.add(name)
 
     @cached_property
     def _layout_texts(self) -> dict[str, str]:

@@ -49,7 +49,7 @@ def scan_by_section(
     sink = site.sink(to, np.array(road.parameters.transform.translate))
     with closing(work.plans(timer)) as plans:
         counts = record_cloud(plans, sink, timer)
-    return counts | {"sections": work.scanned}, tuple(work.warnings)
+    return counts | {"sections": work.section_count}, tuple(work.warnings)
 
 
 class SectionScan:
@@ -61,7 +61,7 @@ class SectionScan:
 
     Attributes:
         cut: the scan's blocks.
-        scanned: sections that are done.
+        section_count: number of sections that are done.
         warnings: what of them isn't scanned as it is declared, each once.
     """
 
@@ -69,12 +69,12 @@ class SectionScan:
         self._site, self._scenario, self._road, self.cut = site, site.scenario, road, site.cut
         motions = lane_motions(road, self._scenario.scan.traffic_speed_factor)
         self._motions = {name: motion for name, motion in motions.items() if not motion.stands}
-        self._own = site.inputs.materials
-        self._vehicles = VehicleMeshes(RoadMaterials.of(road.parameters, self._own))
+        self._own_materials = site.inputs.materials
+        self._vehicles = VehicleMeshes(RoadMaterials.of(road.parameters, self._own_materials))
         fixed_objects = {name: item for name, item in road.parameters.objects.items() if name not in self._motions}
-        self.scanned = 0
+        self.section_count = 0
         self.warnings: list[str] = []
-        self._standing = road.parameters.model_copy(update={"objects": fixed_objects})
+        self._parameters_of_fixed = road.parameters.model_copy(update={"objects": fixed_objects})
 
     def sections(self) -> Iterator[RoadSection]:
         """Yield the road's sections from its start to its end."""
@@ -97,7 +97,7 @@ class SectionScan:
                     gc.collect()
                     release_memory()
                 blocks_done += len(section.blocks)
-                self.scanned += 1
+                self.section_count += 1
         finally:
             gc.unfreeze()
 
@@ -122,7 +122,9 @@ class SectionScan:
         """Build a section; return its scene with passing vehicles, and its frame's origin (3,) in the road's, m."""
         settings, parameters, stretch = self._scenario.settings(), self._road.parameters, (section.low, section.high)
         tolerance, detail = settings.tolerance, settings.vegetation_detail
-        request = BuildRequest(self._standing, tolerance, detail, None, stretch, self._road, self._own)
+        request = BuildRequest(
+            self._parameters_of_fixed, tolerance, detail, None, stretch, self._road, self._own_materials
+        )
         model = build_road(request)
         frame = model.origin - np.array(parameters.transform.translate)
         class_ids = self._site.inputs.scheme.source_ids()

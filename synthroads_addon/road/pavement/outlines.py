@@ -26,7 +26,7 @@ def patch_outline(patch: Patch) -> Float:
 
 
 def _chain(corners: list[Corner]) -> list[Corner]:
-    """Return those of sorted corners that are on the right of all others."""
+    """Return one half of the convex hull of sorted corners: the chain with all others on its left."""
     chain: list[Corner] = []
     for corner in corners:
         while len(chain) > 1 and _turn(chain[-2], chain[-1], corner) <= 0.0:

@@ -133,7 +133,7 @@ class _CarriagewayWriter:
         self.section = scene.geometry.sections[carriageway.side]
         self._damaged_strips = set(damaged_strips(self.section))
         self._damages: list[Rut | Pothole] = [*carriageway.pavement.ruts, *carriageway.pavement.potholes]
-        self._bare = _with_damages(self.section, ())
+        self._undamaged_section = _with_damages(self.section, ())
         self.turnouts = {
             shape.turnout.instance: key
             for shape in self.section.turnouts
@@ -257,7 +257,7 @@ class _CarriagewayWriter:
                 section = _with_damages(section, damages)
                 shares = damage_columns(section, piece.index, self.scene.tolerance)
             elif piece.index in self._damaged_strips:
-                section = self._bare
+                section = self._undamaged_section
             yield self._mesh(piece.index, station[first_row : last_row + 1], shares, section)
 
     def _mesh(

@@ -65,22 +65,24 @@ class Scene:
     road: Entity
     along_axis: bool = True
     parts: dict[str, Entity] = field(default_factory=dict)
-    _known: dict[tuple[float, float], tuple[float, int]] = field(default_factory=dict)
+    _height_and_strip_of_place: dict[tuple[float, float], tuple[float, int]] = field(default_factory=dict)
 
     def cache_surface(self, places: Iterable[tuple[float, float]]) -> None:
         """Compute and cache surface elevation and strip index at stations and offsets (m), all at once for speed."""
-        uncached = [place for place in dict.fromkeys(places) if place not in self._known]
+        uncached = [place for place in dict.fromkeys(places) if place not in self._height_and_strip_of_place]
         if not uncached:
             return
         station, offset = np.array(uncached).T
         station = np.clip(station, 0.0, self.geometry.length)
         heights, strips = self.surface(station, offset), self.geometry.strip_index(station, offset)
-        self._known.update(zip(uncached, zip(heights.tolist(), strips.tolist(), strict=True), strict=True))
+        self._height_and_strip_of_place.update(
+            zip(uncached, zip(heights.tolist(), strips.tolist(), strict=True), strict=True)
+        )
 
     def surface_and_strip(self, station: float, offset: float) -> tuple[float, int]:
         """Return the surface's local elevation (m) and the strip's index, -1 beside the road; cached."""
         self.cache_surface([(station, offset)])
-        return self._known[station, offset]
+        return self._height_and_strip_of_place[station, offset]
 
     def surface(self, station: Float, offset: Float) -> Float:
         """Return the local elevations (N,) of road or ground at stations and offsets (N,), m."""

@@ -16,12 +16,12 @@ class FreeIds:
     """
 
     def __init__(self, parameters: RoadParameters) -> None:
-        self._taken = {item.instance for item in parameters.objects.values()}
+        self._numbers_in_use = {item.instance for item in parameters.objects.values()}
         self._next = HIGHEST
 
     def take(self) -> int:
         """Return an unused id, each time a lower one."""
-        while self._next in self._taken:
+        while self._next in self._numbers_in_use:
             self._next -= 1
         self._next -= 1
         return self._next + 1
