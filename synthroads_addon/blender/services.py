@@ -101,7 +101,7 @@ class SnapshotServices:
 
     @contextmanager
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> Iterator[LayerSource]:
-        """Context of a source of layers: from the snapshot's nodes if these are requested, else from materials' means."""
+        """Context of a source of layers: from the snapshot's nodes if requested, else from materials' means."""
         if self._snapshot is None or self._calls is None or not takes_nodes(request.settings):
             yield material_layers(request, self._constants)
             return

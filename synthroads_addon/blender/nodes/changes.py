@@ -14,7 +14,7 @@ def make_changes(changes: list[Change]) -> None:
 
     Blender updates a whole tree at each change, so that a tree of 800 nodes takes seconds. It doesn't update any tree
     while it calls a node's method `update`, as it would call itself. So all changes but the last are made in the
-    method of a node in a tree that exists only for that. In a release that updated trees even then, this would only be slower.
+    method of a node in a tree that exists only for that. If a release updated trees even then, this would only be slow.
 
     Args:
         changes: functions that add links or set inputs' values; a change may not add or remove nodes or sockets, as
