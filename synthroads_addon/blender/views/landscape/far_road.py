@@ -63,7 +63,7 @@ Strip = tuple[Float, Float, str, Float | float]
 
 
 def _strips(geometry: RoadGeometry, relief: LandRelief, end: float, direction: float) -> list[Strip]:
-    """Return the strips of surfaces and lines beyond one end of the road; the direction is -1 at its beginning, else 1."""
+    """Return the strips of surfaces and lines beyond one end of the road; the direction is -1 at its start, else 1."""
     distances = np.append(0.0, np.geomspace(4.0, relief.landscape.reach * 1.4, _ROWS))
     station = end + direction * np.repeat(distances[:, None], 2, axis=1)
     offsets = geometry.offsets(end)[0]
