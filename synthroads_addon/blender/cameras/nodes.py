@@ -153,7 +153,7 @@ class NodeLayers:
                 arrays[name][rows] = array
         return LayerValues(arrays, source)
 
-    def _work_out(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
+    def _work_out(self, points: SeenPoints, names: frozenset[str]) -> LayerValues:
         """Return the requested layers of N points whose materials' nodes can be evaluated."""
         source = np.full(len(points), FROM_NODES, np.uint8)
         channels: dict[str, Float32] = {}
@@ -167,9 +167,9 @@ class NodeLayers:
                     self._calculate(calculator, points, rows[start : start + calculator.at_once], channels)
             with self._counting:
                 self._worked_out += int((worker >= 0).sum())
-        if "rgb" in wanted and self.material.mode == "lit":
+        if "rgb" in names and self.material.mode == "lit":
             channels["sun"] = self._sunlight(points, channels)
-        return self.material.layer_values(points, channels, source, wanted)
+        return self.material.layer_values(points, channels, source, names)
 
     def _calculate(
         self, calculator: LayerCalculator, points: SeenPoints, rows: Index, channels: dict[str, Float32]

@@ -85,14 +85,14 @@ class ReturnCamera:
         arrays = {name: np.concatenate([part.arrays[name] for part in parts]) for name in parts[0].arrays}
         return LayerValues(arrays, np.concatenate([part.source for part in parts]))
 
-    def _block(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
+    def _block(self, points: SeenPoints, names: frozenset[str]) -> LayerValues:
         """Return the requested layers of at most `BLOCK` points, see `sample`."""
         channels: dict[str, NDArray[np.float32]] = {}
         matching = np.zeros(0, bool)
         if len(points):
             channels, matching = self.calls.call(lambda: self._render_points(points))
         source = np.where(matching, FROM_RETURN, FROM_MATERIAL).astype(np.uint8)
-        return self.material.layer_values(points, channels, source, wanted)
+        return self.material.layer_values(points, channels, source, names)
 
     def _render_points(self, points: SeenPoints) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.bool_]]:
         """Render N points; return channels (N, C) by name, and a mask (N,) of points that their pixels show."""

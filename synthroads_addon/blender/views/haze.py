@@ -3,8 +3,8 @@
 A radiance L is seen through d metres of air as L exp(-s d) + A (1 - exp(-s d)) with the extinction s = 3.912 /
 visibility (Koschmieder 1924). The air's radiance A, and the light on the road, follow from two-stream theory for a
 layer that scatters but doesn't absorb (Bohren 1987, Multiple scattering of light and some of its observable
-consequences, Am. J. Phys. 55): fog reflects a part of the light, transmits the rest diffusely, and is bright itself. A renderer that
-follows single scattering only would show fog as dark as the asphalt.
+consequences, Am. J. Phys. 55): fog reflects a part of the light, transmits the rest diffusely, and is bright itself. A
+renderer that follows single scattering only would show fog as dark as the asphalt.
 """
 
 from __future__ import annotations
