@@ -75,8 +75,9 @@ def _housing(tree: Tree, light: _Light) -> list[Value]:
     rim = box(tree, rim_size, op.vector(tree, 0.0, rim_y, middle_z))
     # The board lies in front of the rim and leaves its edges free.
     board_thickness, board_distance = sizes.PANEL
+    board_width = rim_width - 2 * sizes.EDGE
     board_height = chambers_height + 2 * (sizes.MARGIN - sizes.EDGE)
-    board_size = op.vector(tree, rim_width - 2 * sizes.EDGE, board_thickness, board_height)
+    board_size = op.vector(tree, board_width, board_thickness, board_height)
     board = box(tree, board_size, op.vector(tree, 0.0, rim_y - board_distance, middle_z))
     chamber_depth = light.light_diameter * sizes.CHAMBER[1]
     chamber_size = op.vector(
@@ -86,8 +87,8 @@ def _housing(tree: Tree, light: _Light) -> list[Value]:
         light.light_diameter * (sizes.CHAMBER[2] - sizes.JOINT),
     )
     level = light.level(op.index(tree))
-    chamber_place = op.vector(tree, 0.0, chamber_depth * -0.5 - 0.055, level)
-    chambers = put_on_points(row_of_points(tree, light.lights), box(tree, chamber_size), chamber_place)
+    points, chamber = row_of_points(tree, light.lights), box(tree, chamber_size)
+    chambers = put_on_points(points, chamber, op.vector(tree, 0.0, chamber_depth * -0.5 - 0.055, level))
     return [paint_faces(rim, light.rim_material), paint_faces(op.join(board, chambers), light.housing_material)]
 
 

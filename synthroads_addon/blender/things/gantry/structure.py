@@ -57,8 +57,9 @@ def _chords(tree: Tree, length: Value, height: Value, depth: Value) -> Value:
     chords = []
     for y_side in (-1.0, 1.0):
         for z_side in (-1.0, 1.0):
-            y, z = (depth - width) * (0.5 * y_side), height * 0.5 + (height - width) * (0.5 * z_side)
-            chords.append(move_geometry(bar, op.vector(tree, length * 0.5, y, z)))
+            x, y = length * 0.5, (depth - width) * (0.5 * y_side)
+            z = height * 0.5 + (height - width) * (0.5 * z_side)
+            chords.append(move_geometry(bar, op.vector(tree, x, y, z)))
     return op.join(*chords)
 
 

@@ -105,8 +105,8 @@ def bridge_railing_group(tree: Tree) -> None:
             op.vector(tree, length * 0.5, 0.0, rail_z),
         )
         upper_rail = move_geometry(rail, op.vector(tree, 0.0, 0.0, height - hand_height - 2.0 * rail_z))
-        hand_place = op.vector(tree, length * 0.5, 0.0, height - hand_height / 2)
-        handrail = box(tree, op.vector(tree, length, hand_width, hand_height), hand_place)
+        hand_size = op.vector(tree, length, hand_width, hand_height)
+        handrail = box(tree, hand_size, op.vector(tree, length * 0.5, 0.0, height - hand_height / 2))
     with tree.frame("Posts"):
         bays = op.round_up(length / sizes.RAILING_SPACING)
         points = row_of_points(tree, bays + 1)
