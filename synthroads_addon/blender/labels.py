@@ -130,12 +130,14 @@ def _shown_collections(scene: bpy.types.Scene) -> Iterator[bpy.types.Collection]
     scene_collections = list(scene.collection.children_recursive)
     yielded = set(scene_collections)
     yield from scene_collections
+    # Level by level: collections that objects show as instances, then those shown by the objects in them.
     objects = set(scene.objects)
     while objects:
         sources = {item.instance_collection for item in objects if item.instance_type == "COLLECTION"} - {None}
         instance_collections = [
             part for source in sources for part in (source, *source.children_recursive) if part not in yielded
         ]
+        # Outer collections first, then by name: the order of a set would differ from run to run.
         instance_collections = sorted(
             dict.fromkeys(instance_collections), key=lambda part: (part not in sources, part.name)
         )

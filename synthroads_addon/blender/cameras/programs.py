@@ -55,6 +55,7 @@ class ProgramCalculator:
             material: (N,) index of each place's material, ascending.
             values: (N, 4) values of each input at the places.
         """
+        # First place of each material, and the spans of places of one material.
         starts = np.flatnonzero(np.diff(material, prepend=-1)).tolist()
         spans = list(pairwise([*starts, len(material)]))
         programs = [self._programs[int(material[start])] for start in starts]

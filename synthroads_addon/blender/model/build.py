@@ -254,7 +254,7 @@ _CLASSES = {"Road": "road", "Terrain": "ground", "Painted Areas": "road_marking"
 def _describe(item: bpy.types.Object, role: str, parameters: RoadParameters) -> None:
     """Write a part's class to its object's properties; lock the transform of what lies along the whole road.
 
-    Its shape follows the road, wherever its object is.
+    The shape of such a part follows the road wherever its object is, so that a move would mislead.
     """
     thing = parameters.objects.get(role.partition("/")[0])
     kind = _CLASSES.get(role) or (thing.semantic_class if thing is not None else "")

@@ -165,6 +165,7 @@ class _Reading:
         if lost := self._lost_reason():
             self.by_hand.append(HandEdit("Road", self.root.name, lost))
             return EditedRoad(self._base, tuple(self.by_hand), lost)
+        # Parts that parameters still describe; others are added to `by_hand`.
         visible_parts = {role: item for role, item in self._parts.items() if role not in (*_SURFACE, "Ground")}
         described_parts = {role: item for role, item in visible_parts.items() if self._is_fine(role, item)}
         described_parts |= {role: self._parts[role] for role in _SURFACE if role in self._parts}
@@ -182,7 +183,7 @@ class _Reading:
         data = parameters.to_dict() | {"objects": {name: item.to_dict() for name, item in objects.items()}}
         placed_parameters = self._placed(RoadParameters.from_dict(data))
         if not self.stale and InstanceNumbers(placed_parameters).parts != _kept_numbers(self._base, placed_parameters):
-            self.stale.append("numbers of dashes and plants follow from the objects that there are")
+            self.stale.append("numbers of dashes and plants depend on the objects that the road has")
         return EditedRoad(placed_parameters, tuple(self.by_hand), "", tuple(self.stale), axis.fit if axis else None)
 
     def _place(self, item: bpy.types.Object) -> Float:
@@ -229,30 +230,30 @@ class _Reading:
         """Return the reason, in words, why no parameters describe a part; empty if they do."""
         thing = self._base.objects.get(role)
         modifier = own_modifier(item)
-        carried = read_inputs(self._base, role, modifier) if modifier is not None else frozenset()
-        grouped = item.type == "MESH" and role not in ("Backbone", "Ground") and not role.endswith(" Detail")
-        points = role in POSTS or isinstance(thing, Vehicle) or _on_a_vertex(thing)
-        reason = shape_reason(item, carried, not points and role != "Backbone", grouped)
-        if not reason and not grouped and role != "Backbone" and mesh_edited(item):
+        read_names = read_inputs(self._base, role, modifier) if modifier is not None else frozenset()
+        has_group = item.type == "MESH" and role not in ("Backbone", "Ground") and not role.endswith(" Detail")
+        is_vertex = role in POSTS or isinstance(thing, Vehicle) or _on_a_vertex(thing)
+        reason = shape_reason(item, read_names, not is_vertex and role != "Backbone", has_group)
+        if not reason and not has_group and role != "Backbone" and mesh_edited(item):
             reason = "its mesh was edited"
-        if not reason and points and role not in POSTS and len(item.data.vertices) != 1:
+        if not reason and is_vertex and role not in POSTS and len(item.data.vertices) != 1:
             reason = "its mesh was edited"
         return reason or place_reason(self._place(item), isinstance(thing, Asset))
 
     def _moved(
         self, parameters: RoadParameters, axes: RoadAxes, fine: dict[str, bpy.types.Object]
     ) -> Iterator[tuple[str, RoadObject]]:
-        """Yield (id, object) of the parameter set's objects that are still there, with their present places."""
-        gone = self._gone_ids(fine)
+        """Yield (id, object) of the parameter set's objects that still exist, with their current places."""
+        removed_ids = self._gone_ids(fine)
         for name, item in parameters.objects.items():
-            if name in gone:
+            if name in removed_ids:
                 continue
-            role = next((role for role, known in self._ids.items() if known == name), name)
+            role = next((role for role, thing_id in self._ids.items() if thing_id == name), name)
             if role in fine:
-                updated = self._updated(item, self._base.objects[name], fine[role], axes)
-                if updated is None:
+                updated_thing = self._updated(item, self._base.objects[name], fine[role], axes)
+                if updated_thing is None:
                     continue
-                yield name, updated
+                yield name, updated_thing
             else:
                 yield name, item
         for role, kind in POSTS.items():
@@ -280,14 +281,14 @@ class _Reading:
             owner = role.partition("/")[0]
             if "/" in role and role not in fine and owner in fine and owner not in gone | ids:
                 ids.add(owner)
-                done = "edited" if role in self._parts else "deleted"
-                self.by_hand.append(HandEdit(owner, fine[owner].name, f"{role} was {done}"))
+                edit_word = "edited" if role in self._parts else "deleted"
+                self.by_hand.append(HandEdit(owner, fine[owner].name, f"{role} was {edit_word}"))
         return ids
 
     def _updated(
         self, item: RoadObject, before: RoadObject, part: bpy.types.Object, axes: RoadAxes
     ) -> RoadObject | None:
-        """Return an object with its part's present place; None, added to `by_hand`, if no parameters describe it."""
+        """Return an object with its part's current place; None, added to `by_hand`, if no parameters describe it."""
         place = self._place(part)
         try:
             update, stale = _update(item, before, part, place, axes)
@@ -324,12 +325,12 @@ class _Reading:
     ) -> dict[str, RoadObject]:
         """Return the user's copies of parts as new road objects by new ids, with new instance numbers."""
         copies: dict[str, RoadObject] = {}
-        largest = max(item.instance for item in self._base.objects.values())
+        largest_number = max(item.instance for item in self._base.objects.values())
         for copy in sorted(self._copies, key=lambda item: item.name_full):
             role = role_of(copy)
-            before = self._base.objects.get(role)
-            if before is None or isinstance(before, Vegetation | Terrain):
-                self.by_hand.append(HandEdit(role, copy.name, "it is a copy of a part that there is once"))
+            built_thing = self._base.objects.get(role)
+            if built_thing is None or isinstance(built_thing, Vegetation | Terrain):
+                self.by_hand.append(HandEdit(role, copy.name, "it is a copy of a part of which a road has only one"))
                 continue
             if reason := self._reason(role, copy):
                 self.by_hand.append(HandEdit(role, copy.name, reason))
@@ -337,11 +338,11 @@ class _Reading:
             item = parameters.objects[role]
             if (modifier := own_modifier(copy)) is not None:
                 item = edited_object(item, modifier)
-            updated = self._updated(item, before, copy, axes)
-            if updated is None:
+            updated_thing = self._updated(item, built_thing, copy, axes)
+            if updated_thing is None:
                 continue
             name = _free_name(role, {*self._base.objects, *copies})
-            copies[name] = updated.model_copy(update={"instance": largest + 1 + len(copies)})
+            copies[name] = updated_thing.model_copy(update={"instance": largest_number + 1 + len(copies)})
             self.stale.append(f"{copy.name} is a copy")
         return copies
 

@@ -112,6 +112,7 @@ def _curvature(tree: Tree, line: Value, smoothing: Value) -> Value:
     previous_row, next_row = op.maximum(inner_row - 1, 0), op.minimum(inner_row + 1, last_row)
 
     def sampled_at(name: str, row: Value, kind: str) -> Value:
+        """Add nodes for an attribute of the line in a row."""
         return op.sample_index(line, op.named_attribute(tree, name, kind), row)
 
     previous_direction, next_direction = (

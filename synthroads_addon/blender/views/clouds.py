@@ -81,8 +81,9 @@ def _color(tree: bpy.types.NodeTree, environment: Environment, density: bpy.type
     mix.data_type = "RGBA"
     colors = [color_input for color_input in mix.inputs if color_input.type == "RGBA"]
     colors[0].default_value = (*(radiance * part for part in SUN_COLOR), 1.0)
-    grey = (0.97, 0.99, 1.03)
+    grey = (0.97, 0.99, 1.03)  # chosen: a base lit by the sky is slightly blue
     colors[1].default_value = (*(radiance * _BASE * part for part in grey), 1.0)
+    # The square of the density keeps thin edges bright.
     tree.links.new(_math(tree, "MULTIPLY", density, density), mix.inputs[0])
     return next(color_output for color_output in mix.outputs if color_output.type == "RGBA")
 

@@ -257,7 +257,7 @@ def _sampled(mapping: Any, number: int, places: list[float]) -> Float32:
 
 
 def _places(start: float, end: float) -> list[float]:
-    """Return the ends of the steps between two places."""
+    """Return the evenly spaced places from `start` to `end`, `_STEPS` + 1 of them, at which a curve is sampled."""
     return [start + step / _STEPS * (end - start) for step in range(_STEPS + 1)]
 
 

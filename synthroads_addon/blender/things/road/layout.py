@@ -246,6 +246,8 @@ def detail_points(geometry: RoadGeometry, station: Float, tolerance: float) -> d
         for strip in damaged_strips(section):
             # Only damage near the stretch: columns for all of a long road's damage would make slivers of the cells.
             station_range = float(station[0]) - BEYOND, float(station[-1]) + BEYOND
+            # Position of each column across the strip, (C, 1), from 0 at its inner edge; arrays below are (C, N), by
+            # column and station.
             outward_share = damage_columns(section, strip, tolerance, *station_range)[:, None]
             distance = distances[:, strip] * (1.0 - outward_share) + distances[:, strip + 1] * outward_share
             offset = float(carriageway.sign) * distance
@@ -255,6 +257,7 @@ def detail_points(geometry: RoadGeometry, station: Float, tolerance: float) -> d
             # Where the edges jump, faces are so skew that rounding would flip narrow ones: inner columns are merged.
             steps = _steps(station, distances[:, strip : strip + 2])
             share[1:-1, steps], depth[:, steps] = 0.0, 0.0
+            # From the left column to the right one.
             order = slice(None, None, -carriageway.sign)
             damage = _damage_of_cells(section, station, offset[order])
             numbers = geometry.numbers.parts[ids[id(carriageway)]].first + damage

@@ -18,6 +18,8 @@ _ROWS = 40
 """Rows of points along each prolongation; chosen."""
 _LINE, _LINE_HEIGHT = 0.15, 0.02
 """Width of a line, and its height above the pavement, m; chosen."""
+_LINE_RISE = 2e-4
+"""Rise of a line above the pavement per metre of distance from the road's end (m/m); chosen."""
 _DASH, _PERIOD, _DASHED = 6.0, 18.0, 700.0
 """Length of a lane line's dash, distance from one dash to the next, and length that has dashes, m; chosen."""
 _COLUMN_DISTANCES = (1.5, 4.0, 9.0, 18.0, 36.0)
@@ -36,12 +38,14 @@ def far_road_mesh(
     for end, direction in ((0.0, -1.0), (geometry.length, 1.0)):
         for station, offset, name, height in _strips(geometry, relief, end, direction):
             first_vertex = sum(len(part) for part in vertices)
+            # Points of a strip: for each row the left one and the right one.
             plan = place_beyond(geometry, station.ravel(), offset.ravel())
             z = relief.elevation_beside(plan, station.ravel(), offset.ravel()) + height
             vertices.append(np.column_stack([plan, z]))
             road_places.append(np.column_stack([station.ravel(), offset.ravel()]))
             rows = len(station)
             first_corners = first_vertex + 2 * np.arange(rows - 1)
+            # Anticlockwise from above beyond the end of the road; before its beginning rows run the other way.
             quads = np.stack([first_corners, first_corners + 2, first_corners + 3, first_corners + 1], axis=-1)
             faces.append(quads if direction > 0.0 else quads[:, ::-1])
             if name not in names:
@@ -83,7 +87,8 @@ def _strips(geometry: RoadGeometry, relief: LandRelief, end: float, direction: f
         columns.append(side * relief.half_width)
         for column, next_column in itertools.pairwise(columns):
             add(max(column, next_column), min(column, next_column), "grass_ground")
-    line_height = _LINE_HEIGHT + 2e-4 * np.repeat(distances, 2)
+    # Lines rise with the distance, so that a camera's depth buffer still tells them from the pavement.
+    line_height = _LINE_HEIGHT + _LINE_RISE * np.repeat(distances, 2)
     for section in geometry.sections.values():
         bounds = section.carriageway.sign * section.lane_boundaries(end)[0]
         for number, bound in enumerate(bounds.tolist()):
@@ -100,5 +105,5 @@ def _dashes(end: float, direction: float, left: float, right: float) -> list[Str
     strips: list[Strip] = []
     for dash_start in np.arange(_PERIOD - _DASH, _DASHED, _PERIOD).tolist():
         station = end + direction * np.array([[dash_start, dash_start], [dash_start + _DASH, dash_start + _DASH]])
-        strips.append((station, np.array([[left, right]] * 2), "paint_white", _LINE_HEIGHT + 2e-4 * dash_start))
+        strips.append((station, np.array([[left, right]] * 2), "paint_white", _LINE_HEIGHT + _LINE_RISE * dash_start))
     return strips

@@ -43,12 +43,14 @@ def ground_mesh(
     parcel_sides = np.stack([parcel_sides, np.roll(parcel_sides, -1, axis=1)], axis=-1).reshape(-1, 2)
     grid_points = np.concatenate([*_ring_points(geometry, relief), _horizon(parcels)])
     plan = np.concatenate([border, parcel_corners, grid_points])
+    # Edges of the triangulation: the border of the terrain, and the four sides of each parcel.
     points, triangles = _triangulate(plan, np.concatenate([edges, parcel_sides + len(border)]))
     centres = points[triangles].mean(axis=1)
     is_land = ~_in_corridor(geometry, relief, centres, 0.0)
     triangles, centres = triangles[is_land], centres[is_land]
     station, offset = geometry.alignment.project(points)
     z = relief.elevation_beside(points, station, offset)
+    # The border lies within the terrain, and a little below it, so that no gap is seen.
     z[np.abs(offset) < relief.half_width - _OVERLAP / 2.0] -= _DEPTH
     mesh = bpy.data.meshes.new("SR Landscape Ground")
     fill(mesh, np.column_stack([points, z]), faces=triangles)
