@@ -87,7 +87,11 @@ class Labels:
             if number is None:
                 continue
             if not isinstance(number, int) or not -(2**31) <= number < 2**32:
-                raise InputError(f"{candidate.name}: {INSTANCE_PROPERTY}", number, "must be a whole number of 32 bits")
+                raise InputError(
+                    f"{candidate.name}: {INSTANCE_PROPERTY}",
+                    number,
+                    "must be a whole number of 32 bits, with or without a sign",
+                )
             return number % 2**32  # Blender's whole numbers have a sign
         return -1
 
@@ -119,7 +123,9 @@ def velocity_of(item: bpy.types.Object | None) -> tuple[bpy.types.Object, NDArra
                 velocity = np.empty(0)
             if velocity.shape != (3,) or not np.isfinite(velocity).all():
                 shown_value = value.to_list() if hasattr(value, "to_list") else value
-                raise InputError(f"{item.name}: {VELOCITY_PROPERTY}", shown_value, "must be three numbers, m/s")
+                raise InputError(
+                    f"{item.name}: {VELOCITY_PROPERTY}", shown_value, "must be three finite numbers (x, y, z), m/s"
+                )
             return item, velocity
         item = item.parent
     return None

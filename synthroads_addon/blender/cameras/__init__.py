@@ -58,15 +58,15 @@ def check_colour(settings: ColourSettings) -> None:
             EEVEE; EEVEE or materials' nodes with whole light paths.
     """
     if settings.source == "nodes" and settings.lighting == "path":
-        raise InputError("colour: source", "nodes", "must be images or returns for whole light paths")
+        raise InputError("colour.source", "nodes", "must be images or returns where colour.lighting is path")
     if settings.source == "nodes" and settings.engine != "cycles":
-        raise InputError("colour: engine", settings.engine, "must be cycles for the materials' nodes")
+        raise InputError("colour.engine", settings.engine, "must be cycles where colour.source is nodes")
     if settings.source == "returns" and not HAS_RETURN_CAMERA:
-        raise InputError("colour: source", "returns", "needs Blender 5.0 or newer, with OSL; this one has images")
+        raise InputError("colour.source", "returns", "needs Blender 5.0 or newer, with OSL: take images or nodes here")
     if settings.source == "returns" and settings.engine != "cycles":
-        raise InputError("colour: engine", settings.engine, "must be cycles for a pixel per return")
+        raise InputError("colour.engine", settings.engine, "must be cycles where colour.source is returns")
     if settings.lighting == "path" and settings.engine != "cycles":
-        raise InputError("colour: lighting", settings.lighting, "must be direct for eevee")
+        raise InputError("colour.lighting", settings.lighting, "must be direct where colour.engine is eevee")
 
 
 def renders_returns(settings: ColourSettings) -> bool:

@@ -150,7 +150,7 @@ class ReturnCamera:
         source, bytecode_file = self._stage.folder / "camera.osl", self._stage.folder / "camera.oso"
         source.write_text(text, encoding="utf-8")
         if not _cycles.osl_compile(str(source), str(bytecode_file)):
-            raise RuntimeError("the camera's shader could not be compiled")
+            raise RuntimeError("Cycles could not compile the shader of the camera that renders a pixel per return")
         bytecode = bytecode_file.read_text(encoding="utf-8")
         data = self._stage.camera.data
         # The bytecode is set here, not compiled by Cycles' operator, which needs a module that the bpy package lacks.

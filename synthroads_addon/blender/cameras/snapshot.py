@@ -148,7 +148,11 @@ def _loaded_copy(item: bpy.types.Material) -> ReadingCopy:
             readers.append((SurfaceInput(*node[_INPUT]), node))
         elif _IMAGE in node:
             if node[_IMAGE] not in images:
-                raise InputError("Scene", None, f"an image of the material {item.name!r} was removed during the scan")
+                raise InputError(
+                    "Scene",
+                    None,
+                    f"an image of its material {item.name!r} was removed during the scan: start the scan again",
+                )
             node.image = images[node[_IMAGE]]
     return ReadingCopy(item, readers)
 

@@ -63,7 +63,11 @@ def check_scene_file(path: Path, up: UpAxis | None = None) -> None:
     if not path.is_file():
         raise MissingFileError("SCENE", str(path), "is a folder" if path.is_dir() else "no such file")
     if up is not None and suffix not in _WITH_AXES:
-        raise InputError("--up", up, f"only for {', '.join(_WITH_AXES)}: a {suffix} file says itself what is up")
+        raise InputError(
+            "--up",
+            up,
+            f"must be left out: a {suffix} file says itself which axis points up, unlike {', '.join(_WITH_AXES)}",
+        )
 
 
 def open_scene(path: Path, up: UpAxis | None = None, to_origin: bool = False, also_from: Sequence[Path] = ()) -> Float:
@@ -149,7 +153,9 @@ def _try_in_a_process(path: Path, importer: str, folders: Sequence[Path]) -> Non
     command = blender_command if blender else [sys.executable, "-c", code]
     process = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
     if not 0 <= process.returncode < 256:  # other failures are reported when the file is imported here
-        raise InputError("SCENE", str(path), "can't be read by Blender: it is damaged so that its importer crashes")
+        raise InputError(
+            "SCENE", str(path), "can't be read by Blender: the file is damaged, and makes the importer crash"
+        )
     lines = process.stdout.decode(errors="replace").splitlines()
     for line in lines:
         if line.startswith(OUTSIDE):
@@ -157,14 +163,16 @@ def _try_in_a_process(path: Path, importer: str, folders: Sequence[Path]) -> Non
             refuse_outside(Path(layer.partition("[")[0]), address.replace("<UDIM>", "1001"), folders, REMEDY)
             raise InputError(layer, address, f"{STAY}: {REMEDY}")
     if INSIDE not in lines:
-        text = "can't be looked into for the files that it names: it is damaged, or this Blender has no module pxr"
+        text = (
+            "can't be searched for files that it refers to: the file is damaged, or this Blender lacks the module pxr"
+        )
         raise InputError("SCENE", str(path), text)
 
 
 def open_scene_warnings() -> list[str]:
     """Return warnings about missing linked files of the open scene, as sentences."""
     return [
-        f"the linked file {library.filepath} is missing: what it holds is not scanned"
+        f"the linked file {library.filepath} is missing: its objects are not scanned"
         for library in bpy.data.libraries
         if not Path(bpy.path.abspath(library.filepath)).is_file()
     ]

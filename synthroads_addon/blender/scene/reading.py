@@ -134,7 +134,7 @@ class MeshCopy:
     def part(self) -> MeshPart:
         """Return the mesh as labelled triangles; raise `InputError` if its vertices aren't finite."""
         if not np.isfinite(self.vertices).all():
-            raise InputError(f"{self.name}: vertices", None, "must be finite numbers")
+            raise InputError(f"{self.name}: vertices", None, "must have finite coordinates: mend or remove the object")
         corners, face, class_numbers, instance_numbers = self.corners, self.face, self.class_id, self.instance_id
         material: NDArray[np.uint16] | int = int(self.materials[0])
         if self.slot is not None:
@@ -313,7 +313,11 @@ def join_parts(pairs: list[tuple[MeshPart, Places]], tables: SceneTables, frame:
     if not counts[1]:
         return empty_scene_mesh(origin, tables.materials)
     if counts.max() >= 2**31:
-        raise InputError("scene", int(counts.max()), "must have less than 2**31 vertices and triangles, with instances")
+        raise InputError(
+            "scene",
+            int(counts.max()),
+            "must have less than 2**31 vertices and triangles, instances included: leave objects out",
+        )
     unchanged_part = pairs[0][0] if len(pairs) == 1 and frame is None and pairs[0][1].matrices == _IDENTITY else None
     arrays: dict[str, NDArray[Any]] = {
         "vertices": unchanged_part.vertices if unchanged_part else np.empty((counts[0], 3), np.float32),
