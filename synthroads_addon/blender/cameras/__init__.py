@@ -111,14 +111,14 @@ def layer_source(
             raise InputError("colour.source", request.settings.source, text)
         render_stage = _lit_stage(stack, request, passes, day, source)
         exposure = day.exposure if day else 1.0
-        if passes.position:
+        if passes.position:  # a pixel per return
             yield ReturnCamera(render_stage, fallback, exposure)
             return
         views = image_views(request)
         images = RenderedLayers(render_stage, views, fallback, exposure)
         try:
             images.render(progress)
-            # The scan needs the renderer's memory.
+            # The stage is removed before the scan, which needs the renderer's memory.
             stack.close()
             yield images
         finally:

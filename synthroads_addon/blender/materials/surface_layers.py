@@ -143,6 +143,7 @@ def _of_closure(node: bpy.types.Node, path: tuple[bpy.types.Node, ...], layer: s
     input_socket = node.inputs.get(layer.capitalize())
     if input_socket is not None and (layer == "metallic" or node.type in _ROUGH_REFLECTORS):
         return _of_input(input_socket, path)
+    # Shaders without such an input: metallic by their type, and otherwise as rough as can be.
     value = float(node.type in _METALS) if layer == "metallic" else 1.0
     return Constant((value, value, value))
 

@@ -39,7 +39,7 @@ def texture_values(
             # As a vector: a number taken from a colour is its luminance, whose weights don't add up to 1 exactly.
             color = Value(tree, image_node.outputs["Color"], "VECTOR")
             if layer == "normal":
-                values[layer] = mapping.turned(geometry["Normal"], color)
+                values[layer] = mapping.tilted_normal(geometry["Normal"], color)
             else:
                 values[layer] = _scaled(color if layer == "base_color" else op.component(color, "X"), factors[layer])
     return values
@@ -68,6 +68,7 @@ class _Mapping:
         x, y, z = (op.component(place, axis) for axis in "XYZ")
         absolute_normal = tree.node("ShaderNodeVectorMath", normal, operation="ABSOLUTE").value
         east, north, up = (op.component(absolute_normal, axis) for axis in "XYZ")
+        # Box projection: from above where the normal is nearest to the vertical, else along x or y.
         self._is_flat = self._is_greater(up, op.maximum(east, north))
         self._faces_east = self._is_greater(east, north)
         u = _choose(self._is_flat, _choose(self._faces_east, x, y), x)
@@ -82,7 +83,7 @@ class _Mapping:
             v = _choose(self._has_station, v, self._offset)
         self.place = op.vector(tree, u, v)
 
-    def turned(self, normal: Value, color: Value) -> Value:
+    def tilted_normal(self, normal: Value, color: Value) -> Value:
         """Add nodes for the surface's normal tilted by a normal image's colour (OpenGL convention: green is up)."""
         slopes = color * 2.0 - (1.0, 1.0, 1.0)
         cosine = op.maximum(op.component(slopes, "Z"), _LEAST_COSINE)

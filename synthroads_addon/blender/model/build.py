@@ -168,9 +168,9 @@ class _Build:
 
     def __init__(self, request: BuildRequest, place: BuildTarget) -> None:
         all_parts = model_parts()
-        self._wanted = set(all_parts if request.parts is None else request.parts)
-        if self._wanted - set(all_parts):
-            raise ValueError(f"parts: {sorted(self._wanted - set(all_parts))} are not among {tuple(all_parts)}")
+        self._part_names = set(all_parts if request.parts is None else request.parts)
+        if self._part_names - set(all_parts):
+            raise ValueError(f"parts: {sorted(self._part_names - set(all_parts))} are not among {tuple(all_parts)}")
         scene = bpy.context.scene
         self._scene, self._place = scene.name, place
         remove_staged()
@@ -188,12 +188,12 @@ class _Build:
         self._builder = ModelBuilder(request, self._collection, root)
 
     def build(self) -> None:
-        """Make the wanted parts' objects, updating `share`; runs within a `Stepper`."""
+        """Make the requested parts' objects, and hidden ones that these need, updating `share`; within a `Stepper`."""
         self._builder.lay_out()
-        there = required_parts(self._wanted)
+        built_names = required_parts(self._part_names)
         for number, (name, part) in enumerate(model_parts().items(), 1):
-            if name in there:
-                self._builder.hidden = name not in self._wanted
+            if name in built_names:
+                self._builder.hidden = name not in self._part_names
                 part.build(self._builder)
             self.share = number / len(model_parts())
 

@@ -69,6 +69,7 @@ def bare_mesh_seconds(triangles: int) -> float:
     item = bpy.data.objects.new("Bare Mesh", mesh)
 
     def make_and_read() -> None:
+        """Fill the mesh, have Blender evaluate it, and read its vertices and triangles."""
         mesh.vertices.add(len(vertices))
         mesh.vertices.foreach_set("co", vertices.ravel())
         mesh.loops.add(faces.size)

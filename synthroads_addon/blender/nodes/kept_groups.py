@@ -93,6 +93,7 @@ def keep_groups() -> None:
     roads = _kept_roads(file)
     if file is None or not made_count or (len(roads) >= ROADS and made_count < _NEW_SHARE * len(road)):
         return
+    # The new file has this road's groups and those of the latest other roads, which are read into the open file first.
     roads = [road, *roads][:ROADS]
     _read(file, {key: name for road_groups in roads[1:] for key, name in road_groups.items()})
     groups = {group[KEY]: group for group in bpy.data.node_groups if KEY in group}

@@ -278,10 +278,14 @@ class _SceneWalk:
         self._objects = None if objects is None else {item.original for item in objects}
         self._lanes = lanes or {}
         self._speed_factor = speed_factor
+        # Indices of materials by name; then, by the key of a mesh's part (its data and its materials' names): meshes to
+        # be copied, copies, and parts converted from copies.
         self._materials: dict[str, int] = {}
         self._queue: dict[tuple[Hashable, ...], _QueuedMesh] = {}
         self._copied: dict[tuple[Hashable, ...], MeshCopy] = {}
         self._parts: dict[tuple[Hashable, ...], MeshPart] = {}
+        # Label of each use of a mesh; object and part of each label without an instance number, by the label's index;
+        # places of the parts, by carrier.
         self._labels: list[Label] = []
         self._unnumbered: dict[int, tuple[str, tuple[Hashable, ...]]] = {}
         self._uses: dict[Hashable, dict[tuple[Hashable, ...], Places]] = {}

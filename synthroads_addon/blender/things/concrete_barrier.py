@@ -80,11 +80,11 @@ def _sweep_profile(tree: Tree, line: Value, barrier: _Barrier) -> Value:
 
     def place(point: Value, row: Value) -> Value:
         foot = op.sample_index(line, op.named_attribute(tree, "foot", "FLOAT_VECTOR"), row)
-        left = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), row)
+        left_vector = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), row)
         height = op.sample_index(line, op.named_attribute(tree, "tall"), row)
         share = op.component(point, "Z")
         z = op.switch(share < 0.0, height * share, -sizes.BURIED)
-        return foot + left * (op.component(point, "X") * barrier.base_width * 0.5) + op.vector(tree, 0.0, 0.0, z)
+        return foot + left_vector * (op.component(point, "X") * barrier.base_width * 0.5) + op.vector(tree, 0.0, 0.0, z)
 
     def station(row: Value) -> Value:
         return op.sample_index(line, op.named_attribute(tree, "station"), row)

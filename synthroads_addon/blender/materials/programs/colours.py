@@ -164,6 +164,7 @@ def _blend_hsv(kind: str, t: Number, a: Vector, b: Vector) -> Vector:
     """Return the blend Hue, Saturation, Value or Color of colours a and b by the factor t."""
     base_hsv, upper_hsv = _convert_color(Op.TO_HSV, a), _convert_color(Op.TO_HSV, b)
     h, s, v = base_hsv
+    # A colour without saturation has no hue: there the base colour stays.
     if kind == "SATURATION":
         mixed_color = _convert_color(Op.FROM_HSV, (h, (1.0 - t) * s + t * upper_hsv[1], v))
         return each(lambda base_part, upper_part: s.equals(0.0).choose(base_part, upper_part), a, mixed_color)

@@ -115,6 +115,7 @@ def _build(tree: Tree, layout: tuple[SideLayout, ...]) -> None:
 
 
 def _declare_side(tree: Tree, layout: SideLayout) -> _Side:
+    """Declare the inputs of a carriageway in a panel; return it as a side without its surface's node."""
     words = layout.side
     text = "Points that make this strip finer, see SR Strip"
     detail_fields = {detail_field(strip): socket("Object", text) for strip in layout.detailed}

@@ -77,18 +77,17 @@ def _row_rotation(angle: float) -> Float:
     return np.array([(math.cos(angle), math.sin(angle)), (-math.sin(angle), math.cos(angle))])
 
 
-def _stand(item: Building, place: Float, turn: float, relief: LandRelief) -> Iterator[Body]:
+def _stand(item: Building, place: Float, angle: float, relief: LandRelief) -> Iterator[Body]:
     """Yield the bodies of a building at a place (2,), turned about the vertical (rad), on the land."""
     z = float(relief.elevation(place[None])[0])
 
     def ground(x: ArrayLike, y: ArrayLike) -> Float:
-        ground_points = np.stack(np.broadcast_arrays(x, y), axis=-1).astype(np.float64).reshape(-1, 2) @ _row_rotation(
-            turn
-        )
-        return relief.elevation(place + ground_points) - z
+        """Return the land's elevation (N,) at places in the building's frame, relative to the building's foot, m."""
+        local_points = np.stack(np.broadcast_arrays(x, y), axis=-1).astype(np.float64).reshape(-1, 2)
+        return relief.elevation(place + local_points @ _row_rotation(angle)) - z
 
     for body in item.bodies(Place(ground, lambda x, y, shear: 0.0, 1.5)):
-        yield Body(rotate_z(body.sections, turn) + np.append(place, z), body.material)
+        yield Body(rotate_z(body.sections, angle) + np.append(place, z), body.material)
 
 
 def _turbine(turbine: WindTurbine, relief: LandRelief) -> Iterator[Body]:
