@@ -198,12 +198,12 @@ def mapped(inverse: bool, vector: Float, rotation: Float, scale: Float, shift: F
     """Return vectors (N, 3) scaled, rotated (Euler angles about x, y, z, rad) and moved; ``inverse`` undoes that."""
     (cx, cy, cz), (sx, sy, sz) = np.cos(rotation).T, np.sin(rotation).T
     # Rows of Rz Ry Rx, as rotations are applied about x first.
-    matrix_rows = [
+    entries = [
         [cy * cz, sy * sx * cz - cx * sz, sy * cx * cz + sx * sz],
         [cy * sz, sy * sx * sz + cx * cz, sy * cx * sz - sx * cz],
         [-sy, cy * sx, cy * cx],
     ]
-    matrix_rows = [np.stack(np.broadcast_arrays(*row), axis=-1) for row in matrix_rows]
+    matrix_rows = [np.stack(np.broadcast_arrays(*row), axis=-1) for row in entries]
     rotation_matrix = np.stack(matrix_rows, axis=1)  # (N, 3, 3), or (1, 3, 3) for a constant rotation
     if inverse:
         rotated = np.einsum("nji,nj->ni", *_broadcast_pairs(rotation_matrix, vector - shift))
