@@ -1,4 +1,7 @@
-"""How each material varies: noises of the base colour, dirt, and the special patterns of a few materials."""
+"""How each material varies: noises of the base colour, dirt, and the special patterns of a few materials.
+
+Wavelengths (m), amounts and other numbers of the noises are chosen.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Utility cabinets with doors, on plinth and pad, under a lid (SR Cabinet), and the objects of emergency phones."""
+"""Utility cabinets with doors, on plinth and pad, under a lid (SR Cabinet), and the objects of emergency phones.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""SR Emergency Phone: the orange pillar of a motorway's emergency telephone."""
+"""SR Emergency Phone: the orange pillar of a motorway's emergency telephone.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 

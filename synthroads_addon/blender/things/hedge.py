@@ -1,4 +1,7 @@
-"""Hedges: leaves within an outline, denser towards its surface (SR Hedge)."""
+"""Hedges: leaves within an outline, denser towards its surface (SR Hedge).
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 

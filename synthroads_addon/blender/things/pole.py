@@ -1,4 +1,7 @@
-"""Lighting and surveillance poles: masts with an arm, and at its end a street light, or cameras (SR Pole)."""
+"""Lighting and surveillance poles: masts with an arm, and at its end a street light, or cameras (SR Pole).
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The gallery: pictures of scenes, of every kind of object, and of every material with its layers."""
+"""The gallery: pictures of scenes, of every kind of object, and of every material with its layers.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Viewpoints on a road: a driver's, and one in the air."""
+"""Viewpoints on a road: a driver's, and one in the air.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from dataclasses import dataclass
 

@@ -174,6 +174,7 @@ def _wave(node: NodeReader) -> Value:
     """Return the result of a Wave Texture node without distortion."""
     wave_node = node.node
     place = scaled(node.place(), node.number("Scale"))
+    # Cycles moves places off whole numbers, where rounding would decide.
     place = each(lambda part: (part + 0.000001) * 0.999999, place)
     phase = node.number("Phase Offset")
     if node.number("Distortion").constant_value != 0.0 or VECTORS_FUSED:

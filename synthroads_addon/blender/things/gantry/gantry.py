@@ -1,4 +1,7 @@
-"""SR Gantry: a shield gantry over one carriageway or both, or on one post, with the boards that hang on its beam."""
+"""SR Gantry: a shield gantry over one carriageway or both, or on one post, with the boards that hang on its beam.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 

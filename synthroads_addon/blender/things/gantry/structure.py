@@ -1,4 +1,7 @@
-"""Parts of a gantry: SR Gantry Beam (box, truss or tube), SR Gantry Post, and SR Gantry Catwalk on the beam."""
+"""Parts of a gantry: SR Gantry Beam (box, truss or tube), SR Gantry Post, and SR Gantry Catwalk on the beam.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 

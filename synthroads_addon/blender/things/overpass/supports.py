@@ -1,4 +1,7 @@
-"""SR Bridge Abutment: bearing seat, back wall and wing walls. SR Bridge Pier: a wall pier and its bearings."""
+"""SR Bridge Abutment: bearing seat, back wall and wing walls. SR Bridge Pier: a wall pier and its bearings.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 

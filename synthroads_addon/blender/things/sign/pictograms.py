@@ -1,4 +1,7 @@
-"""Pictograms of traffic signs as polygons, drawn in a square of side 1 around the origin: x right, y up."""
+"""Pictograms of traffic signs as polygons, drawn in a square of side 1 around the origin: x right, y up.
+
+Coordinates are drawn by eye.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""SR Crown: branches and leaves of trees and shrubs of height 1, and how its shape is declared."""
+"""SR Crown: branches and leaves of trees and shrubs of height 1, and how its shape is declared.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""SR Grass: tufts of blades on the ground, the verges and the median."""
+"""SR Grass: tufts of blades on the ground, the verges and the median.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Structures of the landscape: villages, wind turbines, and power lines beyond the terrain."""
+"""Structures of the landscape: villages, wind turbines, and power lines beyond the terrain.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The landscape's trees: instances of a few crowns, so that a file has only the places of a forest's trees."""
+"""The landscape's trees: instances of a few crowns, so that a file has only the places of a forest's trees.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 
