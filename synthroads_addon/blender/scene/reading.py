@@ -309,7 +309,7 @@ def join_parts(pairs: list[tuple[MeshPart, Places]], tables: SceneTables, frame:
         frame = (np.eye(4) if frame is None else frame) @ np.diag([*[tables.unit] * 3, 1.0])
     uses = np.array([len(places.labels) for _, places in pairs], dtype=np.int64)
     sizes = np.array([(len(part.vertices), len(part.triangles)) for part, _ in pairs], dtype=np.int64).reshape(-1, 2)
-    counts = uses @ sizes
+    counts = uses @ sizes  # vertices and triangles of all uses together
     if not counts[1]:
         return empty_scene_mesh(origin, tables.materials)
     if counts.max() >= 2**31:
@@ -318,6 +318,7 @@ def join_parts(pairs: list[tuple[MeshPart, Places]], tables: SceneTables, frame:
             int(counts.max()),
             "must have less than 2**31 vertices and triangles, instances included: leave objects out",
         )
+    # A single part in the scene's own frame needs no copy of its vertices and triangles.
     unchanged_part = pairs[0][0] if len(pairs) == 1 and frame is None and pairs[0][1].matrices == _IDENTITY else None
     arrays: dict[str, NDArray[Any]] = {
         "vertices": unchanged_part.vertices if unchanged_part else np.empty((counts[0], 3), np.float32),

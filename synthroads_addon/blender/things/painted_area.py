@@ -189,7 +189,7 @@ def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
         for part, patch in _on_stretch(builder, pavement.patches, first_part, lambda patch: patch.outline):
             instance, code = geometry.numbers.part(name, part)[1], damage_code(PATCH, patch.age)
             for piece in _pieces(patch_outline(patch), *builder.stretch):
-                yield _Area(piece, PATCH_FILM, instance, code, 0)
+                yield _Area(piece, PATCH_FILM, instance, code, 0)  # patches are asphalt, the first of `_COURSES`
         first_part += len(pavement.patches)
         films = MarkingFilms(geometry, carriageway.side)
         for part, crack in _on_stretch(

@@ -117,6 +117,7 @@ def _side_group(tree: Tree) -> None:
         mesh, column, row_number = op.grid(tree, last_column + 1, op.point_count(backbone))
         column_rank = op.switch(side > 0.0, column, last_column - column)
         outward_share = op.maximum(column_rank - (_SHAPE_PIECES + _TOE_PIECES), 0) / op.maximum(columns - 1.0, 1.0)
+        # Shares of the way to the terrain's end: closer near the road; the exponent is chosen.
         spread = outward_share * _FINE + op.power(outward_share, 2.2) * (1.0 - _FINE)
     with tree.frame("Offset, cut where it would fold"):
         axis, left_vector, curvature = row(backbone, row_number)
@@ -132,10 +133,12 @@ def _side_group(tree: Tree) -> None:
         toe = op.sample_index(edge, op.named_attribute(tree, "toe"), row_number)
     with tree.frame("Columns: crest or swale, the toe's rounding, the ground"):
         rounding = op.minimum(shape.rounding_length / shape.batter_slope, op.unary("ABSOLUTE", edge_ground))
+        # Where the ground is above the edge (a cutting) there is a swale, else (an embankment) a rounded crest.
         shape_width = op.switch(edge_ground > 0.0, shape.crest_length * 2.0, shape.swale_width)
         shape_distance = shape_width * op.minimum(column_rank * (1.0 / _SHAPE_PIECES), 1.0)
         ditch = _ditch_share(shape, edge_ground)
         tangent = rounding * shape.batter_slope * (1.0 - ditch)
+        # The toe's rounding reaches one tangent to both sides of it; a ditch takes its place.
         toe_start = op.maximum(toe - tangent, shape_width)
         toe_end = op.maximum(toe + op.maximum(tangent, op.switch(ditch > 0.0, 0.0, shape.ditch_width)), toe_start)
         toe_distance = toe_start + (toe_end - toe_start) * op.clip(
@@ -168,16 +171,19 @@ def _batter_group(tree: Tree) -> None:
     distance, ground, at_edge = inputs.distance, inputs.ground, inputs.at_edge
     with tree.frame("Swale: the deeper the cutting, up to its full depth"):
         width = shape.swale_width
-        share = op.clip((at_edge - SWALE_FROM) * (1.0 / (SWALE_FULL - SWALE_FROM)), 0.0, 1.0)
-        depth = op.switch(width > 0.0, 0.0, share * shape.swale_depth)
+        depth_share = op.clip((at_edge - SWALE_FROM) * (1.0 / (SWALE_FULL - SWALE_FROM)), 0.0, 1.0)
+        full_depth = op.switch(width > 0.0, 0.0, depth_share * shape.swale_depth)
         angle = op.minimum(distance / op.maximum(width, 1e-6), 1.0) * math.pi
-        swale_depth = depth * op.power(op.unary("SINE", angle), 2.0)
+        # The swale is a sine squared across its width.
+        swale_depth = full_depth * op.power(op.unary("SINE", angle), 2.0)
     with tree.frame("Planes of the batter, rounded where they begin"):
         cutting_plane = _rise(distance - width * 0.5, width * 0.25) / shape.batter_slope - swale_depth
         embankment_plane = -(_rise(distance, shape.crest_length) / shape.batter_slope)
     with tree.frame("Where they meet the ground"):
         rounding = op.minimum(shape.rounding_length / shape.batter_slope, op.unary("ABSOLUTE", at_edge))
-        cutting_height = op.maximum(-_smooth_maximum(-ground, -cutting_plane, rounding), embankment_plane - depth * 2.0)
+        cutting_height = op.maximum(
+            -_smooth_maximum(-ground, -cutting_plane, rounding), embankment_plane - full_depth * 2.0
+        )
     with tree.frame("Ditch at the foot of an embankment"):
         ditch = _ditch_share(shape, at_edge)
         ditch_position = (ground - embankment_plane) * shape.batter_slope / op.maximum(shape.ditch_width, 1e-6)

@@ -85,15 +85,24 @@ def marking_group(tree: Tree) -> None:
 
 
 def _with_ends(tree: Tree, backbone: Value, dashes: tuple[Value, Value, Value, Value, Value]) -> Value:
-    """Add nodes that insert a row into the backbone at both ends of every dash; return it sorted by station."""
+    """Add nodes that insert a row into the backbone at both ends of every dash; return it sorted by station.
+
+    Args:
+        tree: tree to add the nodes to.
+        backbone: the backbone with the line's edges as attributes.
+        dashes: stations of the line's start and end, length of a dash, distance from one dash to the next (m), and number
+            of dashes.
+    """
     start, end, length, period, count = dashes
     ribbon = station_ribbon(backbone, _EDGES)
     with tree.frame("Ends of the dashes as rows of their own"):
         points = row_of_points(tree, count * 2)
         end_index = op.index(tree)
+        # Points of even number are starts of dashes, the others are their ends.
         end_of_dash = op.minimum(start + (end_index // 2) * period + (end_index % 2) * length, end)
         nearest_row = tree.node("GeometryNodeSampleNearest", ribbon, op.vector(tree, end_of_dash), domain="POINT").value
         row_station = op.sample_index(ribbon, op.named_attribute(tree, "station"), nearest_row)
+        # No row is inserted where the backbone has one already.
         distance = op.unary("ABSOLUTE", end_of_dash - row_station)
         points = op.delete_points(op.store(points, "station", end_of_dash), distance < SNAP)
         station = op.named_attribute(tree, "station")

@@ -147,6 +147,7 @@ def points_on(
             is_outside = (ray["Attribute"] < band.start - _EDGE_TOLERANCE) | (
                 ray["Attribute"] > band.end + _EDGE_TOLERANCE
             )
+            # Where places were decided beforehand, by exact geometry, their decision counts.
             is_decided, has_plant = _decisions(stand, band.places, identity)
             is_removed = op.switch(is_decided, is_removed, ~ray["Is Hit"] | ~has_plant | is_outside)
     # Captured together, so that the rays, which are slow, are cast once.

@@ -79,6 +79,7 @@ def hull(tree: Tree, materials: VehicleMaterials, patches: Iterable[tuple[Any, .
         op.choose(row, [tuple(triple) for triple in table[:, first_column : first_column + 3].tolist()])
         for first_column in (0, 3, 6, 9)
     )
+    # Coordinates of a point are its shares (tables above) of the row's widths and heights.
     x = op.dot(op.choose(section_point, _triples(_widths(shape.tumble))), widths) * side_sign
     height = op.dot(op.choose(section_point, _triples(_LOWER)), lower_heights) + op.dot(
         op.choose(section_point, _triples(_UPPER)), upper_heights
