@@ -115,6 +115,7 @@ def add_sward(
     breadth = np.repeat([ring[3] for ring in _RINGS], [len(ring) for ring in rings])
     mesh = bpy.data.meshes.new("SR Sward")
     fill(mesh, places)
+    # Breadths vary by 20 %, and heights over the lower half of the grass's range (chosen).
     breadth = breadth * random.uniform(0.8, 1.2, len(places))
     height = grass.height_min + (grass.height_max - grass.height_min) * 0.5 * random.random(len(places))
     height = np.where(mown(RoadGeometry(parameters), grass, places), ROADSIDE_HEIGHT, 1.0) * height

@@ -90,8 +90,8 @@ def _with_ends(tree: Tree, backbone: Value, dashes: tuple[Value, Value, Value, V
     Args:
         tree: tree to add the nodes to.
         backbone: the backbone with the line's edges as attributes.
-        dashes: stations of the line's start and end, length of a dash, distance from one dash to the next (m), and number
-            of dashes.
+        dashes: stations of the line's start and end, length of a dash, distance between starts of dashes (m), number of
+            dashes.
     """
     start, end, length, period, count = dashes
     ribbon = station_ribbon(backbone, _EDGES)

@@ -152,12 +152,14 @@ def _leaves(tree: Tree, branches: Value, shape: Crown, seed: Value, detail: Valu
     branch = leaf_index % shape.branches
     start = op.sample_index(branches, op.position(tree), branch)
     end = op.sample_index(branches, op.named_attribute(tree, "end", "FLOAT_VECTOR"), branch)
+    # A leaf lies at a random share of its branch, from the end inwards, shifted within the cluster's radius.
     branch_share = 1.0 - op.random(tree, 0.0, 1.0, seed + 3) * shape.leafy_share
     size = op.sample_index(branches, op.named_attribute(tree, "size"), branch)
     radius = shape.cluster_radius * size * op.random(tree, 0.75, 1.25, seed + 5, branch)
     shift = _in_ball(tree, seed + 4, leaf_index) * radius
     place = start + (end - start) * branch_share + shift
     points = tree.node("GeometryNodePoints", count=shape.leaves * leaf_share).value
+    # Leaves point anywhere, or along their branch, by the order; the droop pulls them down.
     branch_direction = tree.node("ShaderNodeVectorMath", end - start, operation="NORMALIZE").value
     random_direction = op.random(tree, (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), seed + 6)
     leaf_direction = random_direction * (1.0 - shape.leaf_order) + branch_direction * (shape.leaf_order * 1.5)

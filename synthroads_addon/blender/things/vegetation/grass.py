@@ -54,6 +54,8 @@ def grass_group(tree: Tree) -> None:
         points = points_in_band(tree, stand, stand.density * stand.detail, surface_field=distance)
         is_mown = op.named_attribute(tree, "found") < roadside.mown_width
         share = op.switch(is_mown, 1.0, roadside.roadside_height)
+        # Strips, by which instance numbers are given: 0 and 1 beside the road, left and right; 2 and 3 on the median,
+        # 4 on verges.
         points = op.store(op.store(points, "share", share), "strip", _on_right(tree))
     with tree.frame("Places on verges and median"):
         is_roadside = op.named_attribute(tree, "class_id", "INT").equals(class_id("roadside"))
@@ -74,10 +76,8 @@ def grass_group(tree: Tree) -> None:
         height = op.random(tree, stand.smallest_height, stand.largest_height, stand.seed + 3) * share
         # Low tufts are broad for their height; fewer tufts are broader, so that they cover the same area (chosen).
         breadth = (height + stand.largest_height * share) * 0.65 / op.unary("SQRT", op.maximum(stand.detail, 0.05))
-        scale, number = (
-            op.vector(tree, breadth, breadth, height),
-            stand.instance + op.named_attribute(tree, "strip", "INT"),
-        )
+        scale = op.vector(tree, breadth, breadth, height)
+        number = stand.instance + op.named_attribute(tree, "strip", "INT")
         mesh = plant_points(tree, points, variants, scale, 0.12, stand.seed, number)
         mesh = op.store(mesh, "class_id", class_id("vegetation"), "FACE")
         mesh = tree.node("GeometryNodeSetMaterial", mesh, material=roadside.material).value

@@ -108,6 +108,7 @@ def _ring_points(geometry: RoadGeometry, relief: LandRelief) -> Iterator[Float]:
             np.meshgrid(*(np.arange(a, b + 1.0) * cell for a, b in zip(first_cell, last_cell, strict=True))), axis=-1
         )
         plan = grid.reshape(-1, 2)
+        # Distance from the terrain and the road's prolongations: beside, ahead, or both at the ends' corners.
         plan_station, offset = geometry.alignment.project(plan)
         distance_ahead = np.maximum(np.maximum(-plan_station, plan_station - geometry.length), 0.0)
         distance = np.hypot(distance_ahead, np.maximum(np.abs(offset) - relief.half_width, 0.0))
