@@ -10,6 +10,7 @@ _INPUTS_ARE_PROPERTIES = bpy.app.version >= (5, 2, 0)
 
 
 def _identifier(modifier: bpy.types.NodesModifier, name: str) -> str:
+    """Return the socket identifier of a Geometry Nodes modifier's input by its name."""
     for item in modifier.node_group.interface.items_tree:
         if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.name == name:
             return item.identifier
@@ -17,7 +18,7 @@ def _identifier(modifier: bpy.types.NodesModifier, name: str) -> str:
 
 
 def set_modifier_input(modifier: bpy.types.NodesModifier, name: str, value: Any) -> None:
-    """Set the input `name` of a Geometry Nodes modifier; KeyError if its group has none of that name."""
+    """Set the input `name` of a Geometry Nodes modifier; KeyError if its group has no such input."""
     identifier = _identifier(modifier, name)
     if _INPUTS_ARE_PROPERTIES:
         getattr(modifier.properties.inputs, identifier).value = value
@@ -56,6 +57,7 @@ def sky_texture(nodes: bpy.types.Nodes, elevation: float, azimuth: float) -> bpy
     """Add and return a physical sky texture node without sun disc; sun angles in rad, azimuth clockwise from north."""
     node = nodes.new("ShaderNodeTexSky")
     names = [item.identifier for item in node.bl_rna.properties["sky_type"].enum_items]
+    # Blender 5.0 renamed the physical sky.
     node.sky_type = "NISHITA" if "NISHITA" in names else "SINGLE_SCATTERING"
     node.sun_disc = False
     node.sun_elevation, node.sun_rotation = elevation, azimuth

@@ -18,7 +18,7 @@ from ..base.errors import OutputError
 
 
 def empty_file() -> None:
-    """Open a new empty Blender file, discarding the open one.
+    """Open a new empty Blender file and discard the open one.
 
     Not `read_factory_settings`: that would also disable the extension that this code may belong to.
     """
@@ -28,16 +28,16 @@ def empty_file() -> None:
 def remove_startup_objects() -> None:
     """Remove the cube, the camera and the light that Blender begins with, where it is a Python package.
 
-    A program has no window that shows the cube, which stands in the middle of a road. They stay where there is anything
-    else, where the cube was changed, and in a file that was opened.
+    A program has no window that shows the cube, which stands in the middle of a road. The objects stay if the file has
+    other objects, if the cube was changed, and if the file was opened from a disk.
     """
     objects = bpy.data.objects
     if not bpy.app.module or bpy.data.is_saved or {item.name for item in objects} != {"Cube", "Camera", "Light"}:
         return
     cube = objects["Cube"]
     corners = {tuple(vertex.co) for vertex in cube.data.vertices}
-    changed = cube.modifiers or "synthroads_class" in cube or cube.matrix_basis != Matrix()
-    if corners == set(product((-1.0, 1.0), repeat=3)) and not changed:
+    has_changes = cube.modifiers or "synthroads_class" in cube or cube.matrix_basis != Matrix()
+    if corners == set(product((-1.0, 1.0), repeat=3)) and not has_changes:
         bpy.data.batch_remove(list(objects))
 
 
@@ -45,7 +45,7 @@ def save_scene(path: Path, compress: bool = True) -> None:
     """Save a copy of the open Blender file under a path, overwriting; the open file keeps its name and state.
 
     Raises:
-        OutputError: it can't be written.
+        OutputError: the file can't be written.
     """
     try:
         bpy.ops.wm.save_as_mainfile(filepath=str(path.absolute()), copy=True, compress=compress, check_existing=False)
@@ -69,18 +69,18 @@ def stderr_if_it_succeeds() -> Iterator[None]:
     Blender prints the whole traceback of an importer in Python besides raising it.
     """
     try:
-        saved = os.dup(2)
+        saved_descriptor = os.dup(2)
     except OSError:  # no standard error at all
         yield
         return
-    with tempfile.TemporaryFile() as held, os.fdopen(saved, "wb") as before:
-        text = io.TextIOWrapper(held, encoding="utf-8", errors="backslashreplace", write_through=True)
-        os.dup2(held.fileno(), 2)
+    with tempfile.TemporaryFile() as buffer, os.fdopen(saved_descriptor, "wb") as original_stderr:
+        buffer_text = io.TextIOWrapper(buffer, encoding="utf-8", errors="backslashreplace", write_through=True)
+        os.dup2(buffer.fileno(), 2)
         try:
-            with redirect_stderr(text):  # which needn't be the system's standard error
+            with redirect_stderr(buffer_text):  # Python's own, which needn't be the system's standard error
                 yield
-            held.seek(0)
-            with suppress(OSError):  # whoever read it has left
-                shutil.copyfileobj(held, before)
+            buffer.seek(0)
+            with suppress(OSError):  # the reader of standard error has gone
+                shutil.copyfileobj(buffer, original_stderr)
         finally:
-            os.dup2(before.fileno(), 2)
+            os.dup2(original_stderr.fileno(), 2)

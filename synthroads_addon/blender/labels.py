@@ -26,8 +26,8 @@ class Label:
     """Class and instance of an object's faces where these have none of their own.
 
     Attributes:
-        strong: class that the object has, stronger than its materials'; -1 for none.
-        weak: class that it has where its materials have none.
+        strong: class of the object that takes precedence over its materials' classes; -1 for none.
+        weak: class of the object for faces whose materials have none.
         instance: instance number; -1 for none.
     """
 
@@ -45,7 +45,7 @@ class Labels:
         ids: ``class_id`` by the names of classes that objects may have; that of the full table if None.
 
     Attributes:
-        reserved: values of ``class_id`` that no face may have by a number of its own: they are classes' by name.
+        reserved: values of ``class_id`` that a face may not state as a number, since the mapping gives them to names.
 
     Raises:
         InputError: a custom property isn't what it must be; names the object.
@@ -68,37 +68,44 @@ class Labels:
         return Label(-1 if strong is None else strong, weak, self._instance(item, owner))
 
     def _property(self, *candidates: bpy.types.Object) -> int | None:
+        """Return the class id in the custom property of the first object that has it; None if none has."""
         for candidate in candidates:
             name = candidate.get(CLASS_PROPERTY)
             if name is None:
                 continue
             if name not in self._ids:
                 hint = nearest_name(str(name), self._ids)
-                known = f"must be one of {', '.join(self._ids)}{hint}"
-                raise InputError(f"{candidate.name}: {CLASS_PROPERTY}", name, known)
+                text = f"must be one of {', '.join(self._ids)}{hint}"
+                raise InputError(f"{candidate.name}: {CLASS_PROPERTY}", name, text)
             return self._ids[name]
         return None
 
     def _instance(self, *candidates: bpy.types.Object) -> int:
+        """Return the instance number in the custom property of the first object that has it; -1 if none has."""
         for candidate in candidates:
             number = candidate.get(INSTANCE_PROPERTY)
             if number is None:
                 continue
             if not isinstance(number, int) or not -(2**31) <= number < 2**32:
-                raise InputError(f"{candidate.name}: {INSTANCE_PROPERTY}", number, "must be a whole number of 32 bits")
+                raise InputError(
+                    f"{candidate.name}: {INSTANCE_PROPERTY}",
+                    number,
+                    "must be a whole number of 32 bits, with or without a sign",
+                )
             return number % 2**32  # Blender's whole numbers have a sign
         return -1
 
     def _collection_classes(self, scene: bpy.types.Scene) -> dict[bpy.types.Object, int]:
         """Return the class id of each object by its collections' names; the innermost collection counts."""
-        mapped: dict[bpy.types.Object, int] = {}
-        named: dict[bpy.types.Object, int] = {}
+        mapped_classes: dict[bpy.types.Object, int] = {}
+        own_name_classes: dict[bpy.types.Object, int] = {}
         for collection in _shown_collections(scene):
-            number = self.by_name.find("collections", collection.name)
-            into, number = (named, self._ids.get(collection.name)) if number is None else (mapped, number)
+            number, target = self.by_name.find("collections", collection.name), mapped_classes
+            if number is None:  # a collection may have the name of a class itself
+                number, target = self._ids.get(collection.name), own_name_classes
             if number is not None:
-                into |= dict.fromkeys(collection.all_objects, number)
-        return named | mapped
+                target |= dict.fromkeys(collection.all_objects, number)
+        return own_name_classes | mapped_classes
 
 
 def velocity_of(item: bpy.types.Object | None) -> tuple[bpy.types.Object, NDArray[np.float64]] | None:
@@ -115,8 +122,10 @@ def velocity_of(item: bpy.types.Object | None) -> tuple[bpy.types.Object, NDArra
             except (TypeError, ValueError):
                 velocity = np.empty(0)
             if velocity.shape != (3,) or not np.isfinite(velocity).all():
-                shown = value.to_list() if hasattr(value, "to_list") else value
-                raise InputError(f"{item.name}: {VELOCITY_PROPERTY}", shown, "must be three numbers, m/s")
+                shown_value = value.to_list() if hasattr(value, "to_list") else value
+                raise InputError(
+                    f"{item.name}: {VELOCITY_PROPERTY}", shown_value, "must be three finite numbers (x, y, z), m/s"
+                )
             return item, velocity
         item = item.parent
     return None
@@ -124,14 +133,20 @@ def velocity_of(item: bpy.types.Object | None) -> tuple[bpy.types.Object, NDArra
 
 def _shown_collections(scene: bpy.types.Scene) -> Iterator[bpy.types.Collection]:
     """Yield the scene's collections and those shown as instances by its objects, outer ones first, each once."""
-    waiting = list(scene.collection.children_recursive)
-    seen = set(waiting)
-    yield from waiting
+    scene_collections = list(scene.collection.children_recursive)
+    yielded = set(scene_collections)
+    yield from scene_collections
+    # Level by level: collections that objects show as instances, then those shown by the objects in them.
     objects = set(scene.objects)
     while objects:
         sources = {item.instance_collection for item in objects if item.instance_type == "COLLECTION"} - {None}
-        new = [part for source in sources for part in (source, *source.children_recursive) if part not in seen]
-        new = sorted(dict.fromkeys(new), key=lambda part: (part not in sources, part.name))
-        seen.update(new)
-        yield from new
-        objects = {item for part in new for item in part.objects}
+        instance_collections = [
+            part for source in sources for part in (source, *source.children_recursive) if part not in yielded
+        ]
+        # Outer collections first, then by name: the order of a set would differ from run to run.
+        instance_collections = sorted(
+            dict.fromkeys(instance_collections), key=lambda part: (part not in sources, part.name)
+        )
+        yielded.update(instance_collections)
+        yield from instance_collections
+        objects = {item for part in instance_collections for item in part.objects}

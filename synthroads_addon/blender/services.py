@@ -43,7 +43,7 @@ class BlenderServices:
         return normal_images(names)
 
     def transparencies(self, names: Sequence[str]) -> dict[int, Transparency]:
-        """Return the light that the open file's materials of these names let through, by their index."""
+        """Return the share of light that materials of these names let through by place, by the material's index."""
         return transparencies(names)
 
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> AbstractContextManager[LayerSource]:
@@ -55,10 +55,10 @@ class SnapshotServices:
     """A scan's services with a snapshot of the open file's materials: usable in any thread, whatever the file becomes.
 
     Args:
-        names: materials of the scene that is scanned.
-        calls: those that the main thread makes while the materials' nodes are worked out; None where they aren't to be.
-        folder: for files, as long as the services are used; needed with calls.
-        kernels: ``off`` to have Cycles work out all materials.
+        names: names of the materials of the scanned scene.
+        calls: queue of calls that the main thread makes as materials' nodes are evaluated; None not to evaluate them.
+        folder: folder for files, which must exist as long as the services are used; required with `calls`.
+        kernels: ``off`` to have Cycles evaluate all materials.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class SnapshotServices:
 
     @property
     def needs_renderer(self) -> bool:
-        """Return whether this Blender would render a pixel per return of materials that can't be worked out."""
+        """Return whether this Blender would render a pixel per return for materials whose nodes can't be evaluated."""
         return self._snapshot is not None and bool(self._snapshot.obstacles) and HAS_RETURN_CAMERA
 
     def caster(self, name: str, mesh: SceneMesh, kernels: str) -> Caster:
@@ -88,7 +88,7 @@ class SnapshotServices:
         return list(self._means)
 
     def reflectance_varies(self, names: Sequence[str]) -> bool:
-        """Return whether some of the materials reflect otherwise at other places."""
+        """Return whether a layer that the intensity depends on varies over some material; `names` is ignored."""
         return bool(self._constants.varying_layers(OF_INTENSITY))
 
     def normal_images(self, names: Sequence[str]) -> dict[int, NormalImage]:
@@ -101,7 +101,7 @@ class SnapshotServices:
 
     @contextmanager
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> Iterator[LayerSource]:
-        """Yield colours and layers by the materials' nodes as they were read, else the materials' own values."""
+        """Context of a source of layers: from the snapshot's nodes if requested, else from materials' means."""
         if self._snapshot is None or self._calls is None or not takes_nodes(request.settings):
             yield material_layers(request, self._constants)
             return

@@ -12,10 +12,15 @@ from ..scanning.colour.light import sun_direction
 from .compat import sky_texture
 
 SUN_STRENGTH = 4.2
+"""Irradiance of a sun of strength 1, in Blender's unit W/m2; chosen to suit the sky's radiance."""
 SUN_COLOR = (1.0, 0.93, 0.84)
+"""Linear red, green and blue of sunlight; chosen."""
 SUN_ANGLE = math.radians(0.53)
+"""Diameter of the sun's disc as seen from the Earth, rad."""
 _SKY_STRENGTH = 0.16
-_LOWEST_SUN = 1.0  # degrees: below, the sky's model ends
+"""Factor of the sky texture's radiance at a sun of strength 1; chosen."""
+_LOWEST_SUN = 1.0
+"""Least elevation of the sun, deg, for which the sky's model is used."""
 
 
 def new_sun(name: str, environment: Environment, angle: float = SUN_ANGLE) -> bpy.types.Object:

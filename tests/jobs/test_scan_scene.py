@@ -509,7 +509,7 @@ BROKEN |= {"flat.obj": b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "cut.stl": b"sol
         ("empty.obj", [], "{place}: holds nothing visible with faces"),
         ("points.obj", [], "{place}: holds nothing visible with faces"),
         ("flat.obj", [], "{place}: holds nothing visible with faces"),
-        ("yard.glb", ["--up", "z"], "--up is 'z': only for .obj, .ply, .stl"),
+        ("yard.glb", ["--up", "z"], "--up is 'z': must be left out: a .glb file says itself which axis points up"),
         ("yard.obj", ["--device", "riegl-minivux-4uav"], "scan.device is 'riegl-minivux-4uav'"),
         ("yard.obj", ["--epsg", "1"], "epsg is 1"),
         ("yard.obj", ["--rays", "8"], "scan.rays_per_pulse is 8"),

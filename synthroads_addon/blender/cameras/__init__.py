@@ -47,7 +47,7 @@ __all__ = [
 ]
 
 _BOUNCES = 3
-"""Reflections that whole light paths are followed over."""
+"""Reflections after which a light path ends; chosen: later ones add little in the open."""
 
 
 def check_colour(settings: ColourSettings) -> None:
@@ -58,15 +58,15 @@ def check_colour(settings: ColourSettings) -> None:
             EEVEE; EEVEE or materials' nodes with whole light paths.
     """
     if settings.source == "nodes" and settings.lighting == "path":
-        raise InputError("colour: source", "nodes", "must be images or returns for whole light paths")
+        raise InputError("colour.source", "nodes", "must be images or returns where colour.lighting is path")
     if settings.source == "nodes" and settings.engine != "cycles":
-        raise InputError("colour: engine", settings.engine, "must be cycles for the materials' nodes")
+        raise InputError("colour.engine", settings.engine, "must be cycles where colour.source is nodes")
     if settings.source == "returns" and not HAS_RETURN_CAMERA:
-        raise InputError("colour: source", "returns", "needs Blender 5.0 or newer, with OSL; this one has images")
+        raise InputError("colour.source", "returns", "needs Blender 5.0 or newer, with OSL: take images or nodes here")
     if settings.source == "returns" and settings.engine != "cycles":
-        raise InputError("colour: engine", settings.engine, "must be cycles for a pixel per return")
+        raise InputError("colour.engine", settings.engine, "must be cycles where colour.source is returns")
     if settings.lighting == "path" and settings.engine != "cycles":
-        raise InputError("colour: lighting", settings.lighting, "must be direct for eevee")
+        raise InputError("colour.lighting", settings.lighting, "must be direct where colour.engine is eevee")
 
 
 def renders_returns(settings: ColourSettings) -> bool:
@@ -85,9 +85,9 @@ def layer_source(
     Must be called on Blender's main thread; what it yields may be used by any threads.
 
     Args:
-        request: what is wanted.
-        source: the scene that is scanned; the current one if None.
-        progress: called with the share of the images that is rendered.
+        request: the layers that are requested, the scene mesh, and how colours are made.
+        source: the Blender scene that is scanned; the current one if None.
+        progress: called with the share (0 to 1) of the images that is rendered.
     """
     check_colour(request.settings)
     constants = scene_constants(request.mesh.materials)
@@ -109,16 +109,16 @@ def layer_source(
             text = f"can't render a scene whose unit is {request.mesh.unit:g} m: take nodes or material, or set its "
             text += "unit scale to 1 and scale what is in it"
             raise InputError("colour.source", request.settings.source, text)
-        set_up = _lit_stage(stack, request, passes, day, source)
+        render_stage = _lit_stage(stack, request, passes, day, source)
         exposure = day.exposure if day else 1.0
-        if passes.position:
-            yield ReturnCamera(set_up, fallback, exposure)
+        if passes.position:  # a pixel per return
+            yield ReturnCamera(render_stage, fallback, exposure)
             return
         views = image_views(request)
-        images = RenderedLayers(set_up, views, fallback, exposure)
+        images = RenderedLayers(render_stage, views, fallback, exposure)
         try:
             images.render(progress)
-            # The scan needs the renderer's memory.
+            # The stage is removed before the scan, which needs the renderer's memory.
             stack.close()
             yield images
         finally:
@@ -128,7 +128,7 @@ def layer_source(
 def _lit_stage(
     stack: ExitStack, request: LayerRequest, passes: Passes, day: Daylight | None, source: bpy.types.Scene | None
 ) -> RenderStage:
-    """Enter a stage with the scene in daylight into the stack; return it."""
+    """Enter a stage that shows the scene in daylight into the stack, so that the stack closes it; return the stage."""
     lamps = (day.sun,) if day else ()
     world = day.world if day and passes.sky else None
     scene = source or bpy.context.scene
@@ -142,31 +142,35 @@ def _node_layers(
     day: Daylight | None,
     source: bpy.types.Scene | None,
 ) -> LayerSource:
-    """Return a source of layers from materials' nodes; materials that can't be evaluated use a pixel per return."""
+    """Return a source that evaluates layers by the materials' nodes.
+
+    Materials whose nodes can't be evaluated ("obstacles") are rendered with a pixel per return where this Blender can,
+    else they get their mean values.
+    """
     calls, constants, names = MainThreadCalls(), fallback.constants, request.mesh.materials
     layers = node_layers(request, constants)
     if not layers and not request.lit:
         return fallback
     varying = varying_materials(constants, layers)
     items = {index: item for index, item in numbered_materials(names) if index in varying}
-    needs = {index: material_needs(item) for index, item in items.items()}
-    obstacles = {index: need.obstacles for index, need in needs.items() if need.obstacles}
-    easy = {index: item for index, item in items.items() if index not in obstacles}
-    rest = None
+    needs_by_index = {index: material_needs(item) for index, item in items.items()}
+    obstacles = {index: need.obstacles for index, need in needs_by_index.items() if need.obstacles}
+    calculable_items = {index: item for index, item in items.items() if index not in obstacles}
+    return_camera = None
     if obstacles and HAS_RETURN_CAMERA and request.mesh.unit == 1.0:
-        set_up = _lit_stage(stack, request, _passes(request, constants, by_return=True), day, source)
-        rest = ReturnCamera(set_up, fallback, day.exposure if day else 1.0, calls)
-    work = stack.enter_context(material_work(easy, layers, request.kernels))
+        render_stage = _lit_stage(stack, request, _passes(request, constants, by_return=True), day, source)
+        return_camera = ReturnCamera(render_stage, fallback, day.exposure if day else 1.0, calls)
+    work = stack.enter_context(material_work(calculable_items, layers, request.kernels))
     surfaces = SceneSurfaces(request.mesh, request.moving)
-    return NodeLayers(calls, work, surfaces, fallback, rest, obstacles, request)
+    return NodeLayers(calls, work, surfaces, fallback, return_camera, obstacles, request)
 
 
 def node_layers(request: LayerRequest, constants: SurfaceConstants) -> tuple[str, ...]:
-    """Return the layers that materials' nodes must be asked for: those wanted that some material varies."""
-    needed = needed_layers(request.wanted, request.settings.mode)
+    """Return the names of the layers for which materials' nodes are evaluated: requested ones that vary somewhere."""
+    layers = needed_layers(request.wanted, request.settings.mode)
     if request.lit:
-        needed |= set(MATERIAL_LAYERS)  # the light that they throw back depends on all
-    return constants.varying_layers(frozenset(needed))
+        layers |= set(MATERIAL_LAYERS)  # reflected light depends on all layers of the material
+    return constants.varying_layers(frozenset(layers))
 
 
 def varying_materials(constants: SurfaceConstants, layers: Sequence[str] = tuple(MATERIAL_LAYERS)) -> set[int]:
@@ -178,20 +182,21 @@ def varying_materials(constants: SurfaceConstants, layers: Sequence[str] = tuple
 def snapshot_layers(
     request: LayerRequest, constants: SurfaceConstants, snapshot: MaterialSnapshot, calls: MainThreadCalls
 ) -> Iterator[LayerSource]:
-    """Yield what gives the points their layers from materials' nodes as they were; any thread may open it.
+    """Context of a source of layers from materials' nodes as they were at the snapshot; any thread may open it.
 
-    What can't be worked out has its materials' means.
+    Points of materials whose nodes can't be evaluated get their material's mean values.
 
     Args:
-        request: what is wanted.
-        constants: of the scene's materials.
-        snapshot: of these materials.
-        calls: those that the main thread makes.
+        request: the layers that are requested, the scene mesh, and how colours are made.
+        constants: mean layers of the scene's materials, and which of them vary.
+        snapshot: copies of these materials in a file.
+        calls: queue of calls that Blender's main thread makes for other threads.
     """
     light = SunAndSky()
     if request.lit:
         light = calls.call(lambda: measured_light(request.environment))
-    fallback, layers = material_layers(request, constants, light), node_layers(request, constants)
+    fallback = material_layers(request, constants, light)
+    layers = node_layers(request, constants)
     if not layers and not request.lit:
         yield fallback
         return
@@ -202,32 +207,33 @@ def snapshot_layers(
 
 
 def image_views(request: LayerRequest) -> list[View]:
-    """Return the camera views along the path of which a request's images are rendered."""
+    """Return the camera views along the path from which a request's images are rendered."""
     settings, points = request.settings, scene_sample(request.mesh)
     views = views_along(request.path, points, settings, request.field_of_view, settings.max_resolution)
     return views if request.pick is None else request.pick(views)
 
 
 def _passes(request: LayerRequest, constants: SurfaceConstants, by_return: bool = False) -> Passes:
-    """Return the passes to render for a request: only wanted layers that vary on some material.
+    """Return the passes to render for a request: only requested layers that vary on some material.
 
     Args:
-        request: what is wanted.
-        constants: of the materials.
-        by_return: a pixel per return is rendered, whatever is asked for.
+        request: the layers that are requested, and how colours are made.
+        constants: mean layers of the materials, and which of them vary.
+        by_return: whether a pixel per return is rendered whatever the request's settings say.
     """
     settings, lit = request.settings, request.lit
-    whole = lit and settings.lighting == "path" and settings.engine == "cycles"
-    needed = needed_layers(request.wanted, settings.mode)
-    if whole:
-        needed -= {"base_color"} - request.wanted
+    light_paths = lit and settings.lighting == "path" and settings.engine == "cycles"
+    layers = needed_layers(request.wanted, settings.mode)
+    if light_paths:
+        # Cycles multiplies by the base colour itself: it is an output only where it is requested.
+        layers -= {"base_color"} - request.wanted
     returns = by_return or renders_returns(settings)
     return Passes(
-        layers=constants.varying_layers(needed),
+        layers=constants.varying_layers(layers),
         lit=lit,
-        sky=whole,
+        sky=light_paths,
         depth=not returns,
         position=returns,
         samples=settings.samples,
-        bounces=_BOUNCES if whole else 0,
+        bounces=_BOUNCES if light_paths else 0,
     )

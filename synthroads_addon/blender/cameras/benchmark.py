@@ -24,24 +24,24 @@ def measure_rendering(request: LayerRequest, count: int) -> dict[str, Any]:
     Both are without what the first image costs, which brings the scene into the renderer.
 
     Args:
-        request: whose images are rendered, whatever its colours come from.
-        count: about so many of them.
+        request: the scan whose images are rendered, whatever source of colours it names.
+        count: number of images, roughly: views are taken at equal steps of the list.
     """
     request = replace(request, settings=replace(request.settings, source="images"))
-    every = image_views(request)
-    views = every[:: max(1, len(every) // count)]
+    all_views = image_views(request)
+    views = all_views[:: max(1, len(all_views) // count)]
     stamps: list[float] = []
 
-    def pick(_: list[View]) -> list[View]:
+    def pick_views(_: list[View]) -> list[View]:
         return [views[0], *views]
 
-    def stamp(_: float) -> None:
+    def record_time(_: float) -> None:
         stamps.append(time.perf_counter())
 
-    with layer_source(replace(request, pick=pick), progress=stamp):
-        ours = stamps[-1] - stamps[0]
+    with layer_source(replace(request, pick=pick_views), progress=record_time):
+        layer_seconds = stamps[-1] - stamps[0]
     pixels = sum(view.pixels for view in views) / 1e6
-    rates = {"ours": pixels / ours, "floor": pixels / _bare_seconds(request, views)}
+    rates = {"ours": pixels / layer_seconds, "floor": pixels / _bare_seconds(request, views)}
     return {"name": "rendering, all layers; Cycles, the picture alone", "unit": "million samples/s", **rates}
 
 
@@ -49,17 +49,18 @@ def _bare_seconds(request: LayerRequest, views: list[View]) -> float:
     """Render the picture alone of some views; return the wall-clock seconds it takes."""
     with daylight(request.environment, True) as day:
         passes = Passes((), lit=True)
-        with stage(bpy.context.scene, (), passes, (day.sun,), None) as bare:
-            aim(bare.camera, views[0])
-            bare.render(16, 16)  # the tree is built by the first image
+        with stage(bpy.context.scene, (), passes, (day.sun,), None) as bare_stage:
+            aim(bare_stage.camera, views[0])
+            bare_stage.render(16, 16)  # the tree is built by the first image
             seconds = 0.0
             for view in views:
-                aim(bare.camera, view)
-                seconds += seconds_of(partial(_render_picture, bare, view))
+                aim(bare_stage.camera, view)
+                seconds += seconds_of(partial(_render_picture, bare_stage, view))
     return seconds
 
 
-def _render_picture(bare: RenderStage, view: View) -> None:
-    render = bare.scene.render
+def _render_picture(bare_stage: RenderStage, view: View) -> None:
+    """Render one view without reading the picture back."""
+    render = bare_stage.scene.render
     render.resolution_x, render.resolution_y, render.resolution_percentage = *view.size, 100
-    bpy.ops.render.render(scene=bare.scene.name)
+    bpy.ops.render.render(scene=bare_stage.scene.name)

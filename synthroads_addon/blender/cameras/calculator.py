@@ -24,19 +24,20 @@ from .stage import Passes, RenderStage, new_stage
 
 WIDTH = 1024
 """Width of the largest plane, px."""
-_NARROWEST = 64
-_STEP = 64
-"""Heights of images of inputs are multiples of this, px, so that those that are there mostly fit once more."""
-_LOWEST = 4
-"""Least height of an image, px: Blender renders none that is lower."""
+_LEAST_WIDTH = 64
+"""Width of the smallest plane, px; chosen."""
+_HEIGHT_STEP = 64
+"""Heights of input images are multiples of this, px, so that existing images mostly fit the next places too; chosen."""
+_LEAST_HEIGHT = 4
+"""Least height of an image, px: Blender doesn't render lower ones."""
 _FIRST_FRAME = -1_000_000
-"""Frame that no scene comes before."""
-_ABOVE = 10.0
-"""Height of the camera above the plane: an image of it is one unit wide for each pixel."""
+"""A frame before those of every scene."""
+_CAMERA_HEIGHT = 10.0
+"""Height of the orthographic camera above the plane, in pixels of the plane; any height would do."""
 
 
 _Spans: TypeAlias = list[tuple[slice, slice]]
-"""Runs of places, and of the pixels that they are."""
+"""Pairs of slices: a run of places, and the run of pixels (row by row from below) that stands for these places."""
 
 
 @dataclass
@@ -56,11 +57,11 @@ class Calculator:
     """Evaluates layers of materials at given places by rendering; must be used on Blender's main thread.
 
     Attributes:
-        stage: what renders.
-        materials: indices of those that it works out.
-        layers: names of the layers that come back.
-        at_once: places that are worked out at once.
-        main_thread: it can be used there alone.
+        stage: scene and camera that render the plane.
+        materials: indices of the materials that it evaluates.
+        layers: names of the layers that it returns.
+        at_once: largest number of places that one call evaluates.
+        main_thread: whether only Blender's main thread may use it.
     """
 
     at_once = 1 << 20
@@ -75,87 +76,93 @@ class Calculator:
 
     def inputs_of(self, material: int) -> frozenset[SurfaceInput]:
         """Return the inputs that the nodes of the material with this index read."""
-        return frozenset(what for what, _ in self._copies[material].readers)
+        return frozenset(surface_input for surface_input, _ in self._copies[material].readers)
 
     def calculate(self, material: Index, values: dict[SurfaceInput, Float32]) -> dict[str, Float32]:
         """Render the materials' layers at N places; return them by name, (N, C) float32.
 
         Args:
-            material: (N,) of each place, ascending.
-            values: (N, 4) of each input.
+            material: (N,) index of each place's material, ascending.
+            values: (N, 4) values of each input at the places.
         """
         numbers, starts, counts = np.unique(material, return_index=True, return_counts=True)
+        # Few places get a narrower plane, so that at least about 8 rows of pixels are used.
         width = WIDTH
-        while width > _NARROWEST and width * width > 8 * len(material):
+        while width > _LEAST_WIDTH and width * width > 8 * len(material):
             width //= 2
-        rows = -(-counts // width)
-        begins = np.cumsum([0, *rows])
-        # Where the places of each material lie among the pixels, row by row from below.
+        # Each material begins in a new row of pixels.
+        rows = -(-counts // width)  # rounded up
+        first_rows = np.cumsum([0, *rows])
         spans = [
             (slice(start, start + count), slice(row * width, row * width + count))
-            for start, row, count in zip(starts.tolist(), begins[:-1].tolist(), counts.tolist(), strict=True)
+            for start, row, count in zip(starts.tolist(), first_rows[:-1].tolist(), counts.tolist(), strict=True)
         ]
-        height = max(int(begins[-1]), _LOWEST)
+        height = max(int(first_rows[-1]), _LEAST_HEIGHT)
         self._fit_images(width, height)
         self._fill(values, spans)
-        self._lay_out(numbers.tolist(), begins)
+        self._lay_out(numbers.tolist(), first_rows)
         camera = self.stage.camera
         camera.data.type, camera.data.ortho_scale = "ORTHO", float(max(width, height))
-        camera.location = (width / 2.0, height / 2.0, _ABOVE)
-        rendered = self.stage.render(width, height)
+        camera.location = (width / 2.0, height / 2.0, _CAMERA_HEIGHT)
+        passes = self.stage.render(width, height)
         result = {}
-        for name, image in rendered.layers.items():
-            flat = image[::-1].reshape(-1, image.shape[2])
-            result[name] = np.concatenate([flat[pixels] for _, pixels in spans])
+        for name, image in passes.layers.items():
+            # Rows come from the top, spans count them from below.
+            image_pixels = image[::-1].reshape(-1, image.shape[2])
+            result[name] = np.concatenate([image_pixels[pixels] for _, pixels in spans])
         return result
 
     def _fit_images(self, width: int, height: int) -> None:
-        """Remove the input images if they aren't of this width, or too low, or more than twice as high as need be.
+        """Remove the input images unless they have this width and a height between `height` and twice as much.
 
-        Making and removing them looks through all of the file, so that both are done as seldom as can be.
+        Blender looks through the whole file when an image is made or removed, so images are reused where possible.
         """
-        fitting = -(-height // _STEP) * _STEP
-        if self._size[0] != width or not fitting <= self._size[1] <= 2 * fitting:
+        fitting_height = -(-height // _HEIGHT_STEP) * _HEIGHT_STEP
+        if self._size[0] != width or not fitting_height <= self._size[1] <= 2 * fitting_height:
             self._remove_images()
-            self._size = width, fitting
+            self._size = width, fitting_height
 
     def _fill(self, values: dict[SurfaceInput, Float32], spans: _Spans) -> None:
-        """Write the inputs' values into the images that the materials read; what lies between the spans is any."""
-        flat = np.zeros((self._size[0] * self._size[1], 4), np.float32)
-        for what, entry in values.items():
-            if what not in self._images:
-                self._add_image(what)
+        """Write the inputs' values into the images that the materials read; pixels outside the spans become 0."""
+        image_pixels = np.zeros((self._size[0] * self._size[1], 4), np.float32)
+        for surface_input, place_values in values.items():
+            if surface_input not in self._images:
+                self._add_image(surface_input)
             for places, pixels in spans:
-                flat[pixels] = entry[places]
-            image = self._images[what]
-            image.pixels.foreach_set(flat.ravel())
+                image_pixels[pixels] = place_values[places]
+            image = self._images[surface_input]
+            image.pixels.foreach_set(image_pixels.ravel())
             image.update()
 
-    def _add_image(self, what: SurfaceInput) -> None:
-        """Add an image of an input, and have the materials read it."""
-        self._images[what] = _new_image(*self._size)
+    def _add_image(self, surface_input: SurfaceInput) -> None:
+        """Add an image for an input, and have the copies' nodes that read this input show it."""
+        self._images[surface_input] = _new_image(*self._size)
         for copy in self._copies.values():
-            for read, node in copy.readers:
-                if read == what:
-                    node.image = self._images[what]
+            for node_input, node in copy.readers:
+                if node_input == surface_input:
+                    node.image = self._images[surface_input]
 
-    def _lay_out(self, numbers: list[int], begins: np.ndarray) -> None:
-        """Have the stage show a plane with one face per material, of rows `begins` to the next.
+    def _lay_out(self, numbers: list[int], first_rows: np.ndarray) -> None:
+        """Give the stage's plane one face per material, from its first row of pixels up to the next material's.
 
-        What the materials read are the lowest rows of the input images.
+        The UV map makes each pixel of the picture read the same pixel of the input images, which may be higher.
+
+        Args:
+            numbers: index of each face's material.
+            first_rows: (M + 1,) first row of each face, and the end of the last face.
         """
         width, height = self._size
         corners: list[tuple[float, float, float]] = []
         faces: list[tuple[int, ...]] = []
-        maps: list[float] = []
-        for low, high in zip(begins[:-1].tolist(), begins[1:].tolist(), strict=True):
-            first = len(corners)
-            corners += [(0.0, low, 0.0), (width, low, 0.0), (width, high, 0.0), (0.0, high, 0.0)]
-            faces.append((first, first + 1, first + 2, first + 3))
-            maps += [0.0, low / height, 1.0, low / height, 1.0, high / height, 0.0, high / height]
+        map_corners: list[float] = []
+        for bottom, top in zip(first_rows[:-1].tolist(), first_rows[1:].tolist(), strict=True):
+            first_corner = len(corners)
+            corners += [(0.0, bottom, 0.0), (width, bottom, 0.0), (width, top, 0.0), (0.0, top, 0.0)]
+            faces.append((first_corner, first_corner + 1, first_corner + 2, first_corner + 3))
+            map_corners += [0.0, bottom / height, 1.0, bottom / height, 1.0, top / height, 0.0, top / height]
         mesh = self._empty_mesh()
         mesh.from_pydata(corners, [], faces)
-        mesh.uv_layers.new(name="SR Pixels").data.foreach_set("uv", maps)
+        mesh.uv_layers.new(name="SR Pixels").data.foreach_set("uv", map_corners)
         for number in numbers:
             mesh.materials.append(self._copies[number].item)
         mesh.polygons.foreach_set("material_index", np.arange(len(faces), dtype=np.int32))
@@ -191,57 +198,60 @@ class Calculator:
 
 @contextmanager
 def opened_calculator(copies: dict[int, ReadingCopy], layers: Sequence[str]) -> Iterator[Calculator]:
-    """Yield a calculator with copies of materials, by their index; afterwards nothing of it is left but these."""
+    """Context of a calculator with copies of materials, by index; on exit all but the copies is removed."""
     with ExitStack() as stack:
         folder = stack.enter_context(scratch_folder())
-        set_up = stack.enter_context(new_stage(Passes(layers, lit=False), folder))
-        set_up.scene.render.use_persistent_data = False  # else images that change would be kept
-        result = Calculator(set_up, copies, layers)
-        stack.callback(result.close)
-        yield result
+        render_stage = stack.enter_context(new_stage(Passes(layers, lit=False), folder))
+        render_stage.scene.render.use_persistent_data = False  # else images that change would be kept
+        calculator = Calculator(render_stage, copies, layers)
+        stack.callback(calculator.close)
+        yield calculator
 
 
 @contextmanager
 def reading_copy(item: bpy.types.Material, layers: Sequence[str]) -> Iterator[ReadingCopy]:
     """Context of a copy of a material that outputs only the layers, its inputs read from images; removed on exit.
 
-    What is animated in the material stays in the copy as it is in the current scene's frame.
+    Animated values of the material stay in the copy as they are in the current scene's frame.
     """
-    copied = item.copy()
+    copy = item.copy()
     groups: list[bpy.types.NodeTree] = []
     try:
-        tree = copied.node_tree
+        tree = copy.node_tree
         groups = copy_groups(tree)
-        _freeze(copied, groups, bpy.context.scene.frame_current)
-        for part in (tree, *groups):
-            unlink_missing(part)
-        expressions = layer_expressions(copied)
+        _freeze(copy, groups, bpy.context.scene.frame_current)
+        for node_tree in (tree, *groups):
+            unlink_missing(node_tree)
+        expressions = layer_expressions(copy)
         nodes = LayerNodes(tree)
-        kept = {node.aov_name: node for node in tree.nodes if node.type == "OUTPUT_AOV" and node.aov_name in layers}
+        layer_outputs = {
+            node.aov_name: node for node in tree.nodes if node.type == "OUTPUT_AOV" and node.aov_name in layers
+        }
         for layer in layers:
-            if layer in expressions and layer not in kept:
-                kept[layer] = nodes.add_output(layer, expressions[layer])
+            if layer in expressions and layer not in layer_outputs:
+                layer_outputs[layer] = nodes.add_output(layer, expressions[layer])
         for node in [node for node in tree.nodes if node.type in ("OUTPUT_AOV", "OUTPUT_MATERIAL")]:
-            if node not in kept.values():
+            if node not in layer_outputs.values():
                 tree.nodes.remove(node)
+        # Where the outputs' trees read positions, normals and attributes, they read images from now on.
         search = InputSearch()
-        for node in kept.values():
-            for entry in node.inputs:
-                for link in entry.links:
+        for node in layer_outputs.values():
+            for socket in node.inputs:
+                for link in socket.links:
                     search.visit(link.from_socket)
         readers = list(replace_inputs(search.sites))
-        glow, end = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
-        tree.links.new(glow.outputs[0], end.inputs["Surface"])
-        yield ReadingCopy(copied, readers)
+        emission, surface_output = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
+        tree.links.new(emission.outputs[0], surface_output.inputs["Surface"])
+        yield ReadingCopy(copy, readers)
     finally:
-        # Each removal looks through the whole file.
-        bpy.data.batch_remove([copied, *groups])
+        # One removal for all: Blender looks through the whole file each time.
+        bpy.data.batch_remove([copy, *groups])
 
 
 def _freeze(item: bpy.types.Material, groups: Sequence[bpy.types.NodeTree], frame: int) -> None:
-    """Have a copied material look at any time, in any scene, as it does now, at a frame of the current scene."""
+    """Make a copied material look at all frames of all scenes as it does now, at a frame of the current scene."""
     for block in (item, item.node_tree, *groups):
-        block.animation_data_clear()  # values stay as they are; what drives them isn't needed any more
+        block.animation_data_clear()  # values stay as they are, without their animation and drivers
     for tree in (item.node_tree, *groups):
         for node in tree.nodes:
             if node.type == "TEX_IMAGE" and node.image_user.use_auto_refresh:
@@ -249,11 +259,11 @@ def _freeze(item: bpy.types.Material, groups: Sequence[bpy.types.NodeTree], fram
 
 
 def _freeze_sequence(user: bpy.types.ImageUser, frame: int) -> None:
-    """Have an image sequence or movie show at all times what it shows at a frame of the scene."""
-    shown = frame - user.frame_start + 1
+    """Make an image sequence or movie show at all frames the image that it shows at this frame of the scene."""
+    image_number = frame - user.frame_start + 1
     if user.use_cyclic:
-        shown = (shown - 1) % user.frame_duration + 1
-    user.frame_offset += min(max(shown, 0), user.frame_duration) - 1
+        image_number = (image_number - 1) % user.frame_duration + 1
+    user.frame_offset += min(max(image_number, 0), user.frame_duration) - 1
     # Beyond its end a sequence shows its last image, here the only one.
     user.frame_start, user.frame_duration, user.use_cyclic = _FIRST_FRAME, 1, False
 

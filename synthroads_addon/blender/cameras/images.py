@@ -17,7 +17,9 @@ from ...scanning.colour.views import RenderedImage, View
 from .stage import RenderedPasses, RenderStage
 
 _LARGEST_HALF = 65504.0
+"""Largest 16-bit float (IEEE 754)."""
 _SENSOR = 36.0
+"""Width of a camera's sensor, mm: Blender's default."""
 
 
 class RenderedLayers(ImageLayers):
@@ -48,24 +50,28 @@ class RenderedLayers(ImageLayers):
             "bytes": sum(i.layers.nbytes + i.depth.nbytes + i.material.nbytes for i in self.images),
         }
 
-    def _store_image(self, number: int, view: View, rendered: RenderedPasses) -> RenderedImage:
+    def _store_image(self, number: int, view: View, passes: RenderedPasses) -> RenderedImage:
+        """Write a view's rendered passes into files, layers as 16-bit floats; return them as a memory-mapped image."""
         light = ("sun", "sky")
-        parts = [
-            values * np.float32(self._exposure) if name in light else values for name, values in rendered.layers.items()
+        layer_parts = [
+            values * np.float32(self._exposure) if name in light else values for name, values in passes.layers.items()
         ]
-        height, width = rendered.material.shape
-        joined = np.concatenate(parts, axis=2) if parts else np.zeros((height, width, 0), np.float32)
-        assert rendered.depth is not None
-        layers = np.clip(joined, 0.0, _LARGEST_HALF).astype(np.float16)
-        material = np.rint(rendered.material).astype(np.uint16)
+        height, width = passes.material.shape
+        stacked_layers = (
+            np.concatenate(layer_parts, axis=2) if layer_parts else np.zeros((height, width, 0), np.float32)
+        )
+        assert passes.depth is not None
+        layers = np.clip(stacked_layers, 0.0, _LARGEST_HALF).astype(np.float16)
+        material = np.rint(passes.material).astype(np.uint16)
         return RenderedImage(
             view,
             self._map_file(f"{number}-layers", layers),
-            self._map_file(f"{number}-depth", rendered.depth),
+            self._map_file(f"{number}-depth", passes.depth),
             self._map_file(f"{number}-material", material),
         )
 
     def _map_file(self, name: str, array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        """Write an array into a file of the temporary folder; return it memory-mapped, read only."""
         path = self._folder / f"{name}.npy"
         try:
             np.save(path, array)
@@ -81,9 +87,10 @@ class RenderedLayers(ImageLayers):
 
 
 def aim(camera: bpy.types.Object, view: View) -> None:
-    """Set a camera object's place, lens and shift to those of a view."""
+    """Set a camera object's position, rotation, focal length and shift to those of a view."""
     data, (width, height) = camera.data, view.size
     data.type, data.sensor_fit, data.sensor_width = "PERSP", "HORIZONTAL", _SENSOR
+    # Focal length and principal point, of pixels, in Blender's units: mm, and shares of the image's width.
     data.lens = view.focal * _SENSOR / width
     data.shift_x = (width / 2.0 - view.centre[0]) / width
     data.shift_y = (view.centre[1] - height / 2.0) / width

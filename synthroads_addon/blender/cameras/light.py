@@ -18,6 +18,7 @@ from ..sky import SUN_ANGLE, SUN_COLOR, SUN_STRENGTH, fill_sky, new_sun
 from .stage import SUN_GROUP, Passes, stage
 
 _PROBE_SAMPLES = 1024
+"""Samples per pixel of the white surface under the sky; chosen."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,8 @@ def daylight(environment: Environment, sharp: bool) -> Iterator[Daylight]:
     """Context of a sun lamp and a sky for a road's environment, with their exposure; removes them on exit.
 
     Args:
-        environment: the road's.
-        sharp: the sun is a point, so that one sample gives its shadows without noise.
+        environment: angles and strength of the road's sun.
+        sharp: whether the sun is a point, so that one sample per pixel gives shadows without noise.
     """
     sky = _Sky.of(environment)
     with ExitStack() as stack:
@@ -57,15 +58,15 @@ def daylight(environment: Environment, sharp: bool) -> Iterator[Daylight]:
 
 
 def measured_light(environment: Environment) -> SunAndSky:
-    """Return sun and sky as white surfaces see them, exposed; the sky is rendered once. In Blender's main thread."""
+    """Return sunlight and skylight on white surfaces, exposed; renders the sky once. Only in Blender's main thread."""
     return _exposed(environment)[0]
 
 
 def _exposed(environment: Environment) -> tuple[SunAndSky, float]:
-    """Return sun and sky as white surfaces see them, exposed, and the exposure, see `expose_light`."""
-    # A lamp's irradiance, which it keeps as 32 bits, falls on a matt surface, which spreads it over pi.
-    facing = np.array(SUN_COLOR) * float(np.float32(SUN_STRENGTH * environment.sun_strength)) / math.pi
-    return expose_light(sun_direction(environment), facing, np.array(sky_radiance(environment)))
+    """Return sunlight and skylight on white surfaces, exposed, and the factor of exposure, see `expose_light`."""
+    # Radiance of a white Lambertian surface that faces the sun: L = E / pi. Blender keeps the irradiance E as 32 bits.
+    sun_radiance = np.array(SUN_COLOR) * float(np.float32(SUN_STRENGTH * environment.sun_strength)) / math.pi
+    return expose_light(sun_direction(environment), sun_radiance, np.array(sky_radiance(environment)))
 
 
 def sky_radiance(environment: Environment) -> tuple[float, float, float]:
@@ -85,11 +86,13 @@ class _Sky(NamedTuple):
 
     @classmethod
     def of(cls, environment: Environment) -> Self:
+        """Return the sky of a road's environment."""
         return cls(environment.sun_elevation_deg, environment.sun_azimuth_deg, environment.sun_strength)
 
 
 @contextmanager
 def _world(sky: _Sky) -> Iterator[bpy.types.World]:
+    """Context of a new Blender world with this sky; removes it on exit."""
     world = bpy.data.worlds.new("SR Stage Sky")
     try:
         fill_sky(world, *sky)
@@ -102,11 +105,11 @@ def _world(sky: _Sky) -> Iterator[bpy.types.World]:
 def _sky_radiance(sky: _Sky) -> tuple[float, float, float]:
     """Render a white matt horizontal surface under a sky; return its radiance (red, green, blue), cached.
 
-    Most of a small scan's time would go into it, so each sky is rendered once per process.
+    It takes longer than a small scan, so each sky is rendered once per process.
     """
     with ExitStack() as stack:
         world = stack.enter_context(_world(sky))
-        # A map of where the sky is bright would cost more than the many samples that do without.
+        # Importance sampling of the sky would take longer to prepare than the many samples without it take.
         world.cycles.sampling_method = "NONE"
         mesh = bpy.data.meshes.new("SR Probe")
         stack.callback(lambda: bpy.data.meshes.remove(mesh))
@@ -128,10 +131,11 @@ def _sky_radiance(sky: _Sky) -> tuple[float, float, float]:
 
 
 def _make_matt(white: bpy.types.Material) -> None:
+    """Give a material the nodes of a white Lambertian surface."""
     if white.node_tree is None:
         white.use_nodes = True
     nodes = white.node_tree.nodes
     nodes.clear()
-    matt, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
-    matt.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
-    white.node_tree.links.new(matt.outputs[0], output.inputs["Surface"])
+    diffuse, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
+    diffuse.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    white.node_tree.links.new(diffuse.outputs[0], output.inputs["Surface"])

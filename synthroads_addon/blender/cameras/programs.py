@@ -22,18 +22,18 @@ from .calculator import ReadingCopy, opened_calculator, reading_copy
 from .nodes import LayerCalculator, MaterialWork
 
 COMPARED = ((4, 5), (5, 2))
-"""Versions of Blender whose Cycles gives the same, node type by node type (tests/blender/materials/programs)."""
+"""Versions of Blender in whose Cycles each node type gives the program's values (tests/blender/materials/programs)."""
 _OFF, _REC709 = "off", "Linear Rec.709"
 
 
 class ProgramCalculator:
-    """Works out layers of materials by their programs; any threads may use it side by side.
+    """Evaluates layers of materials by their programs; any threads may use it side by side.
 
     Attributes:
-        materials: indices of those that it works out.
-        layers: names of the layers that come back.
-        at_once: places that are worked out at once, as many as the processor keeps at hand.
-        main_thread: it needs none.
+        materials: indices of the materials that it evaluates.
+        layers: names of the layers that it returns.
+        at_once: largest number of places that one call evaluates; chosen to fit into the processor's cache.
+        main_thread: False: any thread may use it.
     """
 
     at_once = 1 << 15
@@ -49,20 +49,22 @@ class ProgramCalculator:
         return frozenset(self._programs[material].program.inputs)
 
     def calculate(self, material: Index, values: dict[SurfaceInput, Float32]) -> dict[str, Float32]:
-        """Return the layers at N places, by name, (N, C) float32; 0 where a material says nothing of one.
+        """Return the layers at N places, by name, (N, C) float32; 0 where a material's program lacks the layer.
 
         Args:
-            material: (N,) of each place, ascending.
-            values: (N, 4) of each input.
+            material: (N,) index of each place's material, ascending.
+            values: (N, 4) values of each input at the places.
         """
+        # First place of each material, and the spans of places of one material.
         starts = np.flatnonzero(np.diff(material, prepend=-1)).tolist()
         spans = list(pairwise([*starts, len(material)]))
-        ready = [self._programs[int(material[start])] for start in starts]
-        widths = {name: width for one in ready for name, width in one.program.outputs}
+        programs = [self._programs[int(material[start])] for start in starts]
+        widths = {name: width for ready in programs for name, width in ready.program.outputs}
         result = {name: np.zeros((len(material), width), np.float32) for name, width in widths.items()}
-        for one, (start, end) in zip(ready, spans, strict=True):
-            here = {what: values[what][start:end] for what in one.program.inputs}
-            one.run(self._kernel, here, {name: result[name][start:end] for name, _ in one.program.outputs})
+        for ready, (start, end) in zip(programs, spans, strict=True):
+            inputs = {surface_input: values[surface_input][start:end] for surface_input in ready.program.inputs}
+            outputs = {name: result[name][start:end] for name, _ in ready.program.outputs}
+            ready.run(self._kernel, inputs, outputs)
         return result
 
 
@@ -71,9 +73,9 @@ class CompiledMaterials:
     """Materials by their index, as far as they could be compiled.
 
     Attributes:
-        kernel: what runs the programs, or why there are none.
-        builders: what makes the programs of materials, for any of their layers.
-        unknown: why a material has none: the node or setting that programs aren't made of.
+        kernel: compiled library that runs the programs, or the reason why no program can run.
+        builders: builder of each compiled material's program, for any of its layers.
+        unknown: for each material without a program: the node or setting that programs can't express.
     """
 
     kernel: ctypes.CDLL | NoKernelError
@@ -104,37 +106,38 @@ class CompiledMaterials:
         return True
 
     def calculator(self, materials: Sequence[int], layers: Sequence[str]) -> ProgramCalculator | None:
-        """Return what works out layers of those of some materials that were compiled; None if none was."""
+        """Return a calculator of those of the materials that were compiled; None if none was."""
         if isinstance(self.kernel, NoKernelError):
             return None
         programs = {index: self.builders[index].build(layers) for index in materials if index in self.builders}
         return ProgramCalculator(self.kernel, programs, layers) if programs else None
 
     def work(self, calculators: Sequence[LayerCalculator], materials: Collection[int]) -> MaterialWork:
-        """Return calculators of some materials, and how these are worked out."""
-        told = "programs"
+        """Return the calculators with what the report says: kernels, and why Cycles evaluates which materials."""
+        kernels = "programs"
         if isinstance(self.kernel, NoKernelError):
-            told = _OFF if str(self.kernel) == _OFF else f"none: Cycles works them out, as {self.kernel}"
-        unknown = {index: why for index, why in self.unknown.items() if index in materials}
-        return MaterialWork(calculators, told, unknown)
+            kernels = _OFF if str(self.kernel) == _OFF else f"none: Cycles works them out, as {self.kernel}"
+        unknown = {index: reason for index, reason in self.unknown.items() if index in materials}
+        return MaterialWork(calculators, kernels, unknown)
 
 
 @contextmanager
 def material_work(
     items: Mapping[int, bpy.types.Material], layers: Sequence[str], kernels: Literal["auto", "off"]
 ) -> Iterator[MaterialWork]:
-    """Context of what works out materials by their index: programs, and Cycles for the others.
+    """Context of the calculators of materials: programs, and Cycles for materials without a program.
 
     Args:
-        items: materials that can be worked out, see `material_needs`.
-        layers: those that are asked for.
-        kernels: ``off`` to have Cycles work out all.
+        items: materials that can be evaluated (see `material_needs`), by index.
+        layers: names of the layers to evaluate.
+        kernels: ``off`` to have Cycles evaluate all.
     """
     compiled, copies = CompiledMaterials.of(kernels), dict[int, ReadingCopy]()
     with ExitStack() as stack:
         for index, item in items.items():
             with ExitStack() as copy_stack:
                 copy = copy_stack.enter_context(reading_copy(item, layers))
+                # Only Cycles needs the copy from here on; the copy of a compiled material is removed at once.
                 if not compiled.compile(index, copy, layers):
                     copies[index] = copy
                     stack.push(copy_stack.pop_all())

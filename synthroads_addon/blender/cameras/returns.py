@@ -20,16 +20,17 @@ from .stage import SKY_GROUP, SUN_GROUP, RenderStage
 Float = NDArray[np.float64]
 
 BLOCK = 1 << 20
-"""Returns rendered at once."""
-_HEIGHT = 1024
-_SMALLEST = 64
-"""Width and height of an image, px: Cycles reads very narrow textures wrongly."""
+"""Largest number of returns that one image renders; chosen."""
+_LARGEST_HEIGHT = 1024
+"""Largest height of an image, px."""
+_LEAST_SIDE = 64
+"""Least width and height of an image, px: Cycles reads very narrow textures wrongly."""
 RENDERINGS_KEPT = 19
-"""Renderings after which the renderer begins anew: it keeps the images of rays, 60 bytes for each of them."""
-_BEFORE = 0.002
-"""How far before the return its ray starts, m: behind leaves, not before them."""
+"""Renderings after which the renderer's data is dropped: Cycles keeps each image of rays, 60 bytes per ray; chosen."""
+_RAY_START = 0.002
+"""Distance before the return at which its ray starts, m: less than that to leaves in front of it; chosen."""
 _LARGEST_ERROR = 0.01
-"""A pixel that shows a place farther from its return than this shows something else, m."""
+"""Distance between a return and the place that its pixel shows, m, beyond which it shows another thing; chosen."""
 
 _SHADER = """
 shader sr_return_camera(
@@ -52,13 +53,13 @@ shader sr_return_camera(
 class ReturnCamera:
     """Source of each return's layers by rendering one pixel per return; the main thread renders them.
 
-    A return's ray starts a little before the place that was hit, along the scanner's ray, so that what the pulse
-    came through on its way doesn't hide it. Pixels that show another place or another material than the return's
-    are given up for the material's means.
+    A return's ray starts a little before the place that was hit, along the scanner's ray, so that leaves or wires that
+    the pulse passed on its way don't hide it. If a pixel shows another place or material than the return's, the return
+    gets the material's mean values.
 
     Attributes:
-        calls: those that it has the main thread make.
-        worst: largest distance between a return and what its pixel shows, of those used, m.
+        calls: queue of calls that Blender's main thread makes for other threads.
+        worst: largest distance so far between a return and the place that its pixel shows, m, of pixels in use.
     """
 
     def __init__(
@@ -84,78 +85,82 @@ class ReturnCamera:
         arrays = {name: np.concatenate([part.arrays[name] for part in parts]) for name in parts[0].arrays}
         return LayerValues(arrays, np.concatenate([part.source for part in parts]))
 
-    def _block(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
+    def _block(self, points: SeenPoints, names: frozenset[str]) -> LayerValues:
+        """Return the requested layers of at most `BLOCK` points, see `sample`."""
         channels: dict[str, NDArray[np.float32]] = {}
         matching = np.zeros(0, bool)
         if len(points):
             channels, matching = self.calls.call(lambda: self._render_points(points))
         source = np.where(matching, FROM_RETURN, FROM_MATERIAL).astype(np.uint8)
-        return self.material.layer_values(points, channels, source, wanted)
+        return self.material.layer_values(points, channels, source, names)
 
     def _render_points(self, points: SeenPoints) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.bool_]]:
-        """Render N points; return channels (N, C), and the mask (N,) of points whose pixel shows just that return."""
+        """Render N points; return channels (N, C) by name, and a mask (N,) of points that their pixels show."""
         # A height that is a power of two divides without error, whichever way a version counts the rows.
-        height = int(np.clip(1 << ((len(points) - 1).bit_length() // 2), _SMALLEST, _HEIGHT))
-        width = max(_SMALLEST, -(-len(points) // height))
-        middle = self._aim(points, width, height)
+        height = int(np.clip(1 << ((len(points) - 1).bit_length() // 2), _LEAST_SIDE, _LARGEST_HEIGHT))
+        width = max(_LEAST_SIDE, -(-len(points) // height))
+        camera_place = self._aim(points, width, height)
         if self._blocks % RENDERINGS_KEPT == 0:
             self._stage.forget()
         with _without_bumps():
-            rendered = self._stage.render(width, height)
-        assert rendered.position is not None
-        # Blender versions differ in the order of the rows.
-        error = [
-            np.linalg.norm(_first_pixels(rendered.position[::step], len(points)) - points.position, axis=1)
+            passes = self._stage.render(width, height)
+        assert passes.position is not None
+        # Blender versions differ in the order of the rows: take the order by which the pixels show the returns' places.
+        errors = {
+            step: np.linalg.norm(_first_pixels(passes.position[::step], len(points)) - points.position, axis=1)
             for step in (1, -1)
-        ]
-        step = 1 if np.median(error[0]) <= np.median(error[1]) else -1
-        matching = error[0 if step == 1 else 1] < _LARGEST_ERROR + 1e-6 * np.abs(middle).max()
-        matching &= np.rint(_first_pixels(rendered.material[::step, :, None], len(points))[:, 0]) == points.material + 1
-        self.worst = max(self.worst, float(error[0 if step == 1 else 1][matching].max(initial=0.0)))
-        channels = {name: _first_pixels(values[::step], len(points)) for name, values in rendered.layers.items()}
+        }
+        step = 1 if np.median(errors[1]) <= np.median(errors[-1]) else -1
+        # Rendered positions are float32: far from the origin they are less precise.
+        matching = errors[step] < _LARGEST_ERROR + 1e-6 * np.abs(camera_place).max()
+        material = np.rint(_first_pixels(passes.material[::step, :, None], len(points))[:, 0]) - 1
+        matching &= material == points.material
+        self.worst = max(self.worst, float(errors[step][matching].max(initial=0.0)))
+        channels = {name: _first_pixels(values[::step], len(points)) for name, values in passes.layers.items()}
         for name in (SUN_GROUP, SKY_GROUP):
             if name in channels:
                 channels[name] = channels[name] * np.float32(self._exposure)
         return channels, matching
 
     def _aim(self, points: SeenPoints, width: int, height: int) -> Float:
-        """Set up the camera's shader with a ray per point; return the camera's place (3,), m."""
-        along = points.position - points.scanner
-        along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
-        # Near the returns, where 32-bit floats are fine.
-        middle = np.round((points.position.min(axis=0) + points.position.max(axis=0)) / 2.0)
-        start = points.position - _BEFORE * along - middle
+        """Give the camera a shader with one ray per point; return the camera's place (3,), m."""
+        direction = points.position - points.scanner
+        direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9)
+        # The camera is amid the returns: rays relative to it are precise enough as 32-bit floats.
+        camera_place = np.round((points.position.min(axis=0) + points.position.max(axis=0)) / 2.0)
+        start = points.position - _RAY_START * direction - camera_place
         coarse = start.astype(np.float16).astype(np.float64)
         self._blocks += 1
-        names = {}
+        file_names = {}
         columns = 1 << (width - 1).bit_length()
-        for name, values in {"coarse": coarse, "fine": start - coarse, "direction": along}.items():
+        for name, values in {"coarse": coarse, "fine": start - coarse, "direction": direction}.items():
             path = self._stage.folder / f"{name}-{self._blocks}.exr"
             write_image(path, _fill_image(values, width, height, columns))
-            names[name] = path.as_posix()
-        self._set_shader(_SHADER.format(width=width, height=height, columns=columns, **names))
+            file_names[name] = path.as_posix()
+        self._set_shader(_SHADER.format(width=width, height=height, columns=columns, **file_names))
         camera = self._stage.camera
-        camera.matrix_world = Matrix.Translation(middle.tolist())
-        self._remove_old()
-        return middle
+        camera.matrix_world = Matrix.Translation(camera_place.tolist())
+        self._remove_earlier_images()
+        return camera_place
 
     def _set_shader(self, text: str) -> None:
         """Compile an OSL shader and make it the camera's; raise RuntimeError if that fails."""
         import _cycles  # not every Blender has it
 
-        source, compiled = self._stage.folder / "camera.osl", self._stage.folder / "camera.oso"
+        source, bytecode_file = self._stage.folder / "camera.osl", self._stage.folder / "camera.oso"
         source.write_text(text, encoding="utf-8")
-        if not _cycles.osl_compile(str(source), str(compiled)):
-            raise RuntimeError("the camera's shader could not be compiled")
-        bytecode = compiled.read_text(encoding="utf-8")
+        if not _cycles.osl_compile(str(source), str(bytecode_file)):
+            raise RuntimeError("Cycles could not compile the shader of the camera that renders a pixel per return")
+        bytecode = bytecode_file.read_text(encoding="utf-8")
         data = self._stage.camera.data
-        # Setting these rather than asking Cycles to compile: its own way needs a module that the bpy package lacks.
+        # The bytecode is set here, not compiled by Cycles' operator, which needs a module that the bpy package lacks.
         data.type, data.custom_mode = "CUSTOM", "INTERNAL"
         data.clip_start, data.clip_end = 1e-5, 1e5
         data.custom_bytecode = bytecode
         data.custom_bytecode_hash = hashlib.md5(bytecode.encode(), usedforsecurity=False).hexdigest()
 
-    def _remove_old(self) -> None:
+    def _remove_earlier_images(self) -> None:
+        """Remove the files with the rays of the block before this one."""
         for name in ("coarse", "fine", "direction"):
             (self._stage.folder / f"{name}-{self._blocks - 1}.exr").unlink(missing_ok=True)
 
@@ -164,7 +169,7 @@ class ReturnCamera:
 def _without_bumps() -> Iterator[None]:
     """Context in which all bump nodes of the file are muted.
 
-    A bump is worked out from what neighbouring pixels see, and here they see places that are far apart.
+    Cycles computes a bump from differences between neighbouring pixels, which here show places far apart.
     """
     trees = [item.node_tree for item in bpy.data.materials if item.node_tree] + list(bpy.data.node_groups)
     bumps = [node for tree in trees for node in tree.nodes if node.bl_idname == "ShaderNodeBump" and not node.mute]
@@ -180,7 +185,7 @@ def _without_bumps() -> Iterator[None]:
 def _fill_image(values: Float, width: int, height: int, columns: int) -> NDArray[np.float32]:
     """Return values (N, 3) row by row as an image (height, columns, 3) whose first `width` columns are used.
 
-    What is left of the last row repeats the last value.
+    Pixels of the last row beyond the N values repeat the last value; N is at most width times height.
     """
     rows = np.empty((width * height, 3), np.float32)
     rows[: len(values)], rows[len(values) :] = values, values[-1]
@@ -190,4 +195,5 @@ def _fill_image(values: Float, width: int, height: int, columns: int) -> NDArray
 
 
 def _first_pixels(image: NDArray[np.float32], count: int) -> NDArray[np.float32]:
+    """Return the first `count` pixels (count, C) of an image (H, W, C), row by row."""
     return image.reshape(-1, image.shape[2])[:count]

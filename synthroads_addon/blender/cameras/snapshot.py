@@ -1,7 +1,7 @@
-"""Materials as they were at one moment, kept in a file: worked out later, without a trace in the open file.
+"""Materials as they were at one moment, kept in a file, and evaluated later without a trace in the open file.
 
-A scan in the panel goes on while the user works. Between two turns of it the open file must hold nothing of it, as each
-step that can be undone, and each save, would keep it; and what the user changes mustn't change the scan.
+A scan in the panel goes on while the user works. Between two turns of the scan the open file must contain nothing of
+it, as each step of undo and each save would keep that; and a user's changes to materials must not change the scan.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from .programs import CompiledMaterials
 from .surfaces import numbered_materials
 
 _INPUT, _IMAGE = "synthroads_input", "synthroads_image"
-"""Properties of nodes in the file: the input that one reads, and Blender's number of the image that one shows."""
+"""Custom properties of nodes in the file: the input that a node reads; session number of the image that it shows."""
 
 
 class MaterialSnapshot:
     """Copies of materials that read images of returns' values, in a file.
 
     Attributes:
-        obstacles: names of nodes that stand in the way, of the materials that can't be worked out, by index.
-        compiled: programs of those that Blender isn't needed for.
+        obstacles: for materials that can't be evaluated, by index: names of the nodes that prevent it.
+        compiled: programs of the materials that can be evaluated without Blender.
     """
 
     def __init__(
@@ -41,10 +41,10 @@ class MaterialSnapshot:
         """Write the file; in Blender's main thread.
 
         Args:
-            names: the scene mesh's materials.
-            varying: indices of those that are to be worked out.
-            folder: for the file, as long as materials are worked out.
-            kernels: ``off`` to have Cycles work out all.
+            names: names of the scene mesh's materials.
+            varying: indices of the materials to evaluate.
+            folder: folder of the file; it must exist as long as materials are evaluated.
+            kernels: ``off`` to have Cycles evaluate all.
         """
         self._path = folder / "materials.blend"
         items = {index: item for index, item in numbered_materials(names) if index in varying}
@@ -58,6 +58,7 @@ class MaterialSnapshot:
             for index, item in items.items():
                 if index in self.obstacles:
                     continue
+                # Only Cycles needs the copy from here on; the copy of a compiled material is removed at once.
                 with ExitStack() as copy_stack:
                     copy = copy_stack.enter_context(reading_copy(item, tuple(MATERIAL_LAYERS)))
                     if not self.compiled.compile(index, copy, tuple(MATERIAL_LAYERS)):
@@ -65,13 +66,13 @@ class MaterialSnapshot:
                         stack.push(copy_stack.pop_all())
             for index, copy in copies.items():
                 self._names[index] = copy.item.name
-                self._inputs[index] = frozenset(what for what, _ in copy.readers)
+                self._inputs[index] = frozenset(surface_input for surface_input, _ in copy.readers)
                 _mark_nodes(copy)
             if copies:
                 bpy.data.libraries.write(str(self._path), {copy.item for copy in copies.values()})
 
     def work(self, materials: Collection[int], layers: Sequence[str]) -> MaterialWork:
-        """Return what works out layers of materials, by index, as far as they can be worked out."""
+        """Return calculators of layers of materials, given by their indices; materials with obstacles have none."""
         programs = self.compiled.calculator(sorted(materials), layers)
         rendered = sorted(index for index in materials if index in self._names)
         calculators: list[LayerCalculator] = [] if programs is None else [programs]
@@ -80,13 +81,13 @@ class MaterialSnapshot:
         return self.compiled.work(calculators, materials)
 
     def inputs_of(self, material: int) -> frozenset[SurfaceInput]:
-        """Return what a material asks for, by its index."""
+        """Return the inputs that the material with this index reads."""
         return self._inputs[material]
 
     @contextmanager
     def loaded(self, materials: Sequence[int]) -> Iterator[dict[int, ReadingCopy]]:
-        """Yield the copies of materials, by index; afterwards they are gone again. In Blender's main thread."""
-        # Not linked: what is linked can't show images of this file.
+        """Context of copies of materials, by index, loaded from the file until the exit; in Blender's main thread."""
+        # Appended, not linked: linked materials can't show images of the open file.
         with bpy.data.libraries.load(str(self._path), link=False) as (_, target):
             target.materials = [self._names[index] for index in materials]
         items = list(target.materials)
@@ -94,18 +95,18 @@ class MaterialSnapshot:
         try:
             yield {index: _loaded_copy(item) for index, item in zip(materials, items, strict=True)}
         finally:
-            here = [library for library in bpy.data.libraries if library.filepath == str(self._path)]
-            bpy.data.batch_remove([*items, *trees, *here])
+            libraries = [library for library in bpy.data.libraries if library.filepath == str(self._path)]
+            bpy.data.batch_remove([*items, *trees, *libraries])
 
 
 class SnapshotCalculator:
-    """Works out layers of a snapshot's materials; all that it needs of Blender is made and removed each time.
+    """Evaluates layers of a snapshot's materials; each call makes and removes all that it needs in Blender.
 
     Attributes:
-        materials: indices of those that it works out.
-        layers: names of the layers that come back.
-        at_once: places that are worked out at once: the window stands still meanwhile.
-        main_thread: it can be used there alone.
+        materials: indices of the materials that it evaluates.
+        layers: names of the layers that it returns.
+        at_once: largest number of places that one call evaluates: Blender's window stands still meanwhile; chosen.
+        main_thread: True: only Blender's main thread may use it.
     """
 
     at_once = 1 << 16
@@ -116,7 +117,7 @@ class SnapshotCalculator:
         self.materials = frozenset(materials)
 
     def inputs_of(self, material: int) -> frozenset[SurfaceInput]:
-        """Return what a material asks for, by its index."""
+        """Return the inputs that the material with this index reads."""
         return self._snapshot.inputs_of(material)
 
     def calculate(self, material: Index, values: dict[SurfaceInput, Float32]) -> dict[str, Float32]:
@@ -126,19 +127,19 @@ class SnapshotCalculator:
 
 
 def _mark_nodes(copy: ReadingCopy) -> None:
-    """Note on a copy's nodes what they read or show, and take their images away, which the file isn't to hold."""
-    for what, node in copy.readers:
-        node[_INPUT] = list(what)
+    """Note on a copy's nodes which input they read or which image they show; unlink the images, to save none."""
+    for surface_input, node in copy.readers:
+        node[_INPUT] = list(surface_input)
     for node in _nodes_below(copy.item.node_tree):
         if node.type == "TEX_IMAGE" and node.image is not None:
             node[_IMAGE], node.image = node.image.session_uid, None
 
 
 def _loaded_copy(item: bpy.types.Material) -> ReadingCopy:
-    """Return a copy from a file, with the images of the open file as these are now.
+    """Return a material from the snapshot's file as a copy whose nodes show the open file's images again.
 
     Raises:
-        InputError: one of them was removed.
+        InputError: the user has removed one of the images.
     """
     images = {image.session_uid: image for image in bpy.data.images}
     readers: list[tuple[SurfaceInput, bpy.types.Node]] = []
@@ -147,19 +148,23 @@ def _loaded_copy(item: bpy.types.Material) -> ReadingCopy:
             readers.append((SurfaceInput(*node[_INPUT]), node))
         elif _IMAGE in node:
             if node[_IMAGE] not in images:
-                raise InputError("Scene", None, f"an image of the material {item.name!r} was removed during the scan")
+                raise InputError(
+                    "Scene",
+                    None,
+                    f"an image of its material {item.name!r} was removed during the scan: start the scan again",
+                )
             node.image = images[node[_IMAGE]]
     return ReadingCopy(item, readers)
 
 
 def _nodes_below(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:
     """Yield the nodes of a tree and of the groups in it."""
-    for one in (tree, *_groups_below(tree)):
-        yield from one.nodes
+    for part_tree in (tree, *_groups_below(tree)):
+        yield from part_tree.nodes
 
 
 def _groups_below(tree: bpy.types.NodeTree) -> Iterator[bpy.types.NodeTree]:
-    """Yield the groups in a tree, of which each stands in one place alone."""
+    """Yield the groups in a tree, at any depth; each group is used by one node only."""
     for node in tree.nodes:
         if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
             yield node.node_tree

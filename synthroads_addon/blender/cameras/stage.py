@@ -1,4 +1,4 @@
-"""The stage: a scene of its own in which the objects of another are rendered, and of which nothing is left."""
+"""The stage: a temporary scene in which the objects of another scene are rendered, removed afterwards."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .versions import eevee_engine, multilayer_exr
 
 NAME = "SR Stage"
 _LEAST_FREE = 1 << 16
-"""Bytes that are free on a disk to which an image could be written to its end."""
+"""Free space of a disk, bytes, below which an image may have been cut short; chosen."""
 _SMALLEST = 4
 """Width and height of the smallest picture that Blender renders, px."""
 SUN_GROUP, SKY_GROUP = "sun", "sky"
@@ -38,13 +38,13 @@ class Passes:
     """Selection of the passes to render, with samples and bounces.
 
     Attributes:
-        layers: of the materials, see `MATERIAL_LAYERS`.
-        lit: light of the sun that the surfaces reflect.
-        sky: that of the sky as well, apart.
-        depth: depth along the camera's axis.
-        position: place that each pixel shows.
+        layers: names of the materials' layers, see `MATERIAL_LAYERS`.
+        lit: whether to render the sunlight that surfaces reflect.
+        sky: whether to render the reflected skylight too, in a pass of its own.
+        depth: whether to render the depth along the camera's axis.
+        position: whether to render the place that each pixel shows.
         samples: samples per pixel.
-        bounces: reflections that the light is followed over.
+        bounces: reflections over which light is followed.
     """
 
     layers: Sequence[str]
@@ -57,7 +57,7 @@ class Passes:
 
     @property
     def channels(self) -> dict[str, int]:
-        """Return the rendered layers' names in order, with their numbers of components."""
+        """Return the rendered channels' names in order, with their numbers of components."""
         light = {SUN_GROUP: 3} if self.lit else {}
         light |= {SKY_GROUP: 3} if self.sky else {}
         return {name: MATERIAL_LAYERS[name] for name in self.layers} | light
@@ -86,7 +86,7 @@ class RenderStage:
     Attributes:
         scene: the temporary scene.
         camera: its camera object.
-        folder: for files; gone afterwards.
+        folder: temporary folder for files.
         images: images rendered so far.
         pixels: pixels rendered so far.
     """
@@ -104,7 +104,7 @@ class RenderStage:
         render, path = self.scene.render, self.folder / "image.exr"
         render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
         render.filepath = str(path)
-        path.unlink(missing_ok=True)  # where the new one can't be written the old one isn't taken for it
+        path.unlink(missing_ok=True)  # else an earlier image would be read if this one can't be written
         self.images, self.pixels = self.images + 1, self.pixels + width * height
         try:
             with _silence(), stderr_if_it_succeeds():
@@ -116,7 +116,7 @@ class RenderStage:
             raise temporary_folder_error(self.folder, error) from None
 
     def drop_picture(self) -> None:
-        """Have Blender hold no large picture of the scene: 5.2 keeps the last one even where the scene is removed."""
+        """Make Blender drop the last picture by rendering a tiny one: 5.2 keeps it even after the scene is removed."""
         if not self.images:
             return
         scene, render = self.scene, self.scene.render
@@ -125,7 +125,7 @@ class RenderStage:
             if item != self.camera:
                 scene.collection.objects.unlink(item)
         render.resolution_x = render.resolution_y = _SMALLEST
-        # After a rendering that failed this one may fail as well: that fault is the one to be told.
+        # After a failed rendering this one may fail too; the user should see the first error.
         with _silence(), stderr_if_it_succeeds(), suppress(RuntimeError):
             bpy.ops.render.render(scene=scene.name)
 
@@ -135,22 +135,25 @@ class RenderStage:
         self.scene.render.use_persistent_data = True
 
     def _read(self, channels: dict[str, NDArray[Any]]) -> RenderedPasses:
-        def several(name: str, parts: str) -> NDArray[np.float32]:
+        """Return the passes of an image from its EXR file's channels (H, W), by name."""
+
+        def stacked(name: str, parts: str) -> NDArray[np.float32]:
             return np.stack([channels[f"{name}.{part}"] for part in parts], axis=-1)
 
         layers = {
-            name: several(name, "RGB") if MATERIAL_LAYERS[name] == 3 else several(name, "X")
+            name: stacked(name, "RGB") if MATERIAL_LAYERS[name] == 3 else stacked(name, "X")
             for name in self.passes.layers
         }
         if self.passes.sky:
-            layers |= {group: several(f"Combined_{group}", "RGB") for group in (SUN_GROUP, SKY_GROUP)}
+            layers |= {group: stacked(f"Combined_{group}", "RGB") for group in (SUN_GROUP, SKY_GROUP)}
         elif self.passes.lit:
-            layers[SUN_GROUP] = several("Combined", "RGB")
-        numbers = (f"{NUMBER}.X", "Material Index.X", "IndexMA.X")
-        number = next(channels[name] for name in numbers if name in channels)
+            layers[SUN_GROUP] = stacked("Combined", "RGB")
+        # Names of the material index: our own output in EEVEE, and Cycles' pass in 5.2 and in 4.5.
+        index_names = (f"{NUMBER}.X", "Material Index.X", "IndexMA.X")
+        material = next(channels[name] for name in index_names if name in channels)
         depth = channels[f"{_DEPTH}.Z"] if self.passes.depth else None
-        position = several(_POSITION, "XYZ") if self.passes.position else None
-        return RenderedPasses(layers, number, depth, position)
+        position = stacked(_POSITION, "XYZ") if self.passes.position else None
+        return RenderedPasses(layers, material, depth, position)
 
 
 @contextmanager
@@ -165,22 +168,22 @@ def stage(
     """Context of a stage with a scene's visible objects and prepared materials; removes and restores all on exit.
 
     Args:
-        source: whose objects are rendered.
-        materials: the scene mesh's.
-        passes: what is rendered.
-        lights: lamps, in place of the scene's own.
+        source: the scene whose objects are rendered.
+        materials: names of the scene mesh's materials.
+        passes: the passes to render.
+        lights: lamps, in place of the source scene's.
         world: the sky, or None for blackness.
         engine: ``cycles`` or ``eevee``.
     """
     with ExitStack() as stack:
         folder = stack.enter_context(scratch_folder())
         stack.enter_context(prepared_materials(materials, passes.layers, engine == "eevee"))
-        result = stack.enter_context(new_stage(passes, folder, (*visible_objects(source), *lights), engine))
-        scene = result.scene
+        render_stage = stack.enter_context(new_stage(passes, folder, (*visible_objects(source), *lights), engine))
+        scene = render_stage.scene
         scene.world = world
         scene.frame_set(source.frame_current, subframe=source.frame_subframe)
         _set_light_groups(scene, passes, lights, world)
-        yield result
+        yield render_stage
 
 
 @contextmanager
@@ -190,14 +193,14 @@ def new_stage(
     """Context of a stage with the given objects and a camera; removes its scene, camera and images on exit.
 
     Args:
-        passes: what is rendered.
-        folder: for files.
+        passes: the passes to render.
+        folder: temporary folder for files.
         items: the objects.
         engine: ``cycles`` or ``eevee``.
     """
-    known = {item.name for item in bpy.data.images}
+    image_names = {item.name for item in bpy.data.images}
     with ExitStack() as stack:
-        stack.callback(_forget_images, known)
+        stack.callback(_forget_images, image_names)
         scene = bpy.data.scenes.new(NAME)
         stack.callback(_remove_stage, scene)
         data = bpy.data.cameras.new(NAME)
@@ -210,9 +213,9 @@ def new_stage(
         _set_engine(scene, engine, passes)
         _set_passes(scene, passes)
         multilayer_exr(scene.render.image_settings)
-        result = RenderStage(scene, camera, passes, folder)
-        stack.callback(result.drop_picture)
-        yield result
+        render_stage = RenderStage(scene, camera, passes, folder)
+        stack.callback(render_stage.drop_picture)
+        yield render_stage
 
 
 def _remove_stage(scene: bpy.types.Scene) -> None:
@@ -240,6 +243,7 @@ def visible_objects(source: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 def _set_engine(scene: bpy.types.Scene, engine: str, passes: Passes) -> None:
+    """Set a scene's render engine, and its settings: one exact ray per sample, linear colours, no denoising."""
     scene.render.use_compositing = scene.render.use_sequencer = False
     scene.render.film_transparent = True
     scene.view_settings.view_transform = "Raw"
@@ -255,6 +259,7 @@ def _set_engine(scene: bpy.types.Scene, engine: str, passes: Passes) -> None:
     cycles.samples, cycles.use_adaptive_sampling, cycles.use_denoising = passes.samples, False, False
     cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = passes.bounces
     cycles.transparent_max_bounces = 8
+    # A narrow filter: pixels take nothing of their neighbours.
     cycles.pixel_filter_type, cycles.filter_width = "BLACKMAN_HARRIS", 0.01
     cycles.use_auto_tile = False
     cycles.seed = 0
@@ -264,6 +269,7 @@ def _set_engine(scene: bpy.types.Scene, engine: str, passes: Passes) -> None:
 
 
 def _set_passes(scene: bpy.types.Scene, passes: Passes) -> None:
+    """Switch on the passes of a scene's view layer, and add an output for each of the materials' layers."""
     layer = scene.view_layers[0]
     layer.use_pass_material_index = scene.render.engine == "CYCLES"
     layer.use_pass_z, layer.use_pass_position = passes.depth, passes.position
@@ -271,7 +277,7 @@ def _set_passes(scene: bpy.types.Scene, passes: Passes) -> None:
         output = layer.aovs.add()
         output.name, output.type = name, "COLOR" if MATERIAL_LAYERS[name] == 3 else "VALUE"
     if not layer.use_pass_material_index:
-        # EEVEE has no such pass. In 5.2 values that are declared before colours come back 0.
+        # EEVEE has no pass of material indices. Declared last: in 5.2 values declared before colours come back 0.
         output = layer.aovs.add()
         output.name, output.type = NUMBER, "VALUE"
 
@@ -293,25 +299,26 @@ def _set_light_groups(
 
 @contextmanager
 def _silence() -> Iterator[None]:
-    """Context in which the process's standard output, where Blender reports each image, goes nowhere."""
+    """Context in which the process's standard output, where Blender reports each image, is discarded."""
     if sys.stdout is not None:
         sys.stdout.flush()
     try:
-        kept = os.dup(1)
+        saved_output = os.dup(1)
     except OSError:
         # A Blender without a console has no standard output.
         yield
         return
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    null_device = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 1)
+        os.dup2(null_device, 1)
         yield
     finally:
-        os.dup2(kept, 1)
-        os.close(nowhere)
-        os.close(kept)
+        os.dup2(saved_output, 1)
+        os.close(null_device)
+        os.close(saved_output)
 
 
-def _forget_images(known: set[str]) -> None:
-    for item in [item for item in bpy.data.images if item.name not in known]:
+def _forget_images(names: set[str]) -> None:
+    """Remove the images from the open file that aren't in `names`."""
+    for item in [item for item in bpy.data.images if item.name not in names]:
         bpy.data.images.remove(item)

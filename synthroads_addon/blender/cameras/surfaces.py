@@ -19,12 +19,12 @@ from ..materials.textures import NORMAL_IMAGE, is_normal_image
 from ..materials.transparency import read_transparency
 
 NUMBER = "sr_material"
-"""Output that shows the material's number, for renderers that have no pass for it."""
+"""Name of the output that shows the material's number plus 1, for renderers without a pass for it."""
 
 
 def scene_constants(names: Sequence[str]) -> SurfaceConstants:
     """Return the mean layers of the named materials, and which layers vary on which."""
-    means = constants(names)  # of each image once: that takes a twentieth of a second and more
+    means = constants(names)  # all at once, so that each image is averaged once: that takes 0.05 s and more
     return surface_constants([means[name] for name in names], varying_materials_by_layer(names))
 
 
@@ -42,18 +42,18 @@ def normal_images(names: Sequence[str]) -> dict[int, NormalImage]:
     normals = {}
     for index, item in numbered_materials(names):
         if NORMAL_IMAGE in item:
-            tile, along = item[NORMAL_IMAGE]
+            tile, along_road = item[NORMAL_IMAGE]
             nodes = item.node_tree.nodes if item.node_tree else ()
             images = [node.image for node in nodes if node.type == "TEX_IMAGE" and is_normal_image(node.image)]
             if images:
-                normals[index] = NormalImage.of(linear_pixels(images[0]), tile, bool(along))
+                normals[index] = NormalImage.of(linear_pixels(images[0]), tile, bool(along_road))
     return normals
 
 
 def transparencies(names: Sequence[str]) -> dict[int, Transparency]:
-    """Return the light that the named materials let through at each place, by the material's index."""
-    read = {index: read_transparency(item).transparency for index, item in numbered_materials(names)}
-    return {index: transparency for index, transparency in read.items() if transparency is not None}
+    """Return the share of light that the named materials let through at each place, by the material's index."""
+    transparency_by_index = {index: read_transparency(item).transparency for index, item in numbered_materials(names)}
+    return {index: transparency for index, transparency in transparency_by_index.items() if transparency is not None}
 
 
 @contextmanager
@@ -61,31 +61,31 @@ def prepared_materials(names: Sequence[str], layers: Sequence[str], numbers: boo
     """Context in which the named materials have pass indices and outputs for the layers; undone on exit.
 
     Args:
-        names: the scene mesh's materials; their numbers, as pass index, are their indices plus 1.
-        layers: those that are rendered.
+        names: names of the scene mesh's materials; a material's pass index is its index among them plus 1.
+        layers: names of the layers to render.
         numbers: whether the materials' numbers need an output as well.
     """
-    before: list[tuple[bpy.types.Material, int]] = []
-    added: list[LayerNodes] = []
+    pass_indices: list[tuple[bpy.types.Material, int]] = []
+    layer_nodes: list[LayerNodes] = []
     items = [item for _, item in numbered_materials(names) if item.node_tree]
     trees = {tree for item in items for tree in trees_below(item.node_tree)}
     stack = ExitStack()
     try:
         stack.enter_context(missing_images_filled(trees))
         for index, item in numbered_materials(names):
-            before.append((item, item.pass_index))
+            pass_indices.append((item, item.pass_index))
             item.pass_index = index + 1
             if item.node_tree:
-                added.append(LayerNodes(item.node_tree))
-                add_layer_outputs(item, layers, added[-1])
-                added[-1].hide_transparency()
+                layer_nodes.append(LayerNodes(item.node_tree))
+                add_layer_outputs(item, layers, layer_nodes[-1])
+                layer_nodes[-1].hide_transparency()
                 if numbers:
-                    added[-1].new_output(NUMBER).inputs["Value"].default_value = index + 1
+                    layer_nodes[-1].new_output(NUMBER).inputs["Value"].default_value = index + 1
         yield
     finally:
-        for nodes in reversed(added):
+        for nodes in reversed(layer_nodes):
             nodes.remove()
-        for item, number in before:
+        for item, number in pass_indices:
             item.pass_index = number
         stack.close()
 
@@ -100,7 +100,7 @@ def add_layer_outputs(item: bpy.types.Material, layers: Sequence[str], nodes: La
 
 
 def numbered_materials(names: Sequence[str]) -> Iterator[tuple[int, bpy.types.Material]]:
-    """Yield (index in `names`, material) of the open file's materials that a scene mesh's names stand for."""
+    """Yield (index in `names`, material) of those of the open file's materials whose scene names are in `names`."""
     index = {name: number for number, name in enumerate(names)}
     for item in bpy.data.materials:
         if (name := scene_name(item)) in index:

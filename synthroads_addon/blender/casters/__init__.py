@@ -18,9 +18,9 @@ def make_caster(name: str, mesh: SceneMesh, kernels: str = "auto") -> Caster:
     """Build the ray caster ``embree`` or ``bvhtree`` for a mesh; ``auto`` takes the fastest that is installed.
 
     Args:
-        name: of the caster.
-        mesh: what rays are cast at.
-        kernels: ``auto`` to have Embree cast rays in packets where this machine can, ``off`` for one by one.
+        name: name of the caster.
+        mesh: triangles that rays hit.
+        kernels: ``auto`` to let Embree cast rays in packets if this machine can, ``off`` to cast them one by one.
 
     Raises:
         InputError: there is no such caster, or its package isn't installed.
@@ -30,7 +30,11 @@ def make_caster(name: str, mesh: SceneMesh, kernels: str = "auto") -> Caster:
             return _embree_caster(mesh, kernels)
         except ImportError:
             if name == "embree":
-                raise InputError("scan.caster", name, "needs the package embreex; bvhtree is always there") from None
+                raise InputError(
+                    "scan.caster",
+                    name,
+                    "needs the package embreex, which isn't installed; take auto or bvhtree, which every Blender has",
+                ) from None
     if name in ("auto", "bvhtree"):
         from .bvhtree import BVHTreeCaster  # only where it is needed
 
@@ -39,7 +43,7 @@ def make_caster(name: str, mesh: SceneMesh, kernels: str = "auto") -> Caster:
 
 
 def _embree_caster(mesh: SceneMesh, kernels: str) -> Caster:
-    """Return the caster that casts packets, where they are wanted and this machine can, else that of single rays."""
+    """Return a caster of packets unless `kernels` is ``off`` or this machine can't, else a caster of single rays."""
     from .embree import EmbreeCaster  # embreex may be missing
 
     in_pieces = not bpy.app.background

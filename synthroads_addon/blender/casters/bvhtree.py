@@ -24,12 +24,13 @@ class BVHTreeCaster:
         self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float | NDArray[np.float32]
     ) -> NDArray[np.int32]:
         """Return the index (N,) of the first face that each ray hits within its range (m), -1 for none."""
-        cast = self._tree.ray_cast
+        ray_cast = self._tree.ray_cast
         faces = np.full(len(origins), -1, dtype=np.int32)
         limits = np.broadcast_to(maximum_range, len(origins)).tolist()
         rays = zip(origins.tolist(), directions.tolist(), limits, strict=True)
         for i, (origin, direction, limit) in enumerate(rays):
-            face = cast(Vector(origin), Vector(direction), limit)[2]
+            # The result is (place, normal, index of the face, distance).
+            face = ray_cast(Vector(origin), Vector(direction), limit)[2]
             if face is not None:
                 faces[i] = face
         return faces

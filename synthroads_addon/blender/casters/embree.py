@@ -15,11 +15,11 @@ from ...base.arrays import Float32
 from ...scanning.scene.mesh import SceneMesh
 
 _AT_ONCE = 20_000
-"""Triangles that are handed over together where others wait: meanwhile no other thread runs, and no window moves."""
+"""Triangles handed over in one call where other threads wait: no other thread runs during the call; chosen."""
 
 
 _SPREAD = 1.5
-"""Vertices per corner of some triangles up to which all of a run of vertices are handed over rather than sorted out."""
+"""Largest ratio of vertices in a run to corners of triangles at which the run is handed over whole; chosen."""
 
 
 class _NativeErrors(logging.Handler):
@@ -33,7 +33,7 @@ class _NativeErrors(logging.Handler):
 
 _log = logging.getLogger("embreex")
 if not _log.handlers:
-    # It tells of Embree's errors by a logger that, by itself, Python would write to `sys.stderr`.
+    # embreex logs Embree's errors; without a handler Python would write them to `sys.stderr`.
     _log.addHandler(_NativeErrors())
     _log.propagate = False
 
@@ -42,10 +42,10 @@ class EmbreeCaster:
     """Ray caster on Embree 4, which releases Python's lock while casting.
 
     Args:
-        mesh: what rays are cast at.
-        robust: no ray slips through an edge that two faces share; a little slower.
-        in_pieces: hand the mesh over in pieces, so that other threads run in between; it then casts a little slower.
-        kernels: why no packets are cast.
+        mesh: triangles that rays hit.
+        robust: whether no ray may slip through an edge that two faces share; a little slower.
+        in_pieces: whether to hand the mesh over in pieces, so that other threads run in between; casting is slower.
+        kernels: reason why rays aren't cast in packets, for the report.
     """
 
     name = "embree"
@@ -61,13 +61,13 @@ class EmbreeCaster:
         self.kernels = kernels
         self._scene = EmbreeScene(robust=robust)
         self._meshes: list[TriangleMesh] = []
-        at_once = _AT_ONCE if in_pieces else max(1, len(mesh.triangles))
-        firsts = range(0, len(mesh.triangles), at_once)
-        for first in firsts:
-            triangles = mesh.triangles[first : first + at_once]
+        piece_size = _AT_ONCE if in_pieces else max(1, len(mesh.triangles))
+        first_triangles = range(0, len(mesh.triangles), piece_size)
+        for first_triangle in first_triangles:
+            triangles = mesh.triangles[first_triangle : first_triangle + piece_size]
             self._meshes.append(TriangleMesh(self._scene, *_used_vertices(mesh.vertices, triangles)))
-        self._firsts = np.array([*firsts, 0], np.int32)
-        "First face of each mesh; the last is that of none, -1."
+        self._firsts = np.array([*first_triangles, 0], np.int32)
+        "Index of each piece's first face. Embree numbers a miss (-1, -1): the last entry, 0, makes it face -1."
         if self._meshes:
             # The tree is built by the first ray: cast one here, before threads do.
             self._scene.run(np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32))
@@ -98,9 +98,11 @@ class EmbreeCaster:
 
 
 def _used_vertices(vertices: Float32, triangles: NDArray[np.int32]) -> tuple[Float32, NDArray[np.int32]]:
-    """Return the vertices (U, 3) that some triangles (N, 3) of a mesh need, and the triangles by these."""
-    first, last = int(triangles.min()), int(triangles.max())
-    if last - first < _SPREAD * triangles.size:  # nearly all of those in between: what is built together lies together
-        return vertices[first : last + 1], triangles - np.int32(first)
-    used, corners = np.unique(triangles, return_inverse=True)
-    return vertices[used], corners.reshape(triangles.shape).astype(np.int32)
+    """Return the vertices (U, 3) that some triangles (N, 3) of a mesh use, and the triangles as indices of these."""
+    lowest_index, highest_index = int(triangles.min()), int(triangles.max())
+    if (
+        highest_index - lowest_index < _SPREAD * triangles.size
+    ):  # nearly every vertex of the run is used: parts built together have neighbouring vertices
+        return vertices[lowest_index : highest_index + 1], triangles - np.int32(lowest_index)
+    vertex_indices, corners = np.unique(triangles, return_inverse=True)
+    return vertices[vertex_indices], corners.reshape(triangles.shape).astype(np.int32)

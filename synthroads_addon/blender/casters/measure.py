@@ -1,4 +1,4 @@
-"""How fast a caster is by itself, and whether two casters agree: what the scan's own speed is held against."""
+"""Rate of a caster alone, which a scan's rate is compared with, and agreement of two casters."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Faces = NDArray[np.int32]
 Rays = NDArray[np.float32]
 
 CHUNK = 2**17
-"""Rays that one call casts: no other number is faster."""
+"""Rays of one call: measured as the fastest number."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,8 @@ class Rate:
     """Rate at which rays were cast, by wall clock and by processor time.
 
     Attributes:
-        rays_per_second: by the clock.
-        rays_per_processor_second: by the time that all cores together spent, which other work hardly touches.
+        rays_per_second: rays by wall-clock time.
+        rays_per_processor_second: rays by the time that all cores together spent, which other work hardly affects.
     """
 
     rays_per_second: float
@@ -40,9 +40,9 @@ class Agreement:
 
     Attributes:
         same: share of the rays for which both find the same face, or both none.
-        gap: how far (m) the worst of the other rays is from a tie, 0 if there are none: it passes an edge of either
-            face at this distance, or meets both faces at ranges that differ by it (where surfaces cross). A caster
-            can't be blamed for taking either face of a tie; 0.1 mm is far more than rounding makes.
+        gap: largest distance (m) from a tie among the other rays, 0 if there are none. A ray's distance from a tie is
+            the least of its distances from the edges of both faces, and of the difference between its ranges to both
+            (where surfaces cross). Either face of a tie is right; rounding makes far less than 0.1 mm.
     """
 
     same: float
@@ -60,36 +60,39 @@ def bare_rate(
 ) -> Rate:
     """Return the rate at which a caster alone casts N rays, in chunks on some threads: the best of the repeats."""
     parts = [slice(start, start + chunk) for start in range(0, len(origins), chunk)]
-    best, least = np.inf, np.inf
+    least_clock_seconds = least_processor_seconds = np.inf
     with ThreadPoolExecutor(threads) as pool:
         run = map if threads == 1 else pool.map
         for _ in range(repeats):
             clock, processor = time.perf_counter(), time.process_time()
             _exhaust(run(lambda part: caster.cast(origins[part], directions[part], maximum_range), parts))
-            best = min(best, time.perf_counter() - clock)
-            least = min(least, time.process_time() - processor)
-    return Rate(len(origins) / best, len(origins) / least)
+            least_clock_seconds = min(least_clock_seconds, time.perf_counter() - clock)
+            least_processor_seconds = min(least_processor_seconds, time.process_time() - processor)
+    return Rate(len(origins) / least_clock_seconds, len(origins) / least_processor_seconds)
 
 
 def _exhaust(results: Iterable[Faces]) -> None:
+    """Consume all results, so that lazy ones are computed."""
     for _ in results:
         pass
 
 
-def agreement(mesh: SceneMesh, origins: Rays, directions: Rays, found: Faces, expected: Faces) -> Agreement:
-    """Return the agreement of the faces (N,) that two casters found for the same rays (N, 3); -1 is none."""
-    differ = np.flatnonzero(found != expected)
-    if not len(differ):
+def agreement(
+    mesh: SceneMesh, origins: Rays, directions: Rays, caster_faces: Faces, reference_faces: Faces
+) -> Agreement:
+    """Return the agreement of the faces (N,) that two casters report for the same rays (N, 3); -1 is none."""
+    differing_rays = np.flatnonzero(caster_faces != reference_faces)
+    if not len(differing_rays):
         return Agreement(1.0, 0.0)
-    start, along = origins[differ].astype(np.float64), directions[differ].astype(np.float64)
+    start, direction = origins[differing_rays].astype(np.float64), directions[differing_rays].astype(np.float64)
     planes = FacePlanes(mesh)
     gaps, ranges = [], []
-    for faces in (found[differ], expected[differ]):
-        gaps.append(_edge_distances(mesh, start, along, faces))
-        ranges.append(np.where(faces >= 0, planes.intersect(faces, start.T, along.T)[0], np.inf))
+    for faces in (caster_faces[differing_rays], reference_faces[differing_rays]):
+        gaps.append(_edge_distances(mesh, start, direction, faces))
+        ranges.append(np.where(faces >= 0, planes.intersect(faces, start.T, direction.T)[0], np.inf))
     with np.errstate(invalid="ignore"):
-        gaps.append(np.abs(ranges[0] - ranges[1]))
-    return Agreement(1.0 - len(differ) / len(origins), float(np.nanmin(gaps, axis=0).max()))
+        gaps.append(np.abs(ranges[0] - ranges[1]))  # NaN where both faces are missed: ignored by nanmin
+    return Agreement(1.0 - len(differing_rays) / len(origins), float(np.nanmin(gaps, axis=0).max()))
 
 
 def _edge_distances(mesh: SceneMesh, origins: Float, directions: Float, faces: Faces) -> Float:
@@ -97,7 +100,8 @@ def _edge_distances(mesh: SceneMesh, origins: Float, directions: Float, faces: F
     corners = mesh.vertices[mesh.triangles[faces]].astype(np.float64)
     distance = np.full(len(faces), np.inf)
     for i in range(3):
-        # Seen along the ray, the line is a point and the edge a segment in the plane across it.
+        # Projected along the ray, the ray is a point (the origin) and the edge a segment from `begin` along `edge`:
+        # the nearest point of the segment is begin + share edge, share = -begin . edge / |edge|^2, clipped to 0..1.
         begin = _perpendicular(corners[:, i] - origins, directions)
         edge = _perpendicular(corners[:, (i + 1) % 3] - corners[:, i], directions)
         length = np.einsum("ij,ij->i", edge, edge)

@@ -7,15 +7,15 @@ from ...scanning.scene.mesh import SceneMesh
 
 
 class PacketCaster(PacketScene):
-    """Ray caster on Embree 4 that casts rays that run side by side in packets, and the others one by one.
+    """Ray caster on Embree 4 that casts nearly parallel rays in packets, and the other rays one by one.
 
     It releases Python's lock while it is built and while it casts.
 
     Args:
-        packets: what casts them.
-        mesh: what rays are cast at.
-        robust: no ray slips through an edge that two faces share; a little slower.
-        packing: of the rays.
+        packets: compiled library that casts packets.
+        mesh: triangles that rays hit.
+        robust: whether no ray may slip through an edge that two faces share; a little slower.
+        packing: how rays are gathered into packets.
     """
 
     name = "embree"

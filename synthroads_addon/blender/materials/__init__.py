@@ -28,24 +28,25 @@ from .transparency import glass_weight
 MEAN = "synthroads_mean"
 """Custom property of a Blender material: its mean properties, as JSON."""
 LOOK = "synthroads_look"
-"""Custom property of a Blender material: digest of all that its nodes were made from, by which it is found again."""
+"""Custom property of a Blender material: digest of all that its nodes follow from, to find the same material again."""
 _SOURCES = ("materials/*.py", "nodes/builder.py", "../road/pavement/*.py")
-"""Source files that materials' nodes follow from."""
+"""Patterns of the source files that materials' nodes follow from."""
 
 
 class RoadMaterials:
     """The Blender materials of one road: the table's entries as its variation, its weather and its seed make them.
 
-    Roads that look alike have the same ones. What the file has already is taken, what it lacks is made, and none that
-    is there is changed: it may be another road's, or the user's.
+    Roads that look alike share materials. A material that the file has already is reused, and one that it lacks is
+    made; existing materials are never changed, as they may be another road's or the user's.
 
     Args:
-        variation, environment: the road's.
-        offset: of what is random on its pavement, a whole number from 0 to 65535.
-        own: materials in place of the shipped table's.
+        variation: how the road's materials differ from the table: age, wetness, textures, ...
+        environment: the road's weather and daylight.
+        offset: shift of the random fields on its pavement, a whole number from 0 to 65535.
+        user_table: entries that replace those of the shipped table, by name.
 
     Raises:
-        InputError: there are textures of a material that the table doesn't have.
+        InputError: textures are given for a material that the table lacks.
     """
 
     def __init__(
@@ -53,26 +54,26 @@ class RoadMaterials:
         variation: MaterialVariation,
         environment: Environment,
         offset: float = 0.0,
-        own: Mapping[str, Material] | None = None,
+        user_table: Mapping[str, Material] | None = None,
     ) -> None:
-        self._variation, self._environment, self._own = variation, environment, own
+        self._variation, self._environment, self._user_table = variation, environment, user_table
         self._wear = Wear(variation.wheel_track_polish, offset)
         self._looks: dict[str, tuple[Material, str]] = {}
         self._textures: dict[str, Texture] = {}
-        self._made: set[int] = set()
+        self._made_numbers: set[int] = set()
         for name in (texture.material for texture in variation.textures):
             if name not in materials():
                 text = f"must be a material of the table{nearest_name(name, materials())}"
                 raise InputError("materials.textures.material", name, text)
 
     @classmethod
-    def of(cls, parameters: RoadParameters, own: Mapping[str, Material] | None = None) -> Self:
-        """Return the materials of a road, with `own` in place of the shipped table's."""
+    def of(cls, parameters: RoadParameters, user_table: Mapping[str, Material] | None = None) -> Self:
+        """Return the materials of a road, with `user_table` in place of the shipped table's."""
         offset = float(stream(parameters.metadata.seed, "pavement look").integers(1 << 16))
-        return cls(parameters.materials, parameters.environment, offset, own)
+        return cls(parameters.materials, parameters.environment, offset, user_table)
 
     def material(self, name: str) -> bpy.types.Material:
-        """Return the material of a table entry, made if the file has none that looks so.
+        """Return the Blender material of a table entry: the file's if it has one that looks so, else a new one.
 
         Raises:
             KeyError: the table has no such entry.
@@ -85,41 +86,43 @@ class RoadMaterials:
             mean = vary_material(name, self._variation, self._environment, self._entries(name))
             self._looks[name] = mean, _look(name, mean, self._wear if is_worn(name) else None, texture)
         mean, look = self._looks[name]
-        for existing in bpy.data.materials:
-            if existing.get(LOOK) == look and existing.library is None:
-                return existing
-        made = bpy.data.materials.new(_usual_name(name))
-        made[PROPERTY], made[MEAN], made[LOOK] = name, mean.to_json(), look
+        for file_material in bpy.data.materials:
+            if file_material.get(LOOK) == look and file_material.library is None:
+                return file_material
+        new_material = bpy.data.materials.new(_usual_name(name))
+        new_material[PROPERTY], new_material[MEAN], new_material[LOOK] = name, mean.to_json(), look
         images = None
         if texture is not None:
             images = partial(texture_values, texture=texture, factors=texture.factors(self._table(name), mean))
             if "normal" in texture.images:
-                made[NORMAL_IMAGE] = [texture.tile, float(texture.along)]
-        shade(made, mean, partial(vary_color, name, self._wear), images)
-        self._made.add(made.session_uid)
-        return made
+                new_material[NORMAL_IMAGE] = [texture.tile, float(texture.along)]
+        shade(new_material, mean, partial(vary_color, name, self._wear), images)
+        self._made_numbers.add(new_material.session_uid)
+        return new_material
 
     def _texture(self, name: str) -> Texture | None:
-        given = self._variation.texture(name)
-        if given is not None and name not in self._textures:
-            self._textures[name] = load_texture(given, is_worn(name))
+        """Return the images of a material's texture, loaded once; None if the road gives none."""
+        texture = self._variation.texture(name)
+        if texture is not None and name not in self._textures:
+            self._textures[name] = load_texture(texture, is_worn(name))
         return self._textures.get(name)
 
     def _table(self, name: str) -> Material:
-        return (self._own or {}).get(name) or materials()[name]
+        """Return a material's entry in the user's table, else in the shipped one."""
+        return (self._user_table or {}).get(name) or materials()[name]
 
     def _entries(self, name: str) -> dict[str, Material]:
-        """Return what stands in place of the shipped table: rows of the user's, means of images.
+        """Return the entries that replace those of the shipped table: the user's, and means of textures' images.
 
-        Of the images of other materials only asphalt's are needed, which shows where a marking is worn.
+        Beside the material's own images only asphalt's are needed: asphalt shows where a marking is worn.
         """
         textures = {entry: texture for entry in (name, "asphalt") if (texture := self._texture(entry))}
-        of_images = {entry: texture.entry(self._table(entry)) for entry, texture in textures.items()}
-        return {**(self._own or {}), **of_images}
+        image_entries = {entry: texture.entry(self._table(entry)) for entry, texture in textures.items()}
+        return {**(self._user_table or {}), **image_entries}
 
     def take_usual_names(self) -> None:
-        """Name the materials that were made here anew, as the names of those before them have become free."""
-        for item in [item for item in bpy.data.materials if item.session_uid in self._made]:
+        """Rename the materials that were made here to their usual names, which removed materials have freed."""
+        for item in [item for item in bpy.data.materials if item.session_uid in self._made_numbers]:
             item.name = _usual_name(str(item[PROPERTY]))
 
 
@@ -134,9 +137,9 @@ def used_materials() -> set[int]:
 
 
 def remove_unused_materials(numbers: set[int]) -> None:
-    """Remove those of some materials, given by their session numbers, that nothing uses, unless the user named them.
+    """Remove the unused among some materials, given by session numbers; keep those that the user has renamed.
 
-    Images of textures that nothing uses go with them.
+    Images of textures that nothing uses are removed too.
     """
     unused = [
         item
@@ -154,26 +157,29 @@ def _sources_digest() -> bytes:
 
 
 def _look(name: str, mean: Material, wear: Wear | None, texture: Texture | None) -> str:
+    """Return the digest of all that the look of a material follows from; see `LOOK`."""
     text = repr((name, mean.to_json(), None if wear is None else tuple(wear), texture and texture.key))
     return hashlib.sha256(_sources_digest() + text.encode()).hexdigest()[:16]
 
 
 def _usual_name(entry: str) -> str:
+    """Return the name of a table entry's Blender material."""
     return f"SR {entry}"
 
 
 def _is_usual_name(name: str, entry: str) -> bool:
-    """Return whether a material has the name that it was made with, or that with Blender's number behind it."""
+    """Return whether a material has its usual name, or that with the number that Blender appends to duplicates."""
     base, _, number = name.rpartition(".")
     usual = _usual_name(entry)
     return name == usual or (base == usual and number.isdigit())
 
 
 def scene_name(item: bpy.types.Material | None) -> str:
-    """Return the name that a material has in a scene that is scanned: no other material of the file has it.
+    """Return the unique name that a material has in a scanned scene.
 
-    It is the table's entry, ``asphalt``; where that has several, as roads differ, the others have Blender's name behind
-    it: ``asphalt (SR asphalt.001)``, see `materials.table.entry_of`. Materials of the user's have Blender's name.
+    It is the table's entry, such as ``asphalt``. If different roads have several materials of one entry, Blender's
+    name follows for all but one: ``asphalt (SR asphalt.001)``, see `materials.table.entry_of`. Users' materials keep
+    their Blender names.
     """
     if item is None:
         return UNKNOWN
@@ -184,17 +190,18 @@ def scene_name(item: bpy.types.Material | None) -> str:
 
 
 def constants(names: Iterable[str]) -> dict[str, Material]:
-    """Return materials' properties by their names in the scene: as they were made, else of their Principled BSDF."""
+    """Return materials' mean properties by scene names: as they were made, else those of their Principled BSDF."""
     table = materials()
-    here = {scene_name(item): item[MEAN] for item in bpy.data.materials if PROPERTY in item and MEAN in item}
+    stored_means = {scene_name(item): item[MEAN] for item in bpy.data.materials if PROPERTY in item and MEAN in item}
 
     def mean(name: str) -> Material:
-        return Material.from_dict(json.loads(here[name])) if name in here else table[entry_of(name)]
+        return Material.from_dict(json.loads(stored_means[name])) if name in stored_means else table[entry_of(name)]
 
     return {name: mean(name) if entry_of(name) in table else _principled(name) for name in names}
 
 
 def _principled(name: str) -> Material:
+    """Return the mean properties of a user's material: of its shaders' layers, else of its viewport settings."""
     item = bpy.data.materials.get(name)
     if item is None:
         return materials()[UNKNOWN]
@@ -205,7 +212,7 @@ def _principled(name: str) -> Material:
     # A renderer's default specular of 0.5 would drown the contrast of the base colours.
     specular = min(0.2, float(node.inputs["Specular IOR Level"].default_value)) if node else 0.2
     glass = glass_weight(item)
-    if glass:  # what a pane reflects is not its colour, which tints what passes
+    if glass:  # a pane's colour tints the light that passes, it isn't the colour that the pane reflects
         pane = materials()["glass"]
         red, green, blue = (
             part + glass * (pane_color - part)

@@ -1,4 +1,4 @@
-"""Which materials can be worked out at the very returns: what their layers ask for, and what stands in the way."""
+"""Which materials can be evaluated at the very returns: the inputs of their layers, and nodes that prevent it."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import bpy
 
 from ...scanning.scene.surface_values import ALONG, SurfaceInput
-from .inputs import OF_POINT, InputSearch
+from .inputs import POINT_INPUTS, InputSearch
 from .surface_layers import layer_expressions, sockets_of
-from .transparency import asked_by_transparency
+from .transparency import transparency_inputs
 
 
 @dataclass(frozen=True)
@@ -17,8 +17,8 @@ class MaterialNeeds:
     """Inputs that a material's layers depend on, and obstacles.
 
     Attributes:
-        inputs: what they ask of the place that is seen.
-        obstacles: names of nodes that no values can stand for; empty where the material can be worked out.
+        inputs: values that the layers' nodes read at the place that is seen: position, normal, attributes, ...
+        obstacles: names of nodes that can't be replaced by values; empty if the material can be evaluated.
     """
 
     inputs: frozenset[SurfaceInput]
@@ -26,20 +26,16 @@ class MaterialNeeds:
 
 
 def material_needs(item: bpy.types.Material) -> MaterialNeeds:
-    """Return what a material's layers depend on."""
+    """Return the inputs that a material's layers depend on, and the nodes that prevent evaluating them."""
     search = InputSearch()
     for expression in layer_expressions(item).values():
         for linked in sockets_of(expression):
             search.visit(linked.output, linked.path)
-    return MaterialNeeds(frozenset(site.what for site in search.sites), tuple(search.obstacles))
+    return MaterialNeeds(frozenset(site.surface_input for site in search.sites), tuple(search.obstacles))
 
 
 def asked_inputs(item: bpy.types.Material) -> frozenset[SurfaceInput]:
-    """Return what a material asks of surfaces beside the places: its layers, if they can be worked out, and its alpha.
-
-    Args:
-        item: the material.
-    """
+    """Return the inputs that a material reads from surfaces, not from the points: for its layers and its alpha."""
     needs = material_needs(item)
-    of_layers = frozenset() if needs.obstacles else needs.inputs
-    return (of_layers | asked_by_transparency(item)) - {*OF_POINT, ALONG}
+    layer_inputs = frozenset() if needs.obstacles else needs.inputs
+    return (layer_inputs | transparency_inputs(item)) - {*POINT_INPUTS, ALONG}

@@ -1,7 +1,7 @@
-"""Inputs that a material's nodes take from the place that is seen: found, and replaced by images of their values.
+"""Inputs that a material's nodes read at the place that is seen: search for them, and their replacement by images.
 
-A node that is in neither table here asks for something that no image of values can stand for: it is named, and its
-material is left to other means.
+A node that is in none of the tables here reads something that an image of values can't replace. It is an obstacle:
+its material can't be evaluated from values.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import bpy
 from ...scanning.scene.surface_values import POSITION, SurfaceInput
 
 NORMAL, TRUE_NORMAL, INCOMING = (SurfaceInput(kind) for kind in ("normal", "true_normal", "incoming"))
-OF_POINT = (POSITION, TRUE_NORMAL, INCOMING)
-"""Inputs that every point has by itself; all others are read from the surfaces."""
+POINT_INPUTS = (POSITION, TRUE_NORMAL, INCOMING)
+"""Inputs that are known from each point alone; all others are read from the surfaces."""
 
 _OUTPUTS: dict[tuple[str, str], SurfaceInput] = {
     ("ShaderNodeNewGeometry", "Position"): POSITION,
@@ -32,11 +32,12 @@ _OUTPUTS: dict[tuple[str, str], SurfaceInput] = {
     ("ShaderNodeObjectInfo", "Object Index"): SurfaceInput("object_index"),
     ("ShaderNodeObjectInfo", "Random"): SurfaceInput("random"),
 }
+"""Inputs by the node's type and its output's name."""
 _NAMED = {
     "ShaderNodeUVMap": ("uv", "uv_map"),
     "ShaderNodeVertexColor": ("color", "layer_name"),
 }
-"""Nodes of one map or attribute: kind, and the property that names it."""
+"""Nodes that read one UV map or attribute: kind of the input, and the node's property that names the map."""
 
 _DEFAULTS = {
     "ShaderNodeTexImage": SurfaceInput("uv"),
@@ -48,7 +49,7 @@ _DEFAULTS = {
         SurfaceInput("generated"),
     ),
 }
-"""Textures, and the coordinates that they take where none are given."""
+"""Coordinates that a texture uses if its vector isn't linked, by the texture node's type."""
 
 _PURE = frozenset(
     [
@@ -70,34 +71,34 @@ class InputSite:
     """A place in a node tree at which an input is read.
 
     Attributes:
-        what: the input.
+        surface_input: the input.
         tree: the node tree.
-        output: socket that gives it; None where a texture takes it by itself.
-        into: that texture's socket.
+        output: output socket that gives the input; None if a texture reads it because its vector isn't linked.
+        vector: that texture's vector socket; None if an output gives the input.
     """
 
-    what: SurfaceInput
+    surface_input: SurfaceInput
     tree: bpy.types.NodeTree
     output: bpy.types.NodeSocket | None = None
-    into: bpy.types.NodeSocket | None = None
+    vector: bpy.types.NodeSocket | None = None
 
 
 @dataclass
 class InputSearch:
-    """Search for what sockets of a material depend on.
+    """Search for the inputs that sockets of a material depend on.
 
     Attributes:
-        sites: where inputs are read.
-        obstacles: names of nodes that no values can stand for.
+        sites: places at which inputs are read.
+        obstacles: names of nodes that values can't replace.
     """
 
     sites: list[InputSite] = field(default_factory=list)
     obstacles: list[str] = field(default_factory=list)
-    _seen: set[tuple[object, ...]] = field(default_factory=set)
+    _visited: set[tuple[object, ...]] = field(default_factory=set)
     _sources: dict[int, dict[int, list[bpy.types.NodeSocket]]] = field(default_factory=dict)
 
     def visit(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...] = ()) -> None:
-        """Look at an output socket, and at all that it depends on.
+        """Add the sites and obstacles that an output socket depends on.
 
         Args:
             socket: the output.
@@ -105,73 +106,79 @@ class InputSearch:
         """
         node = socket.node
         key = (*(outer.as_pointer() for outer in path), node.as_pointer(), socket.identifier)
-        if key in self._seen:
+        if key in self._visited:
             return
-        self._seen.add(key)
+        self._visited.add(key)
         kind, tree = node.bl_idname, socket.id_data
         if kind == "ShaderNodeGroup":
-            self._enter(node, socket, path)
+            self._enter_group(node, socket, path)
         elif kind == "NodeGroupInput":
-            self._leave(socket, path)
-        elif (what := input_of(node, socket)) is not None:
-            self.sites.append(InputSite(what, tree, output=socket))
-        elif kind in _PURE and not _turns_with_surface(node):
-            for entry in node.inputs:
-                self._follow(entry, path)
-            default = _DEFAULTS.get(kind)
+            self._leave_group(socket, path)
+        elif (surface_input := input_of(node, socket)) is not None:
+            self.sites.append(InputSite(surface_input, tree, output=socket))
+        elif kind in _PURE and not _reads_normal(node):
+            for input_socket in node.inputs:
+                self._visit_links(input_socket, path)
+            default_input = _DEFAULTS.get(kind)
             vector = node.inputs.get("Vector")
-            if default is not None and vector is not None and vector.enabled and not vector.is_linked:
-                self.sites.append(InputSite(default, tree, into=vector))
+            if default_input is not None and vector is not None and vector.enabled and not vector.is_linked:
+                self.sites.append(InputSite(default_input, tree, vector=vector))
         else:
-            self._refuse(node, socket)
+            self._add_obstacle(node, socket)
 
-    def _follow(self, entry: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]) -> None:
-        tree = entry.id_data
-        # A socket looks for its links among all those of its tree each time, which made this the dearest of a scene.
+    def _visit_links(self, input_socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]) -> None:
+        """Visit the outputs that are linked to an input socket."""
+        tree = input_socket.id_data
+        # `NodeSocket.links` searches all links of the tree at each access, which is slow: they are stored here.
         if (sources := self._sources.get(tree.as_pointer())) is None:
             sources = self._sources[tree.as_pointer()] = {}
             for link in tree.links:
                 sources.setdefault(link.to_socket.as_pointer(), []).append(link.from_socket)
-        for source in sources.get(entry.as_pointer(), ()):
+        for source in sources.get(input_socket.as_pointer(), ()):
             self.visit(source, path)
 
-    def _enter(self, node: bpy.types.Node, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]) -> None:
+    def _enter_group(
+        self, node: bpy.types.Node, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]
+    ) -> None:
+        """Visit the links inside a group that give the group node's output `socket`."""
         if node.node_tree is None:
             return
         if (output := group_output(node.node_tree)) is not None:
-            for entry in output.inputs:
-                if entry.identifier == socket.identifier:
-                    self._follow(entry, (*path, node))
+            for input_socket in output.inputs:
+                if input_socket.identifier == socket.identifier:
+                    self._visit_links(input_socket, (*path, node))
 
-    def _leave(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]) -> None:
+    def _leave_group(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]) -> None:
+        """Visit the links outside a group that give `socket`, an output of the group's input node."""
         if not path:
             return
-        for entry in path[-1].inputs:
-            if entry.identifier == socket.identifier:
-                self._follow(entry, path[:-1])
+        for input_socket in path[-1].inputs:
+            if input_socket.identifier == socket.identifier:
+                self._visit_links(input_socket, path[:-1])
 
-    def _refuse(self, node: bpy.types.Node, socket: bpy.types.NodeSocket) -> None:
+    def _add_obstacle(self, node: bpy.types.Node, socket: bpy.types.NodeSocket) -> None:
+        """Add a node, with its output's name if it has several, to the obstacles."""
         label = f"{node.bl_rna.name}: {socket.name}" if len(node.outputs) > 1 else node.bl_rna.name
         if label not in self.obstacles:
             self.obstacles.append(label)
 
 
 def input_of(node: bpy.types.Node, socket: bpy.types.NodeSocket) -> SurfaceInput | None:
-    """Return the input that an output gives; None if it gives none, or one that no values can stand for."""
+    """Return the input that an output socket gives; None if it gives none, or one that values can't replace."""
     kind = node.bl_idname
     if getattr(node, "from_instancer", False) or (kind == "ShaderNodeTexCoord" and node.object is not None):
         return None
     if kind in _NAMED:
-        feed, name = _NAMED[kind]
-        return SurfaceInput(feed, getattr(node, name))
+        input_kind, property_name = _NAMED[kind]
+        return SurfaceInput(input_kind, getattr(node, property_name))
     if kind == "ShaderNodeAttribute" and node.attribute_type in ("GEOMETRY", "OBJECT"):
-        feed = "attribute" if node.attribute_type == "GEOMETRY" else "object_attribute"
-        return SurfaceInput(feed + ("_fac" if socket.name in ("Fac", "Factor") else ""), node.attribute_name)
+        input_kind = "attribute" if node.attribute_type == "GEOMETRY" else "object_attribute"
+        return SurfaceInput(input_kind + ("_fac" if socket.name in ("Fac", "Factor") else ""), node.attribute_name)
     return _OUTPUTS.get((kind, socket.name))
 
 
 def copy_groups(tree: bpy.types.NodeTree) -> list[bpy.types.NodeTree]:
-    """Give every group node below a tree a group of its own; return these."""
+    """Give every group node below a tree its own copy of its group; return the copies."""
     copies: list[bpy.types.NodeTree] = []
     for node in tree.nodes:
         if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
@@ -181,26 +188,31 @@ def copy_groups(tree: bpy.types.NodeTree) -> list[bpy.types.NodeTree]:
 
 
 def group_output(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
-    """Return the node that gives a group's results; None if it has none."""
-    ends = [node for node in tree.nodes if node.bl_idname == "NodeGroupOutput"]
-    return next((node for node in ends if node.is_active_output), ends[0] if ends else None)
+    """Return a group's active output node; None if it has none."""
+    output_nodes = [node for node in tree.nodes if node.bl_idname == "NodeGroupOutput"]
+    return next((node for node in output_nodes if node.is_active_output), output_nodes[0] if output_nodes else None)
 
 
-def _turns_with_surface(node: bpy.types.Node) -> bool:
-    """Return whether a texture looks at the surface's own slope beside its coordinates."""
+def identified_socket(sockets: Iterable[bpy.types.NodeSocket], identifier: str) -> bpy.types.NodeSocket | None:
+    """Return the socket with an identifier; None if there is none."""
+    return next((socket for socket in sockets if socket.identifier == identifier), None)
+
+
+def _reads_normal(node: bpy.types.Node) -> bool:
+    """Return whether a texture uses the surface's normal beside its coordinates: an image with box projection."""
     return node.bl_idname == "ShaderNodeTexImage" and node.projection == "BOX"
 
 
 def replace_inputs(sites: Iterable[InputSite]) -> Iterator[tuple[SurfaceInput, bpy.types.Node]]:
-    """Have sites read images instead; yield each input with the node that is to get its image."""
+    """Make sites read images instead; yield each site's input with the image texture node that must get its image."""
     for site in list(sites):
         image = site.tree.nodes.new("ShaderNodeTexImage")
         image.interpolation, image.extension = "Closest", "EXTEND"
-        if site.into is not None:
-            site.tree.links.new(image.outputs["Color"], site.into)
+        if site.vector is not None:
+            site.tree.links.new(image.outputs["Color"], site.vector)
         else:
             assert site.output is not None
-            result = image.outputs["Alpha" if site.output.name == "Alpha" else "Color"]
+            color = image.outputs["Alpha" if site.output.name == "Alpha" else "Color"]
             for target in [link.to_socket for link in site.output.links]:
-                site.tree.links.new(result, target)
-        yield site.what, image
+                site.tree.links.new(color, target)
+        yield site.surface_input, image

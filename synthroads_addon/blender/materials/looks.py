@@ -1,4 +1,7 @@
-"""How each material varies: noises of the base colour added up, and what a few materials have beside them."""
+"""How each material varies: noises of the base colour, dirt, and the special patterns of a few materials.
+
+Wavelengths (m), amounts and other numbers of the noises are chosen.
+"""
 
 from __future__ import annotations
 
@@ -18,30 +21,32 @@ COLOR = "vehicle_color"
 ROWS = "rows"
 """Attribute of fields: the unit vector across the rows of their crop."""
 _DRILL, _TRAM = 3.0, 21.0
-"""Widths that machines drill a field in and tend it in, m."""
+"""Distance between rows of a crop, and between the tracks of machines that tend it, m; chosen."""
 VEHICLE_PLACE, VEHICLE_SEAMS = "vehicle_place_on_it", "vehicle_seams"
-"""Attributes of vehicles: where a point is on it (m), with a height that `VEHICLE_BASE` is added to, as it is 0 on what
-is no vehicle; where its doors' seams are along it (m), 0 for none."""
+"""Attributes of vehicles: a point's place on the vehicle (m), with `VEHICLE_BASE` added to its height as the
+attribute is 0 on other things; positions of the doors' seams along the vehicle (m), 0 for none."""
 VEHICLE_BASE = 10.0
+"""Height that is added in the attribute `VEHICLE_PLACE`, m; chosen."""
 _SEAM_WIDTH, _SEAM_HEIGHTS, _SEAM_DARK = 0.010, (0.30, 1.02), 0.65
-"""Width of a door's seam, heights that it is between (m), and how much of the brightness it takes."""
+"""Width of a door's seam, heights of its ends (m), and the share of the brightness that it takes away; chosen."""
 _DIRT_COLOR, _DIRTIEST, _DIRT_ENDS = (0.13, 0.115, 0.095), 0.85, 0.75
-"""Base colour of what wheels throw up, its largest share, and the height at which there is none of it any more, m."""
+"""Base colour of dirt that wheels throw up, its largest share, and the height where it ends, m; chosen."""
 ELEMENT = 6.0
 """Length of a concrete barrier between two joints, m."""
-_JOINT = 0.02  # m
+_JOINT = 0.02
+"""Width of a joint, m; chosen."""
 _STEEL = 0.5
-"""Mean base colour of a gantry's steel: what its attribute ``shade`` is a share of."""
+"""Mean base colour of a gantry's steel, by which its attribute ``shade`` is divided."""
 _COVER_TINT = 0.35
-"""How much of the vehicle's colour its cover has; the rest is the table's mean."""
+"""Share of the vehicle's colour in its cover's colour; the rest is the table's mean; chosen."""
 _DRY = (0.55, 0.18, 0.25)
-"""How much red, green and blue change between fresh and dry grass, as shares of the mean."""
+"""Change of red, green and blue between fresh and dry grass, as shares of the mean; chosen."""
 _AUTUMN = (0.35, 0.12, 0.0)
-"""The same between a dark and a light tree's leaves."""
+"""Change of red, green and blue between a dark and a light tree's leaves, as shares of the mean; chosen."""
 
 
 class _Noise(NamedTuple):
-    """One noise: see `Shade.vary` and `Shade.noise`."""
+    """One noise of the base colour: its amount for `Shade.vary`, the rest for `Shade.noise`; all chosen."""
 
     amount: float | tuple[float, float, float]
     wavelength: float
@@ -96,9 +101,9 @@ _NOISES: dict[str, tuple[_Noise, ...]] = {
 
 
 class _Dirt(NamedTuple):
-    """By how much dirt, rust or wear changes roughness, specular and metallic where a noise is -1; at 1 it is as clean.
+    """Changes of roughness, specular and metallic by dirt, rust or wear where a noise is -1; their opposites at 1.
 
-    The noise is the last of the material's own; its standard deviation is about 0.17, that of leaves' 0.24.
+    The noise is the last of the material's noises; its standard deviation is about 0.17, that of leaves' noise 0.24.
     """
 
     roughness: float = 0.18
@@ -120,52 +125,55 @@ _DIRT: dict[str, _Dirt] = {
     "number_plate": _Dirt(),
     "sheeting_black": _Dirt(specular=0.03),
 }
-"""Materials that aren't in it stay as the table has them: lamps, displays, glass, chrome, reflectors."""
+"""Dirt by material. Other materials keep the table's values: lamps, displays, glass, chrome, reflectors."""
 _FILM_OF_DIRT = (0.4, 3.0, (1.0, 1.0, 0.5))
-"""Wavelength (m), detail and stretch of the noise of dirt on what has none of its own."""
+"""Wavelength (m), detail and stretch of the noise of dirt on materials that have no noise of their own; chosen."""
 
 
 def _attribute(shade: Shade, name: str) -> Value:
+    """Return a vector attribute of the mesh."""
     return shade.tree.node("ShaderNodeAttribute", attribute_name=name)["Vector"]
 
 
 def _bay(shade: Shade) -> None:
-    """Panels that differ a little, by the attribute ``bay``."""
+    """Give panels slightly different brightness, each its own, by the number in the attribute ``bay``."""
     bay = op.component(_attribute(shade, "bay"), "X")
     number = shade.tree.node("ShaderNodeTexWhiteNoise", w=bay, noise_dimensions="1D")["Value"]
     shade.vary(0.08, number * 2.0 - 1.0)
 
 
 def _gantry_steel(shade: Shade) -> None:
-    """Steel as bright as its faces' attribute ``shade`` says."""
+    """Make steel as bright as the attribute ``shade`` of its faces says."""
     shade.scale(op.component(_attribute(shade, "shade"), "X") / _STEEL)
 
 
 def _paint(shade: Shade, share: float = 1.0) -> None:
-    """Let the base colour have a share of the vehicle's colour."""
-    color = shade.tree.node("ShaderNodeVectorMath", _attribute(shade, COLOR), shade.mean.base_color, operation="DIVIDE")
-    shade.scale(color.value if share == 1.0 else color.value * share + (1.0 - share,) * 3)
+    """Give the base colour a share of the vehicle's colour."""
+    color_ratio = shade.tree.node(
+        "ShaderNodeVectorMath", _attribute(shade, COLOR), shade.mean.base_color, operation="DIVIDE"
+    )
+    shade.scale(color_ratio.value if share == 1.0 else color_ratio.value * share + (1.0 - share,) * 3)
 
 
-def _below(shade: Shade, value: Value, limit: float) -> Value:
+def _is_below(shade: Shade, value: Value, limit: float) -> Value:
     """Return 1 where a number is below a limit, else 0."""
     return shade.tree.node("ShaderNodeMath", value, limit, operation="LESS_THAN").value
 
 
 def _vehicle_wear(shade: Shade) -> None:
-    """Seams of a vehicle's doors, and dirt on its lower part."""
+    """Add the seams of a vehicle's doors, and dirt on its lower part."""
     place, seams = _attribute(shade, VEHICLE_PLACE), _attribute(shade, VEHICLE_SEAMS)
     y, z = op.component(place, "Y"), op.component(place, "Z") - VEHICLE_BASE
-    # Where the attribute is missing it is 0, and z far below any wheel: the mask (1 on vehicles, else 0) is by that.
-    vehicle_mask = 1.0 - _below(shade, z, -1.0)
-    low, high = _SEAM_HEIGHTS
-    door_mask = _below(shade, z, high) - _below(shade, z, low)
+    # On other things the attribute is 0, which puts z far below any wheel: the mask is 1 on vehicles, else 0.
+    vehicle_mask = 1.0 - _is_below(shade, z, -1.0)
+    seam_bottom, seam_top = _SEAM_HEIGHTS
+    door_mask = _is_below(shade, z, seam_top) - _is_below(shade, z, seam_bottom)
     for axis in "XYZ":  # up to three seams along the vehicle, of which 0 stands for none
         seam = op.component(seams, axis)
-        seam_mask = _below(shade, op.unary("ABSOLUTE", y - seam), _SEAM_WIDTH / 2.0)
-        seam_mask = seam_mask * (1.0 - _below(shade, op.unary("ABSOLUTE", seam), 1e-6))
+        seam_mask = _is_below(shade, op.unary("ABSOLUTE", y - seam), _SEAM_WIDTH / 2.0)
+        seam_mask = seam_mask * (1.0 - _is_below(shade, op.unary("ABSOLUTE", seam), 1e-6))
         shade.scale(1.0 - seam_mask * door_mask * _SEAM_DARK)
-    # Share of dirt: _DIRTIEST (1 - z / _DIRT_ENDS)^2 times a noise about 0.75. Chosen: wheels throw most up low.
+    # Share of dirt: _DIRTIEST (1 - z / _DIRT_ENDS)^2 times a noise about 0.75. Chosen: most dirt is near the ground.
     noise = shade.noise(0.35, 3.0, (1.0, 1.0, 0.6)) * 0.5 + 0.75
     depth = op.minimum(op.maximum((_DIRT_ENDS - z) / _DIRT_ENDS, 0.0), 1.0)
     share = depth * depth * noise * _DIRTIEST * vehicle_mask
@@ -178,7 +186,7 @@ def _vehicle_wear(shade: Shade) -> None:
 
 
 def _joints(shade: Shade) -> None:
-    """Dark joints at whole elements, by the attribute ``station``."""
+    """Darken the joints of a barrier at whole elements, by the attribute ``station``."""
     station = op.component(_attribute(shade, "station"), "X")
     distance = op.unary("ABSOLUTE", station % ELEMENT - ELEMENT / 2)
     joint = shade.tree.node("ShaderNodeMath", distance, _JOINT / 2, operation="LESS_THAN").value
@@ -187,20 +195,21 @@ def _joints(shade: Shade) -> None:
 
 
 def _rows(shade: Shade) -> None:
-    """Rows of a crop, and the tracks of the machines that tend it, across the vector attribute ``rows``."""
-    across = op.dot(shade.place, _attribute(shade, ROWS))
-    drills = op.unary("SINE", across * (2.0 * math.pi / _DRILL))
-    shade.scale_texture(1.0 + drills * 0.07)
+    """Add the rows of a crop, and the tracks of the machines that tend it, across the vector attribute ``rows``."""
+    offset = op.dot(shade.place, _attribute(shade, ROWS))
+    row_wave = op.unary("SINE", offset * (2.0 * math.pi / _DRILL))
+    shade.scale_texture(1.0 + row_wave * 0.07)
     # Two wheels, 1 m to either side of each multiple of _TRAM, leave tracks of 0.5 m (chosen: a tractor's).
-    distance = op.unary("ABSOLUTE", op.unary("ABSOLUTE", across % _TRAM - _TRAM / 2.0) - _TRAM / 2.0 + 1.0)
+    distance = op.unary("ABSOLUTE", op.unary("ABSOLUTE", offset % _TRAM - _TRAM / 2.0) - _TRAM / 2.0 + 1.0)
     track = shade.tree.node("ShaderNodeMath", distance, 0.25, operation="LESS_THAN").value
     # Both cover 1 m of _TRAM: the divisor is the mean, so that the field's mean stays.
     shade.scale_texture((1.0 - track * 0.4) / (1.0 - 0.4 * 1.0 / _TRAM))
 
 
 def _film(shade: Shade, wear: Wear) -> None:
-    """Film of a marking: worn where traffic crosses it, in spots as large as tyres' prints; with beads in it."""
+    """Add the film of a marking: worn by traffic, in spots as large as tyres' prints, with glass beads in it."""
     look, _ = pavement_look(shade, "paint", wear)
+    # Wavelengths are chosen, m.
     spots, stretches, beads = shade.noise(0.25, 3.0), shade.noise(2.5, 2.0), shade.noise(0.05, 3.0)
     film = (spots * 0.9 + 1.0) * (stretches * 0.7 + 1.0)
     shade.scale(look.brightness)
@@ -211,12 +220,13 @@ def _film(shade: Shade, wear: Wear) -> None:
 
 
 def _scars(shade: Shade) -> None:
-    """Dark scars across a white bark."""
+    """Add dark scars across a white bark: where a flat noise is low."""
     scars = shade.noise(0.12, 1.0, (0.35, 0.35, 1.6))
     shade.scale_texture(shade.tree.node("ShaderNodeMapRange", scars, 0.25, 0.4, 1.12, 0.25).value)
 
 
 def _clear(shade: Shade, share: float = 0.8) -> None:
+    """Let a share of the light pass straight through."""
     shade.transparency = share
 
 
@@ -224,17 +234,18 @@ class _Texture(NamedTuple):
     """Texture of a pavement: noises of its aggregate, of its patches of binder or slurry, and of long stretches.
 
     Attributes:
-        grain, mottle, wide: amount and wavelength (m) of each on the base colour; no third one if its amount is 0.
-        rough: how much the roughness varies with the mottle.
-        gloss: how much the specular varies with the grain, as a share.
+        grain, mottle, stretches: amount and wavelength (m) of aggregate, patches and long stretches on the base colour;
+            no stretches if their amount is 0.
+        roughness_change: change of the roughness by the mottle.
+        specular_change: change of the specular by the grain, as a share.
         relief: height of the grain, m.
     """
 
     grain: tuple[float, float]
     mottle: tuple[float, float]
-    wide: tuple[float, float]
-    rough: float
-    gloss: float
+    stretches: tuple[float, float]
+    roughness_change: float
+    specular_change: float
     relief: float
 
 
@@ -251,17 +262,17 @@ _PAVEMENTS = {
 
 
 def _pavement(shade: Shade, kind: str, wear: Wear) -> None:
-    """Pavement: its field of station and offset, and its texture."""
+    """Add a pavement's field of station and offset, and its texture."""
     texture = _PAVEMENTS[kind]
     look, height = pavement_look(shade, "concrete" if kind in CONCRETES else "asphalt", wear)
     grain, mottle = shade.noise(texture.grain[1], 1.0), shade.noise(texture.mottle[1], 4.0)
     shade.scale(look.brightness)
     shade.vary(texture.grain[0], grain)
     shade.vary(texture.mottle[0], mottle)
-    if texture.wide[0]:
-        shade.vary(texture.wide[0], shade.noise(texture.wide[1], 2.0))
-    shade.roughness = look.roughness + shade.layer("roughness", mottle * texture.rough)
-    specular = shade.images.get("specular") or (grain * texture.gloss + 1.0) * shade.mean.specular
+    if texture.stretches[0]:
+        shade.vary(texture.stretches[0], shade.noise(texture.stretches[1], 2.0))
+    shade.roughness = look.roughness + shade.layer("roughness", mottle * texture.roughness_change)
+    specular = shade.images.get("specular") or (grain * texture.specular_change + 1.0) * shade.mean.specular
     shade.specular = look.brightness * specular
     shade.relief = height if "normal" in shade.images else grain * texture.relief + (0.0 if height is None else height)
 
@@ -285,12 +296,12 @@ _AFTER_NOISES = {
 _PAINTS = ("paint_white", "paint_yellow")
 
 
-def _lay_dirt(shade: Shade, dirt: _Dirt, clean: Value) -> None:
-    """Make the surface rougher, duller and less metallic where a noise is low."""
-    shade.roughness = shade.layer("roughness", clean * -dirt.roughness)
-    shade.specular = shade.layer("specular", clean * dirt.specular)
+def _lay_dirt(shade: Shade, dirt: _Dirt, cleanness: Value) -> None:
+    """Make the surface rougher, duller and less metallic where the noise `cleanness` (-1 to 1) is low."""
+    shade.roughness = shade.layer("roughness", cleanness * -dirt.roughness)
+    shade.specular = shade.layer("specular", cleanness * dirt.specular)
     if dirt.metallic:
-        shade.metallic = shade.layer("metallic", clean * dirt.metallic)
+        shade.metallic = shade.layer("metallic", cleanness * dirt.metallic)
 
 
 def is_worn(name: str) -> bool:
@@ -299,7 +310,7 @@ def is_worn(name: str) -> bool:
 
 
 def vary_color(name: str, wear: Wear, shade: Shade) -> None:
-    """Let the layers vary as those of a material of the table do; others keep their mean."""
+    """Make the layers of the material `name` under construction vary; other materials keep their means."""
     if name in _PAVEMENTS:
         _pavement(shade, name, wear)
     if name in _BEFORE_NOISES:

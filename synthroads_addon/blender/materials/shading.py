@@ -1,4 +1,4 @@
-"""The small vocabulary that the materials are written in: a colour that varies around the table's mean."""
+"""Construction of a Blender material's nodes: layers that vary around the means of the material table."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ class Shade:
     """A material under construction.
 
     Attributes:
-        tree: its nodes.
+        tree: the material's nodes.
         mean: the table's entry; the base colour's mean must stay equal to it.
         place: position in the world, m.
-        factor: what the base colour is multiplied with; its mean is 1.
-        roughness, metallic, specular: what takes the place of the table's values; their means are these.
-        relief: height that the surface stands out by, m; nothing for a smooth one.
+        factor: field that the base colour is multiplied with; its mean is 1. None for no variation.
+        roughness, metallic, specular: fields whose means are the table's values; None for these values everywhere.
+        relief: height of the surface's fine relief, m; None if it is smooth.
         transparency: share of the light that passes straight through.
-        images: what images give, by layer; ``normal`` is the surface's normal. They take the place of the mean and of
-            what is only texture; what the road's parameters say of a place stays.
+        images: values of texture images by layer; ``normal`` is the surface's normal. An image replaces the layer's
+            mean and noises; variation by the road's parameters (wear, age) is applied to the image too.
     """
 
     tree: Tree
@@ -49,12 +49,12 @@ class Shade:
         return node.value * 2.0 - 1.0
 
     def vary(self, amount: float | tuple[float, float, float], noise: Value) -> None:
-        """Let the base colour vary by +- `amount` (a share, or one for each of red, green and blue) with the noise."""
+        """Let the base colour vary by +- `amount` (a share, or one for each of red, green and blue) with a noise."""
         change = noise * amount
         self.scale_texture((1.0, 1.0, 1.0) + change if isinstance(amount, tuple) else 1.0 + change)
 
     def scale_texture(self, change: Value) -> None:
-        """Multiply the base colour with a field of mean 1 that is texture: unless an image gives it."""
+        """Multiply the base colour with a field of mean 1 that is texture: not if an image gives the base colour."""
         if "base_color" not in self.images:
             self.scale(change)
 
@@ -63,7 +63,7 @@ class Shade:
         self.factor = change if self.factor is None else self.factor * change
 
     def layer(self, name: str, texture: Value) -> Value:
-        """Return a layer of one number: its mean and what texture adds, or what an image gives in place of both."""
+        """Return a layer of one number: its image's value, else its mean plus `texture`."""
         return self.images.get(name) or texture + getattr(self.mean, name)
 
 
@@ -76,10 +76,10 @@ def shade(
     """Give a new Blender material its nodes: a Principled BSDF with the table's values, varied by `build`.
 
     Args:
-        item: the material.
-        mean: the values.
-        build: adds what varies.
-        add_images: adds the nodes of the images that take layers' places, and returns `Shade.images`.
+        item: the new material.
+        mean: the table's values.
+        build: function that adds the variation.
+        add_images: function that adds nodes of texture images and returns `Shade.images`; None for no images.
     """
     if item.node_tree is None:
         item.use_nodes = True
@@ -88,8 +88,8 @@ def shade(
     images = add_images(tree) if add_images else {}
     with tree.frame("Variation around the mean"):
         place = tree.node("ShaderNodeNewGeometry")["Position"]
-        varied = Shade(tree, mean, place, images=images)
-        build(varied)
+        variation = Shade(tree, mean, place, images=images)
+        build(variation)
     with tree.frame("Surface"):
         surface = tree.node(
             "ShaderNodeBsdfPrincipled",
@@ -99,22 +99,22 @@ def shade(
             specular_ior_level=mean.specular,
         )
         color: Operand = images.get("base_color", mean.base_color)
-        if varied.factor is not None:
-            color = tree.node("ShaderNodeVectorMath", color, varied.factor, operation="MULTIPLY").value
+        if variation.factor is not None:
+            color = tree.node("ShaderNodeVectorMath", color, variation.factor, operation="MULTIPLY").value
         if isinstance(color, Value):
             tree.feed(surface.raw.inputs["Base Color"], color)
-        values = {name: _varied(varied, name) for name in ("roughness", "metallic", "specular")}
-        entries = (("roughness", "Roughness"), ("metallic", "Metallic"), ("specular", "Specular IOR Level"))
-        for name, entry in entries:
+        values = {name: _layer_value(variation, name) for name in ("roughness", "metallic", "specular")}
+        input_names = (("roughness", "Roughness"), ("metallic", "Metallic"), ("specular", "Specular IOR Level"))
+        for name, input_name in input_names:
             if isinstance(value := values[name], Value):
-                tree.feed(surface.raw.inputs[entry], value)
-        if (normal := _normal(varied)) is not None:
+                tree.feed(surface.raw.inputs[input_name], value)
+        if (normal := _normal(variation)) is not None:
             tree.feed(surface.raw.inputs["Normal"], normal)
-        seen = surface.value
-        if varied.transparency:
-            clear = tree.node("ShaderNodeBsdfTransparent").value
-            seen = tree.node("ShaderNodeMixShader", varied.transparency, seen, clear).value
-        tree.node("ShaderNodeOutputMaterial", seen)
+        closure = surface.value
+        if variation.transparency:
+            transparent_closure = tree.node("ShaderNodeBsdfTransparent").value
+            closure = tree.node("ShaderNodeMixShader", variation.transparency, closure, transparent_closure).value
+        tree.node("ShaderNodeOutputMaterial", closure)
     with tree.frame("Layers"):
         _layer(tree, "base_color", color=color)
         for name, value in values.items():
@@ -123,12 +123,12 @@ def shade(
     item.roughness, item.metallic = mean.roughness, mean.metallic
     tree.finish()
     if images:
-        _remove_idle(item.node_tree)
+        _remove_unused(item.node_tree)
     arrange(item.node_tree)
 
 
-def _varied(shade: Shade, name: str) -> Operand:
-    """Return a layer of one number: as it varies, kept between 0 and 1, else the table's value."""
+def _layer_value(shade: Shade, name: str) -> Operand:
+    """Return a layer of one number: as it varies, clamped to 0..1, else the table's value."""
     value: Value | None = getattr(shade, name) or shade.images.get(name)
     if value is None:
         return float(getattr(shade.mean, name))
@@ -136,27 +136,27 @@ def _varied(shade: Shade, name: str) -> Operand:
 
 
 def _normal(shade: Shade) -> Value | None:
-    """Return the normal of the surface as its relief and its image turn it; None for the mesh's own."""
+    """Return the surface's normal from its image and its relief; None for the mesh's normal."""
     image = shade.images.get("normal")
     if shade.relief is None:
         return image
-    turned = {} if image is None else {"normal": image}
-    return shade.tree.node("ShaderNodeBump", distance=1.0, height=shade.relief, **turned).value
+    normal_input = {} if image is None else {"normal": image}
+    return shade.tree.node("ShaderNodeBump", distance=1.0, height=shade.relief, **normal_input).value
 
 
 def _layer(tree: Tree, name: str, **value: Operand) -> None:
-    """Add an output for a render layer of this name."""
+    """Add an output (AOV) for a render layer."""
     if isinstance(value.get("color"), tuple):
         value["color"] = (*value["color"], 1.0)  # type: ignore[misc]
     output = tree.node("ShaderNodeOutputAOV", **value)
     output.raw.aov_name = name
 
 
-def _remove_idle(tree: bpy.types.NodeTree) -> None:
-    """Remove nodes whose results nothing takes, as of noises whose place an image has."""
+def _remove_unused(tree: bpy.types.NodeTree) -> None:
+    """Remove nodes whose results aren't used, such as noises that an image replaces."""
     ends = ("OUTPUT_MATERIAL", "OUTPUT_AOV", "FRAME")
-    while idle := [
-        node for node in tree.nodes if node.type not in ends and not any(out.is_linked for out in node.outputs)
+    while unused_nodes := [
+        node for node in tree.nodes if node.type not in ends and not any(output.is_linked for output in node.outputs)
     ]:
-        for node in idle:
+        for node in unused_nodes:
             tree.nodes.remove(node)

@@ -1,6 +1,6 @@
-"""Where a material's layers come from: base colour, roughness, metallic and specular of its shaders, mixed as they are.
+"""Layers of a material (base colour, roughness, metallic, specular) as expressions of its shaders' inputs.
 
-A layer is an expression of constants and sockets, which is looked at, averaged, or built as nodes.
+An expression consists of constants and sockets, mixed as the shaders are. It can be averaged, or built as nodes.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from ...scanning.colour.colour import MATERIAL_LAYERS
 from .image import is_missing, mean_color
-from .inputs import group_output
+from .inputs import group_output, identified_socket
 
 PROPERTY = "synthroads_material"
 """Custom property of a Blender material: its name in the table."""
@@ -22,33 +22,33 @@ PROPERTY = "synthroads_material"
 
 @dataclass(frozen=True)
 class Constant:
-    """A value that is the same everywhere: red, green, blue, or one number three times."""
+    """An expression with the same value everywhere: red, green, blue, or a number three times."""
 
     value: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Linked:
-    """A value that a socket gives.
+    """An expression that is the value of an output socket.
 
     Attributes:
         output: the socket.
         path: the group nodes around it, outermost first.
-        usual: what stands in the input that it is linked to.
+        default: unlinked value of the input that the socket is linked to; used where the mean of the socket is unknown.
     """
 
     output: bpy.types.NodeSocket
     path: tuple[bpy.types.Node, ...]
-    usual: tuple[float, float, float]
+    default: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Mixture:
-    """Two values mixed by a factor: 0 is the first alone."""
+    """Two expressions mixed by a factor: (1 - factor) a + factor b."""
 
     factor: Constant | Linked
-    first: Expression
-    second: Expression
+    a: Expression
+    b: Expression
 
 
 Expression: TypeAlias = "Constant | Linked | Mixture"
@@ -61,15 +61,15 @@ _COLORS = {
 }
 """Shaders by type and the input of their colour, if it isn't ``Color`` or ``Base Color``."""
 _METALS = ("BSDF_GLOSSY", "BSDF_METALLIC", "BSDF_ANISOTROPIC")
-_ROUGH = (*_METALS, "BSDF_PRINCIPLED", "BSDF_GLASS", "BSDF_REFRACTION", "EEVEE_SPECULAR")
-"""Shaders whose roughness is that of their reflection; matt ones have another by that name."""
+_ROUGH_REFLECTORS = (*_METALS, "BSDF_PRINCIPLED", "BSDF_GLASS", "BSDF_REFRACTION", "EEVEE_SPECULAR")
+"""Shaders whose input Roughness is that of their reflection; in matt shaders the name means something else."""
 
 
 def layer_expressions(item: bpy.types.Material) -> dict[str, Expression]:
-    """Return the layers of a material that its nodes say something of, by name.
+    """Return the expressions of those layers that a material's nodes define, by the layer's name.
 
-    A material of the table has outputs for its layers. Of others it is what their shaders have: mixed where they are
-    mixed, and without those that only let light through. Their specular isn't the scanner's, see
+    A material of the table has outputs for its layers. Those of other materials come from their shaders: mixed as the
+    shaders are, without shaders that only let light through. Their specular isn't used, see
     `blender.materials.constants`.
     """
     if item.node_tree is None:
@@ -82,106 +82,110 @@ def layer_expressions(item: bpy.types.Material) -> dict[str, Expression]:
     layers: dict[str, Expression] = {name: _of_input(socket, ()) for name, socket in outputs.items()}
     if PROPERTY in item:
         return layers
-    entry = surface_socket(item.node_tree)
-    if entry is None or not entry.links:
+    surface_input = surface_socket(item.node_tree)
+    if surface_input is None or not surface_input.links:
         return layers
-    surface = entry.links[0].from_socket
+    closure = surface_input.links[0].from_socket
     for name in ("base_color", "roughness", "metallic"):
-        expression = _of_shader(surface, (), name)
+        expression = _of_shader(closure, (), name)
         if expression is not None:
             layers.setdefault(name, expression)
     return layers
 
 
 def material_output(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
-    """Return the node that gives a material to Cycles; None if it has none."""
-    ends = [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL" and node.target in ("ALL", "CYCLES")]
-    return next((node for node in ends if node.is_active_output), ends[0] if ends else None)
+    """Return the output node of a material that Cycles uses; None if it has none."""
+    output_nodes = [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL" and node.target in ("ALL", "CYCLES")]
+    return next((node for node in output_nodes if node.is_active_output), output_nodes[0] if output_nodes else None)
 
 
 def surface_socket(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket | None:
-    """Return the input that takes a material's surface for Cycles; None if it has none."""
-    end = material_output(tree)
-    return None if end is None else end.inputs["Surface"]
+    """Return the input Surface of the output node that Cycles uses; None if the material has none."""
+    output_node = material_output(tree)
+    return None if output_node is None else output_node.inputs["Surface"]
 
 
 def _of_shader(socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...], layer: str) -> Expression | None:
-    """Return a layer of a shader; None of one that has none, as what only lets light through."""
+    """Return the expression of a layer of the shader at an output socket; None if the shader reflects nothing."""
     node = socket.node
     if node.type == "REROUTE":
         return _of_linked(node.inputs[0], path, layer)
     if node.type == "GROUP" and node.node_tree is not None:
         end = group_output(node.node_tree)
-        entry = next((one for one in end.inputs if one.identifier == socket.identifier), None) if end else None
-        return None if entry is None else _of_linked(entry, (*path, node), layer)
+        inner = identified_socket(end.inputs, socket.identifier) if end else None
+        return None if inner is None else _of_linked(inner, (*path, node), layer)
     if node.type == "GROUP_INPUT" and path:
-        entry = next((one for one in path[-1].inputs if one.identifier == socket.identifier), None)
-        return None if entry is None else _of_linked(entry, path[:-1], layer)
+        outer = identified_socket(path[-1].inputs, socket.identifier)
+        return None if outer is None else _of_linked(outer, path[:-1], layer)
     if node.type in ("MIX_SHADER", "ADD_SHADER"):
-        first, second = (_of_linked(entry, path, layer) for entry in node.inputs[-2:])
-        if first is None or second is None or first == second:
-            return second if first is None else first
+        a, b = (_of_linked(shader, path, layer) for shader in node.inputs[-2:])
+        if a is None or b is None or a == b:  # no mixture is needed
+            return b if a is None else a
         factor = _of_input(node.inputs[0], path) if node.type == "MIX_SHADER" else Constant((0.5, 0.5, 0.5))
         assert not isinstance(factor, Mixture)
-        return Mixture(factor, first, second)
+        return Mixture(factor, a, b)
     return _of_closure(node, path, layer)
 
 
-def _of_linked(entry: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...], layer: str) -> Expression | None:
-    links = entry.links
+def _of_linked(input_socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...], layer: str) -> Expression | None:
+    """Return the expression of a layer of the shader that is linked to an input; None if none is."""
+    links = input_socket.links
     return _of_shader(links[0].from_socket, path, layer) if links else None
 
 
 def _of_closure(node: bpy.types.Node, path: tuple[bpy.types.Node, ...], layer: str) -> Expression | None:
+    """Return the expression of a layer of a single shader; None if it reflects nothing."""
     if node.type not in _COLORS:
         return None
     if layer == "base_color":
-        entry = node.inputs.get(_COLORS[node.type] or "Color") or node.inputs.get("Base Color")
-        return None if entry is None else _of_input(entry, path)
-    entry = node.inputs.get(layer.capitalize())
-    if entry is not None and (layer == "metallic" or node.type in _ROUGH):
-        return _of_input(entry, path)
-    usual = float(node.type in _METALS) if layer == "metallic" else 1.0
-    return Constant((usual, usual, usual))
+        input_socket = node.inputs.get(_COLORS[node.type] or "Color") or node.inputs.get("Base Color")
+        return None if input_socket is None else _of_input(input_socket, path)
+    input_socket = node.inputs.get(layer.capitalize())
+    if input_socket is not None and (layer == "metallic" or node.type in _ROUGH_REFLECTORS):
+        return _of_input(input_socket, path)
+    # Shaders without such an input: metallic by their type, and otherwise as rough as can be.
+    value = float(node.type in _METALS) if layer == "metallic" else 1.0
+    return Constant((value, value, value))
 
 
-def _of_input(entry: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]) -> Constant | Linked:
-    value = entry.default_value
-    usual = tuple(float(part) for part in value[:3]) if hasattr(value, "__len__") else (float(value),) * 3
-    links = entry.links
+def _of_input(input_socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]) -> Constant | Linked:
+    """Return the expression of an input of a shader: its unlinked value, or the output that is linked to it."""
+    value = input_socket.default_value
+    default = tuple(float(part) for part in value[:3]) if hasattr(value, "__len__") else (float(value),) * 3
+    links = input_socket.links
     if not links or _is_missing_image(links[0].from_node):
-        return Constant(usual)  # type: ignore[arg-type]
-    return Linked(links[0].from_socket, path, usual)  # type: ignore[arg-type]
+        return Constant(default)  # type: ignore[arg-type]
+    return Linked(links[0].from_socket, path, default)  # type: ignore[arg-type]
 
 
 def _is_missing_image(node: bpy.types.Node) -> bool:
-    """Return whether a node would show a missing image: what stands in the socket that it feeds takes its place."""
+    """Return whether a node is an image texture whose image is missing: then the fed socket's unlinked value counts."""
     return node.bl_idname == "ShaderNodeTexImage" and is_missing(node.image)
 
 
 def sockets_of(expression: Expression) -> Iterator[Linked]:
-    """Yield all sockets that an expression reads."""
+    """Yield all `Linked` parts of an expression."""
     if isinstance(expression, Linked):
         yield expression
     elif isinstance(expression, Mixture):
-        for part in (expression.factor, expression.first, expression.second):
+        for part in (expression.factor, expression.a, expression.b):
             yield from sockets_of(part)
 
 
 def varies(expression: Expression) -> bool:
-    """Return whether an expression may have other values at other places."""
+    """Return whether an expression may have different values at different places."""
     return any(True for _ in sockets_of(expression))
 
 
 def mean_value(expression: Expression) -> tuple[float, float, float]:
-    """Return the mean of an expression, as well as it can be told without rendering: images by their pixels."""
+    """Return the mean of an expression as known without rendering: of images by their pixels, else defaults."""
     if isinstance(expression, Constant):
         return expression.value
     if isinstance(expression, Linked):
-        return mean_color(expression.output.node) or expression.usual
+        return mean_color(expression.output.node) or expression.default
     share = min(1.0, max(0.0, mean_value(expression.factor)[0])) if isinstance(expression.factor, Constant) else 0.5
-    first, second = np.array(mean_value(expression.first)), np.array(mean_value(expression.second))
-    red, green, blue = ((1.0 - share) * first + share * second).tolist()
+    a, b = np.array(mean_value(expression.a)), np.array(mean_value(expression.b))
+    red, green, blue = ((1.0 - share) * a + share * b).tolist()
     return red, green, blue
 
 
@@ -190,68 +194,71 @@ class LayerNodes:
     """Nodes and sockets that are added to a material's trees for its layers, and removed again.
 
     Attributes:
-        tree: the material's own.
+        tree: the material's node tree.
     """
 
     tree: bpy.types.NodeTree
     _undo: list[Callable[[], None]] = field(default_factory=list)
 
     def add_output(self, layer: str, expression: Expression) -> bpy.types.Node:
-        """Add an output for a layer, and return it."""
+        """Add an output (AOV) for a layer with its expression; return the output's node."""
         output = self.new_output(layer)
-        entry = output.inputs["Color" if MATERIAL_LAYERS.get(layer) == 3 else "Value"]
-        self.tree.links.new(self.socket(expression), entry)
+        layer_input = output.inputs["Color" if MATERIAL_LAYERS.get(layer) == 3 else "Value"]
+        self.tree.links.new(self.socket(expression), layer_input)
         return output
 
     def new_output(self, name: str) -> bpy.types.Node:
-        """Add an output of a name to the material."""
+        """Add an output (AOV) with a name to the material; return its node."""
         node = self._new(self.tree, "ShaderNodeOutputAOV")
         node.aov_name = name
         return node
 
     def hide_transparency(self) -> None:
-        """Have a camera's rays end on what else lets them straight through; light still comes through.
+        """Make surfaces opaque for camera rays that go straight through them; light still comes through.
 
-        Else a renderer adds up the layers of all surfaces along a ray, and says whichever of them it likes.
+        Else a renderer adds up the layers of all surfaces along a ray.
         """
-        seen: set[bpy.types.NodeTree] = set()
-        waiting = [self.tree]
-        while waiting:
-            tree = waiting.pop()
-            if tree in seen:
+        visited: set[bpy.types.NodeTree] = set()
+        trees = [self.tree]
+        while trees:
+            tree = trees.pop()
+            if tree in visited:
                 continue
-            seen.add(tree)
+            visited.add(tree)
             for node in list(tree.nodes):
                 if node.type == "MIX_SHADER":
-                    for entry, factor in zip(node.inputs[1:3], (1.0, 0.0), strict=True):
-                        if entry.is_linked and entry.links[0].from_node.type == "BSDF_TRANSPARENT":
-                            self._give_camera(tree, node.inputs[0], factor)
+                    for shader_input, opaque_factor in zip(node.inputs[1:3], (1.0, 0.0), strict=True):
+                        if shader_input.is_linked and shader_input.links[0].from_node.type == "BSDF_TRANSPARENT":
+                            self._set_for_camera(tree, node.inputs[0], opaque_factor)
                 elif node.type == "BSDF_PRINCIPLED":
                     alpha = node.inputs["Alpha"]
                     if alpha.is_linked or alpha.default_value < 1.0:
-                        self._give_camera(tree, alpha, 1.0)
+                        self._set_for_camera(tree, alpha, 1.0)
                 elif node.type == "GROUP" and node.node_tree is not None:
-                    waiting.append(node.node_tree)
+                    trees.append(node.node_tree)
 
-    def _give_camera(self, tree: bpy.types.NodeTree, entry: bpy.types.NodeSocket, value: float) -> None:
-        """Have an input be a value for a camera's rays, and what it was for others."""
-        source, usual = (entry.links[0].from_socket if entry.is_linked else None), entry.default_value
+    def _set_for_camera(self, tree: bpy.types.NodeTree, input_socket: bpy.types.NodeSocket, value: float) -> None:
+        """Give an input a constant value for camera rays, and the value that it had for other rays."""
+        source, default = (
+            (input_socket.links[0].from_socket if input_socket.is_linked else None),
+            input_socket.default_value,
+        )
         if source is not None:
-            self._undo.append(lambda: tree.links.new(source, entry))
+            self._undo.append(lambda: tree.links.new(source, input_socket))
         path, mix = self._new(tree, "ShaderNodeLightPath"), self._new(tree, "ShaderNodeMix")
-        factor, first, second = mix.inputs["Factor"], mix.inputs["A"], mix.inputs["B"]
-        first.default_value, second.default_value = usual, value
+        factor, other_value, camera_value = mix.inputs["Factor"], mix.inputs["A"], mix.inputs["B"]
+        other_value.default_value, camera_value.default_value = default, value
         tree.links.new(path.outputs["Is Camera Ray"], factor)
         if source is not None:
-            tree.links.new(source, first)
-        tree.links.new(mix.outputs["Result"], entry)
+            tree.links.new(source, other_value)
+        tree.links.new(mix.outputs["Result"], input_socket)
 
     def socket(self, expression: Expression) -> bpy.types.NodeSocket:
-        """Return a socket of the material's own tree that gives an expression."""
+        """Return an output socket of the material's own tree that has an expression's value."""
         if isinstance(expression, Linked):
             result = expression.output
             for group in reversed(expression.path):
-                result = self._through(group, result)
+                result = self._group_output(group, result)
             return result
         if isinstance(expression, Constant):
             node = self._new(self.tree, "ShaderNodeRGB")
@@ -259,42 +266,46 @@ class LayerNodes:
             return node.outputs[0]
         node = self._new(self.tree, "ShaderNodeMix")
         node.data_type, node.blend_type, node.clamp_factor = "RGBA", "MIX", True
-        factor, first, second = (
-            next(entry for entry in node.inputs if entry.identifier == name)
+        factor, a, b = (
+            next(part_socket for part_socket in node.inputs if part_socket.identifier == name)
             for name in ("Factor_Float", "A_Color", "B_Color")
         )
-        for part, entry in ((expression.factor, factor), (expression.first, first), (expression.second, second)):
-            self.tree.links.new(self.socket(part), entry)
-        return next(entry for entry in node.outputs if entry.identifier == "Result_Color")
+        for part, part_socket in ((expression.factor, factor), (expression.a, a), (expression.b, b)):
+            self.tree.links.new(self.socket(part), part_socket)
+        return next(part_socket for part_socket in node.outputs if part_socket.identifier == "Result_Color")
 
-    def _through(self, group: bpy.types.Node, inside: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
-        """Return an output of a group node that gives a socket inside of the group."""
+    def _group_output(self, group: bpy.types.Node, inner_socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+        """Add an output to a group node that passes on a socket inside the group; return it."""
         tree = group.node_tree
-        end = group_output(tree)
-        assert end is not None
-        color = inside.type != "VALUE"
-        entry = tree.interface.new_socket(
-            "SR Layer", in_out="OUTPUT", socket_type=f"NodeSocket{'Color' if color else 'Float'}"
+        output_node = group_output(tree)
+        assert output_node is not None
+        is_color = inner_socket.type != "VALUE"
+        interface_socket = tree.interface.new_socket(
+            "SR Layer", in_out="OUTPUT", socket_type=f"NodeSocket{'Color' if is_color else 'Float'}"
         )
-        self._undo.append(lambda: tree.interface.remove(entry))
-        identifier = entry.identifier
-        tree.links.new(inside, next(one for one in end.inputs if one.identifier == identifier))
-        return next(one for one in group.outputs if one.identifier == identifier)
+        self._undo.append(lambda: tree.interface.remove(interface_socket))
+        identifier = interface_socket.identifier
+        tree.links.new(inner_socket, identified_socket(output_node.inputs, identifier))
+        result = identified_socket(group.outputs, identifier)
+        assert result is not None
+        return result
 
     def _new(self, tree: bpy.types.NodeTree, kind: str) -> bpy.types.Node:
-        active = tree.nodes.active
+        """Add a node to a tree; note how to remove it. The tree's active node, which the user chose, stays active."""
+        active_node = tree.nodes.active
         node = tree.nodes.new(kind)
         node.select = False
-        tree.nodes.active = active
-        self._undo.append(lambda: self._drop(tree, node, active))
+        tree.nodes.active = active_node
+        self._undo.append(lambda: self._drop(tree, node, active_node))
         return node
 
     @staticmethod
-    def _drop(tree: bpy.types.NodeTree, node: bpy.types.Node, active: bpy.types.Node | None) -> None:
+    def _drop(tree: bpy.types.NodeTree, node: bpy.types.Node, active_node: bpy.types.Node | None) -> None:
+        """Remove a node from a tree, and make another the active one."""
         tree.nodes.remove(node)
-        tree.nodes.active = active
+        tree.nodes.active = active_node
 
     def remove(self) -> None:
-        """Remove all that was added."""
+        """Remove all nodes and sockets that were added, the latest first."""
         while self._undo:
             self._undo.pop()()

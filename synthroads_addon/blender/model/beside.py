@@ -1,4 +1,4 @@
-"""A new road's place beside what is in the scene already: its root is moved until nothing overlaps in plan."""
+"""A new road's place beside other objects of the scene: its root is moved until nothing overlaps in plan."""
 
 from __future__ import annotations
 
@@ -12,38 +12,41 @@ from ...base.arrays import Float
 from .roads import root_above, world_matrix
 
 GAP = 10.0
-"""Distance in plan, m, that is left free between a new road and what was there before."""
+"""Distance in plan, m, that is left free between a new road and the other objects; chosen."""
 _DIRECTIONS = 32
+"""Number of directions in which outlines are compared; even, so that each has its opposite; chosen."""
 _SOLID = {"MESH", "CURVE", "SURFACE", "META", "FONT", "POINTCLOUD"}
 
 
 def move_beside(root: bpy.types.Object, layer: bpy.types.ViewLayer) -> None:
-    """Move a road's root in plan, by the shortest way found, to where its parts overlap nothing else that is visible.
+    """Move a road's root in plan, in the best of some directions, until its parts overlap no other visible object.
 
-    A road that overlaps nothing stays where its parameters put it. The move is as one by the user: it stays when the
-    road is built again. Overlaps are judged by convex outlines with 32 directions.
+    A road that overlaps nothing stays where its parameters put it. As a user's move would, the move stays when the road
+    is built again. Two sets of objects overlap if their convex outlines do, as seen in 32 directions.
 
     Args:
-        root: of a road that is built completely.
-        layer: view layer that it is in.
+        root: root object of a road that is built completely.
+        layer: view layer that contains it.
     """
     layer.update()
-    visible = [item for item in layer.objects if item.type in _SOLID and item.visible_get(view_layer=layer)]
-    parts = [item for item in visible if root_above(item) == root]
-    others = [item for item in visible if root_above(item) != root]
-    if not parts or not others:
+    visible_items = [item for item in layer.objects if item.type in _SOLID and item.visible_get(view_layer=layer)]
+    parts = [item for item in visible_items if root_above(item) == root]
+    other_items = [item for item in visible_items if root_above(item) != root]
+    if not parts or not other_items:
         return
     angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
     graph = layer.depsgraph
-    reach = _reach(parts, directions, graph)
-    opposite = np.roll(reach, _DIRECTIONS // 2)  # of the road, against each direction
-    there = _reach(others, directions, graph)
-    overlap = there + opposite
-    if not np.all(overlap > 0.0):
+    road_reach = _reach(parts, directions, graph)
+    # Along each direction the outlines overlap from the road's rear end (its reach in the opposite direction, negated)
+    # to the others' front end: a move by that length in the direction separates them.
+    opposite_reach = np.roll(road_reach, _DIRECTIONS // 2)
+    other_reach = _reach(other_items, directions, graph)
+    overlap = other_reach + opposite_reach
+    if not np.all(overlap > 0.0):  # a direction separates them already
         return
-    nearest = int(np.argmin(overlap))
-    step = (overlap[nearest] + GAP) * directions[nearest]
+    best_direction = int(np.argmin(overlap))
+    step = (overlap[best_direction] + GAP) * directions[best_direction]
     place = world_matrix(root)
     place[:2, 3] += step
     root.matrix_world = Matrix(place.tolist())
@@ -51,19 +54,19 @@ def move_beside(root: bpy.types.Object, layer: bpy.types.ViewLayer) -> None:
 
 
 def _reach(items: Iterable[bpy.types.Object], directions: Float, graph: bpy.types.Depsgraph) -> Float:
-    """Return how far (D,), m, objects reach in each direction (D, 2) in plan, from the scene's origin."""
+    """Return the reach (D,), m, of objects in directions (D, 2) in plan: their largest coordinate along each."""
     reaches: list[Float] = [np.max(_plan(item, graph) @ directions.T, axis=0) for item in items]
     return np.asarray(np.max(reaches, axis=0), dtype=np.float64)
 
 
 def _plan(item: bpy.types.Object, graph: bpy.types.Depsgraph) -> Float:
-    """Return the plan coordinates (N, 2), m, of an evaluated object's vertices, or of its box's corners without any."""
+    """Return the plan coordinates (N, 2), m, of an evaluated object's vertices, or of its bounding box."""
     evaluated = item.evaluated_get(graph)
     points = np.array(evaluated.bound_box, dtype=np.float64)
     mesh = evaluated.data
     if isinstance(mesh, bpy.types.Mesh) and len(mesh.vertices):
-        flat = np.empty(3 * len(mesh.vertices), np.float32)
-        mesh.vertices.foreach_get("co", flat)
-        points = flat.reshape(-1, 3).astype(np.float64)
+        coordinates = np.empty(3 * len(mesh.vertices), np.float32)
+        mesh.vertices.foreach_get("co", coordinates)
+        points = coordinates.reshape(-1, 3).astype(np.float64)
     matrix = np.array(evaluated.matrix_world)
     return points @ matrix[:2, :3].T + matrix[:2, 3]

@@ -1,4 +1,4 @@
-"""Road parameters -> scene: Python writes the backbone and the node groups' inputs, the nodes do the rest."""
+"""A road's objects, built from its parameters: Python makes the backbone and sets inputs, node groups do the rest."""
 
 from __future__ import annotations
 
@@ -43,24 +43,24 @@ from .stage import DataBlockLog, new_staging, remove_staged, remove_with_meshes
 COLLECTION = "SynthRoads"
 """Name of the collection that a new road is put into."""
 MADE_COLLECTION = "synthroads_collection"
-"""Custom property of a collection that was made for a road: it goes with the last object in it."""
+"""Custom property of a collection that was made for a road: it is removed with the last object in it."""
 
 _TURN = 0.03
-"""Seconds that a build may take before it lets its caller go on."""
+"""Seconds after which a build returns to its caller for a moment; chosen."""
 _EVALUATION, _MOST_AT_ONCE = 0.1, 32
-"""Seconds that Blender's evaluation of new objects is to take, and how many are evaluated together at most."""
+"""Seconds that one evaluation of new objects by Blender should take, and their largest number in it; chosen."""
 
 
 @dataclass(frozen=True)
 class BuildTarget:
-    """Which road a new one replaces, and what of it stays or goes.
+    """Road that a new one replaces, and the parts of it that stay or are removed.
 
     Attributes:
-        road: the id of its root; the road that is meant in the scene (`roads.road_meant`) if empty.
-        beside: it takes no other's place: it is one more road.
-        keep_moves: where the user has moved the road before, it stays; else it is put where its parameters say.
-        keeps: names of parts that stay beside the new ones.
-        drops: names of copies of parts that are removed with them.
+        road: id of the road to replace; the scene's current road (`roads.road_meant`) if empty.
+        beside: whether to replace no road, but to add one more.
+        keep_moves: whether a user's move of the replaced road stays; else the road is put where its parameters say.
+        keeps: names of old parts that stay beside the new ones.
+        drops: names of copies of parts that are removed with the old parts.
     """
 
     road: str = ""
@@ -73,7 +73,7 @@ class BuildTarget:
         """Return the root object of the road to replace; None if there is none.
 
         Raises:
-            InputError: it is linked from another file, where alone it can be built.
+            InputError: the road is linked from another file, and so can't be changed in this one.
         """
         root = None if self.beside else road_of_id(scene, self.road)
         if root is not None and (file := library_of(root)):
@@ -90,8 +90,8 @@ class RoadModel:
     """A road built in the scene: root, collection and objects.
 
     Attributes:
-        root: the empty that all of the model's objects hang on, see `roads`.
-        collection: that all of them were put into.
+        root: the empty that is the parent of all of the model's objects, see `roads`.
+        collection: collection that contains them.
         objects: by role: ``Backbone``, ``Road``, ``Ground``, ``Terrain``, ``Delineators``, and the parameter
             set's ids of guardrails and vegetation. Hidden helpers are among them.
         origin: (3,) map coordinates of the root's place when it was built.
@@ -114,8 +114,8 @@ def build_road(request: BuildRequest, place: BuildTarget = MEANT) -> RoadModel:
     If it can't be built, the file is as it was before.
 
     Raises:
-        ValueError: a part that there is none of.
-        InputError: an asset of the set can't be read.
+        ValueError: a requested part doesn't exist.
+        InputError: an asset of the parameter set can't be read.
     """
     work = _Build(request, place)
     try:
@@ -132,20 +132,20 @@ def build_road(request: BuildRequest, place: BuildTarget = MEANT) -> RoadModel:
 def build_steps(request: BuildRequest, place: BuildTarget = MEANT) -> Generator[float | None, None, RoadModel]:
     """Generator that builds the road as `build_road` does, in short steps so that Blender's window stays responsive.
 
-    The new road grows beside the one built before, and takes its place in the last step. Each object is evaluated in a
-    step of its own, which Blender can't interrupt. Close the generator to give up: all that was made is removed, and
-    the file is as it was. After an undo or when another file was opened, only closing is allowed.
+    The new road is built beside the old one, and replaces it in the last step. Each object is evaluated in a step of
+    its own, which Blender can't interrupt. Close the generator to cancel: all that was made is removed, and the file is
+    as it was. After an undo, or after another file was opened, the generator may only be closed.
 
     Yields:
-        the share that is done, 0 to 1, or None while there is nothing to do in this thread.
+        the share of the work that is done, 0 to 1, or None while another thread works.
     """
     work = _Build(request, place)
     stepper = Stepper(work.build, "SynthRoads build")
     try:
-        more = True
-        while more:
+        is_unfinished = True
+        while is_unfinished:
             with work.log.record():
-                more = stepper.run_for(_TURN)
+                is_unfinished = stepper.run_for(_TURN)
                 if not stepper.runs_aside:
                     work.evaluate()
             yield None if stepper.runs_aside else work.share
@@ -162,15 +162,15 @@ class _Build:
     """A road under construction in a staging collection, until it replaces the one built before.
 
     Attributes:
-        log: data-blocks that were made for it.
-        share: of it that is done, 0 to 1.
+        log: data-blocks that were made for the road.
+        share: share of the work that is done, 0 to 1.
     """
 
     def __init__(self, request: BuildRequest, place: BuildTarget) -> None:
-        known = model_parts()
-        self._wanted = set(known if request.parts is None else request.parts)
-        if self._wanted - set(known):
-            raise ValueError(f"parts: {sorted(self._wanted - set(known))} are not among {tuple(known)}")
+        all_parts = model_parts()
+        self._part_names = set(all_parts if request.parts is None else request.parts)
+        if self._part_names - set(all_parts):
+            raise ValueError(f"parts: {sorted(self._part_names - set(all_parts))} are not among {tuple(all_parts)}")
         scene = bpy.context.scene
         self._scene, self._place = scene.name, place
         remove_staged()
@@ -188,34 +188,34 @@ class _Build:
         self._builder = ModelBuilder(request, self._collection, root)
 
     def build(self) -> None:
-        """Make the wanted parts' objects, updating `share`; runs within a `Stepper`."""
+        """Make the requested parts' objects, and hidden ones that these need, updating `share`; within a `Stepper`."""
         self._builder.lay_out()
-        there = required_parts(self._wanted)
+        built_names = required_parts(self._part_names)
         for number, (name, part) in enumerate(model_parts().items(), 1):
-            if name in there:
-                self._builder.hidden = name not in self._wanted
+            if name in built_names:
+                self._builder.hidden = name not in self._part_names
                 part.build(self._builder)
             self.share = number / len(model_parts())
 
     def evaluate(self) -> None:
-        """Have Blender evaluate the new objects; adapts how many are made at once to the time it takes."""
+        """Make Blender evaluate the new objects; adapt their number before the next evaluation to the time it takes."""
         scene = bpy.data.scenes[self._scene]
         layer = bpy.context.view_layer if scene == bpy.context.scene else scene.view_layers[0]
-        begin = time.perf_counter()
+        start_time = time.perf_counter()
         layer.update()
-        # Objects in plenty are small: together they are evaluated faster, as each time the whole scene is looked at.
-        change = _EVALUATION / max(time.perf_counter() - begin, 1e-9)
-        self._builder.at_once = int(np.clip(self._builder.at_once * np.clip(change, 0.25, 2.0), 1, _MOST_AT_ONCE))
+        # Many objects are small: evaluating several at once is faster, as Blender visits the whole scene each time.
+        time_ratio = _EVALUATION / max(time.perf_counter() - start_time, 1e-9)
+        self._builder.at_once = int(np.clip(self._builder.at_once * np.clip(time_ratio, 0.25, 2.0), 1, _MOST_AT_ONCE))
 
     def swap(self) -> RoadModel:
         """Replace the road built before by the new one, label its parts and place its root; return the model."""
         parameters, builder, scene = self._builder.parameters, self._builder, bpy.data.scenes[self._scene]
-        used = used_materials()
+        materials_before = used_materials()
         root = next(item for item in scene.objects if item.get(ROAD) == self._road)
-        if FRAME in root:
-            old = _parts_of(root, self._place)
-            _repoint(old, builder.objects)
-            remove_with_meshes(list(old))
+        if FRAME in root:  # the root of a complete road, which is replaced
+            old_parts = _parts_of(root, self._place)
+            _repoint(old_parts, builder.objects)
+            remove_with_meshes(list(old_parts))
             collection = _road_collection(root, scene)
         else:
             collection = bpy.data.collections.new(COLLECTION)
@@ -227,14 +227,16 @@ class _Build:
         bpy.data.collections.remove(self._collection)
         self.log.keep(collection)
         for role, item in builder.objects.items():
-            item.name = role  # its mesh keeps the name it has: to rename a mesh is to evaluate all that hangs on it
+            item.name = (
+                role  # the mesh keeps its name: after renaming a mesh Blender evaluates all objects that depend on it
+            )
             item[OF_ROAD], item[NAME] = self._road, item.name
             keep_built(item)
             _describe(item, role, parameters)
         root[BUILT_PARTS] = json.dumps(list(builder.objects))
         origin = np.array(parameters.transform.translate) + builder.origin
         place_root(root, origin, scene, self._place.keep_moves)
-        remove_unused_materials(used)
+        remove_unused_materials(materials_before)
         if self._keeps_groups:
             keep_groups()
         remove_unused_groups()
@@ -246,13 +248,13 @@ class _Build:
 _CLASSES = {"Road": "road", "Terrain": "ground", "Painted Areas": "road_marking", "Damaged Areas": "road"} | {
     role: kind.points_class for role, kind in POSTS.items()
 }
-"""Classes of parts that are no thing of the parameter set by themselves."""
+"""Classes of the parts that aren't objects of the parameter set, by role."""
 
 
 def _describe(item: bpy.types.Object, role: str, parameters: RoadParameters) -> None:
     """Write a part's class to its object's properties; lock the transform of what lies along the whole road.
 
-    Its shape follows the road, wherever its object is.
+    The shape of such a part follows the road wherever its object is, so that a move would mislead.
     """
     thing = parameters.objects.get(role.partition("/")[0])
     kind = _CLASSES.get(role) or (thing.semantic_class if thing is not None else "")
@@ -265,8 +267,8 @@ def _describe(item: bpy.types.Object, role: str, parameters: RoadParameters) -> 
 
 def _road_collection(root: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collection:
     """Return the scene's collection that holds a road's root object."""
-    inside = {scene.collection, *scene.collection.children_recursive}
-    return next(collection for collection in root.users_collection if collection in inside)
+    scene_collections = {scene.collection, *scene.collection.children_recursive}
+    return next(collection for collection in root.users_collection if collection in scene_collections)
 
 
 def _parts_of(root: bpy.types.Object, place: BuildTarget = MEANT) -> dict[bpy.types.Object, str]:
@@ -280,31 +282,31 @@ def _parts_of(root: bpy.types.Object, place: BuildTarget = MEANT) -> dict[bpy.ty
     return objects
 
 
-def _repoint(old: Mapping[bpy.types.Object, str], new: Mapping[str, bpy.types.Object]) -> None:
-    """Make modifiers of other objects that refer to a road's old parts refer to the new ones of the same role."""
+def _repoint(old_parts: Mapping[bpy.types.Object, str], new_parts: Mapping[str, bpy.types.Object]) -> None:
+    """Make other objects' modifiers that refer to a road's old parts refer to the new parts of the same role."""
     for item in bpy.data.objects:
-        if item in old or item.library is not None:
+        if item in old_parts or item.library is not None:
             continue
         for modifier in item.modifiers:
             if modifier.type == "NODES" and modifier.node_group is not None:
                 for name in object_inputs(modifier):
-                    used = modifier_input(modifier, name)
-                    if used in old and old[used] in new:
-                        set_modifier_input(modifier, name, new[old[used]])
+                    target = modifier_input(modifier, name)
+                    if target in old_parts and old_parts[target] in new_parts:
+                        set_modifier_input(modifier, name, new_parts[old_parts[target]])
 
 
 def remove_road(root: bpy.types.Object | None = None) -> None:
     """Delete a road's objects, its root, and their collection if it is empty then; the user's children stay in place.
 
     Args:
-        root: of the road; that of the one that is meant in the current scene if None.
+        root: root object of the road; that of the current scene's current road if None.
     """
     root = root or road_meant(bpy.context.scene)
     if root is None:
         return
     homes = [collection for collection in root.users_collection if MADE_COLLECTION in collection]
     remove_with_meshes(list(_parts_of(root)))
-    for child in root.children:  # what the user hung on it keeps its place
+    for child in root.children:  # objects that the user made children of the road keep their places
         place = child.matrix_world.copy()
         child.parent = None
         child.matrix_world = place

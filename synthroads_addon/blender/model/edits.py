@@ -1,8 +1,8 @@
-"""Edits of a road's parts that no parameter says: found by what each part was when it was built.
+"""Edits of a road's parts that parameters can't describe, found by comparison with each part's state when it was built.
 
-A part is one modifier with a node group on a mesh that Python made. It can be moved, turned about the vertical, and its
-inputs changed; all else (further or applied modifiers, another mesh, a scale, a tilt, inputs that are no field) makes
-its shape its own: it is *edited by hand*.
+A part is an object with one modifier, a node group, on a mesh that Python made. Moves, turns about the vertical and
+changes of its inputs are read back as parameters. A part with any other edit (further or applied modifiers, another
+mesh, a scale, a tilt, inputs that aren't fields) is *edited by hand*.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from ..compat import identified_input
 Float = NDArray[np.float64]
 
 POSTS: dict[str, type[PointObject]] = {"Delineators": Delineator, "Beacons": ConstructionBeacon}
-"""Roles of parts that hold many things, a vertex each."""
+"""Parts with many things, one per vertex: type of the things by role."""
 BUILT = "synthroads_built"
-"""Custom property of a part: what its mesh and its inputs were when it was built, as JSON."""
+"""Custom property of a part: its mesh's digest and its inputs as built, as JSON."""
 UPRIGHT = 1e-5
-"""Largest tilt, scale less 1, or shear that counts as none."""
+"""Largest tilt, deviation of a scale from 1, or shear that counts as none; chosen."""
 _KINDS = ("NodeSocketFloat", "NodeSocketInt", "NodeSocketBool")
 
 
 @dataclass(frozen=True)
 class HandEdit:
-    """A part that was edited by hand, so that no parameters describe it, and why.
+    """A part that was edited by hand, so that no parameters describe it, with the reason.
 
     Attributes:
-        part: what it was in the road.
-        name: of its object now.
-        reason: what was done to it, in words.
+        part: the part's role in the road.
+        name: name of its object now.
+        reason: the edit, in words.
     """
 
     part: str
@@ -77,9 +77,9 @@ def mesh_digest(item: bpy.types.Object) -> str:
 
 def vertices_of(mesh: bpy.types.Mesh) -> Float:
     """Return a mesh's vertices (V, 3), float64, m, in the object's frame."""
-    flat = np.empty(3 * len(mesh.vertices), np.float32)
-    mesh.vertices.foreach_get("co", flat)
-    return flat.reshape(-1, 3).astype(np.float64)
+    coordinates = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", coordinates)
+    return coordinates.reshape(-1, 3).astype(np.float64)
 
 
 def attribute_of(mesh: bpy.types.Mesh, name: str, default: float = 0.0) -> NDArray[Any]:
@@ -93,6 +93,7 @@ def attribute_of(mesh: bpy.types.Mesh, name: str, default: float = 0.0) -> NDArr
 
 
 def _numbers(modifier: bpy.types.NodesModifier) -> Iterator[tuple[str, float]]:
+    """Yield (name, value) of a modifier's inputs that are numbers or switches."""
     for socket in modifier.node_group.interface.items_tree:
         if socket.item_type == "SOCKET" and socket.in_out == "INPUT" and socket.socket_type in _KINDS:
             yield socket.name, identified_input(modifier, socket.identifier)
@@ -117,9 +118,9 @@ def shape_reason(item: bpy.types.Object, carried: Collection[str], keeps_mesh: b
 
     Args:
         item: the part.
-        carried: its inputs that are read back.
-        keeps_mesh: its mesh must be the one that was built.
-        grouped: it has a modifier with a node group.
+        carried: names of its inputs that are read back.
+        keeps_mesh: whether its mesh must be the one that was built.
+        grouped: whether it was built with a modifier with a node group.
     """
     if not grouped:
         return "it has modifiers" if item.modifiers else ""
@@ -132,9 +133,11 @@ def shape_reason(item: bpy.types.Object, carried: Collection[str], keeps_mesh: b
         return "its modifier is switched off"
     if keeps_mesh and mesh_edited(item):
         return "its mesh was edited"
-    before = built_state(item).get("inputs", {})
-    changed = [name for name, value in _numbers(modifier) if name not in carried and before.get(name, value) != value]
-    return f"its inputs {', '.join(changed)} are no fields of the parameter set" if changed else ""
+    built_inputs = built_state(item).get("inputs", {})
+    changed_names = [
+        name for name, value in _numbers(modifier) if name not in carried and built_inputs.get(name, value) != value
+    ]
+    return f"its inputs {', '.join(changed_names)} are no fields of the parameter set" if changed_names else ""
 
 
 def place_reason(place: Float, scalable: bool = False) -> str:

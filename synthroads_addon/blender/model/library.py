@@ -21,15 +21,15 @@ LIBRARY_NAME = "SynthRoads"
 LIBRARY_FILE = "node_groups.blend"
 _CATALOGUES_FILE = "blender_assets.cats.txt"
 _DECLARING = (model_parts(), points)
-"""Modules that declare node groups when they are imported: things, and places for them."""
+"""Modules that register node groups when they are imported: things, and points along an axis."""
 
 
 def write_library(path: Path, pictures: Path) -> list[str]:
     """Write the asset library of node groups to a .blend file, discarding the open file; return the groups' names.
 
     Args:
-        path: of the file.
-        pictures: folder with a square PNG file for each group, by its name.
+        path: path of the file.
+        pictures: folder with a square PNG file for each group, named like the group.
     """
     empty_file()
     groups = {group: catalogue for catalogue, group in user_groups()}
@@ -43,7 +43,7 @@ def write_library(path: Path, pictures: Path) -> list[str]:
         group.asset_data.license = "GPL-3.0-or-later"
         _give_picture(group, pictures / f"{group.name}.png")
     for group in bpy.data.node_groups:
-        # What a road's building knows its groups by: the user's are not to be taken for those.
+        # Without these properties a build can't mistake a user's group for one of a road's.
         for name in {KEY, MATERIALS} & set(group.keys()):
             del group[name]
     bpy.data.libraries.write(str(path), set(groups), fake_user=True)
@@ -73,6 +73,7 @@ def give_usual_materials(group: bpy.types.NodeTree) -> None:
 
 
 def _give_picture(group: bpy.types.NodeTree, file: Path) -> None:
+    """Set a group's preview picture from an image file."""
     image = bpy.data.images.load(str(file))
     preview = group.preview_ensure()
     preview.image_size = tuple(image.size)

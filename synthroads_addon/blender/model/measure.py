@@ -1,4 +1,4 @@
-"""How fast a road's model is built and edited, beside what Blender alone takes for as much geometry."""
+"""Time of editing a road's model, and time that Blender alone takes for as much geometry."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from ..files import empty_file, stderr_if_it_succeeds
 from .build import RoadModel
 
 _EDITS = 3
-"""Changes there and back whose times are measured."""
+"""Number of changes, each with its reversal, whose times are measured; chosen."""
 
 
 def seconds_of(work: Callable[[], object]) -> float:
     """Call a function; return its wall-clock time, s."""
-    begin = time.perf_counter()
+    start_time = time.perf_counter()
     work()
-    return time.perf_counter() - begin
+    return time.perf_counter() - start_time
 
 
 def panel_edit(model: RoadModel, parameters: RoadParameters) -> tuple[float, int]:
     """Measure changing a lane's width up to the updated view; hides the vegetation.
 
     Returns:
-        median seconds of several such changes, there and back; triangles of the road, which each of them makes anew.
+        median seconds of several such changes and reversals; number of the road's triangles, made anew by each of them.
     """
     for name in parameters.of_type(Vegetation):
         if name in model.objects:
@@ -39,22 +39,23 @@ def panel_edit(model: RoadModel, parameters: RoadParameters) -> tuple[float, int
     road = model.objects["Road"]
     modifier = road.modifiers[0]
     side = "Left" if parameters.carriageway("left") else "Right"
-    name, runs = f"{side} Lane 1 Width", []
+    name, seconds = f"{side} Lane 1 Width", []
     for change in (0.05, -0.05) * _EDITS:
         set_modifier_input(modifier, name, modifier_input(modifier, name) + change)
         road.update_tag()
-        runs.append(seconds_of(bpy.context.view_layer.update))
+        seconds.append(seconds_of(bpy.context.view_layer.update))
     mesh = road.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     mesh.calc_loop_triangles()
-    return sorted(runs)[len(runs) // 2], len(mesh.loop_triangles)
+    return sorted(seconds)[len(seconds) // 2], len(mesh.loop_triangles)
 
 
 def bare_mesh_seconds(triangles: int) -> float:
-    """Return the seconds that Blender alone takes to make a mesh of so many triangles from arrays, and to read it back.
+    """Return the seconds that Blender alone takes to make a mesh of so many triangles from arrays, and to read it.
 
-    It is a flat grid, an object of its own in the open file, which is gone afterwards.
+    The mesh is a flat grid in an object of its own in the open file, removed afterwards.
     """
     side = max(1, round((triangles / 2) ** 0.5))
+    # Number of the lower left vertex of each cell; each cell is two triangles.
     corner = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()
     faces = np.concatenate(
         [
@@ -68,6 +69,7 @@ def bare_mesh_seconds(triangles: int) -> float:
     item = bpy.data.objects.new("Bare Mesh", mesh)
 
     def make_and_read() -> None:
+        """Fill the mesh, have Blender evaluate it, and read its vertices and triangles."""
         mesh.vertices.add(len(vertices))
         mesh.vertices.foreach_set("co", vertices.ravel())
         mesh.loops.add(faces.size)
@@ -76,10 +78,10 @@ def bare_mesh_seconds(triangles: int) -> float:
         mesh.polygons.foreach_set("loop_start", np.arange(0, faces.size, 3, dtype=np.int32))
         mesh.update(calc_edges=True)
         bpy.context.scene.collection.objects.link(item)
-        evaluated = item.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-        evaluated.calc_loop_triangles()
-        evaluated.vertices.foreach_get("co", np.empty(vertices.size, np.float32))
-        evaluated.loop_triangles.foreach_get("vertices", np.empty(faces.size, np.int32))
+        evaluated_mesh = item.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        evaluated_mesh.calc_loop_triangles()
+        evaluated_mesh.vertices.foreach_get("co", np.empty(vertices.size, np.float32))
+        evaluated_mesh.loop_triangles.foreach_get("vertices", np.empty(faces.size, np.int32))
 
     try:
         return seconds_of(make_and_read)
@@ -89,7 +91,7 @@ def bare_mesh_seconds(triangles: int) -> float:
 
 
 def bare_import_seconds(path: Path) -> float:
-    """Return the seconds that Blender's importer alone takes for an .obj file with z up; the open file is lost."""
+    """Return the seconds that Blender's importer alone takes for an .obj file with z up; the open file is discarded."""
     empty_file()
     with stderr_if_it_succeeds():
         return seconds_of(lambda: bpy.ops.wm.obj_import(filepath=str(path), up_axis="Z", forward_axis="Y"))

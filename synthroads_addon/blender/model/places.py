@@ -1,4 +1,4 @@
-"""Where a road's things are now: from the places of their objects back to station, offset, elevation and rotation."""
+"""Current places of a road's things: station, offset, elevation and rotation from the places of their objects."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ IN_A_FRAME = (Gantry, Overpass, Building, PowerLine)
 PLACED = "synthroads_placed"
 """Custom property of what runs along the road: how far (x, y) its object's move is in its inputs already, m."""
 STILL = 2e-4
-"""Moves of less are none, m; objects' places have 32 bits."""
+"""Length of a move, m, below which it counts as none: objects' places are 32-bit floats."""
 _TURNED = 1e-5
 _LANE = 1.9
-"""So far beside the middle of a lane a vehicle is still put on it, m."""
+"""Largest distance from the middle of a lane at which a vehicle still belongs to it, m; chosen."""
 
 
 class Lost(Exception):
-    """Raised for a part that stands where no parameters can place it; its text says where."""
+    """Raised for a part at a place that no parameters can express; the text says where it stands."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,8 @@ class RoadAxes:
     """A road's geometry before and after edits of its axis.
 
     Attributes:
-        before: what it was built from.
-        now: what it is, without other edits.
+        before: geometry of the road as built.
+        now: geometry with the edited axis, without other edits.
     """
 
     before: RoadGeometry
@@ -89,6 +89,7 @@ def point_update(axes: RoadAxes, item: PointObject, vertex: Float, place: Float)
 
 
 def _turned(axes: RoadAxes, item: PointObject, station: float, turn: float) -> float:
+    """Return a thing's rotation, -180 to 180 deg, after a turn (rad) and a move to a station of the edited axis."""
     rotation = item.rotation_deg + float(np.rad2deg(turn)) + axes.turned(item.station, station)
     return round((rotation + 180.0) % 360.0 - 180.0, 9)
 
@@ -120,15 +121,15 @@ def standing_update(axes: RoadAxes, item: PointObject, place: Float) -> dict[str
 
 def asset_update(axes: RoadAxes, item: Asset, place: Float) -> dict[str, Any]:
     """Return the changed fields of an asset by its object's place (4, 4): place, height, rotation, scale."""
-    expected = on_plan(axes.before, [item])[0]
-    expected[2] = _surface(axes.before, item.station, item.offset) + item.elevation
+    built_place = on_plan(axes.before, [item])[0]
+    built_place[2] = _surface(axes.before, item.station, item.offset) + item.elevation
     heading = float(axes.before.alignment.heading(item.station)) - np.pi / 2.0 + np.deg2rad(item.rotation_deg)
     scale = float(np.cbrt(abs(np.linalg.det(place[:3, :3]))))
     turn = _wrapped(turn_of(place) - heading)
     update: dict[str, Any] = {}
     if abs(scale / item.scale - 1.0) > 1e-5:
         update["scale"] = round(scale, 6)
-    if np.linalg.norm(place[:3, 3] - expected) >= STILL or abs(turn) >= _TURNED:
+    if np.linalg.norm(place[:3, 3] - built_place) >= STILL or abs(turn) >= _TURNED:
         station, offset = axes.located(place[:3, 3])
         elevation = float(place[2, 3]) - _surface(axes.now, station, offset)
         update |= {"station": station, "offset": offset, "elevation": round(elevation, 6)}
@@ -137,6 +138,7 @@ def asset_update(axes: RoadAxes, item: Asset, place: Float) -> dict[str, Any]:
 
 
 def _surface(geometry: RoadGeometry, station: float, offset: float) -> float:
+    """Return the elevation, m, of the surface at a station and offset."""
     return float(surface_elevation(geometry, np.array([station]), np.array([offset]))[0])
 
 
@@ -189,4 +191,5 @@ def vehicle_update(axes: RoadAxes, item: Vehicle, part: bpy.types.Object, place:
 
 
 def _wrapped(angle: float) -> float:
+    """Return an angle, rad, wrapped into -pi to pi."""
     return float((angle + np.pi) % (2.0 * np.pi) - np.pi)

@@ -1,8 +1,8 @@
-"""Roads in a file: each is a root object, an empty, that its parts hang on.
+"""Roads in a file: each has a root object, an empty, which is the parent of its parts.
 
-A road's root has an id of its own as a custom property, and all that is kept of the road. It may be renamed, moved, put
-into any collection, linked to other scenes, appended from other files; its copy is another road. Collections mean
-nothing. A part hangs on its root as its child, or on something of the user's and says by the id whose part it is.
+A road's root has a unique id as a custom property, and all data that is stored of the road. It may be renamed, moved,
+put into any collection, linked to other scenes, appended from other files; a copy of it is another road. Collections
+don't matter. A part is a child of its root, or of an object of the user's; then its id says which road it belongs to.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from ..things.model_builder import ROLE
 ROAD = "synthroads_road"
 """Custom property of a road's root: its id."""
 OF_ROAD = "synthroads_of_road"
-"""Custom property of a road's parts: its id."""
+"""Custom property of a road's parts: the road's id."""
 NAME = "synthroads_name"
-"""Custom property of a road's parts: the name that the object was given, by which it is told from its copies."""
+"""Custom property of a road's parts: the name that the object was given; copies of it have another name."""
 ORIGIN = "synthroads_origin"
 """Custom property of a road's root: map coordinates of the scene's own origin, m."""
 FRAME = "synthroads_frame"
 """Custom property of a road's root: map coordinates of the root's place when the road was built, m."""
 CHOSEN = "synthroads_chosen_road"
-"""Property of a scene: the root of the road that is meant where the active object belongs to none."""
+"""Property of a scene: root of its current road if the active object belongs to none."""
 BUILT_PARTS = "synthroads_built_parts"
 """Custom property of a road's root: roles of all parts that were built, as JSON."""
 ROOT_NAME = "SynthRoads Road"
 _SIZE = 5.0
 """Size of the empty in the view, m."""
 _FARTHEST = 20_000.0
-"""A road is put where it lies on the map if that is at most so far from the scene's origin, m."""
+"""Largest distance from the scene's origin, m, at which a new road shares this origin with the other roads; chosen."""
 
 
 def new_id() -> str:
     """Return a road id that no object of the file has."""
-    taken = {item[ROAD] for item in bpy.data.objects if ROAD in item}
-    return next(name for number in count(1) if (name := f"road-{number}") not in taken)
+    used_ids = {item[ROAD] for item in bpy.data.objects if ROAD in item}
+    return next(name for number in count(1) if (name := f"road-{number}") not in used_ids)
 
 
 def new_root() -> bpy.types.Object:
@@ -78,9 +78,9 @@ def root_above(item: bpy.types.Object | None) -> bpy.types.Object | None:
 
 def root_of(item: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object | None:
     """Return the root of the complete road that an object belongs to, as child or by id; None if to none."""
-    above = root_above(item)
-    if above is not None or OF_ROAD not in item:
-        return above if above is None or FRAME in above else None
+    parent_root = root_above(item)
+    if parent_root is not None or OF_ROAD not in item:
+        return parent_root if parent_root is None or FRAME in parent_root else None
     return next((root for root in roots(scene) if root[ROAD] == item[OF_ROAD]), None)
 
 
@@ -89,15 +89,15 @@ def parts_and_copies(
 ) -> tuple[dict[str, bpy.types.Object], list[bpy.types.Object]]:
     """Return a road's parts in a scene by role, and the list of the user's copies of parts."""
     by_role: dict[str, list[bpy.types.Object]] = {}
-    lost = roots(scene)
+    scene_roots = roots(scene)
     for item in scene.objects:
-        if ROLE in item and OF_ROAD in item and _belongs(item, root, lost):
+        if ROLE in item and OF_ROAD in item and _belongs(item, root, scene_roots):
             by_role.setdefault(str(item[ROLE]), []).append(item)
     parts, copies = {}, []
     for role, items in by_role.items():
-        first, *others = sorted(items, key=_originality)
-        parts[role] = first
-        copies += others
+        original, *item_copies = sorted(items, key=_originality)
+        parts[role] = original
+        copies += item_copies
     return parts, copies
 
 
@@ -108,30 +108,32 @@ def has_parts(root: bpy.types.Object, scene: bpy.types.Scene) -> bool:
 
 
 def _belongs(item: bpy.types.Object, root: bpy.types.Object, scene_roots: list[bpy.types.Object]) -> bool:
-    above = root_above(item)
-    if above is None:
-        above = next((other for other in scene_roots if other[ROAD] == item[OF_ROAD]), None)
-    return above == root
+    """Return whether a part belongs to a road: as a descendant of its root, else by the road's id."""
+    part_root = root_above(item)
+    if part_root is None:
+        part_root = next((candidate for candidate in scene_roots if candidate[ROAD] == item[OF_ROAD]), None)
+    return part_root == root
 
 
 def _originality(item: bpy.types.Object) -> tuple[bool, str]:
-    """Return a sort key that puts an original before its copies, which have another name than the one kept."""
+    """Return a sort key that puts an original before its copies, whose names differ from the stored one."""
     return item.name != item.get(NAME), item.name
 
 
 def road_meant(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """Return the root of the scene's current road; None if it has no road.
 
-    It is the active object's; else the only one; else the chosen one, see `choose_road`; else the first by name.
+    It is the scene's only road; of several the active object's; else the chosen one, see `choose_road`; else the first
+    by name.
     """
     road_roots = roots(scene)
     if len(road_roots) < 2:
         return road_roots[0] if road_roots else None
     layer = bpy.context.view_layer if scene == bpy.context.scene else scene.view_layers[0]
-    active = layer.objects.active
-    meant = root_of(active, scene) if active is not None else None
-    chosen = scene.get(CHOSEN)
-    return next((root for root in (meant, chosen) if root in road_roots), road_roots[0])
+    active_item = layer.objects.active
+    active_root = root_of(active_item, scene) if active_item is not None else None
+    chosen_root = scene.get(CHOSEN)
+    return next((root for root in (active_root, chosen_root) if root in road_roots), road_roots[0])
 
 
 def road_of_id(scene: bpy.types.Scene, road: str) -> bpy.types.Object | None:
@@ -148,14 +150,14 @@ def choose_road(scene: bpy.types.Scene, root: bpy.types.Object) -> None:
 
 def renew_ids() -> None:
     """Give roads whose id is taken (copies, appended ones) new ids, in place, with the parts below their roots."""
-    taken: set[str] = set()
+    used_ids: set[str] = set()
     for root in sorted((item for item in bpy.data.objects if is_root(item)), key=_originality):
-        if root[ROAD] in taken and root.library is None:
+        if root[ROAD] in used_ids and root.library is None:
             root[ROAD] = new_id()
             for item in root.children_recursive:
                 if OF_ROAD in item and root_above(item) == root and item.library is None:
                     item[OF_ROAD] = root[ROAD]
-        taken.add(root[ROAD])
+        used_ids.add(root[ROAD])
 
 
 def origin_of(root: bpy.types.Object) -> NDArray[np.float64]:
@@ -176,30 +178,30 @@ def place_root(root: bpy.types.Object, frame: NDArray[np.float64], scene: bpy.ty
 
     Args:
         root: the root.
-        frame: (3,) map coordinates of the frame in which the parts were built, m.
-        scene: that it is in.
-        keep: a displacement by the user stays; else it is taken back.
+        frame: (3,) map coordinates, m, of the origin that the parts were built around.
+        scene: scene that contains the root.
+        keep: whether a displacement by the user stays; else it is undone.
     """
-    moved = displacement(root)
-    others = [origin_of(other) for other in roots(scene) if other != root]
-    near = next((origin for origin in others if np.abs(frame - origin).max() <= _FARTHEST), None)
-    origin = frame if near is None else near
+    user_transform = displacement(root)
+    other_origins = [origin_of(other_root) for other_root in roots(scene) if other_root != root]
+    shared_origin = next((origin for origin in other_origins if np.abs(frame - origin).max() <= _FARTHEST), None)
+    origin = frame if shared_origin is None else shared_origin
     root[ORIGIN], root[FRAME] = [float(value) for value in origin], [float(value) for value in frame]
     place = np.eye(4)
     place[:3, 3] = frame - origin
-    matrix = moved @ place if keep else place
+    matrix = user_transform @ place if keep else place
     if not np.array_equal(matrix, np.array(root.matrix_world)):
-        root.matrix_world = Matrix(matrix.tolist())  # of plain lists Blender takes rows for columns
+        root.matrix_world = Matrix(matrix.tolist())  # Blender would take plain lists' rows for columns
 
 
 def displacement(root: bpy.types.Object) -> NDArray[np.float64]:
     """Return the transform (4, 4) by which the user moved a road since it was built; identity if not, or unbuilt."""
     if FRAME not in root:
         return np.eye(4)
-    there = np.eye(4)
-    there[:3, 3] = np.float32(np.array(root[FRAME]) - np.array(root[ORIGIN]))
-    now = world_matrix(root)
-    return np.eye(4) if np.array_equal(now, there) else now @ np.linalg.inv(there)
+    built_matrix = np.eye(4)
+    built_matrix[:3, 3] = np.float32(np.array(root[FRAME]) - np.array(root[ORIGIN]))
+    current_matrix = world_matrix(root)
+    return np.eye(4) if np.array_equal(current_matrix, built_matrix) else current_matrix @ np.linalg.inv(built_matrix)
 
 
 def world_matrix(item: bpy.types.Object) -> NDArray[np.float64]:

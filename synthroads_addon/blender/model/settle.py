@@ -1,4 +1,4 @@
-"""A scene is made to show its edited road: what runs along the road is moved there, or the road is built again."""
+"""Updates of a scene to show its edited road: line-like things are moved, or the whole road is built again."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from .truth import BY_HAND, EditedRoad
 
 
 def settle_steps(road: str, edited: EditedRoad) -> Generator[float | None, None, RoadModel]:
-    """Generator that rebuilds an edited road in its place, in steps as `build_steps`; its value is the model.
+    """Generator that rebuilds an edited road in its place, in steps as `build_steps`; it returns the model.
 
-    Copies become parts of their own. Parts that were edited by hand stay as they are, as bodies of the user's that hang
-    on the road's root.
+    Copies become parts of the road. Parts that were edited by hand stay as they are, as objects of the user's that are
+    children of the road's root.
 
     Args:
-        road: its id.
-        edited: what was read of it.
+        road: the road's id.
+        edited: the road as read back from the scene.
 
     Raises:
-        InputError: the road as a whole isn't known, or can't be built; the scene is as it was.
+        InputError: the road's surface was edited by hand, or the road can't be built; the scene is as it was.
     """
     parameters, scene = edited.known(), bpy.context.scene
     root = road_of_id(scene, road)
@@ -45,11 +45,11 @@ def settle_steps(road: str, edited: EditedRoad) -> Generator[float | None, None,
     built_from, reconstruction, settings = str(root.get(BUILT_FROM, "")), str(root.get(FOUND, "")), scenario.settings()
     parts, copies = parts_and_copies(root, scene)
     names = {item.name for item in (*parts.values(), *copies)}
-    kept = {edit.name: edit for edit in edited.by_hand if edit.name in names}
-    copied = frozenset(item.name for item in copies) - set(kept)
-    place = BuildTarget(road, keep_moves=False, keeps=frozenset(kept), drops=copied)
+    hand_edits = {edit.name: edit for edit in edited.by_hand if edit.name in names}
+    copy_names = frozenset(item.name for item in copies) - set(hand_edits)
+    place = BuildTarget(road, keep_moves=False, keeps=frozenset(hand_edits), drops=copy_names)
     model = yield from build_steps(BuildRequest(parameters, settings.tolerance, settings.vegetation_detail), place)
-    for name, edit in kept.items():
+    for name, edit in hand_edits.items():
         _hand_over(bpy.data.objects[name], edit.part, edit.reason)
     remember(model.root, parameters, scenario, built_from, reconstruction)
     return model
@@ -81,8 +81,8 @@ def _hand_over(item: bpy.types.Object, part: str, reason: str) -> None:
 def move_line(item: bpy.types.Object, scene: bpy.types.Scene) -> bool:
     """Write an object's move to the station and offset inputs of its line-like thing; return whether it moved.
 
-    Such a thing's shape follows the road whatever its object's place is, so that a move shows nothing by itself. Only
-    this object changes: an undo of its move undoes this too.
+    Such a thing's shape follows the road wherever its object is, so that the move alone changes nothing that is seen.
+    Only this object changes: an undo of its move undoes this too.
     """
     root, modifier = root_of(item, scene), own_modifier(item)
     if ROLE not in item or root is None or modifier is None or item.library is not None or PARAMETERS not in root:

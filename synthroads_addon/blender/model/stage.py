@@ -1,4 +1,4 @@
-"""Data made while a road is being built, so that nothing of it is left when the build is given up."""
+"""Log of the data made while a road is built, so that all of it can be removed when the build is cancelled."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..things.model_builder import ROLE
 from .roads import ROAD
 
 STAGING = "synthroads_staging"
-"""Custom property of the collection in which a road grows, until it is complete."""
+"""Custom property of the collection in which a road is built, until it is complete."""
 
 _NOT_OURS = ("screens", "window_managers", "workspaces", "brushes", "palettes", "scenes")
 
@@ -22,7 +22,7 @@ _NOT_OURS = ("screens", "window_managers", "workspaces", "brushes", "palettes", 
 class DataBlockLog:
     """Log of the data-blocks made while it records, by Blender's session numbers, which outlive an undo.
 
-    Between two looks the user may make data-blocks too; those are not noted.
+    Data-blocks that the user makes between two recordings aren't logged.
     """
 
     def __init__(self) -> None:
@@ -32,17 +32,17 @@ class DataBlockLog:
     @contextmanager
     def record(self) -> Iterator[None]:
         """Context that logs the data-blocks made inside."""
-        before = {item.session_uid for item in _blocks()}
+        earlier_numbers = {item.session_uid for item in _blocks()}
         try:
             yield
         finally:
-            self._numbers |= {item.session_uid for item in _blocks()} - before
+            self._numbers |= {item.session_uid for item in _blocks()} - earlier_numbers
 
     def remove(self) -> None:
         """Remove all logged data-blocks that still exist, and give node groups their former names back."""
         bpy.data.batch_remove([item for item in _blocks() if item.session_uid in self._numbers])
         for group in bpy.data.node_groups:
-            # A new group takes the name of one of an older version.
+            # A new group takes the name of the group of an older version, which was renamed.
             group.name = self._groups.get(group.session_uid, group.name)
 
     def keep(self, collection: bpy.types.Collection) -> None:
@@ -53,6 +53,7 @@ class DataBlockLog:
 
 
 def _blocks() -> Iterator[Any]:
+    """Yield all data-blocks of the open file, without kinds that a build doesn't make."""
     for prop in bpy.data.bl_rna.properties:
         if prop.type == "COLLECTION" and prop.identifier not in _NOT_OURS:
             yield from getattr(bpy.data, prop.identifier)
@@ -67,7 +68,7 @@ def new_staging(scene: bpy.types.Scene) -> bpy.types.Collection:
 
 
 def remove_staged() -> None:
-    """Remove staging collections with their parts, which builds left in files saved or undo steps made meanwhile."""
+    """Remove staging collections with their parts, left over in files or undo steps that were saved during a build."""
     for collection in [item for item in bpy.data.collections if STAGING in item]:
         remove_with_meshes([item for item in collection.objects if ROLE in item or ROAD in item])
         bpy.data.collections.remove(collection)

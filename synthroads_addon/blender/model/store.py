@@ -1,4 +1,4 @@
-"""The road in a scene: what it was built from is kept with its root, so that it is undone and deleted with it."""
+"""Data of a road, stored with its root object, so that it is undone and deleted with the road."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ from .older_files import PARAMETERS, adopt_older_roads
 from .roads import has_parts, parts_and_copies, renew_ids, road_meant, roots
 
 SCENARIO = "synthroads_scenario"
+"""Custom property of a road's root: its scenario as JSON."""
 BUILT_FROM = "synthroads_built_from"
+"""Custom property of a road's root: text of the settings that it was built from."""
 FOUND = "synthroads_found"
-"""Custom property of a road's root: how it was found in a cloud, as JSON."""
+"""Custom property of a road's root: how it was reconstructed from a cloud, as JSON."""
 
 
 def roads(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -36,7 +38,7 @@ def find_road(scene: bpy.types.Scene) -> bpy.types.Object | None:
 
 
 def road_named(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object | None:
-    """Return the root of a scene's road by its name, or of the current road if None; upgrades older roads, ids.
+    """Return the root of a scene's road by name, of the current road if None; older roads get roots, copies new ids.
 
     Raises:
         InputError: no road has this name.
@@ -45,29 +47,31 @@ def road_named(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object | N
     renew_ids()
     if name is None:
         return find_road(scene)
-    known = {root.name: root for root in roads(scene)}
-    if name not in known:
-        raise InputError("--road", name, f"must be one of {', '.join(known)}" if known else "the scene has no road")
-    return known[name]
+    roots_by_name = {root.name: root for root in roads(scene)}
+    if name not in roots_by_name:
+        raise InputError(
+            "--road", name, f"must be one of {', '.join(roots_by_name)}" if roots_by_name else "the scene has no road"
+        )
+    return roots_by_name[name]
 
 
 def remember(
-    root: bpy.types.Object, parameters: RoadParameters, scenario: Scenario, built_from: str, found: str = ""
+    root: bpy.types.Object, parameters: RoadParameters, scenario: Scenario, built_from: str, reconstruction: str = ""
 ) -> None:
-    """Store in a road's root what is known of it.
+    """Store a road's data in its root.
 
     Args:
-        root: where it is stored.
-        parameters: its parameter set.
-        scenario: its limits and the model's fidelity.
+        root: the root object.
+        parameters: the road's parameter set.
+        scenario: limits of the road, and the model's fidelity.
         built_from: text of the settings that it was built from.
-        found: how it was found in a cloud, as JSON; empty for a road that wasn't.
+        reconstruction: how it was reconstructed from a cloud, as JSON; empty if it wasn't.
     """
     root[PARAMETERS] = parameters.to_json()
     root[SCENARIO] = scenario.to_json()
     root[BUILT_FROM] = built_from
-    if found:
-        root[FOUND] = found
+    if reconstruction:
+        root[FOUND] = reconstruction
     elif FOUND in root:
         del root[FOUND]
 
@@ -88,6 +92,7 @@ def recall_parameters(root: bpy.types.Object) -> RoadParameters:
 
 
 def _stored(root: bpy.types.Object, key: str) -> Any:
+    """Return the JSON data in a custom property of a road's root."""
     try:
         return json.loads(root[key])
     except (KeyError, TypeError, ValueError):

@@ -1,8 +1,8 @@
-"""The road that a scene shows now: the parameter set that it was built from, with everything read back that was edited.
+"""The road that a scene shows now: the parameter set that it was built from, updated with the user's edits.
 
-Parts were moved, turned, deleted, copied, their inputs changed, the backbone's points moved, the whole road moved: all
-that is read back exactly. What no parameter can say makes a part *edited by hand*: it is out of the parameter set, and
-what is scanned of it is a foreign body with its class.
+Moves, turns, deletions and copies of parts, changes of their inputs, moves of the backbone's points and of the whole
+road are read back exactly. A part with an edit that parameters can't describe is *edited by hand*: it isn't in the
+parameter set, and a scan sees its object as a foreign body with its class.
 """
 
 from __future__ import annotations
@@ -55,10 +55,10 @@ from .store import recall_parameters, road_named
 Float = NDArray[np.float64]
 
 BY_HAND = "synthroads_by_hand"
-"""Custom property of what was a part until it was edited by hand and the road built again: part and reason, as JSON."""
+"""Custom property of a former part, which was edited by hand before the road was rebuilt: part and reason, as JSON."""
 _PAINT = "Painted Areas"
 _SURFACE = ("Road", "Backbone")
-"""Roles without which there is no road."""
+"""Roles of the parts that a road can't do without."""
 
 
 @dataclass(frozen=True)
@@ -66,11 +66,11 @@ class EditedRoad:
     """A road read back from its scene: parameters as edited, and what they can't describe.
 
     Attributes:
-        parameters: what is known of it; of a road whose surface was edited by hand, what was known before.
+        parameters: the edited parameter set; that from before the edits if the road's surface was edited by hand.
         by_hand: parts that were edited by hand.
-        lost: why nothing is known of the road as a whole; empty if it is known.
-        stale: why the scene must be built again before it shows the parameters to the millimetre; empty if it does.
-        axis: how the moved points of the backbone lie to the axis that was fitted to them; None if none were moved.
+        lost: reason why the road as a whole can't be read back; empty if it can.
+        stale: reasons why the road must be rebuilt for the scene to show the parameters exactly; empty if it does.
+        axis: deviations of the backbone's moved points from the axis fitted to them; None if none were moved.
     """
 
     parameters: RoadParameters
@@ -82,29 +82,33 @@ class EditedRoad:
     def known(self) -> RoadParameters:
         """Return the edited parameter set; raise `InputError` if the road's surface was edited by hand."""
         if self.lost:
-            raise InputError("Road", None, f"its surface was edited by hand ({self.lost}): no parameter set says it")
+            raise InputError(
+                "Road",
+                None,
+                f"its surface was edited by hand ({self.lost}): undo that, or build it again",
+            )
         return self.parameters
 
     def to_dict(self) -> dict[str, Any]:
         """Return the parts edited by hand and the axis' fit as a report's JSON data; empty if there are none."""
-        told: dict[str, Any] = {}
+        data: dict[str, Any] = {}
         if self.by_hand:
-            told["edited_by_hand"] = [edit.to_dict() for edit in self.by_hand]
+            data["edited_by_hand"] = [edit.to_dict() for edit in self.by_hand]
         if self.axis is not None:
-            told["axis_fit"] = {"horizontal": self.axis.horizontal.to_dict(), "height": self.axis.height.to_dict()}
-        return told
+            data["axis_fit"] = {"horizontal": self.axis.horizontal.to_dict(), "height": self.axis.height.to_dict()}
+        return data
 
 
 def read_road(root: bpy.types.Object, scene: bpy.types.Scene | None = None) -> EditedRoad:
     """Read a road back from its scene with all edits; nothing in the scene changes.
 
     Args:
-        root: of the road.
-        scene: that it is in; the current one if None.
+        root: root object of the road.
+        scene: scene that contains it; the current one if None.
 
     Raises:
-        InputError: its kept parameter set is damaged, a value is out of its field's limits, or no road runs through
-            the backbone's points.
+        InputError: the stored parameter set is damaged, a value is outside its field's limits, or no road runs
+            through the backbone's points.
     """
     reading = _Reading(root, scene or bpy.context.scene)
     return reading.result()
@@ -115,8 +119,8 @@ class OpenRoad:
     """Name, id and edited state of a road in the open scene.
 
     Attributes:
-        name: of its root.
-        road_id: its id.
+        name: name of the road's root.
+        road_id: the road's id.
         edited: the road as the scene shows it.
     """
 
@@ -137,11 +141,11 @@ def open_road(name: str | None = None) -> OpenRoad | None:
 
 @dataclass
 class _Reading:
-    """A reading of a road from its scene, with what was found on the way.
+    """A reading of a road from its scene, with lists that grow as it is read.
 
     Attributes:
-        by_hand: parts that were found to be edited by hand.
-        stale: why the scene doesn't show the parameters.
+        by_hand: parts that turned out to be edited by hand.
+        stale: reasons why the scene doesn't show the parameters exactly.
     """
 
     root: bpy.types.Object
@@ -161,25 +165,26 @@ class _Reading:
         if lost := self._lost_reason():
             self.by_hand.append(HandEdit("Road", self.root.name, lost))
             return EditedRoad(self._base, tuple(self.by_hand), lost)
-        shown = {role: item for role, item in self._parts.items() if role not in (*_SURFACE, "Ground")}
-        fine = {role: item for role, item in shown.items() if self._is_fine(role, item)}
-        fine |= {role: self._parts[role] for role in _SURFACE if role in self._parts}
-        parameters = edited_parameters(self._base, fine)
-        before = RoadGeometry(self._base)
+        # Parts that parameters still describe; others are added to `by_hand`.
+        visible_parts = {role: item for role, item in self._parts.items() if role not in (*_SURFACE, "Ground")}
+        described_parts = {role: item for role, item in visible_parts.items() if self._is_fine(role, item)}
+        described_parts |= {role: self._parts[role] for role in _SURFACE if role in self._parts}
+        parameters = edited_parameters(self._base, described_parts)
+        built_geometry = RoadGeometry(self._base)
         backbone = self._parts.get("Backbone")
-        axis = edited_axis(before, backbone, self._place(backbone)) if backbone else None
+        axis = edited_axis(built_geometry, backbone, self._place(backbone)) if backbone else None
         if axis is not None:
             self.stale.append("its axis was changed")
             parameters = _on_axis(parameters, axis)
-        axes = RoadAxes(before, RoadGeometry(parameters) if axis is not None else before)
-        moved = dict(self._moved(parameters, axes, fine))
-        objects = {name: moved[name] for name in parameters.objects if name in moved}
+        axes = RoadAxes(built_geometry, RoadGeometry(parameters) if axis is not None else built_geometry)
+        moved_objects = dict(self._moved(parameters, axes, described_parts))
+        objects = {name: moved_objects[name] for name in parameters.objects if name in moved_objects}
         objects |= self._read_copies(parameters, objects, axes)
         data = parameters.to_dict() | {"objects": {name: item.to_dict() for name, item in objects.items()}}
-        whole = self._placed(RoadParameters.from_dict(data))
-        if not self.stale and InstanceNumbers(whole).parts != _kept_numbers(self._base, whole):
-            self.stale.append("numbers of dashes and plants follow from the objects that there are")
-        return EditedRoad(whole, tuple(self.by_hand), "", tuple(self.stale), axis.fit if axis else None)
+        placed_parameters = self._placed(RoadParameters.from_dict(data))
+        if not self.stale and InstanceNumbers(placed_parameters).parts != _kept_numbers(self._base, placed_parameters):
+            self.stale.append("numbers of dashes and plants depend on the objects that the road has")
+        return EditedRoad(placed_parameters, tuple(self.by_hand), "", tuple(self.stale), axis.fit if axis else None)
 
     def _place(self, item: bpy.types.Object) -> Float:
         """Return an object's matrix (4, 4) in the road's frame; exactly the identity if it nearly is."""
@@ -225,30 +230,30 @@ class _Reading:
         """Return the reason, in words, why no parameters describe a part; empty if they do."""
         thing = self._base.objects.get(role)
         modifier = own_modifier(item)
-        carried = read_inputs(self._base, role, modifier) if modifier is not None else frozenset()
-        grouped = item.type == "MESH" and role not in ("Backbone", "Ground") and not role.endswith(" Detail")
-        points = role in POSTS or isinstance(thing, Vehicle) or _on_a_vertex(thing)
-        reason = shape_reason(item, carried, not points and role != "Backbone", grouped)
-        if not reason and not grouped and role != "Backbone" and mesh_edited(item):
+        read_names = read_inputs(self._base, role, modifier) if modifier is not None else frozenset()
+        has_group = item.type == "MESH" and role not in ("Backbone", "Ground") and not role.endswith(" Detail")
+        is_vertex = role in POSTS or isinstance(thing, Vehicle) or _on_a_vertex(thing)
+        reason = shape_reason(item, read_names, not is_vertex and role != "Backbone", has_group)
+        if not reason and not has_group and role != "Backbone" and mesh_edited(item):
             reason = "its mesh was edited"
-        if not reason and points and role not in POSTS and len(item.data.vertices) != 1:
+        if not reason and is_vertex and role not in POSTS and len(item.data.vertices) != 1:
             reason = "its mesh was edited"
         return reason or place_reason(self._place(item), isinstance(thing, Asset))
 
     def _moved(
         self, parameters: RoadParameters, axes: RoadAxes, fine: dict[str, bpy.types.Object]
     ) -> Iterator[tuple[str, RoadObject]]:
-        """Yield (id, object) of the parameter set's objects that are still there, with their present places."""
-        gone = self._gone_ids(fine)
+        """Yield (id, object) of the parameter set's objects that still exist, with their current places."""
+        removed_ids = self._gone_ids(fine)
         for name, item in parameters.objects.items():
-            if name in gone:
+            if name in removed_ids:
                 continue
-            role = next((role for role, known in self._ids.items() if known == name), name)
+            role = next((role for role, thing_id in self._ids.items() if thing_id == name), name)
             if role in fine:
-                updated = self._updated(item, self._base.objects[name], fine[role], axes)
-                if updated is None:
+                updated_thing = self._updated(item, self._base.objects[name], fine[role], axes)
+                if updated_thing is None:
                     continue
-                yield name, updated
+                yield name, updated_thing
             else:
                 yield name, item
         for role, kind in POSTS.items():
@@ -276,14 +281,14 @@ class _Reading:
             owner = role.partition("/")[0]
             if "/" in role and role not in fine and owner in fine and owner not in gone | ids:
                 ids.add(owner)
-                done = "edited" if role in self._parts else "deleted"
-                self.by_hand.append(HandEdit(owner, fine[owner].name, f"{role} was {done}"))
+                edit_word = "edited" if role in self._parts else "deleted"
+                self.by_hand.append(HandEdit(owner, fine[owner].name, f"{role} was {edit_word}"))
         return ids
 
     def _updated(
         self, item: RoadObject, before: RoadObject, part: bpy.types.Object, axes: RoadAxes
     ) -> RoadObject | None:
-        """Return an object with its part's present place; None, added to `by_hand`, if no parameters describe it."""
+        """Return an object with its part's current place; None, added to `by_hand`, if no parameters describe it."""
         place = self._place(part)
         try:
             update, stale = _update(item, before, part, place, axes)
@@ -320,12 +325,12 @@ class _Reading:
     ) -> dict[str, RoadObject]:
         """Return the user's copies of parts as new road objects by new ids, with new instance numbers."""
         copies: dict[str, RoadObject] = {}
-        largest = max(item.instance for item in self._base.objects.values())
+        largest_number = max(item.instance for item in self._base.objects.values())
         for copy in sorted(self._copies, key=lambda item: item.name_full):
             role = role_of(copy)
-            before = self._base.objects.get(role)
-            if before is None or isinstance(before, Vegetation | Terrain):
-                self.by_hand.append(HandEdit(role, copy.name, "it is a copy of a part that there is once"))
+            built_thing = self._base.objects.get(role)
+            if built_thing is None or isinstance(built_thing, Vegetation | Terrain):
+                self.by_hand.append(HandEdit(role, copy.name, "it is a copy of a part of which a road has only one"))
                 continue
             if reason := self._reason(role, copy):
                 self.by_hand.append(HandEdit(role, copy.name, reason))
@@ -333,11 +338,11 @@ class _Reading:
             item = parameters.objects[role]
             if (modifier := own_modifier(copy)) is not None:
                 item = edited_object(item, modifier)
-            updated = self._updated(item, before, copy, axes)
-            if updated is None:
+            updated_thing = self._updated(item, built_thing, copy, axes)
+            if updated_thing is None:
                 continue
             name = _free_name(role, {*self._base.objects, *copies})
-            copies[name] = updated.model_copy(update={"instance": largest + 1 + len(copies)})
+            copies[name] = updated_thing.model_copy(update={"instance": largest_number + 1 + len(copies)})
             self.stale.append(f"{copy.name} is a copy")
         return copies
 
@@ -391,7 +396,7 @@ def _on_a_vertex(item: RoadObject | None) -> bool:
 
 
 def _on_axis(parameters: RoadParameters, axis: EditedAxis) -> RoadParameters:
-    """Return the road on another axis: all stations are carried over, offsets stay."""
+    """Return the road on an edited axis: all stations are mapped to it, offsets stay."""
     data = parameters.to_dict()
     for name, item in data["objects"].items():
         if item["type"] == "Alignment":
@@ -401,19 +406,19 @@ def _on_axis(parameters: RoadParameters, axis: EditedAxis) -> RoadParameters:
     return RoadParameters.from_dict(data)
 
 
-def _carry_stations(data: Any, carried: Callable[[float], float], length: float) -> None:
-    """Map all stations in an object's JSON data to another axis, in place; positive ones never get negative."""
+def _carry_stations(data: Any, map_station: Callable[[float], float], length: float) -> None:
+    """Map all stations in an object's JSON data to another axis, in place; positive ones never become negative."""
     if isinstance(data, list):
-        for entry in data:
-            _carry_stations(entry, carried, length)
+        for part in data:
+            _carry_stations(part, map_station, length)
     if not isinstance(data, dict):
         return
     for key, value in data.items():
         if key in ("station", "start_station", "end_station") and isinstance(value, int | float):
-            now = round(carried(float(value)), 6)
-            data[key] = max(now, 0.0) if value >= 0 else now
+            new_station = round(map_station(float(value)), 6)
+            data[key] = max(new_station, 0.0) if value >= 0 else new_station
         else:
-            _carry_stations(value, carried, length)
+            _carry_stations(value, map_station, length)
 
 
 def _released(root: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[HandEdit]:
@@ -432,8 +437,9 @@ def _kept_numbers(before: RoadParameters, now: RoadParameters) -> dict[str, Any]
     return {name: parts for name, parts in InstanceNumbers(before).parts.items() if name in now.objects}
 
 
-def _free_name(role: str, taken: set[str]) -> str:
+def _free_name(role: str, used_names: set[str]) -> str:
+    """Return a name for a copy of a part: its role, shortened to 60 characters, with a free number from 2 on."""
     number = 2
-    while f"{role[:60]}-{number}" in taken:
+    while f"{role[:60]}-{number}" in used_names:
         number += 1
     return f"{role[:60]}-{number}"

@@ -1,4 +1,4 @@
-"""SR Axis from Curve: any curve as the backbone that groups follow; SR Axis: the backbone of a group's inputs."""
+"""SR Axis from Curve: a backbone along any curve; SR Axis: the backbone that a group's inputs give."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class AxisInputs(Inputs):
     """Inputs of a node group that follows a backbone or a curve.
 
     Attributes:
-        curve: what is followed where no backbone is given.
+        curve: curve that is followed if no backbone is given.
         backbone: object with the backbone, or with a curve.
     """
 
@@ -29,7 +29,7 @@ class AxisInputs(Inputs):
 
 
 def rows_along(curve: Value) -> Value:
-    """Add nodes that pass a backbone through or make one along a curve; return their output."""
+    """Add nodes that return a backbone unchanged, or make one along a curve; return their output."""
     return curve.tree.call(axis_group(), curve=curve).value
 
 
@@ -43,10 +43,10 @@ def axis_group(tree: Tree) -> None:
     """The backbone if there is one, else one along the first curve that there is."""
     inputs = _Axis(tree)
     with tree.frame("A mesh with rows is a backbone, a curve is yet to become one"):
-        given = op.join(inputs.backbone, inputs.curve)
-        made = tree.call(axis_from_curve_group(), curve=given).value
-        rows = op.switch(op.point_count(inputs.curve) > 0, made, inputs.curve)
-        axis = op.switch(op.point_count(inputs.backbone) > 0, rows, inputs.backbone)
+        line = op.join(inputs.backbone, inputs.curve)
+        curve_backbone = tree.call(axis_from_curve_group(), curve=line).value
+        backbone = op.switch(op.point_count(inputs.curve) > 0, curve_backbone, inputs.curve)
+        axis = op.switch(op.point_count(inputs.backbone) > 0, backbone, inputs.backbone)
     tree.output("Axis", axis, description="Backbone")
 
 
@@ -69,14 +69,14 @@ def axis_from_curve_group(tree: Tree) -> None:
     with tree.frame("Its first spline in plan, with the heights kept"):
         spline = op.separate(axis.curve, op.index(tree).equals(0), "CURVE")
         spline = tree.node("GeometryNodeSetSplineResolution", spline, resolution=_RESOLUTION).value
-        fine = tree.node("GeometryNodeResampleCurve", spline, mode="EVALUATED").value
-        fine = op.store(fine, "elevation", op.component(op.position(tree), "Z"))
-        flat = op.position(tree) * (1.0, 1.0, 0.0)
-        fine = op.set_position(fine, flat)
+        fine_curve = tree.node("GeometryNodeResampleCurve", spline, mode="EVALUATED").value
+        fine_curve = op.store(fine_curve, "elevation", op.component(op.position(tree), "Z"))
+        plan_position = op.position(tree) * (1.0, 1.0, 0.0)
+        fine_curve = op.set_position(fine_curve, plan_position)
     with tree.frame("Rows at even distances"):
-        rows = tree.node("GeometryNodeResampleCurve", fine, length=axis.step, mode="LENGTH").value
-        along = tree.node("GeometryNodeSplineParameter")["Length"]
-        rows = op.store(rows, "station", along + axis.first_station)
+        rows = tree.node("GeometryNodeResampleCurve", fine_curve, length=axis.step, mode="LENGTH").value
+        length = tree.node("GeometryNodeSplineParameter")["Length"]
+        rows = op.store(rows, "station", length + axis.first_station)
         tangent = tree.node("GeometryNodeInputTangent").value
         rows = op.store(rows, "forwards", tangent)
     with tree.frame("Backbone at the curve's height"):
@@ -84,15 +84,17 @@ def axis_from_curve_group(tree: Tree) -> None:
         height = op.named_attribute(tree, "elevation")
         line = op.set_position(line, op.position(tree) + op.vector(tree, 0.0, 0.0, height))
     with tree.frame("Directions at the ends go on turning as they do inside"):
-        number = op.index(tree)
-        inner = op.clip(number, 1, op.point_count(line) - 2)
+        row_index = op.index(tree)
+        inner_index = op.clip(row_index, 1, op.point_count(line) - 2)
         forwards = op.named_attribute(tree, "forwards", "FLOAT_VECTOR")
-        beside = op.sample_index(line, forwards, inner)
-        line = op.store(line, "forwards", op.switch(inner.equals(number), forwards * 2.0 - beside, forwards))
+        inner_forwards = op.sample_index(line, forwards, inner_index)
+        line = op.store(
+            line, "forwards", op.switch(inner_index.equals(row_index), forwards * 2.0 - inner_forwards, forwards)
+        )
     with tree.frame("Direction to the left"):
         forwards = op.named_attribute(tree, "forwards", "FLOAT_VECTOR")
-        left = op.vector(tree, -op.component(forwards, "Y"), op.component(forwards, "X"))
-        line = op.store(line, "left", op.normalize(left))
+        left_vector = op.vector(tree, -op.component(forwards, "Y"), op.component(forwards, "X"))
+        line = op.store(line, "left", op.normalize(left_vector))
     with tree.frame("Curvature: turn from the row before to the row behind"):
         line = op.store(line, "curvature", _curvature(tree, line, axis.smoothing))
     with tree.frame("Crossfalls"):
@@ -105,16 +107,24 @@ def axis_from_curve_group(tree: Tree) -> None:
 
 def _curvature(tree: Tree, line: Value, smoothing: Value) -> Value:
     """Add nodes for the curvature (1/m) at every row, averaged over `smoothing` rows; return their output."""
-    last = op.point_count(line) - 1
-    inner = op.clip(op.index(tree), 1, last - 1)
-    before, behind = op.maximum(inner - 1, 0), op.minimum(inner + 1, last)
+    last_row = op.point_count(line) - 1
+    inner_row = op.clip(op.index(tree), 1, last_row - 1)
+    previous_row, next_row = op.maximum(inner_row - 1, 0), op.minimum(inner_row + 1, last_row)
 
-    def at(name: str, row: Value, kind: str) -> Value:
+    def sampled_at(name: str, row: Value, kind: str) -> Value:
+        """Add nodes for an attribute of the line in a row."""
         return op.sample_index(line, op.named_attribute(tree, name, kind), row)
 
-    first, second = at("forwards", before, "FLOAT_VECTOR"), at("forwards", behind, "FLOAT_VECTOR")
-    across = op.component(tree.node("ShaderNodeVectorMath", first, second, operation="CROSS_PRODUCT").value, "Z")
-    turn = tree.node("ShaderNodeMath", across, op.dot(first, second), operation="ARCTAN2").value
-    length = at("station", behind, "FLOAT") - at("station", before, "FLOAT")
-    curvature = turn / op.maximum(length, 1e-6)
+    previous_direction, next_direction = (
+        sampled_at("forwards", previous_row, "FLOAT_VECTOR"),
+        sampled_at("forwards", next_row, "FLOAT_VECTOR"),
+    )
+    cross_product = op.component(
+        tree.node("ShaderNodeVectorMath", previous_direction, next_direction, operation="CROSS_PRODUCT").value, "Z"
+    )
+    turn = tree.node(
+        "ShaderNodeMath", cross_product, op.dot(previous_direction, next_direction), operation="ARCTAN2"
+    ).value
+    length = sampled_at("station", next_row, "FLOAT") - sampled_at("station", previous_row, "FLOAT")
+    curvature = turn / op.maximum(length, 1e-6)  # turn of the direction per length
     return tree.node("GeometryNodeBlurAttribute", curvature, iterations=smoothing, data_type="FLOAT").value

@@ -1,4 +1,4 @@
-"""The backbone: a polyline along the axis whose points carry what a row of the road needs to know.
+"""The backbone: a polyline along the axis with a point, and its attributes, for each row of the road's mesh.
 
 Attributes of its points: ``station`` (m), ``left`` (unit vector, horizontal), ``curvature`` (1/m, positive to
 the left), ``crossfall_left`` and ``crossfall_right`` (m/m, positive where the surface falls to the right), and
@@ -15,12 +15,12 @@ FOLD_SHARE = 0.98
 """Share of the radius at which an offset curve is cut, as in `road.alignment.clip_offset`."""
 
 
-def row(backbone: Value, number: Value) -> tuple[Value, Value, Value]:
-    """Add nodes for the axis point (m), left vector and curvature (1/m) of the backbone's row `number`."""
+def row(backbone: Value, row_index: Value) -> tuple[Value, Value, Value]:
+    """Add nodes for the axis point (m), left vector and curvature (1/m) of the backbone's row `row_index`."""
     tree = backbone.tree
-    axis = op.sample_index(backbone, op.position(tree), number)
-    left = op.sample_index(backbone, op.named_attribute(tree, "left", "FLOAT_VECTOR"), number)
-    return axis, left, op.sample_index(backbone, op.named_attribute(tree, "curvature"), number)
+    axis = op.sample_index(backbone, op.position(tree), row_index)
+    left = op.sample_index(backbone, op.named_attribute(tree, "left", "FLOAT_VECTOR"), row_index)
+    return axis, left, op.sample_index(backbone, op.named_attribute(tree, "curvature"), row_index)
 
 
 def limit_offset(offset: Value, curvature: Value) -> Value:
@@ -29,9 +29,10 @@ def limit_offset(offset: Value, curvature: Value) -> Value:
 
 
 def station_ribbon(backbone: Value, numbers: tuple[str, ...] = ()) -> Value:
-    """Add nodes for a flat ribbon mesh along x = station, on which `look_up` samples the backbone's attributes.
+    """Add nodes for a flat ribbon mesh along x = station, in which `look_up` finds attributes at any station.
 
-    It carries the backbone's position (``axis``), ``left``, ``station`` and ``curvature``, and the attributes named.
+    Its attributes are the backbone's position (``axis``), ``left``, ``station``, ``curvature``, and those named in
+    `numbers`.
     """
     tree = backbone.tree
     with tree.frame("Ribbon to look up stations"):
@@ -46,14 +47,14 @@ def station_ribbon(backbone: Value, numbers: tuple[str, ...] = ()) -> Value:
 
 
 def look_up(ribbon: Value, name: str, station: Value) -> Value:
-    """Add nodes for a backbone's attribute (``axis``: its position) at any station (m), linear between its rows."""
+    """Add nodes for an attribute of the backbone (``axis``: its position) at a station (m), interpolated linearly."""
     tree = ribbon.tree
     kind = "FLOAT_VECTOR" if name in ("axis", "left") else "FLOAT"
     return op.sample_surface(ribbon, op.named_attribute(tree, name, kind), op.vector(tree, station))
 
 
 def height_on(road: Value, terrain: Value, place: Value) -> Value:
-    """Add nodes for the z (m) of the road or else the terrain above or below `place`; the place's where is neither."""
+    """Add nodes for the z (m) of the road above or below `place`, else of the terrain there, else of the place."""
     return place.tree.call(surface_height_group(), road=road, terrain=terrain, place=place).value
 
 
@@ -72,14 +73,15 @@ def surface_height_group(tree: Tree) -> None:
     surfaces = _Surfaces(tree)
     place = surfaces.place
     with tree.frame("Rays from above"):
-        above = place + (0.0, 0.0, 500.0)
+        ray_start = place + (0.0, 0.0, 500.0)  # chosen: higher than any surface above a place
 
-        def cast(target: Value) -> tuple[Value, Value]:
-            ray = tree.node("GeometryNodeRaycast", target_geometry=target, source_position=above, ray_length=1000.0)
+        def ray_hit(target: Value) -> tuple[Value, Value]:
+            """Return whether the ray hits a mesh, and the height (m) there."""
+            ray = tree.node("GeometryNodeRaycast", target_geometry=target, source_position=ray_start, ray_length=1000.0)
             return ray["Is Hit"], op.component(ray["Hit Position"], "Z")
 
-        on_road, road_z = cast(surfaces.road)
-        on_terrain, terrain_z = cast(surfaces.terrain)
+        on_road, road_z = ray_hit(surfaces.road)
+        on_terrain, terrain_z = ray_hit(surfaces.terrain)
     with tree.frame("Nearest point of the road, if there is one"):
         nearest_z = op.component(op.sample_surface(surfaces.road, op.position(tree), place), "Z")
         nearest_z = op.switch(op.face_count(surfaces.road) > 0, op.component(place, "Z"), nearest_z)

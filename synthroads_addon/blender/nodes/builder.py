@@ -12,9 +12,8 @@
 
     group = lane_group()
 
-Sockets are `Value`s: they can be added, multiplied, compared and handed to other nodes. Places of nodes are
-worked out from the frames and the links. A group that is in the file already, in the same version, is used
-again.
+Sockets are `Value`s: they can be added, multiplied, compared and linked to other nodes. Positions of nodes in the
+editor follow from the frames and the links. A group that the open file has already, in the same version, is reused.
 """
 
 from __future__ import annotations
@@ -35,23 +34,25 @@ from .kept_groups import KEY, note_made, take_kept_group
 from .layout import arrange
 
 MATERIALS = "synthroads_materials"
-"""Custom property of a group: entries of the material table by the names of the inputs that usually have them."""
+"""Custom property of a group: default entries of the material table for its material inputs, by the inputs' names."""
 _TAGS = {"GEOMETRY": "GEOMETRY", "VECTOR": "VECTOR"}
 """Colours of groups by the kind of their first output, as Blender gives them to its own nodes; else ``CONVERTER``."""
 
 
-def _operator_method(operation: str, turned: bool = False) -> Callable[[Value, Operand], Value]:
-    """Return the method of an arithmetic operator of `Value`, of its reflected form (``__radd__`` ...) if `turned`."""
+def _operator_method(operation: str, reflected: bool = False) -> Callable[[Value, Operand], Value]:
+    """Return the method of `Value` for an arithmetic operator, or for its reflected form (``__radd__`` ...)."""
 
-    def calculate(value: Value, other: Operand) -> Value:
-        return value._math(operation, other, value) if turned else value._math(operation, value, other)
+    def calculate(value: Value, operand: Operand) -> Value:
+        return value._math(operation, operand, value) if reflected else value._math(operation, value, operand)
 
     return calculate
 
 
 def _comparison(operation: str) -> Callable[[Value, Operand], Value]:
-    def compare(value: Value, other: Operand) -> Value:
-        return value._compare(operation, other)
+    """Return the method of `Value` for a comparison operator."""
+
+    def compare(value: Value, operand: Operand) -> Value:
+        return value._compare(operation, operand)
 
     return compare
 
@@ -70,6 +71,7 @@ class Value:
         return self.socket
 
     def _math(self, operation: str, *operands: Operand) -> Value:
+        """Add a math node for vectors, integers or floats, as the operands' kinds require; return its output."""
         kinds = {_kind(operand) for operand in operands}
         if "VECTOR" in kinds:
             if operation == "MULTIPLY" and "VECTOR" not in {_kind(operands[1])}:
@@ -79,16 +81,17 @@ class Value:
             return self.tree.node("FunctionNodeIntegerMath", *operands, operation=operation).value
         return self.tree.node("ShaderNodeMath", *operands, operation=operation).value
 
-    def _compare(self, operation: str, other: Operand) -> Value:
-        kind = "INT" if {_kind(self), _kind(other)} == {"INT"} else "FLOAT"
-        return self.tree.node("FunctionNodeCompare", self, other, operation=operation, data_type=kind).value
+    def _compare(self, operation: str, operand: Operand) -> Value:
+        """Add a comparison node, of integers or floats; return its output."""
+        kind = "INT" if {_kind(self), _kind(operand)} == {"INT"} else "FLOAT"
+        return self.tree.node("FunctionNodeCompare", self, operand, operation=operation, data_type=kind).value
 
     __add__ = _operator_method("ADD")
-    __radd__ = _operator_method("ADD", turned=True)
+    __radd__ = _operator_method("ADD", reflected=True)
     __sub__ = _operator_method("SUBTRACT")
-    __rsub__ = _operator_method("SUBTRACT", turned=True)
+    __rsub__ = _operator_method("SUBTRACT", reflected=True)
     __truediv__ = _operator_method("DIVIDE")
-    __rtruediv__ = _operator_method("DIVIDE", turned=True)
+    __rtruediv__ = _operator_method("DIVIDE", reflected=True)
     __floordiv__ = _operator_method("DIVIDE_FLOOR")
     __mod__ = _operator_method("FLOORED_MODULO")
     __lt__ = _comparison("LESS_THAN")
@@ -96,29 +99,29 @@ class Value:
     __gt__ = _comparison("GREATER_THAN")
     __ge__ = _comparison("GREATER_EQUAL")
 
-    def __mul__(self, other: Operand) -> Value:
-        if _kind(other) == "VECTOR" and self.kind != "VECTOR":
-            return self._math("MULTIPLY", other, self)
-        return self._math("MULTIPLY", self, other)
+    def __mul__(self, operand: Operand) -> Value:
+        if _kind(operand) == "VECTOR" and self.kind != "VECTOR":
+            return self._math("MULTIPLY", operand, self)
+        return self._math("MULTIPLY", self, operand)
 
-    def __rmul__(self, other: Operand) -> Value:
-        return self * other
+    def __rmul__(self, operand: Operand) -> Value:
+        return self * operand
 
     def __neg__(self) -> Value:
         return self._math("MULTIPLY", self, -1 if self.kind == "INT" else -1.0)
 
-    def __and__(self, other: Operand) -> Value:
-        return self.tree.node("FunctionNodeBooleanMath", self, other, operation="AND").value
+    def __and__(self, operand: Operand) -> Value:
+        return self.tree.node("FunctionNodeBooleanMath", self, operand, operation="AND").value
 
-    def __or__(self, other: Operand) -> Value:
-        return self.tree.node("FunctionNodeBooleanMath", self, other, operation="OR").value
+    def __or__(self, operand: Operand) -> Value:
+        return self.tree.node("FunctionNodeBooleanMath", self, operand, operation="OR").value
 
     def __invert__(self) -> Value:
         return self.tree.node("FunctionNodeBooleanMath", self, operation="NOT").value
 
-    def equals(self, other: Operand) -> Value:
+    def equals(self, operand: Operand) -> Value:
         """Add a node that compares for equality (exact: for whole numbers); return its output."""
-        return self._compare("EQUAL", other)
+        return self._compare("EQUAL", operand)
 
 
 Operand = Value | float | int | bool | str | tuple[float, ...]
@@ -155,12 +158,12 @@ class Node:
 
 
 class Tree:
-    """A node group under construction: its links and its inputs' values come into it with `finish`.
+    """A node group under construction; links and values of inputs are collected, and made by `finish`.
 
     Attributes:
-        group: Blender's.
-        materials: the usual materials of inputs that have one, by the inputs' names.
-        makes: kind of its first output.
+        group: Blender's node group.
+        materials: default materials of material inputs, by the inputs' names.
+        makes: kind of the group's first output.
     """
 
     def __init__(self, group: bpy.types.NodeTree) -> None:
@@ -174,7 +177,7 @@ class Tree:
         self._changes: list[Change] = []
 
     def finish(self) -> None:
-        """Link all that is to be linked, and set the inputs' values."""
+        """Make all collected links, and set the collected values of inputs."""
         changes, self._changes = self._changes, []
         make_changes(changes)
 
@@ -205,10 +208,10 @@ class Tree:
         self._socket(name, f"NodeSocket{kind}", description)
         return GroupInput(self, name, kind.upper())
 
-    def material(self, name: str, usual: str = "", *, description: str) -> Value:
-        """Declare a material input of the group; `usual` names its default in the material table; return its value."""
-        if usual:
-            self.materials[name] = usual
+    def material(self, name: str, default: str = "", *, description: str) -> Value:
+        """Declare a material input of the group; `default` is an entry of the material table; return its value."""
+        if default:
+            self.materials[name] = default
         return self.input(name, "Material", description=description)
 
     def output(self, name: str, value: Value, *, description: str = "") -> None:
@@ -224,14 +227,15 @@ class Tree:
     @contextmanager
     def panel(self, name: str) -> Iterator[None]:
         """Context in which declared inputs are put into a panel of the modifier; panels nest."""
-        interface, outer = self.group.interface, self._panel
+        interface, outer_panel = self.group.interface, self._panel
         self._panel = interface.new_panel(name, default_closed=True)
-        if outer is not None:
-            interface.move_to_parent(self._panel, outer, len(outer.interface_items))
+        if outer_panel is not None:
+            interface.move_to_parent(self._panel, outer_panel, len(outer_panel.interface_items))
         yield
-        self._panel = outer
+        self._panel = outer_panel
 
     def _socket(self, name: str, kind: str, description: str) -> Any:
+        """Declare an input of the group with a socket type in the current panel; return it."""
         socket = self.group.interface.new_socket(name, in_out="INPUT", socket_type=kind, parent=self._panel)
         socket.description = description
         return socket
@@ -248,12 +252,12 @@ class Tree:
     @contextmanager
     def frame(self, label: str) -> Iterator[None]:
         """Context in which added nodes are put into a labelled frame (63 bytes at most)."""
-        outer, self._frame = self._frame, self.group.nodes.new("NodeFrame")
+        outer_frame, self._frame = self._frame, self.group.nodes.new("NodeFrame")
         self._frame.label = label
-        # Blender cuts labels after 63 bytes without a word.
+        # Blender cuts labels after 63 bytes silently.
         assert self._frame.label == label, label
         yield
-        self._frame = outer
+        self._frame = outer_frame
 
     def node(self, kind: str, *operands: Operand, **settings: Any) -> Node:
         """Add a node to the tree with its properties and inputs set or linked; return it.
@@ -274,18 +278,18 @@ class Tree:
         sockets = [socket for socket in raw.inputs if socket.enabled]
         for socket, operand in zip(sockets, operands, strict=False):
             self.feed(socket, operand)
-        named = {socket.name.lower().replace(" ", "_"): socket for socket in sockets}
+        sockets_by_name = {socket.name.lower().replace(" ", "_"): socket for socket in sockets}
         for name, operand in inputs.items():
-            self.feed(named[name], operand)
+            self.feed(sockets_by_name[name], operand)
         return Node(self, raw)
 
     def call(self, group: bpy.types.NodeTree, **inputs: Operand) -> Node:
         """Add a node of another group, its inputs (names in snake case) set or linked; return it."""
         raw = self._new("GeometryNodeGroup")
         raw.node_tree = group
-        named = {socket.name.lower().replace(" ", "_"): socket for socket in raw.inputs}
+        sockets_by_name = {socket.name.lower().replace(" ", "_"): socket for socket in raw.inputs}
         for name, operand in inputs.items():
-            self.feed(named[name.rstrip("_")], operand)
+            self.feed(sockets_by_name[name.rstrip("_")], operand)
         return Node(self, raw)
 
     def link_all(self, socket: bpy.types.NodeSocket, values: list[Value]) -> None:
@@ -295,7 +299,7 @@ class Tree:
             self.feed(socket, value)
 
     def feed(self, socket: bpy.types.NodeSocket, operand: Operand) -> None:
-        """Have an input linked or its value set."""
+        """Link a value to an input, or set the input's value; both are done by `finish`."""
         if isinstance(operand, Value):
             self._changes.append(partial(self.group.links.new, operand.source(), socket))
             return
@@ -306,6 +310,7 @@ class Tree:
         self._changes.append(partial(setattr, socket, "default_value", operand))
 
     def _new(self, kind: str) -> bpy.types.Node:
+        """Add a node to the current frame; it lets other work run in between."""
         yield_if_due()  # a large group takes half a second: each node updates the whole tree
         raw = self.group.nodes.new(kind)
         raw.parent = self._frame
@@ -313,6 +318,7 @@ class Tree:
 
 
 def _kind(operand: Operand) -> str:
+    """Return the kind of an operand's socket: a value's own, else that of a Python number or tuple."""
     if isinstance(operand, Value):
         return operand.kind
     if isinstance(operand, tuple):
@@ -322,10 +328,10 @@ def _kind(operand: Operand) -> str:
 
 _SOURCES = (
     *("nodes/*.py", "things/**/*.py"),
-    # One has the colour's attribute, one groups of its own, which are written in the road's field.
+    # The first has the name of the colour's attribute, the second groups of its own, built from the road's field.
     *("materials/looks.py", "materials/pavement.py", "../road/pavement/*.py"),
 )
-"""Source files that node groups follow from, beside the table of vehicles and the typeface."""
+"""Patterns of the source files that node groups follow from, beside the table of vehicles and the typeface."""
 TYPEFACE = PRESETS / "fonts" / "road.ttf"
 """Typeface of the signs."""
 
@@ -343,7 +349,7 @@ def source_files(patterns: Iterable[str]) -> list[Path]:
 
 
 def files_digest(*files: Path) -> bytes:
-    """Return a SHA-256 digest of files: what was made from them is told by it from what they make now."""
+    """Return a SHA-256 digest of files' contents; it differs once a file has changed."""
     digest = hashlib.sha256()
     for path in files:
         digest.update(path.read_bytes())
@@ -351,7 +357,7 @@ def files_digest(*files: Path) -> bytes:
 
 
 def remove_unused_groups() -> None:
-    """Remove the project's node groups without users from the file, repeatedly."""
+    """Remove the project's unused node groups from the file, and groups that only they used."""
     while unused := [group for group in bpy.data.node_groups if KEY in group and not group.users]:
         for group in unused:
             bpy.data.node_groups.remove(group)
@@ -364,23 +370,23 @@ def node_group(
     description: str = "",
     kind: str = "GeometryNodeTree",
 ) -> bpy.types.NodeTree:
-    """Return the node group of a name and arguments, of the same version from the open file or a kept one, else built.
+    """Return the node group of a name and arguments: from the open file, else from the file of kept groups, else built.
 
     Args:
-        name: as shown in Blender; an older version of that name is renamed.
-        build: declares inputs, adds nodes, declares outputs; is called with the tree and the arguments.
-        arguments: what `build` depends on apart from its source (a number of lanes, say).
-        description: shown as a tooltip.
+        name: the group's name in Blender; a group of an older version with this name is renamed.
+        build: function that declares inputs, adds nodes and declares outputs; called with the tree and the arguments.
+        arguments: values that `build` depends on apart from its source (a number of lanes, say).
+        description: the group's tooltip; the first line of the docstring of `build` if empty.
         kind: Blender's name of the tree's class.
     """
     key = hashlib.sha256(_sources_digest() + repr((name, arguments)).encode()).hexdigest()[:16]
     for group in bpy.data.node_groups:
         if group.get(KEY) == key:
             return group
-    if (old := bpy.data.node_groups.get(name)) and KEY in old:
-        old.name = f"{name} (older)"
-    if (kept := take_kept_group(key)) is not None:
-        return kept
+    if (older_group := bpy.data.node_groups.get(name)) and KEY in older_group:
+        older_group.name = f"{name} (older)"
+    if (kept_group := take_kept_group(key)) is not None:
+        return kept_group
     note_made()
     group = bpy.data.node_groups.new(name, kind)
     group[KEY] = key
@@ -399,7 +405,7 @@ def node_group(
 
 Make = Callable[[], bpy.types.NodeTree]
 CATALOGUES: dict[str, dict[str, Make]] = {}
-"""Makers of the groups that users can use by hand: by catalogue of the asset library, by name."""
+"""Functions that make the groups for use by hand: by catalogue of the asset library, then by name."""
 
 
 def usual_materials(group: bpy.types.NodeTree) -> dict[str, str]:
@@ -408,7 +414,7 @@ def usual_materials(group: bpy.types.NodeTree) -> dict[str, str]:
 
 
 def offer_group(catalogue: str, name: str, make: Make) -> None:
-    """Register a function that makes a node group, for the asset library's catalogue."""
+    """Register a function that makes a node group, so that users find it in the asset library's catalogue."""
     CATALOGUES.setdefault(catalogue, {})[name] = make
 
 
@@ -416,8 +422,8 @@ def makes_group(name: str, catalogue: str = "") -> Callable[[Callable[[Tree], No
     """Return a decorator that turns a building function into one that returns the node group `name`, reused or built.
 
     Args:
-        name: of the group.
-        catalogue: where users find it in the asset library; empty for one that only other groups use.
+        name: name of the group.
+        catalogue: the asset library's catalogue in which users find it; empty for a group that only other groups use.
     """
 
     def decorate(build: Callable[[Tree], None]) -> Make:

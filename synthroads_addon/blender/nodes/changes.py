@@ -1,4 +1,4 @@
-"""Many changes of a node tree, for which Blender updates the tree once instead of after each."""
+"""Many changes of a node tree, after which Blender updates the tree once, not after each."""
 
 from __future__ import annotations
 
@@ -12,37 +12,38 @@ Change = Callable[[], object]
 def make_changes(changes: list[Change]) -> None:
     """Make changes of links and inputs of one node tree, in order; the tree is updated at the last of them.
 
-    Blender updates a whole tree at each change, so that a tree of 800 nodes takes seconds. It doesn't while it tells a
-    node that the node's own tree has changed (it would come back to where it is), so all but the last are made then,
-    by a node of a tree that exists only for that. A release that updated all the same would only be slower.
+    Blender updates a whole tree at each change, so that a tree of 800 nodes takes seconds. It doesn't update any tree
+    while it calls a node's method `update`, as it would call itself. So all changes but the last are made in the
+    method of a node in a tree that exists only for that. If a release updated trees even then, this would only be slow.
 
     Args:
-        changes: of links and of inputs' values; what a change adds or takes away of nodes and sockets would not be
-            there for the next.
+        changes: functions that add links or set inputs' values; a change may not add or remove nodes or sockets, as
+            the next one wouldn't see that.
 
     Raises:
-        Exception: what a change raises.
+        Exception: an exception of a change.
     """
     if not changes:
         return
-    *most, last = changes
-    _while_updating(most)
-    last()
+    *earlier_changes, last_change = changes
+    _while_updating(earlier_changes)
+    last_change()
 
 
 def _while_updating(changes: list[Change]) -> None:
-    waiting, errors = [changes], []
+    """Make changes within a node's method `update`; raise the first exception among them."""
+    pending_changes, errors = [changes], []
 
     class Updated(bpy.types.GeometryNodeCustomGroup):
-        """A node that makes the changes when it is told that its tree has changed."""
+        """A node that makes the changes when Blender calls its `update`, because its tree has changed."""
 
         bl_idname = "SynthRoadsUpdatedNode"
         bl_label = "Updated"
 
         def update(self) -> None:
-            """Make the changes, the first time that this is called."""
+            """Make the changes at the first call."""
             try:
-                for change in waiting.pop() if waiting else ():
+                for change in pending_changes.pop() if pending_changes else ():
                     change()
             except Exception as error:  # Blender would only print it
                 errors.append(error)
@@ -56,4 +57,4 @@ def _while_updating(changes: list[Change]) -> None:
         bpy.utils.unregister_class(Updated)
     if errors:
         raise errors[0]
-    assert not waiting, "Blender did not tell a new node that its tree had changed"
+    assert not pending_changes, "Blender did not call the update of a new node"

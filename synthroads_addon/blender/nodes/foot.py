@@ -1,4 +1,4 @@
-"""SR Foot: where something that runs along the road stands on the surface."""
+"""SR Foot: points on the surface below something that runs along the road, and solids along them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ def foot_at(backbone: Value, surfaces: tuple[Value, Value], station: Value, offs
 
     Args:
         backbone: geometry of the backbone.
-        surfaces: geometry of the road and of the terrain.
+        surfaces: geometries of the road and of the terrain.
+        station: stations.
+        offset: offsets, positive to the left.
     """
     road, terrain = surfaces
     node = backbone.tree.call(
@@ -28,9 +30,9 @@ class Lengthwise(AxisInputs):
     """Inputs of a node group that puts something along the road.
 
     Attributes:
-        road, terrain: objects that it stands on.
-        start_station, end_station: where it begins and ends.
-        offset: of its axis.
+        road, terrain: objects that the thing stands on.
+        start_station, end_station: stations of its ends.
+        offset: offset of its axis.
     """
 
     road = socket("Object", "Surface that it stands on; else it is at the height of what it follows")
@@ -40,7 +42,7 @@ class Lengthwise(AxisInputs):
     offset = metres(0.0, (-100.0, 100.0), "Offset of its axis, positive to the left")
 
     def geometry(self) -> tuple[Value, tuple[Value, Value]]:
-        """Add nodes for the geometries backbone, (road, terrain); resolves an end station of 0 to the last one."""
+        """Add nodes for the backbone and (road, terrain) as geometries; replace an end station of 0 by the last one."""
         with self.tree.frame("Geometry, and the end"):
             axis = self.axis()
             end = self.end_station
@@ -50,36 +52,38 @@ class Lengthwise(AxisInputs):
     def rows(self, step: Operand) -> Value:
         """Add nodes for points at its stations, a `step` (m) apart, with ``station``, ``foot`` and ``left``.
 
-        Those beyond what it follows collapse at its ends.
+        Points beyond an end of the backbone collapse onto that end.
         """
         axis, surfaces = self.geometry()
         tree = self.tree
         with tree.frame("Rows, at even distances"):
-            first, last = self.start_station, self.end_station
-            count = op.round_up(op.maximum(last - first, 0.01) / step - 1e-4) + 1
-            station = op.minimum(first + op.index(tree) * step, last)
-            within = op.minimum(op.maximum(station, first_station(axis)), last_station(axis))
-            line = op.store(row_of_points(tree, count), "station", within)
+            start, end = self.start_station, self.end_station
+            count = op.round_up(op.maximum(end - start, 0.01) / step - 1e-4) + 1
+            station = op.minimum(start + op.index(tree) * step, end)
+            clamped_station = op.minimum(op.maximum(station, first_station(axis)), last_station(axis))
+            line = op.store(row_of_points(tree, count), "station", clamped_station)
             foot, left = foot_at(axis, surfaces, op.named_attribute(tree, "station"), self.offset)
             return op.store(op.store(line, "foot", foot), "left", left)
 
 
-def sweep(line: Value, outline: list[tuple[float, float]], across: Operand, height: Operand, low: Operand) -> Value:
+def sweep(
+    line: Value, outline: list[tuple[float, float]], width: Operand, height: Operand, base_height: Operand
+) -> Value:
     """Add nodes for a closed solid along the points of `Lengthwise.rows`.
 
     Args:
         line: the rows, with ``foot`` and ``left``.
-        outline: x and z of its corners, 0 to 1, clockwise as seen along the rows; x positive to the left.
-        across, height: what x and z are scaled with, m.
-        low: height of z = 0 above the feet, m.
+        outline: x and z of the solid's corners, 0 to 1, clockwise as seen along the rows; x positive to the left.
+        width, height: factors of x and z, m.
+        base_height: height of z = 0 above the feet, m.
     """
     tree = line.tree
 
     def place(point: Value, row: Value) -> Value:
         foot = op.sample_index(line, op.named_attribute(tree, "foot", "FLOAT_VECTOR"), row)
         left = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), row)
-        above = op.component(point, "Z") * height + low
-        return foot + left * (op.component(point, "X") * across) + op.vector(tree, 0.0, 0.0, above)
+        above = op.component(point, "Z") * height + base_height
+        return foot + left * (op.component(point, "X") * width) + op.vector(tree, 0.0, 0.0, above)
 
     corners = [(x, 0.0, z) for x, z in outline]
     body = loft(tree, lambda number: op.choose(number, corners), len(corners), op.point_count(line), place)

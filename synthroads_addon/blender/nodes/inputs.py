@@ -1,7 +1,7 @@
 """Inputs of a node group as the fields of a class: each is named, limited and described in one place.
 
-A field's name is the input's: `post_spacing` is "Post Spacing" in Blender. Where a group has the same inputs several
-times, words before them tell them apart: "Left Lane Line 1 Width".
+A field's name gives the input's: `post_spacing` is "Post Spacing" in Blender. If a group has the same inputs several
+times, words in front of the names distinguish them: "Left Lane Line 1 Width".
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ class Input:
     """Descriptor of a field of `Inputs`: reading it gives the value of the group's input.
 
     Args:
-        declare: method of `Tree` that declares it.
-        panel: heading that it stands under in the modifier, with the fields beside it of the same panel.
+        declare: method of `Tree` that declares the input.
+        panel: heading above it in the modifier; neighbouring fields with the same panel share one heading.
         settings: further arguments of the method.
     """
 
@@ -43,14 +43,14 @@ class Inputs:
     """Inputs of a node group; a subclass has them as fields, after those of its bases.
 
     Args:
-        tree: the group that they are declared for.
-        words: before the name of each.
-        heading: of those fields that have no panel of their own.
-        defaults: default values in place of those of the fields.
+        tree: the group in which they are declared.
+        words: words in front of each input's name.
+        heading: heading of the fields that have no panel.
+        defaults: default values, by field, that replace the fields' own.
 
     Attributes:
         tree: the group.
-        values: by field, as `Tree.call` takes them.
+        values: the inputs' values by field, as `Tree.call` expects them.
     """
 
     def __init__(
@@ -114,9 +114,9 @@ def socket(kind: str, description: str, *, panel: str = "") -> Input:
     return Input(Tree.input, panel, kind=kind, description=description)
 
 
-def material_of(what: str, usual: str = "", *, panel: str = "") -> Input:
-    """Return the field of a material input described as "Material of `what`", with its default material's entry."""
-    return Input(Tree.material, panel, usual=usual, description=f"Material of {what}")
+def material_of(part: str, default: str = "", *, panel: str = "") -> Input:
+    """Return the field of an input "Material of `part`", by default an entry of the material table."""
+    return Input(Tree.material, panel, default=default, description=f"Material of {part}")
 
 
 def instance_number() -> Input:

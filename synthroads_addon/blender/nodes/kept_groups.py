@@ -1,10 +1,10 @@
-"""Node groups kept between processes: Blender takes seconds to make those of a road, and a fifth of one to read them.
+"""Node groups kept between processes: Blender takes seconds to make a road's groups, but 0.2 s to read them.
 
-Each node that is added has Blender work out the whole tree anew. A build of a road therefore keeps the groups that it
-has made in a .blend file in the user's folder of Blender, and later builds, in any process, read them from it. A group
-is known by the hash of what it is made from (`builder.KEY`), the file by Blender's version and the place of the
-package. A list beside it says which groups the last roads needed, so that a build reads those of a road like its own.
-`SYNTHROADS_KEEP_GROUPS=off` in the environment keeps and reads none.
+Blender updates a whole tree whenever a node is added. A build of a road therefore keeps the groups that it has made in
+a .blend file in the user's folder of Blender, and later builds, in any process, read them from it. A group is
+identified by the hash of its source and arguments (`builder.KEY`), the file by Blender's version and the package's
+folder. A list beside the file has the groups of the latest roads, so that a build reads those of a road like its own.
+With `SYNTHROADS_KEEP_GROUPS=off` in the environment no groups are kept or read.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from pathlib import Path
 import bpy
 
 KEY = "synthroads_key"
-"""Custom property of a group: hash of what it was built from."""
+"""Custom property of a group: hash of its name, arguments and source files."""
 VARIABLE = "SYNTHROADS_KEEP_GROUPS"
 """Environment variable that is ``off`` where no groups are to be kept."""
 ROADS = 8
@@ -35,11 +35,17 @@ _SUFFIX = re.compile(r"( \(older\))?(\.[0-9]{3,})?$")
 
 
 class _State:
-    made = 0
+    """State of this process.
+
+    Attributes:
+        made_count: groups made since the last write of the file of kept groups.
+    """
+
+    made_count = 0
 
 
 def kept_file() -> Path | None:
-    """Return the .blend file of kept groups, be it there or not; None if none are kept."""
+    """Return the path of the .blend file of kept groups, which may not exist yet; None if groups aren't kept."""
     if os.environ.get(VARIABLE) == "off":
         return None
     if __package__.startswith(_EXTENSION):
@@ -52,14 +58,14 @@ def kept_file() -> Path | None:
 
 
 def note_made() -> None:
-    """Note that a group was made that the file of kept groups lacks."""
-    _State.made += 1
+    """Count a group that was made because the file of kept groups lacks it."""
+    _State.made_count += 1
 
 
 def take_kept_group(key: str) -> bpy.types.NodeTree | None:
-    """Return the kept group of a key, put into the open file with the others of a road that had it; None without one.
+    """Return the kept group of a key, read into the open file with the other groups of its road; None if none is kept.
 
-    Of several roads it is the one with the fewest groups.
+    If several roads have the group, those of the road with the fewest groups are read.
     """
     file = kept_file()
     roads = [road for road in _kept_roads(file) if key in road]
@@ -70,65 +76,69 @@ def take_kept_group(key: str) -> bpy.types.NodeTree | None:
 
 
 def may_keep_groups() -> bool:
-    """Return whether the groups that a build makes from here on may be kept: the file holds none of the project's yet.
+    """Return whether the groups that the next build makes may be kept: only if the open file has none of the project's.
 
-    A user can have edited those.
+    A user could have edited existing groups.
     """
     return not any(KEY in group for group in bpy.data.node_groups)
 
 
 def keep_groups() -> None:
-    """Write the groups of the open file's road, and those kept of others, to the file of kept groups, if any is new.
+    """Write the groups of the open file's road, and kept groups of other roads, to the file, if any is new.
 
-    Without a word where that can't be written: they are made anew then.
+    A failure to write is ignored: later builds then make the groups again.
     """
-    file, made, _State.made = kept_file(), _State.made, 0
+    file, made_count, _State.made_count = kept_file(), _State.made_count, 0
     road = {group[KEY]: group.name for group in bpy.data.node_groups if KEY in group and group.users}
     roads = _kept_roads(file)
-    if file is None or not made or (len(roads) >= ROADS and made < _NEW_SHARE * len(road)):
+    if file is None or not made_count or (len(roads) >= ROADS and made_count < _NEW_SHARE * len(road)):
         return
+    # The new file has this road's groups and those of the latest other roads, which are read into the open file first.
     roads = [road, *roads][:ROADS]
-    _read(file, {key: name for kept in roads[1:] for key, name in kept.items()})
+    _read(file, {key: name for road_groups in roads[1:] for key, name in road_groups.items()})
     groups = {group[KEY]: group for group in bpy.data.node_groups if KEY in group}
-    roads = [{key: groups[key].name for key in kept} for kept in roads if kept.keys() <= groups.keys()]
-    contents = {groups[key] for kept in roads for key in kept}
+    roads = [
+        {key: groups[key].name for key in road_groups} for road_groups in roads if road_groups.keys() <= groups.keys()
+    ]
+    contents = {groups[key] for road_groups in roads for key in road_groups}
     with suppress(OSError, RuntimeError):
         _write(file, contents, roads)
 
 
 def _write(file: Path, groups: set[bpy.types.NodeTree], roads: list[dict[str, str]]) -> None:
-    """Write groups and the list of roads; a process that reads meanwhile has one of both files of before at worst."""
+    """Write groups and the list of roads; a process that reads meanwhile may get one of both files as before."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=file.parent) as text:
-        part, index = Path(text) / file.name, Path(text) / "index"
-        bpy.data.libraries.write(str(part), groups, fake_user=False, compress=True)
-        index.write_text(json.dumps({"made_by": _stamp(), "roads": roads}), encoding="utf-8")
-        part.replace(file)
-        index.replace(file.with_suffix(".json"))
+    with tempfile.TemporaryDirectory(dir=file.parent) as folder:
+        part_file, index_file = Path(folder) / file.name, Path(folder) / "index"
+        bpy.data.libraries.write(str(part_file), groups, fake_user=False, compress=True)
+        index_file.write_text(json.dumps({"made_by": _stamp(), "roads": roads}), encoding="utf-8")
+        part_file.replace(file)
+        index_file.replace(file.with_suffix(".json"))
 
 
-def _read(file: Path, wanted: dict[str, str]) -> None:
-    """Put kept groups, names in the file by key, into the open file, but for those that it has."""
+def _read(file: Path, names_by_key: dict[str, str]) -> None:
+    """Read kept groups, given as names in the file by key, into the open file, except groups that it has already."""
     groups = bpy.data.node_groups
-    there = {group[KEY]: group for group in groups if KEY in group}
-    names = {name for key, name in wanted.items() if key not in there}
-    before = {group.session_uid for group in groups}
+    open_groups = {group[KEY]: group for group in groups if KEY in group}
+    names = {name for key, name in names_by_key.items() if key not in open_groups}
+    earlier_numbers = {group.session_uid for group in groups}
     if not names:
         return
     try:
-        with bpy.data.libraries.load(str(file), link=False) as (kept, chosen):
-            chosen.node_groups = [name for name in kept.node_groups if name in names]
-    except OSError:  # another process has taken it away, or it is no .blend file
+        with bpy.data.libraries.load(str(file), link=False) as (file_data, loaded_data):
+            loaded_data.node_groups = [name for name in file_data.node_groups if name in names]
+    except OSError:  # another process has removed it, or it is no .blend file
         return
     bpy.data.libraries.remove(bpy.data.libraries[file.name])
-    for group in [group for group in groups if group.session_uid not in before]:
-        if (same := there.get(group.get(KEY))) is not None:
-            group.user_remap(same)
+    for group in [group for group in groups if group.session_uid not in earlier_numbers]:
+        # Reading a group brings the groups that it uses: copies of open groups are replaced by these.
+        if (open_group := open_groups.get(group.get(KEY))) is not None:
+            group.user_remap(open_group)
             groups.remove(group)
 
 
 def restore_names() -> None:
-    """Give the project's groups in the open file their own names back, where no other group has them any more."""
+    """Remove suffixes from the names of the project's groups in the open file, where no other group has the name."""
     groups = bpy.data.node_groups
     for group in [group for group in groups if KEY in group]:
         name = _SUFFIX.sub("", group.name)
@@ -137,7 +147,7 @@ def restore_names() -> None:
 
 
 def _kept_roads(file: Path | None) -> list[dict[str, str]]:
-    """Return the groups of each road that are in the file, names by key; none if other source files made them."""
+    """Return the groups of each kept road, names by key; none if the file was made by other source files."""
     if file is None:
         return []
     try:
@@ -149,7 +159,7 @@ def _kept_roads(file: Path | None) -> list[dict[str, str]]:
 
 @cache
 def _stamp() -> str:
-    """Return a digest of sizes and times of all source files that work with Blender; cached."""
+    """Return a digest of the sizes and times of change of all source files of this package; cached."""
     blender = Path(__file__).parents[1]
     stats = [(str(path.relative_to(blender)), path.stat()) for path in sorted(blender.rglob("*.py"))]
     text = repr([(name, stat.st_size, stat.st_mtime_ns) for name, stat in stats])

@@ -1,10 +1,11 @@
-"""Where a group's nodes are put: frames one below the other, in each the nodes from left to right."""
+"""Positions of a group's nodes in the editor: frames below each other, and in each frame nodes from left to right."""
 
 from __future__ import annotations
 
 import bpy
 
 COLUMN = 220.0
+"""Width of a column of nodes, px of the node editor; these are chosen."""
 ROW_GAP = 30.0
 FRAME_GAP = 90.0
 
@@ -36,8 +37,8 @@ def arrange(group: bpy.types.NodeTree) -> None:
 def _depth(node: bpy.types.Node, incoming: dict[str, list[bpy.types.Node]], depths: dict[str, int]) -> int:
     """Return the length of the longest link path to a node within its own frame, kept in `depths`."""
     if node.name not in depths:
-        same = [before for before in incoming[node.name] if before.parent == node.parent]
-        depths[node.name] = 1 + max((_depth(before, incoming, depths) for before in same), default=-1)
+        sources = [source for source in incoming[node.name] if source.parent == node.parent]
+        depths[node.name] = 1 + max((_depth(source, incoming, depths) for source in sources), default=-1)
     return depths[node.name]
 
 

@@ -1,4 +1,4 @@
-"""The nodes that the groups use most, as functions of values: what goes in, what comes out."""
+"""The nodes that groups use most, as functions: each adds nodes to its operands' tree and returns their output."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ def named_attribute(tree: Tree, name: str, data_type: str = "FLOAT") -> Value:
     return tree.node("GeometryNodeInputNamedAttribute", name, data_type=data_type).value
 
 
-def attribute_or(usual: Value, name: str) -> Value:
-    """Add nodes for the attribute `name` of the type of `usual`, which is taken where the attribute is missing."""
-    kind = _DATA_TYPES[usual.kind]
-    node = usual.tree.node("GeometryNodeInputNamedAttribute", name, data_type=kind)
-    return switch(node["Exists"], usual, node.value)
+def attribute_or(default: Value, name: str) -> Value:
+    """Add nodes for the attribute `name` of the type of `default`, and `default` where the attribute is missing."""
+    kind = _DATA_TYPES[default.kind]
+    node = default.tree.node("GeometryNodeInputNamedAttribute", name, data_type=kind)
+    return switch(node["Exists"], default, node.value)
 
 
 def minimum(a: Value, b: Operand) -> Value:
@@ -43,9 +43,9 @@ def maximum(a: Value, b: Operand) -> Value:
     return a.tree.node("ShaderNodeMath", a, b, operation="MAXIMUM").value
 
 
-def clip(a: Value, low: Operand, high: Operand) -> Value:
-    """Add nodes that clamp a number to `low` to `high`."""
-    return minimum(maximum(a, low), high)
+def clip(a: Value, lower_limit: Operand, upper_limit: Operand) -> Value:
+    """Add nodes that clamp a number to `lower_limit` to `upper_limit`."""
+    return minimum(maximum(a, lower_limit), upper_limit)
 
 
 def unary(operation: str, a: Value) -> Value:
@@ -78,10 +78,10 @@ def normalize(a: Value) -> Value:
     return a.tree.node("ShaderNodeVectorMath", a, operation="NORMALIZE").value
 
 
-def upright(along: Value) -> Value:
+def upright(x_direction: Value) -> Value:
     """Add a node for the rotation whose z points up and whose x points along a vector in plan."""
-    return along.tree.node(
-        "FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), along, primary_axis="Z", secondary_axis="X"
+    return x_direction.tree.node(
+        "FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), x_direction, primary_axis="Z", secondary_axis="X"
     ).value
 
 
@@ -95,11 +95,11 @@ def component(a: Value, axis: str) -> Value:
     return a.tree.node("ShaderNodeSeparateXYZ", a)[axis]
 
 
-def switch(condition: Value, false: Operand, true: Operand) -> Value:
-    """Add a switch node: `true` where the condition holds, else `false`."""
-    kinds = [value.kind for value in (false, true) if isinstance(value, Value)]
+def switch(condition: Value, if_false: Operand, if_true: Operand) -> Value:
+    """Add a switch node: `if_true` where the condition holds, else `if_false`."""
+    kinds = [value.kind for value in (if_false, if_true) if isinstance(value, Value)]
     kind = _SOCKET_TYPES.get(kinds[0] if kinds else "VALUE", kinds[0] if kinds else "FLOAT")
-    return condition.tree.node("GeometryNodeSwitch", condition, false, true, input_type=kind).value
+    return condition.tree.node("GeometryNodeSwitch", condition, if_false, if_true, input_type=kind).value
 
 
 def only_if(condition: Value, geometry: Value) -> Value:
@@ -119,10 +119,10 @@ def choose(index: Value, items: list[tuple[float, float, float]]) -> Value:
     return node.value
 
 
-def random(tree: Tree, low: Operand, high: Operand, seed: Operand, identifier: Value | None = None) -> Value:
-    """Add a node for a uniform random number (or vector, if `low` is one) per element, by seed and identifier."""
-    kind = "FLOAT_VECTOR" if isinstance(low, tuple) else "FLOAT"
-    settings: dict[str, Operand] = {"min": low, "max": high, "seed": seed}
+def random(tree: Tree, minimum: Operand, maximum: Operand, seed: Operand, identifier: Value | None = None) -> Value:
+    """Add a node for a uniform random number (or vector, if `minimum` is one) per element, by seed and identifier."""
+    kind = "FLOAT_VECTOR" if isinstance(minimum, tuple) else "FLOAT"
+    settings: dict[str, Operand] = {"min": minimum, "max": maximum, "seed": seed}
     if identifier is not None:
         settings["id"] = identifier
     return tree.node("FunctionNodeRandomValue", data_type=kind, **settings).value
@@ -184,7 +184,7 @@ def store(geometry: Value, name: str, value: Operand, domain: str = "POINT") -> 
 
 
 def capture(geometry: Value, **values: Value) -> tuple[Value, dict[str, Value]]:
-    """Add a node that evaluates several fields on the points together; return the geometry, and the values by name."""
+    """Add a node that evaluates fields on the points before these move; return the geometry, and the values by name."""
     node = geometry.tree.node("GeometryNodeCaptureAttribute", geometry)
     for name, value in values.items():
         node.raw.capture_items.new(_SOCKET_TYPES[value.kind], name)
@@ -192,13 +192,13 @@ def capture(geometry: Value, **values: Value) -> tuple[Value, dict[str, Value]]:
     return node["Geometry"], {name: node[name] for name in values}
 
 
-def one_on_each(points: Value, bodies: Value, pick: str) -> Value:
+def one_on_each(points: Value, bodies: Value, number_name: str) -> Value:
     """Add nodes that put one of some instances on each point, as its attributes say; return the instances.
 
     Args:
-        points: with ``size`` (a vector), ``turn`` about the vertical (rad) and the number of their body.
+        points: points with ``size`` (a vector), ``turn`` about the vertical (rad) and the number of their body.
         bodies: the instances to choose from.
-        pick: name of the attribute with that number.
+        number_name: name of the attribute with the number of the body.
     """
     tree = points.tree
     return tree.node(
@@ -206,7 +206,7 @@ def one_on_each(points: Value, bodies: Value, pick: str) -> Value:
         points,
         instance=bodies,
         pick_instance=True,
-        instance_index=named_attribute(tree, pick, "INT"),
+        instance_index=named_attribute(tree, number_name, "INT"),
         rotation=turn(tree, z=named_attribute(tree, "turn")),
         scale=named_attribute(tree, "size", "FLOAT_VECTOR"),
     ).value
@@ -243,11 +243,11 @@ def join(*geometries: Value) -> Value:
 
 def label(geometry: Value, class_id: Operand, instance: Operand, material: Value | None = None) -> Value:
     """Add nodes that store class and instance on all faces and set the material, if given; return the geometry."""
-    labelled = store(geometry, "class_id", class_id, "FACE")
-    labelled = store(labelled, "instance_id", instance, "FACE")
+    labelled_mesh = store(geometry, "class_id", class_id, "FACE")
+    labelled_mesh = store(labelled_mesh, "instance_id", instance, "FACE")
     if material is None:
-        return labelled
-    return geometry.tree.node("GeometryNodeSetMaterial", labelled, material=material).value
+        return labelled_mesh
+    return geometry.tree.node("GeometryNodeSetMaterial", labelled_mesh, material=material).value
 
 
 def transform(geometry: Value, **changes: Operand) -> Value:
@@ -265,6 +265,8 @@ def turn(tree: Tree, x: Operand = 0.0, y: Operand = 0.0, z: Operand = 0.0) -> Va
     return tree.node("FunctionNodeEulerToRotation", vector(tree, x, y, z)).value
 
 
-def random_turn(tree: Tree, low: tuple[float, float, float], high: tuple[float, float, float], seed: Operand) -> Value:
-    """Add nodes for a random rotation per element whose Euler angles (rad) lie between `low` and `high`."""
-    return tree.node("FunctionNodeEulerToRotation", random(tree, low, high, seed)).value
+def random_turn(
+    tree: Tree, minimum: tuple[float, float, float], maximum: tuple[float, float, float], seed: Operand
+) -> Value:
+    """Add nodes for a random rotation per element whose Euler angles (rad) lie between `minimum` and `maximum`."""
+    return tree.node("FunctionNodeEulerToRotation", random(tree, minimum, maximum, seed)).value

@@ -27,17 +27,19 @@ def points_along_axis_group(tree: Tree) -> None:
     with tree.frame("Number of points"):
         axis = inputs.axis()
         end = op.switch(inputs.end_station > 0.0, last_station(axis), inputs.end_station)
-        number = (end - inputs.start_station) / inputs.spacing + 1e-4
-        count = tree.node("FunctionNodeFloatToInt", number, rounding_mode="FLOOR").value + 1
+        step_count = (end - inputs.start_station) / inputs.spacing + 1e-4
+        count = tree.node("FunctionNodeFloatToInt", step_count, rounding_mode="FLOOR").value + 1
     with tree.frame("Places, looking along the axis"):
         ribbon = station_ribbon(axis)
         points = row_of_points(tree, count)
         station = inputs.start_station + op.index(tree) * inputs.spacing
-        left = look_up(ribbon, "left", station)
+        left_vector = look_up(ribbon, "left", station)
         # The heading is the turn from +y; the left is a quarter of a turn further than the way ahead.
-        turn = tree.node("ShaderNodeMath", op.component(left, "Y"), op.component(left, "X"), operation="ARCTAN2").value
+        turn = tree.node(
+            "ShaderNodeMath", op.component(left_vector, "Y"), op.component(left_vector, "X"), operation="ARCTAN2"
+        ).value
         heading = turn + op.switch(inputs.against_traffic, -math.pi, 0.0)
         points = op.store(op.store(points, "heading", heading), "elevation", 0.0)
-        points = op.set_position(points, look_up(ribbon, "axis", station) + left * inputs.offset)
+        points = op.set_position(points, look_up(ribbon, "axis", station) + left_vector * inputs.offset)
         points = tree.node("GeometryNodeDeleteGeometry", points, domain="EDGE", mode="EDGE_FACE").value
     tree.output("Points", points, description="Points with heading and elevation")

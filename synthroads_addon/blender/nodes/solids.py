@@ -17,9 +17,9 @@ def box(tree: Tree, size: Operand, middle: Operand = (0.0, 0.0, 0.0)) -> Value:
     return move_geometry(tree.node("GeometryNodeMeshCube", size=size).value, middle)
 
 
-def move_geometry(geometry: Value, by: Operand) -> Value:
+def move_geometry(geometry: Value, shift: Operand) -> Value:
     """Add a node that translates a whole geometry by a vector, m."""
-    return op.transform(geometry, translation=by)
+    return op.transform(geometry, translation=shift)
 
 
 def paint_faces(geometry: Value, material: Value, selection: Value | bool = True) -> Value:
@@ -28,7 +28,7 @@ def paint_faces(geometry: Value, material: Value, selection: Value | bool = True
 
 
 def picked_material(tree: Tree, name: str) -> Value:
-    """Add a node that holds the file's material of a name."""
+    """Add a node that gives the open file's material of a name."""
     node = tree.node("GeometryNodeInputMaterial")
     node.raw.material = bpy.data.materials[name]
     return node.value
@@ -45,27 +45,29 @@ def loft(
     columns: int,
     rows: Value | int,
     place: Callable[[Value, Value], Value],
-    stored: Mapping[str, Callable[[Value], Value]] | None = None,
+    attributes: Mapping[str, Callable[[Value], Value]] | None = None,
 ) -> Value:
     """Add nodes for a closed solid lofted through copies of an outline, one per row, with lids at both ends.
 
     Args:
-        outline: gives the outline's points by number, 0 to `columns` - 1. Seen along the rows they run clockwise.
+        tree: tree to add the nodes to.
+        outline: function from a point's number, 0 to `columns` - 1, to the point. Seen along the rows, points run
+            clockwise.
         columns: number of the outline's points.
-        rows: number of places that it is put to.
-        place: gives where a point of the outline stands in a row.
-        stored: attributes of the points, by row.
+        rows: number of copies of the outline.
+        place: function from a point of the outline and a row's number to the point's position.
+        attributes: functions from a row's number to attributes of its points, by name.
     """
     mesh, column, row = op.grid(tree, columns + 1, rows)
-    for name, value in (stored or {}).items():
+    for name, value in (attributes or {}).items():
         mesh = op.store(mesh, name, value(row))
     body = op.set_position(mesh, place(outline(column % columns), row))
     lids = []
-    for last in (False, True):
+    for is_last in (False, True):
         lid = tree.node("GeometryNodeMeshCircle", vertices=columns, fill_type="NGON").value
         number = tree.node("FunctionNodeInputInt", integer=0).value
-        lid = op.set_position(lid, place(outline(op.index(tree)), rows - 1 + number if last else number))
-        lids.append(lid if last else flip_faces(lid))
+        lid = op.set_position(lid, place(outline(op.index(tree)), rows - 1 + number if is_last else number))
+        lids.append(lid if is_last else flip_faces(lid))
     return op.join(body, *lids)
 
 
@@ -73,8 +75,8 @@ def prism(tree: Tree, outline: list[tuple[float, float]], size: Operand = (1.0, 
     """Add nodes for a prism on an outline (anticlockwise from above) from z = 0 to 1, scaled by `size`."""
 
     def place(point: Value, row: Value) -> Value:
-        raised = point + op.vector(tree, 0.0, 0.0, row)
-        return raised * size
+        shifted_point = point + op.vector(tree, 0.0, 0.0, row)
+        return shifted_point * size
 
     points = [(x, y, 0.0) for x, y in outline]
     return loft(tree, lambda number: op.choose(number, points), len(points), 2, place)
@@ -83,15 +85,15 @@ def prism(tree: Tree, outline: list[tuple[float, float]], size: Operand = (1.0, 
 def bars(points: Value, start: Value, end: Value, width: Operand) -> Value:
     """Add nodes for a square bar of `width` (m) per point of a mesh, from `start` to `end` (fields on its points)."""
     tree = points.tree
-    along = end - start
-    length = op.length(along)
+    direction = end - start
+    length = op.length(direction)
     body = box(tree, 1.0)
     return op.realize(
         tree.node(
             "GeometryNodeInstanceOnPoints",
             op.set_position(points, (start + end) * 0.5),
             instance=body,
-            rotation=tree.node("FunctionNodeAlignRotationToVector", vector=along, axis="X").value,
+            rotation=tree.node("FunctionNodeAlignRotationToVector", vector=direction, axis="X").value,
             scale=op.vector(tree, length, width, width),
         ).value
     )
@@ -115,11 +117,13 @@ def put_on_points(
 def tube(tree: Tree, radius: Operand, height: Value | float, sides: int = 12) -> Value:
     """Add nodes for an upright closed cylinder from z = 0 to `height`, m, smoothly shaded."""
     cylinder = tree.node("GeometryNodeMeshCylinder", vertices=sides, radius=radius, depth=height)
-    smooth = tree.node("GeometryNodeSetShadeSmooth", cylinder["Mesh"], cylinder["Side"]).value
-    return move_geometry(smooth, op.vector(tree, 0.0, 0.0, height * 0.5))
+    smooth_cylinder = tree.node("GeometryNodeSetShadeSmooth", cylinder["Mesh"], cylinder["Side"]).value
+    return move_geometry(smooth_cylinder, op.vector(tree, 0.0, 0.0, height * 0.5))
 
 
-def cone(tree: Tree, bottom: Operand, top: Operand, height: Operand, sides: int = 16) -> Value:
-    """Add nodes for an upright closed truncated cone from z = 0 to `height`, with bottom and top radius, m."""
-    body = tree.node("GeometryNodeMeshCone", vertices=sides, radius_top=top, radius_bottom=bottom, depth=height)
+def cone(tree: Tree, bottom_radius: Operand, top_radius: Operand, height: Operand, sides: int = 16) -> Value:
+    """Add nodes for an upright closed truncated cone from z = 0 to `height`, m, with the radii at its ends, m."""
+    body = tree.node(
+        "GeometryNodeMeshCone", vertices=sides, radius_top=top_radius, radius_bottom=bottom_radius, depth=height
+    )
     return tree.node("GeometryNodeSetShadeSmooth", body["Mesh"], body["Side"]).value

@@ -1,4 +1,4 @@
-"""Objects that stand at one place: points on the surface, and bodies put on them."""
+"""Objects that stand at a point: points moved onto the surface, and bodies placed on them."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ def on_surface(points: Value, road: Value, terrain: Value) -> Value:
     tree = points.tree
     place = op.position(tree)
     height = height_on(op.object_geometry(road), op.object_geometry(terrain), place)
-    flat = place * (1.0, 1.0, 0.0)
-    return op.set_position(points, raise_place(flat, height + op.named_attribute(tree, "elevation")))
+    plan_position = place * (1.0, 1.0, 0.0)
+    return op.set_position(points, raise_place(plan_position, height + op.named_attribute(tree, "elevation")))
 
 
 def put_on(points: Value, body: Value, scale: Operand = 1.0) -> Value:

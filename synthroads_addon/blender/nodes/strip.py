@@ -29,6 +29,7 @@ CLOSED = 1e-4
 
 
 _DAMAGE = "damage"
+"""Attribute of faces while the strip is made: instance number of the damage."""
 
 
 class StripFaces(Inputs):
@@ -59,40 +60,43 @@ def strip_group(tree: Tree) -> None:
 
     with tree.frame("Columns, one row per point of the backbone"):
         backbone = rows_along(strip.backbone)
-        rows, detailed = op.point_count(backbone), op.point_count(detail)
-        mesh, column, number = op.grid(tree, op.switch(detailed > 0, 2, detailed // rows), rows)
-        point = column * rows + number
+        row_count, detail_points = op.point_count(backbone), op.point_count(detail)
+        mesh, column, row_number = op.grid(tree, op.switch(detail_points > 0, 2, detail_points // row_count), row_count)
+        point = column * row_count + row_number
     with tree.frame("Rows of the backbone"):
-        axis, leftwards, curvature = row(backbone, number)
+        axis, left_vector, curvature = row(backbone, row_number)
         left, right, left_height, right_height = (
-            op.sample_index(backbone, value, number)
+            op.sample_index(backbone, value, row_number)
             for value in (strip.left_offset, strip.right_offset, strip.left_height, strip.right_height)
         )
     with tree.frame("Share of the left edge and depth of every column"):
-        share = op.switch(detailed > 0, 1.0 - column, op.sample_index(detail, op.named_attribute(tree, "share"), point))
-        depth = op.switch(detailed > 0, 0.0, op.sample_index(detail, op.named_attribute(tree, "depth"), point))
+        share = op.switch(
+            detail_points > 0, 1.0 - column, op.sample_index(detail, op.named_attribute(tree, "share"), point)
+        )
+        depth = op.switch(detail_points > 0, 0.0, op.sample_index(detail, op.named_attribute(tree, "depth"), point))
         # Where a strip closes, rounding would fold its fine columns: they all lie on the right edge.
-        wide = left - right > NARROW
-        share = op.switch(wide, op.switch(share > 0.999, 0.0, 1.0), share)
-        depth = op.switch(wide, 0.0, depth)
+        is_wide = left - right > NARROW
+        share = op.switch(is_wide, op.switch(share > 0.999, 0.0, 1.0), share)
+        depth = op.switch(is_wide, 0.0, depth)
     with tree.frame("Offset, cut where it would fold, and the height there"):
         offset = limit_offset(left * share + right * (1.0 - share), curvature)
-        inside = (offset - right) / op.maximum(left - right, 1e-9)
-        height = left_height * inside + right_height * (1.0 - inside) - depth
+        left_weight = (offset - right) / op.maximum(left - right, 1e-9)
+        height = left_height * left_weight + right_height * (1.0 - left_weight) - depth
     with tree.frame("Instance of every face: the damage that it is of, or the strip"):
-        face = op.index(tree)
-        corner = face // (rows - 1) * rows + face % (rows - 1)
-        damage = op.sample_index(detail, op.named_attribute(tree, "damage", "INT"), corner)
-        mesh = op.store(mesh, _DAMAGE, op.switch(detailed > 0, 0, damage), "FACE")
+        face_index = op.index(tree)
+        # Faces are numbered column by column: the first corner of one is a point of the detail.
+        first_corner = face_index // (row_count - 1) * row_count + face_index % (row_count - 1)
+        damage = op.sample_index(detail, op.named_attribute(tree, "damage", "INT"), first_corner)
+        mesh = op.store(mesh, _DAMAGE, op.switch(detail_points > 0, 0, damage), "FACE")
     with tree.frame("Place and label"):
-        place = axis + leftwards * offset + op.vector(tree, 0.0, 0.0, height)
-        mesh = op.store(op.store(mesh, "offset", offset), "row", number)
+        place = axis + left_vector * offset + op.vector(tree, 0.0, 0.0, height)
+        mesh = op.store(op.store(mesh, "offset", offset), "row", row_number)
         mesh = op.store(mesh, "strip_width", left - right)
-        mesh = op.store(mesh, "station", op.sample_index(backbone, op.named_attribute(tree, "station"), number))
+        mesh = op.store(mesh, "station", op.sample_index(backbone, op.named_attribute(tree, "station"), row_number))
         damage = op.named_attribute(tree, _DAMAGE, "INT")
         instance = op.switch(damage.equals(0), damage, faces.instance)
         mesh = op.label(op.set_position(mesh, place), faces.class_, instance, faces.material)
         mesh = tree.node("GeometryNodeRemoveAttribute", mesh, name=_DAMAGE).value
-        # Of faces that narrow, rounding would decide which way they look.
+        # Rounding would decide which way faces look where the strip is this narrow.
         mesh = op.delete_faces(op.delete_degenerate(mesh), op.named_attribute(tree, "strip_width") < CLOSED)
     tree.output("Mesh", mesh, description="Ribbon whose faces look up")

@@ -18,13 +18,13 @@ _KINDS = {
     "GREASEPENCIL": "Grease Pencil",
     "GPENCIL": "Grease Pencil",
 }
-"""Kinds of evaluated objects that renders show and that have no faces."""
+"""Kinds of evaluated objects that renders show although they have no faces, in words."""
 _MOST_NAMES = 5
-"""Names that a sentence lists at most."""
+"""Largest number of names that a sentence lists."""
 
 
 class LeftOut:
-    """Collector of what renders show and scans don't, while a scene is read.
+    """Collector, while a scene is read, of things that renders show but scans don't.
 
     Attributes:
         users: names of the objects that have each material, by the material's name in the scene.
@@ -36,19 +36,19 @@ class LeftOut:
         self._holdouts: set[str] = set()
 
     def see_kind(self, item: bpy.types.Object) -> None:
-        """Take note of an evaluated object that isn't a mesh."""
+        """Note an evaluated object that isn't a mesh."""
         if item.type in _KINDS:
             self._without_faces.setdefault(_KINDS[item.type], set()).add(item.original.name)
 
     def see_object(self, item: bpy.types.Object, slots: Collection[str]) -> None:
-        """Take note of an object that is scanned, with the names of its materials in the scene."""
+        """Note an object that is scanned, with the names of its materials in the scene."""
         for name in slots:
             self.users.setdefault(name, set()).add(item.name)
         if item.is_holdout:
             self._holdouts.add(item.name)
 
     def see_hair(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Take note of the hair in an evaluated scene that particle systems draw as strands."""
+        """Note the hair in an evaluated scene that particle systems draw as strands."""
         for item in depsgraph.objects:
             systems = [modifier for modifier in item.modifiers if modifier.type == "PARTICLE_SYSTEM"]
             for modifier in systems:
@@ -57,7 +57,7 @@ class LeftOut:
                     self._without_faces.setdefault("hair", set()).add(item.original.name)
 
     def warnings(self, layer: bpy.types.ViewLayer) -> tuple[str, ...]:
-        """Return all that was found as sentences, and what the materials in use declare in vain."""
+        """Return sentences about all that was noted, and about features of materials that scans don't show."""
         sentences = [
             f"{names_of(names)}: {kind} can't be scanned, as there are no faces"
             for kind, names in sorted(self._without_faces.items())
@@ -70,15 +70,15 @@ class LeftOut:
 
 
 def material_warnings(users: Mapping[str, Collection[str]]) -> list[str]:
-    """Return warnings about materials of others: what they declare that scans don't show, and what was assumed.
+    """Return sentences about users' materials: features that scans don't show, and assumptions that were made.
 
     Args:
         users: names of the objects that have each material, by the material's name in the scene.
     """
     warnings: list[str] = []
-    shown = {name: item for item in bpy.data.materials if (name := scene_name(item)) in users}
+    used_materials = {name: item for item in bpy.data.materials if (name := scene_name(item)) in users}
     missing: dict[str, set[str]] = {}
-    for name, item in sorted(shown.items()):
+    for name, item in sorted(used_materials.items()):
         if item.node_tree is None or PROPERTY in item:
             continue
         if obstacle := read_transparency(item).obstacle:
@@ -89,11 +89,9 @@ def material_warnings(users: Mapping[str, Collection[str]]) -> list[str]:
             warnings.append(f"{names_of(users[name])}: {text}" if users[name] else text)
         for node in (node for tree in trees_below(item.node_tree) for node in nodes_without_image(tree)):
             if any(output.is_linked for output in node.outputs):
-                image = (
-                    f"the image {node.image.filepath or node.image.name!r}"
-                    if node.image
-                    else "an image texture's image"
-                )
+                image = "an image texture's image"
+                if node.image:
+                    image = f"the image {node.image.filepath or node.image.name!r}"
                 missing.setdefault(image, set()).add(name)
     for image, names in sorted(missing.items()):
         text = "is missing or can't be read as a picture: what stands in the socket that it feeds takes its place"
@@ -102,13 +100,16 @@ def material_warnings(users: Mapping[str, Collection[str]]) -> list[str]:
 
 
 def _is_displaced(item: bpy.types.Material) -> bool:
-    end = material_output(item.node_tree)
+    """Return whether a material's output displaces the surface when it is rendered."""
+    output_node = material_output(item.node_tree)
     methods = ("DISPLACEMENT", "BOTH")
-    return end is not None and end.inputs["Displacement"].is_linked and item.displacement_method in methods
+    return (
+        output_node is not None and output_node.inputs["Displacement"].is_linked and item.displacement_method in methods
+    )
 
 
 def names_of(names: Collection[str]) -> str:
-    """Return some names as a list in a sentence, shortened where they are many."""
-    some = sorted(names)
-    rest = len(some) - _MOST_NAMES
-    return ", ".join(some[:_MOST_NAMES]) + (f" and {rest} more" if rest > 0 else "")
+    """Return some names as a list in a sentence, shortened if there are many."""
+    sorted_names = sorted(names)
+    further_count = len(sorted_names) - _MOST_NAMES
+    return ", ".join(sorted_names[:_MOST_NAMES]) + (f" and {further_count} more" if further_count > 0 else "")

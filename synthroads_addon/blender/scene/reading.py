@@ -1,4 +1,4 @@
-"""Meshes of an evaluated scene as arrays, and their placing: what `evaluated` puts a scene together with."""
+"""Meshes of an evaluated scene as arrays, and their placement in one mesh; used by `evaluated`."""
 
 from __future__ import annotations
 
@@ -27,9 +27,11 @@ from .values import OF_FRAME, OF_OBJECT, mesh_values
 Float = NDArray[np.float64]
 
 _SMALLEST_AREA = 1e-12
+"""Area, m2, up to which a triangle counts as having none; chosen."""
 _LARGEST_LABEL = 2.0**31
+"""Limit of labels that are stored as floats: 32-bit integers."""
 _BLOCK = 1 << 17
-"""Triangles or vertices worked on at a time."""
+"""Largest number of triangles or vertices that one step processes; chosen."""
 _PER_FACE = ("class_id", "instance_id", "material")
 _IDENTITY = array("d", np.eye(4).ravel().tolist())
 
@@ -42,12 +44,12 @@ class MeshPart:
         vertices: (V, 3) float32.
         triangles: (T, 3) int32.
         material: (T,) uint16 indices into the scene's materials, or the one index that all have.
-        class_id, instance_id: (T,) labels of the faces, or None if the mesh has none.
-        material_class: (M,) int16 classes of the scene's materials that a class mapping names, -1 for none; None if it
-            names none of this mesh's.
-        asked: inputs that its materials ask for.
-        values: those that the mesh itself has.
-        corners: (T, 3) corners of the triangles; None where nothing is asked for.
+        class_id, instance_id: (T,) labels of the triangles, or None if the mesh has none.
+        material_class: (M,) int16 classes of the scene's materials by a class mapping, -1 for none; None if the mapping
+            has none of this mesh's materials.
+        inputs: inputs that its materials read.
+        values: the mesh's values of these inputs.
+        corners: (T, 3) corners of the triangles; None if no input is read.
     """
 
     vertices: NDArray[np.float32]
@@ -56,16 +58,16 @@ class MeshPart:
     class_id: NDArray[np.uint8] | None
     instance_id: NDArray[np.uint32] | None
     material_class: NDArray[np.int16] | None
-    asked: frozenset[SurfaceInput] = frozenset()
+    inputs: frozenset[SurfaceInput] = frozenset()
     values: dict[SurfaceInput, MeshValues] = field(default_factory=dict)
     corners: NDArray[np.int32] | None = None
 
 
 @dataclass
 class Places:
-    """Placements of a mesh part: per use a matrix (16 numbers, row by row), a label's index and its object's values.
+    """Placements of a mesh part: for each a matrix (16 numbers, row by row), a label's index and the object's values.
 
-    The values are there only where materials ask for them.
+    There are values only if materials read them.
     """
 
     matrices: array[float] = field(default_factory=lambda: array("d"))
@@ -78,11 +80,11 @@ class SceneTables:
     """Labels, materials and origin that the meshes of a scene share.
 
     Attributes:
-        labels: of all objects.
-        materials: names.
+        labels: labels of all objects.
+        materials: names of the materials.
         origin: (3,) map coordinates of the local origin, m.
-        reserved: values of ``class_id`` that faces' own numbers can't have, see `Labels`.
-        unit: metres that a unit of the scene stands for.
+        reserved: values of ``class_id`` that faces may not have as a number, see `Labels`.
+        unit: length of the scene's unit, m.
     """
 
     labels: Sequence[Label]
@@ -93,7 +95,7 @@ class SceneTables:
 
 
 def slot_names(item: bpy.types.Object) -> list[str]:
-    """Return the names in the scene of an evaluated object's material slots, at least one."""
+    """Return the scene names of an evaluated object's materials by slot; one name, of no material, without slots."""
     names = [scene_name(material) for material in item.data.materials]
     for index, slot in enumerate(item.material_slots[: len(names)]):
         if slot.link == "OBJECT":
@@ -106,15 +108,14 @@ class MeshCopy:
     """Raw arrays of an evaluated mesh, copied fast; `part` converts them without Blender.
 
     Attributes:
-        name: of its object, for messages.
+        name: the object's name for messages.
         vertices: (V, 3) float32.
         corners: (C,) int32 vertices of the faces' corners.
         triangles: (T, 3) int32 corners of the triangles; None if all faces are triangles.
         face: (T,) int32 face of each triangle; None if all faces are triangles.
         slot, class_id, instance_id: (F,) int32 values of the faces, or None if the mesh has none.
         materials: (S,) uint16 indices of the slots' materials into the scene's.
-        material_class, asked: see `MeshPart`.
-        values: see there; those of faces are by face here.
+        material_class, inputs, values: see `MeshPart`; values of faces are by face here.
     """
 
     name: str
@@ -127,28 +128,32 @@ class MeshCopy:
     instance_id: NDArray[np.int32] | None
     materials: NDArray[np.uint16]
     material_class: NDArray[np.int16] | None
-    asked: frozenset[SurfaceInput] = frozenset()
+    inputs: frozenset[SurfaceInput] = frozenset()
     values: dict[SurfaceInput, MeshValues] = field(default_factory=dict)
 
     def part(self) -> MeshPart:
         """Return the mesh as labelled triangles; raise `InputError` if its vertices aren't finite."""
         if not np.isfinite(self.vertices).all():
-            raise InputError(f"{self.name}: vertices", None, "must be finite numbers")
-        corners, face, label, number = self.corners, self.face, self.class_id, self.instance_id
+            raise InputError(f"{self.name}: vertices", None, "must have finite coordinates: mend or remove the object")
+        corners, face, class_numbers, instance_numbers = self.corners, self.face, self.class_id, self.instance_id
         material: NDArray[np.uint16] | int = int(self.materials[0])
         if self.slot is not None:
             material = _by_triangle(self.materials[np.clip(self.slot, 0, len(self.materials) - 1)], face)
         labels = None
-        if label is not None:
-            labels = np.where((label >= 0) & (label <= UNLABELLED), label, UNLABELLED).astype(np.uint8)
+        if class_numbers is not None:
+            labels = np.where((class_numbers >= 0) & (class_numbers <= UNLABELLED), class_numbers, UNLABELLED).astype(
+                np.uint8
+            )
             labels = _by_triangle(labels, face)
-        numbers = None if number is None else _by_triangle(number.view(np.uint32), face)
+        numbers = None if instance_numbers is None else _by_triangle(instance_numbers.view(np.uint32), face)
         triangles = corners.reshape(-1, 3) if self.triangles is None else corners[self.triangles]
-        part = MeshPart(self.vertices, triangles, material, labels, numbers, self.material_class, self.asked)
-        if self.asked:
+        part = MeshPart(self.vertices, triangles, material, labels, numbers, self.material_class, self.inputs)
+        if self.inputs:
             values = {
-                what: replace(entry, values=_by_triangle(entry.values, face)) if entry.domain == "face" else entry
-                for what, entry in self.values.items()
+                surface_input: replace(input_values, values=_by_triangle(input_values.values, face))
+                if input_values.domain == "face"
+                else input_values
+                for surface_input, input_values in self.values.items()
             }
             part.values, part.corners = values, self.triangles
             if part.corners is None:
@@ -162,21 +167,21 @@ def copy_mesh(
     slots: Sequence[str],
     materials: dict[str, int],
     by_name: NameClasses,
-    asked: frozenset[SurfaceInput] = frozenset(),
+    inputs: frozenset[SurfaceInput] = frozenset(),
     undeformed: bool = False,
 ) -> MeshCopy:
     """Copy an evaluated mesh's geometry, face labels, materials and the values its materials read.
 
     Args:
-        name: of its object, for messages.
+        name: the object's name for messages.
         mesh: the mesh.
         slots: names of its materials.
-        materials: indices of all materials so far; new ones are added.
-        by_name: classes of materials.
-        asked: inputs that its materials ask for.
-        undeformed: whether no modifier has changed it.
+        materials: indices of all materials so far, by name; new names are added.
+        by_name: lookup of classes by materials' names.
+        inputs: inputs that its materials read.
+        undeformed: whether the object has no modifiers.
     """
-    # Attributes are copied as a block, where `vertices` and `loops` are read one by one.
+    # Attributes are copied as blocks of memory; Blender would read `vertices` and `loops` one by one.
     vertices = np.empty((len(mesh.vertices), 3), np.float32)
     mesh.attributes["position"].data.foreach_get("vector", vertices.ravel())
     corners = np.empty(len(mesh.loops), np.int32)
@@ -196,40 +201,42 @@ def copy_mesh(
         _face_values(mesh, "material_index") if len(set(slots)) > 1 else None,
         _face_labels(name, mesh, "class_id", corners),
         _face_labels(name, mesh, "instance_id", corners),
-        np.array([materials.setdefault(entry, len(materials)) for entry in slots], np.uint16),
+        np.array([materials.setdefault(slot, len(materials)) for slot in slots], np.uint16),
         _material_classes(slots, materials, by_name),
-        asked,
-        mesh_values(mesh, asked, undeformed),
+        inputs,
+        mesh_values(mesh, inputs, undeformed),
     )
 
 
 def triangle_corners(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
     """Return the corner indices (T, 3) int32 of a mesh's calculated loop triangles, copied as a block of memory.
 
-    Blender has them as an array of three 32-bit numbers each but hands them out one by one, a hundred times slower
-    than they can be copied. So they are copied from where it says that they are, if that is laid out as expected.
+    Blender stores them as an array of three 32-bit numbers each, but returns them one by one, a hundred times slower
+    than a copy of the memory. So the memory at the first one's address is copied, if probes show that layout.
     """
     triangles = mesh.loop_triangles
     count = len(triangles)
     result = np.empty((count, 3), np.int32)
-    first = triangles[0].as_pointer() if count else 0
+    first_address = triangles[0].as_pointer() if count else 0
     probes = {0, 1, count // 2, count - 1} & set(range(count))
-    if any(triangles[i].as_pointer() != first + result.strides[0] * i for i in probes):
+    if any(triangles[i].as_pointer() != first_address + result.strides[0] * i for i in probes):
         triangles.foreach_get("loops", result.ravel())
         return result
-    ctypes.memmove(result.ctypes.data, first, result.nbytes)
+    ctypes.memmove(result.ctypes.data, first_address, result.nbytes)
     if any(tuple(result[i]) != tuple(triangles[i].loops) for i in probes):
         triangles.foreach_get("loops", result.ravel())
     return result
 
 
 def _by_triangle(values: NDArray[Any], face: NDArray[np.int32] | None) -> NDArray[Any]:
+    """Return values of faces (F, ...) as values of triangles (T, ...)."""
     return values if face is None else values[face]
 
 
 def _material_classes(
     slots: Iterable[str], materials: dict[str, int], by_name: NameClasses
 ) -> NDArray[np.int16] | None:
+    """Return the classes (M,) of materials that a class mapping names, -1 for none; None if it names no slot's."""
     classes = {materials[name]: by_name.find("materials", entry_of(name)) for name in slots}
     if all(number is None for number in classes.values()):
         return None
@@ -250,39 +257,41 @@ def _face_values(mesh: bpy.types.Mesh, name: str) -> NDArray[Any] | None:
 
 
 def _face_labels(owner: str, mesh: bpy.types.Mesh, name: str, corners: NDArray[np.int32]) -> NDArray[np.int32] | None:
-    """Return a mesh's labels (F,) of faces, or as glTF and PLY keep them of vertices; None if it has none.
+    """Return the labels (F,) of a mesh's faces, from faces or, as in glTF and PLY files, vertices; None if it has none.
 
-    glTF's attributes of others begin with an underscore, by rule in capitals; the scalars of CloudCompare's files with
-    ``scalar_``. A face has the label of its first vertex; the user is told where its vertices differ.
+    Custom attributes of glTF begin with an underscore, by convention in capitals; scalars of CloudCompare's files with
+    ``scalar_``. A face gets the label of its first vertex; a warning says how many faces' vertices differ.
 
     Args:
         owner: name of the mesh's object, for messages.
         mesh: the mesh.
-        name: of the label.
+        name: name of the label.
         corners: (C,) vertices of the mesh's corners.
     """
     values = _face_values(mesh, name)
     if values is not None:
         return values
-    attribute = next((mesh.attributes[one] for one in _spellings(name) if one in mesh.attributes), None)
+    attribute = next((mesh.attributes[spelling] for spelling in _spellings(name) if spelling in mesh.attributes), None)
     if attribute is None or attribute.domain != "POINT" or attribute.data_type not in ("INT", "INT8", "FLOAT"):
         return None
     if not len(mesh.polygons):
         return np.zeros(0, np.int32)
-    of_vertex = np.empty(len(mesh.vertices), np.float32 if attribute.data_type == "FLOAT" else np.int32)
-    attribute.data.foreach_get("value", of_vertex)
-    of_corner = np.rint(np.where(np.abs(of_vertex) < _LARGEST_LABEL, of_vertex, -1.0)).astype(np.int32)[corners]
-    first = np.empty(len(mesh.polygons), np.int32)
-    mesh.polygons.foreach_get("loop_start", first)
-    mixed = np.minimum.reduceat(of_corner, first) != np.maximum.reduceat(of_corner, first)
-    if mixed.any():
-        text = f"{np.count_nonzero(mixed):,} faces have vertices of several {name}: the first vertex's is taken"
+    vertex_labels = np.empty(len(mesh.vertices), np.float32 if attribute.data_type == "FLOAT" else np.int32)
+    attribute.data.foreach_get("value", vertex_labels)
+    corner_labels = np.rint(np.where(np.abs(vertex_labels) < _LARGEST_LABEL, vertex_labels, -1.0)).astype(np.int32)[
+        corners
+    ]
+    first_corners = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("loop_start", first_corners)
+    is_mixed = np.minimum.reduceat(corner_labels, first_corners) != np.maximum.reduceat(corner_labels, first_corners)
+    if is_mixed.any():
+        text = f"{np.count_nonzero(is_mixed):,} faces have vertices of several {name}: the first vertex's is taken"
         warn(f"{owner}: {text}")
-    return of_corner[first]
+    return corner_labels[first_corners]
 
 
 def _spellings(name: str) -> tuple[str, ...]:
-    """Return what a label's attribute may be called: as ours, by glTF's rule for names of others, by CloudCompare's."""
+    """Return the possible names of a label's attribute: this package's, glTF's by its convention, CloudCompare's."""
     return name, f"_{name.upper()}", f"_{name}", f"scalar_{name}"
 
 
@@ -291,43 +300,57 @@ def join_parts(pairs: list[tuple[MeshPart, Places]], tables: SceneTables, frame:
     """Return all placed parts as one mesh, without triangles of no area; empties `pairs`.
 
     Args:
-        pairs: parts and where they stand; emptied, so that no part is held longer than it is needed.
-        tables: of the scene.
-        frame: (4, 4) from the scene's frame, m, to the mesh's own, whose origin is 0 then; the same frame if None.
+        pairs: parts and their places; emptied, so that the memory of each part is freed early.
+        tables: labels, materials and origin of the scene.
+        frame: (4, 4) matrix from the scene's frame, m, to the mesh's own, whose origin is then 0; None for the scene's.
     """
     origin = tables.origin if frame is None else np.zeros(3)
     if tables.unit != 1.0:
         frame = (np.eye(4) if frame is None else frame) @ np.diag([*[tables.unit] * 3, 1.0])
     uses = np.array([len(places.labels) for _, places in pairs], dtype=np.int64)
     sizes = np.array([(len(part.vertices), len(part.triangles)) for part, _ in pairs], dtype=np.int64).reshape(-1, 2)
-    counts = uses @ sizes
+    counts = uses @ sizes  # vertices and triangles of all uses together
     if not counts[1]:
         return empty_scene_mesh(origin, tables.materials)
     if counts.max() >= 2**31:
-        raise InputError("scene", int(counts.max()), "must have less than 2**31 vertices and triangles, with instances")
-    as_it_is = pairs[0][0] if len(pairs) == 1 and frame is None and pairs[0][1].matrices == _IDENTITY else None
+        raise InputError(
+            "scene",
+            int(counts.max()),
+            "must have less than 2**31 vertices and triangles, instances included: leave objects out",
+        )
+    # A single part in the scene's own frame needs no copy of its vertices and triangles.
+    unchanged_part = pairs[0][0] if len(pairs) == 1 and frame is None and pairs[0][1].matrices == _IDENTITY else None
     arrays: dict[str, NDArray[Any]] = {
-        "vertices": as_it_is.vertices if as_it_is else np.empty((counts[0], 3), np.float32),
-        "triangles": as_it_is.triangles if as_it_is else np.empty((counts[1], 3), np.int32),
+        "vertices": unchanged_part.vertices if unchanged_part else np.empty((counts[0], 3), np.float32),
+        "triangles": unchanged_part.triangles if unchanged_part else np.empty((counts[1], 3), np.int32),
         "class_id": np.empty(counts[1], np.uint8),
         "instance_id": np.empty(counts[1], np.uint32),
         "material": np.empty(counts[1], np.uint16),
     }
-    pairs.reverse()
-    vertex = triangle = 0
+    pairs.reverse()  # so that popping from the end keeps the order
+    first_vertex = first_triangle = 0
     surface = ValuesBuilder()
     while pairs:
         part, places = pairs.pop()
-        if part.asked:
-            surface.parts.append(_part_values(part, places, triangle, frame))
+        if part.inputs:
+            surface.parts.append(_part_values(part, places, first_triangle, frame))
         for matrices, labels in _blocks(part, places):
-            last = vertex + len(matrices) * len(part.vertices), triangle + len(matrices) * len(part.triangles)
-            mine = {name: arrays[name][triangle : last[1]] for name in ("triangles", *_PER_FACE)}
-            _label(part, [tables.labels[i] for i in labels], tables.reserved, mine)
-            if not as_it_is:
-                into = matrices if frame is None else frame @ matrices
-                _place(part, into, arrays["vertices"][vertex : last[0]], mine["triangles"], vertex)
-            vertex, triangle = last
+            next_starts = (
+                first_vertex + len(matrices) * len(part.vertices),
+                first_triangle + len(matrices) * len(part.triangles),
+            )
+            part_arrays = {name: arrays[name][first_triangle : next_starts[1]] for name in ("triangles", *_PER_FACE)}
+            _label(part, [tables.labels[i] for i in labels], tables.reserved, part_arrays)
+            if not unchanged_part:
+                placements = matrices if frame is None else frame @ matrices
+                _place(
+                    part,
+                    placements,
+                    arrays["vertices"][first_vertex : next_starts[0]],
+                    part_arrays["triangles"],
+                    first_vertex,
+                )
+            first_vertex, first_triangle = next_starts
     keep = _with_area(arrays["vertices"], arrays["triangles"])
     if keep is not None:
         for name in ("triangles", *_PER_FACE):
@@ -336,21 +359,27 @@ def join_parts(pairs: list[tuple[MeshPart, Places]], tables: SceneTables, frame:
     return SceneMesh(**arrays, materials=tables.materials, origin=origin, surface=surfaces, unit=tables.unit)
 
 
-def _part_values(part: MeshPart, places: Places, first: int, frame: Float | None) -> PartValues:
-    """Return a part's material input values at all its places; its first triangle has the index ``first``."""
+def _part_values(part: MeshPart, places: Places, first_triangle: int, frame: Float | None) -> PartValues:
+    """Return a part's material input values at all its places; its first triangle has the index ``first_triangle``."""
     assert part.corners is not None
     matrices = np.frombuffer(places.matrices).reshape(-1, 4, 4)
     values = dict(part.values)
-    for what in sorted(part.asked):
-        if what.kind in OF_OBJECT and len(places.objects) == len(matrices):
-            rows = [entry.get(what) for entry in places.objects]
+    for surface_input in sorted(part.inputs):
+        if surface_input.kind in OF_OBJECT and len(places.objects) == len(matrices):
+            rows = [object_rows.get(surface_input) for object_rows in places.objects]
             if None not in rows:
-                values[what] = MeshValues(np.array(rows, np.float32), "object")
-    framed = any(what.kind in OF_FRAME for what in part.asked)
-    into = matrices if frame is None else frame @ matrices
+                values[surface_input] = MeshValues(np.array(rows, np.float32), "object")
+    needs_matrices = any(surface_input.kind in OF_FRAME for surface_input in part.inputs)
+    placements = matrices if frame is None else frame @ matrices
     mirrored = np.linalg.det(matrices[:, :3, :3]) < 0.0
     return PartValues(
-        first, part.corners, part.triangles, len(matrices), mirrored, np.array(into) if framed else None, values
+        first_triangle,
+        part.corners,
+        part.triangles,
+        len(matrices),
+        mirrored,
+        np.array(placements) if needs_matrices else None,
+        values,
     )
 
 
@@ -363,40 +392,44 @@ def _blocks(part: MeshPart, places: Places) -> Iterator[tuple[Float, array[int]]
 
 
 def _place(
-    part: MeshPart, matrices: Float, vertices: NDArray[np.float32], triangles: NDArray[np.int32], first: int
+    part: MeshPart, matrices: Float, vertices: NDArray[np.float32], triangles: NDArray[np.int32], first_vertex: int
 ) -> None:
     """Write a part's vertices and triangles at N places (matrices (N, 4, 4)) into the given arrays, in place."""
     count, size = len(matrices), len(part.vertices)
-    into = vertices.reshape(count, size, 3)
-    step = max(1, _BLOCK // count)
+    placed = vertices.reshape(count, size, 3)
+    step = max(1, _BLOCK // count)  # vertices per step, in float64
     for start in range(0, size, step):
         block = part.vertices[start : start + step].astype(np.float64)
-        into[:, start : start + step] = block @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]
-    mirrored = np.linalg.det(matrices[:, :3, :3]) < 0.0
+        placed[:, start : start + step] = block @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]
+    is_mirrored = np.linalg.det(matrices[:, :3, :3]) < 0.0
     numbers = triangles.reshape(count, -1, 3)
     numbers[...] = part.triangles
-    numbers[mirrored] = part.triangles[:, ::-1]
-    numbers += (first + size * np.arange(count, dtype=np.int64)).astype(np.int32)[:, None, None]
+    # Mirrored triangles are reversed, so that their fronts stay in front.
+    numbers[is_mirrored] = part.triangles[:, ::-1]
+    numbers += (first_vertex + size * np.arange(count, dtype=np.int64)).astype(np.int32)[:, None, None]
 
 
-def _label(part: MeshPart, labels: list[Label], reserved: frozenset[int], into: dict[str, NDArray[Any]]) -> None:
+def _label(part: MeshPart, labels: list[Label], reserved: frozenset[int], arrays: dict[str, NDArray[Any]]) -> None:
     """Write class, instance and material (N * T,) of a part's triangles at N places into arrays, in place."""
     count = len(labels)
-    into["material"].reshape(count, -1)[...] = part.material
-    number = into["instance_id"].reshape(count, -1)
+    arrays["material"].reshape(count, -1)[...] = part.material
+    number = arrays["instance_id"].reshape(count, -1)
     if part.instance_id is not None:
         number[...] = part.instance_id
     else:
         number[...] = np.array([max(label.instance, 0) for label in labels], np.uint32)[:, None]
-    class_id = into["class_id"].reshape(count, -1)
+    class_id = arrays["class_id"].reshape(count, -1)
     if part.class_id is not None:
         class_id[...] = part.class_id
         if reserved:
             class_id[np.isin(class_id, list(reserved))] = UNLABELLED
         return
-    strong, weak = np.array([(label.strong, label.weak) for label in labels], np.int16).T[:, :, None]
-    of_material = np.int16(-1) if part.material_class is None else part.material_class[part.material]
-    class_id[...] = np.where(strong >= 0, strong, np.where(of_material >= 0, of_material, weak))
+    strong_classes, weak_classes = np.array([(label.strong, label.weak) for label in labels], np.int16).T[:, :, None]
+    material_classes = np.int16(-1) if part.material_class is None else part.material_class[part.material]
+    # The object's strong class counts first, then the material's, then the object's weak class.
+    class_id[...] = np.where(
+        strong_classes >= 0, strong_classes, np.where(material_classes >= 0, material_classes, weak_classes)
+    )
 
 
 def _with_area(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.bool_] | None:
@@ -405,6 +438,7 @@ def _with_area(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> N
     for start in range(0, len(triangles), _BLOCK):
         corner = vertices[triangles[start : start + _BLOCK]]
         a, b = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-        square = sum((a[:, i] * b[:, j] - a[:, j] * b[:, i]) ** 2 for i, j in ((1, 2), (2, 0), (0, 1)))
-        keep[start : start + _BLOCK] = square > (2.0 * _SMALLEST_AREA) ** 2
+        # Squared length of the cross product of two edges: (2 A)^2.
+        squared_product = sum((a[:, i] * b[:, j] - a[:, j] * b[:, i]) ** 2 for i, j in ((1, 2), (2, 0), (0, 1)))
+        keep[start : start + _BLOCK] = squared_product > (2.0 * _SMALLEST_AREA) ** 2
     return None if keep.all() else keep

@@ -1,8 +1,8 @@
-"""A scene as a render shows it, in place of how its viewport does: settings that differ are changed for a moment.
+"""A scene as renders show it: settings of the viewport that differ from those of renders are changed for a moment.
 
-Blender evaluates for renders only inside of a render engine. So what the viewport shows otherwise (modifiers and levels
-for renders only, particles shown in part, objects hidden here and not there) is set as the render has it, the scene is
-read, and all is put back.
+Blender evaluates a scene for renders only inside of a render engine. So settings of the viewport (modifiers and levels
+for renders only, shares of particles, hidden objects) are set to those of renders, the scene is read, and all settings
+are restored.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import bpy
 from ..things.model_builder import SUPPORT
 
 Visible = Literal["render", "viewport"]
-"""Whose state of a scene is scanned."""
+"""Which state of a scene is scanned."""
 
 _Setting: TypeAlias = tuple[Any, str, Any]
 """Owner, name of a property, and the value that renders have."""
@@ -26,7 +26,7 @@ _Setting: TypeAlias = tuple[Any, str, Any]
 
 @contextmanager
 def shown_as(visible: Visible, scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> Iterator[bool]:
-    """Context in which a scene's viewport shows what renders do; afterwards it is as it was, whatever happens.
+    """Context in which a scene's viewport shows what renders show; all settings are restored on exit.
 
     Args:
         visible: with ``viewport`` nothing is changed.
@@ -35,14 +35,14 @@ def shown_as(visible: Visible, scene: bpy.types.Scene, layer: bpy.types.ViewLaye
     Yields:
         whether anything had to be changed.
     """
-    changes = _Changed()
+    changes = _ChangedSettings()
     try:
         if visible == "render":
             changes.show(scene, layer)
         yield bool(changes.undo)
     finally:
-        changes.put_back()
-        if changes.undo_done:
+        changes.restore()
+        if changes.is_restored:
             layer.update()
 
 
@@ -53,26 +53,26 @@ def is_seen(visible: Visible, item: bpy.types.Object, layer: bpy.types.ViewLayer
     return bool(item.visible_camera) and not item.indirect_only_get(view_layer=layer)
 
 
-class _Changed:
-    """Settings that were changed, and how each is put back.
+class _ChangedSettings:
+    """Settings that were changed, with functions that restore them.
 
     Attributes:
-        undo: functions that put one back, in the order of the changes.
-        undo_done: whether anything was put back.
+        undo: functions that restore one setting each, in the order of the changes.
+        is_restored: whether any setting was restored.
     """
 
     def __init__(self) -> None:
         self.undo: list[Callable[[], None]] = []
-        self.undo_done = False
+        self.is_restored = False
 
     def show(self, scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> None:
-        """Have a scene's viewport show what renders do."""
+        """Change settings so that a scene's viewport shows what renders show."""
         for setting in _settings(scene):
             self._set(*setting)
-        if layer.layer_collection is None:  # in Blender 5.2, of a scene that a script has made and nobody looked at
+        if layer.layer_collection is None:  # so it is in Blender 5.2 for a new scene of a script
             layer.update()
-        for below in _layers(layer.layer_collection):
-            self._set(below, "hide_viewport", False)
+        for layer_collection in _layers(layer.layer_collection):
+            self._set(layer_collection, "hide_viewport", False)
         for item in layer.objects:
             if SUPPORT not in item and item.hide_get(view_layer=layer):
                 item.hide_set(False, view_layer=layer)
@@ -81,24 +81,25 @@ class _Changed:
             layer.update()
 
     def _set(self, owner: Any, name: str, value: Any) -> None:
-        before = getattr(owner, name)
-        if before == value:
+        """Change a property; mute what animates it, which would set it again; note how to restore both."""
+        original = getattr(owner, name)
+        if original == value:
             return
         for curve in _curves(owner, name):
             _assign(curve, "mute", True)
             self.undo.append(partial(_assign, curve, "mute", False))
         _assign(owner, name, value)
-        self.undo.append(partial(_assign, owner, name, before))
+        self.undo.append(partial(_assign, owner, name, original))
 
-    def put_back(self) -> None:
-        """Put all back as it was."""
+    def restore(self) -> None:
+        """Restore all settings, the latest change first."""
         while self.undo:
             self.undo.pop()()
-            self.undo_done = True
+            self.is_restored = True
 
 
 def _assign(owner: Any, name: str, value: Any) -> None:
-    """Set a property, and have what depends on it evaluated anew: not all of them see to that by themselves."""
+    """Set a property, and tag its owner for evaluation, which Blender doesn't do for all properties itself."""
     setattr(owner, name, value)
     owner.id_data.update_tag()
 
@@ -112,18 +113,19 @@ class _Hidden:
     layer: bpy.types.ViewLayer
 
     def hide(self) -> None:
-        """Hide it again."""
+        """Hide the object again, if it still exists."""
         item = self.layer.objects.get(self.name)
         if item is not None and item.library != self.library:
             item = next(
-                (one for one in self.layer.objects if (one.name, one.library) == (self.name, self.library)), None
+                (other for other in self.layer.objects if (other.name, other.library) == (self.name, self.library)),
+                None,
             )
         if item is not None:
             item.hide_set(True, view_layer=self.layer)
 
 
 def _settings(scene: bpy.types.Scene) -> Iterator[_Setting]:
-    """Yield the settings of the viewport that stand for others of renders."""
+    """Yield the viewport's settings that correspond to settings of renders."""
     if scene.render.use_simplify:
         yield scene.render, "simplify_subdivision", scene.render.simplify_subdivision_render
         yield scene.render, "simplify_child_particles", scene.render.simplify_child_particles_render
@@ -136,17 +138,18 @@ def _settings(scene: bpy.types.Scene) -> Iterator[_Setting]:
 
 
 def _of_object(item: bpy.types.Object) -> Iterator[_Setting]:
+    """Yield the settings of an object and its modifiers."""
     yield item, "hide_viewport", item.hide_render
     yield item, "show_instancer_for_viewport", item.show_instancer_for_render
     for modifier in item.modifiers:
         yield modifier, "show_viewport", modifier.show_render
         if modifier.type in _OF_RENDERS:
-            here, there = _OF_RENDERS[modifier.type]
-            yield modifier, here, getattr(modifier, there)
+            viewport_name, render_name = _OF_RENDERS[modifier.type]
+            yield modifier, viewport_name, getattr(modifier, render_name)
 
 
 def _of_data() -> Iterator[_Setting]:
-    """Yield the settings of what objects share."""
+    """Yield the settings of data that objects share: particles, curves, metaballs, node groups."""
     for particles in bpy.data.particles:
         yield particles, "display_percentage", 100
         yield particles, "child_percent", particles.rendered_child_count
@@ -158,7 +161,7 @@ def _of_data() -> Iterator[_Setting]:
         yield ball, "resolution", ball.render_resolution
     for group in bpy.data.node_groups:
         if group.bl_idname == "GeometryNodeTree":
-            # Without an input of its own the node says no where it is muted.
+            # A muted node "Is Viewport" gives no, as in renders.
             yield from ((node, "mute", True) for node in group.nodes if node.bl_idname == "GeometryNodeIsViewport")
 
 
@@ -168,18 +171,19 @@ _OF_RENDERS |= {"SCREW": ("steps", "render_steps"), "OCEAN": ("viewport_resoluti
 
 
 def _of_curve(curve: bpy.types.Curve) -> Iterator[_Setting]:
-    """Yield the resolutions of a curve, a surface or a text; its own for renders is 0 where there is none."""
+    """Yield the resolutions of a curve, a surface or a text; 0 for renders means the viewport's resolution."""
     if not isinstance(curve, bpy.types.Curve):
         return
-    for along in ("u", "v"):
-        if finer := getattr(curve, f"render_resolution_{along}"):
+    for direction in ("u", "v"):
+        if render_resolution := getattr(curve, f"render_resolution_{direction}"):
             for spline in curve.splines:
-                yield spline, f"resolution_{along}", finer
+                yield spline, f"resolution_{direction}", render_resolution
             if isinstance(curve, bpy.types.TextCurve):
-                yield curve, f"resolution_{along}", finer
+                yield curve, f"resolution_{direction}", render_resolution
 
 
 def _layers(layer: bpy.types.LayerCollection) -> Iterator[bpy.types.LayerCollection]:
+    """Yield all collections below a view layer's collection."""
     for child in layer.children:
         yield child
         yield from _layers(child)

@@ -1,4 +1,4 @@
-"""Names of what has no class in a scene that others made, and a file of classes by these names, to be filled in."""
+"""Names of the things without a class in a user's scene, as a class mapping to be filled in."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from ..things.model_builder import SUPPORT
 from .reading import slot_names
 
 _SHOWN = 6
-"""Names of each kind that are told; the file has all."""
+"""Largest number of names of each kind in a text; the mapping has all."""
 _COPY = re.compile(r"(.+)\.\d+")
-"""Name of one of several things that are numbered, as Blender numbers copies."""
+"""Name of a numbered copy, as Blender numbers copies."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Unlabelled:
     """Things of a scene without a class, by name.
 
     Attributes:
-        names: per kind of `KINDS` the names, copies of a thing together as a pattern, sorted.
+        names: sorted names by kind of `KINDS`; copies of a thing are one pattern.
         count: number of objects without a class.
         total: number of objects with faces.
     """
@@ -36,18 +36,18 @@ class Unlabelled:
     total: int
 
     def mapping(self) -> ClassMapping:
-        """Return a class mapping of these names in which every class is left open."""
+        """Return a class mapping of these names in which every class is empty, to be filled in."""
         return ClassMapping.from_dict({kind: dict.fromkeys(self.names[kind], "") for kind in KINDS})
 
     def text(self) -> str:
         """Return the first names of each kind in words."""
-        told = [f"{kind} {_first_names(self.names[kind])}" for kind in KINDS if self.names[kind]]
-        what = f"{self.count:,} of {self.total:,} objects have no class, and their points will have none"
-        return f"{what}: {'; '.join(told)}"
+        lists = [f"{kind} {_first_names(self.names[kind])}" for kind in KINDS if self.names[kind]]
+        sentence = f"{self.count:,} of {self.total:,} objects have no class, and their points will have none"
+        return f"{sentence}: {'; '.join(lists)}"
 
 
 def unlabelled_things(mapping: ClassMapping | None, class_ids: Mapping[str, int] | None) -> Unlabelled:
-    """Return what is visible in the open file, has faces, and has no class by attribute, property or name.
+    """Return the visible things of the open file that have faces, but no class by attribute, property or name.
 
     Args:
         mapping: classes by name; none if None.
@@ -56,34 +56,42 @@ def unlabelled_things(mapping: ClassMapping | None, class_ids: Mapping[str, int]
     depsgraph = bpy.context.evaluated_depsgraph_get()
     labels = Labels(depsgraph.scene, mapping, class_ids)
     patterns: dict[str, set[str]] = {kind: set() for kind in KINDS}
-    bare: set[bpy.types.Object] = set()
+    unlabelled_items: set[bpy.types.Object] = set()
     uses = ((use.object, use.parent if use.is_instance else use.object) for use in depsgraph.object_instances)
-    seen: set[tuple[bpy.types.Object, bpy.types.Object]] = set()
-    for shown, by in uses:
-        item, owner = shown.original, by.original
-        if shown.type != "MESH" or not len(shown.data.polygons) or SUPPORT in owner or (item, owner) in seen:
+    visited: set[tuple[bpy.types.Object, bpy.types.Object]] = set()
+    for evaluated_item, owner_item in uses:
+        item, owner = evaluated_item.original, owner_item.original
+        if (
+            evaluated_item.type != "MESH"
+            or not len(evaluated_item.data.polygons)
+            or SUPPORT in owner
+            or (item, owner) in visited
+        ):
             continue
-        seen.add((item, owner))
+        visited.add((item, owner))
         label = labels.label_of(item, owner)
-        slots = [name for name in slot_names(shown) if labels.by_name.find("materials", name) is None]
-        if label.strong >= 0 or label.weak != UNLABELLED or "class_id" in shown.data.attributes or not slots:
+        slots = [name for name in slot_names(evaluated_item) if labels.by_name.find("materials", name) is None]
+        if label.strong >= 0 or label.weak != UNLABELLED or "class_id" in evaluated_item.data.attributes or not slots:
             continue
-        bare.add(item)
+        unlabelled_items.add(item)
         patterns["objects"].add(_pattern(item.name))
         patterns["materials"] |= {_pattern(name) for name in slots if bpy.data.materials.get(name)}
-        inside = [part.name for part in item.users_collection]
-        patterns["collections"] |= {escape(name) for name in inside if name in bpy.data.collections}
+        collection_names = [part.name for part in item.users_collection]
+        patterns["collections"] |= {escape(name) for name in collection_names if name in bpy.data.collections}
     return Unlabelled(
-        {kind: tuple(sorted(patterns[kind])) for kind in KINDS}, len(bare), len({item for item, _ in seen})
+        {kind: tuple(sorted(patterns[kind])) for kind in KINDS},
+        len(unlabelled_items),
+        len({item for item, _ in visited}),
     )
 
 
 def _pattern(name: str) -> str:
-    """Return the pattern that a name and its copies fit: of ``Lamp.001`` ``Lamp.*``."""
+    """Return the pattern that a name and its numbered copies match: ``Lamp.*`` for ``Lamp.001``."""
     copy = _COPY.fullmatch(name)
     return f"{escape(copy[1])}.*" if copy else escape(name)
 
 
 def _first_names(names: tuple[str, ...]) -> str:
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return ", ".join(names[:_SHOWN]) + more
+    """Return the first names as a list in words, with the number of further ones."""
+    rest = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return ", ".join(names[:_SHOWN]) + rest

@@ -1,4 +1,4 @@
-"""Vehicles that drive through a section of a road: their meshes in the frame that they move in, without a road."""
+"""Meshes of the vehicles that drive through a section of a road, in the frames of their motions."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ _COLOR = SurfaceInput("attribute", COLOR)
 class VehicleMeshes:
     """Cache of vehicle meshes by model, each built when first needed; must be used on Blender's main thread.
 
-    Materials have one number in all the scenes that one of these put together.
+    A material has the same index in all scenes of one instance of this class.
 
     Args:
-        materials: of the road that they drive on.
+        materials: materials of the road.
     """
 
     def __init__(self, materials: RoadMaterials) -> None:
@@ -48,10 +48,10 @@ class VehicleMeshes:
         """Return a scene to scan of a static mesh and moving vehicles, with common material indices.
 
         Args:
-            static: what stands.
-            vehicles: by id.
-            motions: theirs, in the static mesh's frame.
-            passes: numbers of their later passes.
+            static: mesh of what stands still.
+            vehicles: vehicles by id.
+            motions: their motions by id, in the static mesh's frame.
+            passes: instance numbers of their later passes, by id.
         """
         models = {vehicle.model: self._model(vehicle.model) for vehicle in vehicles.values()}
         for mesh in (static, *models.values()):
@@ -65,6 +65,7 @@ class VehicleMeshes:
         return ScannedScene(_with_materials(static, names), moving)
 
     def _model(self, model: str) -> SceneMesh:
+        """Return the mesh of a vehicle model, built once."""
         if model not in self._models:
             self._models[model] = _model_mesh(model, self._road_materials)
         return self._models[model]
@@ -86,10 +87,10 @@ def _model_mesh(model: str, materials: RoadMaterials) -> SceneMesh:
         bpy.data.objects.remove(item)
         bpy.data.meshes.remove(data)
     # The group's model faces +y.
-    right, ahead, up = mesh.vertices.T
+    right, forward, up = mesh.vertices.T
     return replace(
         mesh,
-        vertices=np.ascontiguousarray(np.stack([ahead, -right, up], axis=1)),
+        vertices=np.ascontiguousarray(np.stack([forward, -right, up], axis=1)),
         class_id=np.full(len(mesh), class_id("vehicle"), np.uint8),
         origin=np.zeros(3),
     )

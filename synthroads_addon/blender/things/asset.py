@@ -1,6 +1,6 @@
-"""Free assets: objects out of .blend, .glb and .obj files, one instance of their collection per place.
+"""Free assets: objects from .blend, .glb and .obj files, placed as an instance of their collection.
 
-Of a file that is placed which a render of it would show, in the metres that its unit stands for.
+An asset consists of the objects that a render of its file would show, scaled by the length of the file's unit.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ KEY = "synthroads_asset"
 """Custom property of an asset's collection: the file (and object) that it was read from."""
 _REMEDY = "copy it into the library's folder"
 UNIT = "synthroads_unit"
-"""Custom property of an asset's collection: metres that a unit of its file stands for."""
+"""Custom property of an asset's collection: length of its file's unit, m."""
 
 
 class _Read(NamedTuple):
-    """Objects out of a file, and the metres that one of its units stands for."""
+    """Objects read from a file, and the length of the file's unit, m."""
 
     objects: list[bpy.types.Object]
     unit: float = 1.0
@@ -54,7 +54,7 @@ def build_assets(builder: ModelBuilder) -> None:
         library = library_file(item.library)
         asset = read_asset_library(library).assets.get(item.name)
         if asset is None:
-            raise InputError(f"objects.{name}.name", item.name, f"the library {library} has no such asset")
+            raise InputError(f"objects.{name}.name", item.name, f"the library {library} has no asset of this name")
         collection = _collection(library.parent, asset)
         instance = builder.add_instance(name, collection)
         instance.location = _foot(builder, item)
@@ -76,25 +76,27 @@ def _collection(library: Path, asset: LibraryAsset) -> bpy.types.Collection:
     """Return the collection of an asset's objects, read from its file unless the open file has it already.
 
     Raises:
-        InputError: the file can't be read, or another file that it names lies outside of the library's folder.
+        InputError: the file can't be read, or refers to a file outside of the library's folder.
     """
     path = library / asset.file
     key = f"{path}:{asset.object or ''}"
-    for existing in bpy.data.collections:
-        if existing.get(KEY) == key:
-            return existing
+    for file_collection in bpy.data.collections:
+        if file_collection.get(KEY) == key:
+            return file_collection
     check_mesh_file(path, (library,), _REMEDY)
-    before = loaded_data()
-    read = {".blend": _read_blend, ".glb": _read_glb, ".obj": _read_obj}[path.suffix.lower()]
+    earlier_data = loaded_data()
+    read_file = {".blend": _read_blend, ".glb": _read_glb, ".obj": _read_obj}[path.suffix.lower()]
     try:
         with stderr_if_it_succeeds():
-            objects, unit = run_in_caller(lambda: read(path, asset.object))  # importers need Blender's main thread
+            objects, unit = run_in_caller(lambda: read_file(path, asset.object))  # importers need Blender's main thread
     except (OSError, RuntimeError) as error:
         raise InputError(str(path), None, f"cannot be read as an asset ({error_line(error)})") from None
     if not objects:
-        raise InputError(str(path), asset.object, "holds no such object" if asset.object else "shows no objects")
-    if path.suffix.lower() != ".blend":  # which names files as Blender shows it
-        check_references(path, (path.parent, library), _REMEDY, before)
+        raise InputError(
+            str(path), asset.object, "has no object of this name" if asset.object else "has no object that renders show"
+        )
+    if path.suffix.lower() != ".blend":  # a .blend may refer to files anywhere, as in Blender
+        check_references(path, (path.parent, library), _REMEDY, earlier_data)
     collection = bpy.data.collections.new(f"SR Asset {path.stem}")
     collection[KEY], collection[UNIT] = key, unit
     slots = [slot.material for item in objects for slot in item.material_slots]
@@ -107,11 +109,13 @@ def _collection(library: Path, asset: LibraryAsset) -> bpy.types.Collection:
 
 
 def _read_blend(path: Path, name: str | None) -> _Read:
-    """Return the named object of a .blend file, even a hidden one; without a name all that its renders show."""
-    shown, unit = _shown_in(path)
-    with being_opened(path), bpy.data.libraries.load(str(path), link=False) as (there, here):
-        here.objects = [item for item in there.objects if item == name or (name is None and shown.get(item, True))]
-    objects = [item for item in here.objects if item is not None]
+    """Return the named object of a .blend file, even if it is hidden; without a name all objects that renders show."""
+    is_rendered, unit = _shown_in(path)
+    with being_opened(path), bpy.data.libraries.load(str(path), link=False) as (file_data, loaded_data):
+        loaded_data.objects = [
+            item for item in file_data.objects if item == name or (name is None and is_rendered.get(item, True))
+        ]
+    objects = [item for item in loaded_data.objects if item is not None]
     if name is not None:
         for item in objects:
             item.hide_render = item.hide_viewport = False
@@ -119,30 +123,32 @@ def _read_blend(path: Path, name: str | None) -> _Read:
 
 
 def _shown_in(path: Path) -> tuple[dict[str, bool], float]:
-    """Return whether renders of a .blend file's scenes show each of their objects, and the metres of its unit.
+    """Return by name whether renders show each object of a .blend file's scenes, and the length of the file's unit, m.
 
-    Objects that are in none of its scenes aren't among them. The open file is left as it was.
+    Objects that are in no scene aren't included. The open file is left as it was.
     """
-    libraries, scenes = set(bpy.data.libraries), set(bpy.data.scenes)
-    with being_opened(path), bpy.data.libraries.load(str(path), link=True) as (there, here):
-        here.scenes = list(there.scenes)
-    file_scenes = [scene for scene in here.scenes if scene is not None]
+    earlier_libraries, earlier_scenes = set(bpy.data.libraries), set(bpy.data.scenes)
+    with being_opened(path), bpy.data.libraries.load(str(path), link=True) as (file_data, loaded_data):
+        loaded_data.scenes = list(file_data.scenes)
+    file_scenes = [scene for scene in loaded_data.scenes if scene is not None]
     try:
-        shown: dict[str, bool] = {}
+        is_rendered: dict[str, bool] = {}
         for scene in file_scenes:
-            rendered = {item.name for layer in scene.view_layers for item in rendered_objects(layer.layer_collection)}
+            rendered_names = {
+                item.name for layer in scene.view_layers for item in rendered_objects(layer.layer_collection)
+            }
             for item in scene.objects:
-                shown[item.name] = shown.get(item.name, False) or item.name in rendered
+                is_rendered[item.name] = is_rendered.get(item.name, False) or item.name in rendered_names
         settings = [scene.unit_settings for scene in file_scenes if scene.unit_settings.system != "NONE"]
-        return shown, float(settings[0].scale_length) if settings else 1.0
+        return is_rendered, float(settings[0].scale_length) if settings else 1.0
     finally:
-        new = [library for library in bpy.data.libraries if library not in libraries]
-        bpy.data.batch_remove([scene for scene in file_scenes if scene not in scenes])
-        bpy.data.batch_remove(new)
+        new_libraries = [library for library in bpy.data.libraries if library not in earlier_libraries]
+        bpy.data.batch_remove([scene for scene in file_scenes if scene not in earlier_scenes])
+        bpy.data.batch_remove(new_libraries)
 
 
 def rendered_objects(layer: bpy.types.LayerCollection) -> Iterator[bpy.types.Object]:
-    """Yield the objects of a layer's collection, and of those in it, that renders show."""
+    """Yield the objects that renders show of a layer's collection and the collections in it."""
     if layer.exclude or layer.collection.hide_render:
         return
     yield from (item for item in layer.collection.objects if not item.hide_render)
@@ -151,21 +157,23 @@ def rendered_objects(layer: bpy.types.LayerCollection) -> Iterator[bpy.types.Obj
 
 
 def _read_glb(path: Path, _: str | None) -> _Read:
+    """Return the objects of a .glb file."""
     return _import_objects(lambda: bpy.ops.import_scene.gltf(filepath=str(path)))
 
 
 def _read_obj(path: Path, _: str | None) -> _Read:
+    """Return the objects of an .obj file."""
     return _import_objects(lambda: bpy.ops.wm.obj_import(filepath=str(path)))
 
 
-def _import_objects(run: Callable[[], object]) -> _Read:
-    """Run an importer; return the objects that it added to the file and that are rendered; others are left aside."""
-    before = set(bpy.data.objects)
-    run()
-    added = [item for item in bpy.data.objects if item not in before]
-    shown = set(rendered_objects(bpy.context.view_layer.layer_collection))
-    for item in added:
-        if item not in shown:  # as what a glTF importer draws bones with
+def _import_objects(run_importer: Callable[[], object]) -> _Read:
+    """Run an importer; return the imported objects that renders show, and unlink the others."""
+    earlier_objects = set(bpy.data.objects)
+    run_importer()
+    imported_objects = [item for item in bpy.data.objects if item not in earlier_objects]
+    shown_objects = set(rendered_objects(bpy.context.view_layer.layer_collection))
+    for item in imported_objects:
+        if item not in shown_objects:  # such as shapes that the glTF importer draws bones with
             for owner in item.users_collection:
                 owner.objects.unlink(item)
-    return _Read([item for item in added if item in shown])
+    return _Read([item for item in imported_objects if item in shown_objects])

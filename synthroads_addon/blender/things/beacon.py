@@ -18,7 +18,7 @@ from .model_builder import ModelBuilder
 from .registry import model_part
 
 CELLS = (2, 8)
-"""Cells across and up a blade, each cut by the border of a stripe: of 0.25 m x 1 m they are squares."""
+"""Columns and rows of a blade's cells, each cut diagonally by a stripe's border; squares on a blade of 0.25 m x 1 m."""
 
 
 class _BeaconInputs(OnSurface):
@@ -50,16 +50,16 @@ def beacon_group(tree: Tree) -> None:
     with tree.frame("On the surface"):
         points = beacon.places()
     with tree.frame("Beacons"):
-        turned = op.turn(tree, z=op.named_attribute(tree, "heading"))
-        place, tall = op.position(tree), op.attribute_or(beacon.height, "height")
-        wide = op.attribute_or(beacon.width, "width")
-        passed = op.attribute_or(op.switch(beacon.pass_on_left, -1, 1), "pass_side")
+        rotation = op.turn(tree, z=op.named_attribute(tree, "heading"))
+        place, height = op.position(tree), op.attribute_or(beacon.height, "height")
+        width = op.attribute_or(beacon.width, "width")
+        passing_side = op.attribute_or(op.switch(beacon.pass_on_left, -1, 1), "pass_side")
         bottom = place + (0.0, 0.0, sizes.BLADE_BOTTOM)
-        parts = [put_on_points(points, foot, place, 1.0, turned)]
+        parts = [put_on_points(points, foot, place, 1.0, rotation)]
         for side, blade in zip((1, -1), blades, strict=True):
-            chosen = op.separate(points, passed.equals(side))
-            parts.append(put_on_points(chosen, blade, bottom, op.vector(tree, wide, 1.0, tall), turned))
-        parts.append(put_on_points(points, lamp, bottom + op.vector(tree, 0.0, 0.0, tall), 1.0, turned))
+            side_points = op.separate(points, passing_side.equals(side))
+            parts.append(put_on_points(side_points, blade, bottom, op.vector(tree, width, 1.0, height), rotation))
+        parts.append(put_on_points(points, lamp, bottom + op.vector(tree, 0.0, 0.0, height), 1.0, rotation))
         beacons = op.join(*parts)
     with tree.frame("Labels"):
         beacons = op.realize(
@@ -72,25 +72,25 @@ def beacon_group(tree: Tree) -> None:
 
 def _foot(tree: Tree) -> Value:
     """Add nodes for a beacon's foot: a slab with chamfered corners and edges, a little sunk."""
-    outline, (share, smaller) = [(x, y) for x, y in sizes.foot_outline().tolist()], sizes.LEVELS
+    outline, (share, top_scale) = [(x, y) for x, y in sizes.foot_outline().tolist()], sizes.LEVELS
     slab = prism(tree, outline, (1.0, 1.0, sizes.FOOT[2] * share + sizes.SUNK))
-    upper = prism(tree, outline, (*smaller, sizes.FOOT[2]))
-    return op.join(move_geometry(slab, (0.0, 0.0, -sizes.SUNK)), upper)
+    top = prism(tree, outline, (*top_scale, sizes.FOOT[2]))
+    return op.join(move_geometry(slab, (0.0, 0.0, -sizes.SUNK)), top)
 
 
 def _blade(tree: Tree, red: Value, white: Value, side: int) -> Value:
     """Add nodes for a blade of 1 m x 1 m on z = 0 whose stripes fall to the left (side 1) or right (-1)."""
     stripes = _blade_face(tree)
     faces = []
-    for front in (True, False):
-        # Seen from the front they rise to the right. A mirror turns the faces round.
+    for is_front in (True, False):
+        # The stripes of `_blade_face` rise to the right. A mirrored face must be flipped, and so must one of the back.
         y = -sizes.BLADE / 2 - sizes.SHEETING
         scale = (float(side), 1.0, 1.0)
-        face = op.transform(stripes, translation=(0.0, y if front else -y, 0.0), scale=scale)
-        faces.append(face if (side > 0) == front else flip_faces(face))
+        face = op.transform(stripes, translation=(0.0, y if is_front else -y, 0.0), scale=scale)
+        faces.append(face if (side > 0) == is_front else flip_faces(face))
     mesh = paint_faces(op.join(*faces), white)
-    first = (op.named_attribute(tree, "stripe", "INT") % 2).equals(0)
-    mesh = paint_faces(mesh, red, first)
+    is_red = (op.named_attribute(tree, "stripe", "INT") % 2).equals(0)
+    mesh = paint_faces(mesh, red, is_red)
     plate = box(tree, (1.0, sizes.BLADE, 1.0), (0.0, 0.0, 0.5))
     return op.join(paint_faces(plate, white), mesh)
 
@@ -99,15 +99,15 @@ def _blade_face(tree: Tree) -> Value:
     """Add nodes for a blade's face towards -y, triangles with their ``stripe``'s number, which rises with x."""
     columns, rows = CELLS
     halves = []
-    for upper in (0, 1):
+    for is_upper in (0, 1):
         corners = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 1.0)]
-        if upper:
+        if is_upper:
             corners = [(0.0, 0.0, 0.0), (1.0, 0.0, 1.0), (0.0, 0.0, 1.0)]
         half = tree.node("GeometryNodeMeshCircle", vertices=3, fill_type="NGON").value
         half = op.set_position(half, op.choose(op.index(tree), corners))
         cells = row_of_points(tree, columns * rows)
         column, row = op.index(tree) % columns, op.index(tree) // columns
-        cells = op.store(cells, "stripe", row - column + upper + columns)
+        cells = op.store(cells, "stripe", row - column + is_upper + columns)
         place = op.vector(tree, column / float(columns) - 0.5, 0.0, row / float(rows))
         halves.append(put_on_points(cells, half, place, (1.0 / columns, 1.0, 1.0 / rows)))
     return op.realize(op.join(*halves))
@@ -115,12 +115,12 @@ def _blade_face(tree: Tree) -> Value:
 
 def _lamp(tree: Tree, housing: Value, lens: Value) -> Value:
     """Add nodes for a warning lamp that shines both ways."""
-    radius, deep = sizes.LENS
+    radius, depth = sizes.LENS
     body = paint_faces(box(tree, sizes.HOUSING, (0.0, 0.0, sizes.HOUSING_MIDDLE)), housing)
     middle = (0.0, 0.0, sizes.LENS_MIDDLE)
-    drum = tree.node("GeometryNodeMeshCylinder", vertices=sizes.LENS_SIDES, radius=radius, depth=deep).value
+    drum = tree.node("GeometryNodeMeshCylinder", vertices=sizes.LENS_SIDES, radius=radius, depth=depth).value
     glass = tree.node(
-        "GeometryNodeMeshCylinder", vertices=sizes.LENS_SIDES, radius=radius * 0.85, depth=deep + sizes.LENS_PROUD
+        "GeometryNodeMeshCylinder", vertices=sizes.LENS_SIDES, radius=radius * 0.85, depth=depth + sizes.LENS_PROUD
     ).value
     lying = op.turn(tree, x=1.5707963)
     parts = [op.transform(mesh, translation=middle, rotation=lying) for mesh in (drum, glass)]

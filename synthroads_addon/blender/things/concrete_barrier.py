@@ -16,9 +16,9 @@ from .registry import model_part
 
 
 def _outline(profile: str) -> list[tuple[float, float, float]]:
-    """Return a barrier profile's relative points, clockwise along the road: x left, y 0, z; buried ones at z = -1."""
-    left = [(1.0, -1.0), *sizes.FLANKS[profile]]
-    return [(x, 0.0, z) for x, z in left] + [(-x, 0.0, z) for x, z in reversed(left)]
+    """Return a profile's points (x, 0, z), clockwise along the road, in half widths and heights; z = -1 is buried."""
+    left_half = [(1.0, -1.0), *sizes.FLANKS[profile]]
+    return [(x, 0.0, z) for x, z in left_half] + [(-x, 0.0, z) for x, z in reversed(left_half)]
 
 
 class _Barrier(Lengthwise):
@@ -37,52 +37,54 @@ def concrete_barrier_group(tree: Tree) -> None:
     barrier = _Barrier(tree)
     axis, surfaces = barrier.geometry()
     with tree.frame("Rows on the backbone, two of them where the ramps end"):
-        begin = op.maximum(barrier.start_station, first_station(axis))
+        start = op.maximum(barrier.start_station, first_station(axis))
         end = op.minimum(barrier.end_station, last_station(axis))
         ramp = op.minimum(barrier.terminal_length, (barrier.end_station - barrier.start_station) * 0.5)
-        line = _rows(tree, barrier, begin, end, ramp)
+        line = _rows(tree, barrier, start, end, ramp)
     with tree.frame("Foot and top"):
         station = op.named_attribute(tree, "station")
-        foot, left = foot_at(axis, surfaces, station, barrier.offset)
-        line = op.store(op.store(line, "left", left), "foot", foot)
-        inside = op.minimum(station - barrier.start_station, barrier.end_station - station)
-        share = op.switch(ramp > 1e-3, 1.0, op.minimum(inside / op.maximum(ramp, 1e-3), 1.0))
-        line = op.store(line, "tall", op.maximum(barrier.height * share, sizes.TIP))
+        foot, left_vector = foot_at(axis, surfaces, station, barrier.offset)
+        line = op.store(op.store(line, "left", left_vector), "foot", foot)
+        end_distance = op.minimum(station - barrier.start_station, barrier.end_station - station)
+        height_share = op.switch(ramp > 1e-3, 1.0, op.minimum(end_distance / op.maximum(ramp, 1e-3), 1.0))
+        line = op.store(line, "tall", op.maximum(barrier.height * height_share, sizes.TIP))
     with tree.frame("Profile swept along the rows"):
         mesh = op.delete_degenerate(_sweep_profile(tree, line, barrier))
     with tree.frame("Labels"):
         mesh = op.label(mesh, class_id(ConcreteBarrier.points_class), barrier.instance, barrier.material)
-    tree.output("Mesh", op.only_if(end - begin > 0.01, mesh), description="Barrier; its points carry their station")
+    tree.output("Mesh", op.only_if(end - start > 0.01, mesh), description="Barrier; its points carry their station")
 
 
-def _rows(tree: Tree, barrier: _Barrier, begin: Value, end: Value, ramp: Value) -> Value:
+def _rows(tree: Tree, barrier: _Barrier, backbone_start: Value, backbone_end: Value, ramp: Value) -> Value:
     """Add nodes for points with their station, evenly spaced along the barrier, two of them moved to the ramps' ends.
 
-    Those beyond the backbone's ends collapse there.
+    Points beyond an end of the backbone collapse onto that end.
     """
-    first, last = barrier.start_station, barrier.end_station
-    count = op.round_up(op.maximum(last - first, 0.01) / barrier.step - 1e-4) + 1
+    start_station, end_station = barrier.start_station, barrier.end_station
+    count = op.round_up(op.maximum(end_station - start_station, 0.01) / barrier.step - 1e-4) + 1
     line = row_of_points(tree, count)
-    station = op.minimum(first + op.index(tree) * barrier.step, last)
-    for kink in (first + ramp, last - ramp):
-        near = op.unary("ABSOLUTE", station - kink) < barrier.step * 0.499
-        inside = (op.index(tree) > 0) & (op.index(tree) < count - 1)
-        station = op.switch(near & inside, station, kink)
-    return op.store(line, "station", op.minimum(op.maximum(station, begin), end))
+    station = op.minimum(start_station + op.index(tree) * barrier.step, end_station)
+    for kink in (start_station + ramp, end_station - ramp):
+        is_nearest = op.unary("ABSOLUTE", station - kink) < barrier.step * 0.499
+        is_inner = (op.index(tree) > 0) & (op.index(tree) < count - 1)
+        station = op.switch(is_nearest & is_inner, station, kink)
+    return op.store(line, "station", op.minimum(op.maximum(station, backbone_start), backbone_end))
 
 
 def _sweep_profile(tree: Tree, line: Value, barrier: _Barrier) -> Value:
+    """Add nodes for the solid along the rows of `line`, with the height ``tall`` of each row."""
+
     def outline(number: Value) -> Value:
         step, jersey = (op.choose(number, _outline(name)) for name in ("step", "new_jersey"))
         return op.switch(barrier.new_jersey, step, jersey)
 
     def place(point: Value, row: Value) -> Value:
         foot = op.sample_index(line, op.named_attribute(tree, "foot", "FLOAT_VECTOR"), row)
-        left = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), row)
-        tall = op.sample_index(line, op.named_attribute(tree, "tall"), row)
+        left_vector = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), row)
+        height = op.sample_index(line, op.named_attribute(tree, "tall"), row)
         share = op.component(point, "Z")
-        z = op.switch(share < 0.0, tall * share, -sizes.BURIED)
-        return foot + left * (op.component(point, "X") * barrier.base_width * 0.5) + op.vector(tree, 0.0, 0.0, z)
+        z = op.switch(share < 0.0, height * share, -sizes.BURIED)
+        return foot + left_vector * (op.component(point, "X") * barrier.base_width * 0.5) + op.vector(tree, 0.0, 0.0, z)
 
     def station(row: Value) -> Value:
         return op.sample_index(line, op.named_attribute(tree, "station"), row)

@@ -16,12 +16,14 @@ from ..nodes.standing import OnSurface, put_on
 from .model_builder import ModelBuilder
 from .registry import model_part
 
-# Rows of the body from below: z on the axis; the slant applies above the surface only.
 _LEVELS = (-BURIED, 0.0, 0.64, 0.89, sizes.TOP)
+"""Heights (m) of the body's rows on its axis, from below; rows above the surface are slanted."""
 _BAND = 2
-_WIDE, _HIGH, _MIDDLE = sizes.REFLECTOR
+"""Number of the level at which the black band begins."""
+_REFLECTOR_WIDTH, _REFLECTOR_HEIGHT, _REFLECTOR_Z = sizes.REFLECTOR
+"""Width and height of the upright reflector, and height of its middle, m."""
 _UNDER, _PROUD = 0.001, 0.004
-"""How far reflectors reach into the post, and out of it, m."""
+"""Depth of reflectors in the post, and their protrusion, m."""
 
 
 class _Delineator(OnSurface):
@@ -44,8 +46,8 @@ def delineator_group(tree: Tree) -> None:
         body = op.join(body, _front(tree, glass), _behind(tree, glass, 0.07), _behind(tree, glass, -0.07))
     with tree.frame("On the surface"):
         places = post.places()
-        tall = op.vector(tree, 1.0, 1.0, op.attribute_or(post.height, "height"))
-        posts = put_on(places, body, tall)
+        height_scale = op.vector(tree, 1.0, 1.0, op.attribute_or(post.height, "height"))
+        posts = put_on(places, body, height_scale)
     with tree.frame("Labels"):
         posts = op.store(posts, "class_id", class_id(Delineator.points_class), "FACE")
         posts = op.store(posts, "instance_id", op.named_attribute(tree, "instance", "INT"), "FACE")
@@ -53,6 +55,7 @@ def delineator_group(tree: Tree) -> None:
 
 
 def _body(tree: Tree, white: Value, black: Value) -> Value:
+    """Add nodes for a post's body, 1 m high, with its slanted band and top."""
     rows = len(_LEVELS)
     mesh, column, row = op.grid(tree, len(sizes.OUTLINE) + 1, rows)
     section = op.choose(column, [(x, y, 0.0) for x, y in (*sizes.OUTLINE, sizes.OUTLINE[0])])
@@ -60,8 +63,8 @@ def _body(tree: Tree, white: Value, black: Value) -> Value:
     slant = op.switch(row > 1, 0.0, op.component(section, "X") * sizes.SLANT)
     mesh = op.set_position(mesh, section + op.vector(tree, 0.0, 0.0, level + slant))
     # Faces of a grid run column by column, rows - 1 of them each.
-    banded = (op.index(tree) % (rows - 1)).equals(_BAND)
-    mesh = paint_faces(paint_faces(mesh, white), black, banded)
+    is_band = (op.index(tree) % (rows - 1)).equals(_BAND)
+    mesh = paint_faces(paint_faces(mesh, white), black, is_band)
     lid = tree.node("GeometryNodeMeshCircle", vertices=len(sizes.OUTLINE), fill_type="NGON").value
     outline = op.choose(op.index(tree), [(x, y, _LEVELS[-1] + sizes.SLANT * x) for x, y in sizes.OUTLINE])
     return op.join(mesh, paint_faces(op.set_position(lid, outline), white))
@@ -70,22 +73,22 @@ def _body(tree: Tree, white: Value, black: Value) -> Value:
 def _front(tree: Tree, glass: Value) -> Value:
     """Add nodes for the upright reflector on the face that approaching drivers see (-y)."""
     mesh, column, row = op.grid(tree, 2, 2)
-    x = column * _WIDE - _WIDE / 2
-    place = op.vector(tree, x, -_flank(x), row * _HIGH - _HIGH / 2 + _MIDDLE)
+    x = column * _REFLECTOR_WIDTH - _REFLECTOR_WIDTH / 2
+    place = op.vector(tree, x, -_flank(x), row * _REFLECTOR_HEIGHT - _REFLECTOR_HEIGHT / 2 + _REFLECTOR_Z)
     return _reflector_body(op.set_position(mesh, place), glass)
 
 
-def _behind(tree: Tree, glass: Value, above: float) -> Value:
-    """Add nodes for a round reflector on the other face, `above` (m) from the reflectors' middle height."""
+def _behind(tree: Tree, glass: Value, height: float) -> Value:
+    """Add nodes for a round reflector on the other face, `height` (m) above the reflectors' middle."""
     disc = tree.node("GeometryNodeMeshCircle", vertices=16, radius=0.03, fill_type="NGON").value
     place = op.position(tree)
     x = op.component(place, "X")
-    place = op.vector(tree, -x, _flank(-x), op.component(place, "Y") + _MIDDLE + above)
+    place = op.vector(tree, -x, _flank(-x), op.component(place, "Y") + _REFLECTOR_Z + height)
     return _reflector_body(op.set_position(disc, place), glass)
 
 
 def _flank(x: Value) -> Value:
-    """Add nodes for the y (m) of the rear flank at x, 1 mm below its surface: (-0.045, 0.055) to (0.05, 0.014)."""
+    """Add nodes for the y (m) of the rear flank at x, 1 mm below the line (-0.045, 0.055) to (0.05, 0.014)."""
     return (x + 0.045) * (-0.041 / 0.095) + (0.055 - _UNDER)
 
 

@@ -1,4 +1,7 @@
-"""SR Emergency Phone: the orange pillar of a motorway's emergency telephone."""
+"""SR Emergency Phone: the orange pillar of a motorway's emergency telephone.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ from ..nodes.standing import Standing
 from .sign.writing import sign_writing_group
 
 _LETTERS = (0.77, 0.92)
-"""Lower and upper border of the writing as shares of the height."""
+"""Lower and upper border of the writing as shares of the height; chosen."""
 
 
 class _Phone(Standing):
@@ -59,7 +62,7 @@ def emergency_phone_group(tree: Tree) -> None:
 
 
 def _pillar(tree: Tree, phone: _Phone, rows: tuple[tuple[float, float], ...]) -> Value:
-    """Add nodes for a solid through rows of (height as a share, or m if below 0; width as a share)."""
+    """Add nodes for a solid through rows of (z as a share of the height, or in m if negative; share of the width)."""
 
     def place(point: Value, row: Value) -> Value:
         level = op.choose(row, [(z, share, 0.0) for z, share in rows])
@@ -74,14 +77,14 @@ def _pillar(tree: Tree, phone: _Phone, rows: tuple[tuple[float, float], ...]) ->
 def _writing(tree: Tree, phone: _Phone) -> Value:
     """Add nodes for the letters SOS on the four sides above the speech panel."""
     sides = []
-    for turns in range(4):
-        wide, deep = (phone.width, phone.depth) if turns % 2 == 0 else (phone.depth, phone.width)
-        low, high = (
-            op.vector(tree, wide * -0.36, phone.height * _LETTERS[0]),
-            op.vector(tree, wide * 0.36, phone.height * _LETTERS[1]),
+    for quarter_turns in range(4):
+        width, depth = (phone.width, phone.depth) if quarter_turns % 2 == 0 else (phone.depth, phone.width)
+        lower_corner, upper_corner = (
+            op.vector(tree, width * -0.36, phone.height * _LETTERS[0]),
+            op.vector(tree, width * 0.36, phone.height * _LETTERS[1]),
         )
-        letters = tree.call(sign_writing_group(), line_1="SOS", low_corner=low, high_corner=high).value
-        upright = op.transform(letters, rotation=(math.pi / 2, 0.0, 0.0))
-        upright = move_geometry(upright, op.vector(tree, 0.0, deep * (-0.5 * sizes.PHONE_WIDTH) - 0.001))
-        sides.append(op.transform(upright, rotation=(0.0, 0.0, turns * math.pi / 2)))
+        letters = tree.call(sign_writing_group(), line_1="SOS", low_corner=lower_corner, high_corner=upper_corner).value
+        face_letters = op.transform(letters, rotation=(math.pi / 2, 0.0, 0.0))
+        face_letters = move_geometry(face_letters, op.vector(tree, 0.0, depth * (-0.5 * sizes.PHONE_WIDTH) - 0.001))
+        sides.append(op.transform(face_letters, rotation=(0.0, 0.0, quarter_turns * math.pi / 2)))
     return op.join(*sides)

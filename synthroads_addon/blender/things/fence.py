@@ -16,6 +16,7 @@ from .model_builder import ModelBuilder
 from .registry import model_part
 
 _BAND = [(1.0, 0.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, 0.0)]
+"""Outline of a band: x in half thicknesses, z in heights."""
 
 
 class _Fence(Lengthwise):
@@ -37,28 +38,30 @@ def fence_group(tree: Tree) -> None:
     with tree.frame("Posts; none where the fence goes on beyond what it follows"):
         station = op.named_attribute(tree, "station")
         end = last_station(fence.axis())
-        number, last = op.index(tree), op.point_count(line) - 1
-        target = op.minimum(fence.start_station + number * fence.post_spacing, fence.end_station)
-        beyond = (target - station > 1e-3) | (station - target > 1e-3)
-        passed = (station > end - 1e-3) & (fence.end_station > end + 1e-3) & (number < last)
-        posts = op.delete_points(line, beyond | passed)
+        post_index, last_index = op.index(tree), op.point_count(line) - 1
+        target = op.minimum(fence.start_station + post_index * fence.post_spacing, fence.end_station)
+        is_outside = (target - station > 1e-3) | (station - target > 1e-3)
+        # A post on the end of a backbone beyond which the fence goes on belongs to the road's next section.
+        is_next_section = (station > end - 1e-3) & (fence.end_station > end + 1e-3) & (post_index < last_index)
+        posts = op.delete_points(line, is_outside | is_next_section)
         body = tube(tree, 1.0, 1.0, sizes.SIDES)
         radius = fence.post_diameter * 0.5
         size = op.vector(tree, radius, radius, fence.height + BURIED)
         foot = op.named_attribute(tree, "foot", "FLOAT_VECTOR")
-        upright = op.upright(op.named_attribute(tree, "left", "FLOAT_VECTOR"))
-        posts = op.realize(put_on_points(posts, body, foot + (0.0, 0.0, -BURIED), size, upright))
+        rotation = op.upright(op.named_attribute(tree, "left", "FLOAT_VECTOR"))
+        posts = op.realize(put_on_points(posts, body, foot + (0.0, 0.0, -BURIED), size, rotation))
         posts = paint_faces(posts, fence.post_material)
     with tree.frame("Bands"):
         mesh = paint_faces(_bands(line, fence, "wildlife"), fence.mesh_material)
         rails = paint_faces(_bands(line, fence, "rails"), fence.rail_material)
         bands = op.switch(fence.rails, mesh, rails)
     with tree.frame("Labels"):
-        whole = op.label(op.join(bands, posts), class_id(Fence.points_class), fence.instance)
-    tree.output("Mesh", whole, description="Posts and bands")
+        fence_mesh = op.label(op.join(bands, posts), class_id(Fence.points_class), fence.instance)
+    tree.output("Mesh", fence_mesh, description="Posts and bands")
 
 
 def _bands(line: Value, fence: _Fence, kind: str) -> Value:
+    """Add nodes for the bands of a kind of fence: wire mesh or rails."""
     bands = [
         sweep(line, _BAND, band.thickness / 2.0, fence.height * (band.high - band.low), fence.height * band.low)
         for band in sizes.KINDS[kind]

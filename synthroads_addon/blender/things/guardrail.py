@@ -16,22 +16,29 @@ from ..nodes.solids import flip_faces, move_geometry, paint_faces, put_on_points
 from .model_builder import ModelBuilder
 from .registry import model_part
 
+# Front of the sheet, then its back, closed.
 BEAM_PROFILE = [(x, 0.0, z) for x, z in sizes.BEAM]
 BEAM_PROFILE += [(x - sizes.SHEET, 0.0, z) for x, z in reversed(sizes.BEAM)]
 BEAM_PROFILE.append(BEAM_PROFILE[0])
 
 _LAP_PROFILE = [(x + sizes.LAP_SHEET, 0.0, z) for x, z in sizes.BEAM]
 _LAP_PROFILE = [BEAM_PROFILE[0], *_LAP_PROFILE, (sizes.BEAM[-1][0], 0.0, sizes.BEAM[-1][1])]
-"""Front of a splice's upper sheet; its edges close the gap to the beam below."""
+"""Front of a splice's upper sheet, with edges that close the gap to the beam below."""
 _BOLT_SIDES = 6
 _NO_BOLTS = 0.01
-"""Tolerance (m) from which on splices have no bolts: it is that of their height."""
+"""Tolerance (m) from which on splices have no bolts: the height of their heads."""
 
-# Across the road, along it; open at its back.
-_HALF, _SIDE = sizes.POST[0] / 2, sizes.POST[1] / 2
-_POST = [(_HALF, -0.010), (_HALF, _SIDE), (-_HALF, _SIDE), (-_HALF, -_SIDE), (_HALF, -_SIDE)]
-POST_DEPTH = _HALF
-"""From a post's axis to the back of a beam that is bolted to it, m."""
+_HALF_DEPTH, _HALF_WIDTH = sizes.POST[0] / 2, sizes.POST[1] / 2
+_POST = [
+    (_HALF_DEPTH, -0.010),
+    (_HALF_DEPTH, _HALF_WIDTH),
+    (-_HALF_DEPTH, _HALF_WIDTH),
+    (-_HALF_DEPTH, -_HALF_WIDTH),
+    (_HALF_DEPTH, -_HALF_WIDTH),
+]
+"""Section of a post, open on one side: coordinates across the road and along it, m."""
+POST_DEPTH = _HALF_DEPTH
+"""Distance from a post's axis to the back of a beam that is bolted to it, m."""
 
 
 class _Rail(Lengthwise):
@@ -62,9 +69,9 @@ class _Rail(Lengthwise):
 
     def top_at(self, station: Value, ramp: Value) -> Value:
         """Add nodes for the height (m) of the beam's top edge above the surface at a station (field)."""
-        inside = op.minimum(station - self.start_station, self.end_station - station) / op.maximum(ramp, 1e-3)
-        share = op.switch(ramp > 1e-3, 1.0, op.minimum(inside, 1.0))
-        return self.height * share + sizes.TIP * (1.0 - share)
+        ramp_share = op.minimum(station - self.start_station, self.end_station - station) / op.maximum(ramp, 1e-3)
+        height_share = op.switch(ramp > 1e-3, 1.0, op.minimum(ramp_share, 1.0))
+        return self.height * height_share + sizes.TIP * (1.0 - height_share)
 
 
 @makes_group("SR Guardrail", catalogue="Barriers")
@@ -74,21 +81,23 @@ def guardrail_group(tree: Tree) -> None:
     axis, surfaces = rail.geometry()
     with tree.frame("Rows of the beams: terminal, middle, terminal"):
         ramp = rail.ramp()
-        begin, end = first_station(axis), last_station(axis)
+        backbone_start, backbone_end = first_station(axis), last_station(axis)
         station = op.named_attribute(tree, "station")
 
         def place_rows(line: Value) -> Value:
-            """Add nodes that store the top edge at the rows; what lies beyond the backbone's ends collapses there."""
-            line = op.store(line, "station", op.clip(station, begin, end))
+            """Add nodes that store the top edge at the rows; rows beyond an end of the backbone collapse onto it."""
+            line = op.store(line, "station", op.clip(station, backbone_start, backbone_end))
             foot, left = foot_at(axis, surfaces, station, rail.offset)
             return op.store(op.store(line, "left", left), "top", raise_place(foot, rail.top_at(station, ramp)))
 
         def place_on_ground(points: Value) -> Value:
             """Add nodes that put points by their station on the ground, and store the height ``tall`` of the beam."""
             points = op.store(points, "tall", rail.top_at(station, ramp))
-            # One on the end of a backbone beyond which the rail goes on is the next stretch's.
-            beyond = (station > end) | ((station > end - 1e-3) & (rail.end_station > end + 1e-3))
-            points = op.delete_points(points, beyond | (station < begin))
+            # A point on the end of a backbone beyond which the rail goes on belongs to the road's next stretch.
+            is_beyond = (station > backbone_end) | (
+                (station > backbone_end - 1e-3) & (rail.end_station > backbone_end + 1e-3)
+            )
+            points = op.delete_points(points, is_beyond | (station < backbone_start))
             foot, left = foot_at(axis, surfaces, station, rail.offset)
             return op.set_position(op.store(points, "left", left), foot)
 
@@ -99,13 +108,13 @@ def guardrail_group(tree: Tree) -> None:
         bolts = op.only_if(rail.bolts, place_on_ground(_splice_rows(tree, rail, sizes.BOLT_ROWS)))
         reflectors = place_on_ground(_reflector_rows(tree, rail, ramp))
     parts, plates = [], []
-    for side, present in rail.beams():
+    for side, has_beam in rail.beams():
         with tree.frame(f"{'Left' if side > 0 else 'Right'} beam"):
             beam = tree.call(
                 _side_group(), line=line, laps=laps, bolts=bolts, reflectors=reflectors, side=side, spacer=rail.spacer
             )
-            parts.append(op.only_if(present, beam["Beam"]))
-            plates.append(op.only_if(present, beam["Plates"]))
+            parts.append(op.only_if(has_beam, beam["Beam"]))
+            plates.append(op.only_if(has_beam, beam["Plates"]))
     with tree.frame("Posts from the start on, where the beam is high enough"):
         posts = place_on_ground(_post_rows(tree, rail))
         posts = op.delete_points(posts, op.named_attribute(tree, "tall") < sizes.LOWEST_POST)
@@ -125,13 +134,18 @@ def _post_rows(tree: Tree, rail: _Rail) -> Value:
     return op.store(posts, "station", rail.start_station + op.index(tree) * rail.post_spacing)
 
 
-def _splice_rows(tree: Tree, rail: _Rail, rows: tuple[float, float]) -> Value:
-    """Add nodes for two points per splice with their ``station``, so far (m) from the splice's middle."""
+def _splice_rows(tree: Tree, rail: _Rail, distances: tuple[float, float]) -> Value:
+    """Add nodes for two points per splice with their ``station``, at two distances (m) after the splice's middle."""
     count = op.maximum(op.round_up((rail.end_station - rail.start_station) / rail.beam_length - 1e-4) - 1, 0)
     count = tree.node("FunctionNodeFloatToInt", count, rounding_mode="ROUND").value
-    points, place = row_of_points(tree, count * 2), op.index(tree)
-    before, after = rows
-    station = rail.start_station + (place // 2 + 1) * rail.beam_length + (place % 2) * (after - before) + before
+    points, point_index = row_of_points(tree, count * 2), op.index(tree)
+    first_distance, second_distance = distances
+    station = (
+        rail.start_station
+        + (point_index // 2 + 1) * rail.beam_length
+        + (point_index % 2) * (second_distance - first_distance)
+        + first_distance
+    )
     return op.store(points, "station", op.clip(station, rail.start_station, rail.end_station))
 
 
@@ -147,23 +161,27 @@ def _reflector_rows(tree: Tree, rail: _Rail, ramp: Value) -> Value:
 def _rows(tree: Tree, rail: _Rail, ramp: Value) -> Value:
     """Add nodes for the beams' rows as points with their ``station``, no farther apart than the beam's step.
 
-    Between the ramps the rows are whole parts of the post spacing from the start on, as the posts are.
+    Between the ramps the post spacing is divided evenly, so that there is a row at each post.
     """
-    first, last = rail.start_station, rail.end_station
+    start, end = rail.start_station, rail.end_station
     step = rail.post_spacing / op.round_up(rail.post_spacing / rail.beam_step - 1e-4)
-    outer = op.round_up(ramp / rail.beam_step - 1e-4)
-    skipped = op.round_up(ramp / step + 1e-4)
-    middle = op.maximum(op.round_up((last - first - ramp) / step - 1e-4) - skipped, 0)
-    middle = tree.node("FunctionNodeFloatToInt", middle, rounding_mode="ROUND").value
-    # Those that lie on a ramp are left out; where it ends there is a row of its own.
-    line = row_of_points(tree, outer * 2 + middle + 2)
-    number = op.index(tree)
-    into = first + ramp * (number / op.maximum(outer, 1))
-    within = first + (number - outer + skipped - 1) * step
-    out_of = last - ramp + ramp * ((number - outer - middle - 1) / op.maximum(outer, 1))
-    within = op.minimum(op.maximum(within, first + ramp), last - ramp)
-    station = op.switch(number > outer, into, op.switch(number > outer + middle, within, out_of))
-    return op.store(line, "station", op.maximum(op.minimum(station, last), first))
+    ramp_rows = op.round_up(ramp / rail.beam_step - 1e-4)
+    skipped_rows = op.round_up(ramp / step + 1e-4)
+    middle_rows = op.maximum(op.round_up((end - start - ramp) / step - 1e-4) - skipped_rows, 0)
+    middle_rows = tree.node("FunctionNodeFloatToInt", middle_rows, rounding_mode="ROUND").value
+    # Rows: ramp up, its end, middle, ramp down. Middle rows that would lie on a ramp are skipped.
+    line = row_of_points(tree, ramp_rows * 2 + middle_rows + 2)
+    row_index = op.index(tree)
+    ramp_up_station = start + ramp * (row_index / op.maximum(ramp_rows, 1))
+    middle_station = start + (row_index - ramp_rows + skipped_rows - 1) * step
+    ramp_down_station = end - ramp + ramp * ((row_index - ramp_rows - middle_rows - 1) / op.maximum(ramp_rows, 1))
+    middle_station = op.minimum(op.maximum(middle_station, start + ramp), end - ramp)
+    station = op.switch(
+        row_index > ramp_rows,
+        ramp_up_station,
+        op.switch(row_index > ramp_rows + middle_rows, middle_station, ramp_down_station),
+    )
+    return op.store(line, "station", op.maximum(op.minimum(station, end), start))
 
 
 class _Side(Inputs):
@@ -183,14 +201,16 @@ def _side_group(tree: Tree) -> None:
         beam = op.delete_degenerate(_sweep(rail, rail.line, BEAM_PROFILE))
     with tree.frame("Upper sheets of the splices"):
         # Faces of a grid run column by column, one less than the rows of them each.
-        between = (op.index(tree) % op.maximum(op.point_count(rail.laps) - 1, 1)) % 2
-        laps = op.delete_faces(_sweep(rail, rail.laps, _LAP_PROFILE), op.maximum(between, 0).equals(1))
+        is_gap = (op.index(tree) % op.maximum(op.point_count(rail.laps) - 1, 1)) % 2
+        laps = op.delete_faces(_sweep(rail, rail.laps, _LAP_PROFILE), op.maximum(is_gap, 0).equals(1))
     with tree.frame("Bolts"):
-        heads = _in_beam(rail, rail.bolts, _bolts(tree))
-    tree.output("Beam", op.join(beam, op.delete_degenerate(laps), heads), description="Beam with splices and bolts")
+        bolt_heads = _in_beam(rail, rail.bolts, _bolts(tree))
+    tree.output(
+        "Beam", op.join(beam, op.delete_degenerate(laps), bolt_heads), description="Beam with splices and bolts"
+    )
     with tree.frame("Reflectors"):
-        plates = _in_beam(rail, rail.reflectors, _reflector(tree))
-    tree.output("Plates", plates, description="Plates of the reflectors, as instances")
+        reflector_plates = _in_beam(rail, rail.reflectors, _reflector(tree))
+    tree.output("Plates", reflector_plates, description="Plates of the reflectors, as instances")
 
 
 def _sweep(rail: _Side, line: Value, outline: list[tuple[float, float, float]]) -> Value:
@@ -198,10 +218,10 @@ def _sweep(rail: _Side, line: Value, outline: list[tuple[float, float, float]]) 
     tree = rail.tree
     mesh, column, row = op.grid(tree, len(outline), op.point_count(line))
     profile = op.choose(column, outline)
-    top = op.sample_index(line, op.named_attribute(tree, "top", "FLOAT_VECTOR"), row)
-    left = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), row)
+    top_edge = op.sample_index(line, op.named_attribute(tree, "top", "FLOAT_VECTOR"), row)
+    left_vector = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), row)
     depth = (op.component(profile, "X") + rail.spacer + POST_DEPTH) * rail.side
-    place = top + left * depth + op.vector(tree, 0.0, 0.0, op.component(profile, "Z"))
+    place = top_edge + left_vector * depth + op.vector(tree, 0.0, 0.0, op.component(profile, "Z"))
     # Seen along the rows the profile runs round clockwise on the right side: there its faces look outwards.
     return flip_faces(op.set_position(mesh, place), rail.side > 0.0)
 
@@ -212,10 +232,13 @@ def _in_beam(rail: _Side, points: Value, body: Value) -> Value:
     The body's x points away from the posts.
     """
     tree = rail.tree
-    away = op.named_attribute(tree, "left", "FLOAT_VECTOR") * rail.side
+    outward_vector = op.named_attribute(tree, "left", "FLOAT_VECTOR") * rail.side
     top = op.vector(tree, 0.0, 0.0, op.named_attribute(tree, "tall"))
     return put_on_points(
-        points, body, op.position(tree) + away * (rail.spacer + POST_DEPTH) + top, rotation=op.upright(away)
+        points,
+        body,
+        op.position(tree) + outward_vector * (rail.spacer + POST_DEPTH) + top,
+        rotation=op.upright(outward_vector),
     )
 
 
@@ -225,47 +248,49 @@ def _bolts(tree: Tree) -> Value:
     disc = tree.node("GeometryNodeMeshCircle", vertices=_BOLT_SIDES, radius=radius, fill_type="NGON").value
     head = tree.node("GeometryNodeExtrudeMesh", disc, offset_scale=height, individual=False).value
     heads = []
-    for depth, below, turn in sizes.BOLTS:
+    for depth, z, angle in sizes.BOLTS:
         # From facing up to facing the road, and then along with the flank's slope.
-        flank = op.transform(head, rotation=(0.0, math.pi / 2.0 - turn, 0.0))
-        outwards = math.cos(turn) * sizes.LAP_SHEET, math.sin(turn) * sizes.LAP_SHEET
-        heads.append(move_geometry(flank, (depth + outwards[0], 0.0, below + outwards[1])))
+        flank = op.transform(head, rotation=(0.0, math.pi / 2.0 - angle, 0.0))
+        sheet_shift = math.cos(angle) * sizes.LAP_SHEET, math.sin(angle) * sizes.LAP_SHEET
+        heads.append(move_geometry(flank, (depth + sheet_shift[0], 0.0, z + sheet_shift[1])))
     return op.join(*heads)
 
 
 def _reflector(tree: Tree) -> Value:
     """Add nodes for a reflector's plate; x points away from the posts, z = 0 is the beam's top edge."""
-    (inner, low), (outer, high) = sizes.REFLECTOR
+    (inner_x, inner_height), (outer_x, outer_height) = sizes.REFLECTOR
+    # A cube whose x, from -0.5 to 0.5, becomes the way from the inner to the outer edge.
     plate = tree.node("GeometryNodeMeshCube", size=1.0).value
     share = op.component(op.position(tree), "X") + 0.5
-    height = op.component(op.position(tree), "Z") * (share * (high - low) + low)
+    height = op.component(op.position(tree), "Z") * (share * (outer_height - inner_height) + inner_height)
     thickness = op.component(op.position(tree), "Y") * sizes.REFLECTOR_PLATE
-    corner = op.vector(tree, share * (outer - inner) + inner, thickness, height + sizes.REFLECTOR_MIDDLE)
+    corner = op.vector(tree, share * (outer_x - inner_x) + inner_x, thickness, height + sizes.REFLECTOR_MIDDLE)
     return op.set_position(plate, corner)
 
 
 def _instances(tree: Tree, posts: Value, rail: _Rail) -> list[Value]:
     """Add nodes for an instance of a post on every point, and of a spacer per beam beside it."""
-    left, tall = op.named_attribute(tree, "left", "FLOAT_VECTOR"), op.named_attribute(tree, "tall")
-    upright = op.upright(left)
+    left_vector, beam_height = op.named_attribute(tree, "left", "FLOAT_VECTOR"), op.named_attribute(tree, "tall")
+    rotation = op.upright(left_vector)
 
     def on_posts(body: Value, height: Operand, scale: Operand) -> Value:
+        """Add nodes for a body on each post's point, `height` (m) above it."""
         points = tree.node("GeometryNodeSetPosition", posts, offset=op.vector(tree, 0.0, 0.0, height)).value
-        return tree.node("GeometryNodeInstanceOnPoints", points, instance=body, rotation=upright, scale=scale).value
+        return tree.node("GeometryNodeInstanceOnPoints", points, instance=body, rotation=rotation, scale=scale).value
 
     parts = [
         on_posts(
             _post(tree),
             -sizes.BURIED,
-            op.vector(tree, 1.0, 1.0, tall + (sizes.BURIED - sizes.POST_TOP)),
+            op.vector(tree, 1.0, 1.0, beam_height + (sizes.BURIED - sizes.POST_TOP)),
         )
     ]
-    for side, present in rail.beams():
-        share, long, high, below = sizes.BLOCK
-        box = tree.node("GeometryNodeMeshCube", size=(share, long, high)).value
-        middle = op.vector(tree, (rail.spacer * 0.5 + POST_DEPTH) * side, 0.0, -below)
+    for side, has_beam in rail.beams():
+        block_width, block_length, block_height, block_depth = sizes.BLOCK
+        box = tree.node("GeometryNodeMeshCube", size=(block_width, block_length, block_height)).value
+        middle = op.vector(tree, (rail.spacer * 0.5 + POST_DEPTH) * side, 0.0, -block_depth)
         body = op.transform(box, translation=middle, scale=op.vector(tree, rail.spacer, 1.0, 1.0))
-        parts.append(op.only_if(present & (rail.spacer > 1e-3), on_posts(body, tall, 1.0)))
+        parts.append(op.only_if(has_beam & (rail.spacer > 1e-3), on_posts(body, beam_height, 1.0)))
     return parts
 
 

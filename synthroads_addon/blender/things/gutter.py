@@ -36,12 +36,12 @@ def gutter_group(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Channel and kerb")
 
 
-def _solid(line: Value, gutter: _Gutter, outline: tuple[tuple[float, float], ...], tall: Operand) -> Value:
+def _solid(line: Value, gutter: _Gutter, outline: tuple[tuple[float, float], ...], height: Operand) -> Value:
     """Add nodes for the solid of an outline, mirrored where the kerb is on the right."""
-    half = gutter.width * 0.5
-    left = sweep(line, list(outline), half, tall, -BURIED)
-    right = sweep(line, sizes.mirrored(outline), half, tall, -BURIED)
-    return op.switch(gutter.kerb_on_right, left, right)
+    half_width = gutter.width * 0.5
+    left_solid = sweep(line, list(outline), half_width, height, -BURIED)
+    right_solid = sweep(line, sizes.mirrored(outline), half_width, height, -BURIED)
+    return op.switch(gutter.kerb_on_right, left_solid, right_solid)
 
 
 @model_part("gutters", 68)

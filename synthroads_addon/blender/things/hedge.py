@@ -1,4 +1,7 @@
-"""Hedges: leaves within an outline, denser towards its surface (SR Hedge)."""
+"""Hedges: leaves within an outline, denser towards its surface (SR Hedge).
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +18,13 @@ from .model_builder import ModelBuilder
 from .registry import model_part
 
 _LEAF = [(0.0, -0.5, 0.0), (0.5, 0.3, 0.0), (-0.42, 0.5, 0.0)]
-"""A triangle that stands for a twig's leaves: across, along, up."""
+"""Triangle that represents a twig's leaves, in widths and lengths; chosen."""
 _SIZE = (0.20, 0.30)
-"""Width and length of such a triangle, m."""
+"""Width and length of such a triangle, m; chosen."""
 _BARE = 0.1
-"""Width of the twigs that are left of it in winter, as a share of its own."""
+"""Width of a bare twig in winter, as a share of the triangle's width; chosen."""
 _HOLLOW = 0.5
-"""Share of the way to its surface within which a hedge has no leaves."""
+"""Share of the way from the middle to the surface within which a hedge has no leaves; chosen."""
 
 
 class _Hedge(Lengthwise):
@@ -42,25 +45,25 @@ def hedge_group(tree: Tree) -> None:
     hedge = _Hedge(tree)
     axis, surfaces = hedge.geometry()
     with tree.frame("Numbers of the leaves, counted from the road's begin"):
-        dense = op.round_up(hedge.leaves_per_metre * op.maximum(hedge.detail, 0.04))
-        first = op.round_up(hedge.start_station * dense) + hedge.zero * dense
-        count = op.maximum((hedge.end_station - hedge.start_station) * dense, 0.0)
+        density = op.round_up(hedge.leaves_per_metre * op.maximum(hedge.detail, 0.04))
+        first_number = op.round_up(hedge.start_station * density) + hedge.zero * density
+        count = op.maximum((hedge.end_station - hedge.start_station) * density, 0.0)
         points = tree.node("GeometryNodePoints", count=op.round_up(count)).value
-        points = op.store(points, "id", op.index(tree) + first)
-        number = op.named_attribute(tree, "id", "INT")
+        points = op.store(points, "id", op.index(tree) + first_number)
+        leaf_number = op.named_attribute(tree, "id", "INT")
     with tree.frame("Places: around the middle, from the hollow to the outline"):
-        station = (number - hedge.zero * dense) / (dense * 1.0)
-        turn = op.random(tree, -0.12 * math.pi, 1.12 * math.pi, hedge.seed + 1, number)
-        depth = op.power(op.random(tree, _HOLLOW**2, 1.0, hedge.seed + 2, number), 0.5)
-        x = op.unary("COSINE", turn) * depth
-        z = op.clip(op.unary("SINE", turn) * depth, -0.3, 1.0)
-        # A rounded box: the sides go up steeply, the top is nearly level.
+        station = (leaf_number - hedge.zero * density) / (density * 1.0)
+        angle = op.random(tree, -0.12 * math.pi, 1.12 * math.pi, hedge.seed + 1, leaf_number)
+        radius = op.power(op.random(tree, _HOLLOW**2, 1.0, hedge.seed + 2, leaf_number), 0.5)
+        x = op.unary("COSINE", angle) * radius
+        z = op.clip(op.unary("SINE", angle) * radius, -0.3, 1.0)
+        # A rounded box: steep sides and a nearly level top; numbers here are chosen.
         x, z = _boxed(x), op.clip(_boxed(z) * 0.62 + 0.38, 0.03, 1.0)
         offset = hedge.offset + x * (hedge.width * 0.5)
         foot, _ = foot_at(axis, surfaces, station, offset)
         place = foot + op.vector(tree, 0.0, 0.0, z * (hedge.height - _SIZE[1] * 0.4))
-        beyond = (station < first_station(axis)) | (station > last_station(axis)) | (station > hedge.end_station)
-        points = op.delete_points(op.set_position(points, place), beyond)
+        is_outside = (station < first_station(axis)) | (station > last_station(axis)) | (station > hedge.end_station)
+        points = op.delete_points(op.set_position(points, place), is_outside)
     with tree.frame("Leaves"):
         face = tree.node("GeometryNodeMeshCircle", vertices=3, fill_type="NGON").value
         size = op.vector(tree, hedge.leaf_width, _SIZE[1], 1.0)
@@ -79,7 +82,7 @@ def hedge_group(tree: Tree) -> None:
 
 
 def _boxed(value: Value) -> Value:
-    """Add nodes that press a number from -1 to 1 towards its ends: a circle becomes a rounded square."""
+    """Add nodes for sign(v) |v|^0.55 of a number from -1 to 1: they turn a circle into a rounded square."""
     size = op.power(op.unary("ABSOLUTE", value), 0.55)
     return op.switch(value < 0.0, size, size * -1.0)
 
@@ -89,8 +92,8 @@ def build_hedges(builder: ModelBuilder) -> None:
     """Add one object per hedge to the model; none at detail 0."""
     if builder.detail == 0.0:
         return
-    bare = builder.parameters.environment.season == "winter"
-    looks = {"material": "bark" if bare else "leaves", "leaf_width": _SIZE[0] * (_BARE if bare else 1.0)}
+    leafless = builder.parameters.environment.season == "winter"
+    looks = {"material": "bark" if leafless else "leaves", "leaf_width": _SIZE[0] * (_BARE if leafless else 1.0)}
     for name, hedge in builder.parameters.of_type(Hedge).items():
         builder.add_thing(
             name,

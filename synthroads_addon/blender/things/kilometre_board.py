@@ -34,9 +34,9 @@ def kilometre_board_group(tree: Tree) -> None:
     with tree.frame("Two faces back to back around the post"):
         plate = tree.call(sign_face_group(), instance=standing.instance, **face.values).value
         front = move_geometry(plate, op.vector(tree, 0.0, -face.thickness))
-        behind = op.transform(front, rotation=(0.0, 0.0, math.pi))
+        back = op.transform(front, rotation=(0.0, 0.0, math.pi))
         middle = board.lower_edge + face.height * 0.5
-        plates = move_geometry(op.join(front, behind), op.vector(tree, 0.0, 0.0, middle))
+        plates = move_geometry(op.join(front, back), op.vector(tree, 0.0, 0.0, middle))
     with tree.frame("Put onto the points"):
         places = standing.places()
         mesh = put_on(places, plates)

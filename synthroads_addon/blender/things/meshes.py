@@ -1,4 +1,4 @@
-"""Meshes that Python hands to the node groups: points with attributes, vertices, edges and faces."""
+"""Meshes that node groups start from: points with attributes, vertices, edges and faces."""
 
 from __future__ import annotations
 
@@ -76,6 +76,7 @@ def fill_polygons(mesh: bpy.types.Mesh, vertices: Float, sizes: Sequence[int]) -
 
 
 def _add_faces(mesh: bpy.types.Mesh, corners: NDArray[np.intp], sizes: NDArray[np.intp]) -> None:
+    """Add faces of given sizes, whose corners (C,) are vertex indices, to a mesh."""
     mesh.loops.add(corners.size)
     mesh.loops.foreach_set("vertex_index", corners.astype(np.int32))
     mesh.polygons.add(len(sizes))
@@ -85,8 +86,8 @@ def _add_faces(mesh: bpy.types.Mesh, corners: NDArray[np.intp], sizes: NDArray[n
 
 def attribute(mesh: bpy.types.Mesh, name: str, values: NDArray[Any]) -> None:
     """Store a new point attribute in a mesh: integers (N,), floats (N,) or vectors (N, 3), in 32 bits."""
-    whole = np.issubdtype(values.dtype, np.integer)
-    kind = "FLOAT_VECTOR" if values.ndim == 2 else "INT" if whole else "FLOAT"
+    is_integer = np.issubdtype(values.dtype, np.integer)
+    kind = "FLOAT_VECTOR" if values.ndim == 2 else "INT" if is_integer else "FLOAT"
     data = mesh.attributes.new(name, kind, "POINT").data
-    flat = values.astype(np.int32 if whole else np.float32).ravel()
-    data.foreach_set("vector" if kind == "FLOAT_VECTOR" else "value", flat)
+    flat_values = values.astype(np.int32 if is_integer else np.float32).ravel()
+    data.foreach_set("vector" if kind == "FLOAT_VECTOR" else "value", flat_values)

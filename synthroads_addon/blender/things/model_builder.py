@@ -25,19 +25,20 @@ from ..nodes.inputs import input_name
 from .meshes import on_plan, points_mesh, signed_instance
 
 ROLE = "synthroads_role"
-"""Custom property of the objects that `build_road` makes: what they are in the model."""
+"""Custom property of the objects that `build_road` makes: their role in the model."""
 SUPPORT = "synthroads_support"
 """Custom property of objects that only other objects need: they are hidden and never scanned."""
 
 _ROOM = 5.0
+"""Width beyond the verges that is reserved for edits, m; chosen."""
 _RENAMED = {"Smallest Height": "height_min", "Largest Height": "height_max"}
-"""Inputs that are not named as their fields."""
+"""Fields of inputs that have another name."""
 _KINDS: dict[str, tuple[type, ...]] = {
     "NodeSocketFloat": (float,),
     "NodeSocketInt": (int,),
     "NodeSocketBool": (bool,),
 }
-"""Kinds of sockets that fields of a thing fill, and the fields' types."""
+"""Types of fields that set inputs, by the socket's type."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +49,11 @@ class BuildRequest:
         parameters: the road.
         tolerance: largest chord error of the road's surface, m.
         vegetation_detail: share of the vegetation's triangles, 0 to 1; 0 builds none.
-        parts: which of `model_parts` are wanted; all if None. What they need from others is built hidden.
-        stretch: stations between which it is built, with an origin of its own (see `road.stretches`), from and to the
-            nearest rows of the whole road's surface; the whole road if None.
-        geometry: of the parameters, if there is one already.
-        own: materials in place of the shipped table's.
+        parts: names of the `model_parts` to build; all if None. Other parts that these need are built hidden.
+        stretch: stations (m) between which the road is built, moved to the nearest rows of the whole road's surface,
+            with an origin of its own (see `road.stretches`); the whole road if None.
+        geometry: geometry of the parameters, if it exists already.
+        user_table: materials that replace those of the shipped table, by name.
     """
 
     parameters: RoadParameters
@@ -61,49 +62,49 @@ class BuildRequest:
     parts: Collection[str] | None = None
     stretch: tuple[float, float] | None = None
     geometry: RoadGeometry | None = None
-    own: Mapping[str, Material] | None = None
+    user_table: Mapping[str, Material] | None = None
 
 
 class ModelBuilder:
-    """Builder that adds a road model's objects one by one, and what they need to know of the road.
+    """Builder that adds a road model's objects one by one, with the data of the road that they need.
 
     Attributes:
-        parameters: the road, with only those objects that stand on the stretch.
+        parameters: the road, with only the objects on the stretch.
         geometry: the whole road's analytic geometry.
-        materials: the road's.
-        stretch: stations between which it is built, two of those that the whole road's surface has.
-        stations: (N,) m, of the rows of the surface.
-        origin: (3,) local coordinates of the scene's origin: near the stretch, as the scene has float32.
-        zero: station (m) that the nodes count theirs from, for the same reason; a whole number.
+        materials: the road's materials.
+        stretch: stations (m) between which the road is built; both are rows of the whole road's surface.
+        stations: (N,) stations of the surface's rows, m.
+        origin: (3,) local coordinates of the scene's origin, m: near the stretch, as the scene has float32.
+        zero: station (m) that nodes' stations are relative to, for the same reason; a whole number.
         tolerance: largest chord error of the road's surface, m.
         detail: share of the vegetation's triangles, 0 to 1.
-        hidden: what is added now is only needed by other parts.
-        objects: what was added, by role.
-        at_once: how many objects may be added in one turn.
+        hidden: whether objects are added hidden, as only other parts need them.
+        objects: the added objects by role.
+        at_once: number of objects that may be added before the caller evaluates them.
     """
 
     def __init__(
         self, request: BuildRequest, collection: bpy.types.Collection, root: bpy.types.Object | None = None
     ) -> None:
         self.geometry = request.geometry or RoadGeometry(request.parameters)
-        self._given = request.stretch or (0.0, self.geometry.length)
+        self._requested_stretch = request.stretch or (0.0, self.geometry.length)
         self.stations: NDArray[np.float64] = np.zeros(0)
-        self.stretch = self._given
-        self._whole = request.stretch is None
-        self.parameters, self.materials = request.parameters, RoadMaterials.of(request.parameters, request.own)
+        self.stretch = self._requested_stretch
+        self._is_whole_road = request.stretch is None
+        self.parameters, self.materials = request.parameters, RoadMaterials.of(request.parameters, request.user_table)
         self.origin, self.zero = np.zeros(3), 0
         self.tolerance = request.tolerance
         self.detail = request.vegetation_detail
         self.hidden = False
         self.objects: dict[str, bpy.types.Object] = {}
         self.at_once = 1
-        self._unseen = 0
+        self._unevaluated = 0
         self._collection, self._root = collection, root
 
     def lay_out(self) -> None:
         """Compute the surface's rows and cut the parameters to the stretch; must be called before anything is added."""
-        self.stations = run_aside(lambda: sample_stations(self.geometry, self.tolerance, *self._given))
-        if not self._whole:
+        self.stations = run_aside(lambda: sample_stations(self.geometry, self.tolerance, *self._requested_stretch))
+        if not self._is_whole_road:
             self.stretch = (float(self.stations[0]), float(self.stations[-1]))
             self.parameters = cut_stretch(self.parameters, *self.stretch)
             self.origin, self.zero = frame_of(self.geometry, *self.stretch)
@@ -112,11 +113,12 @@ class ModelBuilder:
     def step(self) -> float:
         """Longest straight piece (m) of things along the road that keeps the tolerance in its curves; cached.
 
-        It is that of the whole road, 4 m halved as often as need be: pieces of a stretch are the whole road's.
+        It is 4 m, halved as often as the whole road's curves require, so that pieces of a stretch are the whole road's.
         """
-        bends = [max(abs(e.curvature_start), abs(e.curvature_end)) for e in self.geometry.alignment.elements]
-        longest = np.sqrt(8.0 * self.tolerance / max(*bends, 1e-9))
-        return float(2.0 ** np.floor(np.log2(np.clip(longest, 0.5, 4.0))))
+        curvatures = [max(abs(e.curvature_start), abs(e.curvature_end)) for e in self.geometry.alignment.elements]
+        # Chord error of an arc: s = l^2 k / 8.
+        chord_length = np.sqrt(8.0 * self.tolerance / max(*curvatures, 1e-9))
+        return float(2.0 ** np.floor(np.log2(np.clip(chord_length, 0.5, 4.0))))
 
     @cached_property
     def widest(self) -> float:
@@ -126,7 +128,7 @@ class ModelBuilder:
         return float(np.ceil(max(edges)) + _ROOM)
 
     def along(self, station: float) -> float:
-        """Return a station, m, relative to the one that the nodes count from."""
+        """Return a station, m, relative to `zero`, as nodes have it."""
         return station - self.zero
 
     def points(
@@ -146,7 +148,7 @@ class ModelBuilder:
         """Add a thing of the road as an object with its node group, inputs set from the fields of the same names.
 
         Args:
-            name: its id.
+            name: the thing's id.
             item: the thing.
             group: its node group.
             mesh: of the object; if None, a vertex at a point object's place, and nothing for other things.
@@ -170,12 +172,12 @@ class ModelBuilder:
         """Add an object with a mesh to the model, and a Geometry Nodes modifier if a group is given.
 
         Args:
-            role: what it is in the model.
+            role: the object's role in the model.
             mesh: of the object; one without anything if None.
             group: of its modifier.
-            inputs: the modifier's, by name; materials by their names in the table. Those that are named as objects of
-                the model (``Road``, ``Terrain``) need not be among them, nor materials that the group usually has.
-            support: only other objects need it.
+            inputs: the modifier's inputs by name; materials by their names in the table. Inputs named like an object of
+                the model (``Road``, ``Terrain``) and materials with a default may be left out.
+            support: whether only other objects need the object: it is hidden then.
         """
         mesh = mesh or bpy.data.meshes.new("SR")
         item = bpy.data.objects.new(role, mesh)
@@ -224,11 +226,12 @@ class ModelBuilder:
         return self.materials.material(value) if kind == "NodeSocketMaterial" else value
 
     def _added(self, role: str, item: bpy.types.Object) -> None:
+        """Note an added object, and let the caller evaluate objects after every `at_once` of them."""
         self.objects[role] = item
-        self._unseen += 1
-        if self._unseen >= self.at_once:
-            self._unseen = 0
-            yield_now()  # so that they are evaluated in a turn of their own
+        self._unevaluated += 1
+        if self._unevaluated >= self.at_once:
+            self._unevaluated = 0
+            yield_now()  # the caller evaluates the new objects before the next are added
         yield_if_due()
 
 

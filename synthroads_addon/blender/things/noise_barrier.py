@@ -19,7 +19,8 @@ from .model_builder import ModelBuilder
 from .registry import model_part
 
 _KINDS = ("aluminium", "concrete", "wood", "glass")
-_SUNK = 0.003  # m: faces that coincide have no first hit
+_SUNK = 0.003
+"""Depth of slats in the panel's core, m: rays can't tell apart faces that coincide; chosen."""
 
 
 @dataclass(frozen=True)
@@ -27,14 +28,14 @@ class _Relief:
     """Dimensions of the slats (cassettes, ribs or boards) on a panel's face.
 
     Attributes:
-        lying: whether they run along the panel; they stand otherwise.
-        pitch: distance between them, m.
-        share: their width as a share of the pitch.
-        bevel: what either flank takes of the width, as a share.
+        is_horizontal: whether slats run along the panel; else they are upright.
+        pitch: distance between slats, m.
+        share: width of a slat as a share of the pitch.
+        bevel: width of each flank of a slat, as a share of its width.
         cap: whether a strip closes the panel's top.
     """
 
-    lying: bool
+    is_horizontal: bool
     pitch: float
     share: float
     bevel: float
@@ -42,9 +43,9 @@ class _Relief:
 
 
 _RELIEFS = {
-    "aluminium": _Relief(lying=True, pitch=0.25, share=0.9, bevel=0.15, cap=True),
-    "concrete": _Relief(lying=False, pitch=0.2, share=0.7, bevel=0.2, cap=False),
-    "wood": _Relief(lying=False, pitch=0.14, share=0.82, bevel=0.02, cap=True),
+    "aluminium": _Relief(is_horizontal=True, pitch=0.25, share=0.9, bevel=0.15, cap=True),
+    "concrete": _Relief(is_horizontal=False, pitch=0.2, share=0.7, bevel=0.2, cap=False),
+    "wood": _Relief(is_horizontal=False, pitch=0.14, share=0.82, bevel=0.02, cap=True),
 }
 
 
@@ -80,8 +81,8 @@ def noise_barrier_group(tree: Tree) -> None:
         bays = _bays(tree, wall, count, axis, surfaces)
     with tree.frame("Plinths and panels"):
         plinth = op.minimum(wall.height * sizes.PLINTH_SHARE, sizes.HIGHEST_PLINTH)
-        fits = wall.thickness < wall.post_width * (2.0 * sizes.INSIDE)
-        gap = op.switch(fits, wall.post_width * 0.5, wall.post_width * sizes.WEB) + sizes.PLAY
+        is_slim = wall.thickness < wall.post_width * (2.0 * sizes.INSIDE)
+        gap = op.switch(is_slim, wall.post_width * 0.5, wall.post_width * sizes.WEB) + sizes.PLAY
         panel = tree.call(
             _panel_group(),
             panel=wall.panel,
@@ -100,37 +101,39 @@ def noise_barrier_group(tree: Tree) -> None:
 def _posts(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[Value, Value]) -> Value:
     """Add nodes for the posts as instances; those beyond the backbone, or on an end the wall passes, are left out."""
     posts = row_of_points(tree, count + 1)
-    number = op.index(tree)
+    post_index = op.index(tree)
     posts = op.store(
-        posts, "station", op.switch(number < count, wall.end_station, wall.start_station + number * wall.post_spacing)
+        posts,
+        "station",
+        op.switch(post_index < count, wall.end_station, wall.start_station + post_index * wall.post_spacing),
     )
     station, end = op.named_attribute(tree, "station"), last_station(axis)
-    passed = (station > end - 1e-3) & (wall.end_station > end + 1e-3)
-    posts = op.delete_points(posts, passed | (station < first_station(axis)))
+    is_next_section = (station > end - 1e-3) & (wall.end_station > end + 1e-3)
+    posts = op.delete_points(posts, is_next_section | (station < first_station(axis)))
     foot, left = foot_at(axis, surfaces, station, wall.offset)
     size = op.vector(tree, wall.post_width, wall.post_width, wall.height + sizes.BURIED)
-    upright = op.upright(left)
-    return put_on_points(posts, _post(tree), foot + (0.0, 0.0, -sizes.BURIED), size, upright)
+    rotation = op.upright(left)
+    return put_on_points(posts, _post(tree), foot + (0.0, 0.0, -sizes.BURIED), size, rotation)
 
 
 def _post(tree: Tree) -> Value:
     """Add nodes for an HEA profile of 1 m width and height on z = 0: x is across the wall, y along it."""
     flange = (sizes.FLANGE - sizes.INSIDE, 1.0, 1.0)
-    beside = (sizes.FLANGE + sizes.INSIDE) / 2
+    flange_x = (sizes.FLANGE + sizes.INSIDE) / 2
     web = box(tree, (2.0 * sizes.INSIDE + 0.01, 2.0 * sizes.WEB, 1.0), (0.0, 0.0, 0.5))
-    return op.join(web, *(box(tree, flange, (beside * side, 0.0, 0.5)) for side in (1.0, -1.0)))
+    return op.join(web, *(box(tree, flange, (flange_x * side, 0.0, 0.5)) for side in (1.0, -1.0)))
 
 
 def _bays(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[Value, Value]) -> Value:
     """Add nodes for one point per bay with its number and its foot's ``start`` and ``end``, cut at the backbone."""
     bays = row_of_points(tree, count)
-    number = op.index(tree)
-    start = wall.start_station + number * wall.post_spacing
-    end = op.switch(number < count - 1, wall.end_station, start + wall.post_spacing)
+    bay_index = op.index(tree)
+    start = wall.start_station + bay_index * wall.post_spacing
+    end = op.switch(bay_index < count - 1, wall.end_station, start + wall.post_spacing)
     for name, station in {"from": start, "to": end}.items():
-        within = op.minimum(op.maximum(station, first_station(axis)), last_station(axis))
-        bays = op.store(bays, name, within)
-    bays = op.store(bays, "bay", number)
+        clamped_station = op.minimum(op.maximum(station, first_station(axis)), last_station(axis))
+        bays = op.store(bays, name, clamped_station)
+    bays = op.store(bays, "bay", bay_index)
     bays = op.delete_points(bays, op.named_attribute(tree, "to") - op.named_attribute(tree, "from") < 0.05)
     for name, station_name in {"start": "from", "end": "to"}.items():
         foot, _ = foot_at(axis, surfaces, op.named_attribute(tree, station_name), wall.offset)
@@ -142,26 +145,29 @@ def _fill_bays(tree: Tree, wall: _Wall, bays: Value, gaps: tuple[Value, Value], 
     """Add nodes for a panel on a plinth in every bay, level at the lower one of its posts' feet."""
     (gap, plinth), (panel, block) = gaps, bodies
     start, end = (op.named_attribute(tree, name, "FLOAT_VECTOR") for name in ("start", "end"))
-    low = op.minimum(op.component(start, "Z"), op.component(end, "Z"))
-    along = (end - start) * (1.0, 1.0, 0.0)
-    length = op.maximum(op.length(along) - gap * 2.0, 0.02)
+    lower_foot = op.minimum(op.component(start, "Z"), op.component(end, "Z"))
+    direction = (end - start) * (1.0, 1.0, 0.0)
+    length = op.maximum(op.length(direction) - gap * 2.0, 0.02)
     middle = (start + end) * 0.5
-    level = op.vector(tree, op.component(middle, "X"), op.component(middle, "Y"), low + plinth)
-    turned = op.upright(along)
+    panel_place = op.vector(tree, op.component(middle, "X"), op.component(middle, "Y"), lower_foot + plinth)
+    rotation = op.upright(direction)
     # The panels' face looks to -y, which is away from the road on its right side.
-    facing = tree.node(
+    panel_rotation = tree.node(
         "FunctionNodeRotateRotation",
-        turned,
+        rotation,
         op.turn(tree, z=op.switch(wall.offset < 0.0, 0.0, math.pi)),
         rotation_space="LOCAL",
     ).value
     panels = put_on_points(
-        bays, panel, level, op.vector(tree, length / (wall.post_spacing - gap * 2.0), 1.0, 1.0), facing
+        bays, panel, panel_place, op.vector(tree, length / (wall.post_spacing - gap * 2.0), 1.0, 1.0), panel_rotation
     )
-    deep = plinth + sizes.BURIED
-    below = level - op.vector(tree, 0.0, 0.0, deep * 0.5)
+    plinth_height = plinth + sizes.BURIED
+    plinth_place = panel_place - op.vector(tree, 0.0, 0.0, plinth_height * 0.5)
     return op.realize(
-        op.join(panels, put_on_points(bays, block, below, op.vector(tree, length, wall.thickness, deep), turned))
+        op.join(
+            panels,
+            put_on_points(bays, block, plinth_place, op.vector(tree, length, wall.thickness, plinth_height), rotation),
+        )
     )
 
 
@@ -181,39 +187,39 @@ def _panel_group(tree: Tree) -> None:
     parts = []
     for number, name in enumerate(_KINDS):
         with tree.frame(f"{name.capitalize()} panel"):
-            made = _slatted_wall(tree, panel, name) if name in _RELIEFS else _glass_pane(tree, panel)
-            parts.append(op.only_if(panel.panel.equals(number), made))
+            panel_body = _slatted_wall(tree, panel, name) if name in _RELIEFS else _glass_pane(tree, panel)
+            parts.append(op.only_if(panel.panel.equals(number), panel_body))
     tree.output("Mesh", op.realize(op.join(*parts)), description="The panel")
 
 
 def _slatted_wall(tree: Tree, panel: _Panel, kind: str) -> Value:
     """Add nodes for a panel with slats on its face, and a cap where its kind has one."""
     relief = _RELIEFS[kind]
-    out = op.minimum(panel.thickness * sizes.RELIEF_SHARE, sizes.RELIEFS[kind])
-    tall = panel.height - (sizes.CAP if relief.cap else 0.0)
+    relief_depth = op.minimum(panel.thickness * sizes.RELIEF_SHARE, sizes.RELIEFS[kind])
+    core_height = panel.height - (sizes.CAP if relief.cap else 0.0)
     core = box(
         tree,
-        op.vector(tree, panel.length, panel.thickness - out, tall),
-        op.vector(tree, 0.0, out * 0.5, tall * 0.5),
+        op.vector(tree, panel.length, panel.thickness - relief_depth, core_height),
+        op.vector(tree, 0.0, relief_depth * 0.5, core_height * 0.5),
     )
-    span, length = (tall, panel.length) if relief.lying else (panel.length, tall)
+    span, length = (core_height, panel.length) if relief.is_horizontal else (panel.length, core_height)
     count = op.round_up(span / relief.pitch - 0.5)
     pitch = span / count
-    across = (op.index(tree) + 0.5) * pitch
-    front = out - panel.thickness * 0.5 + _SUNK
+    slat_position = (op.index(tree) + 0.5) * pitch
+    front = relief_depth - panel.thickness * 0.5 + _SUNK
     slat = prism(tree, [(-0.5, 0.0), (relief.bevel - 0.5, -1.0), (0.5 - relief.bevel, -1.0), (0.5, 0.0)])
-    size = op.vector(tree, pitch * relief.share, out + _SUNK, length - 0.002)
-    if relief.lying:
-        start = op.vector(tree, 0.001 - length * 0.5, front, across)
+    size = op.vector(tree, pitch * relief.share, relief_depth + _SUNK, length - 0.002)
+    if relief.is_horizontal:
+        start = op.vector(tree, 0.001 - length * 0.5, front, slat_position)
         slats = put_on_points(row_of_points(tree, count), slat, start, size, op.turn(tree, y=math.pi / 2))
     else:
-        start = op.vector(tree, across - panel.length * 0.5, front, 0.001)
+        start = op.vector(tree, slat_position - panel.length * 0.5, front, 0.001)
         slats = put_on_points(row_of_points(tree, count), slat, start, size)
     parts = [paint_faces(core, panel.panel_material), paint_faces(op.realize(slats), panel.panel_material)]
     if relief.cap:
         strip = op.vector(tree, panel.length, panel.thickness, sizes.CAP)
         parts.append(
-            paint_faces(box(tree, strip, op.vector(tree, 0.0, 0.0, tall + sizes.CAP / 2)), panel.frame_material)
+            paint_faces(box(tree, strip, op.vector(tree, 0.0, 0.0, core_height + sizes.CAP / 2)), panel.frame_material)
         )
     return op.join(*parts)
 

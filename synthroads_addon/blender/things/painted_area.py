@@ -1,4 +1,4 @@
-"""Areas on the pavement as outlines in stations and offsets: SR Painted Area; SR Damaged Area."""
+"""Areas on the pavement with outlines in stations and offsets: SR Painted Area, SR Damaged Area."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ from .model_builder import ModelBuilder
 from .registry import model_part
 
 T = TypeVar("T")
-_LONGEST = 1.0
-"""Outlines are cut into pieces no longer than this (m), so that they follow the road's curves and its crossfall."""
-_WIDEST = 1.0
-"""Nothing reaches farther along the road beyond its corners: a crack's band is 0.2 m wide at most, m."""
+_LONGEST_PIECE = 1.0
+"""Largest length of the pieces of an outline, m, so that they follow the road's curves and its crossfall; chosen."""
+_MARGIN = 1.0
+"""Distance along the road (m) by which an area may exceed its corners: more than a crack's band of at most 0.2 m."""
 
 
 class _Outlines(Inputs):
@@ -72,8 +72,8 @@ def painted_area_group(tree: Tree) -> None:
     mesh = _lay(outlines)
     with tree.frame("Labels"):
         mesh = op.label(mesh, class_id("road_marking"), op.named_attribute(tree, "instance", "INT"), paint.material)
-        temporary = op.named_attribute(tree, "yellow") > 0.5
-        mesh = paint_faces(mesh, paint.yellow_material, temporary)
+        is_temporary = op.named_attribute(tree, "yellow") > 0.5
+        mesh = paint_faces(mesh, paint.yellow_material, is_temporary)
     tree.output("Mesh", mesh, description="Paint whose faces look up")
 
 
@@ -103,8 +103,8 @@ def damaged_area_group(tree: Tree) -> None:
         mesh = op.label(mesh, class_id("road"), op.named_attribute(tree, "instance", "INT"), damage.material)
         course = op.named_attribute(tree, "course")
         for number in range(1, len(_COURSES)):
-            of_kind = (course > number - 0.5) & (course < number + 0.5)
-            mesh = paint_faces(mesh, damage.values[f"{_COURSES[number]}_material"], of_kind)
+            is_of_course = (course > number - 0.5) & (course < number + 0.5)
+            mesh = paint_faces(mesh, damage.values[f"{_COURSES[number]}_material"], is_of_course)
     tree.output("Mesh", mesh, description="Pavement whose faces look up")
 
 
@@ -118,8 +118,8 @@ def _lay(area: _Outlines) -> Value:
     with tree.frame("On the pavement"):
         surface = op.object_geometry(area.road)
         height = height_on(surface, surface, plan) + op.named_attribute(tree, "film")
-        flat = plan * (1.0, 1.0, 0.0)
-        return op.set_position(area.outlines, flat + op.vector(tree, 0.0, 0.0, height))
+        plan_place = plan * (1.0, 1.0, 0.0)
+        return op.set_position(area.outlines, plan_place + op.vector(tree, 0.0, 0.0, height))
 
 
 @model_part("painted_areas", 30, on_the_road=True)
@@ -140,16 +140,16 @@ def build_painted_areas(builder: ModelBuilder) -> None:
 def _painted_places(
     builder: ModelBuilder, outlines: list[tuple[NDArray[np.float64], Hatching | Arrow]]
 ) -> NDArray[np.float64]:
-    """Return what the materials read (N, 3) at the corners of painted areas, one outline after the other."""
+    """Return the attribute ``pavement`` (N, 3) at the corners of painted areas, one outline after the other."""
     road, result = builder.geometry.parameters, []
     for outline, item in outlines:
         carriageway = road.carriageway_of(item)
         section = builder.geometry.sections[carriageway.side]
-        across = pavement_places(section, outline[:, 0], outline[:, 1]).across
+        lane_distance = pavement_places(section, outline[:, 0], outline[:, 1]).across
         kind = PAINT_IN_LANE if isinstance(item, Arrow) else PAINT_AREA
-        # Beside whole numbers, so that rounding doesn't make another one of them.
+        # A quarter is added, so that rounding can't change the code's whole part.
         code = place_code(kind, int(carriageway.side == "left")) + 0.25
-        result.append(np.column_stack([outline[:, 0], across, np.full(len(outline), code)]))
+        result.append(np.column_stack([outline[:, 0], lane_distance, np.full(len(outline), code)]))
     return np.concatenate(result)
 
 
@@ -180,18 +180,21 @@ class _Area(NamedTuple):
 
 
 def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
+    """Yield the faces of patches, cracks and removed markings on the stretch that is built."""
     geometry = builder.geometry
     # Of the whole road, as an area may reach over the end of the stretch.
     for name, carriageway in geometry.parameters.of_type(Carriageway).items():
         pavement = carriageway.pavement
-        first, course = len(pavement.ruts) + len(pavement.potholes), _COURSES.index(pavement.kind)
-        for part, patch in _near(builder, pavement.patches, first, lambda patch: patch.outline):
+        first_part, course = len(pavement.ruts) + len(pavement.potholes), _COURSES.index(pavement.kind)
+        for part, patch in _on_stretch(builder, pavement.patches, first_part, lambda patch: patch.outline):
             instance, code = geometry.numbers.part(name, part)[1], damage_code(PATCH, patch.age)
             for piece in _pieces(patch_outline(patch), *builder.stretch):
-                yield _Area(piece, PATCH_FILM, instance, code, 0)
-        first += len(pavement.patches)
+                yield _Area(piece, PATCH_FILM, instance, code, 0)  # patches are asphalt, the first of `_COURSES`
+        first_part += len(pavement.patches)
         films = MarkingFilms(geometry, carriageway.side)
-        for part, crack in _near(builder, pavement.cracks, first, lambda crack: chain.from_iterable(crack.lines)):
+        for part, crack in _on_stretch(
+            builder, pavement.cracks, first_part, lambda crack: chain.from_iterable(crack.lines)
+        ):
             instance, code = (
                 geometry.numbers.part(name, part)[1],
                 damage_code(SEALED_CRACK if crack.sealed else OPEN_CRACK),
@@ -199,31 +202,31 @@ def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
             legs = [piece for outline in crack_outlines(crack) for piece in _pieces(outline, *builder.stretch)]
             for piece, film in films.cut(legs):
                 yield _Area(piece, film + CRACK_FILM, instance, code, _crack_course(crack, pavement))
-        first += len(pavement.cracks)
-        for part, marking in _near(builder, pavement.removed_markings, first, _ends):
+        first_part += len(pavement.cracks)
+        for part, marking in _on_stretch(builder, pavement.removed_markings, first_part, _ends):
             instance, code = geometry.numbers.part(name, part)[1], damage_code(REMOVED_MARKING)
             for outline in removed_outlines(marking, pavement, geometry.length):
                 for piece in _pieces(outline, *builder.stretch):
                     yield _Area(piece, REMOVED_FILM, instance, code, course)
 
 
-def _near(
-    builder: ModelBuilder, items: Sequence[T], first: int, corners: Callable[[T], Iterable[tuple[float, float]]]
+def _on_stretch(
+    builder: ModelBuilder, items: Sequence[T], first_part: int, corners: Callable[[T], Iterable[tuple[float, float]]]
 ) -> Iterator[tuple[int, T]]:
-    """Yield damages that can reach into the stretch that is built, each with its part's number, counted from ``first``.
+    """Yield damages that can reach into the stretch that is built, each with its part's number.
 
-    A long road has thousands of them, whose outlines would be worked out for each of its sections.
+    A long road has thousands of damages: without this choice each section would compute all of their outlines.
 
     Args:
-        builder: of the stretch.
+        builder: builder of the stretch.
         items: the damages.
-        first: number of the first one's part.
-        corners: returns stations and offsets, m, that a damage lies between.
+        first_part: number of the first one's part.
+        corners: function from a damage to the stations and offsets, m, of its corners.
     """
     start, end = builder.stretch
-    for part, item in enumerate(items, first):
+    for part, item in enumerate(items, first_part):
         stations = [station for station, _ in corners(item)]
-        if min(stations) < end + _WIDEST and max(stations) > start - _WIDEST:
+        if min(stations) < end + _MARGIN and max(stations) > start - _MARGIN:
             yield part, item
 
 
@@ -233,7 +236,7 @@ def _ends(marking: RemovedMarking) -> list[tuple[float, float]]:
 
 
 def _crack_course(crack: Crack, pavement: Pavement) -> int:
-    """Return the number of what a crack is of: asphalt's binder where it seals concrete, else the pavement."""
+    """Return the number of a crack's course: asphalt for a sealed crack in concrete, else the pavement's own."""
     return 0 if crack.sealed and pavement.is_concrete else _COURSES.index(pavement.kind)
 
 
@@ -250,6 +253,7 @@ def _polygons_mesh(name: str, polygons: list[NDArray[np.float64]], zero: float) 
 
 
 def _outlines(builder: ModelBuilder) -> Iterator[tuple[NDArray[np.float64], Hatching | Arrow]]:
+    """Yield (outline, item) of the pieces of hatchings and arrows on the stretch that is built."""
     # Of the whole road, as an area may reach over the end of the stretch.
     road = builder.geometry.parameters
     items: list[Hatching | Arrow] = [*road.of_type(Hatching).values(), *road.of_type(Arrow).values()]
@@ -260,11 +264,13 @@ def _outlines(builder: ModelBuilder) -> Iterator[tuple[NDArray[np.float64], Hatc
 
 def _pieces(outline: NDArray[np.float64], start: float, end: float) -> Iterator[NDArray[np.float64]]:
     """Yield the pieces, 1 m long at most, of a convex outline (K, 2) between two stations, m."""
-    if len(outline) < 3:  # a patch whose corners lie on one line
+    if len(outline) < 3:  # a patch with collinear corners
         return
-    low, high = outline[:, 0].min(), outline[:, 0].max()
-    if low < high and low < end and high > start:
-        borders = np.linspace(low, high, int(np.ceil((high - low) / _LONGEST)) + 1)
-        # Its two ends are borders as well: all other pieces are those of the whole outline.
-        inside = borders[(borders > start) & (borders < end)]
-        yield from cut_outline(outline, np.array([max(low, start), *inside, min(high, end)]))
+    first_station, last_station = outline[:, 0].min(), outline[:, 0].max()
+    if first_station < last_station and first_station < end and last_station > start:
+        borders = np.linspace(
+            first_station, last_station, int(np.ceil((last_station - first_station) / _LONGEST_PIECE)) + 1
+        )
+        # Borders depend on the whole outline only, so that neighbouring stretches have the same pieces.
+        inner_borders = borders[(borders > start) & (borders < end)]
+        yield from cut_outline(outline, np.array([max(first_station, start), *inner_borders, min(last_station, end)]))

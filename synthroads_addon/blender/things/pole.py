@@ -1,4 +1,7 @@
-"""Lighting and surveillance poles: masts with an arm, and at its end a street light, or cameras (SR Pole)."""
+"""Lighting and surveillance poles: masts with an arm, and at its end a street light, or cameras (SR Pole).
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ from .model_builder import ModelBuilder
 from .registry import model_part
 
 _GLASS = [(-0.16, -0.1), (-0.16, 0.1), (-0.56, 0.1), (-0.56, -0.1)]
-"""Glass under a luminaire: x from its mount on, y, m."""
+"""Outline of the glass under a luminaire: x from its mount, and y, m; chosen."""
 
 
 class _Pole(Standing):
@@ -63,10 +66,10 @@ def _mast(tree: Tree, pole: _Pole, top: Value) -> Value:
 def _arm(tree: Tree, pole: _Pole, end: Value) -> Value:
     """Add nodes for the arm: a quarter of an ellipse from the mast to the left, up to the height `end` (m)."""
     line = row_of_points(tree, sizes.ARM_POINTS)
-    turn = op.index(tree) * (math.pi / 2.0 / (sizes.ARM_POINTS - 1))
-    across = (op.unary("COSINE", turn) - 1.0) * pole.arm_length
-    above = end - pole.rise() * (1.0 - op.unary("SINE", turn))
-    line = op.set_position(line, op.vector(tree, across, 0.0, above))
+    angle = op.index(tree) * (math.pi / 2.0 / (sizes.ARM_POINTS - 1))
+    x = (op.unary("COSINE", angle) - 1.0) * pole.arm_length
+    z = end - pole.rise() * (1.0 - op.unary("SINE", angle))
+    line = op.set_position(line, op.vector(tree, x, 0.0, z))
     profile = tree.node("GeometryNodeCurvePrimitiveCircle", resolution=sizes.ARM_SIDES, radius=sizes.ARM_RADIUS).value
     curve = tree.node("GeometryNodeMeshToCurve", line).value
     pipe = tree.node("GeometryNodeCurveToMesh", curve, profile_curve=profile, fill_caps=True).value
@@ -84,28 +87,28 @@ def _luminaire(tree: Tree, pole: _Pole) -> Value:
 
 def _cameras(tree: Tree, pole: _Pole, mount: Value) -> Value:
     """Add nodes for a camera along the road either way, a dome camera at the arm's end, and a cabinet on the mast."""
-    front = move_geometry(_camera(tree, pole), op.vector(tree, 0.0, (pole.diameter + sizes.CAMERA[1]) * -0.5))
-    behind = op.transform(front, rotation=(0.0, 0.0, math.pi))
-    pair = move_geometry(op.join(front, behind), op.vector(tree, 0.0, 0.0, mount - sizes.CAMERA_BELOW))
-    radius, high, low, middle = sizes.CAMERA_DOME
-    cap = paint_faces(move_geometry(tube(tree, radius, high), (0.0, 0.0, -low)), pole.housing_material)
+    front_camera = move_geometry(_camera(tree, pole), op.vector(tree, 0.0, (pole.diameter + sizes.CAMERA[1]) * -0.5))
+    rear_camera = op.transform(front_camera, rotation=(0.0, 0.0, math.pi))
+    pair = move_geometry(op.join(front_camera, rear_camera), op.vector(tree, 0.0, 0.0, mount - sizes.CAMERA_BELOW))
+    radius, cap_height, cap_depth, ball_depth = sizes.CAMERA_DOME
+    cap = paint_faces(move_geometry(tube(tree, radius, cap_height), (0.0, 0.0, -cap_depth)), pole.housing_material)
     ball = tree.node("GeometryNodeMeshUVSphere", segments=12, rings=6, radius=radius * 0.9).value
     ball = tree.node("GeometryNodeSetShadeSmooth", ball).value
-    dome = op.join(cap, paint_faces(move_geometry(ball, (0.0, 0.0, -middle)), pole.glass_material))
+    dome = op.join(cap, paint_faces(move_geometry(ball, (0.0, 0.0, -ball_depth)), pole.glass_material))
     dome = op.only_if(
         pole.arm_length > sizes.SHORTEST_ARM, move_geometry(dome, op.vector(tree, -pole.arm_length, 0.0, mount))
     )
-    *size, level = sizes.POLE_CABINET
-    cabinet = box(tree, tuple(size), op.vector(tree, 0.0, pole.diameter * 0.5 + 0.1, level))
+    *size, cabinet_z = sizes.POLE_CABINET
+    cabinet = box(tree, tuple(size), op.vector(tree, 0.0, pole.diameter * 0.5 + 0.1, cabinet_z))
     return op.join(pair, dome, paint_faces(cabinet, pole.housing_material))
 
 
 def _camera(tree: Tree, pole: _Pole) -> Value:
     """Add nodes for a camera under its sunshield around the origin, looking along -y and down."""
-    (across, along, high), (wider, longer, thick) = sizes.CAMERA, sizes.CAMERA_SHIELD
-    shield = box(tree, (across + wider, along + longer, thick), (0.0, -0.03, high / 2 + 0.012))
+    (width, length, height), (extra_width, extra_length, thickness) = sizes.CAMERA, sizes.CAMERA_SHIELD
+    shield = box(tree, (width + extra_width, length + extra_length, thickness), (0.0, -0.03, height / 2 + 0.012))
     lens = tube(tree, 0.045, 0.02)
-    lens = op.transform(lens, translation=(0.0, 0.01 - along / 2, 0.0), rotation=(math.pi / 2, 0.0, 0.0))
+    lens = op.transform(lens, translation=(0.0, 0.01 - length / 2, 0.0), rotation=(math.pi / 2, 0.0, 0.0))
     camera = op.join(
         paint_faces(op.join(box(tree, sizes.CAMERA), shield), pole.housing_material),
         paint_faces(lens, pole.glass_material),

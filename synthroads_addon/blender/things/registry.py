@@ -1,4 +1,4 @@
-"""Parts of a model: each file or folder beside this one registers what builds its part by `model_part`."""
+"""Parts of a model: each file or folder beside this one registers the function that builds its part by `model_part`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .model_builder import ModelBuilder
 
 Build = Callable[[ModelBuilder], None]
 _LAST = 1000
-"""Order of a part that has none."""
+"""Order of a part that is registered without one."""
 
 
 class ModelPart(NamedTuple):
@@ -20,8 +20,8 @@ class ModelPart(NamedTuple):
 
     Attributes:
         order, name: its place in the order of building, and its name.
-        build: adds its objects to a model.
-        on_the_road: whether it needs no terrain; all others stand on it.
+        build: function that adds its objects to a model.
+        on_the_road: whether it needs no terrain; all other parts stand on the terrain.
     """
 
     order: int
@@ -41,9 +41,9 @@ def model_part(name: str, order: int = _LAST, on_the_road: bool = False) -> Call
     """
 
     def register(build: Build) -> Build:
-        known = _PARTS.setdefault(name, ModelPart(order, name, build, on_the_road))
-        if known.build is not build:
-            raise ValueError(f"{known.build.__module__} and {build.__module__} both have a part named {name!r}")
+        part = _PARTS.setdefault(name, ModelPart(order, name, build, on_the_road))
+        if part.build is not build:
+            raise ValueError(f"{part.build.__module__} and {build.__module__} both have a part named {name!r}")
         return build
 
     return register
@@ -57,7 +57,7 @@ def model_parts() -> dict[str, ModelPart]:
     return {part.name: part for part in sorted(_PARTS.values(), key=lambda part: part[:2])}
 
 
-def required_parts(wanted: set[str]) -> set[str]:
-    """Return the wanted parts' names, with the road and the terrain where they stand on them."""
-    standing = any(not model_parts()[name].on_the_road for name in wanted)
-    return wanted | ({"road"} if wanted else set()) | ({"terrain"} if standing else set())
+def required_parts(names: set[str]) -> set[str]:
+    """Return the parts' names with the names of the road and the terrain, if the parts stand on them."""
+    needs_terrain = any(not model_parts()[name].on_the_road for name in names)
+    return names | ({"road"} if names else set()) | ({"terrain"} if needs_terrain else set())

@@ -28,31 +28,33 @@ class _Shaft(Standing):
 def shaft_group(tree: Tree) -> None:
     """The top of a shaft of the drainage; points carry ``heading`` (rad) and ``elevation`` (m)."""
     shaft = _Shaft(tree)
-    wide, tall = shaft.size * sizes.LID, shaft.height + BURIED
+    lid_width, body_height = shaft.size * sizes.LID, shaft.height + BURIED
     with tree.frame("Manhole: a ring under a cover"):
-        ring = move_geometry(tube(tree, shaft.size * 0.5, tall, sizes.SIDES), (0.0, 0.0, -BURIED))
-        above = op.vector(tree, 0.0, 0.0, shaft.height)
-        cover = move_geometry(tube(tree, wide * 0.5, sizes.LID_RISE, sizes.SIDES), above)
+        ring = move_geometry(tube(tree, shaft.size * 0.5, body_height, sizes.SIDES), (0.0, 0.0, -BURIED))
+        lid_place = op.vector(tree, 0.0, 0.0, shaft.height)
+        cover = move_geometry(tube(tree, lid_width * 0.5, sizes.LID_RISE, sizes.SIDES), lid_place)
         manhole = op.join(paint_faces(ring, shaft.concrete_material), paint_faces(cover, shaft.lid_material))
     with tree.frame("Inlet: a frame under a grating"):
-        frame = box(tree, op.vector(tree, shaft.size, shaft.size, tall), op.vector(tree, z=tall * 0.5 - BURIED))
-        middle = op.vector(tree, z=shaft.height + sizes.LID_RISE / 2.0)
-        grating = box(tree, op.vector(tree, wide, wide, sizes.LID_RISE), middle)
+        frame = box(
+            tree, op.vector(tree, shaft.size, shaft.size, body_height), op.vector(tree, z=body_height * 0.5 - BURIED)
+        )
+        grating_place = op.vector(tree, z=shaft.height + sizes.LID_RISE / 2.0)
+        grating = box(tree, op.vector(tree, lid_width, lid_width, sizes.LID_RISE), grating_place)
         parts = [paint_faces(frame, shaft.concrete_material), paint_faces(grating, shaft.lid_material)]
-        inlet = op.join(*parts, paint_faces(_slots(tree, shaft, wide), shaft.slot_material))
+        inlet = op.join(*parts, paint_faces(_slots(tree, shaft, lid_width), shaft.slot_material))
     with tree.frame("Put onto the points"):
         mesh = shaft.put_labelled([op.switch(shaft.manhole, inlet, manhole)], class_id(Shaft.points_class))
     tree.output("Mesh", mesh, description="Shaft")
 
 
-def _slots(tree: Tree, shaft: _Shaft, wide: Value) -> Value:
-    """Add nodes for the slots of a grating: dark plates that stand out of it by next to nothing."""
-    pitch, (long, share) = wide / sizes.SLOTS, sizes.SLOT
+def _slots(tree: Tree, shaft: _Shaft, lid_width: Value) -> Value:
+    """Add nodes for the slots of a grating: dark plates that protrude slightly from it."""
+    pitch, (length_share, width_share) = lid_width / sizes.SLOTS, sizes.SLOT
     points = row_of_points(tree, sizes.SLOTS)
-    beside = (op.index(tree) - (sizes.SLOTS - 1.0) / 2.0) * pitch
-    plate = box(tree, op.vector(tree, pitch * share, wide * long, sizes.SLOT_RISE))
+    x = (op.index(tree) - (sizes.SLOTS - 1.0) / 2.0) * pitch
+    plate = box(tree, op.vector(tree, pitch * width_share, lid_width * length_share, sizes.SLOT_RISE))
     top = shaft.height + (sizes.LID_RISE + sizes.SLOT_RISE / 2.0)
-    return op.realize(put_on_points(points, plate, op.vector(tree, beside, 0.0, top)))
+    return op.realize(put_on_points(points, plate, op.vector(tree, x, 0.0, top)))
 
 
 @model_part("shafts", 112)

@@ -1,4 +1,4 @@
-"""Things whose shape Python makes from their solids: a mesh in their own frame, put onto the surface (SR Solid)."""
+"""Things whose mesh Python makes from solids in their own frame, placed on the surface (SR Solid)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def solid_group(tree: Tree) -> None:
 
 
 def add_solid(builder: ModelBuilder, name: str, item: StandingThing) -> None:
-    """Add a thing that stands at one place to the model, its mesh made from its bodies."""
+    """Add a thing that stands at one point to the model, with a mesh of its bodies."""
     frame = standing_frames(builder.geometry, [item])[0]
     mesh = bodies_mesh(item.bodies(frame.place()), builder.materials.material)
     builder.add_thing(name, item, solid_group(), mesh, class_=class_id(item.semantic_class))

@@ -51,23 +51,23 @@ def temporary_barrier_group(tree: Tree) -> None:
     with tree.frame("Elements from foot to foot"):
         parts = []
         for parity, finish in enumerate((barrier.material, barrier.second_material)):
-            chosen = op.separate(points, (op.named_attribute(tree, "number", "INT") % 2).equals(parity))
-            parts.append(_put_on_elements(tree, chosen, paint_faces(body, finish), True))
-            parts.append(_put_on_elements(tree, chosen, marks, False))
+            parity_points = op.separate(points, (op.named_attribute(tree, "number", "INT") % 2).equals(parity))
+            parts.append(_put_on_elements(tree, parity_points, paint_faces(body, finish), True))
+            parts.append(_put_on_elements(tree, parity_points, marks, False))
     with tree.frame("Labels"):
         mesh = op.label(op.realize(op.join(*parts)), class_id(TemporaryBarrier.points_class), barrier.instance)
     tree.output("Mesh", mesh, description="Elements")
 
 
-def _elements(tree: Tree, barrier: _TemporaryBarrier, begin: Value, end: Value) -> Value:
+def _elements(tree: Tree, barrier: _TemporaryBarrier, backbone_start: Value, backbone_end: Value) -> Value:
     """Add nodes for one point per element with its ``number`` and the stations ``from`` and ``to``."""
-    whole = (barrier.end_station - barrier.start_station) / barrier.segment_length - SHORTEST_ELEMENT
-    count = op.round_up(op.maximum(whole, 1.0))
+    element_count = (barrier.end_station - barrier.start_station) / barrier.segment_length - SHORTEST_ELEMENT
+    count = op.round_up(op.maximum(element_count, 1.0))
     points = op.store(row_of_points(tree, count), "number", op.index(tree))
-    start = barrier.start_station + op.index(tree) * barrier.segment_length
-    stop = op.switch(op.index(tree) < count - 1, barrier.end_station, start + barrier.segment_length)
-    for name, station in {"from": start + sizes.GAP / 2, "to": stop - sizes.GAP / 2}.items():
-        points = op.store(points, name, op.minimum(op.maximum(station, begin), end))
+    element_start = barrier.start_station + op.index(tree) * barrier.segment_length
+    element_end = op.switch(op.index(tree) < count - 1, barrier.end_station, element_start + barrier.segment_length)
+    for name, station in {"from": element_start + sizes.GAP / 2, "to": element_end - sizes.GAP / 2}.items():
+        points = op.store(points, name, op.minimum(op.maximum(station, backbone_start), backbone_end))
     return op.delete_points(points, op.named_attribute(tree, "to") - op.named_attribute(tree, "from") < 0.05)
 
 
@@ -88,28 +88,30 @@ def _body(tree: Tree, barrier: _TemporaryBarrier) -> Value:
         return op.switch(barrier.plastic, steel, plastic)
 
     def place(point: Value, row: Value) -> Value:
-        across, up = op.component(point, "Y") * barrier.base_width * 0.5, op.component(point, "Z") * barrier.height
-        return op.vector(tree, row, across, up)
+        y, z = op.component(point, "Y") * barrier.base_width * 0.5, op.component(point, "Z") * barrier.height
+        return op.vector(tree, row, y, z)
 
     return loft(tree, outline, len(outlines[0]), 2, place)
 
 
 def _reflectors(tree: Tree, barrier: _TemporaryBarrier) -> Value:
     """Add nodes for a reflector on either flank, around x = 0."""
-    beside = barrier.base_width * (0.5 * _STEEL[5][0]) + sizes.REFLECTOR[1] * 0.25
-    up = barrier.height * 0.82
-    sides = [box(tree, sizes.REFLECTOR, op.vector(tree, 0.0, beside * side, up)) for side in (1.0, -1.0)]
+    y = barrier.base_width * (0.5 * _STEEL[5][0]) + sizes.REFLECTOR[1] * 0.25
+    z = barrier.height * 0.82
+    sides = [box(tree, sizes.REFLECTOR, op.vector(tree, 0.0, y * side, z)) for side in (1.0, -1.0)]
     return op.join(*sides)
 
 
-def _put_on_elements(tree: Tree, points: Value, body: Value, whole: bool) -> Value:
-    """Add nodes for an instance of a body on every element: stretched along the `whole` of it, or in its middle."""
+def _put_on_elements(tree: Tree, points: Value, body: Value, is_stretched: bool) -> Value:
+    """Add nodes for an instance of a body on every element: stretched along it, or in its middle."""
     start, end = (op.named_attribute(tree, f"{name}_foot", "FLOAT_VECTOR") for name in ("from", "to"))
-    turned = tree.node("FunctionNodeAxesToRotation", end - start, (0.0, 0.0, 1.0), primary_axis="X", secondary_axis="Z")
-    if not whole:
-        return put_on_points(points, body, (start + end) * 0.5, 1.0, turned.value)
+    rotation = tree.node(
+        "FunctionNodeAxesToRotation", end - start, (0.0, 0.0, 1.0), primary_axis="X", secondary_axis="Z"
+    )
+    if not is_stretched:
+        return put_on_points(points, body, (start + end) * 0.5, 1.0, rotation.value)
     length = op.length(end - start)
-    return put_on_points(points, body, start, op.vector(tree, length, 1.0, 1.0), turned.value)
+    return put_on_points(points, body, start, op.vector(tree, length, 1.0, 1.0), rotation.value)
 
 
 @model_part("temporary_barriers", 70)

@@ -35,10 +35,10 @@ from .registry import model_part
 Float = NDArray[np.float64]
 
 _FINE = 0.12
-"""Share of even spacing among the columns; the rest grows away from the road."""
+"""Share of even spacing among the columns; the other share is a power of the distance; chosen."""
 _SHAPE_PIECES, _TOE_PIECES = 10, 8
-"""Pieces of the cross-section over crest or swale, up to where the batter is a plane, and over its rounded toe or the
-ditch there."""
+"""Pieces of the cross-section over crest or swale, and over the batter's rounded toe or the ditch there; the batter in
+between is a plane."""
 
 
 class _Shape(Inputs):
@@ -112,39 +112,46 @@ def _side_group(tree: Tree) -> None:
     backbone, side = inputs.backbone, inputs.side
 
     with tree.frame("Columns from left to right, rows as the backbone's"):
-        # Those beyond the toe's last one are spread.
-        last = columns + (_SHAPE_PIECES + _TOE_PIECES)
-        mesh, column, number = op.grid(tree, last + 1, op.point_count(backbone))
-        rank = op.switch(side > 0.0, column, last - column)
-        outwards = op.maximum(rank - (_SHAPE_PIECES + _TOE_PIECES), 0) / op.maximum(columns - 1.0, 1.0)
-        spread = outwards * _FINE + op.power(outwards, 2.2) * (1.0 - _FINE)
+        # Columns beyond the toe are spread over the ground.
+        last_column = columns + (_SHAPE_PIECES + _TOE_PIECES)
+        mesh, column, row_number = op.grid(tree, last_column + 1, op.point_count(backbone))
+        column_rank = op.switch(side > 0.0, column, last_column - column)
+        outward_share = op.maximum(column_rank - (_SHAPE_PIECES + _TOE_PIECES), 0) / op.maximum(columns - 1.0, 1.0)
+        # Shares of the way to the terrain's end: closer near the road; the exponent is chosen.
+        spread = outward_share * _FINE + op.power(outward_share, 2.2) * (1.0 - _FINE)
     with tree.frame("Offset, cut where it would fold"):
-        axis, left, curvature = row(backbone, number)
-        start = op.sample_index(inputs.edge, op.position(tree), number)
-        start_offset = op.dot(start - axis, left)
+        axis, left_vector, curvature = row(backbone, row_number)
+        start = op.sample_index(inputs.edge, op.position(tree), row_number)
+        start_offset = op.dot(start - axis, left_vector)
         width = op.maximum(inputs.half_width - start_offset * side, 0.0)
-        farthest = (limit_offset(start_offset + width * side, curvature) - start_offset) * side
-        spread_out = (limit_offset(start_offset + width * spread * side, curvature) - start_offset) * side
+        largest_distance = (limit_offset(start_offset + width * side, curvature) - start_offset) * side
+        spread_distance = (limit_offset(start_offset + width * spread * side, curvature) - start_offset) * side
     with tree.frame("On the edge's points: the ground's height, the batter's toe"):
-        above = _ground_above(tree, inputs.ground, op.position(tree))
-        edge = op.store(op.store(inputs.edge, "above", above), "toe", _toe(tree, inputs, shape, above))
-        at_edge = op.sample_index(edge, op.named_attribute(tree, "above"), number)
-        toe = op.sample_index(edge, op.named_attribute(tree, "toe"), number)
+        ground_height = _ground_above(tree, inputs.ground, op.position(tree))
+        edge = op.store(op.store(inputs.edge, "above", ground_height), "toe", _toe(tree, inputs, shape, ground_height))
+        edge_ground = op.sample_index(edge, op.named_attribute(tree, "above"), row_number)
+        toe = op.sample_index(edge, op.named_attribute(tree, "toe"), row_number)
     with tree.frame("Columns: crest or swale, the toe's rounding, the ground"):
-        rounding = op.minimum(shape.rounding_length / shape.batter_slope, op.unary("ABSOLUTE", at_edge))
-        shaped = op.switch(at_edge > 0.0, shape.crest_length * 2.0, shape.swale_width)
-        over_shape = shaped * op.minimum(rank * (1.0 / _SHAPE_PIECES), 1.0)
-        ditch = _ditch_share(shape, at_edge)
+        rounding = op.minimum(shape.rounding_length / shape.batter_slope, op.unary("ABSOLUTE", edge_ground))
+        # Where the ground is above the edge (a cutting) there is a swale, else (an embankment) a rounded crest.
+        shape_width = op.switch(edge_ground > 0.0, shape.crest_length * 2.0, shape.swale_width)
+        shape_distance = shape_width * op.minimum(column_rank * (1.0 / _SHAPE_PIECES), 1.0)
+        ditch = _ditch_share(shape, edge_ground)
         tangent = rounding * shape.batter_slope * (1.0 - ditch)
-        begin = op.maximum(toe - tangent, shaped)
-        end = op.maximum(toe + op.maximum(tangent, op.switch(ditch > 0.0, 0.0, shape.ditch_width)), begin)
-        rounded = begin + (end - begin) * op.clip((rank - (_SHAPE_PIECES + 1)) * (1.0 / (_TOE_PIECES - 1)), 0.0, 1.0)
-        distance = op.switch(rank > _SHAPE_PIECES, over_shape, op.maximum(spread_out, rounded))
-        distance = op.minimum(distance, farthest)
+        # The toe's rounding reaches one tangent to both sides of it; a ditch takes its place.
+        toe_start = op.maximum(toe - tangent, shape_width)
+        toe_end = op.maximum(toe + op.maximum(tangent, op.switch(ditch > 0.0, 0.0, shape.ditch_width)), toe_start)
+        toe_distance = toe_start + (toe_end - toe_start) * op.clip(
+            (column_rank - (_SHAPE_PIECES + 1)) * (1.0 / (_TOE_PIECES - 1)), 0.0, 1.0
+        )
+        distance = op.switch(column_rank > _SHAPE_PIECES, shape_distance, op.maximum(spread_distance, toe_distance))
+        distance = op.minimum(distance, largest_distance)
     with tree.frame("Height: the ground, as far as the batter reaches to it"):
-        place = start + left * (distance * side)
-        rise = _ground_above(tree, inputs.ground, place)
-        height = tree.call(_batter_group(), **shape.values, distance=distance, ground=rise, at_edge=at_edge).value
+        place = start + left_vector * (distance * side)
+        place_ground = _ground_above(tree, inputs.ground, place)
+        height = tree.call(
+            _batter_group(), **shape.values, distance=distance, ground=place_ground, at_edge=edge_ground
+        ).value
     with tree.frame("Mesh"):
         mesh = op.store(mesh, "distance", distance)
         mesh = op.set_position(mesh, place + op.vector(tree, 0.0, 0.0, height))
@@ -164,24 +171,29 @@ def _batter_group(tree: Tree) -> None:
     distance, ground, at_edge = inputs.distance, inputs.ground, inputs.at_edge
     with tree.frame("Swale: the deeper the cutting, up to its full depth"):
         width = shape.swale_width
-        share = op.clip((at_edge - SWALE_FROM) * (1.0 / (SWALE_FULL - SWALE_FROM)), 0.0, 1.0)
-        depth = op.switch(width > 0.0, 0.0, share * shape.swale_depth)
-        turn = op.minimum(distance / op.maximum(width, 1e-6), 1.0) * math.pi
-        hollow = depth * op.power(op.unary("SINE", turn), 2.0)
+        depth_share = op.clip((at_edge - SWALE_FROM) * (1.0 / (SWALE_FULL - SWALE_FROM)), 0.0, 1.0)
+        full_depth = op.switch(width > 0.0, 0.0, depth_share * shape.swale_depth)
+        angle = op.minimum(distance / op.maximum(width, 1e-6), 1.0) * math.pi
+        # The swale is a sine squared across its width.
+        swale_depth = full_depth * op.power(op.unary("SINE", angle), 2.0)
     with tree.frame("Planes of the batter, rounded where they begin"):
-        upper = _rise(distance - width * 0.5, width * 0.25) / shape.batter_slope - hollow
-        lower = -(_rise(distance, shape.crest_length) / shape.batter_slope)
+        cutting_plane = _rise(distance - width * 0.5, width * 0.25) / shape.batter_slope - swale_depth
+        embankment_plane = -(_rise(distance, shape.crest_length) / shape.batter_slope)
     with tree.frame("Where they meet the ground"):
         rounding = op.minimum(shape.rounding_length / shape.batter_slope, op.unary("ABSOLUTE", at_edge))
-        cutting = op.maximum(-_smooth_maximum(-ground, -upper, rounding), lower - depth * 2.0)
+        cutting_height = op.maximum(
+            -_smooth_maximum(-ground, -cutting_plane, rounding), embankment_plane - full_depth * 2.0
+        )
     with tree.frame("Ditch at the foot of an embankment"):
         ditch = _ditch_share(shape, at_edge)
-        beyond = (ground - lower) * shape.batter_slope / op.maximum(shape.ditch_width, 1e-6)
-        across = op.unary("SINE", op.clip(beyond, 0.0, 1.0) * math.pi)
-        ground = ground - ditch * shape.ditch_depth * op.power(across, 2.0)
+        ditch_position = (ground - embankment_plane) * shape.batter_slope / op.maximum(shape.ditch_width, 1e-6)
+        ditch_sine = op.unary("SINE", op.clip(ditch_position, 0.0, 1.0) * math.pi)
+        ground = ground - ditch * shape.ditch_depth * op.power(ditch_sine, 2.0)
         rounding = rounding * (1.0 - ditch)
-        embankment = op.minimum(_smooth_maximum(ground, lower, rounding), upper)
-    tree.output("Height", op.switch(at_edge > 0.0, embankment, cutting), description="Above the road's edge (m)")
+        embankment_height = op.minimum(_smooth_maximum(ground, embankment_plane, rounding), cutting_plane)
+    tree.output(
+        "Height", op.switch(at_edge > 0.0, embankment_height, cutting_height), description="Above the road's edge (m)"
+    )
 
 
 def _ditch_share(shape: _Shape, at_edge: Value) -> Value:
@@ -191,40 +203,40 @@ def _ditch_share(shape: _Shape, at_edge: Value) -> Value:
 
 
 def _rise(distance: Value, tangent: Value) -> Value:
-    """Add nodes for how far a plane of slope 1 has risen, rounded from level over two tangents (m)."""
-    beyond = op.maximum(distance, 0.0)
-    curve = op.power(beyond, 2.0) / op.maximum(tangent * 4.0, 1e-6)
-    return op.switch(beyond < tangent * 2.0, beyond - tangent, curve)
+    """Add nodes for the height (m) of a plane of slope 1 that begins with a parabola of two tangent lengths (m)."""
+    positive_distance = op.maximum(distance, 0.0)
+    parabola = op.power(positive_distance, 2.0) / op.maximum(tangent * 4.0, 1e-6)
+    return op.switch(positive_distance < tangent * 2.0, positive_distance - tangent, parabola)
 
 
-def _smooth_maximum(first: Value, second: Value, rounding: Value) -> Value:
+def _smooth_maximum(height_a: Value, height_b: Value, rounding: Value) -> Value:
     """Add nodes for the larger of two heights, rounded by a parabola where they differ by less than `rounding`, m."""
-    near = op.maximum(rounding - op.unary("ABSOLUTE", first - second), 0.0)
-    return op.maximum(first, second) + op.power(near, 2.0) / op.maximum(rounding * 4.0, 1e-6)
+    overlap = op.maximum(rounding - op.unary("ABSOLUTE", height_a - height_b), 0.0)
+    return op.maximum(height_a, height_b) + op.power(overlap, 2.0) / op.maximum(rounding * 4.0, 1e-6)
 
 
-def _toe(tree: Tree, inputs: _TerrainInputs, shape: _Shape, above: Value) -> Value:
+def _toe(tree: Tree, inputs: _TerrainInputs, shape: _Shape, ground_height: Value) -> Value:
     """Add nodes for the distance (m) from the edge at which the batter meets the ground; a field on its points."""
-    _, left, _ = row(inputs.backbone, op.index(tree))
-    begin = op.switch(above > 0.0, shape.crest_length, shape.swale_width * 0.75)
-    start = op.position(tree) + left * (begin * inputs.side)
-    rises = op.switch(_ground_above(tree, inputs.ground, start) > 0.0, -1.0, 1.0)
-    along = left * (inputs.side * shape.batter_slope) + op.vector(tree, 0.0, 0.0, rises)
+    _, left_vector, _ = row(inputs.backbone, op.index(tree))
+    batter_start = op.switch(ground_height > 0.0, shape.crest_length, shape.swale_width * 0.75)
+    start = op.position(tree) + left_vector * (batter_start * inputs.side)
+    rise_sign = op.switch(_ground_above(tree, inputs.ground, start) > 0.0, -1.0, 1.0)
+    batter_direction = left_vector * (inputs.side * shape.batter_slope) + op.vector(tree, 0.0, 0.0, rise_sign)
     ray = tree.node(
         "GeometryNodeRaycast",
         target_geometry=inputs.ground,
         source_position=start,
-        ray_direction=along,
+        ray_direction=batter_direction,
         ray_length=2000.0,
     )
-    reach = ray["Hit Distance"] * (shape.batter_slope / op.length(along))
-    return op.switch(ray["Is Hit"], FAR[1], begin + reach)
+    reach = ray["Hit Distance"] * (shape.batter_slope / op.length(batter_direction))
+    return op.switch(ray["Is Hit"], FAR[1], batter_start + reach)
 
 
 def _ground_above(tree: Tree, ground: Value, place: Value) -> Value:
     """Add nodes for the ground's height (m) above `place`, negative below; 0 where there is no ground."""
-    above = place + (0.0, 0.0, 1000.0)
-    ray = tree.node("GeometryNodeRaycast", target_geometry=ground, source_position=above, ray_length=2000.0)
+    ray_start = place + (0.0, 0.0, 1000.0)
+    ray = tree.node("GeometryNodeRaycast", target_geometry=ground, source_position=ray_start, ray_length=2000.0)
     return op.switch(ray["Is Hit"], 0.0, 1000.0 - ray["Hit Distance"])
 
 
@@ -254,22 +266,25 @@ def _ground_grid(
     geometry: RoadGeometry, terrain: Terrain, tolerance: float, stretch: tuple[float, float]
 ) -> tuple[Float, NDArray[np.intp]]:
     """Return the original ground's local vertices (V, 3), m, and faces (F, 4), spaced by its undulation."""
-    bend = terrain.undulation * (2.0 * np.pi / terrain.wavelength) ** 2
-    spacing = float(np.clip(np.sqrt(8.0 * tolerance / max(bend, 1e-9)), 1.5, 4.0))
+    ground_curvature = terrain.undulation * (2.0 * np.pi / terrain.wavelength) ** 2
+    # Chord error of the ground's waves, s = l^2 k / 8; limits are chosen.
+    spacing = float(np.clip(np.sqrt(8.0 * tolerance / max(ground_curvature, 1e-9)), 1.5, 4.0))
 
-    # Whole multiples of the spacing, so that a stretch of the road has the whole road's ground.
-    first, last = (stretch[0] - GROUND_MARGIN) // spacing, -((-stretch[1] - GROUND_MARGIN) // spacing)
+    # Rows lie at multiples of the spacing, so that a stretch of the road has the whole road's ground.
+    first_row, last_row = (stretch[0] - GROUND_MARGIN) // spacing, -((-stretch[1] - GROUND_MARGIN) // spacing)
     ends = -GROUND_MARGIN, geometry.length + GROUND_MARGIN
-    station = np.clip(np.arange(first, last + 1) * spacing, *ends)
+    station = np.clip(np.arange(first_row, last_row + 1) * spacing, *ends)
     reach = terrain.half_width + GROUND_MARGIN
     offset = np.linspace(-reach, reach, int(np.ceil(2.0 * reach / spacing)) + 1)
     position, heading, curvature = geometry.alignment.frame(station)
     offsets = clip_offset(offset[None, :], curvature[:, None])
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
-    plan = position[:, None, :] + offsets[:, :, None] * left[:, None, :]
+    left_vectors = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
+    plan = position[:, None, :] + offsets[:, :, None] * left_vectors[:, None, :]
     stations = np.repeat(station, len(offset))
     height = ground_elevation(geometry, terrain, stations, offsets.ravel())
-    corner = np.arange(len(station) - 1)[:, None] * len(offset) + np.arange(len(offset) - 1)
-    # Offsets grow to the left: forwards along the stations, then right, is seen from above against the clock.
-    faces = np.stack([corner, corner + len(offset), corner + len(offset) + 1, corner + 1], axis=-1)
+    first_corners = np.arange(len(station) - 1)[:, None] * len(offset) + np.arange(len(offset) - 1)
+    # Corners run forwards along the stations and then to larger offsets (left): anticlockwise from above.
+    faces = np.stack(
+        [first_corners, first_corners + len(offset), first_corners + len(offset) + 1, first_corners + 1], axis=-1
+    )
     return np.column_stack([plan.reshape(-1, 2), height]), faces.reshape(-1, 4)

@@ -39,10 +39,10 @@ def traffic_light_group(tree: Tree) -> None:
     light = _Light(tree)
 
     with tree.frame("Post"):
-        tall = light.height + (BURIED - 0.03)
+        post_height = light.height + (BURIED - 0.03)
         parts = [
             paint_faces(
-                move_geometry(tube(tree, sizes.POST / 2, tall), (0.0, 0.0, -BURIED)),
+                move_geometry(tube(tree, sizes.POST / 2, post_height), (0.0, 0.0, -BURIED)),
                 light.post_material,
             )
         ]
@@ -51,8 +51,8 @@ def traffic_light_group(tree: Tree) -> None:
     with tree.frame("Lights by their number from above: red, yellow, green, yellow"):
         parts.append(_lamps(tree, light))
     with tree.frame("Visors"):
-        number = op.index(tree)
-        place = op.vector(tree, 0.0, _front(light), light.level(number))
+        light_index = op.index(tree)
+        place = op.vector(tree, 0.0, _front(light), light.level(light_index))
         visors = put_on_points(row_of_points(tree, light.lights), _visor(tree, light.light_diameter), place)
         parts.append(paint_faces(visors, light.housing_material))
     with tree.frame("Put onto the points"):
@@ -66,66 +66,67 @@ def _front(light: _Light) -> Value:
 
 
 def _housing(tree: Tree, light: _Light) -> list[Value]:
-    tall = light.light_diameter * sizes.CHAMBER[2] * light.lights
-    middle = light.height - sizes.MARGIN - tall * 0.5
-    wide, back = light.light_diameter * sizes.BOARD, -sizes.POST / 2 - sizes.BEHIND
-    deep, before = sizes.PANEL
-    rim = box(
-        tree,
-        op.vector(tree, wide, sizes.RIM, tall + 2 * sizes.MARGIN),
-        op.vector(tree, 0.0, back, middle),
-    )
-    size = op.vector(tree, wide - 2 * sizes.EDGE, deep, tall + 2 * (sizes.MARGIN - sizes.EDGE))
-    board = box(tree, size, op.vector(tree, 0.0, back - before, middle))
-    depth = light.light_diameter * sizes.CHAMBER[1]
-    chamber = op.vector(
+    """Add nodes for the dark board with its rim, and for the lights' chambers; return [rim, board and chambers]."""
+    # All chambers together; the board exceeds them by a margin.
+    chambers_height = light.light_diameter * sizes.CHAMBER[2] * light.lights
+    middle_z = light.height - sizes.MARGIN - chambers_height * 0.5
+    rim_width, rim_y = light.light_diameter * sizes.BOARD, -sizes.POST / 2 - sizes.BEHIND
+    rim_size = op.vector(tree, rim_width, sizes.RIM, chambers_height + 2 * sizes.MARGIN)
+    rim = box(tree, rim_size, op.vector(tree, 0.0, rim_y, middle_z))
+    # The board lies in front of the rim and leaves its edges free.
+    board_thickness, board_distance = sizes.PANEL
+    board_width = rim_width - 2 * sizes.EDGE
+    board_height = chambers_height + 2 * (sizes.MARGIN - sizes.EDGE)
+    board_size = op.vector(tree, board_width, board_thickness, board_height)
+    board = box(tree, board_size, op.vector(tree, 0.0, rim_y - board_distance, middle_z))
+    chamber_depth = light.light_diameter * sizes.CHAMBER[1]
+    chamber_size = op.vector(
         tree,
         light.light_diameter * sizes.CHAMBER[0],
-        depth,
+        chamber_depth,
         light.light_diameter * (sizes.CHAMBER[2] - sizes.JOINT),
     )
     level = light.level(op.index(tree))
-    chambers = put_on_points(
-        row_of_points(tree, light.lights), box(tree, chamber), op.vector(tree, 0.0, depth * -0.5 - 0.055, level)
-    )
+    points, chamber = row_of_points(tree, light.lights), box(tree, chamber_size)
+    chambers = put_on_points(points, chamber, op.vector(tree, 0.0, chamber_depth * -0.5 - 0.055, level))
     return [paint_faces(rim, light.rim_material), paint_faces(op.join(board, chambers), light.housing_material)]
 
 
 def _lamps(tree: Tree, light: _Light) -> Value:
     """Add nodes for the lights' domed glasses: red on top, then yellow, green, yellow."""
-    wide = light.light_diameter
-    dome = cone(tree, wide * 0.5, wide * 0.22, wide * 0.12)
+    diameter = light.light_diameter
+    dome = cone(tree, diameter * 0.5, diameter * 0.22, diameter * 0.12)
     dome = op.transform(dome, rotation=(math.pi / 2, 0.0, 0.0))
-    number = op.index(tree)
-    points = op.store(row_of_points(tree, light.lights), "number", number)
-    lamps = op.realize(put_on_points(points, dome, op.vector(tree, 0.0, _front(light), light.level(number))))
-    number = op.named_attribute(tree, "number", "INT")
-    is_green = (number > 0) & number.equals(op.round_up(op.minimum(light.lights, 3.0)) - 1)
-    for glass, chosen in (
+    light_index = op.index(tree)
+    points = op.store(row_of_points(tree, light.lights), "number", light_index)
+    lamps = op.realize(put_on_points(points, dome, op.vector(tree, 0.0, _front(light), light.level(light_index))))
+    light_index = op.named_attribute(tree, "number", "INT")
+    is_green = (light_index > 0) & light_index.equals(op.round_up(op.minimum(light.lights, 3.0)) - 1)
+    for glass, selection in (
         (light.yellow_material, True),
-        (light.red_material, number.equals(0)),
+        (light.red_material, light_index.equals(0)),
         (light.green_material, is_green),
     ):
-        lamps = paint_faces(lamps, glass, chosen)
+        lamps = paint_faces(lamps, glass, selection)
     return lamps
 
 
 def _visor(tree: Tree, diameter: Value) -> Value:
     """Add nodes for a light's visor, a bent sheet open below that reaches forward; the light's middle is the origin."""
-    share, thick, ahead, more = sizes.VISOR
+    radius_share, thickness, reach_share, extra_reach = sizes.VISOR
     # Clockwise as seen along -y, from outside over the top and back inside.
-    outer = [(math.cos(t), 0.0, math.sin(t)) for t in sizes.VISOR_TURNS]
-    inner = [(math.cos(t), 1.0, math.sin(t)) for t in reversed(sizes.VISOR_TURNS)]
+    outer_points = [(math.cos(t), 0.0, math.sin(t)) for t in sizes.VISOR_TURNS]
+    inner_points = [(math.cos(t), 1.0, math.sin(t)) for t in reversed(sizes.VISOR_TURNS)]
 
     def outline(number: Value) -> Value:
-        point = op.choose(number, outer + inner)
-        radius = diameter * share - op.component(point, "Y") * thick
-        flat = point * (1.0, 0.0, 1.0)
-        return flat * radius
+        point = op.choose(number, outer_points + inner_points)
+        radius = diameter * radius_share - op.component(point, "Y") * thickness
+        direction = point * (1.0, 0.0, 1.0)
+        return direction * radius
 
     def place(point: Value, row: Value) -> Value:
         # The upper part reaches farther forward than the ends.
-        reach = diameter * ahead + op.maximum(op.component(point, "Z"), 0.0) * more
+        reach = diameter * reach_share + op.maximum(op.component(point, "Z"), 0.0) * extra_reach
         return point - op.vector(tree, 0.0, reach * row)
 
     return loft(tree, outline, 2 * len(sizes.VISOR_TURNS), 2, place)

@@ -15,6 +15,7 @@ from .model_builder import ModelBuilder
 from .registry import model_part
 
 _BLOCK = [(1.0, 0.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, 0.0)]
+"""Outline of wall and coping: x in half thicknesses, z in heights."""
 
 
 class _Wall(Lengthwise):
@@ -32,9 +33,11 @@ def wall_group(tree: Tree) -> None:
     wall = _Wall(tree)
     line = wall.rows(wall.step)
     with tree.frame("Wall and coping"):
-        half, body = wall.thickness * 0.5, wall.height - sizes.COPING
-        block = paint_faces(sweep(line, _BLOCK, half, body + BURIED, -BURIED), wall.material)
-        coping = paint_faces(sweep(line, _BLOCK, half + sizes.OVERHANG, sizes.COPING, body), wall.coping_material)
+        half_thickness, body_height = wall.thickness * 0.5, wall.height - sizes.COPING
+        block = paint_faces(sweep(line, _BLOCK, half_thickness, body_height + BURIED, -BURIED), wall.material)
+        coping = paint_faces(
+            sweep(line, _BLOCK, half_thickness + sizes.OVERHANG, sizes.COPING, body_height), wall.coping_material
+        )
     with tree.frame("Labels"):
         mesh = op.label(op.join(block, coping), class_id(Wall.points_class), wall.instance)
     tree.output("Mesh", mesh, description="Wall and coping")

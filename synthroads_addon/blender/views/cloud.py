@@ -1,8 +1,8 @@
 """A cloud drawn over the 3D views: nothing is added to the file, so there is nothing to undo, save, scan or render.
 
-Points are drawn as points of some pixels whatever the viewport's shading, hidden by what stands in front of them. They
-are drawn a little nearer to the eye than they are: a cloud lies in the surfaces that it was scanned from. Where drawing
-all of them takes long, fewer are drawn while a view is turned, and all once it stands still.
+Points are drawn as squares of some pixels in every shading of the viewport, and are hidden by objects in front of them.
+They are drawn slightly nearer to the eye than they are, as a cloud lies in the surfaces that it was scanned from. If
+drawing all points takes long, fewer are drawn while a view is turned, and all once it stands still.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from ...cloud.tools.display import ColourBy, DisplayCloud
 from ..model.roads import scene_origin
 
 _NEARER = 0.004
-"""By which share of their distance points are drawn nearer: at 50 m, 20 cm along the line of sight."""
+"""Share of their distance by which points are drawn nearer: at 50 m, 20 cm along the line of sight; chosen."""
 _FLUENT = 0.05
-"""Seconds that drawing may take while a view is turned."""
+"""Seconds that drawing may take while a view is turned; chosen."""
 _STILL = 0.3
-"""Seconds after which a view that isn't turned any more is drawn with all points."""
+"""Seconds after its last movement after which a view is drawn with all points; chosen."""
 
 
 class CloudView:
@@ -31,9 +31,9 @@ class CloudView:
 
     Attributes:
         cloud: the points; None while there is nothing to draw.
-        by: what they are coloured by.
-        size: of a point, pixels.
-        visible: whether they are drawn.
+        by: attribute by which the points are coloured.
+        size: size of a point, pixels.
+        visible: whether the points are drawn.
     """
 
     def __init__(self) -> None:
@@ -75,28 +75,29 @@ class CloudView:
         return bool(context.space_data.overlay.show_overlays)
 
     def _draw(self) -> None:
+        """Draw the points into the current 3D view; Blender calls this at each redraw."""
         context = bpy.context
         if not self.is_drawn(context):
             return
         assert self.cloud
         shader = gpu.shader.from_builtin("POINT_FLAT_COLOR")
-        batch = self._coloured(shader)
+        batch = self._colored_batch(shader)
         with gpu.matrix.push_pop():
-            gpu.matrix.load_matrix(_nearer(context.region_data) @ gpu.matrix.get_model_view_matrix())
+            gpu.matrix.load_matrix(_depth_offset(context.region_data) @ gpu.matrix.get_model_view_matrix())
             gpu.matrix.translate(Vector(self.offset(context.scene)))
             depth_test, depth_mask = gpu.state.depth_test_get(), gpu.state.depth_mask_get()
             gpu.state.depth_test_set("LESS_EQUAL")
             gpu.state.depth_mask_set(True)  # points hide each other
             gpu.state.point_size_set(self.size * context.preferences.system.pixel_size)
             count = self._pace.points(len(self.cloud), context.region, context.region_data.perspective_matrix)
-            begin = perf_counter()
+            start_time = perf_counter()
             batch.draw_range(shader, elem_start=0, elem_count=count)
-            self._pace.measure(perf_counter() - begin, count)
+            self._pace.measure(perf_counter() - start_time, count)
             gpu.state.point_size_set(1.0)
             gpu.state.depth_test_set(depth_test)
             gpu.state.depth_mask_set(depth_mask)
 
-    def _coloured(self, shader: gpu.types.GPUShader) -> gpu.types.GPUBatch:
+    def _colored_batch(self, shader: gpu.types.GPUShader) -> gpu.types.GPUBatch:
         """Return the GPU batch of coloured points, cached; positions are uploaded once, colours when `by` changes."""
         assert self.cloud
         if self._batch and self._batch[0] == self.by:
@@ -119,44 +120,46 @@ class CloudView:
 class Pace:
     """Limiter of the points drawn while a view is turned, by the measured drawing speed.
 
-    Where the graphics card draws, handing over the points takes no time and all are drawn; software does the work at
-    once, and it is measured.
+    If a graphics card draws, the call returns at once, so that all points are drawn; software returns when it is done,
+    so that its time is measured.
     """
 
     def __init__(self) -> None:
         self._rate = 0.0
         self._views: dict[int, Matrix] = {}
-        self._waiting: bpy.types.Region | None = None
+        self._region: bpy.types.Region | None = None
 
     def points(self, count: int, region: bpy.types.Region, view: Matrix) -> int:
-        """Return how many of ``count`` points to draw: fewer if the view moved and drawing is slow, all soon after."""
-        key, fluent = region.as_pointer(), int(_FLUENT * self._rate)
-        moved = key in self._views and self._views[key] != view
+        """Return how many of ``count`` points to draw now: fewer if the view moves and drawing is slow."""
+        key, affordable_count = region.as_pointer(), int(_FLUENT * self._rate)
+        is_turned = key in self._views and self._views[key] != view
         self._views[key] = view.copy()
-        if not moved or not 0 < fluent < count:
+        if not is_turned or not 0 < affordable_count < count:
             return count
         self._draw_all_soon(region)
-        return max(fluent, min(count, 10_000))
+        return max(affordable_count, min(count, 10_000))
 
     def measure(self, seconds: float, count: int) -> None:
         """Update the drawing speed from the seconds that ``count`` points took."""
         self._rate = count / max(seconds, 1e-6)
 
     def _draw_all_soon(self, region: bpy.types.Region) -> None:
-        self._waiting = region
+        """Start a timer that redraws a region with all points once its view stands still; restart it if it runs."""
+        self._region = region
         if bpy.app.timers.is_registered(self._draw_all):
             bpy.app.timers.unregister(self._draw_all)
         bpy.app.timers.register(self._draw_all, first_interval=_STILL)
 
     def _draw_all(self) -> None:
+        """Have Blender redraw the region."""
         try:
-            if self._waiting is not None:
-                self._waiting.tag_redraw()
+            if self._region is not None:
+                self._region.tag_redraw()
         except ReferenceError:
             pass  # the area was closed meanwhile
 
 
-def _nearer(view: bpy.types.RegionView3D) -> Matrix:
+def _depth_offset(view: bpy.types.RegionView3D) -> Matrix:
     """Return the matrix that brings points slightly nearer to the eye without moving them in the picture."""
     if view.is_perspective:
         return Matrix.Diagonal((1.0 - _NEARER, 1.0 - _NEARER, 1.0 - _NEARER, 1.0))

@@ -10,23 +10,23 @@ from ...cloud.tools.display import ColourBy, DisplayCloud
 from ..things.model_builder import SUPPORT
 
 CLOUD = "synthroads_cloud"
-"""Custom property of a cloud's object: its file."""
+"""Custom property of a cloud's object: path of its file."""
 SHOWN = "shown"
-"""Attribute with the colours that are shown."""
+"""Name of the attribute with the colours that are shown."""
 _MATERIAL = "SR Cloud"
 
 
 def add_cloud_object(cloud: DisplayCloud, by: ColourBy, radius: float, offset: NDArray[np.float64]) -> bpy.types.Object:
     """Add a cloud to the open scene as a Blender point cloud object with attributes; return the object.
 
-    Its points have the attributes ``class_id`` (integer), ``intensity`` (float), ``color`` (the points' own, where they
-    have one) and ``shown`` (what the material shows). Scans leave it out.
+    Its points have the attributes ``class_id`` (integer), ``intensity`` (float), ``color`` (the cloud's colours, if it
+    has any) and ``shown`` (the colours that the material shows). Scans leave the object out.
 
     Args:
-        cloud: the points that are drawn.
-        by: what they are coloured by.
-        radius: of a point where it is rendered, m.
-        offset: what is added (3,) to the cloud's coordinates to have those of the scene, m.
+        cloud: the points.
+        by: attribute by which they are coloured.
+        radius: radius of a rendered point, m.
+        offset: vector (3,) from the cloud's coordinates to the scene's, m.
     """
     name = cloud.header.path.name
     item = _new_points(name, cloud.xyz)
@@ -77,22 +77,23 @@ def _converted(name: str, xyz: NDArray[np.float32]) -> bpy.types.Object:
     item = bpy.data.objects.new(name, mesh)
     bpy.context.scene.collection.objects.link(item)
     layer = bpy.context.view_layer
-    active, selected = layer.objects.active, list(layer.objects.selected)
-    for other in selected:
-        other.select_set(False)
+    active_item, selected_items = layer.objects.active, list(layer.objects.selected)
+    for selected_item in selected_items:
+        selected_item.select_set(False)
     layer.objects.active = item
     item.select_set(True)
     bpy.ops.object.convert(target="POINTCLOUD")
     item.select_set(False)
-    for other in selected:
-        other.select_set(True)
-    layer.objects.active = active
+    for selected_item in selected_items:
+        selected_item.select_set(True)
+    layer.objects.active = active_item
     if not mesh.users:
         bpy.data.meshes.remove(mesh)
     return item
 
 
 def _fill(points: Any, name: str, kind: str, field: str, values: NDArray[Any]) -> None:
+    """Set a point attribute, created if missing, to values (N,) or (N, C)."""
     attribute = points.attributes.get(name) or points.attributes.new(name, kind, "POINT")
     attribute.data.foreach_set(field, np.ascontiguousarray(values).ravel())
 
@@ -100,8 +101,9 @@ def _fill(points: Any, name: str, kind: str, field: str, values: NDArray[Any]) -
 def _to_linear(colors: NDArray[np.uint8]) -> NDArray[np.float32]:
     """Return sRGB colours (N, 4) uint8 as linear float32, 0 to 1, alpha unchanged."""
     share = colors.astype(np.float32) / 255.0
-    low = share[:, :3] <= 0.04045
-    share[:, :3] = np.where(low, share[:, :3] / 12.92, ((share[:, :3] + 0.055) / 1.055) ** 2.4)
+    is_linear_part = share[:, :3] <= 0.04045
+    # Inverse of the transfer function of sRGB (IEC 61966-2-1).
+    share[:, :3] = np.where(is_linear_part, share[:, :3] / 12.92, ((share[:, :3] + 0.055) / 1.055) ** 2.4)
     return share
 
 
@@ -112,10 +114,10 @@ def _material() -> bpy.types.Material:
         material.use_nodes = True
     nodes = material.node_tree.nodes
     nodes.clear()
-    source, shine, output = (
+    source, emission, output = (
         nodes.new(kind) for kind in ("ShaderNodeAttribute", "ShaderNodeEmission", "ShaderNodeOutputMaterial")
     )
     source.attribute_name = SHOWN
-    material.node_tree.links.new(source.outputs["Color"], shine.inputs["Color"])
-    material.node_tree.links.new(shine.outputs[0], output.inputs["Surface"])
+    material.node_tree.links.new(source.outputs["Color"], emission.inputs["Color"])
+    material.node_tree.links.new(emission.outputs[0], output.inputs["Surface"])
     return material

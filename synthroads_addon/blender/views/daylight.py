@@ -1,4 +1,4 @@
-"""Sun, sky, haze, landscape, sward and cameras of a road, kept in the file: for the user's pictures, not for scans."""
+"""Sun, sky, haze, landscape, sward and cameras of a road in the file, for the user's pictures, not for scans."""
 
 import math
 from collections.abc import Iterator
@@ -20,35 +20,35 @@ from .sward import Lawn, add_sward, remove_sward
 from .viewpoints import Viewpoint, aerial_view, driver_view
 
 VIEW = "synthroads_view"
-"""Custom property of what is made here: what it is."""
+"""Custom property of the objects and the world that are made here: their kind."""
 SUN, SKY, HAZE, DRIVER, AERIAL = "sun", "sky", "haze", "driver", "aerial"
 _NAMES = {SUN: "SR Sun", SKY: "SR Sky", HAZE: "SR Haze", DRIVER: "SR Driver", AERIAL: "SR Aerial"}
 _VIEWS = {DRIVER: driver_view, AERIAL: aerial_view}
 _HAZE_BELOW = 10_000.0
-"""Visibility (m) from which on a picture shows no haze."""
+"""Visibility (m) from which on a picture shows no haze; chosen."""
 _LOWEST_SKY = 0.02
-"""Sine of the elevation whose colour goes on below."""
+"""Sine of the elevation below which the sky keeps its colour; chosen."""
 
 
 def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix) -> None:
     """Add a road's sun, sky with clouds, haze, landscape and cameras to a scene, replacing those of an earlier call.
 
-    Other lights and cameras stay. A dense sward grows around the driver's camera, which becomes the scene's if it has
-    none, or one of ours. The scene's exposure becomes that of the light.
+    Other lights and cameras stay. A dense sward is added around the driver's camera. The driver's camera becomes the
+    scene's if it has none; a camera of an earlier call is replaced by the same one. The scene is exposed for the light.
 
     Args:
-        scene: that shows the road.
+        scene: scene that shows the road.
         parameters: the road.
-        matrix: from the road's local coordinates to the scene's.
+        matrix: matrix from the road's local coordinates to the scene's.
     """
-    current = scene.camera.get(VIEW, "") if scene.camera else DRIVER
+    camera_kind = scene.camera.get(VIEW, "") if scene.camera else DRIVER
     remove_views(scene)
     environment = parameters.environment
     sun = _mark(SUN, new_sun(_NAMES[SUN], environment), scene)
     scene.world = _world(scene, environment)
     if environment.visibility < _HAZE_BELOW:
-        middle = matrix @ Vector(driver_view(parameters).place.tolist())
-        _add_haze(scene, environment, sun, middle)
+        haze_centre = matrix @ Vector(driver_view(parameters).place.tolist())
+        _add_haze(scene, environment, sun, haze_centre)
     else:
         scene.view_settings.exposure = stops_for(level_irradiance(environment))
     add_clouds(scene.world, environment)
@@ -56,12 +56,12 @@ def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix
     add_sward(scene, parameters, Lawn.of(scene, matrix), driver_view(parameters).place, matrix)
     for name, view in _VIEWS.items():
         camera = _mark(name, _camera(_NAMES[name], view(parameters), matrix), scene)
-        if name == current:
+        if name == camera_kind:
             scene.camera = camera
 
 
 def remove_views(scene: bpy.types.Scene) -> None:
-    """Remove what `add_views` added to a scene, with its data; the world stays."""
+    """Remove the objects that `add_views` added to a scene, with their data; the world stays."""
     remove_landscape(scene)
     remove_sward(scene)
     items = list(views_of(scene).values())
@@ -82,6 +82,7 @@ def cameras_of(scene: bpy.types.Scene) -> Iterator[tuple[str, bpy.types.Object]]
 
 
 def _mark(kind: str, item: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object:
+    """Note an object's kind in it, and add it to a scene; return it."""
     item[VIEW] = kind
     scene.collection.objects.link(item)
     return item
@@ -96,40 +97,45 @@ def _world(scene: bpy.types.Scene, environment: Environment) -> bpy.types.World:
         if scene.world is not None:
             scene.world.use_fake_user = True
     fill_sky(world, environment.sun_elevation_deg, environment.sun_azimuth_deg, environment.sun_strength)
-    _go_on_below_horizon(world)
+    _extend_below_horizon(world)
     return world
 
 
-def _go_on_below_horizon(world: bpy.types.World) -> None:
+def _extend_below_horizon(world: bpy.types.World) -> None:
     """Change a world's nodes so that the sky's lowest colour continues below the horizon, where it would be black."""
     nodes, links = world.node_tree.nodes, world.node_tree.links
     kinds = ("TexCoord", "SeparateXYZ", "Math", "CombineXYZ")
-    place, parts, height, joined = (nodes.new(f"ShaderNode{kind}") for kind in kinds)
+    coordinates, direction, height, clamped_direction = (nodes.new(f"ShaderNode{kind}") for kind in kinds)
     sky = next(node for node in nodes if node.type == "TEX_SKY")
     height.operation = "MAXIMUM"
     height.inputs[1].default_value = _LOWEST_SKY
-    links.new(place.outputs["Generated"], parts.inputs[0])
+    links.new(coordinates.outputs["Generated"], direction.inputs[0])
     for axis in "XY":
-        links.new(parts.outputs[axis], joined.inputs[axis])
-    links.new(parts.outputs["Z"], height.inputs[0])
-    links.new(height.outputs[0], joined.inputs["Z"])
-    links.new(joined.outputs[0], sky.inputs["Vector"])
+        links.new(direction.outputs[axis], clamped_direction.inputs[axis])
+    links.new(direction.outputs["Z"], height.inputs[0])
+    links.new(height.outputs[0], clamped_direction.inputs["Z"])
+    links.new(clamped_direction.outputs[0], sky.inputs["Vector"])
 
 
 def _add_haze(scene: bpy.types.Scene, environment: Environment, sun: bpy.types.Object, middle: Vector) -> None:
     """Add the environment's haze around a place, and dim the scene's sun and sky by it."""
     elevation = math.radians(environment.sun_elevation_deg)
-    across, level = sun_and_sky(environment)
-    light = haze_light(environment.visibility, elevation, across, level)
-    below = across * light.sun * max(math.sin(elevation), 0.0) + level * light.sky + math.pi * light.diffuse
-    scene.view_settings.exposure = stops_for(below)
+    sun_irradiance, sky_irradiance = sun_and_sky(environment)
+    light = haze_light(environment.visibility, elevation, sun_irradiance, sky_irradiance)
+    ground_irradiance = (
+        sun_irradiance * light.sun * max(math.sin(elevation), 0.0)
+        + sky_irradiance * light.sky
+        + math.pi * light.diffuse
+    )
+    scene.view_settings.exposure = stops_for(ground_irradiance)
     sun.data.energy *= light.sun
     light_below(scene.world, light)
     item = _mark(HAZE, haze_body(_NAMES[HAZE], environment.visibility, light.air, middle), scene)
-    item[SUPPORT] = True  # scans leave it out: they have weather of their own
+    item[SUPPORT] = True  # scans leave it out, as they simulate weather themselves
 
 
 def _camera(name: str, view: Viewpoint, matrix: Matrix) -> bpy.types.Object:
+    """Return a new camera object for a view, in no scene yet."""
     data = bpy.data.cameras.new(name)
     data.lens, data.clip_start, data.clip_end = view.lens, 0.05, 5000.0
     item = bpy.data.objects.new(name, data)
@@ -140,4 +146,5 @@ def _camera(name: str, view: Viewpoint, matrix: Matrix) -> bpy.types.Object:
 
 
 def _list(point: NDArray[np.float64]) -> list[float]:
+    """Return a point (3,) as a list of floats."""
     return [float(value) for value in point]

@@ -1,4 +1,4 @@
-"""Exposure of pictures: as an automatic camera's, so that level ground is as bright at a low sun as at a high one."""
+"""Exposure of pictures, as of an automatic camera: level ground is nearly as bright at a low sun as at a high one."""
 
 import math
 
@@ -10,14 +10,15 @@ from ..cameras.light import sky_radiance
 from ..sky import SUN_COLOR, SUN_STRENGTH
 
 _REFERENCE = Environment(sun_elevation_deg=42.0)
-"""Light at which pictures need no correction."""
-_FOLLOWS = 0.85
-"""Share of a change of light, in stops, that is made up for: a dull day stays duller than a bright one."""
+"""Environment whose light needs no correction; chosen."""
+_CORRECTED_SHARE = 0.85
+"""Share of a change of light, in stops, that is corrected: a dull day stays duller than a bright one; chosen."""
 _STOPS = (-1.0, 4.0)
+"""Limits of the correction, stops; chosen."""
 
 
 def sun_and_sky(environment: Environment) -> tuple[Float, Float]:
-    """Return the sun's irradiance (3,) across its rays, and that of level ground by the sky (3,): red, green, blue."""
+    """Return the sun's irradiance normal to its rays, and the sky's on level ground, (3,) each: red, green, blue."""
     sun = np.array(SUN_COLOR) * SUN_STRENGTH * environment.sun_strength
     return sun, math.pi * np.array(sky_radiance(environment))
 
@@ -29,7 +30,7 @@ def level_irradiance(environment: Environment) -> Float:
 
 
 def stops_for(irradiance: Float) -> float:
-    """Return the exposure (stops) at which level ground under an irradiance (3,) is as bright as usual."""
-    usual = float(level_irradiance(_REFERENCE).mean())
-    stops = _FOLLOWS * math.log2(usual / max(float(np.mean(irradiance)), 1e-6))
+    """Return the exposure (stops) for level ground under an irradiance (3,), compared with the reference light."""
+    reference = float(level_irradiance(_REFERENCE).mean())
+    stops = _CORRECTED_SHARE * math.log2(reference / max(float(np.mean(irradiance)), 1e-6))
     return min(max(stops, _STOPS[0]), _STOPS[1])

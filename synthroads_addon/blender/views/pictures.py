@@ -20,7 +20,7 @@ CAMERA = "SR Camera"
 
 
 def light(environment: Environment) -> None:
-    """Add a sun and a sky with clouds to the current scene, replacing those of an earlier call; expose for them."""
+    """Add a sun and a sky with clouds to the current scene, replacing those of an earlier call; set the exposure."""
     scene = bpy.context.scene
     remove(SUN)
     scene.collection.objects.link(new_sun(SUN, environment))
@@ -31,14 +31,14 @@ def light(environment: Environment) -> None:
 
 
 def camera(place: ArrayLike, target: ArrayLike, lens: float = 35.0) -> bpy.types.Object:
-    """Add the scene's camera at a place (m), looking at a target, `lens` in mm on 36 mm; replaces it; return it."""
+    """Add a camera at a place (m), looking at a target, with a lens (mm on 36 mm), as the scene's; return it."""
     remove(CAMERA)
     data = bpy.data.cameras.new(CAMERA)
     data.lens, data.clip_start, data.clip_end = lens, 0.05, 5000.0
     item = bpy.data.objects.new(CAMERA, data)
-    eye, towards = (Vector(np.asarray(point, dtype=np.float64).tolist()) for point in (place, target))
+    eye, target_point = (Vector(np.asarray(point, dtype=np.float64).tolist()) for point in (place, target))
     item.location = eye
-    item.rotation_euler = (towards - eye).to_track_quat("-Z", "Y").to_euler()
+    item.rotation_euler = (target_point - eye).to_track_quat("-Z", "Y").to_euler()
     bpy.context.scene.collection.objects.link(item)
     bpy.context.scene.camera = item
     return item

@@ -1,4 +1,7 @@
-"""Places from which a road is looked at: as its drivers see it, and from the air."""
+"""Viewpoints on a road: a driver's, and one in the air.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from dataclasses import dataclass
 
@@ -18,7 +21,7 @@ class Viewpoint:
     """Place, target and focal length of a camera.
 
     Attributes:
-        place, target: local coordinates (3,) of the camera and of what it looks at, m.
+        place, target: local coordinates (3,) of the camera and of the point that it looks at, m.
         lens: focal length, mm on 36 mm.
     """
 
@@ -40,25 +43,26 @@ def driver_view(parameters: RoadParameters) -> Viewpoint:
     carriageway = parameters.carriageway("right") or next(iter(parameters.of_type(Carriageway).values()))
     section = RoadGeometry(parameters).sections[carriageway.side]
 
-    def lane(station: float) -> float:
+    def lane_offset(station: float) -> float:
+        """Return the offset (m) of the outermost lane's middle."""
         boundaries = section.lane_boundaries(station)[0]
         return carriageway.sign * float(boundaries[:2].mean())
 
-    ahead = 60.0 / length
-    here, there = (0.3, 0.3 + ahead) if carriageway.traffic > 0 else (0.7, 0.7 - ahead)
-    there = float(np.clip(there, 0.0, 1.0))
+    view_share = 60.0 / length
+    place_share, target_share = (0.3, 0.3 + view_share) if carriageway.traffic > 0 else (0.7, 0.7 - view_share)
+    target_share = float(np.clip(target_share, 0.0, 1.0))
     return Viewpoint(
-        place_on_road(parameters, here * length, lane(here * length), EYE),
-        place_on_road(parameters, there * length, lane(there * length), EYE + 0.6),
+        place_on_road(parameters, place_share * length, lane_offset(place_share * length), EYE),
+        place_on_road(parameters, target_share * length, lane_offset(target_share * length), EYE + 0.6),
         26.0,
     )
 
 
 def place_on_road(parameters: RoadParameters, station: float, offset: float, height: float) -> NDArray[np.float64]:
-    """Return the local point (3,), m, at a height above the surface; beside the road, above its edge's height."""
+    """Return the local point (3,), m, at a height above the surface; beside the road, above its edge."""
     geometry = RoadGeometry(parameters)
     offsets = geometry.offsets(station)[0]
     point = geometry.point(station, np.clip(offset, float(offsets[-1]), float(offsets[0])))[0]
     plan, heading, _ = geometry.alignment.frame(np.array([station]))
-    left = np.array([-np.sin(heading[0]), np.cos(heading[0])])
-    return np.array([*(plan[0] + offset * left), point[2] + height])
+    left_direction = np.array([-np.sin(heading[0]), np.cos(heading[0])])
+    return np.array([*(plan[0] + offset * left_direction), point[2] + height])

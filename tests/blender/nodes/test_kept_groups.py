@@ -27,7 +27,7 @@ WIDE["objects"]["road"]["lanes"].append({"width": 3.5})
 def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     path = tmp_path / "groups" / "kept.blend"
     monkeypatch.setattr(kept_groups, "kept_file", lambda: path)
-    kept_groups._State.made = 0
+    kept_groups._State.made_count = 0
     return path
 
 

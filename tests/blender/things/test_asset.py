@@ -100,11 +100,11 @@ def test_faults_are_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"box\.glb"):
         build_road(BuildRequest(road_with(library(tmp_path, "box.glb")), 0.02, 0.0, ("road", "assets")))
     save_cube(tmp_path / "box.blend")
-    with pytest.raises(InputError, match="holds no such object"):
+    with pytest.raises(InputError, match="has no object of this name"):
         build_road(
             BuildRequest(road_with(library(tmp_path, "box.blend", object="Ball")), 0.02, 0.0, ("road", "assets"))
         )
-    with pytest.raises(InputError, match="has no such asset"):
+    with pytest.raises(InputError, match="has no asset of this name"):
         build_road(BuildRequest(road_with(library(tmp_path, "box.blend"), name="ball"), 0.02, 0.0, ("road", "assets")))
 
 
@@ -226,7 +226,7 @@ def test_a_file_that_shows_nothing_is_refused(tmp_path: Path) -> None:
         _cube("Box").hide_render = True
 
     _saved(tmp_path / "box.blend", hidden)
-    with pytest.raises(InputError, match="shows no objects"):
+    with pytest.raises(InputError, match="has no object that renders show"):
         _size_of_asset(library(tmp_path, "box.blend"))
 
 

@@ -10,7 +10,7 @@ from ....scanning.colour.colour import MATERIAL_LAYERS
 from ....scanning.kernels.program import ProgramBuilder
 from ....scanning.scene.surface_values import SurfaceInput
 
-# Each adds what it reads to the table of all.
+# Each of these modules adds its readers of nodes to `tree.READERS` when it is imported.
 from . import arithmetic, colours, pictures, textures
 from .tree import TreeReader, UnknownNodeError
 
@@ -20,21 +20,21 @@ __all__ = ["UnknownNodeError", "arithmetic", "colours", "compile_material", "pic
 def compile_material(
     tree: bpy.types.NodeTree, inputs: Sequence[tuple[SurfaceInput, bpy.types.Node]], layers: Sequence[str]
 ) -> ProgramBuilder:
-    """Return what makes the program that gives a material's layers, or some of them.
+    """Return the builder of a program that evaluates a material's layers.
 
     Args:
-        tree: its nodes, with an output for each of the layers that they say something of.
-        inputs: nodes that stand for what is read of the places.
-        layers: names of those that are asked for; what the material says nothing of is left out.
+        tree: the material's nodes, with an output (AOV) for each layer that they define.
+        inputs: pairs of an input of the place and the node that stands for it.
+        layers: names of the layers to compile; layers that the material doesn't define are left out.
 
     Raises:
-        UnknownNodeError: a node, or a setting of one, that programs aren't made of.
+        UnknownNodeError: the material has a node, or a setting of one, that programs can't express.
     """
-    reader = TreeReader({node: what for what, node in inputs})
+    reader = TreeReader({node: surface_input for surface_input, node in inputs})
     for node in tree.nodes:
         if node.type == "OUTPUT_AOV" and node.aov_name in layers:
             parts = MATERIAL_LAYERS[node.aov_name]
-            value = reader.entry(node.inputs["Color" if parts == 3 else "Value"], ())
+            value = reader.input_value(node.inputs["Color" if parts == 3 else "Value"], ())
             numbers = value if isinstance(value, tuple) else (value,)
             reader.builder.output(node.aov_name, [number.value for number in numbers])
     return reader.builder

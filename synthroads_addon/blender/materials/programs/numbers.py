@@ -1,6 +1,7 @@
-"""Numbers and vectors of a material's program, written as formulas: what Cycles' kernel does, operation by operation.
+"""Numbers and vectors of a material's program, written as formulas: the operations of Cycles' kernel, one by one.
 
-The order of the operations is that of Cycles, as float32 rounds after each.
+Arithmetic on a `Number` doesn't compute, but adds an operation to the program. The order of operations is that of
+Cycles, as float32 rounds after each.
 """
 
 from __future__ import annotations
@@ -14,53 +15,58 @@ import bpy
 from ....scanning.kernels.program import Op, ProgramBuilder
 
 VECTORS_FUSED = bpy.app.version < (5, 0, 0)
-"""Whether Cycles multiplies and adds vectors in one step, as it does numbers."""
+"""Whether Cycles multiplies and adds components of vectors with one rounding (fused), as it does numbers."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number of a program, with the arithmetic of Python."""
+    """A number that a program computes when it runs; Python's operators add operations to the program.
+
+    Attributes:
+        builder: builder of the program.
+        value: index of the number among the program's values.
+    """
 
     builder: ProgramBuilder
     value: int
 
-    def of(self, other: Operand) -> Number:
-        """Return another number of the same program."""
-        return other if isinstance(other, Number) else Number(self.builder, self.builder.constant(other))
+    def as_number(self, operand: Operand) -> Number:
+        """Return an operand as a number of the same program; a float becomes a constant."""
+        return operand if isinstance(operand, Number) else Number(self.builder, self.builder.constant(operand))
 
-    def apply(self, op: Op, *others: Operand) -> Number:
-        """Return the result of an operation on it and others."""
-        values = (self.of(other).value for other in others)
+    def apply(self, op: Op, *operands: Operand) -> Number:
+        """Add an operation on this number and further operands to the program; return its result."""
+        values = (self.as_number(operand).value for operand in operands)
         return Number(self.builder, self.builder.add(op, self.value, *values))
 
     @property
-    def known(self) -> float | None:
-        """Return the number that it is; None if it is worked out."""
+    def constant_value(self) -> float | None:
+        """Return the value of a constant; None if the program computes the number."""
         return self.builder.number_of(self.value)
 
     def __add__(self, other: Operand) -> Number:
         return self.apply(Op.ADD, other)
 
     def __radd__(self, other: float) -> Number:
-        return self.of(other) + self
+        return self.as_number(other) + self
 
     def __sub__(self, other: Operand) -> Number:
         return self.apply(Op.SUBTRACT, other)
 
     def __rsub__(self, other: float) -> Number:
-        return self.of(other) - self
+        return self.as_number(other) - self
 
     def __mul__(self, other: Operand) -> Number:
         return self.apply(Op.MULTIPLY, other)
 
     def __rmul__(self, other: float) -> Number:
-        return self.of(other) * self
+        return self.as_number(other) * self
 
     def __truediv__(self, other: Operand) -> Number:
         return self.apply(Op.DIVIDE, other)
 
     def __rtruediv__(self, other: float) -> Number:
-        return self.of(other) / self
+        return self.as_number(other) / self
 
     def __neg__(self) -> Number:
         return self.apply(Op.NEGATE)
@@ -69,46 +75,46 @@ class Number:
         return self.apply(Op.LESS, other)
 
     def __gt__(self, other: Operand) -> Number:
-        return self.of(other) < self
+        return self.as_number(other) < self
 
     def __le__(self, other: Operand) -> Number:
         return self.apply(Op.LESS_EQUAL, other)
 
     def __ge__(self, other: Operand) -> Number:
-        return self.of(other) <= self
+        return self.as_number(other) <= self
 
     def equals(self, other: Operand) -> Number:
-        """Return 1 where both are the same, else 0."""
+        """Return 1 where both numbers are equal, else 0."""
         return self.apply(Op.EQUAL, other)
 
-    def choose(self, yes: Operand, no: Operand) -> Number:
-        """Return one number where this one isn't 0, another where it is."""
-        return self.apply(Op.SELECT, yes, no)
+    def choose(self, if_true: Operand, if_false: Operand) -> Number:
+        """Return `if_true` where this number isn't 0, `if_false` where it is."""
+        return self.apply(Op.SELECT, if_true, if_false)
 
 
 Operand: TypeAlias = "Number | float"
 Vector: TypeAlias = tuple[Number, Number, Number]
 Plus: TypeAlias = "Callable[[Number, Operand, Operand], Number]"
-"""How a product and another number are added up."""
+"""Function that returns a b + c, with or without rounding the product."""
 
 
 def smaller(a: Number, b: Operand) -> Number:
-    """Return the smaller of two numbers, the second where one is none."""
+    """Return the smaller of two numbers, b where either is NaN."""
     return a.apply(Op.MINIMUM, b)
 
 
 def larger(a: Number, b: Operand) -> Number:
-    """Return the larger of two numbers, the second where one is none."""
+    """Return the larger of two numbers, b where either is NaN."""
     return a.apply(Op.MAXIMUM, b)
 
 
-def clamp(a: Number, low: Operand, high: Operand) -> Number:
-    """Return a number kept between two others."""
-    return smaller(larger(a, low), high)
+def clamp(a: Number, minimum: Operand, maximum: Operand) -> Number:
+    """Return a number clamped between a minimum and a maximum."""
+    return smaller(larger(a, minimum), maximum)
 
 
 def saturate(a: Number) -> Number:
-    """Return a number kept between 0 and 1."""
+    """Return a number clamped between 0 and 1."""
     return clamp(a, 0.0, 1.0)
 
 
@@ -118,17 +124,17 @@ def floor(a: Number) -> Number:
 
 
 def fraction(a: Number) -> Number:
-    """Return what is left of a number beyond the whole."""
+    """Return a - floor(a)."""
     return a - floor(a)
 
 
 def absolute(a: Number) -> Number:
-    """Return a number without its sign."""
+    """Return the absolute value of a number."""
     return a.apply(Op.ABSOLUTE)
 
 
 def root(a: Number) -> Number:
-    """Return the square root."""
+    """Return the square root of a number."""
     return a.apply(Op.SQRT)
 
 
@@ -138,14 +144,14 @@ def safe_divide(a: Number, b: Operand) -> Number:
 
 
 def safe_remainder(a: Number, b: Number) -> Number:
-    """Return what is left after whole multiples, with the first one's sign; 0 where the second is 0."""
+    """Return the remainder of a / b with the sign of a; 0 where b is 0."""
     return b.equals(0.0).choose(0.0, a.apply(Op.REMAINDER, b))
 
 
 def power(a: Number, b: Number) -> Number:
-    """Return a power; 0 of a negative number with a fraction, which has none."""
+    """Return a to the power b; 0 for a negative a and a fractional b."""
     result = a.apply(Op.POWER, b)
-    # Since 5.0 negative powers of 0 are 0, and not without end.
+    # Since Blender 5.0 negative powers of 0 are 0, not infinite.
     return result if VECTORS_FUSED else a.equals(0.0).choose((b < 0.0).choose(0.0, result), result)
 
 
@@ -160,23 +166,23 @@ def cosine(a: Number) -> Number:
 
 
 def mix(a: Number, b: Number, share: Number) -> Number:
-    """Return what lies between two numbers, from the first on."""
+    """Return a + share (b - a)."""
     return a + share * (b - a)
 
 
 def each(function: Callable[..., Number], *vectors: Vector) -> Vector:
-    """Return a vector of a function of vectors' components."""
+    """Return the vector of a function's values for each component of some vectors."""
     x, y, z = (function(*parts) for parts in zip(*vectors, strict=True))
     return x, y, z
 
 
 def multiply_add(a: Number, b: Operand, c: Operand) -> Number:
-    """Return a b + c, rounded once: processors have an instruction for it that Cycles takes where one line says so."""
+    """Return a b + c rounded once (fused), as compilers translate such terms of Cycles' kernel."""
     return a.apply(Op.MULTIPLY_ADD, b, c)
 
 
-def of_vectors(a: Number, b: Operand, c: Operand) -> Number:
-    """Return a b + c as Cycles has it where a, b and c are components of vectors."""
+def component_multiply_add(a: Number, b: Operand, c: Operand) -> Number:
+    """Return a b + c as this Blender's Cycles computes it for components of vectors: fused or not."""
     return multiply_add(a, b, c) if VECTORS_FUSED else a * b + c
 
 
@@ -196,12 +202,12 @@ def subtracted(a: Vector, b: Vector) -> Vector:
 
 
 def dot(a: Vector, b: Vector) -> Number:
-    """Return the scalar product."""
+    """Return the scalar product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """Return the vector product."""
+    """Return the vector product of two vectors."""
     return (
         multiply_add(a[1], b[2], -(a[2] * b[1])),
         multiply_add(a[2], b[0], -(a[0] * b[2])),
@@ -215,14 +221,14 @@ def length(a: Vector) -> Number:
 
 
 def safe_normalize(a: Vector) -> Vector:
-    """Return the unit vector, the vector itself where it has no length."""
+    """Return the unit vector of a vector, the vector itself where its length is 0."""
     size = length(a)
     inverse = 1.0 / size
     return each(lambda part: size.equals(0.0).choose(part, part * inverse), a)
 
 
 def rotated(vector: Vector, angles: Vector, backwards: bool = False) -> Vector:
-    """Return a vector turned by Euler angles (rad) about x, then y, then z."""
+    """Return a vector rotated by Euler angles (rad) about x, then y, then z; `backwards` by the inverse rotation."""
     (cx, cy, cz), (sx, sy, sz) = each(cosine, angles), each(sine, angles)
     rows = (
         (cy * cz, multiply_add(sy * sx, cz, -(cx * sz)), multiply_add(sy * cx, cz, sx * sz)),
@@ -230,7 +236,7 @@ def rotated(vector: Vector, angles: Vector, backwards: bool = False) -> Vector:
         (-sy, cy * sx, cy * cx),
     )
     x, y, z = vector
-    if backwards:
+    if backwards:  # the inverse of a rotation matrix is its transpose
         (a, b, c) = zip(*rows, strict=True)
         return (dot(a, vector), dot(b, vector), dot(c, vector))
     return each(lambda p, q, r: multiply_add(p, x, multiply_add(q, y, r * z)), *zip(*rows, strict=True))

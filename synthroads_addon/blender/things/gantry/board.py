@@ -13,7 +13,7 @@ from ...nodes.solids import move_geometry, put_on_points
 from ..sign.face import Face, sign_face_group
 
 _BEFORE = 0.002
-"""Distance between a board and the back of its face, m."""
+"""Distance between a board and the back of its face, m; chosen."""
 
 
 class _BoardInputs(Inputs):

@@ -1,4 +1,7 @@
-"""SR Gantry: a shield gantry over one carriageway or both, or on one post, with the boards that hang on its beam."""
+"""SR Gantry: a shield gantry over one carriageway or both, or on one post, with the boards that hang on its beam.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 
@@ -62,7 +65,7 @@ def gantry_group(tree: Tree) -> None:
     with tree.frame("Surfaces"):
         surfaces = op.object_geometry(gantry.road), op.object_geometry(gantry.terrain)
     with tree.frame("Height of the lowest part, above the pavement's highest point"):
-        low, bottom = _levels(tree, gantry, surfaces[0])
+        lowest_z, beam_bottom = _levels(tree, gantry, surfaces[0])
     with tree.frame("Beam"):
         beam = tree.call(
             gantry_beam_group(),
@@ -71,13 +74,13 @@ def gantry_group(tree: Tree) -> None:
             height=gantry.beam_height,
             depth=gantry.beam_depth,
         ).value
-        beam = move_geometry(beam, op.vector(tree, -gantry.left_end, 0.0, bottom))
+        beam = move_geometry(beam, op.vector(tree, -gantry.left_end, 0.0, beam_bottom))
     with tree.frame("Posts"):
-        posts = _posts(tree, gantry, surfaces, bottom)
+        posts = _posts(tree, gantry, surfaces, beam_bottom)
     with tree.frame("Catwalk and ladder"):
-        walk = op.only_if(gantry.catwalk, _catwalk(tree, gantry, surfaces, bottom + gantry.beam_height))
+        walk = op.only_if(gantry.catwalk, _catwalk(tree, gantry, surfaces, beam_bottom + gantry.beam_height))
     with tree.frame("Boards and what they hang on"):
-        signs = _place_signs(tree, gantry, low, bottom)
+        signs = _place_signs(tree, gantry, lowest_z, beam_bottom)
         boards, hangers = _boards(tree, gantry, signs)
     with tree.frame("Labels"):
         steel = paint_faces(op.join(beam, walk, hangers), gantry.steel_material)
@@ -96,107 +99,118 @@ def _thickness(signs: Value) -> Value:
 def _levels(tree: Tree, gantry: _Gantry, road: Value) -> tuple[Value, Value]:
     """Add nodes for z (m) of the gantry's lowest part, clear of the pavement below, and of the beam's lower edge."""
 
-    def most(value: Value) -> Value:
+    def maximum_of(value: Value) -> Value:
+        """Add a node for the largest value of a field on the signs' points."""
         return tree.node("GeometryNodeAttributeStatistic", gantry.signs, attribute=value, data_type="FLOAT")["Max"]
 
-    reach = op.maximum(op.unary("ABSOLUTE", gantry.left_end), op.unary("ABSOLUTE", gantry.right_end)) + 10.0
-    beyond = _thickness(gantry.signs) + sizes.HANGER
-    front, rear = (
+    reach = op.maximum(op.unary("ABSOLUTE", gantry.left_end), op.unary("ABSOLUTE", gantry.right_end)) + 10.0  # chosen
+    sign_reach = _thickness(gantry.signs) + sizes.HANGER
+    front_reach, rear_reach = (
         gantry.beam_depth * 0.5
-        + op.maximum(most(op.switch(op.named_attribute(tree, "facing") * side > 0.0, 0.0, beyond)), 0.0)
+        + op.maximum(maximum_of(op.switch(op.named_attribute(tree, "facing") * side > 0.0, 0.0, sign_reach)), 0.0)
         for side in (1.0, -1.0)
     )
-    below = highest_below(pavement_near(road, reach), -gantry.left_end, -gantry.right_end, (-front, rear))
-    low = below + gantry.clearance
-    return low, low + op.maximum(most(op.named_attribute(tree, "height")) - gantry.beam_height, 0.0) * sizes.OVERHANG
+    pavement_z = highest_below(
+        pavement_near(road, reach), -gantry.left_end, -gantry.right_end, (-front_reach, rear_reach)
+    )
+    lowest_z = pavement_z + gantry.clearance
+    return lowest_z, lowest_z + op.maximum(
+        maximum_of(op.named_attribute(tree, "height")) - gantry.beam_height, 0.0
+    ) * sizes.OVERHANG
 
 
-def _posts(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], bottom: Value) -> Value:
+def _posts(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], beam_bottom: Value) -> Value:
     """Add nodes for the posts: those at the ends enclose the beam's end, the middle one ends in it."""
     parts = []
-    for present, place, outer in (
+    for has_post, place, is_outer in (
         (gantry.left_post, gantry.left_end, True),
         (gantry.right_post, gantry.right_end, True),
         (gantry.middle_post, gantry.middle_post_place, False),
     ):
         foot = height_on(*surfaces, op.vector(tree, -place)) + gantry.elevation
-        top = bottom + (gantry.beam_height + sizes.POST_ENCLOSES if outer else sizes.POST_ENTERS)
+        top = beam_bottom + (gantry.beam_height + sizes.POST_ENCLOSES if is_outer else sizes.POST_ENTERS)
         post = tree.call(
             gantry_post_group(),
             width=gantry.post_width,
-            depth=gantry.beam_depth + (2.0 * sizes.POST_ENCLOSES) if outer else gantry.beam_depth * sizes.POST_SHARE,
+            depth=gantry.beam_depth + (2.0 * sizes.POST_ENCLOSES) if is_outer else gantry.beam_depth * sizes.POST_SHARE,
             height=top - foot,
             steel_material=gantry.steel_material,
             concrete_material=gantry.concrete_material,
         ).value
-        parts.append(op.only_if(present, move_geometry(post, op.vector(tree, -place, 0.0, foot))))
+        parts.append(op.only_if(has_post, move_geometry(post, op.vector(tree, -place, 0.0, foot))))
     return op.join(*parts)
 
 
 def _catwalk(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], top: Value) -> Value:
     """Add nodes for the catwalk on the beam and its ladder at the right post, or at the left without a right one."""
-    clear = gantry.post_width * 0.5 + sizes.CATWALK_CLEAR
-    length = op.maximum(gantry.left_end - gantry.right_end - clear * 2.0, 1.0)
+    end_margin = gantry.post_width * 0.5 + sizes.CATWALK_CLEAR
+    length = op.maximum(gantry.left_end - gantry.right_end - end_margin * 2.0, 1.0)
     walk = tree.call(gantry_catwalk_group(), length=length, beam_depth=gantry.beam_depth).value
-    walk = move_geometry(walk, op.vector(tree, clear - gantry.left_end, 0.0, top))
-    # Behind the boards of the carriageway that the post stands beside.
+    walk = move_geometry(walk, op.vector(tree, end_margin - gantry.left_end, 0.0, top))
+    # The ladder is at the post, behind the boards that face the carriageway beside it.
     place = op.switch(gantry.right_post, gantry.left_end, gantry.right_end)
     side = op.switch(gantry.right_post, -1.0, 1.0)
     foot = height_on(*surfaces, op.vector(tree, -place)) + gantry.elevation + sizes.LADDER_FOOT
-    tall = top + sizes.CATWALK_RAIL - foot
-    (wide, thick, step), half = sizes.LADDER_RUNG, sizes.LADDER_HALF
-    rail = box(tree, op.vector(tree, sizes.LADDER_RAIL, sizes.LADDER_RAIL, tall), op.vector(tree, 0.0, 0.0, tall * 0.5))
-    rungs = put_on_points(
-        row_of_points(tree, op.round_up(tall / step - 1.0)),
-        box(tree, (wide, thick, thick)),
-        op.vector(tree, 0.0, 0.0, (op.index(tree) + 0.5) * step),
+    ladder_height = top + sizes.CATWALK_RAIL - foot
+    (rung_width, rung_thickness, rung_spacing), half_width = sizes.LADDER_RUNG, sizes.LADDER_HALF
+    rail = box(
+        tree,
+        op.vector(tree, sizes.LADDER_RAIL, sizes.LADDER_RAIL, ladder_height),
+        op.vector(tree, 0.0, 0.0, ladder_height * 0.5),
     )
-    ladder = op.join(move_geometry(rail, (-half, 0.0, 0.0)), move_geometry(rail, (half, 0.0, 0.0)), rungs)
-    away = (gantry.beam_depth * 0.5 + sizes.LADDER_AWAY) * side
-    return op.join(walk, move_geometry(op.realize(ladder), op.vector(tree, -place, away, foot)))
+    rungs = put_on_points(
+        row_of_points(tree, op.round_up(ladder_height / rung_spacing - 1.0)),
+        box(tree, (rung_width, rung_thickness, rung_thickness)),
+        op.vector(tree, 0.0, 0.0, (op.index(tree) + 0.5) * rung_spacing),
+    )
+    ladder = op.join(move_geometry(rail, (-half_width, 0.0, 0.0)), move_geometry(rail, (half_width, 0.0, 0.0)), rungs)
+    y = (gantry.beam_depth * 0.5 + sizes.LADDER_AWAY) * side
+    return op.join(walk, move_geometry(op.realize(ladder), op.vector(tree, -place, y, foot)))
 
 
-def _place_signs(tree: Tree, gantry: _Gantry, low: Value, bottom: Value) -> Value:
+def _place_signs(tree: Tree, gantry: _Gantry, lowest_z: Value, beam_bottom: Value) -> Value:
     """Add nodes that move the signs' points to their faces' middles: lower edges in line, small ones on the beam."""
-    tall = op.named_attribute(tree, "height")
-    behind = low + tall < bottom + gantry.beam_height
-    z = op.switch(behind, low + tall * 0.5, bottom + gantry.beam_height * 0.5)
+    sign_height = op.named_attribute(tree, "height")
+    is_low = lowest_z + sign_height < beam_bottom + gantry.beam_height
+    z = op.switch(is_low, lowest_z + sign_height * 0.5, beam_bottom + gantry.beam_height * 0.5)
     thickness = _thickness(gantry.signs)
     signs = op.store(gantry.signs, "thickness", thickness)
     y = op.named_attribute(tree, "facing") * -1.0 * (gantry.beam_depth * 0.5 + sizes.HANGER + thickness)
     signs = op.set_position(signs, op.vector(tree, op.component(op.position(tree), "X"), y, z))
-    return op.store(signs, "level", bottom + gantry.beam_height * 0.5 - z)
+    return op.store(signs, "level", beam_bottom + gantry.beam_height * 0.5 - z)
 
 
 def _boards(tree: Tree, gantry: _Gantry, signs: Value) -> tuple[Value, Value]:
     """Add nodes for the bodies of boards and displays behind the signs' points, and for their hangers."""
-    wide, tall, thick = (op.named_attribute(tree, name) for name in ("width", "height", "thickness"))
-    facing = op.turn(tree, z=op.switch(op.named_attribute(tree, "facing") > 0.0, math.pi, 0.0))
+    width, height, thickness = (op.named_attribute(tree, name) for name in ("width", "height", "thickness"))
+    rotation = op.turn(tree, z=op.switch(op.named_attribute(tree, "facing") > 0.0, math.pi, 0.0))
     body = box(tree, 1.0, (0.0, 0.5, 0.0))
     boards = []
     for kind, finish in enumerate((gantry.board_material, gantry.display_material)):
-        chosen = op.separate(signs, op.named_attribute(tree, "display", "INT").equals(kind))
-        size = op.vector(tree, wide, thick, tall)
-        boards.append(put_on_points(chosen, paint_faces(body, finish), op.position(tree), size, facing))
+        kind_points = op.separate(signs, op.named_attribute(tree, "display", "INT").equals(kind))
+        size = op.vector(tree, width, thickness, height)
+        boards.append(put_on_points(kind_points, paint_faces(body, finish), op.position(tree), size, rotation))
     hangers = []
-    share, hung, longer = sizes.HUNG
+    x_share, hanger_width, overlap = sizes.HUNG
     for side in (-1.0, 1.0):
-        x = wide * (share * side)
-        back = op.named_attribute(tree, "facing") * (thick + sizes.HANGER / 2)
-        upright = op.vector(tree, hung, sizes.HANGER + longer, op.maximum(tall - 0.2, tall * 0.5))
+        x = width * (x_share * side)
+        hanger_y = op.named_attribute(tree, "facing") * (thickness + sizes.HANGER / 2)
+        hanger_size = op.vector(tree, hanger_width, sizes.HANGER + overlap, op.maximum(height - 0.2, height * 0.5))
         hangers.append(
-            put_on_points(signs, box(tree, 1.0), op.position(tree) + op.vector(tree, x, back), upright, facing)
+            put_on_points(
+                signs, box(tree, 1.0), op.position(tree) + op.vector(tree, x, hanger_y), hanger_size, rotation
+            )
         )
-        # A clamp that reaches into the beam.
-        inwards = op.named_attribute(tree, "facing") * (thick + sizes.HANGER + gantry.beam_depth * 0.1)
+        # A clamp that reaches into the beam; its size is chosen.
+        clamp_y = op.named_attribute(tree, "facing") * (thickness + sizes.HANGER + gantry.beam_depth * 0.1)
         clamp = op.vector(tree, 0.16, gantry.beam_depth * 0.3 + 0.05, gantry.beam_height * 0.3)
-        place = op.position(tree) + op.vector(tree, x, inwards, op.named_attribute(tree, "level"))
-        hangers.append(put_on_points(signs, box(tree, 1.0), place, clamp, facing))
+        place = op.position(tree) + op.vector(tree, x, clamp_y, op.named_attribute(tree, "level"))
+        hangers.append(put_on_points(signs, box(tree, 1.0), place, clamp, rotation))
     return op.realize(op.join(*boards)), op.realize(op.join(*hangers))
 
 
 _LIT = 0.9
-"""Share of a display's sides that lights up."""
+"""Share of a display's sides that lights up; chosen."""
 
 
 @model_part("gantries", 90)
@@ -223,23 +237,24 @@ def build_gantries(builder: ModelBuilder) -> None:
             _add_face(builder, name, gantry, place, sign)
 
 
-def _add_face(builder: ModelBuilder, name: str, gantry: Gantry, place: int, sign: GantrySign) -> None:
+def _add_face(builder: ModelBuilder, name: str, gantry: Gantry, number: int, sign: GantrySign) -> None:
     """Add the object of one sign's face to the model; none for a display that shows nothing."""
-    shown = any(line.strip() for line in sign.text)
-    if sign.kind == "display" and not shown:
+    has_text = any(line.strip() for line in sign.text)
+    if sign.kind == "display" and not has_text:
         return
     inputs = {
         "Gantry": builder.objects[name],
-        "Number": place,
+        "Number": number,
         "Instance": gantry.instance,
         **(_display_inputs(sign) if sign.kind == "display" else _board_inputs(sign)),
     }
-    role = f"{name}/sign-{place}"
+    role = f"{name}/sign-{number}"
     builder.add(role, None, gantry_sign_group(), inputs)
     builder.stand(role, gantry, gantry.rotation_deg)
 
 
 def _board_inputs(sign: GantrySign) -> dict[str, Any]:
+    """Return the face inputs of a painted board: white text and arrows on blue."""
     return face_inputs(
         FaceStyle("blue", "white", "white", "down_arrow"), "rectangle", sign.width, sign.height, sign.text
     )
@@ -253,16 +268,16 @@ def _display_inputs(sign: GantrySign) -> dict[str, Any]:
     else:
         size = (_LIT * sign.width, _LIT * sign.height)
         inputs = face_inputs(FaceStyle("black", "black", "white"), "rectangle", *size, sign.text)
-    dark = dict.fromkeys(("Ground Material", "Edge Material", "Back Material"), "display")
+    dark_materials = dict.fromkeys(("Ground Material", "Edge Material", "Back Material"), "display")
     ring = "led_red" if "".join(sign.text).isdigit() else "display"
-    return inputs | dark | {"Border Material": ring, "Writing Material": "led_white"}
+    return inputs | dark_materials | {"Border Material": ring, "Writing Material": "led_white"}
 
 
 def _signs_mesh(gantry: Gantry) -> bpy.types.Mesh:
     """Create a mesh with one vertex per sign in the gantry's frame, with the attributes that its node group reads."""
     mesh = bpy.data.meshes.new("SR Gantry")
-    across = np.array([gantry.offset - sign.offset for sign in gantry.signs])
-    fill(mesh, np.column_stack([across, np.zeros((len(across), 2))]))
+    x = np.array([gantry.offset - sign.offset for sign in gantry.signs])
+    fill(mesh, np.column_stack([x, np.zeros((len(x), 2))]))
     # Traffic on the right carriageway comes from -y.
     facing = np.array([1.0 if sign.offset < 0.0 else -1.0 for sign in gantry.signs])
     values = {

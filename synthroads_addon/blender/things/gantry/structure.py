@@ -1,4 +1,7 @@
-"""Parts of a gantry: SR Gantry Beam (box, truss or tube), SR Gantry Post, and SR Gantry Catwalk on the beam."""
+"""Parts of a gantry: SR Gantry Beam (box, truss or tube), SR Gantry Post, and SR Gantry Catwalk on the beam.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,8 @@ from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import Inputs, integer, material_of, metres
 from ...nodes.solids import bars, box, move_geometry, paint_faces, prism, put_on_points, row_of_points
 
-_JOINT_SPACING = 9.0  # m, between the bolted joints of a box or tube
+_JOINT_SPACING = 9.0
+"""Largest distance between the bolted joints of a box or tube, m; chosen."""
 
 
 class _Beam(Inputs):
@@ -31,10 +35,10 @@ def gantry_beam_group(tree: Tree) -> None:
     with tree.frame("Truss"):
         lattice = op.join(_chords(tree, length, height, depth), _lattice(tree, length, height, depth))
     with tree.frame("Tube"):
-        round_ = tree.node("GeometryNodeMeshCylinder", vertices=sizes.TUBE_SIDES, radius=0.5, depth=1.0).value
-        lying = op.transform(round_, rotation=op.turn(tree, y=math.pi / 2))
+        cylinder = tree.node("GeometryNodeMeshCylinder", vertices=sizes.TUBE_SIDES, radius=0.5, depth=1.0).value
+        unit_tube = op.transform(cylinder, rotation=op.turn(tree, y=math.pi / 2))
         size = op.vector(tree, length, depth, height)
-        tube = op.transform(lying, translation=middle, scale=size)
+        tube = op.transform(unit_tube, translation=middle, scale=size)
     with tree.frame("Bolted joints of box and tube"):
         joints = _joints(tree, kind, length, height, depth)
     with tree.frame("The chosen one"):
@@ -45,23 +49,21 @@ def gantry_beam_group(tree: Tree) -> None:
 
 def _chord(height: Value) -> Value:
     """Add nodes for the width (m) of a truss's chords."""
-    share, least, most = sizes.TRUSS_CHORD
-    return op.minimum(op.maximum(height * share, least), most)
+    share, minimum, maximum = sizes.TRUSS_CHORD
+    return op.minimum(op.maximum(height * share, minimum), maximum)
 
 
 def _chords(tree: Tree, length: Value, height: Value, depth: Value) -> Value:
+    """Add nodes for the four chords of a truss, along the beam's edges."""
     width = _chord(height)
     bar = box(tree, op.vector(tree, length, width, width))
-    return op.join(
-        *(
-            move_geometry(
-                bar,
-                op.vector(tree, length * 0.5, (depth - width) * (0.5 * y), height * 0.5 + (height - width) * (0.5 * z)),
-            )
-            for y in (-1.0, 1.0)
-            for z in (-1.0, 1.0)
-        )
-    )
+    chords = []
+    for y_side in (-1.0, 1.0):
+        for z_side in (-1.0, 1.0):
+            x, y = length * 0.5, (depth - width) * (0.5 * y_side)
+            z = height * 0.5 + (height - width) * (0.5 * z_side)
+            chords.append(move_geometry(bar, op.vector(tree, x, y, z)))
+    return op.join(*chords)
 
 
 def _lattice(tree: Tree, length: Value, height: Value, depth: Value) -> Value:
@@ -69,23 +71,23 @@ def _lattice(tree: Tree, length: Value, height: Value, depth: Value) -> Value:
     width = _chord(height)
     bays = op.round_up(length / (op.maximum(height, sizes.TRUSS_BAY[0]) * sizes.TRUSS_BAY[1]))
     points = row_of_points(tree, bays * len(sizes.TRUSS_BARS) + sizes.TRUSS_FRAME)
-    bay, number = op.index(tree) // len(sizes.TRUSS_BARS), op.index(tree) % len(sizes.TRUSS_BARS)
-    mirror = 1.0 - (bay % 2) * 2.0
-    ends = []
+    bay, bar_index = op.index(tree) // len(sizes.TRUSS_BARS), op.index(tree) % len(sizes.TRUSS_BARS)
+    mirror_sign = 1.0 - (bay % 2) * 2.0
+    bar_ends = []
     for end in (0, 1):
-        corner = op.choose(number, [bar[end] for bar in sizes.TRUSS_BARS])
+        corner = op.choose(bar_index, [bar[end] for bar in sizes.TRUSS_BARS])
         x = (bay + op.component(corner, "X")) * (length - width) / bays + width * 0.5
-        y = op.component(corner, "Y") * mirror * ((depth - width) * 0.5)
-        z = (op.component(corner, "Z") - 0.5) * mirror * (height - width) + height * 0.5
-        ends.append(op.vector(tree, x, y, z))
-    return bars(points, ends[0], ends[1], width * sizes.TRUSS_BAR)
+        y = op.component(corner, "Y") * mirror_sign * ((depth - width) * 0.5)
+        z = (op.component(corner, "Z") - 0.5) * mirror_sign * (height - width) + height * 0.5
+        bar_ends.append(op.vector(tree, x, y, z))
+    return bars(points, bar_ends[0], bar_ends[1], width * sizes.TRUSS_BAR)
 
 
 def _joints(tree: Tree, kind: Value, length: Value, height: Value, depth: Value) -> Value:
     """Add nodes for the flanges of the bolted joints of a box or tube beam, no higher than it."""
-    pieces = op.round_up(length / _JOINT_SPACING)
-    points = row_of_points(tree, pieces - 1)
-    place = op.vector(tree, (op.index(tree) + 1) * (length / pieces), 0.0, height * 0.5)
+    piece_count = op.round_up(length / _JOINT_SPACING)
+    points = row_of_points(tree, piece_count - 1)
+    place = op.vector(tree, (op.index(tree) + 1) * (length / piece_count), 0.0, height * 0.5)
     plate = box(tree, op.vector(tree, 0.08, depth + 0.06, height * 0.97))
     ring = tree.node("GeometryNodeMeshCylinder", vertices=sizes.TUBE_SIDES, radius=0.5, depth=0.08).value
     ring = op.transform(ring, rotation=op.turn(tree, y=math.pi / 2))
@@ -106,13 +108,13 @@ def gantry_catwalk_group(tree: Tree) -> None:
     catwalk = _Catwalk(tree)
     length, width = catwalk.length, op.maximum(catwalk.beam_depth, sizes.NARROWEST_CATWALK)
     with tree.frame("Grating and toe boards"):
-        level = support + grate / 2
-        thin, tall, middle = sizes.CATWALK_TOE
-        grating = box(tree, op.vector(tree, length, width, grate), op.vector(tree, length * 0.5, 0.0, level))
+        grating_z = support + grate / 2
+        toe_thickness, toe_height, toe_z = sizes.CATWALK_TOE
+        grating = box(tree, op.vector(tree, length, width, grate), op.vector(tree, length * 0.5, 0.0, grating_z))
         toe = box(
             tree,
-            op.vector(tree, length, thin, tall),
-            op.vector(tree, length * 0.5, 0.0, support + middle),
+            op.vector(tree, length, toe_thickness, toe_height),
+            op.vector(tree, length * 0.5, 0.0, support + toe_z),
         )
         rail = box(tree, op.vector(tree, length, bar, bar), op.vector(tree, length * 0.5, 0.0, 0.0))
     with tree.frame("Railings on both sides"):
@@ -129,9 +131,9 @@ def gantry_catwalk_group(tree: Tree) -> None:
         bays = op.round_up(length / sizes.CATWALK_SPACING)
         points = row_of_points(tree, bays + 1)
         x = op.index(tree) * ((length - bar) / bays) + bar / 2
-        tall = top - bar - support
-        thick = bar * sizes.CATWALK_POST
-        post = box(tree, (thick, thick, tall), (0.0, 0.0, support + tall / 2))
+        post_height = top - bar - support
+        post_width = bar * sizes.CATWALK_POST
+        post = box(tree, (post_width, post_width, post_height), (0.0, 0.0, support + post_height / 2))
         frame = [move_geometry(post, op.vector(tree, 0.0, edge * side)) for side in (-1.0, 1.0)]
         size = op.vector(tree, support, width * sizes.CATWALK_SUPPORT_SHARE, support + sizes.CATWALK_SUPPORT_EXCESS)
         feet = box(tree, size, (0.0, 0.0, support / 2))
@@ -142,7 +144,9 @@ def gantry_catwalk_group(tree: Tree) -> None:
 
 
 _BOLT = [(0.025, 0.0), (0.0125, 0.0217), (-0.0125, 0.0217), (-0.025, 0.0), (-0.0125, -0.0217), (0.0125, -0.0217)]
+"""Outline of a bolt's hexagonal head, m."""
 _BOLTS = [(x, y, 0.0) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0) if x or y]
+"""Places of the bolts around a post, in half sides of their square."""
 
 
 class _Post(Inputs):
@@ -164,15 +168,15 @@ def gantry_post_group(tree: Tree) -> None:
         plinth = paint_faces(box(tree, size, (0.0, 0.0, (sizes.PLINTH - sizes.BURIED) / 2)), inputs.concrete_material)
     with tree.frame("Base plate"):
         margin = 2.0 * sizes.PLATE_MARGIN
-        thick = sizes.BASE_PLATE + sizes.PLATE_SUNK
-        middle = sizes.PLINTH + (sizes.BASE_PLATE - sizes.PLATE_SUNK) / 2
-        plate = box(tree, op.vector(tree, width + margin, depth + margin, thick), (0.0, 0.0, middle))
+        plate_thickness = sizes.BASE_PLATE + sizes.PLATE_SUNK
+        plate_z = sizes.PLINTH + (sizes.BASE_PLATE - sizes.PLATE_SUNK) / 2
+        plate = box(tree, op.vector(tree, width + margin, depth + margin, plate_thickness), (0.0, 0.0, plate_z))
     with tree.frame("Post"):
-        tall = height - sizes.PLINTH - sizes.BASE_PLATE + sizes.PLATE_SUNK
+        post_height = height - sizes.PLINTH - sizes.BASE_PLATE + sizes.PLATE_SUNK
         post = box(
             tree,
-            op.vector(tree, width, depth, tall),
-            op.vector(tree, 0.0, 0.0, tall * 0.5 + (sizes.PLINTH + sizes.BASE_PLATE - sizes.PLATE_SUNK)),
+            op.vector(tree, width, depth, post_height),
+            op.vector(tree, 0.0, 0.0, post_height * 0.5 + (sizes.PLINTH + sizes.BASE_PLATE - sizes.PLATE_SUNK)),
         )
     with tree.frame("Bolts"):
         bolts = _bolts(tree, width, depth)
@@ -183,6 +187,6 @@ def gantry_post_group(tree: Tree) -> None:
 
 def _bolts(tree: Tree, width: Value, depth: Value) -> Value:
     """Add nodes for the bolts around a post, on its base plate."""
-    half = op.vector(tree, width * 0.5 + sizes.PLATE_MARGIN * 0.55, depth * 0.5 + sizes.PLATE_MARGIN * 0.55, 0.0)
-    place = op.choose(op.index(tree), _BOLTS) * half + (0.0, 0.0, sizes.PLINTH + 0.03)
+    half_sides = op.vector(tree, width * 0.5 + sizes.PLATE_MARGIN * 0.55, depth * 0.5 + sizes.PLATE_MARGIN * 0.55, 0.0)
+    place = op.choose(op.index(tree), _BOLTS) * half_sides + (0.0, 0.0, sizes.PLINTH + 0.03)
     return put_on_points(row_of_points(tree, len(_BOLTS)), prism(tree, _BOLT, (1.0, 1.0, 0.06)), place)

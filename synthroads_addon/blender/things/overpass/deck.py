@@ -8,8 +8,9 @@ from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import Inputs, material_of, metres
 from ...nodes.solids import box, flip_faces, loft, move_geometry, paint_faces, put_on_points, row_of_points
 
-# An edge beam: 1 for its inner side and 0 for the outer one; 1 for the back of its nose; 1 on top, 0 and -1 below.
 _BEAM = [(0.0, 0.0, -1.0), (0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, -1.0)]
+"""Corners of an edge beam's section as codes, see `_edge_beam`: 1 on its inner side, 0 on the outer one; 1 at the back
+of its nose; 1 on top, 0 at the deck's surface, -1 at the lower edge."""
 
 
 class _Deck(Inputs):
@@ -41,9 +42,10 @@ def bridge_deck_group(tree: Tree) -> None:
         road = box(tree, size, op.vector(tree, (start + end) * 0.5, 0.0, height - sizes.PAVEMENT / 2))
     with tree.frame("Railings"):
         railing = tree.call(bridge_railing_group(), length=end - start, height=inputs.parapet_height - sizes.CURB).value
-        beside = width * 0.5 - sizes.RAILING_INSIDE
+        railing_y = width * 0.5 - sizes.RAILING_INSIDE
         pair = [
-            move_geometry(railing, op.vector(tree, start, beside * side, height + sizes.CURB)) for side in (1.0, -1.0)
+            move_geometry(railing, op.vector(tree, start, railing_y * side, height + sizes.CURB))
+            for side in (1.0, -1.0)
         ]
         railings = op.only_if(
             inputs.parapet_height > sizes.LOWEST_PARAPET, paint_faces(op.join(*pair), inputs.steel_material)
@@ -54,6 +56,7 @@ def bridge_deck_group(tree: Tree) -> None:
 
 
 def _deck(tree: Tree, ends: tuple[Value, Value], width: Value, height: Value) -> Value:
+    """Add nodes for the deck's solid between two x (m), with its underside on z = 0."""
     half = [(0.0, y, z) for y, z in sizes.DECK]
     outline = half + [(x, -y, z) for x, y, z in reversed(half)]
 
@@ -67,19 +70,20 @@ def _deck(tree: Tree, ends: tuple[Value, Value], width: Value, height: Value) ->
 
 def _edge_beam(tree: Tree, ends: tuple[Value, Value], width: Value, height: Value) -> Value:
     """Add nodes for the deck's edge beam on the left of an observer who looks along x."""
-    share, most = sizes.HANG
-    hang = op.minimum(height * share, most)
+    share, maximum = sizes.HANG
+    hang = op.minimum(height * share, maximum)
 
     def place(point: Value, row: Value) -> Value:
-        inwards = op.component(point, "X") * (width * sizes.EDGE) + op.component(point, "Y") * sizes.NOSE
+        inner_distance = op.component(point, "X") * (width * sizes.EDGE) + op.component(point, "Y") * sizes.NOSE
         z = op.component(point, "Z")
         rise = op.switch(z > 0.5, op.switch(z < -0.5, -sizes.PAVEMENT, -hang), sizes.CURB)
-        return op.vector(tree, op.switch(row > 0, *ends), width * 0.5 - inwards, height + rise)
+        return op.vector(tree, op.switch(row > 0, *ends), width * 0.5 - inner_distance, height + rise)
 
     return loft(tree, lambda number: op.choose(number, _BEAM), len(_BEAM), 2, place)
 
 
-_BAR_SPACING = 0.14  # m
+_BAR_SPACING = 0.14
+"""Distance between the bars of a railing, m; chosen."""
 
 
 class _Railing(Inputs):
@@ -90,36 +94,37 @@ class _Railing(Inputs):
 @makes_group("SR Bridge Railing")
 def bridge_railing_group(tree: Tree) -> None:
     """A railing from x = 0 on along x, standing on z = 0."""
-    post, thin, low = sizes.RAILING_POST, sizes.RAILING_RAIL, sizes.RAILING_LOWER
+    post_width, rail_width, rail_z = sizes.RAILING_POST, sizes.RAILING_RAIL, sizes.RAILING_LOWER
     railing = _Railing(tree)
     length, height = railing.length, railing.height
     with tree.frame("Rails"):
-        wide, high = sizes.RAILING_HAND
+        hand_width, hand_height = sizes.RAILING_HAND
         rail = box(
             tree,
-            op.vector(tree, length, thin, thin),
-            op.vector(tree, length * 0.5, 0.0, low),
+            op.vector(tree, length, rail_width, rail_width),
+            op.vector(tree, length * 0.5, 0.0, rail_z),
         )
-        upper = move_geometry(rail, op.vector(tree, 0.0, 0.0, height - high - 2.0 * low))
-        hand = box(tree, op.vector(tree, length, wide, high), op.vector(tree, length * 0.5, 0.0, height - high / 2))
+        upper_rail = move_geometry(rail, op.vector(tree, 0.0, 0.0, height - hand_height - 2.0 * rail_z))
+        hand_size = op.vector(tree, length, hand_width, hand_height)
+        handrail = box(tree, hand_size, op.vector(tree, length * 0.5, 0.0, height - hand_height / 2))
     with tree.frame("Posts"):
         bays = op.round_up(length / sizes.RAILING_SPACING)
         points = row_of_points(tree, bays + 1)
-        x = op.index(tree) * ((length - post) / bays) + post / 2
-        tall = height - high / 2
+        x = op.index(tree) * ((length - post_width) / bays) + post_width / 2
+        post_height = height - hand_height / 2
         posts = put_on_points(
             points,
-            box(tree, op.vector(tree, post, post, tall)),
-            op.vector(tree, x, 0.0, tall * 0.5),
+            box(tree, op.vector(tree, post_width, post_width, post_height)),
+            op.vector(tree, x, 0.0, post_height * 0.5),
         )
     with tree.frame("Bars between the rails"):
         points = row_of_points(tree, op.round_up(length / _BAR_SPACING) - 1)
         x = (op.index(tree) + 1) * _BAR_SPACING
-        tall = height - high - 2.0 * low
-        open_ = tree.node(
-            "GeometryNodeMeshCylinder", vertices=4, fill_type="NONE", radius=sizes.RAILING_BAR * 0.7, depth=tall
+        bar_height = height - hand_height - 2.0 * rail_z
+        bar = tree.node(
+            "GeometryNodeMeshCylinder", vertices=4, fill_type="NONE", radius=sizes.RAILING_BAR * 0.7, depth=bar_height
         ).value
-        bars = put_on_points(points, open_, op.vector(tree, x, 0.0, tall * 0.5 + low))
+        bars = put_on_points(points, bar, op.vector(tree, x, 0.0, bar_height * 0.5 + rail_z))
     with tree.frame("All"):
-        mesh = op.realize(op.join(rail, upper, hand, posts, bars))
+        mesh = op.realize(op.join(rail, upper_rail, handrail, posts, bars))
     tree.output("Mesh", mesh, description="The railing")

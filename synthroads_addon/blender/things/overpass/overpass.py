@@ -63,28 +63,31 @@ def overpass_group(tree: Tree) -> None:
         shear = op.unary("TANGENT", bridge.skew)
     with tree.frame("Underside, above the pavement's highest point"):
         reach = op.maximum(bridge.faces[1.0], -bridge.faces[-1.0]) * 1.5 + bridge.width
-        paved = pavement_near(surfaces[0], reach)
+        pavement = pavement_near(surfaces[0], reach)
         edges = bridge.width * -0.5, bridge.width * 0.5
-        low = highest_below(paved, bridge.faces[-1.0], bridge.faces[1.0], edges, shear) + bridge.clearance
+        underside = highest_below(pavement, bridge.faces[-1.0], bridge.faces[1.0], edges, shear) + bridge.clearance
     with tree.frame("Ground at the abutments, and wing walls"):
-        feet = {side: _lowest(bridge, surfaces, shear, face) for side, face in bridge.faces.items()}
-        wings = {side: _wing_length(bridge, low, foot) for side, foot in feet.items()}
+        foot_heights = {side: _lowest_ground(bridge, surfaces, shear, face) for side, face in bridge.faces.items()}
+        wing_lengths = {side: _wing_length(bridge, underside, foot) for side, foot in foot_heights.items()}
     with tree.frame("Deck and abutments, skewed"):
-        mesh = op.join(_deck(bridge, low, wings), *(_abutment(bridge, low, feet, wings, side) for side in (-1.0, 1.0)))
+        mesh = op.join(
+            _deck(bridge, underside, wing_lengths),
+            *(_abutment(bridge, underside, foot_heights, wing_lengths, side) for side in (-1.0, 1.0)),
+        )
         place = op.position(tree)
         mesh = op.set_position(mesh, place + op.vector(tree, 0.0, op.component(place, "X") * shear))
     with tree.frame("Piers, parallel to the road"):
-        mesh = op.join(mesh, _piers(bridge, surfaces, shear, low))
+        mesh = op.join(mesh, _piers(bridge, surfaces, shear, underside))
     with tree.frame("Embankments"):
         ground = op.join(*surfaces)
-        banks = [_embankment(bridge, ground, low, wings[side], shear, side) for side in (-1.0, 1.0)]
+        banks = [_embankment(bridge, ground, underside, wing_lengths[side], shear, side) for side in (-1.0, 1.0)]
     with tree.frame("Labels"):
         mesh = op.join(op.store(mesh, "class_id", class_id(Overpass.points_class), "FACE"), *banks)
         mesh = op.store(mesh, "instance_id", bridge.instance, "FACE")
     tree.output("Mesh", mesh, description="The bridge; its embankments' slopes are ground")
 
 
-def _lowest(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, face: Value) -> Value:
+def _lowest_ground(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, face: Value) -> Value:
     """Add nodes for the lower z (m) of the ground at both ends of an abutment's face."""
     ends = [
         height_on(*surfaces, op.vector(bridge.tree, face, bridge.width * half + face * shear)) for half in (0.5, -0.5)
@@ -92,20 +95,21 @@ def _lowest(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, face
     return op.minimum(*ends)
 
 
-def _wing_length(bridge: _Overpass, low: Value, foot: Value) -> Value:
+def _wing_length(bridge: _Overpass, underside: Value, foot: Value) -> Value:
     """Add nodes for the wing walls' length (m), such that the embankment's cones reach the abutment's face."""
-    needed = (low + bridge.deck_thickness - foot) * bridge.slope
-    return op.clip(needed, *sizes.WINGS)
+    cone_reach = (underside + bridge.deck_thickness - foot) * bridge.slope
+    return op.clip(cone_reach, *sizes.WINGS)
 
 
-def _deck(bridge: _Overpass, low: Value, wings: dict[float, Value]) -> Value:
-    left, right = bridge.faces[-1.0], bridge.faces[1.0]
+def _deck(bridge: _Overpass, underside: Value, wing_lengths: dict[float, Value]) -> Value:
+    """Add nodes for the deck, straight, with its edge beams over the wing walls."""
+    left_face, right_face = bridge.faces[-1.0], bridge.faces[1.0]
     deck = bridge.tree.call(
         bridge_deck_group(),
-        deck_start=left - sizes.SEAT,
-        deck_end=right + sizes.SEAT,
-        start=left - wings[-1.0],
-        end=right + wings[1.0],
+        deck_start=left_face - sizes.SEAT,
+        deck_end=right_face + sizes.SEAT,
+        start=left_face - wing_lengths[-1.0],
+        end=right_face + wing_lengths[1.0],
         width=bridge.width,
         thickness=bridge.deck_thickness,
         parapet_height=bridge.parapet_height,
@@ -114,26 +118,30 @@ def _deck(bridge: _Overpass, low: Value, wings: dict[float, Value]) -> Value:
         steel_material=bridge.steel_material,
         pavement_material=bridge.pavement_material,
     ).value
-    return move_geometry(deck, op.vector(bridge.tree, 0.0, 0.0, low))
+    return move_geometry(deck, op.vector(bridge.tree, 0.0, 0.0, underside))
 
 
-def _abutment(bridge: _Overpass, low: Value, feet: dict[float, Value], wings: dict[float, Value], side: float) -> Value:
+def _abutment(
+    bridge: _Overpass, underside: Value, foot_heights: dict[float, Value], wing_lengths: dict[float, Value], side: float
+) -> Value:
+    """Add nodes for the abutment of one side (-1 left, +1 right), straight."""
     tree = bridge.tree
-    made = tree.call(
+    abutment = tree.call(
         bridge_abutment_group(),
         width=bridge.width,
         thickness=bridge.deck_thickness,
-        foot=feet[side] - low - sizes.BURIED,
-        wing_length=wings[side],
+        foot=foot_heights[side] - underside - sizes.BURIED,
+        wing_length=wing_lengths[side],
         concrete_material=bridge.concrete_material,
         steel_material=bridge.steel_material,
     ).value
     if side < 0.0:
-        made = flip_faces(op.transform(made, scale=(-1.0, 1.0, 1.0)))
-    return move_geometry(made, op.vector(tree, bridge.faces[side], 0.0, low))
+        abutment = flip_faces(op.transform(abutment, scale=(-1.0, 1.0, 1.0)))
+    return move_geometry(abutment, op.vector(tree, bridge.faces[side], 0.0, underside))
 
 
-def _piers(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, low: Value) -> Value:
+def _piers(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, underside: Value) -> Value:
+    """Add nodes for the piers with their bearings, each on the surface below it."""
     tree = bridge.tree
     pier = tree.call(
         bridge_pier_group(),
@@ -145,22 +153,27 @@ def _piers(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, low: 
     x = op.component(op.position(tree), "X")
     plan = op.vector(tree, x, x * shear)
     points = op.store(bridge.piers, "foot", height_on(*surfaces, plan) - sizes.BURIED)
-    tall = low - sizes.BEARING - op.named_attribute(tree, "foot")
-    top = plan + op.vector(tree, 0.0, 0.0, low - sizes.BEARING)
-    bodies = put_on_points(points, pier["Body"], top, op.vector(tree, 1.0, 1.0, tall))
-    return op.realize(op.join(bodies, put_on_points(points, pier["Bearings"], plan + op.vector(tree, 0.0, 0.0, low))))
+    pier_height = underside - sizes.BEARING - op.named_attribute(tree, "foot")
+    top = plan + op.vector(tree, 0.0, 0.0, underside - sizes.BEARING)
+    bodies = put_on_points(points, pier["Body"], top, op.vector(tree, 1.0, 1.0, pier_height))
+    return op.realize(
+        op.join(bodies, put_on_points(points, pier["Bearings"], plan + op.vector(tree, 0.0, 0.0, underside)))
+    )
 
 
-def _embankment(bridge: _Overpass, ground: Value, low: Value, wing: Value, shear: Value, side: float) -> Value:
+def _embankment(
+    bridge: _Overpass, ground: Value, underside: Value, wing_length: Value, shear: Value, side: float
+) -> Value:
+    """Add nodes for the embankment of one side (-1 left, +1 right)."""
     approach = bridge.left_approach_length if side < 0.0 else bridge.right_approach_length
     return bridge.tree.call(
         bridge_embankment_group(),
         ground=ground,
         face=bridge.faces[side],
         side=side,
-        wing_length=wing,
-        length=op.maximum(approach, wing + 1.0),
-        top=low + bridge.deck_thickness,
+        wing_length=wing_length,
+        length=op.maximum(approach, wing_length + 1.0),
+        top=underside + bridge.deck_thickness,
         width=bridge.width,
         edge_width=bridge.width * sizes.EDGE,
         shear=shear,
@@ -171,8 +184,9 @@ def _embankment(bridge: _Overpass, ground: Value, low: Value, wing: Value, shear
 
 
 _LONGEST_APPROACH = 150.0
+"""Largest length (m) of the embankments; chosen."""
 _APPROACH_ALONE = 20.0
-"""Length (m) of the embankments where there is no terrain."""
+"""Length (m) of the embankments without terrain; chosen."""
 
 
 @model_part("overpasses", 100)
@@ -182,7 +196,7 @@ def build_overpasses(builder: ModelBuilder) -> None:
     for name, bridge in builder.parameters.of_type(Overpass).items():
         approaches = {}
         for side, face in (("left", bridge.left_abutment), ("right", -bridge.right_abutment)):
-            # As far as there is ground.
+            # The embankment ends where the terrain does.
             reach = terrain.half_width - face if terrain else _APPROACH_ALONE
             approaches[f"{side}_approach_length"] = float(np.clip(reach, 1.0, _LONGEST_APPROACH))
         mesh = bpy.data.meshes.new("SR Overpass")

@@ -1,4 +1,7 @@
-"""SR Bridge Abutment: bearing seat, back wall and wing walls. SR Bridge Pier: a wall pier and its bearings."""
+"""SR Bridge Abutment: bearing seat, back wall and wing walls. SR Bridge Pier: a wall pier and its bearings.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 
@@ -25,34 +28,35 @@ def bridge_abutment_group(tree: Tree) -> None:
     """An abutment whose face looks to -x and stands on x = 0; the deck's underside is z = 0."""
     abutment = _Abutment(tree)
     width, height = abutment.width, abutment.thickness
-    wide = width - 2.0 * sizes.WALL_INSIDE
+    wall_width = width - 2.0 * sizes.WALL_INSIDE
 
     def wall(start: float, end: Operand, top: Value, size: Operand, middle: Operand = 0.0) -> Value:
+        """Add nodes for a box from x = start to end and from the foot to the top, with a size and a middle in y, m."""
         corner = op.vector(tree, start, middle, abutment.foot)
         length = op.vector(tree, end, middle, top) - corner
         return box(tree, length + op.vector(tree, 0.0, size), corner + length * 0.5)
 
     with tree.frame("Seat and back wall"):
-        level = height * 0.0 - sizes.BEARING
-        walls = [wall(0.0, sizes.ABUTMENT, level, wide)]
+        seat_z = height * 0.0 - sizes.BEARING
+        walls = [wall(0.0, sizes.ABUTMENT, seat_z, wall_width)]
         walls.append(
             wall(
                 sizes.SEAT + sizes.BACK_WALL[0],
                 sizes.ABUTMENT - sizes.BACK_WALL[1],
                 height - sizes.PAVEMENT * 0.5,
-                wide - 0.02,
+                wall_width - 0.02,
             )
         )
     with tree.frame("Wing walls"):
         for side in (1.0, -1.0):
-            beside = (wide * 0.5 - sizes.WALL / 2) * side
+            y = (wall_width * 0.5 - sizes.WALL / 2) * side
             walls.append(
-                wall(sizes.ABUTMENT - 0.02, abutment.wing_length, height - sizes.PAVEMENT * 0.6, sizes.WALL, beside)
+                wall(sizes.ABUTMENT - 0.02, abutment.wing_length, height - sizes.PAVEMENT * 0.6, sizes.WALL, y)
             )
     with tree.frame("Bearings below the webs"):
-        beside, below = width * (0.25 * sum(sizes.WEB)), -sizes.BEARING / 2
+        y, bearing_z = width * (0.25 * sum(sizes.WEB)), -sizes.BEARING / 2
         pads = [
-            box(tree, (0.5, 0.6, sizes.BEARING + 0.02), op.vector(tree, sizes.SEAT / 2, beside * side, below))
+            box(tree, (0.5, 0.6, sizes.BEARING + 0.02), op.vector(tree, sizes.SEAT / 2, y * side, bearing_z))
             for side in (1.0, -1.0)
         ]
     with tree.frame("All"):
@@ -74,22 +78,22 @@ class _Pier(Inputs):
 def bridge_pier_group(tree: Tree) -> None:
     """A pier along y whose bearings carry a deck with its underside on z = 0; its body is 1 high, to be stretched."""
     pier = _Pier(tree)
-    width, deck = pier.pier_width, pier.width
+    width, deck_width = pier.pier_width, pier.width
     angles = [math.pi * i / (sizes.PIER_ROUND - 1) for i in range(sizes.PIER_ROUND)]
-    end = [(0.5 * math.cos(a), 0.5 * math.sin(a)) for a in angles]
-    # z says which end a point belongs to.
-    outline = [(x, y, 1.0) for x, y in end] + [(-x, -y, -1.0) for x, y in end]
+    end_outline = [(0.5 * math.cos(a), 0.5 * math.sin(a)) for a in angles]
+    # z is the sign of the end that a point belongs to.
+    outline = [(x, y, 1.0) for x, y in end_outline] + [(-x, -y, -1.0) for x, y in end_outline]
     with tree.frame("Body"):
-        straight = (op.maximum(deck * sizes.PIER_LENGTH, width * 1.02) - width) * 0.5
+        half_straight = (op.maximum(deck_width * sizes.PIER_LENGTH, width * 1.02) - width) * 0.5
 
         def place(point: Value, row: Value) -> Value:
-            y = op.component(point, "Y") * width + op.component(point, "Z") * straight
+            y = op.component(point, "Y") * width + op.component(point, "Z") * half_straight
             return op.vector(tree, op.component(point, "X") * width, y, row - 1)
 
         body = loft(tree, lambda number: op.choose(number, outline), len(outline), 2, place)
     with tree.frame("Bearings"):
-        beside = op.minimum(deck * (0.25 * sum(sizes.WEB)), straight)
+        bearing_y = op.minimum(deck_width * (0.25 * sum(sizes.WEB)), half_straight)
         size = op.vector(tree, op.minimum(width * 0.8, 0.6), 0.5, sizes.BEARING + 0.02)
-        pads = [box(tree, size, op.vector(tree, 0.0, beside * side, -sizes.BEARING / 2)) for side in (1.0, -1.0)]
+        pads = [box(tree, size, op.vector(tree, 0.0, bearing_y * side, -sizes.BEARING / 2)) for side in (1.0, -1.0)]
     tree.output("Body", paint_faces(body, pier.concrete_material), description="The pier, from z = -1 to 0")
     tree.output("Bearings", paint_faces(op.join(*pads), pier.steel_material), description="The bearings")

@@ -1,4 +1,4 @@
-"""The backbone, a polyline along the axis with what the nodes need to know at each station, and the road's surface."""
+"""The backbone, a polyline along the axis with attributes for the nodes at each station, and the road's surface."""
 
 from __future__ import annotations
 
@@ -61,20 +61,21 @@ def _road_inputs(
     """Return the road group's numeric inputs (widths, lines, turnouts, instances) by name, without objects, materials.
 
     Args:
-        parameters: the road, or what of it is on a stretch.
-        geometry: the whole road's.
-        zero: station that the nodes count theirs from, m.
+        parameters: the road, with only the objects on the stretch that is built.
+        geometry: the whole road's geometry.
+        zero: station that nodes' stations are relative to, m.
     """
     inputs: dict[str, float | int | bool] = {}
-    words = names_in_words(parameters)
+    words_by_id = names_in_words(parameters)
 
-    def give(before: str, **values: float) -> None:
-        inputs.update({input_name(field, before): value for field, value in values.items()})
+    def add_inputs(words_before: str, **values: float) -> None:
+        """Add inputs given by their fields; `words_before` stand in front of each input's name."""
+        inputs.update({input_name(field, words_before): value for field, value in values.items()})
 
     for carriageway in parameters.of_type(Carriageway).values():
         side = carriageway.side.title()
-        give(side, **{width_field(strip): nominal_width(width) for strip, width in strip_widths(carriageway)})
-        give(
+        add_inputs(side, **{width_field(strip): nominal_width(width) for strip, width in strip_widths(carriageway)})
+        add_inputs(
             side,
             verge_slope=carriageway.verge_slope_percent / 100.0,
             turns_about_inner_edge=carriageway.rotation_axis == "inner_edge",
@@ -85,29 +86,29 @@ def _road_inputs(
             joint_depth=carriageway.pavement.joint_depth,
             wheel_track_depth=carriageway.pavement.wheel_track_depth,
         )
-        give(side, **_age_inputs(carriageway, parameters.materials.asphalt_age))
+        add_inputs(side, **_age_inputs(carriageway, parameters.materials.asphalt_age))
     for median in parameters.of_type(Median).values():
         if len(parameters.of_type(Carriageway)) == 2:
-            give("Median", instance=median.instance)
+            add_inputs("Median", instance=median.instance)
     for section in sections_of(parameters).values():
         for shape in section.turnouts:
             name = next(key for key, item in parameters.objects.items() if item is shape.turnout)
-            low, high = shape.range()
-            place = f"{side_of(parameters, shape.turnout)} {words[name]}"
-            give(place, start_station=low - zero, end_station=high - zero, instance=shape.turnout.instance)
+            start, end = shape.range()
+            line_words = f"{side_of(parameters, shape.turnout)} {words_by_id[name]}"
+            add_inputs(line_words, start_station=start - zero, end_station=end - zero, instance=shape.turnout.instance)
     for name, line in parameters.of_type(LineMarking).items():
-        place = f"{side_of(parameters, line)} {words[name]}"
+        line_words = f"{side_of(parameters, line)} {words_by_id[name]}"
         values = {field: getattr(line, field) for field in LINE_FIELDS}
         stations = {"start_station": line.start_station - zero, "end_station": line.end_station - zero}
-        give(place, **values | stations, instance=line.instance)
-        give(place, first_dash_instance=_first_dash(name, line, geometry))
+        add_inputs(line_words, **values | stations, instance=line.instance)
+        add_inputs(line_words, first_dash_instance=_first_dash(name, line, geometry))
         if line.kind == "free":
-            give(place, distance=nominal_width(line.offset))
+            add_inputs(line_words, distance=nominal_width(line.offset))
     return inputs
 
 
 def _age_inputs(carriageway: Carriageway, road_age: float) -> dict[str, float]:
-    """Return how much brighter a carriageway's lanes and shoulder are for their age, by input field."""
+    """Return the brightness of a carriageway's lanes and shoulder by age, as shares of the road's, by input field."""
     pavement, lanes = carriageway.pavement, len(carriageway.lanes)
     contrasts = lane_contrasts(pavement, lanes, road_age)
     contrasts = [*contrasts[::-1], age_contrast(pavement, pavement.shoulder_age, road_age)]
@@ -116,11 +117,11 @@ def _age_inputs(carriageway: Carriageway, road_age: float) -> dict[str, float]:
 
 def _first_dash(name: str, line: LineMarking, geometry: RoadGeometry) -> int:
     """Return the instance number of a line's first dash on the stretch, counted along the whole road."""
-    whole = geometry.parameters.objects[name]
-    assert isinstance(whole, LineMarking)
+    whole_line = geometry.parameters.objects[name]
+    assert isinstance(whole_line, LineMarking)
     period = line.dash_length + line.gap_length
-    before = round((line.start_station - whole.start_station) / period) if period else 0
-    return geometry.numbers.parts[name].first + before
+    dashes_before = round((line.start_station - whole_line.start_station) / period) if period else 0
+    return geometry.numbers.parts[name].first + dashes_before
 
 
 def backbone_mesh(geometry: RoadGeometry, station: Float, origin: Float, zero: float = 0.0) -> bpy.types.Mesh:
@@ -130,7 +131,7 @@ def backbone_mesh(geometry: RoadGeometry, station: Float, origin: Float, zero: f
         geometry: the road.
         station: (N,) m.
         origin: (3,) local coordinates of the scene's origin, m.
-        zero: station (m) that the nodes count theirs from: as float32 they are exact near it only.
+        zero: station (m) that nodes' stations are relative to: as float32 they are exact near it only.
     """
     position, heading, curvature = geometry.alignment.frame(station)
     elevation = geometry.profile.elevation(station)
@@ -140,10 +141,14 @@ def backbone_mesh(geometry: RoadGeometry, station: Float, origin: Float, zero: f
         values[f"crossfall_{side}"] = geometry.crossfall(carriageway, station) if carriageway else 0.0 * station
     values |= varying_widths(geometry, station)
     mesh = bpy.data.meshes.new("SR Backbone")
-    first = np.arange(len(station) - 1)
-    fill(mesh, np.column_stack([position, elevation]) - origin, edges=np.column_stack([first, first + 1]))
-    left = np.column_stack([-np.sin(heading), np.cos(heading), np.zeros(len(station))])
-    attribute(mesh, "left", left)
+    first_vertices = np.arange(len(station) - 1)
+    fill(
+        mesh,
+        np.column_stack([position, elevation]) - origin,
+        edges=np.column_stack([first_vertices, first_vertices + 1]),
+    )
+    left_vectors = np.column_stack([-np.sin(heading), np.cos(heading), np.zeros(len(station))])
+    attribute(mesh, "left", left_vectors)
     for name, value in values.items():
         attribute(mesh, name, value)
     return mesh

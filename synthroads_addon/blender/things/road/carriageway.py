@@ -30,10 +30,13 @@ from ...nodes.strip import StripFaces, strip_group
 from .layout import TURNOUT_NAMES, aged_strips, brightness_field, detail_field, strips_of, width_field
 
 _FAR = (-1000.0, 1000.0)
+"""Limits of distances from the axis, m."""
 _UNPAVED = ("Verge", "Island")
 _WIDTHS = {"Inner Edge Strip": 0.5, "Outer Edge Strip": 0.5, "Hard Shoulder": 2.5, "Verge": 1.5}
 _LANE = 3.5
+"""Default width of a lane, m."""
 _CONTRAST = (-1.0, 4.0)
+"""Limits of the brightness by age, as a share."""
 _CROSSFALL = "Fall of the pavement to the right (m/m), which may be a field"
 
 
@@ -44,7 +47,7 @@ class _Ramp(Inputs):
 
 
 RAMP_FIELDS = tuple(field.name for field in _Ramp.fields())
-"""Inputs that say how ramps leave the pavement's plane, fields on the backbone."""
+"""Inputs of ramps that leave the pavement's plane; their values are fields on the backbone."""
 
 
 class Section(_Ramp):
@@ -65,19 +68,19 @@ class _Distance(Inputs):
 def height_group(tree: Tree) -> None:
     """Offset and height above the axis of a line at a distance from it."""
     section, distance = Section(tree), _Distance(tree).distance
-    paved = section.paved_edge
+    paved_edge = section.paved_edge
     with tree.frame("The pavement turns about the pivot, the verge falls away"):
         # A surface that falls to the right rises with the offset, and the offset is side * distance.
         side = op.switch(section.left_side, -1.0, 1.0)
         rise = section.crossfall * side
-        beyond = op.maximum(distance - paved, 0.0)
-        plane = op.minimum(distance, paved)
-        height = rise * (plane - section.pivot) - beyond * section.verge_slope
+        verge_distance = op.maximum(distance - paved_edge, 0.0)
+        pavement_distance = op.minimum(distance, paved_edge)
+        height = rise * (pavement_distance - section.pivot) - verge_distance * section.verge_slope
     with tree.frame("A ramp has a plane of its own"):
-        # The boundary from which on it has is rounded to single precision in two ways.
-        begin = paved - section.ramp_width
-        on_ramp = section.ramp_lift + section.ramp_tilt * (plane - begin)
-        height = height + op.switch(distance > begin - 0.001, 0.0, on_ramp)
+        # The ramp's boundary is computed in two ways in single precision: 1 mm covers the difference.
+        ramp_start = paved_edge - section.ramp_width
+        ramp_height = section.ramp_lift + section.ramp_tilt * (pavement_distance - ramp_start)
+        height = height + op.switch(distance > ramp_start - 0.001, 0.0, ramp_height)
     tree.output("Height", height, description="Height above the axis, per row of the backbone (m)")
     tree.output("Offset", distance * side, description="Offset, positive to the left (m)")
 
@@ -93,17 +96,21 @@ def carriageway_strip_group(tree: Tree) -> None:
     """A strip of a carriageway between two distances from the axis, which may be fields on the backbone's points."""
     strip, section, faces = _CarriagewayStrip(tree), Section(tree), StripFaces(tree)
     with tree.frame("Both edges: outwards is to the left on the left side"):
-        inner, outer = strip.inner_distance, strip.outer_distance
-        left = tree.call(height_group(), **section.values, distance=op.switch(section.left_side, inner, outer))
-        right = tree.call(height_group(), **section.values, distance=op.switch(section.left_side, outer, inner))
+        inner_distance, outer_distance = strip.inner_distance, strip.outer_distance
+        left_edge = tree.call(
+            height_group(), **section.values, distance=op.switch(section.left_side, inner_distance, outer_distance)
+        )
+        right_edge = tree.call(
+            height_group(), **section.values, distance=op.switch(section.left_side, outer_distance, inner_distance)
+        )
     with tree.frame("Strip"):
         mesh = tree.call(
             strip_group(),
             backbone=strip.backbone,
-            left_offset=left["Offset"],
-            right_offset=right["Offset"],
-            left_height=left["Height"],
-            right_height=right["Height"],
+            left_offset=left_edge["Offset"],
+            right_offset=right_edge["Offset"],
+            left_height=left_edge["Height"],
+            right_height=right_edge["Height"],
             **faces.values,
         ).value
     tree.output("Mesh", mesh, description="Ribbon whose faces look up")
@@ -132,15 +139,15 @@ def pavement_place_group(tree: Tree) -> None:
     """
     lane = _PavementPlace(tree)
     with tree.frame("Middle and half width of the lane at each row"):
-        number_ = op.named_attribute(tree, "row", "INT")
-        inner, outer = (
-            op.sample_index(lane.backbone, value, number_) for value in (lane.inner_distance, lane.outer_distance)
+        row_number = op.named_attribute(tree, "row", "INT")
+        inner_edge, outer_edge = (
+            op.sample_index(lane.backbone, value, row_number) for value in (lane.inner_distance, lane.outer_distance)
         )
-        across = op.unary("ABSOLUTE", op.named_attribute(tree, "offset")) - (inner + outer) * 0.5
-        code = (outer - inner) * (0.5 / HALF_UNIT) + lane.kind
+        lane_distance = op.unary("ABSOLUTE", op.named_attribute(tree, "offset")) - (inner_edge + outer_edge) * 0.5
+        code = (outer_edge - inner_edge) * (0.5 / HALF_UNIT) + lane.kind
     with tree.frame("Attributes that the materials read"):
         station = op.named_attribute(tree, "station") + lane.first_station
-        mesh = op.store(lane.strip, "pavement", op.vector(tree, station, across, code))
+        mesh = op.store(lane.strip, "pavement", op.vector(tree, station, lane_distance, code))
         shape = op.vector(tree, lane.slab_length, lane.joint_depth, lane.wheel_track_depth)
         mesh = op.store(mesh, "pavement_shape", shape)
         mesh = op.store(mesh, "pavement_age", lane.brightness)
@@ -156,16 +163,20 @@ def carriageway_group(lanes: int, turnouts: bool = False) -> bpy.types.NodeTree:
 
 def width_fields(lanes: int, turnouts: bool = False, varying: tuple[str, ...] = ()) -> dict[str, Input]:
     """Return the input fields of a carriageway's strip widths, from the inner offset outwards, by field name."""
-    inner = "Distance of the inner paved edge from the axis"
-    about = {"Inner Offset": inner} | {strip: f"Width of the {strip.lower()}" for strip in strips_of(lanes, turnouts)}
-    about["Lane 1"] += "; 1 is the outermost lane"
-    about |= {strip: f"{about[strip]}; the backbone says where there is less of it" for strip in varying}
-    sizes = {strip: (_WIDTHS.get(strip, _LANE), 6.0) for strip in about}
-    sizes |= {"Inner Offset": (2.0, 50.0), **dict.fromkeys(TURNOUT_NAMES, (0.0, 50.0))}
-    least = {"Inner Offset": -50.0}
+    inner_text = "Distance of the inner paved edge from the axis"
+    texts = {"Inner Offset": inner_text} | {
+        strip: f"Width of the {strip.lower()}" for strip in strips_of(lanes, turnouts)
+    }
+    texts["Lane 1"] += "; 1 is the outermost lane"
+    texts |= {strip: f"{texts[strip]}; the backbone says where there is less of it" for strip in varying}
+    defaults_and_maxima = {strip: (_WIDTHS.get(strip, _LANE), 6.0) for strip in texts}
+    defaults_and_maxima |= {"Inner Offset": (2.0, 50.0), **dict.fromkeys(TURNOUT_NAMES, (0.0, 50.0))}
+    minima = {"Inner Offset": -50.0}
     return {
-        width_field(strip): metres(sizes[strip][0], (least.get(strip, 0.0), sizes[strip][1]), text)
-        for strip, text in about.items()
+        width_field(strip): metres(
+            defaults_and_maxima[strip][0], (minima.get(strip, 0.0), defaults_and_maxima[strip][1]), text
+        )
+        for strip, text in texts.items()
     }
 
 
@@ -187,8 +198,8 @@ class SideInputs(Inputs):
 
 def age_fields(lanes: int) -> dict[str, Input]:
     """Return the input fields of how bright a carriageway's lanes and shoulder are for their age, by field name."""
-    about = "By how much it is brighter for its age than its material, as a share"
-    return {brightness_field(strip): number(0.0, _CONTRAST, about) for strip in aged_strips(lanes)}
+    text = "By how much it is brighter for its age than its material, as a share"
+    return {brightness_field(strip): number(0.0, _CONTRAST, text) for strip in aged_strips(lanes)}
 
 
 class _Place(Inputs):
@@ -204,49 +215,56 @@ class _Turnouts(_Ramp):
 
 
 def _build(tree: Tree, lanes: int, turnouts: bool) -> None:
+    """Build the node group of one side: its inputs, strips, and the boundaries and edges as outputs."""
     place = _Place(tree)
     widths = inputs_class("Widths", width_fields(lanes, turnouts))(tree)
     side = SideInputs(tree)
     ages = inputs_class("Ages", age_fields(lanes))(tree).values
     verge = tree.material("Verge Material", "verge", description="Material of the verge")
-    more = _Turnouts(tree) if turnouts else None
+    turnout_inputs = _Turnouts(tree) if turnouts else None
     strips = strips_of(lanes, turnouts)
-    about = "Points that make the {} finer, see SR Strip"
-    fields = {detail_field(strip): socket("Geometry", about.format(strip.lower())) for strip in strips[:-1]}
+    fields = {
+        detail_field(strip): socket("Geometry", f"Points that make the {strip.lower()} finer, see SR Strip")
+        for strip in strips[:-1]
+    }
     with tree.panel("Detail"):
         details = inputs_class("Details", fields)(tree)
     with tree.frame("Boundaries: distances from the axis"):
         backbone = rows_along(place.backbone)
-        distances, plane, pivot = _boundaries(strips, widths, side, more)
+        distances, plane, pivot = _boundaries(strips, widths, side, turnout_inputs)
     section: dict[str, Operand] = {"left_side": place.left_side, "crossfall": place.crossfall}
     section |= {"paved_edge": plane, "pivot": pivot, "verge_slope": side.verge_slope}
-    section |= {field: more.values[field] for field in RAMP_FIELDS} if more else {}
+    section |= {field: turnout_inputs.values[field] for field in RAMP_FIELDS} if turnout_inputs else {}
     with tree.frame("Pavement and verge"):
         parts = []
-        on_left = op.switch(place.left_side, 0, CODES)
-        of_lanes = strip_lanes(tuple("lane" if strip.startswith("Lane") else _kind(strip) for strip in strips), lanes)
-        for number_, strip in enumerate(strips):
-            paved = strip not in _UNPAVED
+        side_code = op.switch(place.left_side, 0, CODES)
+        strip_kinds = strip_lanes(
+            tuple("lane" if strip.startswith("Lane") else _kind(strip) for strip in strips), lanes
+        )
+        for strip_number, strip in enumerate(strips):
+            is_paved = strip not in _UNPAVED
             mesh = tree.call(
                 carriageway_strip_group(),
                 backbone=backbone,
-                inner_distance=distances[number_],
-                outer_distance=distances[number_ + 1],
+                inner_distance=distances[strip_number],
+                outer_distance=distances[strip_number + 1],
                 **section,
-                class_=class_id("road" if paved else "roadside"),
-                instance=more.turnout_instance if more and strip in TURNOUT_NAMES else side.instance,
-                material=side.pavement_material if paved else verge,
+                class_=class_id("road" if is_paved else "roadside"),
+                instance=turnout_inputs.turnout_instance
+                if turnout_inputs and strip in TURNOUT_NAMES
+                else side.instance,
+                material=side.pavement_material if is_paved else verge,
                 **{"detail": details.values[detail_field(strip)]} if strip != "Verge" else {},
             ).value
-            if paved:
-                kind, lane = of_lanes[number_]
+            if is_paved:
+                kind, lane = strip_kinds[strip_number]
                 mesh = tree.call(
                     pavement_place_group(),
                     strip=mesh,
                     backbone=backbone,
                     inner_distance=distances[lane],
                     outer_distance=distances[lane + 1],
-                    kind=on_left + kind,
+                    kind=side_code + kind,
                     first_station=side.first_station,
                     slab_length=side.slab_length,
                     joint_depth=side.joint_depth,
@@ -254,16 +272,16 @@ def _build(tree: Tree, lanes: int, turnouts: bool) -> None:
                     brightness=ages.get(brightness_field(strips[lane]), 0.0),
                 ).value
             parts.append(mesh)
-        at_row = op.sample_index(backbone, distances[-1], op.named_attribute(tree, "row", "INT"))
-        beyond = op.unary("ABSOLUTE", op.named_attribute(tree, "offset")) - at_row
-        parts[-1] = op.store(parts[-1], "distance", beyond)
+        outer_distance = op.sample_index(backbone, distances[-1], op.named_attribute(tree, "row", "INT"))
+        edge_distance = op.unary("ABSOLUTE", op.named_attribute(tree, "offset")) - outer_distance
+        parts[-1] = op.store(parts[-1], "distance", edge_distance)
         mesh = op.join(*parts)
     with tree.frame("Inner and outer edge"):
         edges = [tree.call(height_group(), **section, distance=distances[end]) for end in (0, -1)]
     tree.output("Mesh", mesh, description="Pavement and verge; every face has class_id and instance_id")
-    for number_, distance in enumerate(distances):
+    for strip_number, distance in enumerate(distances):
         text = "Distance of a boundary from the axis, per row; counted from the median (m)"
-        tree.output(f"Boundary {number_}", distance, description=text)
+        tree.output(f"Boundary {strip_number}", distance, description=text)
     tree.output("Paved Edge", plane, description="Where the pavement's plane ends, per row (m)")
     tree.output("Pivot", pivot, description="Line that keeps the axis's height, per row (m)")
     for name, edge in zip(("Inner", "Outer"), edges, strict=True):
@@ -272,28 +290,29 @@ def _build(tree: Tree, lanes: int, turnouts: bool) -> None:
 
 
 def _kind(strip: str) -> str:
+    """Return the kind of a strip's name: "Hard Shoulder" -> "hard_shoulder"."""
     return strip.lower().replace(" ", "_")
 
 
 def _boundaries(
     strips: list[str], widths: Inputs, side: SideInputs, turnouts: _Turnouts | None
 ) -> tuple[list[Value], Value, Value]:
-    """Add nodes for the strips' boundaries, the pavement plane's end and its pivot, as distances from the axis, m."""
-    inner = main = widths.values["inner_offset"]
-    distances = [inner]
+    """Add nodes for distances from the axis, m: the strips' boundaries, the end of the pavement's plane, its pivot."""
+    inner_edge = main_edge = widths.values["inner_offset"]
+    distances = [inner_edge]
     for strip in strips:
         width = widths.values[width_field(strip)]
         if turnouts and strip == "Verge":
             width = width + turnouts.verge_extra_width
         distances.append(distances[-1] + width)
         if turnouts and strip not in ("Verge", *TURNOUT_NAMES):
-            # Beside turnouts, too, the crossfall turns about the middle of the whole main road.
-            main = main + (turnouts.whole_hard_shoulder_width if strip == "Hard Shoulder" else width)
-    plane = distances[-2]
-    main = main if turnouts else plane
-    plane = plane + turnouts.verge_extra_width if turnouts else plane
-    of_pavement = op.switch(side.turns_about_inner_edge, (inner + main) * 0.5, inner)
-    return distances, plane, op.switch(side.turns_about_axis, of_pavement, 0.0)
+            # Beside turnouts, too, the crossfall turns about the middle of the main road alone.
+            main_edge = main_edge + (turnouts.whole_hard_shoulder_width if strip == "Hard Shoulder" else width)
+    plane_end = distances[-2]
+    main_edge = main_edge if turnouts else plane_end
+    plane_end = plane_end + turnouts.verge_extra_width if turnouts else plane_end
+    pavement_pivot = op.switch(side.turns_about_inner_edge, (inner_edge + main_edge) * 0.5, inner_edge)
+    return distances, plane_end, op.switch(side.turns_about_axis, pavement_pivot, 0.0)
 
 
 offer_group("Road", "SR Carriageway 3 Lanes", partial(carriageway_group, 3))

@@ -1,4 +1,4 @@
-"""Layout of SR Road: the counts that its nodes depend on, the values of its inputs and of the backbone's attributes."""
+"""Layout of SR Road, by which its nodes are built; names of its inputs; values of the backbone's attributes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 TURNOUT_NAMES = tuple(kind.replace("_", " ").title() for kind in TURNOUT_STRIPS)
-"""Strips that turnouts make, from the hard shoulder outwards, as the inputs and attributes name them."""
+"""Names, in inputs and attributes, of the strips that turnouts add, from the hard shoulder outwards."""
 
 
 def strips_of(lanes: int, turnouts: bool) -> list[str]:
@@ -41,25 +41,25 @@ def detail_field(strip: str) -> str:
 
 
 def aged_strips(lanes: int) -> list[str]:
-    """Return the names of a carriageway's strips that may be of another age than the road: lanes, hard shoulder."""
+    """Return the names of a carriageway's strips whose age may differ from the road's: lanes, hard shoulder."""
     return [*(f"Lane {number}" for number in range(lanes, 0, -1)), "Hard Shoulder"]
 
 
 def brightness_field(strip: str) -> str:
-    """Return the input field name of how bright a strip is for its age: "Lane 1" -> "lane_1_brightness"."""
+    """Return the input field name of a strip's brightness by its age: "Lane 1" -> "lane_1_brightness"."""
     return f"{strip.lower().replace(' ', '_')}_brightness"
 
 
 @dataclass(frozen=True)
 class MarkingLayout:
-    """Properties of a line marking that the road's node group is built by.
+    """Properties of a line marking on which the road's node group depends.
 
     Attributes:
-        name: what its inputs call it, without the side: ``Lane Line 1``.
-        kind: as `LineMarking` has it.
-        boundary: of lanes that it lies on, counted from the outer edge of lane 1.
+        name: its name in inputs, without the side: ``Lane Line 1``.
+        kind: its kind, see `LineMarking`.
+        boundary: number of the boundary of lanes that it lies on, counted from the outer edge of lane 1.
         varies: whether its distance from the axis changes along the road.
-        yellow: whether it is temporary.
+        yellow: whether it is temporary, and so yellow.
     """
 
     name: str
@@ -71,14 +71,14 @@ class MarkingLayout:
 
 @dataclass(frozen=True)
 class SideLayout:
-    """Properties of one carriageway that the road's node group is built by.
+    """Properties of one carriageway on which the road's node group depends.
 
     Attributes:
         side: ``Left`` or ``Right``.
         lanes: number of lanes.
         markings: its line markings.
         varying: names of the strips (and ``Inner Offset``) whose widths change along the road.
-        turnouts: what the inputs call its turnouts, without the side: ``Exit 1``.
+        turnouts: names of its turnouts in inputs, without the side: ``Exit 1``.
         detailed: names of the strips with damage.
     """
 
@@ -99,21 +99,23 @@ def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
     """Return the layout of each carriageway by which the road's node group is built, left side first."""
     sides, sections, words = [], sections_of(parameters), names_in_words(parameters)
     for name, carriageway in sorted(parameters.of_type(Carriageway).items(), key=lambda item: -item[1].sign):
-        lines = [(key, line) for key, line in parameters.of_type(LineMarking).items() if line.carriageway == name]
+        side_lines = [(key, line) for key, line in parameters.of_type(LineMarking).items() if line.carriageway == name]
         turnouts = tuple(words[key] for key, item in parameters.of_type(Turnout).items() if item.carriageway == name)
         section = sections[carriageway.side]
-        varying = {key for key, width in strip_widths(carriageway) if isinstance(width, tuple)}
+        varying_strips = {key for key, width in strip_widths(carriageway) if isinstance(width, tuple)}
         if turnouts:
-            varying.add("Hard Shoulder")
+            varying_strips.add("Hard Shoulder")
         sides.append(
             SideLayout(
                 carriageway.side.title(),
                 len(carriageway.lanes),
                 tuple(
-                    MarkingLayout(words[key], m.kind, m.boundary, isinstance(m.offset, tuple), m.color == "yellow")
-                    for key, m in lines
+                    MarkingLayout(
+                        words[key], line.kind, line.boundary, isinstance(line.offset, tuple), line.color == "yellow"
+                    )
+                    for key, line in side_lines
                 ),
-                tuple(sorted(varying)),
+                tuple(sorted(varying_strips)),
                 turnouts,
                 tuple(strip_names(section)[strip] for strip in damaged_strips(section)),
             )
@@ -136,17 +138,17 @@ _TURNOUTS = {"emergency_bay": "Emergency Bay", "exit": "Exit", "entry": "Entry"}
 def names_in_words(parameters: RoadParameters) -> dict[str, str]:
     """Return the names in words of a road's lines and turnouts by id, as inputs use them after the side: "Lane Line 1".
 
-    They are counted in their order where a side has several of a kind.
+    If a side has several of a kind, they are numbered in their order.
     """
-    kinds = {key: (item.carriageway, _TURNOUTS[item.kind]) for key, item in parameters.of_type(Turnout).items()}
+    kinds_by_key = {key: (item.carriageway, _TURNOUTS[item.kind]) for key, item in parameters.of_type(Turnout).items()}
     for key, line in parameters.of_type(LineMarking).items():
-        temporary = "Temporary " if line.color == "yellow" else ""
-        kinds[key] = (line.carriageway, temporary + _LINES[line.kind])
-    of_kind: dict[tuple[str, str], list[str]] = {}
-    for key, kind in kinds.items():
-        of_kind.setdefault(kind, []).append(key)
-    numbered = {key: number for keys in of_kind.values() if len(keys) > 1 for number, key in enumerate(keys, 1)}
-    return {key: f"{kind} {numbered[key]}" if key in numbered else kind for key, (_, kind) in kinds.items()}
+        prefix = "Temporary " if line.color == "yellow" else ""
+        kinds_by_key[key] = (line.carriageway, prefix + _LINES[line.kind])
+    keys_by_kind: dict[tuple[str, str], list[str]] = {}
+    for key, kind in kinds_by_key.items():
+        keys_by_kind.setdefault(kind, []).append(key)
+    numbers = {key: number for keys in keys_by_kind.values() if len(keys) > 1 for number, key in enumerate(keys, 1)}
+    return {key: f"{kind} {numbers[key]}" if key in numbers else kind for key, (_, kind) in kinds_by_key.items()}
 
 
 def side_of(parameters: RoadParameters, item: LineMarking | Turnout) -> str:
@@ -175,9 +177,10 @@ def attribute_name(side: str, strip: str) -> str:
 def varying_widths(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
     """Return the backbone's attributes (N,) of varying widths at stations (N,), by name: shares of the input, or m.
 
-    A strip whose width changes has its share of the width that the input holds; the hard shoulder beside turnouts also
-    ``..._main``, the share without them. Turnouts' strips have their widths, the verge its ``..._extra``, and ramps
-    ``..._ramp_width``, ``..._ramp_lift``, ``..._ramp_tilt``, see `RampFields`.
+    A strip of varying width has its width as a share of the input's; the hard shoulder beside turnouts also has
+    ``..._main``, its share without turnouts. Strips of turnouts have their widths, the verge the added width
+    ``..._extra``, and ramps ``..._ramp_width``, ``..._ramp_lift`` and ``..._ramp_tilt``, see `RampFields`; these are in
+    m, the tilt in m/m.
     """
     values: dict[str, Float] = {}
     road, words = geometry.parameters, names_in_words(geometry.parameters)
@@ -201,16 +204,19 @@ def varying_widths(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
 
 
 def _turnout_widths(side: str, section: CarriagewaySection, station: Float) -> dict[str, Float]:
+    """Return the backbone's attributes (N,) of a side with turnouts: widths of strips, shares of the hard shoulder."""
     shapes = [shape.widths(station) for shape in section.turnouts]
     values = {
         attribute_name(side, name): sum((shape.strips[kind] for shape in shapes), 0.0 * station)
         for kind, name in zip(TURNOUT_STRIPS, TURNOUT_NAMES, strict=True)
     }
-    main = section.carriageway.hard_shoulder_width
-    nominal = max(nominal_width(main), 1e-9)
-    values[attribute_name(side, "Hard Shoulder Main")] = width_at(main, station) / nominal
-    remaining = np.minimum.reduce([shape.hard_shoulder for shape in shapes])
-    values[attribute_name(side, "Hard Shoulder")] = sum((shape.shoulder_extra for shape in shapes), remaining) / nominal
+    shoulder_width = section.carriageway.hard_shoulder_width
+    nominal_shoulder_width = max(nominal_width(shoulder_width), 1e-9)
+    values[attribute_name(side, "Hard Shoulder Main")] = width_at(shoulder_width, station) / nominal_shoulder_width
+    shoulder_without_extra = np.minimum.reduce([shape.hard_shoulder for shape in shapes])
+    values[attribute_name(side, "Hard Shoulder")] = (
+        sum((shape.shoulder_extra for shape in shapes), shoulder_without_extra) / nominal_shoulder_width
+    )
     values[attribute_name(side, "Verge Extra")] = sum((shape.verge_extra for shape in shapes), 0.0 * station)
     return values
 
@@ -220,9 +226,9 @@ class DetailPoints:
     """Arrays of a damaged strip's grid points, (columns * rows,): row by row within a column, columns from the left.
 
     Attributes:
-        share: of the strip's width, 1 at its left edge.
-        depth: below the undamaged surface, m.
-        instance: of the damage that makes up the cell after the point, in both directions; 0 where there is none.
+        share: position across the strip as a share of its width, 1 at its left edge.
+        depth: depth below the undamaged surface, m.
+        instance: instance number of the damage in the cell after the point in both directions; 0 for none.
     """
 
     share: Float
@@ -238,17 +244,20 @@ def detail_points(geometry: RoadGeometry, station: Float, tolerance: float) -> d
         carriageway = section.carriageway
         names, distances = strip_names(section), section.distances(station)
         for strip in damaged_strips(section):
-            # That of a long road far away would cut all of the rest into slivers.
-            near = float(station[0]) - BEYOND, float(station[-1]) + BEYOND
-            outwards = damage_columns(section, strip, tolerance, *near)[:, None]
-            distance = distances[:, strip] * (1.0 - outwards) + distances[:, strip + 1] * outwards
+            # Only damage near the stretch: columns for all of a long road's damage would make slivers of the cells.
+            station_range = float(station[0]) - BEYOND, float(station[-1]) + BEYOND
+            # Position of each column across the strip, (C, 1), from 0 at its inner edge; arrays below are (C, N), by
+            # column and station.
+            outward_share = damage_columns(section, strip, tolerance, *station_range)[:, None]
+            distance = distances[:, strip] * (1.0 - outward_share) + distances[:, strip + 1] * outward_share
             offset = float(carriageway.sign) * distance
-            depth = damage_depth(section, np.tile(station, len(outwards)), offset.ravel()).reshape(offset.shape)
-            # Outwards is to the left on the left carriageway.
-            share = np.tile(outwards if carriageway.sign > 0 else 1.0 - outwards, len(station))
-            # In a step the faces lie so skew that rounding would turn narrow ones over: there are no columns inside.
+            depth = damage_depth(section, np.tile(station, len(outward_share)), offset.ravel()).reshape(offset.shape)
+            # On the left carriageway outwards is to the left.
+            share = np.tile(outward_share if carriageway.sign > 0 else 1.0 - outward_share, len(station))
+            # Where the edges jump, faces are so skew that rounding would flip narrow ones: inner columns are merged.
             steps = _steps(station, distances[:, strip : strip + 2])
             share[1:-1, steps], depth[:, steps] = 0.0, 0.0
+            # From the left column to the right one.
             order = slice(None, None, -carriageway.sign)
             damage = _damage_of_cells(section, station, offset[order])
             numbers = geometry.numbers.parts[ids[id(carriageway)]].first + damage
@@ -261,19 +270,21 @@ def detail_points(geometry: RoadGeometry, station: Float, tolerance: float) -> d
 def _damage_of_cells(section: CarriagewaySection, station: Float, offset: Float) -> Int:
     """Return the index (C, N) of the damage in each grid cell, stored at its first corner; -1 for none.
 
-    A cell is of the damage that is deepest in its middle.
+    A cell belongs to the damage that is deepest in its middle.
     """
-    middle = (station[1:] + station[:-1]) / 2.0
-    across = (offset[1:, 1:] + offset[1:, :-1] + offset[:-1, 1:] + offset[:-1, :-1]) / 4.0
+    cell_station = (station[1:] + station[:-1]) / 2.0
+    cell_offset = (offset[1:, 1:] + offset[1:, :-1] + offset[:-1, 1:] + offset[:-1, :-1]) / 4.0
     result = np.full(offset.shape, -1, dtype=np.int64)
-    result[:-1, :-1] = deepest_damage(section, np.tile(middle, len(across)), across.ravel()).reshape(across.shape)
+    result[:-1, :-1] = deepest_damage(section, np.tile(cell_station, len(cell_offset)), cell_offset.ravel()).reshape(
+        cell_offset.shape
+    )
     return result
 
 
 def _steps(station: Float, edges: Float) -> NDArray[np.bool_]:
     """Return a mask (N,) of the stations at which a strip's edges (N, 2) jump sideways, steeper than 45 degrees."""
-    skew = np.abs(np.diff(edges, axis=0)).max(axis=1) > np.diff(station)
-    return np.append(skew, False) | np.insert(skew, 0, False)
+    is_skew = np.abs(np.diff(edges, axis=0)).max(axis=1) > np.diff(station)
+    return np.append(is_skew, False) | np.insert(is_skew, 0, False)
 
 
 def strip_names(section: CarriagewaySection) -> list[str]:

@@ -12,8 +12,9 @@ from ...nodes.solids import row_of_points
 from ...nodes.strip import strip_group
 
 _EDGES = ("edge_left", "edge_right", "edge_left_height", "edge_right_height")
+"""Attributes of the backbone's rows: offsets and heights of the line's edges, m."""
 SNAP = 1e-3
-"""End of a dash this near (m) to a row of the backbone: it is that row."""
+"""Distance (m) from a row of the backbone up to which an end of a dash is that row; chosen."""
 
 
 class Dashes(Inputs):
@@ -50,24 +51,24 @@ def marking_group(tree: Tree) -> None:
     Offsets and heights may be fields on the backbone's points.
     """
     edges, line, paint = _EdgeInputs(tree), Dashes(tree), LinePaint(tree)
-    first, film = line.start_station, line.film_thickness
+    start, film = line.start_station, line.film_thickness
 
     with tree.frame("Dashes: a solid line is one dash"):
         backbone = rows_along(edges.backbone)
         end = op.minimum(line.end_station, last_station(backbone))
-        dashed = line.dash_length > 0.0
-        length = op.switch(dashed, end - first, line.dash_length)
-        period = op.switch(dashed, (end - first) * 2.0, line.dash_length + line.gap_length)
-        count = op.round_up(op.maximum((end - first) / period - 1e-6, 0.0))
+        is_dashed = line.dash_length > 0.0
+        length = op.switch(is_dashed, end - start, line.dash_length)
+        period = op.switch(is_dashed, (end - start) * 2.0, line.dash_length + line.gap_length)
+        count = op.round_up(op.maximum((end - start) / period - 1e-6, 0.0))
     with tree.frame("Edges as attributes of the rows"):
-        across = (edges.left_offset, edges.right_offset, edges.left_height, edges.right_height)
-        for name, value in zip(_EDGES, across, strict=True):
+        edge_values = (edges.left_offset, edges.right_offset, edges.left_height, edges.right_height)
+        for name, value in zip(_EDGES, edge_values, strict=True):
             backbone = op.store(backbone, name, value)
-    rows = _with_ends(tree, backbone, (first, end, length, period, count))
+    rows = _with_ends(tree, backbone, (start, end, length, period, count))
     with tree.frame("Instance number: the line's own, or one for each dash"):
         station = op.named_attribute(tree, "station")
-        dash = tree.node("FunctionNodeFloatToInt", (station - first) / period, rounding_mode="FLOOR").value
-        instance = op.switch(dashed, line.instance, line.first_dash_instance + dash)
+        dash = tree.node("FunctionNodeFloatToInt", (station - start) / period, rounding_mode="FLOOR").value
+        instance = op.switch(is_dashed, line.instance, line.first_dash_instance + dash)
     with tree.frame("Ribbon over all rows; the faces of the gaps are deleted"):
         ribbon = tree.call(
             strip_group(),
@@ -79,28 +80,37 @@ def marking_group(tree: Tree) -> None:
             instance=instance,
             **paint.values,
         ).value
-        painted = (station > first) & (station < end) & ((station - first) % period < length)
-        tree.output("Mesh", op.delete_faces(ribbon, ~painted), description="Dashes whose faces look up")
+        is_painted = (station > start) & (station < end) & ((station - start) % period < length)
+        tree.output("Mesh", op.delete_faces(ribbon, ~is_painted), description="Dashes whose faces look up")
 
 
 def _with_ends(tree: Tree, backbone: Value, dashes: tuple[Value, Value, Value, Value, Value]) -> Value:
-    """Add nodes that insert a row into the backbone at both ends of every dash; return it sorted by station."""
-    first, end, length, period, count = dashes
+    """Add nodes that insert a row into the backbone at both ends of every dash; return it sorted by station.
+
+    Args:
+        tree: tree to add the nodes to.
+        backbone: the backbone with the line's edges as attributes.
+        dashes: stations of the line's start and end, length of a dash, distance between starts of dashes (m), number of
+            dashes.
+    """
+    start, end, length, period, count = dashes
     ribbon = station_ribbon(backbone, _EDGES)
     with tree.frame("Ends of the dashes as rows of their own"):
         points = row_of_points(tree, count * 2)
-        number = op.index(tree)
-        end_of_dash = op.minimum(first + (number // 2) * period + (number % 2) * length, end)
-        near = tree.node("GeometryNodeSampleNearest", ribbon, op.vector(tree, end_of_dash), domain="POINT").value
-        snapped = op.sample_index(ribbon, op.named_attribute(tree, "station"), near)
-        distance = op.unary("ABSOLUTE", end_of_dash - snapped)
+        end_index = op.index(tree)
+        # Points of even number are starts of dashes, the others are their ends.
+        end_of_dash = op.minimum(start + (end_index // 2) * period + (end_index % 2) * length, end)
+        nearest_row = tree.node("GeometryNodeSampleNearest", ribbon, op.vector(tree, end_of_dash), domain="POINT").value
+        row_station = op.sample_index(ribbon, op.named_attribute(tree, "station"), nearest_row)
+        # No row is inserted where the backbone has one already.
+        distance = op.unary("ABSOLUTE", end_of_dash - row_station)
         points = op.delete_points(op.store(points, "station", end_of_dash), distance < SNAP)
         station = op.named_attribute(tree, "station")
         for name in ("curvature", *_EDGES):
             points = op.store(points, name, look_up(ribbon, name, station))
         points = op.store(points, "left", look_up(ribbon, "left", station))
         points = op.set_position(points, look_up(ribbon, "axis", station))
-        both = op.join(backbone, points)
+        rows = op.join(backbone, points)
         return tree.node(
-            "GeometryNodeSortElements", both, domain="POINT", sort_weight=op.named_attribute(tree, "station")
+            "GeometryNodeSortElements", rows, domain="POINT", sort_weight=op.named_attribute(tree, "station")
         ).value

@@ -13,7 +13,7 @@ from .layout import MarkingLayout, strips_of
 from .line import Dashes, LinePaint, marking_group
 
 _OUTWARDS = {"outer_edge": 0.5, "block": 0.5, "turnout_edge": 0.5, "inner_edge": -0.5, "gore_edge": -0.5}
-"""Kind of line -> share of its width by which its middle lies outside of its boundary."""
+"""Distance of a line's middle outwards from its boundary, as a share of its width, by its kind; else 0."""
 _FAR = (-1000.0, 1000.0)
 
 
@@ -26,7 +26,7 @@ class LineInputs(Dashes, _Width):
 
 
 LINE_FIELDS = tuple(field.name for field in LineInputs.fields() if not field.name.endswith("instance"))
-"""Those that stand for fields of `LineMarking`."""
+"""Inputs of a line that correspond to fields of `LineMarking`."""
 
 
 class Distance(Inputs):
@@ -45,19 +45,19 @@ def carriageway_marking_group(tree: Tree) -> None:
     backbone, middle, line = _Backbone(tree).backbone, Distance(tree).distance, LineInputs(tree)
     paint, section = LinePaint(tree), Section(tree)
     with tree.frame("Both edges of the line"):
-        half = line.width * (op.switch(section.left_side, -1.0, 1.0) * 0.5)
+        half_width = line.width * (op.switch(section.left_side, -1.0, 1.0) * 0.5)
         # Left is outwards on the left carriageway and inwards on the right one.
-        left = tree.call(height_group(), **section.values, distance=middle + half)
-        right = tree.call(height_group(), **section.values, distance=middle - half)
+        left_edge = tree.call(height_group(), **section.values, distance=middle + half_width)
+        right_edge = tree.call(height_group(), **section.values, distance=middle - half_width)
     with tree.frame("Line"):
         values = {name: value for name, value in line.values.items() if name != "width"}
         mesh = tree.call(
             marking_group(),
             backbone=backbone,
-            left_offset=left["Offset"],
-            right_offset=right["Offset"],
-            left_height=left["Height"],
-            right_height=right["Height"],
+            left_offset=left_edge["Offset"],
+            right_offset=right_edge["Offset"],
+            left_height=left_edge["Height"],
+            right_height=right_edge["Height"],
             **values,
             **paint.values,
         ).value
@@ -73,8 +73,8 @@ def markings_group(lanes: int, turnouts: bool, lines: tuple[MarkingLayout, ...])
 def declare_line(tree: Tree, line: MarkingLayout, words: str) -> dict[str, Value]:
     """Declare the inputs of a line in a panel of its own; return their values by field."""
     kind = LineOnItsOwn if line.kind == "free" else LineInputs
-    solid = {} if line.kind == "lane" else {"dash_length": 0.0, "gap_length": 0.0}
-    return kind(tree, words, words, solid).values
+    defaults = {} if line.kind == "lane" else {"dash_length": 0.0, "gap_length": 0.0}
+    return kind(tree, words, words, defaults).values
 
 
 class LineOnItsOwn(LineInputs, Distance):
@@ -82,20 +82,21 @@ class LineOnItsOwn(LineInputs, Distance):
 
 
 def _build(tree: Tree, lanes: int, turnouts: bool, lines: tuple[MarkingLayout, ...]) -> None:
+    """Build the node group of one side's lines: a carriageway marking for each line, on its boundary."""
     backbone = _Backbone(tree).backbone
     section = Section(tree)
-    about = "Distance of a boundary from the axis, counted from the median"
+    text = "Distance of a boundary from the axis, counted from the median"
     strips = strips_of(lanes, turnouts)
     boundaries = inputs_class(
-        "Boundaries", {f"boundary_{number}": metres(0.0, _FAR, about) for number in range(len(strips) + 1)}
+        "Boundaries", {f"boundary_{number}": metres(0.0, _FAR, text) for number in range(len(strips) + 1)}
     )(tree)
-    white = tree.material("Material", "paint_white", description="Material of the lines")
-    yellow = tree.material("Yellow Material", "paint_yellow", description="Material of temporary lines")
-    first = metres(0.0, (-1e6, 1e6), "Station that the backbone's stations count from")
-    first_station = inputs_class("Stations", {"first_station": first})(tree).values["first_station"]
+    white_material = tree.material("Material", "paint_white", description="Material of the lines")
+    yellow_material = tree.material("Yellow Material", "paint_yellow", description="Material of temporary lines")
+    station_field = metres(0.0, (-1e6, 1e6), "Station that the backbone's stations count from")
+    first_station = inputs_class("Stations", {"first_station": station_field})(tree).values["first_station"]
     inputs = [declare_line(tree, line, line.name) for line in lines]
-    # Beside whole numbers, so that rounding doesn't make another one of them.
-    on_left = op.switch(section.left_side, 0.25, 0.25 + CODES)
+    # A quarter is added, so that rounding can't change the code's whole part.
+    side_code = op.switch(section.left_side, 0.25, 0.25 + CODES)
     parts = []
     with tree.frame("Lines"):
         for line, values in zip(lines, inputs, strict=True):
@@ -106,14 +107,14 @@ def _build(tree: Tree, lanes: int, turnouts: bool, lines: tuple[MarkingLayout, .
                 backbone=backbone,
                 **section.values,
                 **values,
-                material=yellow if line.yellow else white,
+                material=yellow_material if line.yellow else white_material,
             ).value
             wear = PAINT_CROSSED if line.kind in ("lane", "block") else PAINT_BESIDE
             place = op.vector(
                 tree,
                 op.named_attribute(tree, "station") + first_station,
                 0.0,
-                on_left + float(wear + 2 * CODES * line.boundary),
+                side_code + float(wear + 2 * CODES * line.boundary),
             )
             parts.append(op.store(mesh, "pavement", place))
         mesh = op.join(*parts)
@@ -134,5 +135,5 @@ def _middle(line: MarkingLayout, values: dict[str, Value], boundary: Value | Non
     """Add nodes for the distance (m) of a line's middle from the axis."""
     if boundary is None:
         return values["distance"]
-    outwards = _OUTWARDS.get(line.kind)
-    return boundary + values["width"] * outwards if outwards else boundary
+    share = _OUTWARDS.get(line.kind)
+    return boundary + values["width"] * share if share else boundary

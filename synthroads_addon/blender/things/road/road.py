@@ -26,7 +26,17 @@ MARKINGS = "Markings"
 
 @dataclass
 class _Side:
-    """One carriageway in the road's node group: its layout, inputs, lines' inputs and surface node."""
+    """One carriageway in the road's node group.
+
+    Attributes:
+        layout: its layout.
+        widths: inputs of the strips' widths.
+        inputs: other inputs of the carriageway.
+        ages: inputs of the strips' brightness by age.
+        details: inputs of details and turnouts.
+        lines: inputs of each line, by field.
+        surface: the carriageway's node, once it is added.
+    """
 
     layout: SideLayout
     widths: Inputs
@@ -71,6 +81,7 @@ def road_group(layout: tuple[SideLayout, ...]) -> bpy.types.NodeTree:
 
 
 def _build(tree: Tree, layout: tuple[SideLayout, ...]) -> None:
+    """Build the node group of the road: inputs of both sides, their surfaces, the median, markings, outermost edges."""
     road = AxisInputs(tree)
     sides = [_declare_side(tree, side) for side in layout]
     median = None
@@ -104,18 +115,19 @@ def _build(tree: Tree, layout: tuple[SideLayout, ...]) -> None:
 
 
 def _declare_side(tree: Tree, layout: SideLayout) -> _Side:
+    """Declare the inputs of a carriageway in a panel; return it as a side without its surface's node."""
     words = layout.side
-    about = "Points that make this strip finer, see SR Strip"
-    further = {detail_field(strip): socket("Object", about) for strip in layout.detailed}
+    text = "Points that make this strip finer, see SR Strip"
+    detail_fields = {detail_field(strip): socket("Object", text) for strip in layout.detailed}
     for turnout in layout.turnouts:
-        further |= turnout_fields(turnout)
+        detail_fields |= turnout_fields(turnout)
     with tree.panel(f"{words} Carriageway"):
         return _Side(
             layout,
             inputs_class("Widths", width_fields(layout.lanes, varying=layout.varying))(tree, words),
             SideInputs(tree, words),
             inputs_class("Ages", age_fields(layout.lanes))(tree, words),
-            inputs_class("Further", further)(tree, words),
+            inputs_class("Further", detail_fields)(tree, words),
             [],
         )
 
@@ -140,8 +152,8 @@ def _surface(tree: Tree, side: _Side, backbone: Value, verge: Value) -> Node:
         field = detail_field(strip)
         values[field] = op.object_geometry(side.details.values[field])
     if turnouts:
-        whole = side.widths.values[width_field("Hard Shoulder")] * side.attribute("Hard Shoulder Main")
-        values |= {"whole_hard_shoulder_width": whole, "verge_extra_width": side.attribute("Verge Extra")}
+        shoulder_width = side.widths.values[width_field("Hard Shoulder")] * side.attribute("Hard Shoulder Main")
+        values |= {"whole_hard_shoulder_width": shoulder_width, "verge_extra_width": side.attribute("Verge Extra")}
         values["turnout_instance"] = _turnout_instance(side)
         values |= _ramps(side)
     return tree.call(
@@ -157,7 +169,7 @@ def _surface(tree: Tree, side: _Side, backbone: Value, verge: Value) -> Node:
 
 
 def _ramps(side: _Side) -> dict[str, Value]:
-    """Add nodes for how ramps leave the pavement's plane, by input field."""
+    """Add nodes for the inputs of ramps that leave the pavement's plane, by input field."""
     return {field: side.attribute(field) for field in RAMP_FIELDS}
 
 
@@ -171,6 +183,7 @@ def _turnout_instance(side: _Side) -> Value:
 
 
 def _markings(tree: Tree, backbone: Value, side: _Side, materials: _RoadMaterials) -> Value:
+    """Add nodes for the line markings of a side."""
     layout = side.layout
     turnouts = bool(layout.turnouts)
     names = [f"Boundary {number}" for number in range(len(strips_of(layout.lanes, turnouts)) + 1)]
@@ -195,14 +208,15 @@ def _markings(tree: Tree, backbone: Value, side: _Side, materials: _RoadMaterial
 
 
 def _median(tree: Tree, backbone: Value, sides: list[_Side], instance: Value, material: Value) -> Value:
-    left, right = sides
+    """Add nodes for the median: a strip between both carriageways' inner edges."""
+    left_side, right_side = sides
     return tree.call(
         strip_group(),
         backbone=backbone,
-        left_offset=left.output("Inner Edge Offset"),
-        left_height=left.output("Inner Edge Height"),
-        right_offset=right.output("Inner Edge Offset"),
-        right_height=right.output("Inner Edge Height"),
+        left_offset=left_side.output("Inner Edge Offset"),
+        left_height=left_side.output("Inner Edge Height"),
+        right_offset=right_side.output("Inner Edge Offset"),
+        right_height=right_side.output("Inner Edge Height"),
         class_=class_id("roadside"),
         instance=instance,
         material=material,
@@ -213,15 +227,15 @@ def _edges(tree: Tree, backbone: Value, sides: list[_Side]) -> Iterator[Value]:
     """Add nodes for the leftmost and the rightmost edge; yield each as points with ``edge`` = +1 or -1."""
     for sign in (1.0, -1.0):
         side = sides[0] if sign > 0 else sides[-1]
-        which = "Outer" if side.layout.left == (sign > 0) else "Inner"
+        edge_name = "Outer" if side.layout.left == (sign > 0) else "Inner"
         points = row_of_points(tree, op.point_count(backbone))
-        number = op.index(tree)
-        axis, left, _ = row(backbone, number)
-        offset = op.sample_index(backbone, side.output(f"{which} Edge Offset"), number)
-        height = op.sample_index(backbone, side.output(f"{which} Edge Height"), number)
-        place = axis + left * offset + op.vector(tree, 0.0, 0.0, height)
+        row_number = op.index(tree)
+        axis, left_vector, _ = row(backbone, row_number)
+        offset = op.sample_index(backbone, side.output(f"{edge_name} Edge Offset"), row_number)
+        height = op.sample_index(backbone, side.output(f"{edge_name} Edge Height"), row_number)
+        place = axis + left_vector * offset + op.vector(tree, 0.0, 0.0, height)
         points = op.store(op.set_position(points, place), "edge", sign)
-        # A mesh line has edges; only its points are wanted.
+        # A mesh line has edges: only its points are kept.
         yield tree.node("GeometryNodeDeleteGeometry", points, domain="EDGE", mode="EDGE_FACE").value
 
 

@@ -17,9 +17,9 @@ from .pictograms import NAMES
 from .writing import LINES, sign_writing_group
 
 RAISED = 0.001
-"""Writing stands so far in front of the face, m."""
+"""Distance of the writing in front of the face, m; chosen."""
 _WIDEST_EDGE, _WIDEST_BORDER = 0.1, 0.15
-"""Most that edge and border take of a face's smaller side: a triangle hasn't more room."""
+"""Largest widths of edge and border as shares of a face's smaller side, so that they fit into a triangle; chosen."""
 _LINE = "Line of writing; empty for none"
 _TEXT_BORDER, _DRAWING_BORDER = "Border of the writing's box on the face", "Border of the pictogram's box on the face"
 
@@ -69,6 +69,7 @@ def sign_face_group(tree: Tree) -> None:
     face = _LabelledFace(tree)
 
     def outline(inset: Value | float) -> Value:
+        """Add nodes for the sign's outline, moved inwards by `inset` (m)."""
         names = ("shape", "width", "height", "corner_radius")
         return tree.call(sign_outline_group(), inset=inset, **{name: face.values[name] for name in names}).value
 
@@ -76,44 +77,51 @@ def sign_face_group(tree: Tree) -> None:
         side = op.minimum(face.width, face.height)
         edge = op.minimum(face.edge_width, side * _WIDEST_EDGE)
         border = op.minimum(face.border_width, side * _WIDEST_BORDER)
-        outer, middle, inner = outline(0.0), outline(edge), outline(edge + border)
+        plate_outline, border_outline, ground_outline = outline(0.0), outline(edge), outline(edge + border)
     with tree.frame("Front"):
-        front = [
-            paint_faces(_fill_curves(inner), face.ground_material),
-            op.only_if(border > 1e-4, paint_faces(_fill_curves(op.join(middle, inner)), face.border_material)),
-            op.only_if(edge > 1e-4, paint_faces(_fill_curves(op.join(outer, middle)), face.edge_material)),
+        front_parts = [
+            paint_faces(_fill_curves(ground_outline), face.ground_material),
+            op.only_if(
+                border > 1e-4, paint_faces(_fill_curves(op.join(border_outline, ground_outline)), face.border_material)
+            ),
+            op.only_if(
+                edge > 1e-4, paint_faces(_fill_curves(op.join(plate_outline, border_outline)), face.edge_material)
+            ),
         ]
     with tree.frame("Back and rim"):
         plate = tree.node(
-            "GeometryNodeExtrudeMesh", flip_faces(_fill_curves(outer)), offset_scale=face.thickness, individual=False
+            "GeometryNodeExtrudeMesh",
+            flip_faces(_fill_curves(plate_outline)),
+            offset_scale=face.thickness,
+            individual=False,
         ).value
-        back = paint_faces(plate, face.back_material)
+        back_part = paint_faces(plate, face.back_material)
     with tree.frame("Writing and pictogram"):
-        drawn = [move_geometry(part, (0.0, 0.0, RAISED)) for part in _draw_writing(tree, face)]
+        drawn_parts = [move_geometry(part, (0.0, 0.0, RAISED)) for part in _draw_writing(tree, face)]
     with tree.frame("Upright, and labelled"):
-        mesh = op.transform(op.join(back, *front, *drawn), rotation=(math.pi / 2.0, 0.0, 0.0))
+        mesh = op.transform(op.join(back_part, *front_parts, *drawn_parts), rotation=(math.pi / 2.0, 0.0, 0.0))
         mesh = op.label(mesh, class_id(TrafficSign.points_class), face.instance)
     tree.output("Mesh", mesh, description="Plate; its front is at y = 0")
 
 
 def _fill_curves(curve: Value) -> Value:
-    """Add a node that fills closed curves (even-odd: inside of two is a hole); return the mesh."""
+    """Add a node that fills closed curves by the even-odd rule; return the mesh."""
     return curve.tree.node("GeometryNodeFillCurve", curve).value
 
 
 def _draw_writing(tree: Tree, face: Face) -> list[Value]:
     """Add nodes for the meshes of writing and pictogram in the xy plane."""
     lines = {f"line_{number}": face.values[f"line_{number}"] for number in range(1, LINES + 1)}
-    low, high = _box(tree, face, "text")
+    low_corner, high_corner = _box(tree, face, "text")
     writing = tree.call(
-        sign_writing_group(), low_corner=low, high_corner=high, flush_left=face.flush_left, **lines
+        sign_writing_group(), low_corner=low_corner, high_corner=high_corner, flush_left=face.flush_left, **lines
     ).value
-    low, high = _box(tree, face, "pictogram")
+    low_corner, high_corner = _box(tree, face, "pictogram")
     pictogram = tree.call(
         pictogram_group(),
         pictogram=face.pictogram,
-        low_corner=low,
-        high_corner=high,
+        low_corner=low_corner,
+        high_corner=high_corner,
         writing_material=face.writing_material,
         border_material=face.border_material,
     ).value
@@ -124,7 +132,7 @@ def _box(tree: Tree, face: Face, prefix: str) -> tuple[Value, Value]:
     """Add nodes for the lower left and upper right corner (m) of a box given in shares of the face."""
 
     def corner(x: str, y: str) -> Value:
-        right, up = face.values[f"{prefix}_{x}"] - 0.5, face.values[f"{prefix}_{y}"] - 0.5
-        return op.vector(tree, right * face.width, up * face.height)
+        x_share, y_share = face.values[f"{prefix}_{x}"] - 0.5, face.values[f"{prefix}_{y}"] - 0.5
+        return op.vector(tree, x_share * face.width, y_share * face.height)
 
     return corner("left", "bottom"), corner("right", "top")

@@ -1,4 +1,4 @@
-"""Look of a sign's face: from its shape, colours, writing and pictogram to the inputs of SR Sign Face."""
+"""Look of a sign's face: inputs of SR Sign Face for its shape, colours, writing and pictogram."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class FaceStyle:
 
     Attributes:
         ground, border, writing: colours, as `presets/signs.json` names them.
-        pictogram: what is drawn, as `road.things.sign_catalogue.Pictogram` names it.
+        pictogram: name of the drawing, see `road.things.sign_catalogue.Pictogram`.
     """
 
     ground: str
@@ -41,13 +41,15 @@ _OF_SHAPE = {
     "octagon": FaceStyle("red", "white", "white"),
     "arrow": FaceStyle("blue", "white", "white", "arrow"),
 }
-"""Faces of signs that the catalogue doesn't have."""
+"""Styles by shape of signs that the catalogue lacks."""
 
-# Shares of the smaller side of a face, and a border's limits in m.
 _RING, _RIM, _LINE = 0.1, 0.012, 0.022
+"""Widths of a red border, of the white edge around it, and of another border, as shares of the face's smaller side."""
 _LINE_LIMITS = (0.008, 0.04)
+"""Limits of the width of a border that isn't red, m."""
 
 _WHOLE: Box = (0.08, 0.92, 0.06, 0.94)
+"""Box of a rectangular face's content. Boxes here are chosen by eye."""
 _TEXT: dict[str, Box] = {
     "round": (0.17, 0.83, 0.22, 0.78),
     "triangle": (0.35, 0.65, 0.0, 0.72),
@@ -55,6 +57,7 @@ _TEXT: dict[str, Box] = {
     "octagon": (0.12, 0.88, 0.2, 0.8),
     "arrow": (0.06, 0.82, 0.44, 0.96),
 }
+"""Box of the writing by shape."""
 _DRAWING: dict[str, Box] = {
     "round": (0.16, 0.84, 0.16, 0.84),
     "triangle": (0.28, 0.72, 0.13, 0.64),
@@ -62,6 +65,7 @@ _DRAWING: dict[str, Box] = {
     "octagon": _WHOLE,
     "arrow": (0.36, 0.64, 0.1, 0.46),
 }
+"""Box of the pictogram by shape."""
 # Pictograms that share a rectangular board with writing: the writing's box, and the pictogram's.
 _SHARED: dict[str, tuple[Box, Box]] = {
     "down_arrow": ((0.06, 0.94, 0.36, 0.96), (0.38, 0.62, 0.05, 0.34)),
@@ -69,15 +73,19 @@ _SHARED: dict[str, tuple[Box, Box]] = {
     **dict.fromkeys(("bars_1", "bars_2", "bars_3"), ((0.08, 0.92, 0.68, 0.97), (0.12, 0.88, 0.05, 0.66))),
 }
 _DESTINATIONS = ("449", "453")
-"""Signs with a list of places, which begins on the left."""
+"""Codes of signs with a list of places, whose lines begin on the left."""
 _ACROSS: dict[str, Box] = {"end": (0.02, 0.98, 0.02, 0.98)}
 """Pictograms that reach over the whole face."""
 
 
 def sign_face_inputs(sign: TrafficSign) -> dict[str, Any]:
     """Return the face inputs by name for a traffic sign, from the catalogue if it has the code, else by shape."""
-    known = sign_type(sign)
-    style = FaceStyle(known.ground, known.border, known.writing, known.pictogram) if known else _OF_SHAPE[sign.shape]
+    catalogue_type = sign_type(sign)
+    style = (
+        FaceStyle(catalogue_type.ground, catalogue_type.border, catalogue_type.writing, catalogue_type.pictogram)
+        if catalogue_type
+        else _OF_SHAPE[sign.shape]
+    )
     inputs = face_inputs(style, sign.shape, sign.width, sign.height, sign.text)
     return inputs | {"Flush Left": sign.code in _DESTINATIONS}
 
@@ -88,12 +96,12 @@ def face_inputs(style: FaceStyle, shape: str, width: float, height: float, text:
     Args:
         style: colours and pictogram.
         shape: outline, one of `things.sign.outline.SHAPES`.
-        width, height: of the face, m.
+        width, height: size of the face, m.
         text: lines of writing.
     """
-    side = min(width, height)
-    ringed = style.border == "red"
-    line = float(np.clip(_LINE * side, *_LINE_LIMITS))
+    smaller_side = min(width, height)
+    has_red_border = style.border == "red"
+    line_width = float(np.clip(_LINE * smaller_side, *_LINE_LIMITS))
     writing, drawing = _boxes(style.pictogram, shape)
     lines = [*text, *([""] * LINES)][:LINES]
     return {
@@ -101,9 +109,9 @@ def face_inputs(style: FaceStyle, shape: str, width: float, height: float, text:
         "Width": width,
         "Height": height,
         "Corner Radius": corner_radius(shape, width, height),
-        "Edge Width": _RIM * side if ringed else 0.0,
-        "Border Width": _RING * side if ringed else line,
-        **{f"Line {number}": entry for number, entry in enumerate(lines, 1)},
+        "Edge Width": _RIM * smaller_side if has_red_border else 0.0,
+        "Border Width": _RING * smaller_side if has_red_border else line_width,
+        **{f"Line {number}": line for number, line in enumerate(lines, 1)},
         **_box_inputs("Text", writing),
         "Flush Left": False,
         "Pictogram": NAMES.index(style.pictogram) if style.pictogram in NAMES else 0,
@@ -117,10 +125,12 @@ def face_inputs(style: FaceStyle, shape: str, width: float, height: float, text:
 
 
 def _boxes(pictogram: str, shape: str) -> tuple[Box, Box]:
+    """Return the boxes of writing and pictogram on a face of a shape."""
     if shape == "rectangle" and pictogram in _SHARED:
         return _SHARED[pictogram]
     return _TEXT[shape], _ACROSS.get(pictogram, _DRAWING[shape])
 
 
 def _box_inputs(prefix: str, box: Box) -> dict[str, float]:
+    """Return the four inputs of a box by name."""
     return {f"{prefix} {side}": share for side, share in zip(("Left", "Right", "Bottom", "Top"), box, strict=True)}

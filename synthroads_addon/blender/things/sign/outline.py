@@ -1,4 +1,4 @@
-"""SR Sign Outline: the outline of a sign's face, or one inside of it at the same distance all around."""
+"""SR Sign Outline: the outline of a sign's face, or a parallel curve inside of it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...nodes.inputs import Inputs, integer, metres
 SHAPES = ("round", "triangle", "rectangle", "octagon", "arrow")
 """Shapes by their number in the group's input."""
 _SHARPEST = 0.35
-"""Share of its radius that a corner keeps, however far inside."""
+"""Least share of its radius that a corner keeps inside the outline; chosen."""
 
 
 class _Outline(Inputs):
@@ -29,41 +29,49 @@ def sign_outline_group(tree: Tree) -> None:
 
     with tree.frame("Corners of the shape, and points on each"):
         start, count, steps = _corners_of(tree, outline.shape)
-        number = op.index(tree)
-        corner, step = number // steps, number % steps
+        point_index = op.index(tree)
+        corner, step = point_index // steps, point_index % steps
     with tree.frame("Radius; a round sign is nothing but corners"):
-        half = op.minimum(width, height) * MOST_OF_SIDE
-        outer = op.minimum(op.switch(outline.shape.equals(0), outline.corner_radius, half), half)
-        inner = op.maximum(outer - inset, outer * _SHARPEST)
+        largest_radius = op.minimum(width, height) * MOST_OF_SIDE
+        corner_radius = op.minimum(
+            op.switch(outline.shape.equals(0), outline.corner_radius, largest_radius), largest_radius
+        )
+        inset_radius = op.maximum(corner_radius - inset, corner_radius * _SHARPEST)
     with tree.frame("Middle of the corner's arc, and of those beside it"):
-        size = op.vector(tree, width - outer * 2.0, height - outer * 2.0)
-        before, middle, after = (
-            op.choose(start + (corner + count + beside) % count, _table()) * size for beside in (-1, 0, 1)
+        size = op.vector(tree, width - corner_radius * 2.0, height - corner_radius * 2.0)
+        previous_corner, arc_centre, next_corner = (
+            op.choose(start + (corner + count + shift) % count, _table()) * size for shift in (-1, 0, 1)
         )
     with tree.frame("Points on the arcs"):
-        outwards, inwards = _directions(tree, middle - before, after - middle, step / (steps - 1.0))
+        outward_direction, inward_move = _directions(
+            tree, arc_centre - previous_corner, next_corner - arc_centre, step / (steps - 1.0)
+        )
         points = tree.node("GeometryNodeMeshCircle", vertices=count * steps).value
-        # Radii shrink with the distance; where none is left, the arc's middle moves inwards.
-        points = op.set_position(points, middle + inwards * (inset - outer + inner) + outwards * inner)
+        # The radius shrinks with the inset; once it is at its least, the arc's centre moves inwards.
+        points = op.set_position(
+            points, arc_centre + inward_move * (inset - corner_radius + inset_radius) + outward_direction * inset_radius
+        )
         curve = tree.node("GeometryNodeMeshToCurve", points).value
     tree.output("Curve", curve, description="Closed curve, anticlockwise")
 
 
-def _directions(tree: Tree, before: Value, after: Value, share: Value) -> tuple[Value, Value]:
+def _directions(tree: Tree, side_before: Value, side_after: Value, share: Value) -> tuple[Value, Value]:
     """Add nodes for the outward unit direction at a share of a corner's arc, and its centre's move per metre inset.
 
-    `before` and `after` are the sides that meet there.
+    `side_before` and `side_after` are the sides that meet there. The move is -(n1 + n2) / (1 + n1 . n2) for their
+    outward unit normals n1 and n2.
     """
-    first, last = _normal(before), _normal(after)
-    cosine = op.dot(first, last)
-    turned = op.unary("ARCCOSINE", cosine) * share
-    outwards = tree.node(
-        "ShaderNodeVectorRotate", first, axis=(0.0, 0.0, 1.0), angle=turned, rotation_type="AXIS_ANGLE"
+    normal_before, normal_after = _normal(side_before), _normal(side_after)
+    cosine = op.dot(normal_before, normal_after)
+    angle = op.unary("ARCCOSINE", cosine) * share
+    direction = tree.node(
+        "ShaderNodeVectorRotate", normal_before, axis=(0.0, 0.0, 1.0), angle=angle, rotation_type="AXIS_ANGLE"
     ).value
-    return outwards, (first + last) * (-1.0 / (1.0 + cosine))
+    return direction, (normal_before + normal_after) * (-1.0 / (1.0 + cosine))
 
 
 def _table() -> list[tuple[float, float, float]]:
+    """Return the corners of all shapes, one shape after the other."""
     return [(x, y, 0.0) for corners in SIGN_OUTLINES.values() for x, y in corners]
 
 
@@ -84,5 +92,5 @@ def _corners_of(tree: Tree, shape: Value) -> tuple[Value, Value, Value]:
 
 def _normal(side: Value) -> Value:
     """Add nodes for the unit normal to the right of a vector in the xy plane: outwards along the outline."""
-    right = op.vector(side.tree, op.component(side, "Y"), -op.component(side, "X"))
-    return side.tree.node("ShaderNodeVectorMath", right, operation="NORMALIZE").value
+    right_vector = op.vector(side.tree, op.component(side, "Y"), -op.component(side, "X"))
+    return side.tree.node("ShaderNodeVectorMath", right_vector, operation="NORMALIZE").value

@@ -1,4 +1,4 @@
-"""SR Pictogram: what is drawn on a traffic sign, fitted into a box."""
+"""SR Pictogram: the drawing of a traffic sign, fitted into a box."""
 
 from __future__ import annotations
 
@@ -22,33 +22,35 @@ class _Pictogram(Inputs):
 @makes_group("SR Pictogram")
 def pictogram_group(tree: Tree) -> None:
     """A pictogram in the xy plane, as large as fits into a box."""
-    drawn = _Pictogram(tree)
-    low, high = drawn.low_corner, drawn.high_corner
+    inputs = _Pictogram(tree)
+    low_corner, high_corner = inputs.low_corner, inputs.high_corner
 
     ranges, corners = _tables()
     with tree.frame("Corners of its polygons out of the table of all"):
-        first, count, others = (op.round_up(op.component(op.choose(drawn.pictogram, ranges), axis)) for axis in "XYZ")
-        corner = op.choose(op.index(tree) + first, corners)
+        first_corner, count, red_count = (
+            op.round_up(op.component(op.choose(inputs.pictogram, ranges), axis)) for axis in "XYZ"
+        )
+        corner = op.choose(op.index(tree) + first_corner, corners)
         place = corner * (1.0, 1.0, 0.0)
         points = tree.node("GeometryNodePoints", count=count, position=place).value
         polygon = op.round_up(op.component(corner, "Z"))
         curves = tree.node("GeometryNodePointsToCurves", points, curve_group_id=polygon).value
         curves = tree.node("GeometryNodeSetSplineCyclic", curves, cyclic=True).value
     with tree.frame("Filled one by one: the red ones come first"):
-        red = op.index(tree) < others
+        is_red = op.index(tree) < red_count
         mesh = op.join(
-            paint_faces(_fill_curves(op.separate(curves, red, "CURVE")), drawn.border_material),
-            paint_faces(_fill_curves(op.separate(curves, ~red, "CURVE")), drawn.writing_material),
+            paint_faces(_fill_curves(op.separate(curves, is_red, "CURVE")), inputs.border_material),
+            paint_faces(_fill_curves(op.separate(curves, ~is_red, "CURVE")), inputs.writing_material),
         )
     with tree.frame("Fitted into the box"):
         extent = tree.node("GeometryNodeBoundBox", mesh)
-        size, room = extent["Max"] - extent["Min"], high - low
+        size, box_size = extent["Max"] - extent["Min"], high_corner - low_corner
         scale = op.minimum(
-            op.component(room, "X") / op.maximum(op.component(size, "X"), 1e-3),
-            op.component(room, "Y") / op.maximum(op.component(size, "Y"), 1e-3),
+            op.component(box_size, "X") / op.maximum(op.component(size, "X"), 1e-3),
+            op.component(box_size, "Y") / op.maximum(op.component(size, "Y"), 1e-3),
         )
-        middle = (low + high) * 0.5 - (extent["Max"] + extent["Min"]) * (scale * 0.5)
-        mesh = op.transform(mesh, translation=middle, scale=op.vector(tree, scale, scale, 1.0))
+        shift = (low_corner + high_corner) * 0.5 - (extent["Max"] + extent["Min"]) * (scale * 0.5)
+        mesh = op.transform(mesh, translation=shift, scale=op.vector(tree, scale, scale, 1.0))
     tree.output("Mesh", mesh, description="Pictogram, facing +z")
 
 

@@ -1,4 +1,7 @@
-"""Pictograms of traffic signs as polygons, drawn in a square of side 1 around the origin: x right, y up."""
+"""Pictograms of traffic signs as polygons, drawn in a square of side 1 around the origin: x right, y up.
+
+Coordinates are drawn by eye.
+"""
 
 from __future__ import annotations
 
@@ -14,65 +17,88 @@ Polygon = list[Point]
 
 def _stroke(line: list[Point], width: float) -> Polygon:
     """Return the polygon of a band along a line, mitred at its corners."""
-    left, right = _sides(np.array(line), width)
-    return _polygon([*right, *left[::-1]])
+    left_side, right_side = _sides(np.array(line), width)
+    return _polygon([*right_side, *left_side[::-1]])
 
 
 def _arrow(line: list[Point], width: float, head: float = 3.0) -> Polygon:
     """Return the polygon of an arrow along a line, with a barbed head `head` times as wide as the shaft."""
     points = np.array(line)
-    tip, along = points[-1].copy(), points[-1] - points[-2]
-    along /= np.hypot(*along)
-    across = np.array([-along[1], along[0]])
-    points[-1] = tip - along * width * head * 0.6
-    left, right = _sides(points, width)
-    back = points[-1] - along * width * 0.15
-    wings = [back - across * width * head / 2.0, tip, back + across * width * head / 2.0]
-    return _polygon([*right, *wings, *left[::-1]])
+    tip, direction = points[-1].copy(), points[-1] - points[-2]
+    direction /= np.hypot(*direction)
+    left_direction = np.array([-direction[1], direction[0]])
+    # The shaft ends within the head; 0.6 and 0.15 are chosen.
+    points[-1] = tip - direction * width * head * 0.6
+    left_side, right_side = _sides(points, width)
+    head_base = points[-1] - direction * width * 0.15
+    head_corners = [
+        head_base - left_direction * width * head / 2.0,
+        tip,
+        head_base + left_direction * width * head / 2.0,
+    ]
+    return _polygon([*right_side, *head_corners, *left_side[::-1]])
 
 
 def _sides(points: NDArray[np.float64], width: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the left and the right border (N, 2) of a mitred band along points (N, 2)."""
-    along = np.diff(points, axis=0)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    before, after = along[[0, *range(len(along))]], along[[*range(len(along)), -1]]
-    across = np.column_stack([-(before + after)[:, 1], (before + after)[:, 0]])
-    across *= width / (1.0 + (before * after).sum(axis=1, keepdims=True)) / 2.0
-    return points + across, points - across
+    directions = np.diff(points, axis=0)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    directions_before, directions_after = (
+        directions[[0, *range(len(directions))]],
+        directions[[*range(len(directions)), -1]],
+    )
+    mitre = np.column_stack(
+        [-(directions_before + directions_after)[:, 1], (directions_before + directions_after)[:, 0]]
+    )
+    # Mitre: n1 + n2, times width / 2 / (1 + d1 . d2), of the directions d and normals n of both pieces.
+    mitre *= width / (1.0 + (directions_before * directions_after).sum(axis=1, keepdims=True)) / 2.0
+    return points + mitre, points - mitre
 
 
 def _polygon(points: list[NDArray[np.float64]]) -> Polygon:
+    """Return points as a polygon with coordinates rounded to 4 decimals."""
     return [(round(float(x), 4), round(float(y), 4)) for x, y in points]
 
 
 def _mirror(polygons: list[Polygon]) -> list[Polygon]:
+    """Return polygons mirrored at x = 0, anticlockwise again."""
     return [[(-x, y) for x, y in reversed(polygon)] for polygon in polygons]
 
 
-def _disc(middle: Point, radius: float, corners: int = 10) -> Polygon:
-    turns = [2.0 * math.pi * i / corners for i in range(corners)]
-    return [(round(middle[0] + radius * math.cos(t), 4), round(middle[1] + radius * math.sin(t), 4)) for t in turns]
+def _disc(centre: Point, radius: float, corners: int = 10) -> Polygon:
+    """Return the polygon of a disc."""
+    angles = [2.0 * math.pi * i / corners for i in range(corners)]
+    return [
+        (round(centre[0] + radius * math.cos(angle), 4), round(centre[1] + radius * math.sin(angle), 4))
+        for angle in angles
+    ]
 
 
 def _bars(count: int) -> list[Polygon]:
-    """Return the polygons of slanted bars one above the other, as on an exit's countdown markers."""
-    thick, rise, pitch = 0.2, 0.3, 0.42
-    lowest = [-(thick + rise + pitch * (count - 1)) / 2.0 + pitch * i for i in range(count)]
-    return [[(-0.5, z), (0.5, z + rise), (0.5, z + rise + thick), (-0.5, z + thick)] for z in lowest]
+    """Return the polygons of slanted bars above each other, as on the countdown markers before an exit."""
+    thickness, rise, pitch = 0.2, 0.3, 0.42
+    bottoms = [-(thickness + rise + pitch * (count - 1)) / 2.0 + pitch * i for i in range(count)]
+    return [
+        [(-0.5, bottom), (0.5, bottom + rise), (0.5, bottom + rise + thickness), (-0.5, bottom + thickness)]
+        for bottom in bottoms
+    ]
 
 
 def _stripes() -> list[Polygon]:
-    """Return the polygons of the five stripes that cross out a round sign."""
+    """Return the polygons of the five diagonal stripes that cross out a round sign of diameter 1."""
     result = []
-    for across in (-0.15, -0.075, 0.0, 0.075, 0.15):
-        along = math.sqrt(0.25 - across**2) - 0.01
-        turned = [((a - across) * math.sqrt(0.5), (a + across) * math.sqrt(0.5)) for a in (-along, along)]
-        result.append(_stroke(turned, 0.035))
+    for distance in (-0.15, -0.075, 0.0, 0.075, 0.15):
+        half_length = math.sqrt(0.25 - distance**2) - 0.01
+        ends = [
+            ((end - distance) * math.sqrt(0.5), (end + distance) * math.sqrt(0.5))
+            for end in (-half_length, half_length)
+        ]
+        result.append(_stroke(ends, 0.035))
     return result
 
 
-def _car(middle: float) -> list[Polygon]:
-    """Return the polygons of a car seen from behind around x = `middle`, its window left out."""
+def _car(centre: float) -> list[Polygon]:
+    """Return the polygons of a car seen from behind around x = `centre`, its window left out."""
     parts = [
         [(-0.2, -0.17), (-0.12, -0.17), (-0.12, -0.11), (0.12, -0.11), (0.12, -0.17), (0.2, -0.17), (0.2, 0.02),
          (-0.2, 0.02)],
@@ -80,7 +106,7 @@ def _car(middle: float) -> list[Polygon]:
         [(0.2, 0.02), (0.14, 0.17), (0.11, 0.13), (0.155, 0.02)],
         [(-0.14, 0.17), (-0.11, 0.13), (0.11, 0.13), (0.14, 0.17)],
     ]  # fmt: skip
-    return [[(round(x + middle, 4), y) for x, y in part] for part in parts]
+    return [[(round(x + centre, 4), y) for x, y in part] for part in parts]
 
 
 _CURVE = [_arrow([(0.17, -0.5), (0.17, -0.16), (0.13, 0.02), (0.03, 0.14), (-0.32, 0.38)], 0.15)]
@@ -126,4 +152,4 @@ PICTOGRAMS: dict[str, list[Polygon]] = {
 NAMES = ("none", *PICTOGRAMS)
 """Pictograms by their number in the node groups' inputs."""
 RED = {"no_overtaking": 4}
-"""How many of a pictogram's first polygons have the border's colour instead of the writing's."""
+"""Number of a pictogram's first polygons that have the border's colour, not the writing's."""

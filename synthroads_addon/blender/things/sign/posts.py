@@ -13,6 +13,7 @@ from ...nodes.solids import bars, paint_faces, row_of_points, tube
 from ...nodes.standing import OnSurface, on_surface, put_on
 
 MOST_POSTS = 4
+"""Largest number of posts."""
 _PANEL = 0.9
 """Height of a lattice post's panels, m."""
 _DIAGONAL = 0.02
@@ -36,10 +37,10 @@ def sign_posts_group(tree: Tree) -> None:
     count, top, diameter = sign.posts, sign.top, sign.post_diameter
 
     with tree.frame("Places side by side, each on the surface below it"):
-        beside = ((op.index(tree) + 0.5) / count - 0.5) * sign.width
-        side_by_side = op.set_position(row_of_points(tree, count), op.vector(tree, beside))
-        level = op.store(sign.points, "level", op.component(op.position(tree), "Z"))
-        places = on_surface(put_on(level, side_by_side), sign.road, sign.terrain)
+        x = ((op.index(tree) + 0.5) / count - 0.5) * sign.width
+        side_by_side = op.set_position(row_of_points(tree, count), op.vector(tree, x))
+        points = op.store(sign.points, "level", op.component(op.position(tree), "Z"))
+        places = on_surface(put_on(points, side_by_side), sign.road, sign.terrain)
     with tree.frame("Length from below the surface up"):
         foot = op.component(op.position(tree), "Z") - BURIED
         places = op.store(places, "tall", op.maximum(op.named_attribute(tree, "level") + top - foot, 0.1))
@@ -56,9 +57,9 @@ def sign_posts_group(tree: Tree) -> None:
 
 
 def _lattice(tree: Tree, radius: Value, height: Value) -> Value:
-    """Add nodes for a lattice post of 1 m height: three chords on a circle with diagonals between them."""
-    turns = [math.pi / 2.0 + 2.0 * math.pi * i / 3.0 for i in range(3)]
-    corners = [(math.cos(turn), math.sin(turn), 0.0) for turn in turns]
+    """Add nodes for a lattice post, squeezed from its height (m) to 1 m: three chords on a circle, with diagonals."""
+    angles = [math.pi / 2.0 + 2.0 * math.pi * i / 3.0 for i in range(3)]
+    corners = [(math.cos(angle), math.sin(angle), 0.0) for angle in angles]
 
     def corner(number: Value) -> Value:
         return op.choose(number % 3, corners) * radius
@@ -69,9 +70,9 @@ def _lattice(tree: Tree, radius: Value, height: Value) -> Value:
     panels = op.round_up(height / _PANEL)
     number = op.index(tree)
     side, panel = number // panels, number % panels
-    odd = panel % 2
-    start = corner(side + odd) + op.vector(tree, 0.0, 0.0, panel * _PANEL)
-    end = corner(side + 1 - odd) + op.vector(tree, 0.0, 0.0, (panel + 1) * _PANEL)
+    is_odd = panel % 2
+    start = corner(side + is_odd) + op.vector(tree, 0.0, 0.0, panel * _PANEL)
+    end = corner(side + 1 - is_odd) + op.vector(tree, 0.0, 0.0, (panel + 1) * _PANEL)
     diagonals = bars(row_of_points(tree, panels * 3), start, end, _DIAGONAL)
-    squeezed = op.transform(diagonals, scale=op.vector(tree, 1.0, 1.0, 1.0 / (panels * _PANEL)))
-    return op.join(chords, squeezed)
+    unit_diagonals = op.transform(diagonals, scale=op.vector(tree, 1.0, 1.0, 1.0 / (panels * _PANEL)))
+    return op.join(chords, unit_diagonals)

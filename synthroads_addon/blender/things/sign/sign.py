@@ -17,9 +17,12 @@ from .looks import sign_face_inputs
 from .outline import SHAPES
 from .posts import MOST_POSTS, sign_posts_group
 
-_RAIL_SPACING = 0.9  # m
-_PLAY = 0.0005  # m between rails and what is before and behind them
-_CLAMP = 0.05  # m, height
+_RAIL_SPACING = 0.9
+"""Largest distance between rails, m; chosen."""
+_PLAY = 0.0005
+"""Gap between rails and the parts in front of and behind them, m; chosen."""
+_CLAMP = 0.05
+"""Height of a clamp, m; chosen."""
 
 
 class _SignInputs(Inputs):
@@ -36,13 +39,13 @@ def sign_group(tree: Tree) -> None:
     standing, face, sign = Standing(tree), Face(tree), _SignInputs(tree)
 
     with tree.frame("What is behind the face, by its shape"):
-        behind = op.choose(face.shape, [sizes.BEHIND[shape] for shape in SHAPES])
-        top, spread, long = (op.component(behind, axis) for axis in "XYZ")
+        back_sizes = op.choose(face.shape, [sizes.BEHIND[shape] for shape in SHAPES])
+        top_share, spread_share, length_share = (op.component(back_sizes, axis) for axis in "XYZ")
     with tree.frame("Face, in front of the posts"):
         plate = tree.call(sign_face_group(), instance=standing.instance, **face.values).value
         front = (sign.post_diameter * 0.5 + face.thickness + sizes.RAIL) * -1.0
         plate = move_geometry(plate, op.vector(tree, 0.0, front, sign.lower_edge + face.height * 0.5))
-    mounting = _mounting(tree, face, sign, spread, long)
+    mounting = _mounting(tree, face, sign, spread_share, length_share)
     with tree.frame("Put onto the points"):
         places = standing.places()
         mesh = put_on(places, op.join(plate, mounting))
@@ -54,7 +57,7 @@ def sign_group(tree: Tree) -> None:
             terrain=standing.terrain,
             posts=sign.posts,
             width=face.width,
-            top=sign.lower_edge + face.height * top,
+            top=sign.lower_edge + face.height * top_share,
             post_diameter=sign.post_diameter,
             lattice=sign.lattice,
             material=sign.post_material,
@@ -64,24 +67,25 @@ def sign_group(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Sign with its posts")
 
 
-def _mounting(tree: Tree, face: Face, sign: _SignInputs, spread: Value, long: Value) -> Value:
+def _mounting(tree: Tree, face: Face, sign: _SignInputs, spread_share: Value, length_share: Value) -> Value:
     """Add nodes for the rails behind the face and the clamps that hold them to the posts."""
     with tree.frame("Rails behind the face, one above the other"):
         count = op.round_up(op.maximum(face.height / _RAIL_SPACING, 2.0))
 
-        def level(number: Value) -> Value:
-            return sign.lower_edge + face.height * spread * ((number + 0.5) / count)
+        def rail_height(rail_index: Value) -> Value:
+            """Add nodes for the height (m) of a rail above the surface."""
+            return sign.lower_edge + face.height * spread_share * ((rail_index + 0.5) / count)
 
-        # A little less deep than the gap: faces that coincide with the plate's have no first hit.
-        bar = box(tree, op.vector(tree, face.width * long, sizes.RAIL - 2.0 * _PLAY, sizes.RAIL))
+        # Slightly less deep than the gap: rays can't tell apart coinciding faces.
+        bar = box(tree, op.vector(tree, face.width * length_share, sizes.RAIL - 2.0 * _PLAY, sizes.RAIL))
         depth = (sign.post_diameter + sizes.RAIL) * -0.5
-        rails = put_on_points(row_of_points(tree, count), bar, op.vector(tree, 0.0, depth, level(op.index(tree))))
+        rails = put_on_points(row_of_points(tree, count), bar, op.vector(tree, 0.0, depth, rail_height(op.index(tree))))
     with tree.frame("Clamps around the posts"):
         radius, height = sign.post_diameter * 0.5 + sizes.CLAMP, _CLAMP
         clamp = tube(tree, radius, height, 8)
-        number = op.index(tree)
-        beside = (((number % sign.posts) + 0.5) / sign.posts - 0.5) * face.width
-        place = op.vector(tree, beside, 0.0, level(number // sign.posts) - height / 2.0)
+        clamp_index = op.index(tree)
+        x = (((clamp_index % sign.posts) + 0.5) / sign.posts - 0.5) * face.width
+        place = op.vector(tree, x, 0.0, rail_height(clamp_index // sign.posts) - height / 2.0)
         clamps = put_on_points(row_of_points(tree, sign.posts * count), clamp, place)
         return paint_faces(op.join(rails, clamps), face.back_material)
 

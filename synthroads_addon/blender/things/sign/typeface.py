@@ -15,19 +15,20 @@ _KEY = "synthroads_typeface"
 
 
 def sign_typeface() -> bpy.types.VectorFont:
-    """Return the typeface of the signs, packed into the open file; read if it isn't there yet."""
+    """Return the typeface of the signs, packed into the open file; read if the file lacks it."""
     for font in bpy.data.fonts:
         if font.get(_KEY) == _digest() and font.packed_file is not None and font.library is None:
             return font
     font = bpy.data.fonts.load(str(TYPEFACE))
     font[_KEY] = _digest()
     font.pack()
-    # It is in the open file from now on, and that is to name no folder of this machine. Of a name alone Blender would
-    # make a way to it when the file is saved.
+    # The open file contains it now, and should name no folder of this machine. Blender would expand a bare name to a
+    # path when the file is saved.
     font.filepath = f"//{TYPEFACE.name}"
     return font
 
 
 @cache
 def _digest() -> str:
+    """Return a digest of the typeface's file; cached."""
     return files_digest(TYPEFACE).hex()[:16]

@@ -1,4 +1,4 @@
-"""Plants."""
+"""Builder of the part vegetation: an object for each stand of plants."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .shrub import shrub_group
 from .tree import tree_group
 
 _DARK_TWIGS = {"birch": "hazel_bark"}
-"""Material of the twigs of species whose bark is white on trunk and branches alone."""
+"""Material of the twigs of species with white bark on trunk and branches only."""
 _SIDES = {"both": 0, "left": 1, "right": -1}
 _GROUPS = {"grass": grass_group, "shrub": shrub_group, "tree": tree_group}
 
@@ -49,7 +49,7 @@ def build_vegetation(builder: ModelBuilder) -> None:
 
 
 def _places_mesh(builder: ModelBuilder, plants: Vegetation, terrain: Terrain) -> bpy.types.Mesh:
-    """Create a mesh with a vertex per candidate place of a stand, carrying whether a plant grows there and why."""
+    """Create a mesh with a vertex per candidate place of a stand: number, whether a plant stands there, inputs."""
     places = run_aside(lambda: plant_places(builder.geometry, plants, terrain, *builder.stretch))
     mesh = bpy.data.meshes.new("SR Places")
     fill(mesh, np.zeros((len(places.number), 3)))
@@ -66,17 +66,17 @@ def _places_mesh(builder: ModelBuilder, plants: Vegetation, terrain: Terrain) ->
 def _further_inputs(plants: Vegetation, builder: ModelBuilder) -> dict[str, Any]:
     """Return a stand's inputs that depend on its kind: for grass densities on verge and median, else materials.
 
-    Bare plants have twigs of bark in the place of leaves.
+    Leafless plants have twigs of bark in place of leaves.
     """
     if plants.kind == "grass":
         roadside = plants.density * ROADSIDE_SHARE * (plants.species not in WILD_GRASSES)
-        median = next((item.instance for item in builder.parameters.of_type(Median).values()), 0)
-        reach = {"roadside_reach": builder.widest, "median_instance": median}
-        return {"roadside_density": roadside, "material": plants.species, **reach}
+        median_instance = next((item.instance for item in builder.parameters.of_type(Median).values()), 0)
+        reach_inputs = {"roadside_reach": builder.widest, "median_instance": median_instance}
+        return {"roadside_density": roadside, "material": plants.species, **reach_inputs}
     bark, leaves = f"{plants.species}_bark", f"{plants.species}_leaves"
-    side = {"on_side": _SIDES[plants.side]}
+    side_input = {"on_side": _SIDES[plants.side]}
     if not is_bare(plants.species, builder.parameters.environment.season):
-        return {"bark_material": bark, "leaves_material": leaves, **side}
-    shape = species_shapes()[plants.kind][plants.species]
-    twigs = {name: shape[name] * factor for name, factor in BARE_TWIGS.items()}
-    return {"bark_material": bark, "leaves_material": _DARK_TWIGS.get(plants.species, bark), **twigs, **side}
+        return {"bark_material": bark, "leaves_material": leaves, **side_input}
+    species_shape = species_shapes()[plants.kind][plants.species]
+    twigs = {name: species_shape[name] * factor for name, factor in BARE_TWIGS.items()}
+    return {"bark_material": bark, "leaves_material": _DARK_TWIGS.get(plants.species, bark), **twigs, **side_input}

@@ -1,4 +1,7 @@
-"""SR Crown: branches and leaves of trees and shrubs of height 1, and how its shape is declared."""
+"""SR Crown: branches and leaves of trees and shrubs of height 1, and how its shape is declared.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +12,13 @@ from ...nodes.solids import paint_faces
 from .plants import one_high
 
 _GOLDEN_ANGLE = 2.4
+"""Angle between successive branches, rad, near pi (3 - sqrt 5): they spread evenly around the stem."""
 _SEGMENTS = 2
+"""Pieces of a branch along its length."""
 _CROOKED = 0.05
-# A leaf is a triangle that stands for a twig's leaves, for a length and a width of 1: across, along, up.
+"""Largest sideways bend of stems, for a plant of height 1; chosen."""
 _LEAF = [(0.0, -0.5, 0.0), (0.5, 0.3, 0.0), (-0.42, 0.5, 0.0)]
+"""Triangle that represents a twig's leaves, for a width (x) and a length (y) of 1; chosen."""
 
 
 class Crown(Inputs):
@@ -64,13 +70,13 @@ def crown_group(tree: Tree) -> None:
     shape, wood, plant = Crown(tree), _Branches(tree), Plant(tree)
     seed = plant.seed
     with tree.frame("Ends of the branches, on and within the crown's outline"):
-        end, share, bulge = _ends(tree, shape, seed)
+        end, share, relative_width = _ends(tree, shape, seed)
     with tree.frame("Their beginnings: on the stem, or on the ground"):
-        begin = _beginnings(tree, shape, wood.from_ground, end)
+        start = _beginnings(tree, shape, wood.from_ground, end)
     with tree.frame("Branches, thinner towards the top"):
         points = tree.node("GeometryNodePoints", count=shape.branches).value
-        points = op.store(op.store(op.set_position(points, begin), "end", end), "share", share)
-        points = op.store(points, "size", 0.55 + 0.45 * bulge)
+        points = op.store(op.store(op.set_position(points, start), "end", end), "share", share)
+        points = op.store(points, "size", 0.55 + 0.45 * relative_width)
         branches = _branches(tree, points, wood.branch_radius)
     with tree.frame("Leaves around the outer parts of the branches"):
         leaves = _leaves(tree, points, shape, seed, plant.detail)
@@ -82,39 +88,42 @@ def crown_group(tree: Tree) -> None:
 
 def _ends(tree: Tree, shape: Crown, seed: Value) -> tuple[Value, Value, Value]:
     """Add nodes for the branches' ends, and for the crown's relative height and width (0 to 1) there; fields."""
-    number = op.index(tree)
-    share = (number + 0.5) / (shape.branches * 1.0)
-    # The power of the height that makes the sine's maximum lie where the crown is widest.
-    bulge = op.unary("SINE", op.power(share, _log(0.5, shape.crown_widest)) * 3.1416)
-    bulge = op.power(op.maximum(bulge, 0.0), shape.crown_fullness)
-    outline = bulge * shape.crown_radius
-    inside = op.unary("SQRT", op.random(tree, 0.25, 1.0, seed + 1)) * op.maximum(
+    branch_index = op.index(tree)
+    share = (branch_index + 0.5) / (shape.branches * 1.0)
+    # sin(pi share^p) has its maximum where share^p = 1/2: p = log 0.5 / log(widest) puts it where the crown is widest.
+    relative_width = op.unary("SINE", op.power(share, _log(0.5, shape.crown_widest)) * 3.1416)
+    relative_width = op.power(op.maximum(relative_width, 0.0), shape.crown_fullness)
+    outline = relative_width * shape.crown_radius
+    radius = op.unary("SQRT", op.random(tree, 0.25, 1.0, seed + 1)) * op.maximum(
         outline - shape.cluster_radius * 0.6, 0.0
     )
-    around = number * _GOLDEN_ANGLE + op.random(tree, -0.5, 0.5, seed + 2)
+    angle = branch_index * _GOLDEN_ANGLE + op.random(tree, -0.5, 0.5, seed + 2)
     height = shape.crown_bottom + (1.0 - shape.crown_bottom - shape.cluster_radius * 0.7) * share
-    end = op.vector(tree, op.unary("COSINE", around) * inside, op.unary("SINE", around) * inside, height)
-    return end, share, bulge
+    end = op.vector(tree, op.unary("COSINE", angle) * radius, op.unary("SINE", angle) * radius, height)
+    return end, share, relative_width
 
 
 def _log(value: float, base: Value) -> Value:
+    """Add a node for the logarithm of a number to a base."""
     return base.tree.node("ShaderNodeMath", value, base, operation="LOGARITHM").value
 
 
-def _beginnings(tree: Tree, shape: Crown, ground: Value, end: Value) -> Value:
+def _beginnings(tree: Tree, shape: Crown, from_ground: Value, end: Value) -> Value:
+    """Add nodes for the starts of branches: on the stem, below the ends by the branches' rise, or on the ground."""
     height = op.component(end, "Z")
-    flat = end * (1.0, 1.0, 0.0)
-    reach = op.length(flat)
-    lowest = shape.crown_bottom * 0.9
-    on_stem = op.minimum(op.maximum(height - reach * shape.branch_rise, lowest), 0.95)
-    below = flat * 0.18 + op.vector(tree, 0.0, 0.0, -0.02)
-    return op.switch(ground, op.vector(tree, 0.0, 0.0, on_stem), below)
+    plan_end = end * (1.0, 1.0, 0.0)
+    reach = op.length(plan_end)
+    lowest_start = shape.crown_bottom * 0.9
+    stem_height = op.minimum(op.maximum(height - reach * shape.branch_rise, lowest_start), 0.95)
+    ground_start = plan_end * 0.18 + op.vector(tree, 0.0, 0.0, -0.02)
+    return op.switch(from_ground, op.vector(tree, 0.0, 0.0, stem_height), ground_start)
 
 
-def _branches(tree: Tree, points: Value, thick: Value) -> Value:
-    along = op.named_attribute(tree, "end", "FLOAT_VECTOR") - op.position(tree)
-    length = op.length(along)
-    width = thick * (1.0 - op.named_attribute(tree, "share") * 0.6)
+def _branches(tree: Tree, points: Value, radius: Value) -> Value:
+    """Add nodes for the branches as tapered cones from the points to their ``end``, thinner towards the top."""
+    direction = op.named_attribute(tree, "end", "FLOAT_VECTOR") - op.position(tree)
+    length = op.length(direction)
+    width = radius * (1.0 - op.named_attribute(tree, "share") * 0.6)
     cone = tree.node(
         "GeometryNodeMeshCone",
         fill_type="NONE",
@@ -128,43 +137,47 @@ def _branches(tree: Tree, points: Value, thick: Value) -> Value:
         "GeometryNodeInstanceOnPoints",
         points,
         instance=cone,
-        rotation=tree.node("FunctionNodeAlignRotationToVector", vector=along, axis="Z").value,
+        rotation=tree.node("FunctionNodeAlignRotationToVector", vector=direction, axis="Z").value,
         scale=op.vector(tree, width, width, length),
     ).value
-    for name in ("end", "share", "size"):  # the many points of many plants would carry them along
+    for name in ("end", "share", "size"):  # else each of a forest's many points would have them
         branches = tree.node("GeometryNodeRemoveAttribute", branches, name=name).value
     return op.realize(branches)
 
 
 def _leaves(tree: Tree, branches: Value, shape: Crown, seed: Value, detail: Value) -> Value:
-    share = op.maximum(detail, 0.04)
-    number = op.index(tree)
-    branch = number % shape.branches
-    begin = op.sample_index(branches, op.position(tree), branch)
+    """Add nodes for the leaves in clusters around the outer parts of branches."""
+    leaf_share = op.maximum(detail, 0.04)
+    leaf_index = op.index(tree)
+    branch = leaf_index % shape.branches
+    start = op.sample_index(branches, op.position(tree), branch)
     end = op.sample_index(branches, op.named_attribute(tree, "end", "FLOAT_VECTOR"), branch)
-    along = 1.0 - op.random(tree, 0.0, 1.0, seed + 3) * shape.leafy_share
+    # A leaf lies at a random share of its branch, from the end inwards, shifted within the cluster's radius.
+    branch_share = 1.0 - op.random(tree, 0.0, 1.0, seed + 3) * shape.leafy_share
     size = op.sample_index(branches, op.named_attribute(tree, "size"), branch)
     radius = shape.cluster_radius * size * op.random(tree, 0.75, 1.25, seed + 5, branch)
-    around = _in_ball(tree, seed + 4, number) * radius
-    place = begin + (end - begin) * along + around
-    points = tree.node("GeometryNodePoints", count=shape.leaves * share).value
-    way = tree.node("ShaderNodeVectorMath", end - begin, operation="NORMALIZE").value
-    anywhere = op.random(tree, (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), seed + 6)
-    points_to = anywhere * (1.0 - shape.leaf_order) + way * (shape.leaf_order * 1.5)
-    points_to = points_to - op.vector(tree, 0.0, 0.0, shape.leaf_droop)
-    turned = op.random_turn(tree, (0.0, -0.9, 0.0), (0.0, 0.9, 0.0), seed + 7)
+    shift = _in_ball(tree, seed + 4, leaf_index) * radius
+    place = start + (end - start) * branch_share + shift
+    points = tree.node("GeometryNodePoints", count=shape.leaves * leaf_share).value
+    # Leaves point anywhere, or along their branch, by the order; the droop pulls them down.
+    branch_direction = tree.node("ShaderNodeVectorMath", end - start, operation="NORMALIZE").value
+    random_direction = op.random(tree, (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), seed + 6)
+    leaf_direction = random_direction * (1.0 - shape.leaf_order) + branch_direction * (shape.leaf_order * 1.5)
+    leaf_direction = leaf_direction - op.vector(tree, 0.0, 0.0, shape.leaf_droop)
+    rotation = op.random_turn(tree, (0.0, -0.9, 0.0), (0.0, 0.9, 0.0), seed + 7)
     leaves = tree.node(
         "GeometryNodeInstanceOnPoints",
         op.set_position(points, place),
         instance=_leaf(tree, shape.leaf_length, shape.leaf_width),
-        rotation=tree.node("FunctionNodeAlignRotationToVector", turned, 1.0, points_to, axis="Y").value,
-        # Fewer leaves are larger, so that the crown lets as much through.
-        scale=op.random(tree, 0.7, 1.3, seed + 8) * size / op.unary("SQRT", share),
+        rotation=tree.node("FunctionNodeAlignRotationToVector", rotation, 1.0, leaf_direction, axis="Y").value,
+        # Fewer leaves are larger, so that the crown covers the same area.
+        scale=op.random(tree, 0.7, 1.3, seed + 8) * size / op.unary("SQRT", leaf_share),
     ).value
     return op.realize(leaves)
 
 
 def _leaf(tree: Tree, length: Value, width: Value) -> Value:
+    """Add nodes for a leaf's triangle of a length and a width (m)."""
     face = tree.node("GeometryNodeMeshCircle", vertices=3, fill_type="NGON").value
     outline = op.choose(op.index(tree), _LEAF)
     size = op.vector(tree, width, length, 1.0)
@@ -181,7 +194,7 @@ def _in_ball(tree: Tree, seed: Value, identifier: Value) -> Value:
 def bend_stems(tree: Tree, plant: Value, seed: Value) -> Value:
     """Add nodes that bend a plant's stems a little by noise and scale it to height 1; return the plant."""
     place = op.position(tree)
-    bent = tree.node("ShaderNodeTexNoise", place, noise_dimensions="4D", w=seed, scale=2.5, detail=1.0)
-    aside = (bent["Color"] - (0.5, 0.5, 0.5)) * (op.minimum(op.component(place, "Z") * 4.0, 1.0) * (2.0 * _CROOKED))
-    flat = aside * (1.0, 1.0, 0.0)
-    return one_high(tree.node("GeometryNodeSetPosition", plant, offset=flat).value)
+    noise = tree.node("ShaderNodeTexNoise", place, noise_dimensions="4D", w=seed, scale=2.5, detail=1.0)
+    shift = (noise["Color"] - (0.5, 0.5, 0.5)) * (op.minimum(op.component(place, "Z") * 4.0, 1.0) * (2.0 * _CROOKED))
+    plan_shift = shift * (1.0, 1.0, 0.0)
+    return one_high(tree.node("GeometryNodeSetPosition", plant, offset=plan_shift).value)

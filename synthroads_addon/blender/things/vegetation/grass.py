@@ -1,4 +1,7 @@
-"""SR Grass: tufts of blades on the ground, the verges and the median."""
+"""SR Grass: tufts of blades on the ground, the verges and the median.
+
+Dimensions (m) and shares without a name here are chosen.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +14,13 @@ from ...nodes.solids import Point
 from .plants import Stand, one_high, plant_points, points_in_band, points_on
 
 _VARIANTS = 4
+"""Number of different tufts; chosen."""
 _GOLDEN_ANGLE = 2.4
-# A blade is a triangle from a broad foot, a little in the ground, to its tip: out, across, up.
+"""Angle between successive blades, rad, near pi (3 - sqrt 5): they spread evenly."""
 _BLADE = [(0.0, -0.5, -0.04), (0.0, 0.5, -0.04), (0.0, 0.0, 1.0)]
-# A stalk is one face, creased between its widest places, which are its ear.
+"""A blade of height and width 1: a triangle from a broad foot, slightly buried, to its tip; x is outwards."""
 _STALK = [(0.0, 0.0, -0.04), (0.10, -0.5, 0.78), (0.10, 0.5, 0.78), (0.2, 0.0, 1.0)]
+"""A stalk of height and width 1: one face, widest at its ear."""
 
 
 class _Roadside(Inputs):
@@ -46,28 +51,33 @@ def grass_group(tree: Tree) -> None:
 
     with tree.frame("Places on the terrain"):
         distance = op.named_attribute(tree, "distance")
-        points = points_in_band(tree, stand, stand.density * stand.detail, found=distance)
-        near = op.named_attribute(tree, "found") < roadside.mown_width
-        share = op.switch(near, 1.0, roadside.roadside_height)
+        points = points_in_band(tree, stand, stand.density * stand.detail, surface_field=distance)
+        is_mown = op.named_attribute(tree, "found") < roadside.mown_width
+        share = op.switch(is_mown, 1.0, roadside.roadside_height)
+        # Strips, by which instance numbers are given: 0 and 1 beside the road, left and right; 2 and 3 on the median,
+        # 4 on verges.
         points = op.store(op.store(points, "share", share), "strip", _on_right(tree))
     with tree.frame("Places on verges and median"):
-        beside = op.named_attribute(tree, "class_id", "INT").equals(class_id("roadside"))
-        faces = op.separate(op.object_geometry(stand.road), beside, "FACE")
+        is_roadside = op.named_attribute(tree, "class_id", "INT").equals(class_id("roadside"))
+        faces = op.separate(op.object_geometry(stand.road), is_roadside, "FACE")
         density = roadside.roadside_density * stand.detail
         instance = op.named_attribute(tree, "instance_id", "INT")
-        mown = points_on(tree, stand, faces, density, roadside.roadside_reach, stand.seed + 7, found=instance)
-        on = op.named_attribute(tree, "found", "INT")
-        in_median = (on - roadside.median_instance).equals(0) & ~roadside.median_instance.equals(0)
-        mown = op.store(mown, "strip", op.switch(in_median, 2 + _on_right(tree), 4))
-        points = op.join(points, op.store(mown, "share", roadside.roadside_height))
+        roadside_points = points_on(
+            tree, stand, faces, density, roadside.roadside_reach, stand.seed + 7, surface_field=instance
+        )
+        surface_instance = op.named_attribute(tree, "found", "INT")
+        is_in_median = (surface_instance - roadside.median_instance).equals(0) & ~roadside.median_instance.equals(0)
+        roadside_points = op.store(roadside_points, "strip", op.switch(is_in_median, 2 + _on_right(tree), 4))
+        points = op.join(points, op.store(roadside_points, "share", roadside.roadside_height))
     with tree.frame("Kinds of tufts"):
         variants = [tree.call(tuft_group(), **shape.values, seed=100 * n).value for n in range(_VARIANTS)]
     with tree.frame("Tufts"):
         share = op.named_attribute(tree, "share")
         height = op.random(tree, stand.smallest_height, stand.largest_height, stand.seed + 3) * share
-        # Low tufts are broad for their height. Fewer tufts are broader, so that they cover as much of the ground.
-        broad = (height + stand.largest_height * share) * 0.65 / op.unary("SQRT", op.maximum(stand.detail, 0.05))
-        scale, number = op.vector(tree, broad, broad, height), stand.instance + op.named_attribute(tree, "strip", "INT")
+        # Low tufts are broad for their height; fewer tufts are broader, so that they cover the same area (chosen).
+        breadth = (height + stand.largest_height * share) * 0.65 / op.unary("SQRT", op.maximum(stand.detail, 0.05))
+        scale = op.vector(tree, breadth, breadth, height)
+        number = stand.instance + op.named_attribute(tree, "strip", "INT")
         mesh = plant_points(tree, points, variants, scale, 0.12, stand.seed, number)
         mesh = op.store(mesh, "class_id", class_id("vegetation"), "FACE")
         mesh = tree.node("GeometryNodeSetMaterial", mesh, material=roadside.material).value
@@ -95,14 +105,15 @@ def tuft_group(tree: Tree) -> None:
     with tree.frame("Stalks"):
         stalks = _around(tree, stalk, shape.stalks, shape.spread * 0.6, shape.lean * 0.3, seed + 50)
     with tree.frame("Blades of their height, all 1 high"):
-        low = op.vector(tree, 1.0, 1.0, shape.blade_height)
-        place = op.position(tree) * low
+        blade_scale = op.vector(tree, 1.0, 1.0, shape.blade_height)
+        place = op.position(tree) * blade_scale
         blades = op.set_position(blades, place)
         tuft = one_high(op.join(blades, stalks))
     tree.output("Mesh", tuft, description="The tuft's blades")
 
 
 def _shape_blade(face: Value, outline: list[Point], width: Value) -> Value:
+    """Add nodes that give a face the outline of a blade or stalk of a width (m) and height 1."""
     tree = face.tree
     size = op.vector(tree, 1.0, width, 1.0)
     place = op.choose(op.index(tree), outline) * size
@@ -110,18 +121,18 @@ def _shape_blade(face: Value, outline: list[Point], width: Value) -> Value:
 
 
 def _around(tree: Tree, blade: Value, count: Value, spread: Value, lean: Value, seed: Value) -> Value:
-    """Add nodes for `count` blades on a disc, each leaning away from its middle, the more the farther out."""
-    number = op.index(tree)
-    out = op.unary("SQRT", (number + 0.5) / (count * 1.0))
-    around = number * _GOLDEN_ANGLE + op.random(tree, -0.6, 0.6, seed)
-    place = op.vector(tree, op.unary("COSINE", around), op.unary("SINE", around)) * (out * spread)
+    """Add nodes for `count` blades on a disc of radius `spread`; outer blades lean more, away from the middle."""
+    blade_index = op.index(tree)
+    radius_share = op.unary("SQRT", (blade_index + 0.5) / (count * 1.0))
+    angle = blade_index * _GOLDEN_ANGLE + op.random(tree, -0.6, 0.6, seed)
+    place = op.vector(tree, op.unary("COSINE", angle), op.unary("SINE", angle)) * (radius_share * spread)
     points = tree.node("GeometryNodePoints", count=count).value
-    tilt = out * lean * op.random(tree, 0.5, 1.1, seed + 1)
+    tilt = radius_share * lean * op.random(tree, 0.5, 1.1, seed + 1)
     blades = tree.node(
         "GeometryNodeInstanceOnPoints",
         op.set_position(points, place),
         instance=blade,
-        rotation=op.turn(tree, y=tilt, z=around + op.random(tree, -0.9, 0.9, seed + 2)),
+        rotation=op.turn(tree, y=tilt, z=angle + op.random(tree, -0.9, 0.9, seed + 2)),
         scale=op.random(tree, 0.7, 1.0, seed + 3),
     ).value
     return op.realize(blades)

@@ -1,7 +1,7 @@
-"""Placement of grass and trees: where plants grow, and how they are put there.
+"""Placement of grass and trees: points where plants grow, and plants on these points.
 
-A plant's place, size and turn follow from its seed and its number, and its number from the metre of road that it stands
-beside: a stretch of a road has the whole road's plants. `road.vegetation.plants` works out the same without Blender.
+A plant's place, size and turn follow from the seed and its number, and its number from the metre of road beside it, so
+that a stretch of a road has the whole road's plants. `road.vegetation.plants` computes the same without Blender.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from ...nodes.builder import Operand, Tree, Value
 from ...nodes.inputs import INSTANCES, Inputs, backbone_socket, integer, metres, number, share, socket
 
 _NUMBER = "plant_instance"
-_ABOVE = 1000.0
-"""Height from which the ground is looked for, m."""
+"""Attribute of the plants while they are made: instance number."""
+_RAY_HEIGHT = 1000.0
+"""Height above the axis from which rays look for the ground, m; chosen."""
 
-_ASIDE = 1.0
-"""Distance (m) that the road's edge may have moved by hand before decided places beyond the band are left out."""
-_NEEDED_NO_MORE = ("distance", "station", "offset", "edge", "share", "id", "strip", "found")
-"""Attributes of the places that the plants' many points would only carry along."""
+_EDGE_TOLERANCE = 1.0
+"""Distance (m) beyond the band up to which places decided beforehand stay if a user moves the road's edge; chosen."""
+_PLACE_ATTRIBUTES = ("distance", "station", "offset", "edge", "share", "id", "strip", "found")
+"""Attributes of the places that are removed, as the plants' many points don't need them."""
 
 
 class Stand(Inputs):
@@ -53,22 +54,24 @@ class PlantStand(Stand):
 
 
 DECIDED = ("density", "band_start", "band_end", "reach", "start_station", "end_station", "on_side")
-"""Inputs of a stand that the places of `decided_places` were decided for: their points carry them, and the seed."""
+"""Inputs of a stand on which the decisions of `decided_places` depend: the points carry their values, and the seed."""
 
 
 def decided_places(tree: Tree) -> Value:
     """Declare the input "Places", candidate places of a stand that are decided beforehand; return its value."""
-    about = "Places decided already: points with id, stands (0 or 1) and the inputs that this holds for; may be empty"
-    return tree.input("Places", "Geometry", description=about)
+    description = (
+        "Places decided already: points with id, stands (0 or 1) and the inputs that this holds for; may be empty"
+    )
+    return tree.input("Places", "Geometry", description=description)
 
 
 def points_in_band(
-    tree: Tree, stand: Stand, density: Operand, places: Value | None = None, found: Value | None = None
+    tree: Tree, stand: Stand, density: Operand, places: Value | None = None, surface_field: Value | None = None
 ) -> Value:
     """Add nodes for random points on the terrain within the stand's band, see `points_on`."""
     surface = op.object_geometry(stand.terrain)
     band = _Band(stand.band_start, stand.band_end, places)
-    return points_on(tree, stand, surface, density, stand.reach, stand.seed, band, found)
+    return points_on(tree, stand, surface, density, stand.reach, stand.seed, band, surface_field)
 
 
 class _Band(NamedTuple):
@@ -87,80 +90,88 @@ def points_on(
     reach: Value,
     seed: Value,
     band: _Band | None = None,
-    found: Value | None = None,
+    surface_field: Value | None = None,
 ) -> Value:
     """Add nodes for random points on a surface at a uniform density per area, identified by metre of road.
 
     Args:
-        surface: its points carry their ``distance``, if there is a band.
+        tree: tree to add the nodes to.
+        stand: inputs of the stand.
+        surface: mesh of the surface; its points carry their ``distance`` if there is a band.
         density: points per area, 1/m2.
-        reach: how far from the axis they are looked for, m.
-        seed: of their places.
-        band: that they grow in; none if None.
-        found: field of the surface that the points carry as ``found``; none if None.
+        reach: largest distance from the axis at which places are tried, m.
+        seed: seed of the places.
+        band: band in which plants grow; everywhere if None.
+        surface_field: field of the surface that the points carry as ``found``; none if None.
     """
     axis = op.object_geometry(stand.backbone)
     ribbon = station_ribbon(axis)
-    first = stand.first_metre - stand.zero
-    rows = _integer(op.round_up(last_station(axis)) - first, 0)
+    first_metre = stand.first_metre - stand.zero
+    rows = _integer(op.round_up(last_station(axis)) - first_metre, 0)
     per_metre = reach * 2.0 * density
-    each = _integer(op.round_up(per_metre * SPARE), 1)
-    points = tree.node("GeometryNodePoints", count=rows * each).value
-    number = op.index(tree)
-    metre = number // each
-    # A number of its own for every place on the road, however much of the road is here.
-    points = op.store(points, "id", (stand.first_metre + metre) * each + number % each)
+    places_per_metre = _integer(op.round_up(per_metre * SPARE), 1)
+    points = tree.node("GeometryNodePoints", count=rows * places_per_metre).value
+    place_index = op.index(tree)
+    metre = place_index // places_per_metre
+    # A unique number for every place of the whole road, whatever stretch of it is built.
+    points = op.store(points, "id", (stand.first_metre + metre) * places_per_metre + place_index % places_per_metre)
     identity = op.named_attribute(tree, "id", "INT")
-    points = op.store(points, "station", (metre + first) + op.random(tree, 0.0, 1.0, seed + STATION, identity))
+    points = op.store(points, "station", (metre + first_metre) + op.random(tree, 0.0, 1.0, seed + STATION, identity))
     points = op.store(points, "offset", op.random(tree, -1.0, 1.0, seed + OFFSET, identity) * reach)
     station, offset = op.named_attribute(tree, "station"), op.named_attribute(tree, "offset")
     points = op.delete_points(points, (station < first_station(axis)) | (station > last_station(axis)))
-    above = look_up(ribbon, "axis", station) + look_up(ribbon, "left", station) * offset + (0.0, 0.0, _ABOVE)
-    points = op.set_position(points, above)
-    looked_for = op.named_attribute(tree, "distance") if found is None else found
+    ray_start = look_up(ribbon, "axis", station) + look_up(ribbon, "left", station) * offset + (0.0, 0.0, _RAY_HEIGHT)
+    points = op.set_position(points, ray_start)
+    hit_field = op.named_attribute(tree, "distance") if surface_field is None else surface_field
     ray = tree.node(
         "GeometryNodeRaycast",
-        data_type="INT" if looked_for.kind == "INT" else "FLOAT",
+        data_type="INT" if hit_field.kind == "INT" else "FLOAT",
         target_geometry=surface,
-        attribute=looked_for,
+        attribute=hit_field,
         source_position=op.position(tree),
-        ray_length=2.0 * _ABOVE,
+        ray_length=2.0 * _RAY_HEIGHT,
     )
-    # Ground per metre of road and metre across it: longer outside of a curve, and on a slope.
+    # Area of ground per metre of station and metre of offset: larger on the outside of a curve, and on a slope. Of the
+    # places tried, the share that the density requires is kept.
     ground = 1.0 - look_up(ribbon, "curvature", station) * offset
-    needed = per_metre * ground / op.maximum(op.component(ray["Hit Normal"], "Z"), 0.1)
-    gone = ~ray["Is Hit"] | (op.random(tree, 0.0, 1.0, seed + CHANCE, identity) * each > needed)
+    plants_per_metre = per_metre * ground / op.maximum(op.component(ray["Hit Normal"], "Z"), 0.1)
+    is_removed = ~ray["Is Hit"] | (
+        op.random(tree, 0.0, 1.0, seed + CHANCE, identity) * places_per_metre > plants_per_metre
+    )
     if band is not None:
-        gone = gone | (ray["Attribute"] < band.start) | (ray["Attribute"] > band.end)
+        is_removed = is_removed | (ray["Attribute"] < band.start) | (ray["Attribute"] > band.end)
         if band.places is not None:
             assert isinstance(stand, PlantStand)
-            gone = gone | (station < stand.start_station) | (station > stand.end_station)
-            gone = gone | (offset * stand.on_side < 0.0)
-            aside = (ray["Attribute"] < band.start - _ASIDE) | (ray["Attribute"] > band.end + _ASIDE)
-            decided, stands = _decisions(stand, band.places, identity)
-            gone = op.switch(decided, gone, ~ray["Is Hit"] | ~stands | aside)
-    # Together, as rays are dear.
-    points, at = op.capture(points, gone=gone, hit=ray["Hit Position"], found=ray["Attribute"])
-    points = op.set_position(op.delete_points(points, at["gone"]), at["hit"])
-    return points if found is None else op.store(points, "found", at["found"])
+            is_removed = is_removed | (station < stand.start_station) | (station > stand.end_station)
+            is_removed = is_removed | (offset * stand.on_side < 0.0)
+            is_outside = (ray["Attribute"] < band.start - _EDGE_TOLERANCE) | (
+                ray["Attribute"] > band.end + _EDGE_TOLERANCE
+            )
+            # Where places were decided beforehand, by exact geometry, their decision counts.
+            is_decided, has_plant = _decisions(stand, band.places, identity)
+            is_removed = op.switch(is_decided, is_removed, ~ray["Is Hit"] | ~has_plant | is_outside)
+    # Captured together, so that the rays, which are slow, are cast once.
+    points, captured = op.capture(points, gone=is_removed, hit=ray["Hit Position"], found=ray["Attribute"])
+    points = op.set_position(op.delete_points(points, captured["gone"]), captured["hit"])
+    return points if surface_field is None else op.store(points, "found", captured["found"])
 
 
 def _decisions(stand: Stand, places: Value, identity: Value) -> tuple[Value, Value]:
-    """Add nodes for whether the places were decided for these very inputs, and whether a plant grows at each."""
+    """Add nodes that tell whether the places were decided for these inputs, and whether a plant grows at each place."""
     tree = places.tree
-    decided = op.sample_index(places, op.named_attribute(tree, "seed", "INT"), 0).equals(stand.seed)
-    decided = decided & (op.point_count(places) > 0)
+    is_decided = op.sample_index(places, op.named_attribute(tree, "seed", "INT"), 0).equals(stand.seed)
+    is_decided = is_decided & (op.point_count(places) > 0)
     for name in DECIDED:
-        at_first = op.sample_index(places, op.named_attribute(tree, name), 0)
-        decided = decided & (op.unary("ABSOLUTE", at_first - stand.values[name]) < 1e-9)
-    first = op.sample_index(places, op.named_attribute(tree, "id", "INT"), 0)
-    stands = op.sample_index(places, op.named_attribute(tree, "stands", "INT"), identity - first)
-    return decided, stands > 0
+        decided_value = op.sample_index(places, op.named_attribute(tree, name), 0)
+        is_decided = is_decided & (op.unary("ABSOLUTE", decided_value - stand.values[name]) < 1e-9)
+    first_number = op.sample_index(places, op.named_attribute(tree, "id", "INT"), 0)
+    has_plant = op.sample_index(places, op.named_attribute(tree, "stands", "INT"), identity - first_number)
+    return is_decided, has_plant > 0
 
 
-def _integer(value: Value, least: int) -> Value:
-    """Add a node for an integer that is at least `least`."""
-    return value.tree.node("FunctionNodeIntegerMath", value, least, operation="MAXIMUM").value
+def _integer(value: Value, minimum: int) -> Value:
+    """Add a node for the larger of an integer and a minimum."""
+    return value.tree.node("FunctionNodeIntegerMath", value, minimum, operation="MAXIMUM").value
 
 
 def own_numbers(tree: Tree, stand: Stand) -> Value:
@@ -170,9 +181,9 @@ def own_numbers(tree: Tree, stand: Stand) -> Value:
 
 def sizes(tree: Tree, stand: Stand, kind: str) -> Value:
     """Add nodes for each plant's random scale (vector): its height, m, and a breadth relative to it; a field."""
-    tall = op.random(tree, stand.smallest_height, stand.largest_height, stand.seed + HEIGHT)
-    across = tall * op.random(tree, *BREADTHS[kind], stand.seed + BREADTH)
-    return op.vector(tree, across, across, tall)
+    height = op.random(tree, stand.smallest_height, stand.largest_height, stand.seed + HEIGHT)
+    breadth = height * op.random(tree, *BREADTHS[kind], stand.seed + BREADTH)
+    return op.vector(tree, breadth, breadth, height)
 
 
 def plant_points(
@@ -182,28 +193,28 @@ def plant_points(
 
     Args:
         tree: the group.
-        points: where they stand.
-        variants: plants of height 1.
-        scale: of each, m.
-        lean: largest, rad.
-        seed: of the choice and the turns.
-        number: instance number of each.
+        points: places of the plants.
+        variants: different plants of height 1.
+        scale: size of each plant, m.
+        lean: largest lean, rad.
+        seed: seed of the choice and of the turns.
+        number: instance number of each plant.
     """
     bodies = op.join(*(tree.node("GeometryNodeGeometryToInstance", variant).value for variant in variants))
-    # A whole random number would be another one in Blender 5.
+    # A random float rounded down: random integers differ between Blender 4.5 and 5.
     share = op.random(tree, 0.0, len(variants) - PICK, seed + KIND)
-    pick = tree.node("FunctionNodeFloatToInt", share, rounding_mode="FLOOR").value
+    variant_index = tree.node("FunctionNodeFloatToInt", share, rounding_mode="FLOOR").value
     plants = tree.node(
         "GeometryNodeInstanceOnPoints",
         points,
         instance=bodies,
         pick_instance=True,
-        instance_index=pick,
+        instance_index=variant_index,
         rotation=op.random_turn(tree, (-lean, -lean, 0.0), (lean, lean, 6.2832), seed + 1),
         scale=scale,
     ).value
     plants = op.store(plants, _NUMBER, number, "INSTANCE")
-    for name in _NEEDED_NO_MORE:
+    for name in _PLACE_ATTRIBUTES:
         plants = tree.node("GeometryNodeRemoveAttribute", plants, name=name).value
     mesh = op.realize(plants)
     mesh = op.store(mesh, "instance_id", op.named_attribute(tree, _NUMBER, "INT"), "FACE")

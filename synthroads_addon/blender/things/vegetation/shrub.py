@@ -10,9 +10,10 @@ from ...nodes.inputs import metres
 from .crown import Crown, Plant, PlantMaterials, bend_stems, crown_group
 from .plants import PlantStand, decided_places, own_numbers, plant_points, points_in_band, sizes
 
-# Kinds of one species: seed, and a factor on the crown's radius.
 _KINDS = tuple(zip((5, 17, 29), KINDS["shrub"], strict=True))
+"""Kinds of one species: seed, and a factor of the crown's radius."""
 _LEAN = 0.06
+"""Largest lean of a shrub, rad; chosen."""
 _DEFAULTS = {
     "crown_bottom": 0.05,
     "crown_radius": 0.5,
@@ -52,8 +53,11 @@ def shrub_group(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Shrubs")
 
 
-def _kind(tree: Tree, inputs: dict[str, Value], seed: int, wider: float) -> Value:
-    return tree.call(shape_group(), **inputs | {"crown_radius": inputs["crown_radius"] * wider}, seed=seed).value
+def _kind(tree: Tree, inputs: dict[str, Value], seed: int, radius_factor: float) -> Value:
+    """Add nodes for one kind of shrub: the species' shape with another seed and radius."""
+    return tree.call(
+        shape_group(), **inputs | {"crown_radius": inputs["crown_radius"] * radius_factor}, seed=seed
+    ).value
 
 
 @makes_group("SR Shrub Shape", catalogue="Plants")
@@ -65,5 +69,5 @@ def shape_group(tree: Tree) -> None:
             crown_group(), **shape.crown(), **plant.values, branch_radius=shape.stem_radius, from_ground=True
         ).value
     with tree.frame("Crooked, and 1 high"):
-        grown_up = bend_stems(tree, shrub, plant.seed)
-    tree.output("Mesh", grown_up, description="The shrub, upright on the origin")
+        unit_shrub = bend_stems(tree, shrub, plant.seed)
+    tree.output("Mesh", unit_shrub, description="The shrub, upright on the origin")

@@ -12,10 +12,12 @@ from ...nodes.solids import paint_faces
 from .crown import Crown, Plant, PlantMaterials, bend_stems, crown_group
 from .plants import PlantStand, decided_places, own_numbers, plant_points, points_in_band, sizes
 
-# Kinds of one species: seed, and factors on the crown's bottom and radius.
 _KINDS = tuple(zip((11, 23, 37), BOTTOMS["tree"], KINDS["tree"], strict=True))
+"""Kinds of one species: seed, and factors of the crown's bottom and radius."""
 _SIDES, _ROWS = 7, 5
+"""Sides of a trunk, and pieces along it; chosen."""
 _LEAN = 0.04
+"""Largest lean of a tree, rad; chosen."""
 
 
 _STAND = {"density": 0.005, "smallest_height": 5.0, "largest_height": 14.0, "band_start": 12.0, "band_end": 60.0}
@@ -44,9 +46,13 @@ def tree_group(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Trees")
 
 
-def _kind(tree: Tree, inputs: dict[str, Value], seed: int, lower: float, wider: float) -> Value:
-    changed = {"crown_bottom": inputs["crown_bottom"] * lower, "crown_radius": inputs["crown_radius"] * wider}
-    return tree.call(shape_group(), **inputs | changed, seed=seed).value
+def _kind(tree: Tree, inputs: dict[str, Value], seed: int, bottom_factor: float, radius_factor: float) -> Value:
+    """Add nodes for one kind of tree: the species' shape with another seed, crown's bottom and radius."""
+    crown_inputs = {
+        "crown_bottom": inputs["crown_bottom"] * bottom_factor,
+        "crown_radius": inputs["crown_radius"] * radius_factor,
+    }
+    return tree.call(shape_group(), **inputs | crown_inputs, seed=seed).value
 
 
 @makes_group("SR Tree Shape", catalogue="Plants")
@@ -60,11 +66,12 @@ def shape_group(tree: Tree) -> None:
     with tree.frame("Crown"):
         crown = tree.call(crown_group(), **shape.crown(), **plant.values, branch_radius=radius * 0.4).value
     with tree.frame("Crooked, and 1 high"):
-        grown_up = bend_stems(tree, op.join(trunk, crown), plant.seed)
-    tree.output("Mesh", grown_up, description="The tree, upright on the origin")
+        unit_tree = bend_stems(tree, op.join(trunk, crown), plant.seed)
+    tree.output("Mesh", unit_tree, description="The tree, upright on the origin")
 
 
 def _trunk(tree: Tree, radius: Value) -> Value:
+    """Add nodes for a tapered trunk, wider near the ground, of a tree 1 m high."""
     trunk = tree.node(
         "GeometryNodeMeshCone",
         fill_type="NONE",
@@ -76,7 +83,7 @@ def _trunk(tree: Tree, radius: Value) -> Value:
     ).value
     place = op.position(tree)
     height = op.component(place, "Z")
-    wider = 1.0 + 0.45 * op.maximum(1.0 - height * 12.0, 0.0)
-    size = op.vector(tree, wider, wider, 1.0)
+    foot_factor = 1.0 + 0.45 * op.maximum(1.0 - height * 12.0, 0.0)
+    size = op.vector(tree, foot_factor, foot_factor, 1.0)
     place = place * size
     return op.set_position(trunk, place - (0.0, 0.0, TRUNK_FOOT))

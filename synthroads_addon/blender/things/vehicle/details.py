@@ -1,4 +1,4 @@
-"""Details of vehicles beside their bodies: wheels, boxes such as lights and plates, and round parts."""
+"""Parts of vehicles other than their bodies: wheels, boxes such as lights and plates, and round parts."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ class VehicleMaterials(Inputs):
 
 
 _SIDES = 16
-# Cross-section of a wheel from the hub outside to the hub inside: radius as a share of the wheel's, and place across as
-# a share of its width from the middle.
+# Cross-section of a wheel from the hub outside to the hub inside: radius as a share of the wheel's, and position along
+# the axle as a share of its width from the middle.
 _WHEEL = [(0.0, 0.30), (0.58, 0.30), (0.66, 0.46), (0.92, 0.5), (1.0, 0.38), (1.0, -0.38), (0.92, -0.5), (0.0, -0.4)]
 _RIM_FACES = 2
-_SHARP = math.radians(38.0)
-"""Faces that meet at a larger angle show an edge."""
+_SHARP_ANGLE = math.radians(38.0)
+"""Angle between faces, rad, from which on their edge is shaded sharp; chosen."""
 
 
 def wheels(
@@ -45,9 +45,9 @@ def wheels(
 
     Args:
         tree: the group.
-        materials: by name.
-        radius, width: of a wheel.
-        axles: x of the middles of an axle's wheels, 0 for a single wheel, and y.
+        materials: materials of the vehicle's parts.
+        radius, width: size of a wheel, m.
+        axles: x of the middles of an axle's wheels, 0 for a single wheel, and y of the axle, m.
     """
     wheel = tree.call(
         _wheel_group(),
@@ -56,11 +56,11 @@ def wheels(
         rubber_material=materials.rubber_material,
         chrome_material=materials.chrome_material,
     ).value
-    stands = [(side * x, y, radius) for x, y in axles for side in ((-1.0, 1.0) if x else (1.0,))]
-    points = row_of_points(tree, len(stands))
-    place = op.choose(op.index(tree), stands)
-    turned = op.switch(op.component(place, "X") < 0.0, math.pi, 0.0)
-    return op.realize(put_on_points(points, wheel, place, rotation=op.turn(tree, z=turned)))
+    wheel_places = [(side * x, y, radius) for x, y in axles for side in ((-1.0, 1.0) if x else (1.0,))]
+    points = row_of_points(tree, len(wheel_places))
+    place = op.choose(op.index(tree), wheel_places)
+    angle = op.switch(op.component(place, "X") < 0.0, math.pi, 0.0)
+    return op.realize(put_on_points(points, wheel, place, rotation=op.turn(tree, z=angle)))
 
 
 def boxes(
@@ -107,8 +107,8 @@ def smooth(vehicle: Value) -> Value:
     """Add nodes that shade a vehicle smoothly but for edges sharper than 38 degrees; return the vehicle."""
     tree = vehicle.tree
     angle = tree.node("GeometryNodeInputMeshEdgeAngle")["Unsigned Angle"]
-    rounded = tree.node("GeometryNodeSetShadeSmooth", vehicle, shade_smooth=True).value
-    return tree.node("GeometryNodeSetShadeSmooth", rounded, angle > _SHARP, False, domain="EDGE").value
+    smooth_vehicle = tree.node("GeometryNodeSetShadeSmooth", vehicle, shade_smooth=True).value
+    return tree.node("GeometryNodeSetShadeSmooth", smooth_vehicle, angle > _SHARP_ANGLE, False, domain="EDGE").value
 
 
 class _Wheel(Inputs):
@@ -124,13 +124,13 @@ def _wheel_group(tree: Tree) -> None:
     inputs = _Wheel(tree)
     with tree.frame("Profile, turned around the axle"):
         mesh, column, row = op.grid(tree, _SIDES + 1, len(_WHEEL))
-        profile = op.choose(row, [(share, across, 0.0) for share, across in _WHEEL])
+        profile = op.choose(row, [(share, x, 0.0) for share, x in _WHEEL])
         # The lowest point of the tread is a corner of the polygon.
         angle = (column % _SIDES) * (2.0 * math.pi / _SIDES) + 0.5 * math.pi
-        out = op.component(profile, "X") * inputs.radius
-        across = op.component(profile, "Y") * inputs.wheel_width
-        turned = op.vector(tree, -across, op.unary("COSINE", angle) * out, op.unary("SINE", angle) * out)
-        wheel = op.delete_degenerate(op.set_position(mesh, turned))
+        radius = op.component(profile, "X") * inputs.radius
+        x = op.component(profile, "Y") * inputs.wheel_width
+        place = op.vector(tree, -x, op.unary("COSINE", angle) * radius, op.unary("SINE", angle) * radius)
+        wheel = op.delete_degenerate(op.set_position(mesh, place))
     with tree.frame("Tyre and rim"):
         wheel = paint_faces(wheel, inputs.rubber_material)
         rim = (op.index(tree) % (len(_WHEEL) - 1)) < _RIM_FACES
@@ -156,8 +156,8 @@ def _box_group(tree: Tree) -> None:
     with tree.frame("Box"):
         body = paint_faces(move_geometry(box(tree, size), middle), material)
     with tree.frame("On the other side"):
-        other = move_geometry(box(tree, size), _mirror(middle))
-        body = op.join(body, op.only_if(sides.both_sides, paint_faces(other, material)))
+        other_box = move_geometry(box(tree, size), _mirror(middle))
+        body = op.join(body, op.only_if(sides.both_sides, paint_faces(other_box, material)))
     tree.output("Mesh", body, description="The box")
 
 
@@ -174,9 +174,10 @@ def _rod_group(tree: Tree) -> None:
     inputs, sides = _Rod(tree), _Sides(tree)
     start, end = inputs.start, inputs.end
 
-    def between(first: Value, last: Value) -> Value:
-        way = last - first
-        length = op.length(way)
+    def rod_between(rod_start: Value, rod_end: Value) -> Value:
+        """Add nodes for a rod between two places."""
+        direction = rod_end - rod_start
+        length = op.length(direction)
         cone = tree.node(
             "GeometryNodeMeshCone",
             fill_type="NGON",
@@ -185,16 +186,17 @@ def _rod_group(tree: Tree) -> None:
             radius_top=inputs.end_radius,
             depth=length,
         ).value
-        turned = tree.node("FunctionNodeAlignRotationToVector", vector=way, axis="Z").value
-        body = op.transform(cone, translation=first, rotation=turned)
+        rotation = tree.node("FunctionNodeAlignRotationToVector", vector=direction, axis="Z").value
+        body = op.transform(cone, translation=rod_start, rotation=rotation)
         return paint_faces(body, sides.material)
 
     with tree.frame("Rod"):
-        body = between(start, end)
+        body = rod_between(start, end)
     with tree.frame("On the other side"):
-        body = op.join(body, op.only_if(sides.both_sides, between(_mirror(start), _mirror(end))))
+        body = op.join(body, op.only_if(sides.both_sides, rod_between(_mirror(start), _mirror(end))))
     tree.output("Mesh", body, description="The rod")
 
 
 def _mirror(place: Value) -> Value:
+    """Add nodes for a place mirrored at x = 0."""
     return place * (-1.0, 1.0, 1.0)

@@ -1,7 +1,7 @@
 """SR Car, SR Estate, ... SR Motorcycle: one vehicle each, its wheels on z = 0, facing along +y.
 
-They are put together as `presets/vehicles.json` says: a model is a list of frames of nodes, a frame a list of parts
-(joined at once where it says so), a part a function of this package with its arguments, in metres.
+They are described in `presets/vehicles.json`: a model is a list of frames of nodes, a frame is a list of parts (joined
+at once if it is marked so), and a part is a function of this package with its arguments, in metres.
 """
 
 from __future__ import annotations
@@ -30,11 +30,12 @@ def model_group(model: str) -> bpy.types.NodeTree:
 
 
 def _build(tree: Tree, model: str) -> None:
+    """Build the node group of a vehicle's model from the preset."""
     materials, parts = VehicleMaterials(tree), []
     for frame in _models()[model]:
         with tree.frame(frame["frame"]):
-            made = [_PARTS[part["part"]](tree, materials, **_settings(part)) for part in frame["parts"]]
-            parts += [op.join(*made)] if frame.get("joined") else made
+            frame_parts = [_PARTS[part["part"]](tree, materials, **_settings(part)) for part in frame["parts"]]
+            parts += [op.join(*frame_parts)] if frame.get("joined") else frame_parts
     vehicle = op.join(*parts)
     with tree.frame("Shading"):
         vehicle = smooth(vehicle)
@@ -43,6 +44,7 @@ def _build(tree: Tree, model: str) -> None:
 
 @cache
 def _models() -> dict[str, list[dict[str, Any]]]:
+    """Return the preset's models: the frames of each by its name; cached."""
     models: dict[str, list[dict[str, Any]]] = read_json(PRESETS / "vehicles.json")
     return models
 
@@ -60,6 +62,7 @@ def _settings(part: dict[str, Any]) -> dict[str, Any]:
 
 
 def _as_tuples(value: Any) -> Any:
+    """Return a JSON value with its lists as tuples."""
     return tuple(_as_tuples(item) for item in value) if isinstance(value, list) else value
 
 

@@ -39,6 +39,7 @@ class _Vehicles(Inputs):
 
 
 def _build(tree: Tree, model: str) -> None:
+    """Build the node group that puts vehicles of a model on points of the road."""
     traffic, materials = _Vehicles(tree), VehicleMaterials(tree)
     with tree.frame("Vehicle"):
         body = tree.call(model_group(model), **materials.values).value
@@ -71,19 +72,19 @@ class _OnWheels(Inputs):
 def _on_wheels_group(tree: Tree) -> None:
     """A vehicle on each point, pitched and rolled as the road below its axles."""
     inputs = _OnWheels(tree)
-    road, front, rear = inputs.road, inputs.front_axle, inputs.rear_axle
+    road, front_axle, rear_axle = inputs.road, inputs.front_axle, inputs.rear_axle
     with tree.frame("The road below the wheels"):
-        behind, across_behind = _axle(tree, road, rear, inputs.half_track)
-        ahead, across_ahead = _axle(tree, road, front, inputs.half_track)
+        rear_middle, rear_vector = _axle(tree, road, rear_axle, inputs.half_track)
+        front_middle, front_vector = _axle(tree, road, front_axle, inputs.half_track)
     with tree.frame("As the road is pitched and rolled"):
-        # Place and turn are evaluated where the points still are.
-        raised = op.vector(tree, 0.0, 0.0, op.named_attribute(tree, "elevation"))
-        middle = behind - (ahead - behind) * (rear / (front - rear)) + raised
+        # Place and rotation are fields: they are evaluated before the points are moved.
+        elevation_vector = op.vector(tree, 0.0, 0.0, op.named_attribute(tree, "elevation"))
+        middle = rear_middle - (front_middle - rear_middle) * (rear_axle / (front_axle - rear_axle)) + elevation_vector
         points = op.store(inputs.points, "vehicle_place", middle)
         rotation = tree.node(
             "FunctionNodeAxesToRotation",
-            ahead - behind,
-            across_behind + across_ahead,
+            front_middle - rear_middle,
+            rear_vector + front_vector,
             primary_axis="Y",
             secondary_axis="X",
         ).value
@@ -97,28 +98,37 @@ def _on_wheels_group(tree: Tree) -> None:
     tree.output("Mesh", vehicles, description="Vehicles; each face has its own vehicle's instance number")
 
 
-def _axle(tree: Tree, road: Value, along: Value, track: Value) -> tuple[Value, Value]:
+def _axle(tree: Tree, road: Value, axle_y: Value, half_track: Value) -> tuple[Value, Value]:
     """Add nodes for the midpoint of the road below an axle's wheels, and the vector from the left to the right one."""
     heading = op.named_attribute(tree, "heading")
     sine, cosine = op.unary("SINE", heading), op.unary("COSINE", heading)
-    way, right = op.vector(tree, -sine, cosine), op.vector(tree, cosine, sine)
+    forward, right_vector = op.vector(tree, -sine, cosine), op.vector(tree, cosine, sine)
     left_wheel, right_wheel = (
-        _on_road(road, op.position(tree) + way * along + right * beside, way) for beside in (-track, track)
+        _on_road(road, op.position(tree) + forward * axle_y + right_vector * x, forward)
+        for x in (-half_track, half_track)
     )
     return (left_wheel + right_wheel) * 0.5, right_wheel - left_wheel
 
 
-def _on_road(road: Value, place: Value, way: Value) -> Value:
-    """Add nodes for the road's point above or below `place`; beyond its ends it goes on at the vehicle's grade."""
+def _on_road(road: Value, place: Value, forward: Value) -> Value:
+    """Add nodes for the road's point above or below `place`; beyond its ends the road goes on at the vehicle's grade.
+
+    Args:
+        road: mesh of the road.
+        place: place to project, m (a field).
+        forward: unit vector of the vehicle's direction (a field).
+    """
     tree = road.tree
     ray = tree.node(
         "GeometryNodeRaycast", target_geometry=road, source_position=place + (0.0, 0.0, 500.0), ray_length=1000.0
     )
-    nearest = op.sample_surface(road, op.position(tree), place)
-    beyond = op.component(nearest, "Z") + op.dot(place - nearest, way) * op.named_attribute(tree, "grade")
-    height = op.switch(ray["Is Hit"], beyond, op.component(ray["Hit Position"], "Z"))
-    flat = place * (1.0, 1.0, 0.0)
-    return flat + op.vector(tree, 0.0, 0.0, height)
+    nearest_point = op.sample_surface(road, op.position(tree), place)
+    extended_z = op.component(nearest_point, "Z") + op.dot(place - nearest_point, forward) * op.named_attribute(
+        tree, "grade"
+    )
+    height = op.switch(ray["Is Hit"], extended_z, op.component(ray["Hit Position"], "Z"))
+    plan_place = place * (1.0, 1.0, 0.0)
+    return plan_place + op.vector(tree, 0.0, 0.0, height)
 
 
 @model_part("vehicles", 180)

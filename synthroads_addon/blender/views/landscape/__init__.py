@@ -1,4 +1,4 @@
-"""The landscape in pictures: objects that renders show and scans leave out; none is built unless something sees it."""
+"""The landscape in pictures: objects that renders show and scans leave out, built only for pictures."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from .structures import structures_mesh
 from .woods import trees_mesh, woods_group
 
 LANDSCAPE = "synthroads_landscape"
-"""Custom property of a landscape's objects: what it is."""
+"""Custom property of a landscape's objects: their kind."""
 
 
 def add_landscape(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix) -> dict[str, bpy.types.Object]:
-    """Add the landscape of a parameter set to a scene, replacing an earlier one; return its objects by what they are.
+    """Add the landscape of a parameter set to a scene, replacing an earlier one; return its objects by kind.
 
     Args:
-        scene: that shows the road.
-        parameters: the road; where they have no landscape, nothing is added.
-        matrix: from the road's local coordinates to the scene's.
+        scene: scene that shows the road.
+        parameters: the road; if they have no landscape, nothing is added.
+        matrix: matrix from the road's local coordinates to the scene's.
     """
     remove_landscape(scene)
     landscape = next(iter(parameters.of_type(Landscape).values()), None)
@@ -45,16 +45,17 @@ def add_landscape(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Ma
         "woods": lambda: trees_mesh(land_trees(geometry, landscape, parcels, relief)),
         "structures": lambda: structures_mesh(geometry, landscape, relief, material),
     }
-    made = {kind: _add(scene, kind, make(), matrix) for kind, make in meshes.items()}
-    woods = made["woods"].modifiers.new("SynthRoads", "NODES")
+    objects = {kind: _add(scene, kind, make(), matrix) for kind, make in meshes.items()}
+    woods = objects["woods"].modifiers.new("SynthRoads", "NODES")
     woods.node_group = woods_group(material, parameters.environment.season == "winter")
-    return made
+    return objects
 
 
 def _add(scene: bpy.types.Scene, kind: str, mesh: bpy.types.Mesh, matrix: Matrix) -> bpy.types.Object:
+    """Add an object of the landscape to a scene; return it."""
     item = bpy.data.objects.new(f"SR Landscape {kind.title()}", mesh)
     item[LANDSCAPE] = kind
-    item[SUPPORT] = True  # scans leave it out: nothing of it is within the terrain's reach
+    item[SUPPORT] = True  # scans leave it out, as all of it is beyond the terrain
     item.matrix_world = matrix
     scene.collection.objects.link(item)
     return item
