@@ -141,6 +141,7 @@ def apply_effect(
 def _pulse_hits(
     setting: ScannerSetting, attenuation: float, pulses: Pulses, traced: TracedRays, signals: BothSignals
 ) -> PulseHits:
+    """Return the hits of a block's rays as effects get them: with pulse and ray of what lies behind as two indices."""
     ray, pulse = np.divmod(traced.ray, len(pulses.time))
     return PulseHits(
         time=pulses.time,
@@ -160,18 +161,18 @@ def _add_echoes(
 ) -> tuple[TracedRays, BothSignals]:
     """Return traced rays and signals with an effect's echoes added, less those out of the scanner's range."""
     distance = np.asarray(changes.distance, dtype=np.float64)
-    here = np.flatnonzero((distance >= setting.minimum_range) & (distance <= setting.maximum_range))
-    distance, brightness = distance[here], np.asarray(changes.brightness, dtype=np.float64)[here]
-    none = np.zeros(len(here), dtype=np.intp)
+    in_range = np.flatnonzero((distance >= setting.minimum_range) & (distance <= setting.maximum_range))
+    distance, brightness = distance[in_range], np.asarray(changes.brightness, dtype=np.float64)[in_range]
+    zeros = np.zeros(len(in_range), dtype=np.intp)
     # In the air there is no face; it counts as one that lies across the beam.
-    hits = Hits(none - 1, none, distance, none - 1.0, brightness)
-    added = HitSignals(
+    hits = Hits(zeros - 1, zeros, distance, zeros - 1.0, brightness)
+    added_signals = HitSignals(
         distance, np.maximum(brightness, LEAST_REFLECTANCE), received_intensity(brightness, distance, attenuation)
     )
-    first, behind = signals
-    ray = changes.ray[here] * len(traced.rays.time) + changes.pulse[here]
+    first_signals, behind_signals = signals
+    ray = changes.ray[in_range] * len(traced.rays.time) + changes.pulse[in_range]
     traced = replace(traced, behind=Hits.join([traced.behind, hits]), ray=np.concatenate([traced.ray, ray]))
-    return traced, (first, HitSignals.join([behind, added]))
+    return traced, (first_signals, HitSignals.join([behind_signals, added_signals]))
 
 
 def _brightness(signals: HitSignals, attenuation: float) -> Float:
@@ -181,24 +182,43 @@ def _brightness(signals: HitSignals, attenuation: float) -> Float:
 
 
 def _check(name: str, changes: EchoChanges, shape: tuple[int, ...]) -> None:
-    if not len(changes.pulse) == len(changes.ray) == len(changes.distance) == len(changes.brightness):
-        raise ValueError(f"effect {name}: pulse, ray, distance and brightness must be as many")
-    for index, count in ((changes.ray, shape[0]), (changes.pulse, shape[1])):
+    """Raise `ValueError` if the echoes that an effect adds don't fit a block of ``shape`` = (K rays, P pulses)."""
+    lengths = [len(array) for array in (changes.pulse, changes.ray, changes.distance, changes.brightness)]
+    if len(set(lengths)) > 1:
+        raise ValueError(
+            f"effect {name}: pulse, ray, distance and brightness must have one value for each added echo, but have "
+            f"{', '.join(map(str, lengths))} values"
+        )
+    for field_name, index, count in (("ray", changes.ray, shape[0]), ("pulse", changes.pulse, shape[1])):
         if len(index) and not 0 <= index.min() <= index.max() < count:
-            raise ValueError(f"effect {name}: echoes must be of one of {shape[0]} rays of {shape[1]} pulses")
-    if not (np.isfinite(changes.distance).all() and np.isfinite(changes.brightness).all()):
-        raise ValueError(f"effect {name}: distances and brightnesses must be finite numbers")
+            raise ValueError(
+                f"effect {name}: {field_name} of the added echoes must be 0 to {count - 1} (the block has {shape[0]} "
+                f"rays for each of {shape[1]} pulses), but is {index.min()} to {index.max()}"
+            )
+    for field_name, values in (("distance", changes.distance), ("brightness", changes.brightness)):
+        if not np.isfinite(values).all():
+            raise ValueError(f"effect {name}: {field_name} of the added echoes must be finite numbers")
 
 
 def _weaken(traced: TracedRays, signals: BothSignals, transmission: Float) -> tuple[TracedRays, BothSignals]:
-    """Return traced rays and signals with brightness times factors (K, P); hits behind that become 0 drop out."""
-    first, behind = signals
-    left = transmission.ravel()[traced.ray]
-    seen = np.flatnonzero(left > 0.0)
-    first = HitSignals(
-        distance=np.where(transmission > 0.0, first.distance, np.inf),
-        weight=np.where(transmission > 0.0, first.weight * transmission, first.weight),
-        intensity=first.intensity * transmission,
+    """Return traced rays and signals whose brightness is multiplied by a ray's transmission (K, P).
+
+    Where a ray's transmission is 0, its first hit is set to no hit (range inf) and its hits behind are dropped.
+    """
+    first_signals, behind_signals = signals
+    hit_transmission = transmission.ravel()[traced.ray]
+    visible_hits = np.flatnonzero(hit_transmission > 0.0)
+    first_signals = HitSignals(
+        distance=np.where(transmission > 0.0, first_signals.distance, np.inf),
+        weight=np.where(transmission > 0.0, first_signals.weight * transmission, first_signals.weight),
+        intensity=first_signals.intensity * transmission,
     )
-    behind = HitSignals(behind.distance[seen], behind.weight[seen] * left[seen], behind.intensity[seen] * left[seen])
-    return replace(traced, behind=traced.behind.select(seen), ray=traced.ray[seen]), (first, behind)
+    behind_signals = HitSignals(
+        behind_signals.distance[visible_hits],
+        behind_signals.weight[visible_hits] * hit_transmission[visible_hits],
+        behind_signals.intensity[visible_hits] * hit_transmission[visible_hits],
+    )
+    return replace(traced, behind=traced.behind.select(visible_hits), ray=traced.ray[visible_hits]), (
+        first_signals,
+        behind_signals,
+    )

@@ -52,20 +52,20 @@ def fills(array: str) -> Callable[[Filler], Filler]:
     return register
 
 
-def fill_layers(points: MeasuredPoints, wanted: frozenset[str]) -> dict[str, AnyArray]:
+def fill_layers(points: MeasuredPoints, names: frozenset[str]) -> dict[str, AnyArray]:
     """Return the wanted per-point layers that the scan itself fills, as arrays by name."""
-    return {array: filler(points) for array, filler in FILLERS.items() if array in wanted}
+    return {array: filler(points) for array, filler in FILLERS.items() if array in names}
 
 
 def place_points(origin: Float, direction: Float, pulse: Index, distance: Float, map_origin: Float) -> Float:
     """Return the map coordinates (N, 3) of points at a distance (N,) along the beams (3, P) of their pulses, m."""
     result = np.empty((len(pulse), 3))
     for axis in range(3):
-        place = np.take(direction[axis], pulse)
-        place *= distance
-        place += np.take(origin[axis], pulse)
-        place += map_origin[axis]
-        result[:, axis] = place
+        coordinate = np.take(direction[axis], pulse)
+        coordinate *= distance
+        coordinate += np.take(origin[axis], pulse)
+        coordinate += map_origin[axis]
+        result[:, axis] = coordinate
     return result
 
 

@@ -437,7 +437,7 @@ class BlockScan:
     def _signals(self, hits: Hits) -> HitSignals:
         """Return the signals that hits send back: ranges, their weights in mean ranges, and received intensities."""
         surfaces, material = self.plan.reflection.surfaces, hits.material.ravel()
-        brightness = brightness_of(surfaces, material, np.abs(hits.along.ravel())).reshape(hits.face.shape)
+        brightness = brightness_of(surfaces, material, np.abs(hits.cosine.ravel())).reshape(hits.face.shape)
         brightness *= hits.share
         weight = np.maximum(np.take(surfaces.reflectivity, material), LEAST_REFLECTANCE).reshape(hits.face.shape)
         weight *= hits.share
@@ -493,12 +493,12 @@ class BlockScan:
         plan, setting, target = self.plan, self.plan.setting, self.plan.target
         number, returns, speckle = recorded
         pulse, hit = echoes.pulse, echoes.hit
-        along = traced.pick("along", hit)
+        cosine = traced.pick("cosine", hit)
         distance = echoes.range + plan.reception.noise.range_bias
         if errors.range is not None:
             delayed = setting.receiver.range_delay or 0.0
             range_errors = errors.range_errors(np.take(number_in_block, pulse), number, delayed)
-            distance = distance + range_sigma(setting, echoes.range, along, echoes.intensity) * range_errors
+            distance = distance + range_sigma(setting, echoes.range, cosine, echoes.intensity) * range_errors
             if setting.receiver.range_walk:
                 gain = strip_gain(plan.reception.strip_errors, plan.run.seed, strip.index)
                 distance = distance + range_walk(setting, speckle, plan.reception.noise, gain)
@@ -514,7 +514,7 @@ class BlockScan:
             number_of_returns=returns,
             strip=np.full(len(pulse), strip.index, dtype=np.uint16),
             range=distance,
-            incidence_deg=np.rad2deg(np.arccos(np.minimum(np.abs(along), 1.0))).astype(np.float32),
+            incidence_deg=np.rad2deg(np.arccos(np.minimum(np.abs(cosine), 1.0))).astype(np.float32),
             **arrays,
         )
         return points, seen
@@ -533,10 +533,10 @@ class BlockScan:
         """
         plan, setting, target = self.plan, self.plan.setting, self.plan.target
         pulse, hit = echoes.pulse, echoes.hit
-        face, along = traced.pick("face", hit), traced.pick("along", hit)
+        face, cosine = traced.pick("face", hit), traced.pick("cosine", hit)
         normal, seen = None, None
         if plan.layers.seen_points or "normal" in plan.layers.measured:
-            normal = target.normals(face, along, pulses.time[pulse], motions)
+            normal = target.normals(face, cosine, pulses.time[pulse], motions)
             if self._off_surfaces:
                 air = np.flatnonzero(face < 0)
                 normal[:, air] = -traced.directions(hit[air])
@@ -562,7 +562,7 @@ class BlockScan:
         plan, target = self.plan, self.plan.target
         of_pulses = (pulses.time, pulses.scan_angle, pulses.origin, pulses.measured_origin, pulses.measured_direction)
         of_faces = (target.static_planes, target.class_id, target.instance_id, target.material)
-        hits = (traced.face, traced.along, traced.distance, traced.direction, traced.begin)
+        hits = (traced.face, traced.cosine, traced.distance, traced.direction, traced.begin)
         asked = plan.layers.seen_points or "normal" in plan.layers.measured
         placed = loops.placed(
             EchoPlaces(

@@ -135,7 +135,7 @@ def assert_same(plan: ScanPlan, pulses: Pulses) -> Echoes:
 
 def known(traced: Traced, hit: np.ndarray) -> list[np.ndarray]:
     """Return all that is asked of hits."""
-    picked = [traced.pick(name, hit) for name in ("face", "material", "along")]
+    picked = [traced.pick(name, hit) for name in ("face", "material", "cosine")]
     return [*picked, *traced.ends(hit), traced.directions(hit), traced.times(hit)]
 
 
