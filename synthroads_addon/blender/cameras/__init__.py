@@ -163,7 +163,7 @@ def _node_layers(
 
 def node_layers(request: LayerRequest, constants: SurfaceConstants) -> tuple[str, ...]:
     """Return the layers that materials' nodes must be asked for: those wanted that some material varies."""
-    needed = needed_layers(request.wanted, request.settings.mode)
+    needed = needed_layers(request.names, request.settings.mode)
     if request.lit:
         needed |= set(MATERIAL_LAYERS)  # the light that they throw back depends on all
     return constants.varying_layers(frozenset(needed))
@@ -218,9 +218,9 @@ def _passes(request: LayerRequest, constants: SurfaceConstants, by_return: bool 
     """
     settings, lit = request.settings, request.lit
     whole = lit and settings.lighting == "path" and settings.engine == "cycles"
-    needed = needed_layers(request.wanted, settings.mode)
+    needed = needed_layers(request.names, settings.mode)
     if whole:
-        needed -= {"base_color"} - request.wanted
+        needed -= {"base_color"} - request.names
     returns = by_return or renders_returns(settings)
     return Passes(
         layers=constants.varying_layers(needed),

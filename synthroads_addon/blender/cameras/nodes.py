@@ -129,18 +129,18 @@ class NodeLayers:
             }
         return result
 
-    def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
+    def sample(self, points: SeenPoints, names: frozenset[str]) -> LayerValues:
         """Return the wanted layers of N points, and how each point got them (its source)."""
         hard = self._hard[points.material]
         if not hard.any():
-            return self._work_out(points, wanted)
+            return self._work_out(points, names)
         with self._counting:
             self._left_out += np.bincount(points.material[hard], minlength=len(self._left_out))
         easy, other = np.flatnonzero(~hard), np.flatnonzero(hard)
         rest = self._rest or self.material
         parts = [
-            (easy, self._work_out(points.select(easy), wanted)),
-            (other, rest.sample(points.select(other), wanted)),
+            (easy, self._work_out(points.select(easy), names)),
+            (other, rest.sample(points.select(other), names)),
         ]
         arrays = {}
         for name, array in parts[0][1].arrays.items():

@@ -114,7 +114,7 @@ class Trial:
             layers: ``rgb`` and names of layers.
         """
         seen = [one.seen for one in self.scan_lines(RINGS[1], _COLOURED) if one.seen is not None and len(one.seen)]
-        request = replace(self.layer_request({}), wanted=layers, pick=lambda views: views_near(views, seen))
+        request = replace(self.layer_request({}), names=layers, pick=lambda views: views_near(views, seen))
         true = truest_settings(request)
         truth = render_layers(replace(request, settings=true), seen)
         errors = {}

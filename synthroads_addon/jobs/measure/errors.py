@@ -102,7 +102,7 @@ def truest_settings(request: LayerRequest) -> ColourSettings:
 def render_layers(request: LayerRequest, parts: Sequence[SeenPoints]) -> list[LayerValues]:
     """Render and return the requested colours and layers at the seen points of each part."""
     with layer_source(request) as source:
-        return [sample_points(source, seen, request.wanted) for seen in parts]
+        return [sample_points(source, seen, request.names) for seen in parts]
 
 
 def colour_errors(mine: Sequence[LayerValues], truth: Sequence[LayerValues], kinds: frozenset[str]) -> Errors:

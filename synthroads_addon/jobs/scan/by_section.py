@@ -120,7 +120,11 @@ class SectionScan:
 
     def _build(self, section: RoadSection) -> tuple[ScannedScene, Float]:
         """Build a section; return its scene with passing vehicles, and its frame's origin (3,) in the road's, m."""
-        settings, whole, stretch = self._scenario.settings(), self._road.parameters, (section.build_start, section.build_end)
+        settings, whole, stretch = (
+            self._scenario.settings(),
+            self._road.parameters,
+            (section.build_start, section.build_end),
+        )
         tolerance, detail = settings.tolerance, settings.vegetation_detail
         request = BuildRequest(self._standing, tolerance, detail, None, stretch, self._road, self._own)
         model = build_road(request)

@@ -213,7 +213,7 @@ def make_layers(
         means=surfaces_of(materials.means),
         request=LayerRequest(
             settings=scenario.colour.settings(scenario.fidelity, path.typical_range),
-            wanted=coloured | (OF_INTENSITY if by_layers else set()),
+            names=coloured | (OF_INTENSITY if by_layers else set()),
             mesh=scene.static,
             environment=survey.conditions.environment,
             path=path,

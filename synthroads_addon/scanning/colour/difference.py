@@ -58,16 +58,16 @@ def ciede2000(one: Float, other: Float) -> Float:
 
 
 def known_rows(truth: LayerValues) -> Bool:
-    """Return a mask (N,) of the points whose layers were rendered at the very point, not means nor taken nearby."""
+    """Return a mask (N,) of the points whose layers were rendered at the very point: neither means nor taken nearby."""
     return ~np.isin(truth.source, (FROM_MATERIAL, NEARBY))
 
 
 def colour_difference(mine: LayerValues, truth: LayerValues, rows: Bool) -> Float:
-    """Return the CIEDE2000 differences (n,) between two sets' RGB at the n points chosen by a mask."""
+    """Return the CIEDE2000 differences (n,) of the RGB in two sets of layers, at the n points of a mask (N,)."""
     return ciede2000(cie_lab(mine.arrays["rgb"][rows]), cie_lab(truth.arrays["rgb"][rows]))  # type: ignore[arg-type]
 
 
 def squared_error(name: str, mine: LayerValues, truth: LayerValues, rows: Bool) -> Float:
-    """Return the squared errors (n, components) of a material layer at the n points chosen by a mask."""
+    """Return the squared errors (n, components) of a material layer at the n points that a mask (N,) chooses."""
     difference = mine.arrays[name][rows].astype(np.float64) - truth.arrays[name][rows].astype(np.float64)
     return np.square(difference).reshape(len(difference), -1)

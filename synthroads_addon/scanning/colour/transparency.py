@@ -82,12 +82,19 @@ class SeeThrough:
     def _values(
         self, inputs: frozenset[SurfaceInput], face: Index, cosine: Float, place: Float
     ) -> dict[SurfaceInput, Float]:
-        """Return the values (N, 4) of inputs at places (N, 3) on faces."""
-        asked = inputs - {POSITION, ALONG}
+        """Return the values (N, 4) of inputs at places on faces, by input.
+
+        Args:
+            inputs: that materials ask for.
+            face: (N,) that the places are on.
+            cosine: (N,) n . d of the face's normal and the ray.
+            place: (N, 3) local, m.
+        """
+        surface_inputs = inputs - {POSITION, ALONG}
         result: dict[SurfaceInput, Float] = {}
-        if asked:
-            read = self.surfaces.read_places(asked, face, place)
-            result = {what: values.astype(np.float64) for what, values in read.items()}
+        if surface_inputs:
+            read_values = self.surfaces.read_places(surface_inputs, face, place)
+            result = {what: values.astype(np.float64) for what, values in read_values.items()}
         if POSITION in inputs:
             result[POSITION] = np.pad((place + self.frame_origin) / self.unit, ((0, 0), (0, 1)))
         if ALONG in inputs:

@@ -291,7 +291,7 @@ class PacketScene:
 
     @property
     def native(self) -> tuple[int, int]:
-        """Return the addresses of packets.c's function that casts rays, and of Embree's scene; the mesh must have faces."""
+        """Return the addresses of packets.c's casting function and of Embree's scene, which must have faces."""
         function = ctypes.cast(self._packets.kernel.synthroads_cast, _POINTER).value
         assert function is not None
         return function, self._scene

@@ -143,7 +143,7 @@ def _as(kind: Any, shape: tuple[int, ...], **arrays: AnyArray) -> list[AnyArray]
 
 
 def _faces(faces: Faces) -> tuple[AnyArray, ...]:
-    """Return vertices (V, 3), triangles (T, 3) and planes (T, 4) of faces as C-contiguous arrays of the types of points.c."""
+    """Return vertices (V, 3), triangles (T, 3) and planes (T, 4) of faces in the types that points.c takes."""
     (vertices,) = _as(np.float32, (len(faces.vertices), 3), vertices=faces.vertices)
     (triangles,) = _as(np.int32, (len(faces.triangles), 3), triangles=faces.triangles)
     (planes,) = _as(np.float64, (len(triangles), 4), planes=faces.planes)
@@ -201,7 +201,7 @@ class CompiledPoints:
         )
         rows = None if rows is None else np.ascontiguousarray(rows, np.int64)
         means = np.ascontiguousarray(means, np.float32)
-        values = None if point_values is None else _as(np.float32, (len(material), width), own=point_values)[0]
+        values = None if point_values is None else _as(np.float32, (len(material), width), point_values=point_values)[0]
         result = np.empty((row_count, *means.shape[1:]), np.float32)
         rows_at, values_at = (None if array is None else array.ctypes.data for array in (rows, values))
         self._functions["layer"](
@@ -287,7 +287,7 @@ class CompiledPoints:
     ) -> bool:
         """Write values, interpolated between the corners of triangles, into rows (K,) of a result (N, 4).
 
-        Args: see `scene.surface_values`. Rows, uses and triangles must be there: that isn't checked.
+        The arguments are those of `scene.surface_values`. Rows, uses and triangles must be there: that isn't checked.
 
         Returns:
             False, with nothing written, where an array has another type than the loop takes.
@@ -329,10 +329,10 @@ class CompiledPoints:
         place: Float,
         distance: Float,
     ) -> tuple[Float, Float]:
-        """Return places (N, 3) and ranges (N,) of points, some of which are brought nearer along their beams by a relief.
+        """Return places (N, 3) and ranges (N,) of points, some of which a relief brings nearer along their beams.
 
         Args:
-            rough: (K,) rows of these points, ascending.
+            rough_rows: (K,) rows of these points, ascending.
             height, cosine: (K,) heights of the relief, m, and cosines of the incidence angles.
             material: (N,) indices; of rough ones there is a reach.
             reach: (M,) by material, within which a beam that grazes the relief meets some peak, m.
@@ -515,7 +515,7 @@ class CompiledPoints:
         brackets: Sequence[Float],
         most_iterations: int,
     ) -> tuple[Float, Float, Float]:
-        """Return the feet of points on an alignment: stations (N,), remaining distances along it (N,) and offsets (N,), m.
+        """Return the feet of points on an alignment: stations (N,), what remains along it (N,), and offsets (N,), m.
 
         See `road.alignment.Alignment`.
 
@@ -523,7 +523,7 @@ class CompiledPoints:
             evaluate: gives x, y, heading and curvature (K,) at stations (K,).
             places: x and y (N,).
             brackets: first guesses of the stations, and the least and largest that they may be, (N,) each.
-            most_iterations: number of Newton's steps at most.
+            most_iterations: steps of the iteration at most.
         """
         count = len(places[0])
         x, y = _as(np.float64, (count,), x=places[0], y=places[1])
@@ -559,7 +559,7 @@ class CompiledPoints:
         return station, rest, offset
 
     def face_columns(self, faces: Faces, grid: ColumnGrid, most_faces: int) -> tuple[AnyArray, AnyArray]:
-        """Return, for each cell of a grid, the faces that may touch it: indices (C + 1,) into a list, and the list of faces.
+        """Return the faces that may touch each cell of a grid: indices (C + 1,) into a list of faces, and this list.
 
         The faces of cell i are ``numbers[starts[i]:starts[i + 1]]``.
 

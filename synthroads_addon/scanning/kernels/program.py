@@ -240,7 +240,7 @@ class ProgramBuilder:
 
 
 class _Allocation:
-    """Assignment of registers to the values of a program: a register is used anew as soon as no operation needs its value."""
+    """Assignment of registers to the values of a program; registers of values that no one reads any more are reused."""
 
     def __init__(self, builder: ProgramBuilder, order: list[int], outputs: dict[str, list[int]]) -> None:
         self._builder, self._order, self._outputs = builder, order, outputs
@@ -249,7 +249,7 @@ class _Allocation:
         self._count = 0
 
     def program(self) -> MaterialProgram:
-        """Return the program: first the operations that are the same at all places, then the others, each with its stores."""
+        """Return the program: operations that are the same everywhere first, then the others with their stores."""
         builder = self._builder
         targets: dict[int, list[tuple[int, int]]] = {}
         for number, values in enumerate(self._outputs.values()):
@@ -310,7 +310,7 @@ class _Allocation:
         return rows
 
     def _count_inputs_anew(self, rows: list[tuple[int, ...]]) -> tuple[SurfaceInput, ...]:
-        """Return the inputs that instructions read, numbered in the order of their first use; renumber them in place."""
+        """Return the inputs that instructions read, in the order of first use; renumber them in the rows, in place."""
         inputs: dict[SurfaceInput, int] = {}
         for number, row in enumerate(rows):
             if row[0] == Op.LOAD:
@@ -319,7 +319,7 @@ class _Allocation:
         return tuple(inputs)
 
     def _take(self, first_value: int, count: int) -> None:
-        """Give registers to ``count`` values that follow on each other: a free one to a single value, else new ones in a row."""
+        """Give registers to ``count`` values that follow on each other: a free one to a single value, else new ones."""
         if count == 1 and self._free:
             self._register[first_value] = self._free.pop()
             return

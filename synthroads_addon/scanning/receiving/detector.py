@@ -46,7 +46,12 @@ class Readout(ArrayRows):
         return (number if self.unread is None else np.where(self.unread, 0.0, number)), clipped
 
     def detected(self, intensity: Float, threshold: float) -> Bool:
-        """Return which of the points (N,) are detected."""
+        """Return a mask (N,) of the points that are detected.
+
+        Args:
+            intensity: (N,) received power without the receiver's noise.
+            threshold: of detection.
+        """
         return np.asarray(intensity >= (threshold if self.noise is None else threshold - self.noise))
 
 
@@ -86,13 +91,13 @@ def detect_echoes(
     if lost is not None:
         seen &= lost >= dropout
     if not seen.all():
-        kept = np.flatnonzero(seen)
-        echoes, readout = echoes.select(kept), readout.select(kept)
+        kept_rows = np.flatnonzero(seen)
+        echoes, readout = echoes.select(kept_rows), readout.select(kept_rows)
     return echoes, readout, weak
 
 
 def _values_of_errors(echoes: Echoes, errors: Errors, number: Index) -> tuple[Float | None, ...]:
-    """Return the echoes' (N,) factors by speckle, noise, and shares that say whose number and who is lost.
+    """Return the echoes' random numbers (N,): speckle, noise, and shares for lost numbers and lost echoes.
 
     Each is None where there is no such error.
 
