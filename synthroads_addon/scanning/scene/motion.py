@@ -99,21 +99,21 @@ class ShiftedMotion:
     """A motion expressed in a local frame with another origin; see `BodyMotion`.
 
     Attributes:
-        whole: the motion in the road's local frame.
+        motion: in the road's local frame.
         origin: (3,) where the frame begins in the road's, m.
     """
 
-    whole: BodyMotion
+    motion: BodyMotion
     origin: Float
 
     def pose(self, time: Float) -> Pose:
         """Return rotations (K, 3, 3), positions (K, 3) in this frame, m, and presence (K,), at times (K,), s."""
-        rotation, place, present = self.whole.pose(time)
+        rotation, place, present = self.motion.pose(time)
         return rotation, place - self.origin, present
 
     def passes(self, time: Float) -> Int:
         """Return how many times (K,) the body has left and come in again before times (K,), s."""
-        return self.whole.passes(time)
+        return self.motion.passes(time)
 
 
 class LaneMotion:
@@ -252,15 +252,15 @@ class VehiclePasses:
     Attributes:
         start: distance of its middle from the lane's beginning, in the direction of traffic, at the time 0, m.
         speed: m/s, > 0.
-        whole: length of the lane, m.
+        lane_length: m.
         length: of the vehicle, m.
         entry: when its middle comes in for the first time, s; after it has left.
-        period: s from one entry to the next, at least ``whole / speed``.
+        period: s from one entry to the next, at least ``lane_length / speed``.
     """
 
     start: float
     speed: float
-    whole: float
+    lane_length: float
     length: float
     entry: float
     period: float
@@ -268,18 +268,20 @@ class VehiclePasses:
     @property
     def leave(self) -> float:
         """Return the time, s, at which the vehicle's middle first reaches the lane's end."""
-        return max(0.0, (self.whole - self.start) / self.speed)
+        return max(0.0, (self.lane_length - self.start) / self.speed)
 
     def at(self, time: Float) -> tuple[Float, Bool]:
         """Return the vehicle's distances (K,) along the lane, m, and whether (K,) it is there, at times (K,), s.
 
-        Where it waits to come in again it is at the lane's end.
+        While it waits to come in again its distance is that of the lane's end.
         """
         time_since_entry = np.mod(time - self.entry, self.period)
-        distance_again = np.where(time < self.entry, self.whole, np.minimum(time_since_entry * self.speed, self.whole))
+        distance_again = np.where(
+            time < self.entry, self.lane_length, np.minimum(time_since_entry * self.speed, self.lane_length)
+        )
         distance = np.where(time <= self.leave, self.start + self.speed * time, distance_again)
         inset = self.length / 2.0 - OVERHANG
-        return distance, (distance >= inset) & (distance <= self.whole - inset)
+        return distance, (distance >= inset) & (distance <= self.lane_length - inset)
 
     def passes(self, time: Float) -> Int:
         """Return the number (K,) of the pass that the vehicle is on at times (K,), s; 0 is that at time 0."""
@@ -293,7 +295,7 @@ class VehiclePasses:
 
 
 def lane_passes(
-    start: Sequence[float], speed: Sequence[float], length: Sequence[float], whole: float
+    start: Sequence[float], speed: Sequence[float], length: Sequence[float], lane_length: float
 ) -> list[VehiclePasses]:
     """Return the passes of all vehicles of one lane, in their order, timed so that none overtakes another.
 
@@ -305,16 +307,16 @@ def lane_passes(
         start: (N,) distances of their middles from the lane's beginning, in the direction of traffic, at time 0, m.
         speed: (N,) m/s, > 0.
         length: (N,) m.
-        whole: length of the lane, m.
+        lane_length: length of the lane, m.
     """
     order = sorted(range(len(start)), key=lambda i: -start[i])  # the one that leaves first comes first
-    leave_time = [max(0.0, (whole - x) / v) for x, v in zip(start, speed, strict=True)]
+    leave_time = [max(0.0, (lane_length - x) / v) for x, v in zip(start, speed, strict=True)]
 
     def entry_behind(leader: int, leader_entry: float, follower: int) -> float:
         """Return the time, s, at which the follower may come in behind one whose middle came in at ``leader_entry``."""
         gap = (length[leader] + length[follower]) / 2.0 + VEHICLE_GAP
         # Of a faster follower the gap shrinks up to the lane's end, of a slower one it is least at the beginning.
-        least_delay = whole / speed[leader] - (whole - gap) / speed[follower]
+        least_delay = lane_length / speed[leader] - (lane_length - gap) / speed[follower]
         return leader_entry + max(gap / speed[leader], least_delay)
 
     entry = [0.0] * len(start)
@@ -325,6 +327,6 @@ def lane_passes(
         leader = number
     # The first one may come in for the second time behind the last one.
     period = entry_behind(order[-1], entry_time, order[0]) - entry[order[0]]
-    period = max(period, *(whole / v for v in speed))
+    period = max(period, *(lane_length / v for v in speed))
     rows = zip(start, speed, length, entry, strict=True)
-    return [VehiclePasses(x, v, whole, size, entry_time, period) for x, v, size, entry_time in rows]
+    return [VehiclePasses(x, v, lane_length, size, entry_time, period) for x, v, size, entry_time in rows]
