@@ -84,6 +84,7 @@ def fit_level_and_spreads(
     width = interquartile_range(quantiles)
 
     def residual(x: Float) -> Float:
+        """Return the errors (4,) of the expected quantiles, over the interquartile range, at parameters."""
         linear = apply_gain(expectation, material, _fit(x, material), side)
         return np.asarray((np.quantile(receiver.to_stored(linear), FITTED) - quantiles) / width)
 

@@ -177,6 +177,7 @@ class ClassComparison:
         names = [f"{100 * share:g}" for share in SHOWN]
 
         def quantiles(values: Float) -> dict[str, float]:
+            """Return the `SHOWN` quantiles of values, by name."""
             return {name: _short(value) for name, value in zip(names, np.quantile(values, SHOWN), strict=True)}
 
         data: dict[str, Any] = {"material": self.target.material, "expected": quantiles(self.expected)}

@@ -116,6 +116,7 @@ def _results(plan: ScanPlan, source: LayerSource | None) -> Iterator[BlockResult
     workers, block_scan = plan.run.threads or available_cores(), BlockScan(plan)
 
     def scan(block: Block) -> BlockResult:
+        """Return the result of a block."""
         return block_scan.scan_block(*block)
 
     if source is None:

@@ -79,7 +79,12 @@ class CloudHeader:
 
 
 def placed(path: Path, declared: MapSystem | None, notes: Sequence[str] = ()) -> Placement:
-    """Return the placement of a cloud by the system that its file declares, of which notes may have to be told.
+    """Return the placement of a cloud by the system that its file declares, with notes for the user.
+
+    Args:
+        path: the file.
+        declared: the system; None if the file declares none.
+        notes: remarks on it so far; those on units are added.
 
     Raises:
         InputError: its coordinates are degrees.
@@ -87,8 +92,8 @@ def placed(path: Path, declared: MapSystem | None, notes: Sequence[str] = ()) ->
     if declared is None:
         return Placement(notes=tuple(notes))
     if declared.unit is None:
-        allowed = "its coordinates are degrees: metres or feet of a projected system are needed"
-        raise InputError(f"{path}: coordinate system", declared.label, allowed)
+        requirement = "its coordinates are degrees: metres or feet of a projected system are needed"
+        raise InputError(f"{path}: coordinate system", declared.label, requirement)
     if declared.in_metres:
         return Placement(declared, declared, tuple(notes))
     system, units = declared.metric(), declared.scale
@@ -103,7 +108,7 @@ def placed(path: Path, declared: MapSystem | None, notes: Sequence[str] = ()) ->
 
 
 def system_of_text(text: str | None) -> tuple[MapSystem | None, list[str]]:
-    """Return the system that a file's text names, None without text, and what is to be said of text that names none.
+    """Return the system that a file's text names, and remarks for the user; None without text, or if it names none.
 
     Raises:
         InputError: the system isn't one of a map.

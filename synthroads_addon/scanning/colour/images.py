@@ -285,6 +285,7 @@ def _plane_depth(view: View, points: SeenPoints) -> Callable[[Index, Index], Flo
     constant = np.einsum("nk,nk->n", normal, (points.position - view.position) @ view.rotation)
 
     def depths(i: Index, j: Index) -> Float:
+        """Return the depths (N,), m, in pixels of columns i and rows j (N,)."""
         right, up = (i + 0.5 - view.centre[0]) / view.focal, (view.centre[1] - j - 0.5) / view.focal
         return np.asarray(constant / (normal[:, 0] * right + normal[:, 1] * up - normal[:, 2]))
 

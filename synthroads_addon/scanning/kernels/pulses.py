@@ -180,7 +180,9 @@ class PulseKernel:
             for signal in signals
         ]
         no_faces = np.empty(0, np.int32)
-        first_hits, hits_behind = (HitRows(no_faces, *three, None, None, None) for three in columns)
+        first_hits, hits_behind = (
+            HitRows(no_faces, distance, intensity, weight, None, None, None) for distance, intensity, weight in columns
+        )
         late_hits = LateHits(np.ascontiguousarray(ray, np.int64), hits_behind)
         echo_count, echo_columns = self._group(signals[0].distance.shape[1], first_hits, late_hits)
         return Echoes(*(column[:echo_count].copy() for column in echo_columns))
