@@ -50,13 +50,15 @@ def times(plan: ScanPlan) -> tuple[float, float]:
     for strip, number in list(plan.blocks())[:BLOCKS]:
         first, count = plan.cut.pulse_span(strip, number)
         count, scan = min(count, PULSES), BlockScan(plan)
-        poses = scan.poses_between(strip, *(plan.cut.time(strip, pulse) for pulse in (first, first + count - 1)))
-        pulses = scan.emit(strip, poses, None, first, count)
+        poses = scan.emitter.poses_between(
+            strip, *(plan.cut.time(strip, pulse) for pulse in (first, first + count - 1))
+        )
+        pulses = scan.emitter.emit(strip, poses, None, first, count)
         spent: tuple[list[float], list[float]] = ([], [])
         for _ in range(RUNS):
             for one, taken in zip((plan, by_numpy), spent, strict=True):
                 begin = time.thread_time()
-                BlockScan(one).traced_echoes(strip, pulses, poses.motions, 0)
+                BlockScan(one).tracer.traced_echoes(strip, pulses, poses.motions, 0)
                 taken.append(time.thread_time() - begin)
         result = [total + min(taken) for total, taken in zip(result, spent, strict=True)]
     return result[0], result[1]
@@ -90,8 +92,10 @@ def faces(plan: ScanPlan) -> dict[str, float]:
     for strip, number in (blocks[i] for i in chosen):
         first, count = plan.cut.pulse_span(strip, number)
         count = min(count, PULSES)
-        poses = scan.poses_between(strip, *(plan.cut.time(strip, pulse) for pulse in (first, first + count - 1)))
-        pulses = scan.emit(strip, poses, None, first, count)
+        poses = scan.emitter.poses_between(
+            strip, *(plan.cut.time(strip, pulse) for pulse in (first, first + count - 1))
+        )
+        pulses = scan.emitter.emit(strip, poses, None, first, count)
         if plan.emission.outline is not None:
             there = ~plan.emission.outline.passed_by(pulses.origin, pulses.direction, plan.setting.maximum_range)
             pulses = pulses.select(np.flatnonzero(there))
