@@ -136,21 +136,29 @@ class ReceiverModel:
         power = received_intensity(brightness, distance, self.attenuation)
         return np.maximum(power - self.pedestal, 0.0) if self.pedestal else power
 
-    def to_stored(self, linear: Float) -> Float:
+    def to_stored(self, linear_values: Float) -> Float:
         """Return the unrounded intensities that the device stores for linear ones times its gain.
 
         Of decibels they are -inf for a linear intensity of 0.
         """
         if self.decibels is None:
-            return linear if self.compression == 1.0 else FULL_SCALE * (linear / FULL_SCALE) ** self.compression
+            return (
+                linear_values
+                if self.compression == 1.0
+                else FULL_SCALE * (linear_values / FULL_SCALE) ** self.compression
+            )
         with np.errstate(divide="ignore"):
-            return FULL_SCALE / self.decibels * 10.0 * np.log10(linear)
+            return FULL_SCALE / self.decibels * 10.0 * np.log10(linear_values)
 
-    def to_linear(self, stored: Float) -> Float:
+    def to_linear(self, stored_values: Float) -> Float:
         """Return the linear intensities, times the gain, of stored ones: the inverse of `to_stored`."""
         if self.decibels is None:
-            return stored if self.compression == 1.0 else FULL_SCALE * (stored / FULL_SCALE) ** (1.0 / self.compression)
-        return np.asarray(10.0 ** (stored * self.decibels / (10.0 * FULL_SCALE)))
+            return (
+                stored_values
+                if self.compression == 1.0
+                else FULL_SCALE * (stored_values / FULL_SCALE) ** (1.0 / self.compression)
+            )
+        return np.asarray(10.0 ** (stored_values * self.decibels / (10.0 * FULL_SCALE)))
 
 
 def receiver_of_device(setting: ScannerSetting, attenuation: float) -> ReceiverModel:

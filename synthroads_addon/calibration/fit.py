@@ -67,7 +67,7 @@ def fit_level_and_spreads(
     quantiles: Float,
     receiver: ReceiverModel,
     side: tuple[Material, float] | None = None,
-    spread: bool = True,
+    with_spreads: bool = True,
 ) -> Fit:
     """Return level and spreads at which the expected quantiles fit the cloud's best (least squares).
 
@@ -79,7 +79,7 @@ def fit_level_and_spreads(
         quantiles: (4,) `FITTED` quantiles as stored.
         receiver: the device.
         side: for a strip, the material beside it and its level.
-        spread: whether the spreads are fitted as well; else they are the material's.
+        with_spreads: whether the spreads are fitted as well; else they are the material's.
     """
     width = interquartile_range(quantiles)
 
@@ -92,7 +92,7 @@ def fit_level_and_spreads(
     if start <= 0.0:
         raise InputError("material", material.to_dict(), "gives nothing back at these incidence angles and ranges")
     level = np.log(float(receiver.to_linear(quantiles[1:2])[0]) / start)
-    if not spread:
+    if not with_spreads:
         return _fit(_levenberg_marquardt(residual, np.array([level])), material)
     # A quartile of a normal distribution lies 0.6745 standard deviations from its median; spreads are of logarithms.
     log_linear = np.log(receiver.to_linear(quantiles))
@@ -256,11 +256,11 @@ def fitted_wavelength(place: Float, intensity: Float, noise: float = 0.0) -> flo
         noise: share of the variance that is the single points' and no field's.
     """
     squares = [_members(place, size) for size in _CELLS]
-    real = np.maximum((_variance_within(_normal_scores(intensity), squares) - noise) / (1.0 - noise), 0.0)
+    real_variance = np.maximum((_variance_within(_normal_scores(intensity), squares) - noise) / (1.0 - noise), 0.0)
     misfits = []
     for wavelength in WAVELENGTHS:
         values = noise_field(place - place.min(axis=0), wavelength, 1, OCTAVES)
-        misfits.append(float(np.nansum((_variance_within(_normal_scores(values), squares) - real) ** 2)))
+        misfits.append(float(np.nansum((_variance_within(_normal_scores(values), squares) - real_variance) ** 2)))
     return WAVELENGTHS[int(np.argmin(misfits))]
 
 

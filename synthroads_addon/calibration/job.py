@@ -169,8 +169,8 @@ class ClassComparison:
         """Return the errors of the `FITTED` quantiles (4,) over the real interquartile range; None without a cloud."""
         if self.real is None:
             return None
-        real = np.quantile(self.real.intensity, FITTED)
-        return np.asarray((np.quantile(self.expected, FITTED) - real) / interquartile_range(real))
+        real_quantiles = np.quantile(self.real.intensity, FITTED)
+        return np.asarray((np.quantile(self.expected, FITTED) - real_quantiles) / interquartile_range(real_quantiles))
 
     def to_dict(self) -> dict[str, Any]:
         """Return quantiles, errors, views and materials of the comparison as JSON data."""
@@ -275,11 +275,11 @@ def _calibration_steps(job: CalibrationJob) -> Generator[float, None, Calibratio
     check_job(job)
     table = job.initial_materials()
     yield 0.02
-    real = _real_classes(job)
+    real_classes = _real_classes(job)
     yield 0.4
     if "compression" in job.parts and job.fit and job.real is not None:
-        job = replace(job, compression=_fitted_compression(job, table, real))
-    pairs = zip(job.targets, real, strict=True)
+        job = replace(job, compression=_fitted_compression(job, table, real_classes))
+    pairs = zip(job.targets, real_classes, strict=True)
     inputs = [_fit_input(job, target, table[target.material], points) for target, points in pairs]
     fits: list[Fit] = []
     for number, item in enumerate(inputs):
@@ -367,7 +367,9 @@ def _check_road(job: CalibrationJob, road: RoadClasses) -> None:
         raise InputError("--line-width", road.line_width, "must be 0.02 to 2 m")
 
 
-def _fitted_compression(job: CalibrationJob, table: Mapping[str, Material], real: list[RealClass | None]) -> float:
+def _fitted_compression(
+    job: CalibrationJob, table: Mapping[str, Material], real_classes: list[RealClass | None]
+) -> float:
     """Return the exponent with which the table's materials explain how far the classes' medians lie apart.
 
     Raises:
@@ -377,7 +379,7 @@ def _fitted_compression(job: CalibrationJob, table: Mapping[str, Material], real
         raise InputError("--fit", "compression", "needs two materials or more, and numbers that aren't decibels")
     linear_receiver = replace(job.receiver, compression=1.0)
     powers, numbers = [], []
-    for target, points in zip(job.targets, real, strict=True):
+    for target, points in zip(job.targets, real_classes, strict=True):
         assert points is not None
         expectation = Expectation(class_views(job, points), linear_receiver, job.reflection)
         powers.append(float(np.log(np.median(expectation.linear_intensities(table[target.material])))))
@@ -507,8 +509,8 @@ def _level(job: CalibrationJob, item: _FitInput, side: tuple[Material, float] | 
     if item.real is None:
         return Fit(1.0, item.material.spread_below, item.material.spread_above)
     quantiles = np.quantile(item.real.intensity, FITTED)
-    spread = job.fit and "spread" in job.parts
-    return fit_level_and_spreads(item.expectation, item.material, quantiles, job.receiver, side, spread)
+    with_spreads = job.fit and "spread" in job.parts
+    return fit_level_and_spreads(item.expectation, item.material, quantiles, job.receiver, side, with_spreads)
 
 
 def _result(
@@ -547,7 +549,9 @@ def _compare_class(
 ) -> ClassComparison:
     """Return the comparison of a class with the intensities that its final material and the gain give."""
     pairs = zip(rows, inputs, strict=True)
-    side_material = next((material for material, other in pairs if other.target.real_class == "paved"), None)
+    side_material = next(
+        (material for material, other_input in pairs if other_input.target.real_class == "paved"), None
+    )
     fit = Fit(gain, row.spread_below, row.spread_above)
     expectation = item.expectation
     linear = apply_gain(

@@ -57,10 +57,10 @@ def calibration_picture(result: Calibration) -> Image.Image:
     def paint(draw: ImageDraw.ImageDraw) -> None:
         """Draw the title, the classes' histograms one below the other, and the fall-off last."""
         draw_text(draw, (_MARGIN, _MARGIN), _title(result), 19)
-        lowest, highest = _limits(result)
+        least_intensity, largest_intensity = _limits(result)
         for number, entry in enumerate(result.compared):
             top = 2 * _MARGIN + 30 + number * (_PANEL + 54)
-            _draw_class(draw, top, entry, (lowest, highest), LINES[number % len(LINES)])
+            _draw_class(draw, top, entry, (least_intensity, largest_intensity), LINES[number % len(LINES)])
         _draw_fall_off(draw, 2 * _MARGIN + 30 + (rows - 1) * (_PANEL + 54), result)
 
     return draw_picture((_WIDTH, rows * (_PANEL + 54) + 3 * _MARGIN + 40), paint)
@@ -80,9 +80,9 @@ def _limits(result: Calibration) -> tuple[float, float]:
     values = [entry.expected for entry in result.compared]
     values += [entry.real.intensity for entry in result.compared if entry.real is not None]
     extremes = np.array([np.quantile(part, (0.002, 0.998)) for part in values])
-    lowest, highest = float(extremes[:, 0].min()), float(extremes[:, 1].max())
-    margin = max(0.03 * (highest - lowest), 1e-9 * max(abs(highest), 1e-9), 1e-12)
-    return lowest - margin, highest + margin
+    least_intensity, largest_intensity = float(extremes[:, 0].min()), float(extremes[:, 1].max())
+    margin = max(0.03 * (largest_intensity - least_intensity), 1e-9 * max(abs(largest_intensity), 1e-9), 1e-12)
+    return least_intensity - margin, largest_intensity + margin
 
 
 def _draw_class(

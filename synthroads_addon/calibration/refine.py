@@ -120,7 +120,7 @@ def refine_settings(road: RealClass, settings: Sequence[Setting], simulate: Simu
         InputError: the real pavement, or a simulated one, has too few points in patches.
     """
     windows = _windows(road)
-    names, real = _moments(road)
+    names, real_moments = _moments(road)
 
     def moments(x: Float) -> Float:
         """Return the statistics (W, M) of scans simulated in W windows, with settings at a place of the search."""
@@ -137,15 +137,15 @@ def refine_settings(road: RealClass, settings: Sequence[Setting], simulate: Simu
 
     def residual(x: Float) -> Float:
         """Return the deviations (M,) of the mean statistics from the real ones, over their scatter."""
-        return np.asarray((np.nanmean(moments(x), axis=0) - real) / scatter)
+        return np.asarray((np.nanmean(moments(x), axis=0) - real_moments) / scatter)
 
-    start_residual = np.asarray((np.nanmean(first_moments, axis=0) - real) / scatter)
+    start_residual = np.asarray((np.nanmean(first_moments, axis=0) - real_moments) / scatter)
     limits = np.array([setting.reach() for setting in settings]).T
     x, end_residual = _search(residual, start_residual, limits)
     values = {setting.path: setting.value(place) for setting, place in zip(settings, x, strict=True)}
     # A residual back to a statistic: that of the real cloud has none.
     residuals = (0.0 * start_residual, start_residual, end_residual)
-    statistics = [dict(zip(names, map(float, real + scatter * r), strict=True)) for r in residuals]
+    statistics = [dict(zip(names, map(float, real_moments + scatter * r), strict=True)) for r in residuals]
     return Refined(values, *statistics)
 
 

@@ -415,16 +415,16 @@ def _rings(place: Float, level: Float) -> tuple[float | None, float | None]:
 
 def _range_exponent(level: Float, distance: Float) -> float | None:
     """Return the power of the range that the brightness goes with; None where ranges hardly differ."""
-    nearest, farthest = np.quantile(distance, (0.05, 0.95))
-    if not np.isfinite(distance).all() or farthest < _RANGE_FACTOR * nearest:
+    nearest_range, farthest_range = np.quantile(distance, (0.05, 0.95))
+    if not np.isfinite(distance).all() or farthest_range < _RANGE_FACTOR * nearest_range:
         return None
     # level = 10 n log10(range) + constant.
     return float(np.polyfit(np.log10(distance), level, 1)[0] / 10.0)
 
 
-def number_bits(stored: Float) -> int | None:
+def number_bits(stored_numbers: Float) -> int | None:
     """Return the bits of stored numbers (N,), shares of 65535, by the steps between those that occur; None if 16."""
-    values = np.unique(np.rint(stored))
+    values = np.unique(np.rint(stored_numbers))
     steps = np.diff(values)
     if len(steps) < 2:
         return None

@@ -272,7 +272,7 @@ class _MovingSensor:
         if estimate.pulse_spacing is not None:
             ratio, factor = estimate.pulse_spacing**2 * estimate.density / self.strips, _KNOWN
         noise = _noise_of(estimate, self.device)
-        middle = {path: float(np.sqrt(lowest * highest)) for path, (lowest, highest) in self.usual.items()}
+        middle = {path: float(np.sqrt(minimum * maximum)) for path, (minimum, maximum) in self.usual.items()}
         rows = [
             Setting(_RATIO, ratio, ratio / factor, ratio * factor),
             Setting(_DENSITY, 1.0, 0.5, 2.0),
@@ -280,8 +280,8 @@ class _MovingSensor:
         ]
         middle |= {_PERIOD: _SWAY[self.kind]["shortest_period"]}
         rows += [Setting(path, middle[path], *limits) for path, limits in _FITTED_SWAY[self.kind].items()]
-        for name, highest in (("noise.range_sigma", 1.0), ("receiver.faint_range_sigma", 10.0), ("noise.speckle", 1.0)):
-            rows.append(Setting(f"scan.{name}", max(noise[f"scan.{name}"], 1e-4), 1e-4, highest))
+        for name, maximum in (("noise.range_sigma", 1.0), ("receiver.faint_range_sigma", 10.0), ("noise.speckle", 1.0)):
+            rows.append(Setting(f"scan.{name}", max(noise[f"scan.{name}"], 1e-4), 1e-4, maximum))
         rows.append(Setting("scan.noise.speckle_normal", _USUAL_NORMAL, 0.0, 1.0, False, 0.5))
         rows.append(Setting("scan.receiver.range_delay", noise["scan.receiver.range_delay"], 0.0, 0.9, False, 0.3))
         rows.append(Setting("scan.receiver.range_walk", noise["scan.receiver.range_walk"], 0.0, 0.1, False, 0.003))
@@ -354,7 +354,7 @@ class _MovingSensor:
         """Return a scan of level pavement with values of `settings`."""
         spacing, device = self.scanner(values)
         edge = window_edge(self.estimate.density)
-        middle = {path: float(np.sqrt(lowest * highest)) for path, (lowest, highest) in self.usual.items()}
+        middle = {path: float(np.sqrt(minimum * maximum)) for path, (minimum, maximum) in self.usual.items()}
         scan_values = {path: value for path, value in values.items() if path.startswith("scan.")}
         changes = _FREE | spacing | middle | scan_values | _POWER | {"scan.attenuation": self.attenuation}
         data = apply_values(load_scenario("airborne-1000m").to_dict(), changes)
@@ -548,7 +548,7 @@ def save_recipe(sensor: FittedSensor, path: Path, device: Path, table: Path | No
             **sensor.scan,
         },
         "draw": {name: _about(name, value) for name, value in sensor.drawn.items()}
-        | {name: {"minimum": lowest, "maximum": highest} for name, (lowest, highest) in sensor.usual.items()},
+        | {name: {"minimum": minimum, "maximum": maximum} for name, (minimum, maximum) in sensor.usual.items()},
         "groups": [{"name": "roads", "scenes": 8, "split": {"train": 6, "validation": 1, "test": 1}}],
     }
     text = "# Written by synthroads calibrate; groups and roads are an example to be changed.\n"
@@ -565,10 +565,10 @@ def _about(path: str, value: float) -> dict[str, float]:
         value: the fitted one.
     """
     share = SPREAD_OF_STRIPS if path in _OF_STRIPS else SPREAD
-    largest = value * (1.0 + share)
+    maximum = value * (1.0 + share)
     return {
         "minimum": _short(value * (1.0 - share)),
-        "maximum": _short(min(largest, 1.0) if path in _SHARES else largest),
+        "maximum": _short(min(maximum, 1.0) if path in _SHARES else maximum),
     }
 
 

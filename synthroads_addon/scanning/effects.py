@@ -111,7 +111,7 @@ def apply_effect(
     setting: ScannerSetting,
     attenuation: float,
     pulses: Pulses,
-    traced: TracedRays,
+    traced_rays: TracedRays,
     signals: BothSignals,
 ) -> tuple[TracedRays, BothSignals]:
     """Return a block's traced rays and signals after an effect has added echoes and weakened what they meet.
@@ -124,30 +124,30 @@ def apply_effect(
         setting: the scanner's.
         attenuation: 1/m of range.
         pulses: the block's.
-        traced: what their rays meet.
+        traced_rays: what their rays meet.
         signals: what that adds to returns.
 
     Raises:
         ValueError: the effect's echoes are of no ray, or not finite numbers.
     """
-    hits = _pulse_hits(setting, attenuation, pulses, traced, signals)
+    hits = _pulse_hits(setting, attenuation, pulses, traced_rays, signals)
     changes = effect.change_echoes(hits, random)
     _check(effect.name, changes, hits.distance.shape)
     if changes.transmission is not None:
-        traced, signals = _weaken(traced, signals, np.broadcast_to(changes.transmission, hits.distance.shape))
-    return _add_echoes(setting, attenuation, traced, signals, changes)
+        traced_rays, signals = _weaken(traced_rays, signals, np.broadcast_to(changes.transmission, hits.distance.shape))
+    return _add_echoes(setting, attenuation, traced_rays, signals, changes)
 
 
 def _pulse_hits(
-    setting: ScannerSetting, attenuation: float, pulses: Pulses, traced: TracedRays, signals: BothSignals
+    setting: ScannerSetting, attenuation: float, pulses: Pulses, traced_rays: TracedRays, signals: BothSignals
 ) -> PulseHits:
     """Return the hits of a block's rays as effects get them: with pulse and ray of what lies behind as two indices."""
-    ray, pulse = np.divmod(traced.ray, len(pulses.time))
+    ray, pulse = np.divmod(traced_rays.ray, len(pulses.time))
     return PulseHits(
         time=pulses.time,
         origin=pulses.origin,
         direction=pulses.direction,
-        share=traced.rays.share[:, 0],
+        share=traced_rays.rays.share[:, 0],
         behind_pulse=pulse,
         behind_ray=ray,
         setting=setting,
@@ -157,7 +157,7 @@ def _pulse_hits(
 
 
 def _add_echoes(
-    setting: ScannerSetting, attenuation: float, traced: TracedRays, signals: BothSignals, changes: EchoChanges
+    setting: ScannerSetting, attenuation: float, traced_rays: TracedRays, signals: BothSignals, changes: EchoChanges
 ) -> tuple[TracedRays, BothSignals]:
     """Return traced rays and signals with an effect's echoes added, less those out of the scanner's range."""
     distance = np.asarray(changes.distance, dtype=np.float64)
@@ -170,9 +170,11 @@ def _add_echoes(
         distance, np.maximum(brightness, LEAST_REFLECTANCE), received_intensity(brightness, distance, attenuation)
     )
     first_signals, behind_signals = signals
-    ray = changes.ray[in_range] * len(traced.rays.time) + changes.pulse[in_range]
-    traced = replace(traced, behind=Hits.join([traced.behind, hits]), ray=np.concatenate([traced.ray, ray]))
-    return traced, (first_signals, HitSignals.join([behind_signals, added_signals]))
+    ray = changes.ray[in_range] * len(traced_rays.rays.time) + changes.pulse[in_range]
+    traced_rays = replace(
+        traced_rays, behind=Hits.join([traced_rays.behind, hits]), ray=np.concatenate([traced_rays.ray, ray])
+    )
+    return traced_rays, (first_signals, HitSignals.join([behind_signals, added_signals]))
 
 
 def _brightness(signals: HitSignals, attenuation: float) -> Float:
@@ -200,13 +202,13 @@ def _check(name: str, changes: EchoChanges, shape: tuple[int, ...]) -> None:
             raise ValueError(f"effect {name}: {field_name} of the added echoes must be finite numbers")
 
 
-def _weaken(traced: TracedRays, signals: BothSignals, transmission: Float) -> tuple[TracedRays, BothSignals]:
+def _weaken(traced_rays: TracedRays, signals: BothSignals, transmission: Float) -> tuple[TracedRays, BothSignals]:
     """Return traced rays and signals whose brightness is multiplied by a ray's transmission (K, P).
 
     Where a ray's transmission is 0, its first hit is set to no hit (range inf) and its hits behind are dropped.
     """
     first_signals, behind_signals = signals
-    hit_transmission = transmission.ravel()[traced.ray]
+    hit_transmission = transmission.ravel()[traced_rays.ray]
     visible_hits = np.flatnonzero(hit_transmission > 0.0)
     first_signals = HitSignals(
         distance=np.where(transmission > 0.0, first_signals.distance, np.inf),
@@ -218,7 +220,7 @@ def _weaken(traced: TracedRays, signals: BothSignals, transmission: Float) -> tu
         behind_signals.weight[visible_hits] * hit_transmission[visible_hits],
         behind_signals.intensity[visible_hits] * hit_transmission[visible_hits],
     )
-    return replace(traced, behind=traced.behind.select(visible_hits), ray=traced.ray[visible_hits]), (
+    return replace(traced_rays, behind=traced_rays.behind.select(visible_hits), ray=traced_rays.ray[visible_hits]), (
         first_signals,
         behind_signals,
     )

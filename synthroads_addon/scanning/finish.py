@@ -53,12 +53,14 @@ class Finish:
             changes["intensity"] = range_corrected(points.intensity, points.range, plan.setting)
         return replace(result, points=points.with_arrays(changes), seen=None)
 
-    def _with_relief(self, points: PointBlock, seen: SeenPoints, relief: MicroRelief) -> PointBlock:
+    def _with_relief(self, points: PointBlock, seen_points: SeenPoints, relief: MicroRelief) -> PointBlock:
         """Return points shifted to where their beams meet the surface's relief, and their normals if planned."""
         plan, pavement = self.plan, self.plan.relief.pavement
-        map_place = seen.position + plan.target.origin
+        map_place = seen_points.position + plan.target.origin
         # Only what stands still has a relief, so that beams in the scene at time 0 are the true ones.
-        ends = BeamEnds(seen.position + plan.reflection.frame_origin, seen.towards_scanner, plan.setting.beam_angle)
+        ends = BeamEnds(
+            seen_points.position + plan.reflection.frame_origin, seen_points.towards_scanner, plan.setting.beam_angle
+        )
         relief_settings = relief, plan.relief.strength, plan.run.seed, plan.relief.octaves
         pavement_heights = None if pavement is None else pavement.heights(points.instance_id, map_place)
         shifted_points = shift_by_relief(points, ends, *relief_settings, pavement_heights)
@@ -75,29 +77,31 @@ class Finish:
 
         return turn_normals(shifted_points, field.rough, ends.towards, heights)
 
-    def _tilts(self, points: PointBlock, seen: SeenPoints) -> tuple[Index, Float]:
+    def _tilts(self, points: PointBlock, seen_points: SeenPoints) -> tuple[Index, Float]:
         """Return the indices (K,) of the points that normal images tilt, and their tilts: see `NormalImages.tilts`."""
         plan = self.plan
         assert plan.relief.images is not None
-        map_place = seen.position + plan.target.origin
-        frame_place = seen.position + plan.reflection.frame_origin
-        normal = np.asarray(seen.normal, np.float64)
+        map_place = seen_points.position + plan.target.origin
+        frame_place = seen_points.position + plan.reflection.frame_origin
+        normal = np.asarray(seen_points.normal, np.float64)
         footprint = points.range * plan.setting.beam_angle  # m
-        return plan.relief.images.tilts(seen.material, points.instance_id, map_place, frame_place, normal, footprint)
+        return plan.relief.images.tilts(
+            seen_points.material, points.instance_id, map_place, frame_place, normal, footprint
+        )
 
-    def _with_layers(self, result: BlockResult, seen: SeenPoints) -> BlockResult:
+    def _with_layers(self, result: BlockResult, seen_points: SeenPoints) -> BlockResult:
         """Return a block with its points' colours and layers, and with the intensities that follow from these."""
         plan = self.plan
         layer_names = plan.layers.coloured | (OF_INTENSITY if plan.reception.after_layers else set())
-        values = sample_points(self.source, seen, layer_names)
+        values = sample_points(self.source, seen_points, layer_names)
         changes: dict[str, Any] = {name: values.arrays[name] for name in plan.layers.coloured}
         changes["color_source"] = values.source
         if plan.reception.after_layers:
             assert plan.layers.means is not None
-            factors = layer_brightness(plan.layers.means, seen, values)
+            factors = layer_brightness(plan.layers.means, seen_points, values)
             if plan.relief.images is not None:
-                rows, tilts = self._tilts(result.points, seen)
-                factors[rows] *= tilted_brightness(seen.normal[rows], tilts, seen.towards_scanner[rows])
+                rows, tilts = self._tilts(result.points, seen_points)
+                factors[rows] *= tilted_brightness(seen_points.normal[rows], tilts, seen_points.towards_scanner[rows])
             changes["intensity"] = result.points.intensity * factors
             if (power := result.points.array("power_db")) is not None:
                 changes["power_db"] = np.maximum(power + decibels(factors), DARKEST_DB)
@@ -108,7 +112,7 @@ class Finish:
         return replace(result, sources=np.bincount(result.points.color_source, minlength=256))
 
 
-def layer_brightness(means: Surfaces, seen: SeenPoints, values: LayerValues) -> Float:
+def layer_brightness(means: Surfaces, seen_points: SeenPoints, values: LayerValues) -> Float:
     """Return factors (N,) by which points are brighter by their own layers than by their materials' means.
 
     A return has the layers of what gave most of it. Dirt, print and wear dim what beads and prisms send back as they
@@ -116,13 +120,13 @@ def layer_brightness(means: Surfaces, seen: SeenPoints, values: LayerValues) -> 
 
     Args:
         means: of the scene's materials, which the layers vary around.
-        seen: N points.
+        seen_points: N points.
         values: their layers.
     """
     layer_reflectivity = reflectivity(*(values.arrays[name] for name in ("base_color", "metallic", "specular")))
-    mean_reflectivity = np.take(means.reflectivity, seen.material, mode="clip")
+    mean_reflectivity = np.take(means.reflectivity, seen_points.material, mode="clip")
     factor = np.asarray(layer_reflectivity / np.maximum(mean_reflectivity, _DARKEST))
-    factor[seen.material == NO_MATERIAL] = 1.0
+    factor[seen_points.material == NO_MATERIAL] = 1.0
     return factor
 
 

@@ -71,19 +71,19 @@ class ScanForecast:
         )
 
 
-def forecast_scan(cut: Blocks, triangles: int, threads: int = 0) -> ScanForecast:
+def forecast_scan(division: Blocks, triangles: int, threads: int = 0) -> ScanForecast:
     """Return the expected pulses, computing time (s) and memory (bytes) of a scan on this machine.
 
     Args:
-        cut: its pulses.
+        division: its pulses.
         triangles: of the scene.
         threads: blocks that are worked on at once; 0 for every core.
     """
-    pulses = sum(cut.pulse_count(strip) for strip in cut.path.strips)
+    pulses = sum(division.pulse_count(strip) for strip in division.path.strips)
     workers = threads or available_cores()
-    seconds = pulses * (_PULSE + _RAY * cut.rays_per_pulse) / free_cores(workers, 1.0)
+    seconds = pulses * (_PULSE + _RAY * division.rays_per_pulse) / free_cores(workers, 1.0)
     scene_memory = _TRIANGLE * triangles
-    blocks_at_once = min(workers + 1, cut.count())
+    blocks_at_once = min(workers + 1, division.count())
     return ScanForecast(pulses, seconds, _BASE + scene_memory + _THREAD * blocks_at_once, scene_memory, workers)
 
 

@@ -112,7 +112,7 @@ class Multipath:
         surfaces: Surfaces,
         setting: ScannerSetting,
         attenuation: float,
-        traced: TracedRays,
+        traced_rays: TracedRays,
         motions: list[Track],
     ) -> tuple[Hits, Index, HitSignals]:
         """Return the ghosts of a block's rays as hits in the air, the rays that they are of, and their signals.
@@ -122,14 +122,14 @@ class Multipath:
             surfaces: its materials.
             setting: the scanner's.
             attenuation: 1/m of range.
-            traced: what the rays meet first: only that mirrors.
+            traced_rays: what the rays meet first: only that mirrors.
             motions: of the target's moving parts.
         """
-        ray, share = self._mirroring(setting, surfaces, traced)
+        ray, share = self._mirroring(setting, surfaces, traced_rays)
         if not len(ray):
-            none, nothing = np.empty(0, dtype=np.intp), np.empty(0)
-            return Hits(none, none, nothing, nothing, nothing), none, HitSignals(nothing, nothing, nothing)
-        first_hits, rays = traced.first, traced.rays
+            zeros, nothing = np.empty(0, dtype=np.intp), np.empty(0)
+            return Hits(zeros, zeros, nothing, nothing, nothing), zeros, HitSignals(nothing, nothing, nothing)
+        first_hits, rays = traced_rays.first, traced_rays.rays
         mirror_range, pulse = np.take(first_hits.distance, ray), ray % len(rays.time)
         normal = target.normals(
             np.take(first_hits.face, ray), np.take(first_hits.cosine, ray), rays.time[pulse], motions
@@ -148,25 +148,25 @@ class Multipath:
             slope, mirror_range[recorded_rows], mirrored_hits.distance[recorded_rows], setting.beam_angle
         )
         brightness = share * brightness_of(surfaces, material, np.abs(mirrored_hits.cosine[recorded_rows]))
-        none = np.zeros(len(recorded_rows), dtype=np.intp)
+        zeros = np.zeros(len(recorded_rows), dtype=np.intp)
         # What comes from nowhere has no face; it counts as one that lies across the beam.
-        hits = Hits(none - 1, none, distance, none - 1.0, brightness)
+        hits = Hits(zeros - 1, zeros, distance, zeros - 1.0, brightness)
         weight = np.maximum(brightness, LEAST_REFLECTANCE)
         return hits, ray, HitSignals(distance, weight, received_intensity(brightness, distance, attenuation))
 
-    def _mirroring(self, setting: ScannerSetting, surfaces: Surfaces, traced: TracedRays) -> tuple[Index, Float]:
+    def _mirroring(self, setting: ScannerSetting, surfaces: Surfaces, traced_rays: TracedRays) -> tuple[Index, Float]:
         """Return the rays (N,) whose light may come back over a mirror, and the share (N,) of it that does so at most.
 
         Rays whose ghosts couldn't be detected even if all of this came back from the brightest surface are left out.
         """
-        first_hits = traced.first
+        first_hits = traced_rays.first
         material = first_hits.material.ravel()
         reflectance = np.take(self.mirrors.reflectance, material)
         ray = np.flatnonzero(
             (reflectance > 0.0) & (first_hits.face.ravel() >= 0) & np.isfinite(first_hits.distance.ravel())
         )
         cosine = np.minimum(np.abs(np.take(first_hits.cosine, ray)), 1.0)
-        ray_share = np.take(np.broadcast_to(traced.rays.share, first_hits.face.shape), ray)
+        ray_share = np.take(np.broadcast_to(traced_rays.rays.share, first_hits.face.shape), ray)
         share = ray_share * self.strength * mirrored_share(reflectance[ray], cosine) ** 2
         brightest = BRIGHTEST if surfaces.retroreflective else 1.0
         faintest = PROVISIONAL_THRESHOLD * setting.threshold * np.take(first_hits.distance, ray) ** 2

@@ -102,8 +102,8 @@ def trajectory_errors(noise: Noise, seed: int, strip: Strip, time: Float) -> tup
     for block in np.unique(block_numbers):
         rows = np.flatnonzero(block_numbers == block)
         process, knot_in_block = _process_block(seed, strip.index, int(block)), knots_within[rows]
-        before = weights_before[rows, None] * process[knot_in_block]
-        unit_errors[rows] = before + weights_after[rows, None] * process[knot_in_block + 1]
+        value_before = weights_before[rows, None] * process[knot_in_block]
+        unit_errors[rows] = value_before + weights_after[rows, None] * process[knot_in_block + 1]
     unit_errors *= sigma
     return unit_errors[:, :3], unit_errors[:, 3:]
 

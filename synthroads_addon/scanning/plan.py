@@ -93,8 +93,8 @@ class ScanPlan:
     def openings(self) -> Openings | None:
         """Return where the scene's materials are open; None where none is."""
         reflection = self.reflection
-        clear = reflection.transparency and replace(reflection.transparency, frame_origin=reflection.frame_origin)
-        return None if self.gaps is None and clear is None else Openings(self.gaps, clear)
+        see_through = reflection.transparency and replace(reflection.transparency, frame_origin=reflection.frame_origin)
+        return None if self.gaps is None and see_through is None else Openings(self.gaps, see_through)
 
     @cached_property
     def pulse_kernel(self) -> PulseKernel | NoKernelError:

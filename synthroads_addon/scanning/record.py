@@ -143,7 +143,7 @@ def _nothing() -> None:
 
 
 def _computed(
-    work: Callable[[Block], BlockResult], plan: ScanPlan, workers: int, ahead: int, wait: Wait
+    work: Callable[[Block], BlockResult], plan: ScanPlan, workers: int, items_ahead: int, wait: Wait
 ) -> Iterator[BlockResult]:
     """Return an iterator over the results of a plan's blocks, in their order.
 
@@ -151,13 +151,13 @@ def _computed(
         work: computes the result of a block.
         plan: the scan.
         workers: threads that compute side by side; where the caster needs the main thread, that one computes all.
-        ahead: see `_map_side_by_side`.
+        items_ahead: see `_map_side_by_side`.
         wait: waits for a result.
     """
     blocks = plan.blocks()
     if plan.target.caster.main_thread_only:
         return map(work, blocks)
-    return _map_side_by_side(work, blocks, workers, ahead, wait)
+    return _map_side_by_side(work, blocks, workers, items_ahead, wait)
 
 
 def _join_into_batches(results: Iterator[BlockResult]) -> Iterator[BlockResult]:
@@ -176,7 +176,7 @@ def _map_side_by_side(
     work: Callable[[T], BlockResult],
     items: Iterator[T],
     workers: int,
-    ahead: int,
+    items_ahead: int,
     wait: Wait,
     stop: Callable[[], None] = _nothing,
 ) -> Iterator[BlockResult]:
@@ -186,13 +186,13 @@ def _map_side_by_side(
         work: computes an item.
         items: blocks, or results of several.
         workers: threads.
-        ahead: items beyond these that may wait until they are taken.
+        items_ahead: items beyond these that may wait until they are taken.
         wait: waits for a result.
         stop: called before the threads are waited for in the end: they may wait for this one.
     """
     pool = ThreadPoolExecutor(workers)
     try:
-        pending: list[Future[BlockResult]] = [pool.submit(work, item) for item in islice(items, workers + ahead)]
+        pending: list[Future[BlockResult]] = [pool.submit(work, item) for item in islice(items, workers + items_ahead)]
         while pending:
             yield wait(pending.pop(0))
             pending += [pool.submit(work, item) for item in islice(items, 1)]

@@ -63,11 +63,11 @@ class RoadSection:
     blocks: tuple[Block, ...]
 
 
-def sections(cut: Blocks, geometry: RoadGeometry, length: float, shadows: float = 0.0) -> Iterator[RoadSection]:
+def sections(division: Blocks, geometry: RoadGeometry, length: float, shadows: float = 0.0) -> Iterator[RoadSection]:
     """Yield the parts of a road to be built and scanned in turn, from its start on, that have any blocks.
 
     Args:
-        cut: the scan's blocks.
+        division: the scan's blocks.
         geometry: the road's.
         length: of a section along the road, m; the last one is shorter.
         shadows: how far something must be built, beside what the rays reach, for the shadow that it throws, m.
@@ -75,59 +75,61 @@ def sections(cut: Blocks, geometry: RoadGeometry, length: float, shadows: float 
     # The small number keeps a length that rounding puts above a whole number of sections from adding an empty one.
     count = max(1, int(np.ceil(geometry.length / length - 1e-9)))
     section_blocks: list[list[Block]] = [[] for _ in range(count)]
-    for strip in cut.path.strips:
-        station = _block_stations(cut, geometry, strip)
+    for strip in division.path.strips:
+        station = _block_stations(division, geometry, strip)
         section_numbers = np.clip(station // length, 0, count - 1).astype(int)
         for block, number in enumerate(section_numbers):
             section_blocks[number].append((strip, block))
     margin = BORDER + shadows + _crossing_reach(geometry)
     for number, blocks in enumerate(section_blocks):
         if blocks:
-            lowest_station, highest_station = reached_stations(cut, geometry, blocks)
+            lowest_station, highest_station = reached_stations(division, geometry, blocks)
             start, end = number * length, min((number + 1) * length, geometry.length)
             build_start = max(lowest_station - margin, 0.0)
             build_end = min(highest_station + margin, geometry.length)
             yield RoadSection(start, end, build_start, build_end, tuple(blocks))
 
 
-def reached_stations(cut: Blocks, geometry: RoadGeometry, blocks: list[Block]) -> tuple[float, float]:
+def reached_stations(division: Blocks, geometry: RoadGeometry, blocks: list[Block]) -> tuple[float, float]:
     """Return the smallest and largest station, m, at which rays of some blocks can meet anything."""
     stations = []
     for strip, numbers in _by_strip(blocks):
         sample_indices = np.unique(np.linspace(0, len(numbers) - 1, _PLACES).astype(int))
-        rays = [_sample_rays(cut, strip, numbers[i]) for i in sample_indices]
+        rays = [_sample_rays(division, strip, numbers[i]) for i in sample_indices]
         origin, direction = (np.concatenate(parts) for parts in zip(*rays, strict=True))
-        stations.append(_stations_of_rays(cut, geometry, origin, direction))
-    return min(lowest for lowest, _ in stations), max(highest for _, highest in stations)
+        stations.append(_stations_of_rays(division, geometry, origin, direction))
+    return min(lowest_station for lowest_station, _ in stations), max(
+        highest_station for _, highest_station in stations
+    )
 
 
-def strip_parts(cut: Blocks, blocks: Sequence[Block]) -> tuple[Strip, ...]:
+def strip_parts(division: Blocks, blocks: Sequence[Block]) -> tuple[Strip, ...]:
     """Return the parts of strips that blocks cover, as shorter strips of the same index: one for each run of blocks."""
     parts = []
     for strip, numbers in _by_strip(blocks):
         for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
-            first_pulse, _ = cut.pulse_span(strip, int(run[0]))
-            last_pulse, count = cut.pulse_span(strip, int(run[-1]))
-            begin, end = cut.time(strip, first_pulse), cut.time(strip, last_pulse + count - 1)
+            first_pulse, _ = division.pulse_span(strip, int(run[0]))
+            last_pulse, count = division.pulse_span(strip, int(run[-1]))
+            begin, end = division.time(strip, first_pulse), division.time(strip, last_pulse + count - 1)
             parts.append(Strip(strip.index, begin, end - begin))
     return tuple(parts)
 
 
 def vehicles_through(
-    section: RoadSection, cut: Blocks, motions: Mapping[str, LaneMotion], speed_factor: float
+    section: RoadSection, division: Blocks, motions: Mapping[str, LaneMotion], speed_factor: float
 ) -> dict[str, LaneMotion]:
     """Return the motions, by id, of the vehicles that pass a section while its blocks are scanned.
 
     Args:
         section: of the scan.
-        cut: the scan's blocks.
+        division: the scan's blocks.
         motions: of all vehicles, by id.
         speed_factor: share of their speeds that they drive at.
     """
     interval = _LOOK / max(1.0, speed_factor)
     times = np.concatenate([
         strip.start_time + np.linspace(0.0, strip.duration, int(np.ceil(strip.duration / interval)) + 2)
-        for strip in strip_parts(cut, section.blocks)
+        for strip in strip_parts(division, section.blocks)
     ])  # fmt: skip
     lowest_station, highest_station = section.build_start - _AROUND, section.build_end + _AROUND
     stations = {name: motion.station(times) for name, motion in motions.items()}
@@ -149,41 +151,41 @@ def shadow_length(geometry: RoadGeometry) -> float:
     return float(_tallest(geometry) / np.tan(elevation))
 
 
-def _block_stations(cut: Blocks, geometry: RoadGeometry, strip: Strip) -> Float:
+def _block_stations(division: Blocks, geometry: RoadGeometry, strip: Strip) -> Float:
     """Return the scanner's stations (B,), m, at the middle pulse of each of a strip's blocks."""
-    borders = [cut.pulse_span(strip, block) for block in cut.block_numbers(strip)]
-    times = np.array([cut.time(strip, first_pulse + count // 2) for first_pulse, count in borders])
-    return geometry.alignment.project(cut.path.pose(strip, times)[0][:, :2])[0]
+    borders = [division.pulse_span(strip, block) for block in division.block_numbers(strip)]
+    times = np.array([division.time(strip, first_pulse + count // 2) for first_pulse, count in borders])
+    return geometry.alignment.project(division.path.pose(strip, times)[0][:, :2])[0]
 
 
-def _sample_rays(cut: Blocks, strip: Strip, block: int) -> tuple[Float, Float]:
+def _sample_rays(division: Blocks, strip: Strip, block: int) -> tuple[Float, Float]:
     """Return local origins (N, 3), m, and unit directions (N, 3) of a sample of a block's pulses.
 
     Up to `_TAKEN` pulses are taken of each of three runs of `_RUN` pulses: at the block's beginning, middle and end.
     """
-    first_pulse, count = cut.pulse_span(strip, block)
+    first_pulse, count = division.pulse_span(strip, block)
     starts = sorted({first_pulse, first_pulse + max(0, (count - _RUN) // 2), first_pulse + max(0, count - _RUN)})
     origins, directions = [], []
     for start in starts:
         run = min(_RUN, first_pulse + count - start)
         sample_rows = np.linspace(0, run - 1, min(run, _TAKEN)).astype(int)
-        shot = shots(cut.setting, start, run, False)
-        position, rotation = cut.path.pose(strip, strip.start_time + shot.time[sample_rows])
+        shot = shots(division.setting, start, run, False)
+        position, rotation = division.path.pose(strip, strip.start_time + shot.time[sample_rows])
         origins.append(position)
         directions.append(np.einsum("nij,jn->ni", rotation, shot.direction[:, sample_rows]))
     return np.concatenate(origins), np.concatenate(directions)
 
 
-def _stations_of_rays(cut: Blocks, geometry: RoadGeometry, origin: Float, direction: Float) -> tuple[float, float]:
+def _stations_of_rays(division: Blocks, geometry: RoadGeometry, origin: Float, direction: Float) -> tuple[float, float]:
     """Return the smallest and largest station, m, at which rays can meet anything.
 
     Args:
-        cut: the scan's blocks.
+        division: the scan's blocks.
         geometry: the road's.
         origin: (N, 3) where the rays begin, local, m.
         direction: (N, 3) unit vectors.
     """
-    farthest = cut.setting.maximum_range
+    farthest = division.setting.maximum_range
     origin_stations, _ = geometry.alignment.project(origin[:, :2])
     begin, end = float(origin_stations.min()) - farthest, float(origin_stations.max()) + farthest
     lowest_elevation, highest_elevation = _elevation_range(geometry, begin, end)
@@ -203,7 +205,7 @@ def _stations_of_rays(cut: Blocks, geometry: RoadGeometry, origin: Float, direct
     # Each of these rays is looked at in `_STEPS` places, of which those count that lie in the road's corridor.
     share = np.linspace(0.0, 1.0, _STEPS)
     sample_ranges = begin_range[rows, None] + (end_range - begin_range)[rows, None] * share
-    footprint = 0.5 * max(cut.setting.divergence) * float(sample_ranges.max())
+    footprint = 0.5 * max(division.setting.divergence) * float(sample_ranges.max())
     places = origin[rows, None, :2] + sample_ranges[..., None] * direction[rows, None, :2]
     station, offset = geometry.alignment.project(places.reshape(-1, 2))
     in_corridor = station[np.abs(offset) <= _corridor(geometry) + footprint]
@@ -240,9 +242,9 @@ def _elevation_range(geometry: RoadGeometry, start: float, end: float) -> tuple[
     pairs: Any = np.meshgrid(station, offset)
     height = surface_elevation(geometry, *(part.ravel() for part in pairs))
     axis = geometry.profile.elevation(station)
-    lowest = min(float(np.nanmin(height)), float(axis.min()))
-    highest = max(float(np.nanmax(height)), float(axis.max()))
-    return lowest - _UNEVEN, highest + _UNEVEN + _tallest(geometry)
+    lowest_elevation = min(float(np.nanmin(height)), float(axis.min()))
+    highest_elevation = max(float(np.nanmax(height)), float(axis.max()))
+    return lowest_elevation - _UNEVEN, highest_elevation + _UNEVEN + _tallest(geometry)
 
 
 def _tallest(geometry: RoadGeometry) -> float:

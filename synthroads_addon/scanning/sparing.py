@@ -172,9 +172,9 @@ class Sparing:
         relative_depth = np.hypot(steepness[:, 0] * self._reach[0], steepness[:, 1] * self._reach[1])
         relative_depth += 0.5 * float(self._reach.max()) ** 2
         # 1 / (1 - d) is less than 1 + 1.2 d for depths d up to `_WIDEST`.
-        nearest, farthest = distance * (1.0 - relative_depth), distance * (1.0 + 1.2 * relative_depth)
-        in_reach = (nearest >= setting.minimum_range) & (farthest <= setting.maximum_range)
-        one_return = farthest - nearest <= setting.range_resolution
+        nearest_range, farthest_range = distance * (1.0 - relative_depth), distance * (1.0 + 1.2 * relative_depth)
+        in_reach = (nearest_range >= setting.minimum_range) & (farthest_range <= setting.maximum_range)
+        one_return = farthest_range - nearest_range <= setting.range_resolution
         return np.asarray((relative_depth <= _WIDEST) & one_return & in_reach)
 
     def _near_traffic(self, spared: SparedPulses, pulses: Pulses, motions: list[Track]) -> Bool:

@@ -153,8 +153,8 @@ def trace(
     surfaces: Surfaces,
     rays: Rays,
     motions: list[Track],
-    nearest: float,
-    farthest: float,
+    nearest_range: float,
+    farthest_range: float,
     axis: FirstHits | None = None,
     openings: Openings | None = None,
 ) -> TracedRays:
@@ -168,32 +168,36 @@ def trace(
         surfaces: means of its materials.
         rays: of pulses.
         motions: tracks of the target's moving parts.
-        nearest, farthest: ranges, m.
+        nearest_range, farthest_range: ranges, m.
         axis: (P,) what the first ray of each pulse meets, where it has been cast already.
         openings: where materials are open; None: all of a material weakens rays alike.
     """
-    met = _first_hits(target, rays, motions, farthest, axis)
-    material = np.take(target.material, met.face, mode="clip").astype(np.intp)
+    ray_hits = _first_hits(target, rays, motions, farthest_range, axis)
+    material = np.take(target.material, ray_hits.face, mode="clip").astype(np.intp)
     if not surfaces.permeable:
-        first_hits = Hits(met.face, material, _within(met.distance, nearest, np.inf), met.cosine, rays.share)
+        first_hits = Hits(
+            ray_hits.face, material, _within(ray_hits.distance, nearest_range, np.inf), ray_hits.cosine, rays.share
+        )
         return _gather_hits(rays, first_hits, [], [])
     # Rays, as k * P + p, whose first face is of a permeable material; to a miss, at inf, no material applies.
     permeable = np.flatnonzero(np.take(surfaces.pervious, material, mode="clip"))
-    permeable = permeable[np.take(met.distance, permeable) < farthest]
+    permeable = permeable[np.take(ray_hits.distance, permeable) < farthest_range]
     share = np.broadcast_to(rays.share, material.shape).copy()
     arriving_light = np.take(share, permeable)
     onward = _Onward(target, surfaces, openings or Openings(), rays, motions)
-    surface, start = np.take(material, permeable), np.take(met.distance, permeable)
-    face, cosine = (np.take(met.face, permeable), np.take(met.cosine, permeable)) if onward.clear else (None, None)
+    surface, start = np.take(material, permeable), np.take(ray_hits.distance, permeable)
+    face, cosine = (
+        (np.take(ray_hits.face, permeable), np.take(ray_hits.cosine, permeable)) if onward.clear else (None, None)
+    )
     transmission = onward.transmitted(permeable, face, surface, cosine, start)
     share.ravel()[permeable] = arriving_light * (1.0 - transmission)
-    distance = _within(met.distance, nearest, np.inf)
+    distance = _within(ray_hits.distance, nearest_range, np.inf)
     if openings is not None and (transmission == 1.0).any():
         distance = distance.copy()
         distance.ravel()[permeable[transmission == 1.0]] = np.inf
-    first_hits = Hits(met.face, material, distance, met.cosine, share)
-    passed = _Passed(permeable, arriving_light * transmission, start, face, onward.steps(surface))
-    layers = list(onward.follow(passed, nearest, farthest))
+    first_hits = Hits(ray_hits.face, material, distance, ray_hits.cosine, share)
+    passed_rays = _Passed(permeable, arriving_light * transmission, start, face, onward.steps(surface))
+    layers = list(onward.follow(passed_rays, nearest_range, farthest_range))
     return _gather_hits(rays, first_hits, [hits for hits, _ in layers], [ray for _, ray in layers])
 
 
@@ -251,41 +255,47 @@ class _Onward:
         """Return whether some materials are clear in places."""
         return self.openings.clear is not None
 
-    def follow(self, passed: _Passed, nearest: float, farthest: float) -> Iterator[tuple[Hits, Index]]:
+    def follow(self, passed_rays: _Passed, nearest_range: float, farthest_range: float) -> Iterator[tuple[Hits, Index]]:
         """Yield, layer by layer, the next hits (N,) behind passed surfaces and the rays (N,) that they belong to.
 
-        The first layer is what rays meet behind the surfaces that they have ``passed``, the next layer what lies behind
-        that, and so on. A ray ends where it meets nothing, or where less than `FAINTEST` of its own light is left.
+        The first layer is what rays meet behind the surfaces that they have passed, the next layer what lies behind that,
+        and so on. A ray ends where it meets nothing, or where less than `FAINTEST` of its own light is left.
 
         Args:
-            passed: rays behind what they have met first.
-            nearest, farthest: ranges, m; hits out of these have the distance inf, but rays go on behind them.
+            passed_rays: rays behind what they have met first.
+            nearest_range, farthest_range: m; hits out of these have the distance inf, but rays go on behind them.
         """
         pulses = len(self.rays.time)
         for _ in range((CLEAR_LAYERS if self.clear else LAYERS) - 1):
-            ray_share = np.take(self.rays.share, passed.ray // pulses)
-            bright = np.flatnonzero(passed.light > FAINTEST * ray_share)
-            if not len(bright):
+            ray_share = np.take(self.rays.share, passed_rays.ray // pulses)
+            bright_rows = np.flatnonzero(passed_rays.light > FAINTEST * ray_share)
+            if not len(bright_rows):
                 break
-            ahead = passed.select(bright)
+            onward_rays = passed_rays.select(bright_rows)
             # Each ray is cast anew from a little behind the surface that it has passed last.
-            step: Float | float = BEYOND if ahead.step is None else ahead.step
-            start, (origin, direction) = ahead.start + step, self.rays.pick(ahead.ray)
-            times = self.rays.time[ahead.ray % pulses]
-            met = self.target.cast(origin + start * direction, direction, farthest, times, self.motions)
-            hit = np.flatnonzero(met.face >= 0)
-            ahead, face, cosine = ahead.select(hit), met.face[hit], met.cosine[hit]
-            distance = start[hit] + met.distance[hit]
+            step: Float | float = BEYOND if onward_rays.step is None else onward_rays.step
+            start, (origin, direction) = onward_rays.start + step, self.rays.pick(onward_rays.ray)
+            times = self.rays.time[onward_rays.ray % pulses]
+            next_hits = self.target.cast(origin + start * direction, direction, farthest_range, times, self.motions)
+            hit_rows = np.flatnonzero(next_hits.face >= 0)
+            onward_rays, face, cosine = (
+                onward_rays.select(hit_rows),
+                next_hits.face[hit_rows],
+                next_hits.cosine[hit_rows],
+            )
+            distance = start[hit_rows] + next_hits.distance[hit_rows]
             material = np.take(self.target.material, face).astype(np.intp)
-            transmission = self.transmitted(ahead.ray, face, material, cosine, distance)
+            transmission = self.transmitted(onward_rays.ray, face, material, cosine, distance)
             steps = self.steps(material)
-            if ahead.face is not None and steps is not None and (same_face := face == ahead.face).any():
+            if onward_rays.face is not None and steps is not None and (same_face := face == onward_rays.face).any():
                 # No ray meets a flat face twice: rounding has put it before the face that it has passed.
-                transmission[same_face], steps[same_face] = 1.0, 4.0 * np.asarray(ahead.step)[same_face]
-            taken_light = ahead.light * (1.0 - transmission)
-            recorded_distance = np.where(taken_light > 0.0, _within(distance, nearest, farthest), np.inf)
-            yield Hits(face, material, recorded_distance, cosine, taken_light), ahead.ray
-            passed = _Passed(ahead.ray, ahead.light * transmission, distance, None if steps is None else face, steps)
+                transmission[same_face], steps[same_face] = 1.0, 4.0 * np.asarray(onward_rays.step)[same_face]
+            taken_light = onward_rays.light * (1.0 - transmission)
+            recorded_distance = np.where(taken_light > 0.0, _within(distance, nearest_range, farthest_range), np.inf)
+            yield Hits(face, material, recorded_distance, cosine, taken_light), onward_rays.ray
+            passed_rays = _Passed(
+                onward_rays.ray, onward_rays.light * transmission, distance, None if steps is None else face, steps
+            )
 
     def steps(self, material: Index) -> Float | None:
         """Return how far (N,), m, rays go on behind surfaces that they have passed, by material; None: all alike."""
@@ -306,20 +316,20 @@ class _Onward:
             distance: (N,) where they meet them, m.
         """
         result = np.take(self.surfaces.transmission, material)
-        gaps, clear = self.openings
+        gaps, see_through = self.openings
         if gaps is not None and len(leafy := np.flatnonzero(np.take(self.surfaces.gappy, material))):
             leafy_ray, leafy_distance = ray[leafy], distance[leafy]
             share = np.take(self.rays.share, leafy_ray // self.rays.direction.shape[2])
             place = self._places(leafy_ray, leafy_distance)
             result[leafy] = gaps.transmitted(self.surfaces, material[leafy], place, leafy_distance, share)
-        if clear is None or face is None or cosine is None:
+        if see_through is None or face is None or cosine is None:
             return result
         rows = np.flatnonzero(np.take(self.surfaces.clear, material))  # materials that are clear in places
         if len(rows):
             clear_ray = ray[rows]
             times = np.take(self.rays.time, clear_ray % len(self.rays.time))
             place = self._places(clear_ray, distance[rows])
-            result[rows] = clear.transmitted(
+            result[rows] = see_through.transmitted(
                 self.target, material[rows], face[rows], cosine[rows], place, times, self.motions
             )
         return result
@@ -330,20 +340,22 @@ class _Onward:
         return np.asarray(origin + distance * direction)
 
 
-def _first_hits(target: Target, rays: Rays, motions: list[Track], farthest: float, axis: FirstHits | None) -> FirstHits:
+def _first_hits(
+    target: Target, rays: Rays, motions: list[Track], farthest_range: float, axis: FirstHits | None
+) -> FirstHits:
     """Return what rays (K, P) meet first.
 
     Args:
         target: what is scanned.
         rays: of pulses.
         motions: tracks of the target's moving parts.
-        farthest: range up to which rays are cast, m.
+        farthest_range: range up to which rays are cast, m.
         axis: (P,) known hits of the first ray of each pulse, which isn't cast again; None: all rays are cast.
     """
     if axis is None:
-        return target.cast(rays.origin, rays.direction, farthest, rays.time, motions)
+        return target.cast(rays.origin, rays.direction, farthest_range, rays.time, motions)
     origin = rays.origin[:, 1:] if rays.origin.shape[1] > 1 else rays.origin
-    other_hits = target.cast(origin, rays.direction[:, 1:], farthest, rays.time, motions)
+    other_hits = target.cast(origin, rays.direction[:, 1:], farthest_range, rays.time, motions)
     return FirstHits(
         *(
             np.concatenate([axis_values[None], other_values])
@@ -364,17 +376,17 @@ def _gather_hits(rays: Rays, first_hits: Hits, layers: list[Hits], layer_rays: l
     if not layers:
         no_index, no_number = np.empty(0, dtype=np.intp), np.empty(0)
         return TracedRays(rays, first_hits, Hits(no_index, no_index, no_number, no_number, no_number), no_index)
-    behind = Hits.join(layers)
-    recorded = np.flatnonzero(behind.distance < np.inf)
-    return TracedRays(rays, first_hits, behind.select(recorded), np.concatenate(layer_rays)[recorded])
+    late_hits = Hits.join(layers)
+    recorded = np.flatnonzero(late_hits.distance < np.inf)
+    return TracedRays(rays, first_hits, late_hits.select(recorded), np.concatenate(layer_rays)[recorded])
 
 
-def _within(distance: Float, nearest: float, farthest: float) -> Float:
-    """Return ranges (m) with inf in place of those below ``nearest`` or above ``farthest`` (m), which aren't recorded.
+def _within(distance: Float, nearest_range: float, farthest_range: float) -> Float:
+    """Return ranges (N,), m, with inf in place of those out of two limits, m, which aren't recorded.
 
-    What rays meet first is never farther than they were cast, so there ``farthest`` is inf.
+    What rays meet first is never farther than they were cast, so there ``farthest_range`` is inf.
     """
-    if distance.size == 0 or (farthest == np.inf and distance.min() >= nearest):
+    if distance.size == 0 or (farthest_range == np.inf and distance.min() >= nearest_range):
         return distance
-    is_outside = (distance < nearest) | (distance > farthest)
+    is_outside = (distance < nearest_range) | (distance > farthest_range)
     return np.where(is_outside, np.inf, distance) if is_outside.any() else distance

@@ -202,7 +202,7 @@ class PointLoops(Protocol):
 
     def approached(
         self,
-        rough: Index,
+        rough_rows: Index,
         height: Float,
         cosine: Float,
         material: UInt16,
@@ -211,7 +211,7 @@ class PointLoops(Protocol):
         place: Float,
         distance: Float,
     ) -> tuple[Float, Float]:
-        """Return places (N, 3) and ranges (N,) of which rows ``rough`` (K,) are nearer along their beams by heights."""
+        """Return places (N, 3) and ranges (N,) of which rows ``rough_rows`` (K,) are nearer along their beams by heights."""
         ...
 
     def daylight(

@@ -119,16 +119,16 @@ class E57Writer(CloudWriter):
         """Write what is left in the buffers, then bounds, limits and identifiers of the scan, and close the file."""
         self._flush()
         self._points.close()
-        real, whole = self._e57.FloatNode, self._e57.IntegerNode
+        float_node, integer_node = self._e57.FloatNode, self._e57.IntegerNode
         if self.count:
             spans = np.round([self._low - self.offset, self._high - self.offset], 4).T.tolist()
             axes = zip("xyz", spans, strict=True)
             bounds = {f"{axis}{end}": at for axis, span in axes for end, at in zip(_ENDS, span, strict=True)}
-            self._scan.set("cartesianBounds", self._structure(real, bounds))
+            self._scan.set("cartesianBounds", self._structure(float_node, bounds))
             limits = {"intensityMinimum": self._dimmest, "intensityMaximum": self._brightest}
-            self._scan.set("intensityLimits", self._structure(real, limits))
+            self._scan.set("intensityLimits", self._structure(float_node, limits))
         colors = {f"{name}{end}": at for name in _CHANNELS for end, at in zip(_ENDS, (0, 255), strict=True)}
-        self._scan.set("colorLimits", self._structure(whole, colors))
+        self._scan.set("colorLimits", self._structure(integer_node, colors))
         for node, what in ((self._scan, "scan"), (self._file.root(), "file")):
             digits = self.content_id(what, self._low.tolist(), self._high.tolist())
             groups = (digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:])
@@ -143,12 +143,14 @@ class E57Writer(CloudWriter):
 
     def _pack_columns(self, part: PointBlock) -> dict[str, AnyArray]:
         """Return the stored values (n,) of at most `_CAPACITY` points, by the columns' names in E57."""
-        local = part.xyz - self.offset
-        stored = {f"cartesian{'XYZ'[i]}": self.to_integers(local[:, i], "int32", "xyz", SCALE) for i in range(3)}
+        local_place = part.xyz - self.offset
+        columns_of_part = {
+            f"cartesian{'XYZ'[i]}": self.to_integers(local_place[:, i], "int32", "xyz", SCALE) for i in range(3)
+        }
         rgb = self.to_integers(part.rgb, "uint16", "rgb") >> 8
-        stored |= dict(zip(_CHANNELS, rgb.T, strict=True))
+        columns_of_part |= dict(zip(_CHANNELS, rgb.T, strict=True))
         number, angle = self.to_integers(part.return_number, "uint8", "return_number"), f"{EXTENSION}:scan_angle"
-        stored |= {
+        columns_of_part |= {
             "intensity": self.check_finite(part.intensity, "intensity", self._types["intensity"]),
             "timeStamp": self.check_finite(part.gps_time, "gps_time", self._types["timeStamp"]),
             "returnIndex": np.maximum(number, 1) - 1,  # counts from 0
@@ -158,7 +160,7 @@ class E57Writer(CloudWriter):
             # Readers such as pye57's `read_scan` insist on it.
             "cartesianInvalidState": np.full(len(part), _VALID, dtype=np.uint8),
         }
-        return stored | {e57_name(column): self.stored_integers(column, part) for column in self.columns}
+        return columns_of_part | {e57_name(column): self.stored_integers(column, part) for column in self.columns}
 
     def _begin_root(self) -> None:
         """Write the file's metadata and those of its one scan, the offset as its pose."""
@@ -353,8 +355,8 @@ class E57Reader(CloudReader):
         limits: Limits | None = None
         try:
             if scan.isDefined(group) and all(scan[group].isDefined(f"{name}{end}") for end in _ENDS):
-                lowest, highest = (_number_of(scan[group][f"{name}{end}"]) for end in _ENDS)
-                limits = (lowest, highest)
+                minimum, maximum = (_number_of(scan[group][f"{name}{end}"]) for end in _ENDS)
+                limits = (minimum, maximum)
             if not _tells(limits):
                 limits = _field_limits(self._e57.StructureNode(scan["points"].prototype())[name])
         except Exception as problem:

@@ -118,15 +118,15 @@ def system_of_text(text: str | None) -> tuple[MapSystem | None, list[str]]:
     try:
         return MapSystem.read(text), []
     except UnknownSystemError:
-        shown = " ".join(text.split())[:60]
-        return None, [f"its coordinate system can't be read ({shown}): it is ignored, coordinates are metres"]
+        text_beginning = " ".join(text.split())[:60]
+        return None, [f"its coordinate system can't be read ({text_beginning}): it is ignored, coordinates are metres"]
 
 
 def header_from_notes(
     path: Path,
     kind: str,
     count: int,
-    stored: set[str],
+    stored_names: set[str],
     notes: Any,
     *,
     name_of: Callable[[Column], str],
@@ -139,7 +139,7 @@ def header_from_notes(
         path: the file.
         kind: of file.
         count: number of points.
-        stored: names of what is stored of each point.
+        stored_names: names of what is stored of each point.
         notes: `CloudWriter.placed_notes`; None for a file of others.
         name_of: what the format calls a column.
         usual: names of what is read in any case.
@@ -148,9 +148,9 @@ def header_from_notes(
     Raises:
         InputError: the notes are damaged.
     """
-    names = {column.name for layer in LAYERS.values() for column in layer.columns if name_of(column) in stored}
+    names = {column.name for layer in LAYERS.values() for column in layer.columns if name_of(column) in stored_names}
     attributes = attributes_of(names)
-    left_out = tuple(sorted(stored - usual - {name_of(column) for column in columns(attributes)}))
+    left_out = tuple(sorted(stored_names - usual - {name_of(column) for column in columns(attributes)}))
     header = CloudHeader(path, kind, count, np.zeros(3), attributes=attributes, has_color=has_color, left_out=left_out)
     if not isinstance(notes, dict):
         return header

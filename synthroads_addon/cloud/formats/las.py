@@ -145,10 +145,10 @@ class LasWriter(CloudWriter):
         extent_and_counts = loops.pack(record, points)
         if extent_and_counts is None:
             return False
-        (lowest, highest), by_return = extent_and_counts
+        (least_steps, largest_steps), by_return = extent_and_counts
         self._low, self._high = (
-            np.minimum(self._low, lowest.astype(np.int64)),
-            np.maximum(self._high, highest.astype(np.int64)),
+            np.minimum(self._low, least_steps.astype(np.int64)),
+            np.maximum(self._high, largest_steps.astype(np.int64)),
         )
         self._by_return += by_return
         return True
@@ -177,15 +177,15 @@ class LasWriter(CloudWriter):
         steps = np.empty((3, len(xyz)))  # a row per axis: its extremes are found ten times as fast
         np.subtract(xyz.T, self._header.offsets[:, None], out=steps)
         np.rint(np.multiply(steps, 1.0 / SCALE, out=steps), out=steps)
-        lowest, highest = steps.min(axis=1), steps.max(axis=1)
-        if not (np.all(lowest >= -(2**31)) and np.all(highest < 2**31)):
+        least_steps, largest_steps = steps.min(axis=1), steps.max(axis=1)
+        if not (np.all(least_steps >= -(2**31)) and np.all(largest_steps < 2**31)):
             farthest_place = xyz[np.abs(steps).max(axis=0).argmax()]
             raise OutputError(
                 str(self.path), farthest_place.tolist(), "coordinates must lie within 2147 km of the offset"
             )
         record["X"], record["Y"], record["Z"] = steps
-        self._low = np.minimum(self._low, lowest.astype(np.int64))
-        self._high = np.maximum(self._high, highest.astype(np.int64))
+        self._low = np.minimum(self._low, least_steps.astype(np.int64))
+        self._high = np.maximum(self._high, largest_steps.astype(np.int64))
 
     def _pack_returns(self, block: PointBlock, record: AnyArray) -> None:
         """Fill in, in place, return number and number of returns, four bits each, and count points by return."""
@@ -311,7 +311,7 @@ class LasReader(CloudReader):
         position, path = 0, self.header.path
         if self._reader.points_read:
             self._reader.seek(0)
-        full = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
+        brightness = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
         while position < self.header.count:
             count = min(size, self.header.count - position)
             try:
@@ -324,7 +324,7 @@ class LasReader(CloudReader):
                 raise
             if len(record) != count:
                 raise damage_error(path, position + len(record), self.header.count)
-            yield self._block(record, full, position)
+            yield self._block(record, brightness, position)
             position += count
 
     def _check_size(self, path: Path) -> None:
@@ -356,12 +356,12 @@ class LasReader(CloudReader):
 
         return self._assumed_brightness(colors(), is_integer=True)
 
-    def _block(self, record: Any, full: float, position: int) -> PointBlock:
+    def _block(self, record: Any, brightness: float, position: int) -> PointBlock:
         """Return the block of points from a record.
 
         Args:
             record: of laspy, n points.
-            full: stored value of full brightness.
+            brightness: stored value of full brightness.
             position: points before these, for messages.
         """
         header = self._reader.header
@@ -369,17 +369,17 @@ class LasReader(CloudReader):
         present = [column.name for column in columns(self.header.attributes) if column.name in names]
         present += [name for name in FLAGS if name in names]
         fields = [name for name in ("return_number", "number_of_returns", "gps_time") if name in names]
-        stored = {name: np.array(record[name]) for name in (*present, *fields)}
-        stored["class_id"] = np.array(record["class_id" if self.header.labelled else "classification"])
+        arrays = {name: np.array(record[name]) for name in (*present, *fields)}
+        arrays["class_id"] = np.array(record["class_id" if self.header.labelled else "classification"])
         steps = np.stack([record.array[axis] for axis in "XYZ"], axis=1)
-        stored["xyz"] = steps * header.scales + header.offsets
-        stored["intensity"] = np.asarray(record["intensity"]).astype(np.float64) / (self.header.intensity_scale or 1.0)
+        arrays["xyz"] = steps * header.scales + header.offsets
+        arrays["intensity"] = np.asarray(record["intensity"]).astype(np.float64) / (self.header.intensity_scale or 1.0)
         if self.header.has_color:
             rgb = np.stack([record[name] for name in ("red", "green", "blue")], axis=1)
-            stored["rgb"] = rgb if full == SIXTEEN_BITS else sixteen_bits(rgb, full)
-        stored["scan_angle_deg"] = _scan_angle(record, names)
-        stored["strip"] = np.asarray(record["point_source_id"]) - np.uint16(1)
-        block = self._points(stored, len(record), position)
+            arrays["rgb"] = rgb if brightness == SIXTEEN_BITS else sixteen_bits(rgb, brightness)
+        arrays["scan_angle_deg"] = _scan_angle(record, names)
+        arrays["strip"] = np.asarray(record["point_source_id"]) - np.uint16(1)
+        block = self._points(arrays, len(record), position)
         return block if self.header.predicted is None else block.with_arrays({PREDICTED: np.array(record[PREDICTED])})
 
 

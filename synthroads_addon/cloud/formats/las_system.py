@@ -121,10 +121,10 @@ class _GeoKeys:
     def _no_map(self, model: str) -> MapSystem:
         """Raise `InputError` for coordinates of a model that is no map."""
         code = self.values.get(_GEOGRAPHIC)
-        shown = f"{model}, EPSG:{code}" if code and code != _OWN else model
+        model_text = f"{model}, EPSG:{code}" if code and code != _OWN else model
         unit = "degrees" if model == "geographic" else "distances from the Earth's centre"
         requirement = f"its coordinates are {unit}: metres or feet of a projected system are needed"
-        raise InputError(f"{self._path}: coordinate system", shown, requirement)
+        raise InputError(f"{self._path}: coordinate system", model_text, requirement)
 
     def _projected(self, code: Any, notes: list[str]) -> MapSystem | None:
         """Return the projected system of a code; None without a code, or for an unknown one, which is noted."""

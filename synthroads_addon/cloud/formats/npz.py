@@ -107,12 +107,12 @@ class NpzReader(CloudReader):
             self.close()
             raise
         arrays = set(self._kinds)
-        stored = {name.removesuffix(".npy") for name in self._file.namelist()}
+        stored_names = {name.removesuffix(".npy") for name in self._file.namelist()}
         self.header = header_from_notes(
             path,
             "NPZ",
             self._kinds["xyz"][0][0],
-            stored,
+            stored_names,
             notes,
             name_of=lambda column: column.array,
             usual=arrays | {"notes"},
@@ -121,7 +121,7 @@ class NpzReader(CloudReader):
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
         """Yield the points as blocks of at most ``size``, read in step from all arrays."""
-        full = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
+        brightness = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
         members = {name: self._file.open(f"{name}.npy") for name in self._kinds}
         try:
             for member in members.values():
@@ -133,8 +133,8 @@ class NpzReader(CloudReader):
                 except ARCHIVE_FAULTS:
                     raise damage_error(self.header.path, position, self.header.count) from None
                 check_coordinates(self.header.path, position, arrays["xyz"])
-                if "rgb" in arrays and (full != SIXTEEN_BITS or arrays["rgb"].dtype.kind == "f"):
-                    arrays["rgb"] = sixteen_bits(arrays["rgb"], full)
+                if "rgb" in arrays and (brightness != SIXTEEN_BITS or arrays["rgb"].dtype.kind == "f"):
+                    arrays["rgb"] = sixteen_bits(arrays["rgb"], brightness)
                 yield self._block(arrays, rows, position)
         finally:
             for member in members.values():

@@ -173,9 +173,9 @@ class PlyReader(CloudReader):
         self._others = {} if isinstance(notes, dict) else self._names_of_others()
         used_names = {*"xyz", *self._own.values(), *self._others.values()}
         has_color = all(name in self._own or name in self._others for name in _CHANNELS)
-        stored, usual = {*self._own, *(self._names - used_names)}, {*_own_names()}
+        names_for_header, usual = {*self._own, *(self._names - used_names)}, {*_own_names()}
         self.header = header_from_notes(
-            path, "PLY", count, stored, notes, name_of=ply_name, usual=usual, has_color=has_color
+            path, "PLY", count, names_for_header, notes, name_of=ply_name, usual=usual, has_color=has_color
         )
         self._assumed_scheme = not self.header.labelled and {ply_name(column) for column in LABELS} <= self._own.keys()
         if self._assumed_scheme:  # one of ours that other software wrote again, without its notes
@@ -208,14 +208,14 @@ class PlyReader(CloudReader):
             assume(f"{self.header.path.name}: its class_id is read as numbers of the 17 classes")
         elif label and _plain(label) != _CLASSES[0]:
             assume(f"{self.header.path.name}: its property {label} is read as LAS codes of classes")
-        full = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
+        brightness = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
         self._file.seek(self._start)
         for position in range(0, self.header.count, size):
             rows = min(size, self.header.count - position)
             data = self._file.read(rows * self._type.itemsize)
             if len(data) != rows * self._type.itemsize:
                 raise damage_error(self.header.path, position, self.header.count)
-            yield self._block(np.frombuffer(data, dtype=self._type), full, position)
+            yield self._block(np.frombuffer(data, dtype=self._type), brightness, position)
 
     def _channels(self) -> list[str]:
         """Return the names of the properties of red, green and blue."""
@@ -238,34 +238,38 @@ class PlyReader(CloudReader):
 
         return self._assumed_brightness(colors(), is_integer=all(kind.kind in "iu" for kind in kinds))
 
-    def _block(self, record: AnyArray, full: float, position: int) -> PointBlock:
+    def _block(self, record: AnyArray, brightness: float, position: int) -> PointBlock:
         """Return the block of points from records.
 
         Args:
             record: (n,) of the file's type.
-            full: stored value of full brightness.
+            brightness: stored value of full brightness.
             position: points before these, for messages.
         """
-        stored_names, others = self._own, self._others
-        stored = {
+        stored_names, properties_of_others = self._own, self._others
+        arrays = {
             c.name: record[stored_names[ply_name(c)]]
             for c in columns(self.header.attributes)
             if ply_name(c) in stored_names
         }
-        stored |= {
+        arrays |= {
             array: record[stored_names[name]].copy() for array, (name, _) in _FIELDS.items() if name in stored_names
         }
-        stored |= {name: record[field].copy() for name, field in others.items() if name in (*_FIELDS, *FLAGS)}
-        if "source" in others:  # from 1, as in LAS; 0 is none, which strips count as 65535
-            source = self._fit(record[others["source"]], "strip", position)
-            stored["strip"] = source - np.uint16(1)
+        arrays |= {
+            name: record[field].copy() for name, field in properties_of_others.items() if name in (*_FIELDS, *FLAGS)
+        }
+        if "source" in properties_of_others:  # from 1, as in LAS; 0 is none, which strips count as 65535
+            source = self._fit(record[properties_of_others["source"]], "strip", position)
+            arrays["strip"] = source - np.uint16(1)
         if not self.header.labelled:
-            stored["class_id"] = record[others["class"]] if "class" in others else np.zeros(len(record))
+            arrays["class_id"] = (
+                record[properties_of_others["class"]] if "class" in properties_of_others else np.zeros(len(record))
+            )
         xyz = np.stack([record[name].astype(np.float64) for name in "xyz"], axis=1)
-        stored["xyz"] = check_coordinates(self.header.path, position, xyz)
+        arrays["xyz"] = check_coordinates(self.header.path, position, xyz)
         if self.header.has_color:
-            stored["rgb"] = sixteen_bits(np.stack([record[name] for name in self._channels()], axis=1), full)
-        return self._points(stored, len(record), position)
+            arrays["rgb"] = sixteen_bits(np.stack([record[name] for name in self._channels()], axis=1), brightness)
+        return self._points(arrays, len(record), position)
 
 
 def _own_names() -> tuple[str, ...]:

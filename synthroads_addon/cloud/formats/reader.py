@@ -110,8 +110,8 @@ class CloudReader(ABC):
         Raises:
             InputError: a number doesn't fit into its array: nothing wraps.
         """
-        fitted = {name: self._fit(values, name, position) for name, values in stored.items()}
-        return make_points(fitted, self.header.attributes, count)
+        checked_arrays = {name: self._fit(values, name, position) for name, values in stored.items()}
+        return make_points(checked_arrays, self.header.attributes, count)
 
     def _fit(self, values: AnyArray, name: str, position: int) -> AnyArray:
         """Return values (N, ...) in the type of whole numbers that their name has in blocks, where it has one.

@@ -187,8 +187,8 @@ class _Neighbourhood:
         """Return the statistics of how a patch's points lie about their plane; roughness in mm."""
         skew, kurtosis = _shape(residual)
         steps = self.place[self.neighbour[rows, 0], 2] - self.place[rows, 2]
-        spread = max(float(residual.std()), 1e-6)
-        return [1e3 * spread, skew, kurtosis, curvature, float(np.sqrt(np.mean(steps**2))) / spread]
+        deviation = max(float(residual.std()), 1e-6)
+        return [1e3 * deviation, skew, kurtosis, curvature, float(np.sqrt(np.mean(steps**2))) / deviation]
 
     def _intensity(self, rows: Index, residual: Float) -> list[float]:
         """Return the statistics of a patch's intensities, in dB, among each other and to the cloud's median."""
@@ -220,10 +220,10 @@ def _fit_surface(place: Float) -> tuple[Float, float]:
 
 def _shape(values: Float) -> tuple[float, float]:
     """Return skewness and (non-excess) kurtosis of values (N,); 0 for both if all are alike."""
-    spread = values.std()
-    if spread < 1e-9:
+    deviation = values.std()
+    if deviation < 1e-9:
         return 0.0, 0.0
-    standardised = (values - values.mean()) / spread
+    standardised = (values - values.mean()) / deviation
     return float(np.mean(standardised**3)), float(np.mean(standardised**4))
 
 

@@ -212,13 +212,13 @@ def _draw(
     view = TopView(start, end, right_reach, left_reach, header.scheme)
     predicted = TopView(start, end, right_reach, left_reach, header.predicted) if "predicted" in kinds else None
     path = extent.axis() if centerline is None else centerline
-    middle, right, reach = _cross_cut(line, station, path, max(1.0, (left_reach - right_reach) / 2), extent)
+    middle, rightward, reach = _cross_cut(line, station, path, max(1.0, (left_reach - right_reach) / 2), extent)
     slab: list[PointBlock] = []
     for block in _staying_blocks(cloud, strays):
         view.add(block)
         if predicted:
             predicted.add(block.with_arrays({"class_id": block.array(PREDICTED)}))
-        distance = (block.xyz[:, :2] - middle) @ np.array([-right[1], right[0]])
+        distance = (block.xyz[:, :2] - middle) @ np.array([-rightward[1], rightward[0]])
         slab.append(block.select(np.abs(distance) <= depth / 2))
     fields = {kind: {"class": header.class_field, "predicted": PREDICTED}.get(kind, kind) for kind in kinds}
     view.save(folder, header.epsg, [kind for kind in kinds if kind not in ("predicted", "section")], fields)
@@ -232,9 +232,9 @@ def _draw(
         raise InputError("--line" if line else "--station", line or station, "meets no points of the cloud")
     heights = float(slab_points.xyz[:, 2].min()), float(slab_points.xyz[:, 2].max())
     if line is None:
-        reach = 1.02 * float(np.abs((slab_points.xyz[:, :2] - middle) @ right).max()) + 0.5
+        reach = 1.02 * float(np.abs((slab_points.xyz[:, :2] - middle) @ rightward).max()) + 0.5
     by_class = len(np.unique(slab_points.class_id)) > 1
-    section = CrossSection(middle, right, reach, depth, heights, header.scheme, by_class)
+    section = CrossSection(middle, rightward, reach, depth, heights, header.scheme, by_class)
     section.add(slab_points)
     fields["section"] = header.class_field if by_class else "intensity"
     section.save(folder / preview_file("section"), fields["section"])
@@ -297,12 +297,12 @@ class _Extent:
             if not len(block):
                 continue
             origin = origin if count else block.xyz[0, :2].copy()
-            local = block.xyz[:, :2] - origin
-            count += len(local)
-            total += local.sum(axis=0)
-            products += local.T @ local
-            projections = local @ directions
-            outermost.append(local[np.r_[projections.argmin(axis=0), projections.argmax(axis=0)]])
+            offsets = block.xyz[:, :2] - origin
+            count += len(offsets)
+            total += offsets.sum(axis=0)
+            products += offsets.T @ offsets
+            projections = offsets @ directions
+            outermost.append(offsets[np.r_[projections.argmin(axis=0), projections.argmax(axis=0)]])
         if count == 0:
             raise InputError(str(path), None, "has no points")
         self._outermost = np.concatenate(outermost) + origin
@@ -322,8 +322,8 @@ class _Extent:
         direction = np.asarray(end) - np.asarray(start)
         length = float(np.hypot(*direction))
         direction = direction / length if length else np.array([1.0, 0.0])
-        lowest, highest = self._reach(np.asarray(start), np.array([-direction[1], direction[0]]))
-        return lowest - 1.0, highest + 1.0
+        right_reach, left_reach = self._reach(np.asarray(start), np.array([-direction[1], direction[0]]))
+        return right_reach - 1.0, left_reach + 1.0
 
     def axis(self) -> Float:
         """Return both ends (2, 2) of the cloud's long axis, map coordinates, m."""

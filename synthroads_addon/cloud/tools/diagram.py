@@ -37,10 +37,10 @@ class PlotFrame:
 
     def at(self, x: Float, y: Float) -> list[tuple[float, float]]:
         """Return values as (x, y) pixels of the enlarged picture; what lies above the box is cut at its top."""
-        left_edge, top, right_edge, bottom = self.box
+        left_edge, top_edge, right_edge, bottom_edge = self.box
         columns = left_edge + (np.asarray(x) - self.low[0]) / (self.high[0] - self.low[0]) * (right_edge - left_edge)
-        rows = bottom - (np.asarray(y) - self.low[1]) / (self.high[1] - self.low[1]) * (bottom - top)
-        return list(zip(columns.tolist(), np.maximum(rows, top).tolist(), strict=True))
+        rows = bottom_edge - (np.asarray(y) - self.low[1]) / (self.high[1] - self.low[1]) * (bottom_edge - top_edge)
+        return list(zip(columns.tolist(), np.maximum(rows, top_edge).tolist(), strict=True))
 
 
 def draw_picture(size: tuple[int, int], paint: Callable[[ImageDraw.ImageDraw], None]) -> Image.Image:
@@ -52,15 +52,15 @@ def draw_picture(size: tuple[int, int], paint: Callable[[ImageDraw.ImageDraw], N
 
 def draw_grid(frame: PlotFrame, text: str) -> None:
     """Draw a frame with vertical grid lines, their values, and the axis label below."""
-    left_edge, top, right_edge, bottom = frame.box
+    left_edge, top_edge, right_edge, bottom_edge = frame.box
     step = nice_step((frame.high[0] - frame.low[0]) / 6.0)
     for value in _multiples(np.ceil(frame.low[0] / step), frame.high[0], step):
         (x, _), *_ = frame.at(np.array([value]), np.array([0.0]))
-        frame.draw.line([(x, top), (x, bottom)], fill=GRID, width=SCALE)
+        frame.draw.line([(x, top_edge), (x, bottom_edge)], fill=GRID, width=SCALE)
         value_text = f"{value:,.0f}" if step >= 1 else f"{value:.3g}"
-        draw_text(frame.draw, (x / SCALE, bottom / SCALE + 6), value_text, 13, SOFT, anchor="ma")
-    frame.draw.rectangle([left_edge, top, right_edge, bottom], outline=SOFT, width=SCALE)
-    draw_text(frame.draw, (right_edge / SCALE, bottom / SCALE + 24), text, 13, SOFT, anchor="ra")
+        draw_text(frame.draw, (x / SCALE, bottom_edge / SCALE + 6), value_text, 13, SOFT, anchor="ma")
+    frame.draw.rectangle([left_edge, top_edge, right_edge, bottom_edge], outline=SOFT, width=SCALE)
+    draw_text(frame.draw, (right_edge / SCALE, bottom_edge / SCALE + 24), text, 13, SOFT, anchor="ra")
 
 
 def draw_levels(frame: PlotFrame, step: float) -> None:

@@ -83,8 +83,8 @@ class DisplayCloud:
         """Return the 0.5 and 99.5 % quantiles that the first and last colour stand for; heights in map m; cached."""
         if by not in self._limits:
             values, shift = (self.brightness, 0.0) if by == "intensity" else (self.xyz[:, 2], self.origin[2])
-            lowest, highest = np.quantile(values, [0.005, 0.995])
-            self._limits[by] = (float(lowest + shift), float(highest + shift))
+            minimum, maximum = np.quantile(values, [0.005, 0.995])
+            self._limits[by] = (float(minimum + shift), float(maximum + shift))
         return self._limits[by]
 
     def colors(self, by: ColourBy) -> UInt8:
@@ -102,8 +102,8 @@ class DisplayCloud:
         if by == "intensity":
             shades, _ = grays(self.brightness.astype(np.float64), np.ones(len(self), dtype=bool), self.brightness_text)
             return shades.astype(np.uint8)
-        lowest, highest = (value - self.origin[2] for value in self.limits("height"))
-        share = np.clip((self.xyz[:, 2] - lowest) / max(highest - lowest, 1e-9), 0.0, 1.0)
+        minimum, maximum = (value - self.origin[2] for value in self.limits("height"))
+        share = np.clip((self.xyz[:, 2] - minimum) / max(maximum - minimum, 1e-9), 0.0, 1.0)
         return height_colors()[np.nan_to_num(share * 255.0).astype(np.uint8)]
 
 

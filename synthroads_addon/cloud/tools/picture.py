@@ -242,9 +242,9 @@ def _grow_cells(picture: UInt8, is_filled: Bool) -> tuple[UInt8, Bool]:
         edge: list[slice | int] = [slice(None), slice(None)]
         edge[axis] = 0 if step == 1 else -1
         beside_filled[tuple(edge)] = False  # nothing comes round from the other side
-        grown = beside_filled & ~mask
-        result[grown] = color[grown]
-        mask |= grown
+        grown_mask = beside_filled & ~mask
+        result[grown_mask] = color[grown_mask]
+        mask |= grown_mask
     return result, mask
 
 
@@ -287,9 +287,9 @@ def grays(values: Float, is_filled: Bool, text: str) -> tuple[Float, GrayBar]:
         is_filled: (N,) of which values the quantiles are.
         text: name of the quantity.
     """
-    lowest, highest = np.quantile(values[is_filled], [0.005, 0.995]) if is_filled.any() else (0.0, 1.0)
-    shade = np.clip((values - lowest) / max(highest - lowest, 1e-300), 0, 1) * 255
-    return np.repeat(shade[:, None], 3, axis=1), GrayBar(float(lowest), float(highest), text)
+    black_value, white_value = np.quantile(values[is_filled], [0.005, 0.995]) if is_filled.any() else (0.0, 1.0)
+    shade = np.clip((values - black_value) / max(white_value - black_value, 1e-300), 0, 1) * 255
+    return np.repeat(shade[:, None], 3, axis=1), GrayBar(float(black_value), float(white_value), text)
 
 
 def add_frame(

@@ -65,8 +65,8 @@ class TopView:
         normal = np.array([-chord[1], chord[0]]) / max(np.hypot(*chord), 1e-9)
         edges = np.concatenate([plan + reach * leftward, plan - reach * leftward])
         offsets = (edges - plan[0]) @ normal
-        lowest, highest = float(offsets.min()) - _BORDER, float(offsets.max()) + _BORDER
-        return cls(plan[0] + origin, plan[-1] + origin, lowest, highest, scheme)
+        right_reach, left_reach = float(offsets.min()) - _BORDER, float(offsets.max()) + _BORDER
+        return cls(plan[0] + origin, plan[-1] + origin, right_reach, left_reach, scheme)
 
     @classmethod
     def over_box(cls, lowest_corner: Float, highest_corner: Float, scheme: ClassScheme | None = None) -> Self:
@@ -150,13 +150,13 @@ class CrossSection:
         self.depth = depth
         self.by_class = by_class
         pixel = 2 * reach / WIDTH
-        lowest, highest = heights[0] - 0.5, heights[1] + 0.5
-        usual_exaggeration = _LOWEST * pixel / (highest - lowest)
+        bottom_height, top_height = heights[0] - 0.5, heights[1] + 0.5
+        usual_exaggeration = _LOWEST * pixel / (top_height - bottom_height)
         self.exaggeration = 1.0 if usual_exaggeration <= 1 else min(10.0, nice_step(1.4 * usual_exaggeration))
-        row_height = max(pixel / self.exaggeration, (highest - lowest) / _MOST_PIXELS)
+        row_height = max(pixel / self.exaggeration, (top_height - bottom_height) / _MOST_PIXELS)
         self.exaggeration = pixel / row_height
-        size = (WIDTH, max(1, int(np.ceil((highest - lowest) / row_height))))
-        self.raster = Raster(Axes(-reach, lowest, pixel, row_height), size)
+        size = (WIDTH, max(1, int(np.ceil((top_height - bottom_height) / row_height))))
+        self.raster = Raster(Axes(-reach, bottom_height, pixel, row_height), size)
         self.scheme = scheme or class_scheme("17")
 
     def add(self, block: PointBlock) -> None:

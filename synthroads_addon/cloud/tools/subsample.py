@@ -127,11 +127,11 @@ def _order(block: PointBlock, cells: Float, nearness: Float) -> Index:
         cells: (N, 3) numbers of their cells.
         nearness: (N,) the less, the nearer to the cell's centre.
     """
-    lowest = cells.min(axis=0) if len(cells) else np.zeros(3)
-    spans = (cells.max(axis=0) - lowest + 1 if len(cells) else np.ones(3)).astype(np.int64)
+    least_numbers = cells.min(axis=0) if len(cells) else np.zeros(3)
+    spans = (cells.max(axis=0) - least_numbers + 1 if len(cells) else np.ones(3)).astype(np.int64)
     if float(np.prod(spans.astype(np.float64))) < 2**62:
         # The three numbers as one, which sorts faster.
-        relative = (cells - lowest).astype(np.int64)
+        relative = (cells - least_numbers).astype(np.int64)
         key = (relative[:, 2] * spans[1] + relative[:, 1]) * spans[0] + relative[:, 0]
         order = np.lexsort((nearness, key))
         has_ties = (np.diff(key[order]) == 0) & (np.diff(nearness[order]) == 0)

@@ -227,9 +227,9 @@ def needed_layers(names: frozenset[str], mode: ColourMode) -> frozenset[str]:
     return frozenset(layer_names)
 
 
-def decode_srgb(stored: Float) -> Float:
+def decode_srgb(encoded: Float) -> Float:
     """Return the linear values of sRGB-encoded ones (IEC 61966-2-1), both 0 to 1."""
-    return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
 
 
 def encode_srgb(linear: NDArray[np.floating]) -> UInt16:
@@ -336,8 +336,11 @@ class MaterialLayers:
                 sun[rendered] = channels["sun"][rendered]
         if everywhere and "sky" not in channels and self.clouds is None and (loops := point_loops()) is not None:
             normal = np.asarray(points.normal, np.float32)
-            above, below = np.asarray(self.light.above, np.float32), np.asarray(self.light.below, np.float32)
-            linear = loops.daylight(sun, color, normal, above, below)
+            light_above, light_below = (
+                np.asarray(self.light.above, np.float32),
+                np.asarray(self.light.below, np.float32),
+            )
+            linear = loops.daylight(sun, color, normal, light_above, light_below)
             return loops.encoded(linear, np.power(linear, _SRGB_POWER))
         sky = color * self.light.sky(points.normal)
         if "sky" in channels:

@@ -133,10 +133,10 @@ class ImageLayers:
             for slot in np.unique(slots):
                 members_of_image = members[slots == slot]
                 image = self.images[candidates[slot]]
-                sampled, is_shown = sample_image(image, group.select(members_of_image))
-                shown = members_of_image[is_shown]
-                self._write(points, rows[shown], values, source, image, sampled, rank + 1)
-                is_hidden[shown] = False
+                channels, is_shown = sample_image(image, group.select(members_of_image))
+                shown_members = members_of_image[is_shown]
+                self._write(points, rows[shown_members], values, source, image, channels, rank + 1)
+                is_hidden[shown_members] = False
         if is_hidden.any():
             self._fill_hidden(points, rows[is_hidden], values, source)
 
@@ -158,20 +158,20 @@ class ImageLayers:
         for slot, number in enumerate(candidates):
             better = np.flatnonzero(misfit[slot] < least_misfit)
             image = self.images[number]
-            sampled, is_shown = sample_image(image, group.select(better))
-            shown = better[is_shown]
-            self._write(points, rows[shown], values, source, image, sampled, rank[slot, shown] + 1)
-            least_misfit[shown] = misfit[slot, shown]
+            channels, is_shown = sample_image(image, group.select(better))
+            shown_members = better[is_shown]
+            self._write(points, rows[shown_members], values, source, image, channels, rank[slot, shown_members] + 1)
+            least_misfit[shown_members] = misfit[slot, shown_members]
         # Points that no image shows: the nearest place of their material within `REACH`; 0 for those that one shows.
         nearest_distance = np.where(source[rows] == FROM_MATERIAL, REACH, 0.0)
         for slot, number in enumerate(candidates):
             members = np.flatnonzero((nearest_distance > 0.0) & (misfit[slot] < _NOWHERE))
             image = self.images[number]
-            sampled, is_nearer, distance = sample_nearby(
+            channels, is_nearer, distance = sample_nearby(
                 image, group.position[members], group.material[members], nearest_distance[members]
             )
             nearer = members[is_nearer]
-            self._write(points, rows[nearer], values, source, image, sampled, NEARBY)
+            self._write(points, rows[nearer], values, source, image, channels, NEARBY)
             nearest_distance[nearer] = distance
         nearby_rows = rows[source[rows] == NEARBY]
         nearby_points = points.select(nearby_rows)
@@ -184,7 +184,7 @@ class ImageLayers:
         values: Float32,
         source: UInt8,
         image: RenderedImage,
-        sampled: Float32,
+        channels: Float32,
         code: Index | int,
     ) -> None:
         """Write what an image gives some rows (K,) of points into values, sources and times, in place.
@@ -193,10 +193,10 @@ class ImageLayers:
             points, values, source: see `_fill_group`.
             rows: (K,) of the points.
             image: the image.
-            sampled: (K, C) channels.
+            channels: (K, C) channels.
             code: (K,) or one, of `LayerValues.source`.
         """
-        values[rows], source[rows], points.time[rows] = sampled, code, image.view.time
+        values[rows], source[rows], points.time[rows] = channels, code, image.view.time
 
     def _misfits(self, points: SeenPoints, count: int) -> tuple[Index, Float32]:
         """Return the indices (C,) of the images nearest to the scanner, and their misfits (C, N) to the points, rad.
@@ -321,9 +321,13 @@ def sample_nearby(image: RenderedImage, position: Float, material: UInt16, limit
     counts &= image.material[j, i] == material[:, None] + 1
     distance = np.linalg.norm(view.unproject(i, j, image.depth[j, i]) - position[:, None, :], axis=2)
     distance[~counts] = np.inf
-    nearest = np.arange(len(position)), distance.argmin(axis=1)
-    in_limit = distance[nearest] < limit
-    return image.layers[j[nearest], i[nearest]][in_limit].astype(np.float32), in_limit, distance[nearest][in_limit]
+    nearest_pixel = np.arange(len(position)), distance.argmin(axis=1)
+    in_limit = distance[nearest_pixel] < limit
+    return (
+        image.layers[j[nearest_pixel], i[nearest_pixel]][in_limit].astype(np.float32),
+        in_limit,
+        distance[nearest_pixel][in_limit],
+    )
 
 
 def relight_nearby(
@@ -347,8 +351,8 @@ def relight_nearby(
     mean = fallback.constants.values["base_color"][points.material]
     color = np.where(varies, values[:, channels["base_color"]], mean)
     sun = fallback.light.sun.astype(np.float32)
-    lit = values[:, channels["sun"]].sum(axis=1) > _LIT * (color * sun).sum(axis=1)
-    result[:, channels["sun"]] = color * fallback.light.sunlight(points.normal) * lit[:, None]
+    is_sunlit = values[:, channels["sun"]].sum(axis=1) > _LIT * (color * sun).sum(axis=1)
+    result[:, channels["sun"]] = color * fallback.light.sunlight(points.normal) * is_sunlit[:, None]
     return result
 
 

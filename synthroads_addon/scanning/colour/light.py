@@ -115,9 +115,9 @@ class CloudShadows:
         i, j = (corner % _CELLS).T
         next_i, next_j = (i + 1) % _CELLS, (j + 1) % _CELLS
         field = self._field
-        before = (1 - u) * field[i, j] + u * field[next_i, j]
-        after = (1 - u) * field[i, next_j] + u * field[next_i, next_j]
-        return np.asarray((1 - v) * before + v * after)
+        value_before = (1 - u) * field[i, j] + u * field[next_i, j]
+        value_after = (1 - u) * field[i, next_j] + u * field[next_i, next_j]
+        return np.asarray((1 - v) * value_before + v * value_after)
 
 
 def _cloud_field(cover: float, seed: int) -> Float32:

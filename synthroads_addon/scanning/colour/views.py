@@ -73,12 +73,19 @@ class View:
         is_shown = (depth > 0.0) & (x >= 0.0) & (x <= self.size[0]) & (y >= 0.0) & (y <= self.size[1])
         if not is_shown.any():
             return None
-        left, top = (max(0, int(values[is_shown].min()) - margin) for values in (x, y))
-        right, bottom = (
+        left_edge, top_edge = (max(0, int(values[is_shown].min()) - margin) for values in (x, y))
+        right_edge, bottom_edge = (
             min(size, int(values[is_shown].max()) + 1 + margin) for values, size in zip((x, y), self.size, strict=True)
         )
-        centre = (self.centre[0] - left, self.centre[1] - top)
-        return View(self.position, self.rotation, self.focal, centre, (right - left, bottom - top), self.time)
+        centre = (self.centre[0] - left_edge, self.centre[1] - top_edge)
+        return View(
+            self.position,
+            self.rotation,
+            self.focal,
+            centre,
+            (right_edge - left_edge, bottom_edge - top_edge),
+            self.time,
+        )
 
     @property
     def pixels(self) -> int:
@@ -200,8 +207,8 @@ def _cameras(
 
 def _turned_ahead(cos: float, sin: float) -> Float:
     """Return the axes (3, 3) of a level camera that looks ahead, turned about the vertical by an angle's cos, sin."""
-    ahead = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    return np.asarray(np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ ahead)
+    forward_axes = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    return np.asarray(np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ forward_axes)
 
 
 _UP = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -238,16 +245,16 @@ def _cut_view(
         return None
     x, y = right[in_limits] / -backward[in_limits], up[in_limits] / -backward[in_limits]
     left_edge, right_edge = _padded_range(x, limits[0])
-    bottom, top = _padded_range(y, limits[1])
-    if right_edge <= left_edge or top <= bottom:
+    bottom_edge, top_edge = _padded_range(y, limits[1])
+    if right_edge <= left_edge or top_edge <= bottom_edge:
         return None
-    focal = min(focal, largest_side / max(right_edge - left_edge, top - bottom))
-    size = (int(np.ceil((right_edge - left_edge) * focal)), int(np.ceil((top - bottom) * focal)))
-    return View(place, rotation, focal, (float(-left_edge * focal), float(top * focal)), size, time)
+    focal = min(focal, largest_side / max(right_edge - left_edge, top_edge - bottom_edge))
+    size = (int(np.ceil((right_edge - left_edge) * focal)), int(np.ceil((top_edge - bottom_edge) * focal)))
+    return View(place, rotation, focal, (float(-left_edge * focal), float(top_edge * focal)), size, time)
 
 
 def _padded_range(values: Float, limit: float) -> tuple[float, float]:
     """Return the range of sampled values, widened by a margin and cut at plus and minus the limit."""
-    lowest, highest = float(values.min()), float(values.max())
-    margin = 0.02 * (1.0 + highest - lowest)
-    return max(lowest - margin, -limit), min(highest + margin, limit)
+    least_value, largest_value = float(values.min()), float(values.max())
+    margin = 0.02 * (1.0 + largest_value - least_value)
+    return max(least_value - margin, -limit), min(largest_value + margin, limit)

@@ -95,12 +95,12 @@ class ShotRun:
         return PulseRays(self.time, *(self.column(name) for name in names))
 
 
-def shot_run(setting: ScannerSetting, first: int, count: int, with_frame: bool = False) -> ShotRun:
+def shot_run(setting: ScannerSetting, first_shot: int, count: int, with_frame: bool = False) -> ShotRun:
     """Return the shots that `shots` returns, as columns of a cached table where their directions repeat.
 
     Args:
         setting: the scanner's.
-        first: number of the first pulse.
+        first_shot: number of the first pulse.
         count: of pulses.
         with_frame: whether the axes across the beam are worked out.
     """
@@ -108,13 +108,13 @@ def shot_run(setting: ScannerSetting, first: int, count: int, with_frame: bool =
     length = lines * setting.pulses_per_line * len(setting.device.heads)  # shots of a cycle
     if 0 < length <= _LARGEST_TABLE and not setting.free_mirror:
         table = _cycle_table(setting, with_frame)
-        first_cycle, column = divmod(first, length)
+        first_cycle, column = divmod(first_shot, length)
         cycle_count = -(-(column + count) // length)
         cycles = np.arange(first_cycle, first_cycle + cycle_count, dtype=np.int64)
         time = table.time + (cycles * lines / setting.lines_per_second)[:, None]
         return ShotRun(table, column, time.ravel()[column : column + count].copy())
     # Directions that don't repeat, or too many to keep, are worked out shot by shot.
-    numbers = np.arange(first, first + count, dtype=np.int64)
+    numbers = np.arange(first_shot, first_shot + count, dtype=np.int64)
     if lines == 0 or setting.free_mirror:
         rays = _shots(setting, numbers, with_frame)
     else:

@@ -86,7 +86,7 @@ class MovingParts:
         beams: ctypes.Structure,
         first_ray: int,
         onward: OnwardRays | None,
-        met: tuple[AnyArray, Float, Float],
+        hit_arrays: tuple[AnyArray, Float, Float],
         maximum_range: float,
     ) -> None:
         """Replace, in place, what rays have met by what moves, where they meet that nearer.
@@ -96,12 +96,12 @@ class MovingParts:
             beams: the pulses, `Beams`.
             first_ray: number of the first of each pulse's rays that is cast.
             onward: (N,) rays that go on behind surfaces; None for the rays (K, P) of the pulses.
-            met: (K, P) or (N,) faces, int32, ranges, m, and n . d; ranges count from where a ray goes on.
+            hit_arrays: (K, P) or (N,) faces, int32, ranges, m, and n . d; ranges count from where a ray goes on.
             maximum_range: m.
         """
         if not self._bodies:
             return
-        face, distance, cosine = met
+        face, distance, cosine = hit_arrays
         reach = np.minimum(distance, maximum_range)
         ray_count = beams.pulses if onward is None else len(onward.ray)
         bundles = -(-ray_count // _BUNDLE)

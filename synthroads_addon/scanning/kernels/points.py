@@ -127,9 +127,9 @@ class _Columns(ctypes.Structure):
     @classmethod
     def of(cls, grid: ColumnGrid) -> _Columns:
         """Return a grid in the structure that points.c takes."""
-        axes, low, direction = (np.ravel(array).tolist() for array in (grid.axes, grid.low, grid.direction))
+        axes, corner, direction = (np.ravel(array).tolist() for array in (grid.axes, grid.low, grid.direction))
         return cls(
-            *((ctypes.c_double * 6)(*axes), (ctypes.c_double * 2)(*low), (_INT64 * 2)(*grid.cells), grid.margin),
+            *((ctypes.c_double * 6)(*axes), (ctypes.c_double * 2)(*corner), (_INT64 * 2)(*grid.cells), grid.margin),
             *((ctypes.c_double * 3)(*direction), grid.above),
         )
 
@@ -320,7 +320,7 @@ class CompiledPoints:
 
     def approached(
         self,
-        rough: Index,
+        rough_rows: Index,
         height: Float,
         cosine: Float,
         material: UInt16,
@@ -339,16 +339,30 @@ class CompiledPoints:
             towards: (N, 3) unit vectors to the scanner.
             place, distance: (N, 3), (N,) m.
         """
-        rough_count, count = len(rough), len(distance)
+        rough_count, count = len(rough_rows), len(distance)
         height, cosine = _as(np.float64, (rough_count,), height=height, cosine=cosine)
-        (rough,), (reach,) = _as(np.int64, (rough_count,), rough=rough), _as(np.float64, (len(reach),), reach=reach)
+        (rough_rows,), (reach,) = (
+            _as(np.int64, (rough_count,), rough=rough_rows),
+            _as(np.float64, (len(reach),), reach=reach),
+        )
         (material,), (distance,) = (
             _as(np.uint16, (count,), material=material),
             _as(np.float64, (count,), range=distance),
         )
         (towards,), (place,) = _as(np.float32, (count, 3), towards=towards), _as(np.float64, (count, 3), place=place)
         shifted_place, shifted_distance = np.empty((count, 3)), np.empty(count)
-        arrays = (rough, height, cosine, material, reach, towards, place, distance, shifted_place, shifted_distance)
+        arrays = (
+            rough_rows,
+            height,
+            cosine,
+            material,
+            reach,
+            towards,
+            place,
+            distance,
+            shifted_place,
+            shifted_distance,
+        )
         self._functions["approach"](count, rough_count, *(array.ctypes.data for array in arrays))
         return shifted_place, shifted_distance
 
@@ -529,7 +543,7 @@ class CompiledPoints:
         x, y = _as(np.float64, (count,), x=places[0], y=places[1])
         station, least_station, largest_station = (np.array(array, np.float64) for array in brackets)
         _as(np.float64, (count,), station=station, low=least_station, high=largest_station)
-        rest, offset, active, active_count = np.empty(count), np.empty(count), np.arange(count), count
+        remainder, offset, active, active_count = np.empty(count), np.empty(count), np.arange(count), count
         for _ in range(most_iterations):
             px, py, heading, bend = (np.ascontiguousarray(array) for array in evaluate(station[active[:active_count]]))
             cosine, sine, turn, lever = np.cos(heading), np.sin(heading), np.empty(active_count), np.empty(active_count)
@@ -539,7 +553,7 @@ class CompiledPoints:
                 station,
                 least_station,
                 largest_station,
-                rest,
+                remainder,
                 offset,
                 active,
                 px,
@@ -556,7 +570,7 @@ class CompiledPoints:
             active_count = self._functions["step"](active_count, ctypes.byref(native_feet), angle.ctypes.data)
             if not active_count:
                 break
-        return station, rest, offset
+        return station, remainder, offset
 
     def face_columns(self, faces: Faces, grid: ColumnGrid, most_faces: int) -> tuple[AnyArray, AnyArray]:
         """Return the faces that may touch each cell of a grid: indices (C + 1,) into a list of faces, and this list.
@@ -578,8 +592,8 @@ class CompiledPoints:
         self._functions["sort_faces"](*head, counts.ctypes.data, None, None, None)
         counts[counts > most_faces] = 0
         np.cumsum(counts, out=counts)
-        numbers, filled = np.empty(int(starts[-1]), np.int32), np.zeros(cells, np.uint8)
-        self._functions["sort_faces"](*head, None, *(array.ctypes.data for array in (starts, filled, numbers)))
+        numbers, fill_counts = np.empty(int(starts[-1]), np.int32), np.zeros(cells, np.uint8)
+        self._functions["sort_faces"](*head, None, *(array.ctypes.data for array in (starts, fill_counts, numbers)))
         return starts, numbers
 
     def clear_places(
@@ -629,8 +643,8 @@ class CompiledPoints:
             *(points.per_metre, points.per_intensity, points.per_degree, len(points.codes)),
         )
         extremes, by_return = np.array([[np.inf] * 3, [-np.inf] * 3]), np.zeros(16, np.int64)
-        filled = (record.ctypes.data, extremes.ctypes.data, by_return.ctypes.data)
-        fits = self._functions["pack"](count, ctypes.byref(native_points), record.itemsize, *filled)
+        output_addresses = (record.ctypes.data, extremes.ctypes.data, by_return.ctypes.data)
+        fits = self._functions["pack"](count, ctypes.byref(native_points), record.itemsize, *output_addresses)
         return (extremes, by_return) if fits else None
 
     def evaluate_pieces(self, station: Float, pieces: Sequence[Float]) -> Float:

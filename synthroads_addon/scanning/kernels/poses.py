@@ -66,14 +66,14 @@ class CompiledPoses:
                 f"vectors must be {MOST_SETS} arrays of shape (3, {width}) at most, but have the shapes {shapes}; "
                 f"rotations must be (9, {knots}), but are {rotation.shape}"
             )
-        place, turned = np.empty((3, count)), [np.empty((3, count)) for _ in sets]
-        addresses = [(_POINTER * MOST_SETS)(*(array.ctypes.data for array in arrays)) for arrays in (sets, turned)]
+        place, results = np.empty((3, count)), [np.empty((3, count)) for _ in sets]
+        addresses = [(_POINTER * MOST_SETS)(*(array.ctypes.data for array in arrays)) for arrays in (sets, results)]
         self._turn(
             *(count, times.ctypes.data, track.begin, track.spacing, knots, rotation.ctypes.data, position.ctypes.data),
             *(first_column, width, None if rows is None else rows.ctypes.data),
             *(len(sets), *addresses, place.ctypes.data),
         )
-        return place, turned
+        return place, results
 
 
 @cache

@@ -184,8 +184,8 @@ class ProgramBuilder:
 
     def picture(self, picture: Picture) -> int:
         """Return the number of an image, which is added to the program if it isn't there yet."""
-        for number, other in enumerate(self.pictures):
-            if other.pixels is picture.pixels and other[1:] == picture[1:]:
+        for number, known_picture in enumerate(self.pictures):
+            if known_picture.pixels is picture.pixels and known_picture[1:] == picture[1:]:
                 return number
         self.pictures.append(picture)
         return len(self.pictures) - 1

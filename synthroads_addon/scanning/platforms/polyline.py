@@ -140,8 +140,8 @@ def _clothoid_lengths(turn: Float, reach: Float) -> Float:
     # Gauss and Legendre's rule of 20 nodes on 0 to 1 is exact to rounding for any turn that isn't refused.
     angle = np.abs(turn)[:, None] / 2.0 * ((nodes + 1.0) / 2.0) ** 2
     x, y = np.cos(angle) @ weights / 2.0, np.sin(angle) @ weights / 2.0
-    half = np.abs(turn) / 2.0
-    return np.asarray(reach / (x + y * np.tan(half)))
+    half_turn = np.abs(turn) / 2.0
+    return np.asarray(reach / (x + y * np.tan(half_turn)))
 
 
 def _refuse_sharp(points: Float, point_indices: Index, turn: Float, lengths: Float) -> None:

@@ -43,10 +43,10 @@ def laser_gains(setting: ScannerSetting, seed: int) -> Float:
 
 def overlap_share(setting: ScannerSetting, distance: Float) -> Float | None:
     """Return the share (N,) of the power that the receiver sees at ranges (N,), m; None if it is all."""
-    begin, full = setting.receiver.overlap_begin or 0.0, setting.receiver.overlap_full
-    if not full:
+    begin_range, full_range = setting.receiver.overlap_begin or 0.0, setting.receiver.overlap_full
+    if not full_range:
         return None
-    return np.clip((distance - begin) / max(full - begin, 1e-9), 0.0, 1.0)
+    return np.clip((distance - begin_range) / max(full_range - begin_range, 1e-9), 0.0, 1.0)
 
 
 def read_power(

@@ -32,9 +32,9 @@ def have_one_peak(ratio: Float, separation: Float) -> Bool:
         ratio: (N,) logarithm of the powers' ratio.
         separation: (N,) of the pulses, in rms lengths.
     """
-    half = np.maximum(separation / 2.0, 1.0)
-    root = np.sqrt(half**2 - 1.0)
-    return np.asarray(np.abs(ratio) >= 2.0 * half * root - 2.0 * np.log(half + root))
+    half_separation = np.maximum(separation / 2.0, 1.0)
+    root = np.sqrt(half_separation**2 - 1.0)
+    return np.asarray(np.abs(ratio) >= 2.0 * half_separation * root - 2.0 * np.log(half_separation + root))
 
 
 def merge_peaks(echoes: Echoes, resolution: float) -> Echoes:

@@ -79,8 +79,8 @@ class BareGround:
         vertices in plan, at the angle 1/2 atan2(2 c_xy, c_xx - c_yy) for their covariance c.
         """
         x, y = mesh.vertices[np.unique(mesh.triangles[ground]), :2].T.astype(np.float64)
-        spread = np.cov(x, y)
-        angle = 0.5 * np.arctan2(2.0 * spread[0, 1], spread[0, 0] - spread[1, 1])
+        covariance = np.cov(x, y)
+        angle = 0.5 * np.arctan2(2.0 * covariance[0, 1], covariance[0, 0] - covariance[1, 1])
         self._cosine, self._sine = float(np.cos(angle)), float(np.sin(angle))
         x, y, z = mesh.vertices.T
         return np.array(self._turn(x, y) + (z,), np.float32)
@@ -141,9 +141,9 @@ class BareGround:
         plan_axes = [np.array(axis[:2])[:, near_edge] for axis in (axis_a, axis_b)]
         one_plane[near_edge] = self._within_faces(face[near_edge], np.array(middle[:2])[:, near_edge], *plan_axes)
         rows = np.flatnonzero(one_plane)
-        back = np.array([*self._turn(towards[0, rows], towards[1, rows]), towards[2, rows]])
+        direction_back = np.array([*self._turn(towards[0, rows], towards[1, rows]), towards[2, rows]])
         unblocked = np.zeros(len(one_plane), bool)
-        unblocked[rows] = self._things.passed_by(corner[:, rows], width[rows], back)
+        unblocked[rows] = self._things.passed_by(corner[:, rows], width[rows], direction_back)
         return one_plane, unblocked
 
     def _within_faces(self, face: Index, middle: Float, axis_a: Float, axis_b: Float) -> Bool:
@@ -182,14 +182,14 @@ class BareGround:
         begin = np.array([x - self._corner[0], y - self._corner[1], origins[2] - self._corner[2]])
         direction_x, direction_y = self._turn(directions[0], directions[1])
         rise, size = directions[2], self._size
-        inside = (begin[0] >= 0.0) & (begin[0] <= size[0]) & (begin[1] >= 0.0) & (begin[1] <= size[1])
+        starts_inside = (begin[0] >= 0.0) & (begin[0] <= size[0]) & (begin[1] >= 0.0) & (begin[1] <= size[1])
         # Range at which they leave the scene's box: first by its top or bottom, then by its sides if that is nearer.
         slope = np.where(np.abs(rise) > _LEVEL, rise, _LEVEL)
         length = np.where(slope > 0.0, np.maximum(size[2] - begin[2], 0.0), -begin[2]) / slope
         for speed, place, side in ((direction_x, begin[0], size[0]), (direction_y, begin[1], size[1])):
             with np.errstate(divide="ignore"):
                 np.minimum(length, np.where(speed > 0.0, side - place, -place) / speed, where=speed != 0.0, out=length)
-        rows = np.flatnonzero(inside & (np.abs(rise) > _LEVEL) & (length >= 0.0))
+        rows = np.flatnonzero(starts_inside & (np.abs(rise) > _LEVEL) & (length >= 0.0))
         # A beam that goes up is followed from its beginning, one that goes down back from where it leaves the box:
         # either from its lowest place to its highest.
         goes_up, radius = rise[rows] > 0.0, spread * length[rows]

@@ -47,9 +47,11 @@ class Bundles:
         time, delay = _box(times[None], starts)
         apex, ball = _box(origins, starts)
         # All directions lie in a ball around the middle of their box: seen from the origin it has this angle.
-        axis, spread = _box(directions, starts)
+        axis, direction_radius = _box(directions, starts)
         length = np.sqrt(np.einsum("ib,ib->b", axis, axis))
-        angle = np.where(spread < length, np.arcsin(np.minimum(spread / np.maximum(length, 1e-300), 1.0)), np.pi)
+        angle = np.where(
+            direction_radius < length, np.arcsin(np.minimum(direction_radius / np.maximum(length, 1e-300), 1.0)), np.pi
+        )
         axis /= np.maximum(length, 1e-300)
         farthest = np.maximum.reduceat(reach, starts)
         return cls(origins, directions, times, reach, time[0], delay, apex, ball, axis, angle + _SLACK, farthest)
@@ -103,7 +105,9 @@ def dot(a: Float, b: Float) -> Float:
 
 def _box(values: Float, starts: Index) -> tuple[Float, Float]:
     """Return the centres (C, B) of the bounding boxes of bundles of values (C, N), and their half diagonals (B,)."""
-    lowest, highest = (
+    lowest_corners, highest_corners = (
         np.stack([extreme.reduceat(row, starts) for row in values]) for extreme in (np.minimum, np.maximum)
     )
-    return (lowest + highest) / 2.0, np.sqrt(np.square(highest - lowest).sum(axis=0)) / 2.0
+    return (lowest_corners + highest_corners) / 2.0, np.sqrt(
+        np.square(highest_corners - lowest_corners).sum(axis=0)
+    ) / 2.0

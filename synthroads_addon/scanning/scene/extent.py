@@ -85,10 +85,10 @@ def elevation_at(mesh: SceneMesh, x: float, y: float) -> float | None:
         # They are all of one sign where the place lies inside.
         side_areas = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)])
         area = side_areas.sum(axis=0)
-        inside = ((side_areas >= 0.0).all(axis=0) | (side_areas <= 0.0).all(axis=0)) & (area != 0.0)
-        if inside.any():
-            shares = side_areas[:, inside] / area[inside]
-            elevations = (shares * corners[inside, :, 2].T).sum(axis=0)
+        is_inside = ((side_areas >= 0.0).all(axis=0) | (side_areas <= 0.0).all(axis=0)) & (area != 0.0)
+        if is_inside.any():
+            shares = side_areas[:, is_inside] / area[is_inside]
+            elevations = (shares * corners[is_inside, :, 2].T).sum(axis=0)
             highest = max(highest, float(elevations.max()))
     return highest if np.isfinite(highest) else None
 

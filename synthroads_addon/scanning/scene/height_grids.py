@@ -230,7 +230,7 @@ class _Beams:
     aside: Float
     rise: Float
 
-    def next_boxes(self, cells: Float, top: float) -> tuple[Float, list[Float]]:
+    def next_boxes(self, cells: Float, top_code: float) -> tuple[Float, list[Float]]:
         """Return the next part of each beam: its length (N,), m, and x and y (N,) of its box's lowest corner, m.
 
         A part is as long as the box around it may be in the grid of the beam's level, and ends where the beam has
@@ -238,9 +238,9 @@ class _Beams:
 
         Args:
             cells: (L,) widths of the levels' cells, m.
-            top: code above which nothing is any more.
+            top_code: code above which nothing is any more.
         """
-        length = (top - self.lowest) / self.rise
+        length = (top_code - self.lowest) / self.rise
         speed = np.maximum(np.abs(self.ahead), np.abs(self.aside))
         room = WINDOW * np.take(cells, self.level) - self.width
         # In the last grid a box may be as large as the area: there the length has no limit.
@@ -273,8 +273,8 @@ def _pieces(corners: Float32, longest_piece: float) -> Iterator[Float32]:
         longest_piece: largest extent of a piece along x or y, m.
     """
     while corners.shape[2]:
-        lowest, highest = extremes(corners[:2])
-        is_long = np.maximum(*(highest - lowest)) > longest_piece
+        lowest_corners, highest_corners = extremes(corners[:2])
+        is_long = np.maximum(*(highest_corners - lowest_corners)) > longest_piece
         if not is_long.any():
             yield corners
             return

@@ -123,17 +123,17 @@ class _Text:
         first, count: lines with vertices, of a PLY.
     """
 
-    def __init__(self, path: Path, word: bytes | None, first: int = 0, count: int = 0) -> None:
+    def __init__(self, path: Path, word: bytes | None, first_line: int = 0, count: int = 0) -> None:
         self._path, self._word = path, word
-        self._lines = range(first, first + count)
+        self._lines = range(first_line, first_line + count)
 
     def bounds(self) -> Float:
         """Return the smallest and the largest coordinates (2, 3) of the vertices; inf and -inf without any."""
-        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        least_place, largest_place = np.full(3, np.inf), np.full(3, -np.inf)
         for place, _ in self._vertices():
             if place is not None:
-                low, high = np.minimum(low, place), np.maximum(high, place)
-        return np.array([low, high])
+                least_place, largest_place = np.minimum(least_place, place), np.maximum(largest_place, place)
+        return np.array([least_place, largest_place])
 
     def write(self, output: BinaryIO, shift: Float) -> None:
         """Write the file with a vector (3,) subtracted from each vertex."""
@@ -160,8 +160,8 @@ class _Text:
         try:
             return np.array([float(word) for word in words]).reshape(3)
         except ValueError:
-            shown = b" ".join(words).decode("ascii", "replace")
-            raise InputError(f"{self._path}:{number + 1}", shown, "three numbers of a vertex are needed") from None
+            words_text = b" ".join(words).decode("ascii", "replace")
+            raise InputError(f"{self._path}:{number + 1}", words_text, "three numbers of a vertex are needed") from None
 
 
 class _Doubles:
@@ -184,14 +184,14 @@ class _Doubles:
             byte_order = str(self._rows.dtype["x"].byteorder).replace("=", "<")
             types = {name: self._rows.dtype[name] for name in self._rows.dtype.names or ()}
             axis_shift = dict(zip("xyz", shift.tolist(), strict=True))
-            single = np.zeros(
+            rounded_rows = np.zeros(
                 len(self._rows),
                 [(name, f"{byte_order}f4" if name in axis_shift else kind) for name, kind in types.items()],
             )
             for name in types:
                 values = self._rows[name]
-                single[name] = values - axis_shift[name] if name in axis_shift else values
-            output.write(single.tobytes())
+                rounded_rows[name] = values - axis_shift[name] if name in axis_shift else values
+            output.write(rounded_rows.tobytes())
             # What follows the vertices is copied as it is.
             file.seek(self._start + self._rows.nbytes)
             shutil.copyfileobj(file, output, _COPIED)

@@ -87,8 +87,8 @@ def refuse_outside(path: Path, address: str, folders: Sequence[Path], remedy: st
         remedy: what users can do about it, for the message.
     """
     if not file_in_one_of(folders, address, path.parent):
-        shown = address if len(address) < _SHOWN else f"{address[:_SHOWN]}..."
-        raise InputError(str(path), shown, f"{STAY}: {remedy}")
+        address_text = address if len(address) < _SHOWN else f"{address[:_SHOWN]}..."
+        raise InputError(str(path), address_text, f"{STAY}: {remedy}")
 
 
 @dataclass(frozen=True)
@@ -99,14 +99,14 @@ class _Reach:
     folders: tuple[Path, ...]
     remedy: str
 
-    def refuse(self, address: str, beside: Path | None = None) -> None:
+    def refuse(self, address: str, source: Path | None = None) -> None:
         """Raise `InputError` if something is at an address that lies outside of the folders.
 
         Args:
             address: as it stands in a file.
-            beside: that file; None: the file itself.
+            source: that file; None: the file itself.
         """
-        refuse_outside(beside or self.path, address, self.folders, self.remedy)
+        refuse_outside(source or self.path, address, self.folders, self.remedy)
 
 
 # --- STL ------------------------------------------------------------------------------------------------------------
@@ -260,9 +260,9 @@ def _check_obj(path: Path, reach: _Reach) -> None:
         if not library.is_file():
             continue
         for line in library.read_text(encoding="utf-8", errors="replace").splitlines():
-            statement, _, rest = line.strip().partition(" ")
+            statement, _, arguments = line.strip().partition(" ")
             if statement.lower().startswith(_PICTURES):
-                for address in _addresses(rest):
+                for address in _addresses(arguments):
                     reach.refuse(address, library)
 
 
@@ -331,16 +331,16 @@ def _part_size(reach: _Reach, address: str, optional: bool = False) -> int:
     """
     if address[:5].lower() == "data:":
         return 3 * len(address.partition(",")[2]) // 4
-    shown = address if len(address) < _SHOWN else f"{address[:_SHOWN]}..."
+    address_text = address if len(address) < _SHOWN else f"{address[:_SHOWN]}..."
     name = unquote(address).replace("\\", "/")
     folders = [Path(os.path.realpath(folder)) for folder in reach.folders]
     place = Path(os.path.realpath(folders[0] / name))
     if _SCHEME.match(name) or name.startswith("//") or not any(place.is_relative_to(folder) for folder in folders):
-        raise InputError(str(reach.path), shown, f"{STAY}: {reach.remedy}")
+        raise InputError(str(reach.path), address_text, f"{STAY}: {reach.remedy}")
     if not place.exists() and optional:
         return 0
     if not place.is_file():
-        raise InputError(str(reach.path), shown, "a regular file is needed at this address")
+        raise InputError(str(reach.path), address_text, "a regular file is needed at this address")
     return place.stat().st_size
 
 

@@ -68,19 +68,19 @@ def _boxes(mesh: SceneMesh, margin: float) -> tuple[Float, Float]:
     tops, bottoms = (PlanGrids(size[:2], cell, np.float32, -np.inf) for _ in range(2))
     origin = bounds[0, :2].astype(np.float32)[:, None]
     for start in range(0, len(mesh.triangles), _AT_ONCE):
-        lowest, highest = extremes(mesh.vertices.T[:, mesh.triangles[start : start + _AT_ONCE].T])
-        begin, end = lowest[:2] - origin, highest[:2] - origin
+        lowest_places, highest_places = extremes(mesh.vertices.T[:, mesh.triangles[start : start + _AT_ONCE].T])
+        begin, end = lowest_places[:2] - origin, highest_places[:2] - origin
         triangle_levels = np.searchsorted(2.0 * tops.cells[:-1], (end - begin).max(axis=0))
         for level in np.unique(triangle_levels).tolist():
             rows = np.flatnonzero(triangle_levels == level)
-            tops.draw(level, begin[:, rows], end[:, rows], highest[2, rows])
-            bottoms.draw(level, begin[:, rows], end[:, rows], -lowest[2, rows])
-    top, negative_bottom = tops.spread(), bottoms.spread()
-    cells = np.array(np.nonzero(top > -np.inf))
+            tops.draw(level, begin[:, rows], end[:, rows], highest_places[2, rows])
+            bottoms.draw(level, begin[:, rows], end[:, rows], -lowest_places[2, rows])
+    top_heights, negative_bottom = tops.spread(), bottoms.spread()
+    cells = np.array(np.nonzero(top_heights > -np.inf))
     margin += _ROUNDING * float(np.abs(bounds).max() + size.max())
     cell_begin = bounds[0, :2, None] + cell * cells
     lowest_corners = np.array([*(cell_begin - margin), -negative_bottom[*cells] - margin], np.float64)
-    highest_corners = np.array([*(cell_begin + cell + margin), top[*cells] + margin], np.float64)
+    highest_corners = np.array([*(cell_begin + cell + margin), top_heights[*cells] + margin], np.float64)
     return lowest_corners, highest_corners
 
 

@@ -258,9 +258,9 @@ class ValuesBuilder:
 
     parts: list[PartValues] = field(default_factory=list)
 
-    def table(self, kept: Bool | None) -> SurfaceValues | None:
-        """Return the values gathered, with triangles renumbered by the mask ``kept``; None if there are none."""
+    def table(self, keep_mask: Bool | None) -> SurfaceValues | None:
+        """Return the values gathered, with triangles renumbered by the mask ``keep_mask``; None if there are none."""
         if not self.parts:
             return None
-        number = None if kept is None else np.flatnonzero(kept).astype(np.int32)
+        number = None if keep_mask is None else np.flatnonzero(keep_mask).astype(np.int32)
         return SurfaceValues(tuple(self.parts), number)

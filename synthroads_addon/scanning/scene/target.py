@@ -168,14 +168,18 @@ class Target:
         shape = directions.shape
         flat_origins = np.broadcast_to(origins, shape).reshape(3, -1)
         flat_directions, flat_times = directions.reshape(3, -1), np.broadcast_to(times, shape[1:]).ravel()
-        nearest = FirstHits(static_hits.face.ravel(), static_hits.distance.ravel(), static_hits.cosine.ravel())
-        rays = Bundles.gather(flat_origins, flat_directions, flat_times, np.minimum(nearest.distance, maximum_range))
+        nearest_hits = FirstHits(static_hits.face.ravel(), static_hits.distance.ravel(), static_hits.cosine.ravel())
+        rays = Bundles.gather(
+            flat_origins, flat_directions, flat_times, np.minimum(nearest_hits.distance, maximum_range)
+        )
         for part, track in zip(self._parts[1:], motions, strict=True):
             if track.present.any():
-                _cast_moving(part, track, rays, maximum_range, nearest)
+                _cast_moving(part, track, rays, maximum_range, nearest_hits)
         ray_shape = shape[1:]
         return FirstHits(
-            nearest.face.reshape(ray_shape), nearest.distance.reshape(ray_shape), nearest.cosine.reshape(ray_shape)
+            nearest_hits.face.reshape(ray_shape),
+            nearest_hits.distance.reshape(ray_shape),
+            nearest_hits.cosine.reshape(ray_shape),
         )
 
     def unobstructed(
@@ -331,9 +335,9 @@ def _part(mesh: SceneMesh, caster: Caster, first_face: int) -> TargetPart:
     bounds = mesh.vertex_bounds()
     lowest_corner, highest_corner = np.zeros((2, 3)) if bounds is None else bounds
     centre = (lowest_corner + highest_corner) / 2.0
-    half = (highest_corner - lowest_corner) / 2.0
-    radius = float(np.linalg.norm(half)) + 1e-3
-    return TargetPart(caster, FacePlanes(mesh), first_face, len(mesh.triangles), centre, half, radius)
+    half_size = (highest_corner - lowest_corner) / 2.0
+    radius = float(np.linalg.norm(half_size)) + 1e-3
+    return TargetPart(caster, FacePlanes(mesh), first_face, len(mesh.triangles), centre, half_size, radius)
 
 
 def _clear_scanner(track: Track, part: TargetPart, scanner: Float) -> Track:
@@ -402,7 +406,7 @@ def _as_rows(vectors: Float, shape: tuple[int, ...]) -> Float32:
     return result.reshape(-1, 3)
 
 
-def _cast_moving(part: TargetPart, track: Track, rays: Bundles, maximum_range: float, nearest: FirstHits) -> None:
+def _cast_moving(part: TargetPart, track: Track, rays: Bundles, maximum_range: float, nearest_hits: FirstHits) -> None:
     """Replace hits by nearer ones on a moving part, in place.
 
     Args:
@@ -410,7 +414,7 @@ def _cast_moving(part: TargetPart, track: Track, rays: Bundles, maximum_range: f
         track: its.
         rays: N of them.
         maximum_range: m.
-        nearest: (N,) hits so far.
+        nearest_hits: (N,) hits so far.
     """
     ray_index = rays.rays_near(track, part.centre, part.radius)
     if not len(ray_index):
@@ -419,8 +423,8 @@ def _cast_moving(part: TargetPart, track: Track, rays: Bundles, maximum_range: f
     ray_index, rotation, place = ray_index[present], rotation[:, present], place[:, present]
     begin, towards = rays.origins[:, ray_index] - place, rays.directions[:, ray_index]
     part_hits = _cast(part, _unrotate(rotation, begin), _unrotate(rotation, towards), maximum_range)
-    closer_rows = np.flatnonzero(part_hits.distance < nearest.distance[ray_index])
-    for values, closer_values in zip(nearest, part_hits, strict=True):
+    closer_rows = np.flatnonzero(part_hits.distance < nearest_hits.distance[ray_index])
+    for values, closer_values in zip(nearest_hits, part_hits, strict=True):
         values[ray_index[closer_rows]] = closer_values[closer_rows]
 
 
