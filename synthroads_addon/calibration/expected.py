@@ -141,24 +141,20 @@ class ReceiverModel:
 
         Of decibels they are -inf for a linear intensity of 0.
         """
-        if self.decibels is None:
-            return (
-                linear_values
-                if self.compression == 1.0
-                else FULL_SCALE * (linear_values / FULL_SCALE) ** self.compression
-            )
-        with np.errstate(divide="ignore"):
-            return FULL_SCALE / self.decibels * 10.0 * np.log10(linear_values)
+        if self.decibels is not None:
+            with np.errstate(divide="ignore"):
+                return FULL_SCALE / self.decibels * 10.0 * np.log10(linear_values)
+        if self.compression == 1.0:
+            return linear_values
+        return FULL_SCALE * (linear_values / FULL_SCALE) ** self.compression
 
     def to_linear(self, stored_values: Float) -> Float:
         """Return the linear intensities, times the gain, of stored ones: the inverse of `to_stored`."""
-        if self.decibels is None:
-            return (
-                stored_values
-                if self.compression == 1.0
-                else FULL_SCALE * (stored_values / FULL_SCALE) ** (1.0 / self.compression)
-            )
-        return np.asarray(10.0 ** (stored_values * self.decibels / (10.0 * FULL_SCALE)))
+        if self.decibels is not None:
+            return np.asarray(10.0 ** (stored_values * self.decibels / (10.0 * FULL_SCALE)))
+        if self.compression == 1.0:
+            return stored_values
+        return FULL_SCALE * (stored_values / FULL_SCALE) ** (1.0 / self.compression)
 
 
 def receiver_of_device(setting: ScannerSetting, attenuation: float) -> ReceiverModel:

@@ -217,12 +217,14 @@ def _crossing_reach(geometry: RoadGeometry) -> float:
     """Return how far, m, along the road an overpass, a power line or a building reaches at most from its station."""
     parameters = geometry.parameters
     bridges, lines = parameters.of_type(Overpass).values(), parameters.of_type(PowerLine).values()
-    lengths = [abs(np.sin(np.deg2rad(item.rotation_deg))) * _BRIDGE_SIDE + item.width for item in bridges]
+    buildings = parameters.of_type(Building).values()
+    # What crosses at a slant reaches sin(angle) of its length to the side along the road, and at most its own width more.
+    reaches = [abs(np.sin(np.deg2rad(bridge.rotation_deg))) * _BRIDGE_SIDE + bridge.width for bridge in bridges]
     for line in lines:
-        side_reach = abs(np.sin(np.deg2rad(line.rotation_deg))) * max(line.left_distance, line.right_distance)
-        lengths.append(side_reach + line.height * HALF_ARM)
-    lengths += [math.hypot(item.width, item.depth) for item in parameters.of_type(Building).values()]
-    return float(max(lengths, default=0.0))
+        side_length = max(line.left_distance, line.right_distance)
+        reaches.append(abs(np.sin(np.deg2rad(line.rotation_deg))) * side_length + line.height * HALF_ARM)
+    reaches += [math.hypot(building.width, building.depth) for building in buildings]
+    return float(max(reaches, default=0.0))
 
 
 def _corridor(geometry: RoadGeometry) -> float:

@@ -158,7 +158,7 @@ def trace(
     axis: FirstHits | None = None,
     openings: Openings | None = None,
 ) -> TracedRays:
-    """Return what rays meet between two ranges (m), through permeable surfaces, and the light that each hit takes.
+    """Return what rays meet between two ranges, through permeable surfaces, and the light that each hit takes.
 
     The shares of energy that all hits of one ray take never add up to more than the ray's own share. A hit that takes
     nothing, or that lies out of the ranges, has the distance inf.
@@ -166,39 +166,36 @@ def trace(
     Args:
         target: what is scanned.
         surfaces: means of its materials.
-        rays: of pulses.
+        rays: K rays of each of P pulses.
         motions: tracks of the target's moving parts.
-        nearest_range, farthest_range: ranges, m.
+        nearest_range, farthest_range: m.
         axis: (P,) what the first ray of each pulse meets, where it has been cast already.
         openings: where materials are open; None: all of a material weakens rays alike.
     """
-    ray_hits = _first_hits(target, rays, motions, farthest_range, axis)
-    material = np.take(target.material, ray_hits.face, mode="clip").astype(np.intp)
+    met = _first_hits(target, rays, motions, farthest_range, axis)
+    material = np.take(target.material, met.face, mode="clip").astype(np.intp)
+    distance = _within(met.distance, nearest_range, np.inf)
     if not surfaces.permeable:
-        first_hits = Hits(
-            ray_hits.face, material, _within(ray_hits.distance, nearest_range, np.inf), ray_hits.cosine, rays.share
-        )
-        return _gather_hits(rays, first_hits, [], [])
-    # Rays, as k * P + p, whose first face is of a permeable material; to a miss, at inf, no material applies.
-    permeable = np.flatnonzero(np.take(surfaces.pervious, material, mode="clip"))
-    permeable = permeable[np.take(ray_hits.distance, permeable) < farthest_range]
-    share = np.broadcast_to(rays.share, material.shape).copy()
-    arriving_light = np.take(share, permeable)
+        return _gather_hits(rays, Hits(met.face, material, distance, met.cosine, rays.share), [], [])
+    # Rays, as k * P + p, that meet a permeable material first. A miss has any material, but the distance inf.
+    ray = np.flatnonzero(np.take(surfaces.pervious, material, mode="clip"))
+    ray = ray[np.take(met.distance, ray) < farthest_range]
     onward = _Onward(target, surfaces, openings or Openings(), rays, motions)
-    surface, start = np.take(material, permeable), np.take(ray_hits.distance, permeable)
-    face, cosine = (
-        (np.take(ray_hits.face, permeable), np.take(ray_hits.cosine, permeable)) if onward.clear else (None, None)
-    )
-    transmission = onward.transmitted(permeable, face, surface, cosine, start)
-    share.ravel()[permeable] = arriving_light * (1.0 - transmission)
-    distance = _within(ray_hits.distance, nearest_range, np.inf)
+    ray_material, start = np.take(material, ray), np.take(met.distance, ray)
+    face, cosine = (np.take(met.face, ray), np.take(met.cosine, ray)) if onward.clear else (None, None)
+    transmission = onward.transmitted(ray, face, ray_material, cosine, start)
+    # The first surface takes what it doesn't let through; where that is nothing, it isn't recorded.
+    share = np.broadcast_to(rays.share, material.shape).copy()
+    arriving_light = np.take(share, ray)
+    share.ravel()[ray] = arriving_light * (1.0 - transmission)
     if openings is not None and (transmission == 1.0).any():
         distance = distance.copy()
-        distance.ravel()[permeable[transmission == 1.0]] = np.inf
-    first_hits = Hits(ray_hits.face, material, distance, ray_hits.cosine, share)
-    passed_rays = _Passed(permeable, arriving_light * transmission, start, face, onward.steps(surface))
+        distance.ravel()[ray[transmission == 1.0]] = np.inf
+    first_hits = Hits(met.face, material, distance, met.cosine, share)
+    # The light that is left goes on to what lies behind, layer by layer.
+    passed_rays = _Passed(ray, arriving_light * transmission, start, face, onward.steps(ray_material))
     layers = list(onward.follow(passed_rays, nearest_range, farthest_range))
-    return _gather_hits(rays, first_hits, [hits for hits, _ in layers], [ray for _, ray in layers])
+    return _gather_hits(rays, first_hits, [hits for hits, _ in layers], [layer_ray for _, layer_ray in layers])
 
 
 class Openings(NamedTuple):
@@ -258,8 +255,8 @@ class _Onward:
     def follow(self, passed_rays: _Passed, nearest_range: float, farthest_range: float) -> Iterator[tuple[Hits, Index]]:
         """Yield, layer by layer, the next hits (N,) behind passed surfaces and the rays (N,) that they belong to.
 
-        The first layer is what rays meet behind the surfaces that they have passed, the next layer what lies behind that,
-        and so on. A ray ends where it meets nothing, or where less than `FAINTEST` of its own light is left.
+        The first layer is what rays meet behind the surfaces that they have passed, the next layer what lies behind
+        that, and so on. A ray ends where it meets nothing, or where less than `FAINTEST` of its own light is left.
 
         Args:
             passed_rays: rays behind what they have met first.

@@ -211,7 +211,7 @@ class PointLoops(Protocol):
         place: Float,
         distance: Float,
     ) -> tuple[Float, Float]:
-        """Return places (N, 3) and ranges (N,) of which rows ``rough_rows`` (K,) are nearer along their beams by heights."""
+        """Return places (N, 3) and ranges (N,) of points, of which rough rows (K,) come nearer along their beams."""
         ...
 
     def daylight(

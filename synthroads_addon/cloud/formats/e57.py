@@ -110,7 +110,10 @@ class E57Writer(CloudWriter):
                 self._flush()
 
     def _flush(self) -> None:
-        """Write the points held, always as many at a time, so that the file doesn't depend on the blocks' sizes."""
+        """Write the points in the buffers.
+
+        They are always as many at a time, so that the file doesn't depend on the blocks' sizes.
+        """
         if self._held:
             self._points.write(self._held)
             self._held = 0
@@ -357,13 +360,13 @@ class E57Reader(CloudReader):
             if scan.isDefined(group) and all(scan[group].isDefined(f"{name}{end}") for end in _ENDS):
                 minimum, maximum = (_number_of(scan[group][f"{name}{end}"]) for end in _ENDS)
                 limits = (minimum, maximum)
-            if not _tells(limits):
+            if not _are_limits(limits):
                 limits = _field_limits(self._e57.StructureNode(scan["points"].prototype())[name])
         except Exception as problem:
             raise InputError(
                 str(self.header.path), None, f"is an E57 file that is damaged ({_error_text(problem)})"
             ) from None
-        return limits if _tells(limits) else None
+        return limits if _are_limits(limits) else None
 
     def _color_limits(self, scan: Any, fields: set[str]) -> dict[str, Limits]:
         """Return the limits of a scan's colour channels; where none are declared, by the largest value there is."""
@@ -451,7 +454,7 @@ class E57Reader(CloudReader):
         return self._points(stored, count, position)
 
 
-def _tells(limits: Limits | None) -> bool:
+def _are_limits(limits: Limits | None) -> bool:
     """Return whether limits are those of a quantity: not the extremes of a number's type, and not equal."""
     return limits is not None and -_SANE < limits[0] < limits[1] < _SANE
 

@@ -162,6 +162,7 @@ class _FirstPass:
         """Return the places (S, 3) to measure roughness at, by class; fewer in dense clouds to bound the time."""
         places = {label: sample.xyz for label, sample in self._samples.items() if len(sample.xyz)}
         density = self.moments.count.sum() / max(1.0, self._cells.area(None))
+        # Each place is compared with the points in nine cells of the ground, a radius wide.
         pairs = sum(map(len, places.values())) * density * 9 * radius**2
         share = min(1.0, _MOST_PAIRS / max(pairs, 1.0))
         return {label: xyz[: max(1, int(len(xyz) * share))] for label, xyz in places.items()}
@@ -297,18 +298,19 @@ class _Roughness:
             self._gather(xyz[point] - self._places[place], place)
 
     def by_class(self) -> dict[int, tuple[float, int]]:
-        """Return the mean surface variation, and the number of places it was measured at, by class."""
-        count = self._sums[0]
+        """Return the mean surface variation, and the number of places that it was measured at, by class."""
+        # Sums over the points around each place: their number, x, y and z, and the products of these.
+        count, sums, products = self._sums[0], self._sums[1:4], self._sums[4:]
         is_measured = count >= _FEWEST_NEIGHBOURS
-        number = np.maximum(count, 1)
-        mean = self._sums[1:4] / number
-        second_moments = self._sums[4:] / number
+        divisor = np.maximum(count, 1)
+        mean, mean_products = sums / divisor, products / divisor
         covariance = np.empty((len(count), 3, 3))
         for row, (i, j) in enumerate(_PAIRS):
-            covariance[:, i, j] = covariance[:, j, i] = second_moments[row] - mean[i] * mean[j]
-        values = np.maximum(np.linalg.eigvalsh(covariance), 0.0)
-        total = values.sum(axis=1)
-        variation = values[:, 0] / np.where(total > 0, total, 1.0)
+            covariance[:, i, j] = covariance[:, j, i] = mean_products[row] - mean[i] * mean[j]
+        # Surface variation: the least eigenvalue over the sum of all three (Pauly et al. 2002).
+        eigenvalues = np.maximum(np.linalg.eigvalsh(covariance), 0.0)
+        total = eigenvalues.sum(axis=1)
+        variation = eigenvalues[:, 0] / np.where(total > 0, total, 1.0)
         result = {}
         for label in np.unique(self._label[is_measured]):
             is_of_class = is_measured & (self._label == label)

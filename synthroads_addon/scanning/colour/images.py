@@ -76,9 +76,11 @@ class ImageLayers:
         """Set the cameras' positions, the numbers of candidate images, and the cell size for scanner positions."""
         self._places = np.array([image.view.position for image in self.images]).reshape(-1, 3)
         places, count = np.unique(self._places, axis=0, return_counts=True)
+        # Several images may be taken from one place, in different directions: candidates are all images of the nearest
+        # three places, or of nine, if that is more than the usual number.
         images_per_place = int(count.max(initial=0))
         self._candidates, self._all = max(CANDIDATES, 3 * images_per_place), max(ALL_CANDIDATES, 9 * images_per_place)
-        # Points whose scanner stood within one such cube share their candidates.
+        # Points whose scanner stood within one cube, half as wide as two places lie apart, share their candidates.
         spacing = np.linalg.norm(np.diff(places, axis=0), axis=1) if len(places) > 1 else np.ones(1)
         self._cell = max(float(np.median(spacing)) / 2.0, 0.5)
 

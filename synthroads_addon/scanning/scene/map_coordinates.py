@@ -223,21 +223,22 @@ def _ply_kind(path: Path) -> _Text | _Doubles | None:
     Only files whose first element are vertices that begin with x, y and z, without lists, are moved.
     """
     with path.open("rb") as file:
-        kind, elements = read_ply_header(file)
-        start = file.tell()
+        file_format, elements = read_ply_header(file)
+        header_size = file.tell()
         file.seek(0)
-        head = file.read(start).count(b"\n")
+        header_lines = file.read(header_size).count(b"\n")
     if not elements or elements[0][0] != "vertex":
         return None
     _, count, properties = elements[0]
     names = [name for _, _, name in properties]
-    if any(length for length, _, _ in properties) or names[:3] != ["x", "y", "z"] or not count:
+    has_lists = any(length_type for length_type, _, _ in properties)
+    if has_lists or names[:3] != ["x", "y", "z"] or not count:
         return None
-    if kind == "ascii":
-        return _Text(path, None, head, count)
-    order = "<" if kind == "binary_little_endian" else ">"
-    fields = [(order + code, name) for _, code, name in properties]
-    return _Doubles(path, start, count, fields) if fields[0][0].endswith("f8") else None
+    if file_format == "ascii":
+        return _Text(path, None, header_lines, count)
+    byte_order = "<" if file_format == "binary_little_endian" else ">"
+    fields = [(byte_order + value_type, name) for _, value_type, name in properties]
+    return _Doubles(path, header_size, count, fields) if fields[0][0].endswith("f8") else None
 
 
 def _link_neighbours(path: Path, folder: Path) -> None:

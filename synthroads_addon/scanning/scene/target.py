@@ -460,7 +460,7 @@ def _crosses_box(begin: Float, direction: Float, reach: Float, half_size: Float)
 
 
 def _unrotate(rotation: Float, vectors: Float) -> Float:
-    """Return vectors (3, N), each rotated by the inverse of its matrix (9, N)."""
+    """Return vectors (3, N), each rotated by the inverse, that is the transpose, of its matrix (9, N), row by row."""
     result = np.empty_like(vectors)
     product = np.empty(vectors.shape[1])
     for i in range(3):
