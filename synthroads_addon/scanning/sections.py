@@ -218,7 +218,7 @@ def _crossing_reach(geometry: RoadGeometry) -> float:
     parameters = geometry.parameters
     bridges, lines = parameters.of_type(Overpass).values(), parameters.of_type(PowerLine).values()
     buildings = parameters.of_type(Building).values()
-    # What crosses at a slant reaches sin(angle) of its length to the side along the road, and at most its own width more.
+    # What crosses at a slant reaches sin(angle) of its length to the side along the road, and its own width at most.
     reaches = [abs(np.sin(np.deg2rad(bridge.rotation_deg))) * _BRIDGE_SIDE + bridge.width for bridge in bridges]
     for line in lines:
         side_length = max(line.left_distance, line.right_distance)
