@@ -54,7 +54,7 @@ def fills(array: str) -> Callable[[Filler], Filler]:
 
 
 def fill_layers(points: MeasuredPoints, names: frozenset[str]) -> dict[str, AnyArray]:
-    """Return the wanted per-point layers that the scan itself fills, as arrays by name."""
+    """Return those of the named per-point layers that the scan itself fills, as arrays by name."""
     return {array: filler(points) for array, filler in FILLERS.items() if array in names}
 
 

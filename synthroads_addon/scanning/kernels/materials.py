@@ -83,7 +83,7 @@ class ReadyProgram:
         self._registers = np.zeros((program.registers + SCRATCH, LANES), np.float32)
         for number, value in program.constants:
             self._registers[number] = value
-        self._pictures = (_Picture * max(1, len(program.pictures)))(*map(_told, program.pictures))
+        self._pictures = (_Picture * max(1, len(program.pictures)))(*map(_picture_structure, program.pictures))
         self._widths = np.array([parts for _, parts in program.outputs], np.int32)
         self._native = _Program(
             program.code.ctypes.data,
@@ -153,8 +153,8 @@ def run_program(
     return outputs
 
 
-def _told(picture: Picture) -> _Picture:
-    """Return an image in the structure that the kernel takes."""
+def _picture_structure(picture: Picture) -> _Picture:
+    """Return an image as the structure that the kernel reads."""
     pixels = picture.pixels
     height, width = pixels.shape[:2]
     bytes_ = int(pixels.dtype == np.uint8)

@@ -145,7 +145,7 @@ class ProgramBuilder:
         """Return the value that stands for a number, as float32 has it."""
         bits = struct.pack("<f", np.float32(number))
         if bits not in self._known:
-            self._known[bits] = self._new(1)
+            self._known[bits] = self._reserve(1)
             self._constants[self._known[bits]] = struct.unpack("<f", bits)[0]
         return self._known[bits]
 
@@ -203,10 +203,10 @@ class ProgramBuilder:
         step_order.sort(key=lambda step: not self._steps[step].uniform)
         return _Allocation(self, step_order, outputs).program()
 
-    def _new(self, results: int) -> int:
-        """Return the first of so many new values."""
+    def _reserve(self, count: int) -> int:
+        """Number the next values of the program, and return the first number."""
         first_value = self._size
-        self._size += results
+        self._size += count
         return first_value
 
     def _is_uniform(self, value: int) -> bool:
@@ -222,7 +222,7 @@ class ProgramBuilder:
         """Return the first result of an operation; one with the same operands and settings is added only once."""
         key = (op, operands, settings)
         if key not in self._known:
-            first_value = self._known[key] = self._new(results)
+            first_value = self._known[key] = self._reserve(results)
             self._steps[first_value] = _Step(op, operands, settings, results, uniform)
             self._owners.update(dict.fromkeys(range(first_value, first_value + results), first_value))
         return self._known[key]
