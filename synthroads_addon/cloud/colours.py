@@ -41,7 +41,7 @@ def sixteen_bits(values: AnyArray, brightness: float) -> UInt16:
 
     Example:
         >>> import numpy as np
-        >>> sixteen_bits(np.array([0, 128, 255]), full=255).tolist()
+        >>> sixteen_bits(np.array([0, 128, 255]), brightness=255).tolist()
         [0, 32896, 65535]
     """
     share = np.clip(np.nan_to_num(np.asarray(values, dtype=np.float64)) / brightness, 0.0, 1.0)
