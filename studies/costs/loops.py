@@ -114,7 +114,7 @@ def faces(plan: ScanPlan) -> dict[str, float]:
         one, believed = ((found[name] == found["axis"]).all(axis=1) & hits for name in ("cast", "four"))
         for name, mask in (("hits", hits), ("one face", one), ("believed", believed), ("wrong", believed & ~one)):
             counts[name] += int(mask.sum())
-        seconds["pulses"] += shortest(scan.traced_echoes, strip, pulses, poses.motions, 0)
+        seconds["pulses"] += shortest(scan.tracer.traced_echoes, strip, pulses, poses.motions, 0)
         seconds["blocks"] += shortest(scan.scan_pulses, strip, first, count, number)
     share = {name: counts[name] / max(1, counts["hits"]) for name in ("one face", "believed")}
     return {**share, "wrong": counts["wrong"] / max(1, counts["believed"]), **seconds}
