@@ -49,7 +49,7 @@ class Strays:
         """Return the number of places added that stray from the rest."""
         return int(self._counts.sum() - self._counts[np.isin(self._keys, self._body_cubes())].sum())
 
-    def stay(self, xyz: NDArray[np.floating]) -> Bool:
+    def belongs(self, xyz: NDArray[np.floating]) -> Bool:
         """Return a mask (N,) of the places (N, 3), all of them added before, that don't stray."""
         return np.isin(self._keys_of(xyz), self._body_cubes())
 

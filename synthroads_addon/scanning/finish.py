@@ -75,7 +75,7 @@ class Finish:
                 pavement_height = pavement.heights(points.instance_id[rows], map_place[rows] + offset)
             return field.heights(rows, offset) + pavement_height
 
-        return turn_normals(shifted_points, field.rough, ends.towards, heights)
+        return turn_normals(shifted_points, field.rough_rows, ends.towards, heights)
 
     def _tilts(self, points: PointBlock, seen_points: SeenPoints) -> tuple[Index, Float]:
         """Return the indices (K,) of the points that normal images tilt, and their tilts: see `NormalImages.tilts`."""

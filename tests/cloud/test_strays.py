@@ -25,8 +25,8 @@ def test_a_place_far_from_all_others_strays(stray: tuple[float, float, float]) -
     body = around((0.0, 0.0, 0.0))
     strays = of(body[:2000], np.array([stray]), body[2000:])
     assert strays.count() == 1
-    assert strays.stay(body).all()
-    assert not strays.stay(np.array([stray])).any()
+    assert strays.belongs(body).all()
+    assert not strays.belongs(np.array([stray])).any()
 
 
 def test_nothing_strays_from_roads_stretches_of_roads_and_clouds_of_few_points() -> None:

@@ -252,7 +252,7 @@ def _strays_of(cloud: CloudReader) -> Strays | None:
 def _staying_blocks(cloud: CloudReader, strays: Strays | None) -> Iterator[PointBlock]:
     """Yield a cloud's blocks without their stray points."""
     for block in cloud.usable_blocks():
-        yield block if strays is None else block.select(np.flatnonzero(strays.stay(block.xyz)))
+        yield block if strays is None else block.select(np.flatnonzero(strays.belongs(block.xyz)))
 
 
 def read_centerline(path: Path, place: Placement | None = None) -> Float:

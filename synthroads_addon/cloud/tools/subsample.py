@@ -36,7 +36,7 @@ class TileFiles:
         self._paths: dict[tuple[int, int], Path] = {}
 
     def __enter__(self) -> Self:
-        self._made = self._scratch.enter_context(scratch_folder(self._folder))
+        self._scratch_path = self._scratch.enter_context(scratch_folder(self._folder))
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -56,7 +56,7 @@ class TileFiles:
         starts = np.flatnonzero(np.r_[True, np.any(tile[1:] != tile[:-1], axis=1)])
         for begin, end in zip(starts, np.r_[starts[1:], len(tile)], strict=True):
             key = (int(tile[begin, 0]), int(tile[begin, 1]))
-            path = self._paths.setdefault(key, self._made / f"{key[0]}_{key[1]}")
+            path = self._paths.setdefault(key, self._scratch_path / f"{key[0]}_{key[1]}")
             with path.open("ab") as file:
                 file.write(record[begin:end].tobytes())
 

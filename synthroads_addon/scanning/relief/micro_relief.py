@@ -169,7 +169,7 @@ def shift_by_relief(
         return points
     if points.normal is None or points.material is None:
         raise ValueError("the roughness adjustment needs the points' normals and materials")
-    rough_rows = ReliefField(points, ends, relief, strength, seed, octaves).rough
+    rough_rows = ReliefField(points, ends, relief, strength, seed, octaves).rough_rows
     # Angles stay as they are while points move.
     cosine = np.cos(np.radians(points.incidence_deg.astype(np.float64)))
     if surface_heights is not None:
@@ -215,7 +215,7 @@ class ReliefField:
     octaves: int
 
     @property
-    def rough(self) -> Index:
+    def rough_rows(self) -> Index:
         """Return the rows (K,) of the points whose material has a relief; points in the air have none."""
         assert self.points.material is not None
         return np.flatnonzero(np.take(np.append(self.relief.amplitude, 0.0), self.points.material, mode="clip"))

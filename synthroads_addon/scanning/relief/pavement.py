@@ -131,7 +131,7 @@ def _blocks(geometry: RoadGeometry) -> Iterator[_Block]:
         elif isinstance(item, Turnout | Arrow | Hatching | LineMarking):
             side = parameters.carriageway_of(item).side
             # Traffic seldom drives along lines, and paint fills joints.
-            kind = _Kind(side, isinstance(item, Turnout | Arrow), isinstance(item, Turnout))
+            kind = _Kind(side, tracks=isinstance(item, Turnout | Arrow), joints=isinstance(item, Turnout))
             yield _Block(item.instance, item.instance + 1, kind)
             if name in parts:
                 yield _Block(parts[name].first, parts[name].first + parts[name].room, kind)
@@ -149,11 +149,11 @@ def _damage_blocks(carriageway: Carriageway, first_number: int) -> Iterator[_Blo
     if number > first_number:
         yield _Block(first_number, number, _Kind(side))
     for patch in pavement.patches:
-        yield _Block(number, number + 1, _Kind(side, False, False), damage_height(patch) - PATCH_FILM)
+        yield _Block(number, number + 1, _Kind(side, tracks=False, joints=False), damage_height(patch) - PATCH_FILM)
         number += 1
     for crack in pavement.cracks:
-        yield _Block(number, number + 1, _Kind(side, True, False, True), damage_height(crack) - CRACK_FILM)
+        yield _Block(number, number + 1, _Kind(side, joints=False, lifted=True), damage_height(crack) - CRACK_FILM)
         number += 1
     for marking in pavement.removed_markings:
-        yield _Block(number, number + 1, _Kind(side, True, False), damage_height(marking) - REMOVED_FILM)
+        yield _Block(number, number + 1, _Kind(side, joints=False), damage_height(marking) - REMOVED_FILM)
         number += 1

@@ -59,7 +59,7 @@ def snow_spectrum(rate_mm_h: float) -> ParticleSpectrum:
     return ParticleSpectrum(3800.0 * rate_mm_h**-0.87, 2.55 * rate_mm_h**-0.48, fresnel_reflectance(1.3031))
 
 
-def smallest_seen(spectrum: ParticleSpectrum, setting: ScannerSetting, distance: Float, intensity: float) -> Float:
+def smallest_diameters(spectrum: ParticleSpectrum, setting: ScannerSetting, distance: Float, intensity: float) -> Float:
     """Return the diameters (N,), mm, of the smallest particles that give an intensity; inf where none does.
 
     Args:
@@ -85,7 +85,7 @@ def echoes_per_metre(spectrum: ParticleSpectrum, setting: ScannerSetting, distan
         intensity: without attenuation.
     """
     area = np.pi / 4.0 * (_beam_width(setting, distance) / _MILLIMETRES) ** 2
-    smallest = smallest_seen(spectrum, setting, distance, intensity)
+    smallest = smallest_diameters(spectrum, setting, distance, intensity)
     return np.asarray(area * spectrum.intercept / spectrum.slope * np.exp(-spectrum.slope * smallest))
 
 
@@ -106,7 +106,7 @@ def particle_echoes(spectrum: ParticleSpectrum, hits: PulseHits, random: np.rand
     # Ranges by inversion of the number of echoes before each range.
     distance = np.interp(mean_count * random.random(count), echoes_before, ranges)
     # Diameters beyond the smallest one that is seen are exponential.
-    diameter = smallest_seen(spectrum, setting, distance, faintest)
+    diameter = smallest_diameters(spectrum, setting, distance, faintest)
     diameter += random.exponential(1.0 / spectrum.slope, count)
     beam_share = np.minimum(diameter / np.maximum(_beam_width(setting, distance), 1e-9), 1.0) ** 2
     rows = np.flatnonzero(distance < free_range[pulse])
