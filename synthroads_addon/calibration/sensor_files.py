@@ -170,43 +170,61 @@ def fit_sensor(result: Calibration, by_simulation: bool = True) -> FittedSensor:
     job, pavement = result.job, result.compared[0]
     if pavement.real is None:
         raise InputError("--save-device", None, "needs a cloud that the sensor is fitted to")
-    setting, real = job.setting, pavement.real
     distance, incidence = _views_of_points(job, result)
-    receiver = job.receiver
-    linear = receiver.to_linear(real.intensity)
-    if receiver.range_corrected:
-        linear = linear + result.gain * receiver.pedestal * distance**2
-    else:
-        linear = (linear + result.gain * receiver.pedestal) * distance**2
+    linear = _linear_brightness(result, pavement.real.intensity, distance)
     scanner = None if job.scanner is None else np.array(job.scanner)
-    estimate = estimate_sensor(real, linear, distance, incidence, scanner)
-    device = _fitted_device(result, setting, estimate)
+    estimate = estimate_sensor(pavement.real, linear, distance, incidence, scanner)
+    device = _fitted_device(result, job.setting, estimate)
     surfaces = _surfaces_alone(result, estimate)
     if scanner is not None:
         drawn_values = _drawn_values(_noise_of(estimate, device))
-        scenario, spacing = _standing(estimate, device, setting)
+        scenario, spacing = _standing(estimate, device, job.setting)
         return FittedSensor(estimate, None, device, _FREE | spacing, drawn_values, {}, scenario, surfaces)
-    material = surfaces[pavement.target.material]
     # What isn't corrected by the device is by each point's range, where that is known.
-    corrected = receiver.range_corrected or len(distance) > 1
-    moving = _MovingSensor(estimate, device, setting, material, pavement.target.material, job.attenuation, corrected)
-    begin, refined = moving.settings(), None
-    values = {start_setting.path: start_setting.begin for start_setting in begin}
-    if by_simulation:
-        refined = refine_settings(replace(real, intensity=linear), begin, moving.simulate)
-        values = refined.values
+    corrected = job.receiver.range_corrected or len(distance) > 1
+    name = pavement.target.material
+    moving = _MovingSensor(estimate, device, job.setting, surfaces[name], name, job.attenuation, corrected)
+    road = replace(pavement.real, intensity=linear) if by_simulation else None
+    return _fit_moving(moving, surfaces, road)
+
+
+def _linear_brightness(result: Calibration, intensity: Float, distance: Float) -> Float:
+    """Return real intensities (N,) in proportion to the light times the squared range.
+
+    Args:
+        result: of the calibration.
+        intensity: (N,) as stored.
+        distance: (N,) or (1,) ranges, m.
+    """
+    receiver = result.job.receiver
+    linear, pedestal = receiver.to_linear(intensity), result.gain * receiver.pedestal
+    return linear + pedestal * distance**2 if receiver.range_corrected else (linear + pedestal) * distance**2
+
+
+def _fit_moving(moving: _MovingSensor, surfaces: dict[str, Material], road: RealClass | None) -> FittedSensor:
+    """Return the fitted sensor of a scanner that moves.
+
+    Args:
+        moving: the scanner, with what formulas say of it.
+        surfaces: materials by name.
+        road: real pavement, by which simulated scans refine the settings; None to leave these as they begin.
+    """
+    begin, estimate = moving.settings(), moving.estimate
+    refined = None if road is None else refine_settings(road, begin, moving.simulate)
+    values = {setting.path: setting.begin for setting in begin} if refined is None else refined.values
     spacing, device = moving.scanner(values)
     # Without simulated scans the others are what a search would begin with, and no estimates.
-    estimated_paths = values if by_simulation else (*_noise_of(estimate, device), _OF_STRIPS[0])
+    estimated_paths = (*_noise_of(estimate, device), _OF_STRIPS[0]) if refined is None else values
     drawn_values = _drawn_values(
         {path: value for path, value in values.items() if path.startswith("scan.") and path in estimated_paths}
     )
     usual = {path: limits for path, limits in moving.usual.items() if path not in drawn_values}
-    spread = {"spread_below": round(moving.spreads(values)[0], 4), "spread_above": round(moving.spreads(values)[1], 4)}
-    surfaces |= {pavement.target.material: surfaces[pavement.target.material].model_copy(update=spread)}
+    below, above = (round(spread, 4) for spread in moving.spreads(values))
+    material = surfaces[moving.name].model_copy(update={"spread_below": below, "spread_above": above})
     # The materials' brightness was fitted for this air.
-    air = {"scan.attenuation": job.attenuation}
-    scan = _FREE | spacing | _same_surface(pavement.target.material) | air
+    air = {"scan.attenuation": moving.attenuation}
+    scan = _FREE | spacing | _same_surface(moving.name) | air
+    surfaces = surfaces | {moving.name: material}
     return FittedSensor(estimate, refined, device, scan, drawn_values, usual, "airborne-1000m", surfaces)
 
 
@@ -310,10 +328,8 @@ class _MovingSensor:
 
     def spreads(self, values: Mapping[str, float]) -> tuple[float, float]:
         """Return the material's spreads below and above its median, with values of `settings`."""
-        factor, largest_spread = values[_TEXTURE], _MOST_SPREAD
-        return min(self.material.spread_below * factor, largest_spread), min(
-            self.material.spread_above * factor, largest_spread
-        )
+        below, above = self.material.spread_below, self.material.spread_above
+        return min(below * values[_TEXTURE], _MOST_SPREAD), min(above * values[_TEXTURE], _MOST_SPREAD)
 
     def scanner(self, values: Mapping[str, float]) -> tuple[dict[str, Any], Device]:
         """Return settings of a scenario, by path, and the device, for a scanner with values of `settings`.

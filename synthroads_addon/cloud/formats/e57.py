@@ -21,7 +21,7 @@ from ...base.rotations import quaternion_matrices
 from ..colours import SIXTEEN_BITS
 from ..layers import Column, columns
 from ..points import PointBlock
-from .header import header_from_notes, placed, system_of_text
+from .header import CloudHeader, header_from_notes, placed, system_of_text
 from .reader import CloudReader, check_coordinates, damage_error
 from .writer import CloudWriter
 
@@ -260,54 +260,71 @@ class E57Reader(CloudReader):
     """
 
     def __init__(self, path: Path) -> None:
-        self._e57 = e57 = load_libe57()
+        self._e57 = load_libe57()
         try:
-            self._file = e57.ImageFile(str(path), "r")
+            self._file = self._e57.ImageFile(str(path), "r")
         except Exception as problem:
             raise InputError(str(path), None, f"is not an E57 file that can be read ({_error_text(problem)})") from None
         try:
-            root = self._file.root()
-            self._scans = [root["data3D"][i] for i in range(len(root["data3D"]))]
-            self._fields = [_field_names(e57.StructureNode(scan["points"].prototype())) for scan in self._scans]
-            counts = [int(scan["points"].childCount()) for scan in self._scans]
-            has_notes = f"{EXTENSION}:notes" in _field_names(root)
-            notes = json.loads(root[f"{EXTENSION}:notes"].value()) if has_notes else None
-            metadata = "coordinateMetadata"
-            text = str(root[metadata].value()) if not has_notes and metadata in _field_names(root) else None
-        except Exception as problem:
-            self.close()
-            raise InputError(str(path), None, f"is an E57 file that is damaged ({_error_text(problem)})") from None
-        names: set[str] = set().union(*self._fields)
-        if sum(counts) and not all({"cartesianX", "cartesianY", "cartesianZ"} <= fields for fields in self._fields):
-            self.close()
-            raise InputError(str(path), None, "has no Cartesian coordinates")
-        self._counts = counts
-        try:
-            header = header_from_notes(
-                path,
-                "E57",
-                sum(counts),
-                names,
-                notes,
-                name_of=e57_name,
-                usual={*_FIXED, *_FLAGGED},
-                has_color="colorRed" in names,
-            )
-            self.header = replace(header, place=_declared_place(path, text)) if text else header
+            notes, system_text = self._read_structure(path)
+            self.header = self._header(path, notes, system_text)
         except InputError:
             self.close()
             raise
-        self._intensities: list[Limits | None] = [None] * len(self._scans)
-        if not self.header.labelled:  # ours are in the unit of the notes, whatever the limits
-            self._intensities = [self._limits(scan, "intensity", fields) for scan, fields in self._scanned()]
-            pairs = zip(self._intensities, self._fields, strict=True)
-            stored_limits = [limits for limits, fields in pairs if "intensity" in fields]
-            if stored_limits and None not in stored_limits:
-                self.header = replace(self.header, intensity_scale=SIXTEEN_BITS)
-            elif any(stored_limits):
-                text = "only some of its scans name the limits of intensities: intensities are read unscaled"
-                assume(f"{path.name}: {text}")
-                self._intensities = [None] * len(self._scans)
+        self._intensities = self._intensity_limits()
+        if any(self._intensities):
+            self.header = replace(self.header, intensity_scale=SIXTEEN_BITS)
+
+    def _read_structure(self, path: Path) -> tuple[dict[str, Any] | None, str | None]:
+        """Find the scans with their fields and counts; return our notes, and the coordinate system that others declare.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        try:
+            root = self._file.root()
+            self._scans = [root["data3D"][i] for i in range(len(root["data3D"]))]
+            prototypes = [self._e57.StructureNode(scan["points"].prototype()) for scan in self._scans]
+            self._fields = [_field_names(prototype) for prototype in prototypes]
+            self._counts = [int(scan["points"].childCount()) for scan in self._scans]
+            names = _field_names(root)
+            if f"{EXTENSION}:notes" in names:
+                return json.loads(root[f"{EXTENSION}:notes"].value()), None
+            return None, str(root["coordinateMetadata"].value()) if "coordinateMetadata" in names else None
+        except Exception as problem:
+            raise InputError(str(path), None, f"is an E57 file that is damaged ({_error_text(problem)})") from None
+
+    def _header(self, path: Path, notes: dict[str, Any] | None, system_text: str | None) -> CloudHeader:
+        """Return the file's header; raise `InputError` if it has no Cartesian coordinates, or its notes are wrong.
+
+        Args:
+            path: of the file.
+            notes: ours; None if other software wrote the file.
+            system_text: coordinate system that the file declares.
+        """
+        count, names = sum(self._counts), set[str]().union(*self._fields)
+        if count and not all({"cartesianX", "cartesianY", "cartesianZ"} <= fields for fields in self._fields):
+            raise InputError(str(path), None, "has no Cartesian coordinates")
+        usual, has_color = {*_FIXED, *_FLAGGED}, "colorRed" in names
+        header = header_from_notes(path, "E57", count, names, notes, name_of=e57_name, usual=usual, has_color=has_color)
+        return replace(header, place=_declared_place(path, system_text)) if system_text else header
+
+    def _intensity_limits(self) -> list[Limits | None]:
+        """Return the limits of each scan's intensities; None where they are read as they are stored.
+
+        Ours are in the unit of the notes, whatever the limits. Those of other software are scaled only if all scans
+        that have intensities name their limits.
+        """
+        unscaled: list[Limits | None] = [None] * len(self._scans)
+        if self.header.labelled:
+            return unscaled
+        limits = [self._limits(scan, "intensity", fields) for scan, fields in self._scanned()]
+        known = [found is not None for found, fields in zip(limits, self._fields, strict=True) if "intensity" in fields]
+        if any(known) and not all(known):
+            text = "only some of its scans name the limits of intensities: intensities are read unscaled"
+            assume(f"{self.header.path.name}: {text}")
+            return unscaled
+        return limits
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
         """Yield the points of one scan after the other, in map coordinates, without invalid ones."""

@@ -230,15 +230,32 @@ def _draw(
     slab_points = concatenate(slab)
     if len(slab_points) == 0:
         raise InputError("--line" if line else "--station", line or station, "meets no points of the cloud")
-    heights = float(slab_points.xyz[:, 2].min()), float(slab_points.xyz[:, 2].max())
-    if line is None:
-        reach = 1.02 * float(np.abs((slab_points.xyz[:, :2] - middle) @ rightward).max()) + 0.5
-    by_class = len(np.unique(slab_points.class_id)) > 1
-    section = CrossSection(middle, rightward, reach, depth, heights, header.scheme, by_class)
-    section.add(slab_points)
-    fields["section"] = header.class_field if by_class else "intensity"
+    section = _cross_section(slab_points, header.scheme, middle, rightward, depth, None if line is None else reach)
+    fields["section"] = header.class_field if section.by_class else "intensity"
     section.save(folder / preview_file("section"), fields["section"])
     return counts | {"section_points": len(slab_points)}, fields
+
+
+def _cross_section(
+    points: PointBlock, scheme: ClassScheme, middle: Float, rightward: Float, depth: float, reach: float | None
+) -> CrossSection:
+    """Return a cross-section with its points; coloured by intensity where all of them have one class.
+
+    Args:
+        points: at least one, of a slice of the cloud.
+        scheme: of their classes.
+        middle: (2,) of the section, m.
+        rightward: (2,) unit vector along it.
+        depth: of the slice, m.
+        reach: to either side of the middle, m; as far as the points lie if None.
+    """
+    heights = float(points.xyz[:, 2].min()), float(points.xyz[:, 2].max())
+    if reach is None:
+        reach = 1.02 * float(np.abs((points.xyz[:, :2] - middle) @ rightward).max()) + 0.5
+    by_class = len(np.unique(points.class_id)) > 1
+    section = CrossSection(middle, rightward, reach, depth, heights, scheme, by_class)
+    section.add(points)
+    return section
 
 
 def _strays_of(cloud: CloudReader) -> Strays | None:

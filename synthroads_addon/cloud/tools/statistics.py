@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ...base.arrays import Float, Index, Int, UInt8, UInt16
 from ...materials.reflectance import LUMINANCE
 from ..flags import withheld_points
+from ..formats.header import CloudHeader
 from ..formats.reader import CloudReader
 from ..layers import PREDICTED
 from ..points import PointBlock
@@ -58,21 +59,9 @@ def cloud_statistics(cloud: CloudReader, radius: float = RADIUS, samples: int = 
         first_pass.add(used_points)
         if predicted:
             predicted.add(used_points)
-    result: dict[str, Any] = {
-        "file": header.path.name,
-        "kind": header.kind,
-        "points": header.count,
-        "withheld": withheld_count,
-        "epsg": header.epsg,
-        "height_epsg": header.height_epsg,
-        "coordinate_system": header.system.label if header.system else None,
-        "unit_factors": None if header.place.scale is None else header.place.scale.tolist(),
-        "attributes": list(header.attributes),
-        "left_out": [name for name in header.left_out if name != PREDICTED or not predicted],
-        "class_scheme": header.scheme.name,
-        "class_field": header.class_field,
-        "roughness_radius": radius,
-    } | (predicted.figures() if predicted else {})
+    result = _header_figures(header, withheld_count, predicted is not None) | {"roughness_radius": radius}
+    if predicted:
+        result |= predicted.figures()
     if first_pass.moments.count.sum() == 0:
         return result | {"bounds": None, "all": None, "classes": {}}
     roughness = _Roughness(first_pass.samples(radius), radius)
@@ -88,6 +77,30 @@ def cloud_statistics(cloud: CloudReader, radius: float = RADIUS, samples: int = 
         "bounds": bounds,
         "all": first_pass.figures([int(c) for c in present], roughness_by_class),
         "classes": table,
+    }
+
+
+def _header_figures(header: CloudHeader, withheld_count: int, has_predicted: bool) -> dict[str, Any]:
+    """Return what a cloud's header says, as JSON data.
+
+    Args:
+        header: the cloud's.
+        withheld_count: number of points that are withheld.
+        has_predicted: whether there are predicted classes, which the statistics don't leave out.
+    """
+    return {
+        "file": header.path.name,
+        "kind": header.kind,
+        "points": header.count,
+        "withheld": withheld_count,
+        "epsg": header.epsg,
+        "height_epsg": header.height_epsg,
+        "coordinate_system": header.system.label if header.system else None,
+        "unit_factors": None if header.place.scale is None else header.place.scale.tolist(),
+        "attributes": list(header.attributes),
+        "left_out": [name for name in header.left_out if name != PREDICTED or not has_predicted],
+        "class_scheme": header.scheme.name,
+        "class_field": header.class_field,
     }
 
 
@@ -172,11 +185,10 @@ class _FirstPass:
         count = int(self.moments.count[labels].sum())
         area = self._cells.area(labels)
         height, intensity, luminance_moments = (self.moments.mean_and_deviation(row, labels) for row in range(3))
-        has_color = self.has_color and luminance_moments != (
-            0.0,
-            0.0,
-        )  # point formats with colours are used without them
+        # Point formats with colours are used without them: all points are black then.
+        has_color = self.has_color and luminance_moments != (0.0, 0.0)
         rough_classes = [label for label in labels if label in roughness_by_class]
+        roughness = [roughness_by_class[label][0] for label in rough_classes]
         weights = self.moments.count[rough_classes]
         return {
             "points": count,
@@ -184,10 +196,8 @@ class _FirstPass:
             "density": count / area,
             "height_mean": height[0],
             "height_std": height[1],
-            "roughness": float(np.average([roughness_by_class[c][0] for c in rough_classes], weights=weights))
-            if rough_classes
-            else None,
-            "roughness_samples": sum(roughness_by_class[c][1] for c in rough_classes),
+            "roughness": float(np.average(roughness, weights=weights)) if rough_classes else None,
+            "roughness_samples": sum(roughness_by_class[label][1] for label in rough_classes),
             "intensity_mean": intensity[0],
             "intensity_std": intensity[1],
             "luminance_mean": luminance_moments[0] if has_color else None,

@@ -298,7 +298,7 @@ class Target:
             motions: see `motions`.
         """
         static = self._parts[0]
-        # Of faces that move these are of none; they are replaced.
+        # Of faces that move these mean nothing, and are replaced below.
         result = static.planes.normals(faces, cosine) if static.count else np.empty((3, len(faces)))
         for number, rows in self._on_moving(faces):
             part = self._parts[number + 1]
