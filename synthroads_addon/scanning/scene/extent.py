@@ -26,7 +26,7 @@ def body_bounds(mesh: SceneMesh) -> Float:
     if strays is None:
         return bounds(mesh)
     vertices = mesh.vertices[np.unique(mesh.triangles)]
-    body_mask = strays.stay(vertices)
+    body_mask = strays.belongs(vertices)
     return np.array([vertices[body_mask].min(axis=0), vertices[body_mask].max(axis=0)], dtype=np.float64)
 
 
