@@ -50,4 +50,4 @@ def test_it_does_not_matter_how_places_come_in_blocks() -> None:
     places = np.concatenate([around((0.0, 0.0, 0.0)), around((1e5, 0.0, 0.0), 7), around((0.0, 3e5, 0.0), 4000)])
     whole, parts = of(places), of(*np.array_split(places, 13))
     assert whole.count() == parts.count() == 7
-    np.testing.assert_array_equal(whole.stay(places), parts.stay(places))
+    np.testing.assert_array_equal(whole.belongs(places), parts.belongs(places))
