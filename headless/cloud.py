@@ -192,7 +192,7 @@ def _preview(arguments: argparse.Namespace) -> Outcome:
         centerline=line,
         depth=arguments.depth,
         overwrite=arguments.overwrite,
-        only=arguments.picture,
+        picture=arguments.picture,
     )
     folder = arguments.output.parent if arguments.output.name in result["pictures"] else arguments.output
     lines = [f"{name} shows {field}" for name, field in result["fields"].items()]

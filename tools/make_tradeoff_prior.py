@@ -128,7 +128,7 @@ def image_seconds(trial: Trial, changes: Mapping[str, Any]) -> tuple[float, floa
         return [*middle_views, *small_views]
 
     stamps = [trial.clock()]
-    request = replace(trial.layer_request(changes), wanted=WANTED, pick=pick)
+    request = replace(trial.layer_request(changes), names=WANTED, pick=pick)
     with layer_source(request, progress=lambda share: stamps.append(trial.clock())):
         pass
     times = np.diff(stamps)

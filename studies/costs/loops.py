@@ -50,13 +50,13 @@ def times(plan: ScanPlan) -> tuple[float, float]:
     for strip, number in list(plan.blocks())[:BLOCKS]:
         first, count = plan.cut.pulse_span(strip, number)
         count, scan = min(count, PULSES), BlockScan(plan)
-        poses = scan.poses_between(strip, *(plan.cut.time(strip, pulse) for pulse in (first, first + count - 1)))
-        pulses = scan.emit(strip, poses, None, first, count)
+        poses = scan.emitter.poses_between(strip, *(plan.cut.time(strip, pulse) for pulse in (first, first + count - 1)))
+        pulses = scan.emitter.emit(strip, poses, None, first, count)
         times_by_plan: tuple[list[float], list[float]] = ([], [])
         for _ in range(RUNS):
             for timed_plan, run_times in zip((plan, by_numpy), times_by_plan, strict=True):
                 begin = time.thread_time()
-                BlockScan(timed_plan).traced_echoes(strip, pulses, poses.motions, 0)
+                BlockScan(timed_plan).tracer.traced_echoes(strip, pulses, poses.motions, 0)
                 run_times.append(time.thread_time() - begin)
         result = [total + min(run_times) for total, run_times in zip(result, times_by_plan, strict=True)]
     return result[0], result[1]
@@ -90,8 +90,10 @@ def faces(plan: ScanPlan) -> dict[str, float]:
     for strip, number in (blocks[i] for i in block_indices):
         first, count = plan.cut.pulse_span(strip, number)
         count = min(count, PULSES)
-        poses = scan.poses_between(strip, *(plan.cut.time(strip, pulse) for pulse in (first, first + count - 1)))
-        pulses = scan.emit(strip, poses, None, first, count)
+        poses = scan.emitter.poses_between(
+            strip, *(plan.cut.time(strip, pulse) for pulse in (first, first + count - 1))
+        )
+        pulses = scan.emitter.emit(strip, poses, None, first, count)
         if plan.emission.outline is not None:
             is_near = ~plan.emission.outline.passed_by(pulses.origin, pulses.direction, plan.setting.maximum_range)
             pulses = pulses.select(np.flatnonzero(is_near))
@@ -117,7 +119,7 @@ def faces(plan: ScanPlan) -> dict[str, float]:
             ("wrong", is_believed & ~meets_one_face),
         ):
             counts[name] += int(mask.sum())
-        seconds["pulses"] += shortest(scan.traced_echoes, strip, pulses, poses.motions, 0)
+        seconds["pulses"] += shortest(scan.tracer.traced_echoes, strip, pulses, poses.motions, 0)
         seconds["blocks"] += shortest(scan.scan_pulses, strip, first, count, number)
     share = {name: counts[name] / max(1, counts["hits"]) for name in ("one face", "believed")}
     return {**share, "wrong": counts["wrong"] / max(1, counts["believed"]), **seconds}

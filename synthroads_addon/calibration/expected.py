@@ -41,7 +41,7 @@ class Texture:
     mean_color: tuple[float, float, float]
 
     def factor(self, x: Float, y: Float) -> Float:
-        """Return the reflectivity factors at places x, y (any shape), m: those of the pixels they lie in."""
+        """Return the reflectivity factors at places x, y (any shape), m: those of the pixels that they lie in."""
         height, width = self.values.shape
         column = np.floor(x / self.size[0] * width).astype(np.intp) % width
         row = np.floor(y / self.size[1] * height).astype(np.intp) % height
@@ -74,12 +74,12 @@ def read_texture(path: Path, width: float, material: Material) -> Texture:
     """
     try:
         with Image.open(path, formats=PILLOW_FORMATS) as image:
-            stored = np.asarray(image.convert("RGB"), dtype=np.float64) / 255.0
+            pixels = np.asarray(image.convert("RGB"), dtype=np.float64) / 255.0
     except FileNotFoundError:
         raise MissingFileError(str(path), None, "no such file") from None
     except Exception:  # each of PIL's formats has errors of its own for what is damaged
         raise InputError(str(path), None, f"must be a whole image: {', '.join(PILLOW_FORMATS)}") from None
-    return texture_of(decode_srgb(stored), width, material)
+    return texture_of(decode_srgb(pixels), width, material)
 
 
 SAMPLES = 20_000
@@ -136,18 +136,25 @@ class ReceiverModel:
         power = received_intensity(brightness, distance, self.attenuation)
         return np.maximum(power - self.pedestal, 0.0) if self.pedestal else power
 
-    def to_stored(self, linear: Float) -> Float:
-        """Return the unrounded intensities that the device stores for linear ones times its gain; -inf for 0 in dB."""
-        if self.decibels is None:
-            return linear if self.compression == 1.0 else FULL_SCALE * (linear / FULL_SCALE) ** self.compression
-        with np.errstate(divide="ignore"):
-            return FULL_SCALE / self.decibels * 10.0 * np.log10(linear)
+    def to_stored(self, linear_values: Float) -> Float:
+        """Return the unrounded intensities that the device stores for linear ones times its gain.
 
-    def to_linear(self, stored: Float) -> Float:
+        Of decibels they are -inf for a linear intensity of 0.
+        """
+        if self.decibels is not None:
+            with np.errstate(divide="ignore"):
+                return FULL_SCALE / self.decibels * 10.0 * np.log10(linear_values)
+        if self.compression == 1.0:
+            return linear_values
+        return FULL_SCALE * (linear_values / FULL_SCALE) ** self.compression
+
+    def to_linear(self, stored_values: Float) -> Float:
         """Return the linear intensities, times the gain, of stored ones: the inverse of `to_stored`."""
-        if self.decibels is None:
-            return stored if self.compression == 1.0 else FULL_SCALE * (stored / FULL_SCALE) ** (1.0 / self.compression)
-        return np.asarray(10.0 ** (stored * self.decibels / (10.0 * FULL_SCALE)))
+        if self.decibels is not None:
+            return np.asarray(10.0 ** (stored_values * self.decibels / (10.0 * FULL_SCALE)))
+        if self.compression == 1.0:
+            return stored_values
+        return FULL_SCALE * (stored_values / FULL_SCALE) ** (1.0 / self.compression)
 
 
 def receiver_of_device(setting: ScannerSetting, attenuation: float) -> ReceiverModel:
@@ -203,47 +210,54 @@ class Expectation:
         self._share = None if strip is None else self._share_on_strip(strip)
         self._texture = None if texture is None else self._texture_factors(texture, rng)
 
-    def linear_intensities(self, material: Material, beside: Material | None = None) -> Float:
+    def linear_intensities(self, material: Material, side_material: Material | None = None) -> Float:
         """Return the linear intensities (`SAMPLES`,) that a material gives at the sampled places.
 
         Args:
             material: of the class.
-            beside: what lies beside its strip; not needed for a plane.
+            side_material: what lies beside its strip; not needed for a plane.
         """
-        surfaces = surfaces_of([material] if beside is None else [material, beside], self._reflection)
-        own_material = np.zeros(SAMPLES, dtype=np.intp)
-        brightness = brightness_of(surfaces, own_material, self._cosine)
+        surfaces = surfaces_of([material] if side_material is None else [material, side_material], self._reflection)
+        material_index = np.zeros(SAMPLES, dtype=np.intp)
+        brightness = brightness_of(surfaces, material_index, self._cosine)
         if self._texture is not None:
             brightness = brightness * self._texture
-        if self._share is not None and beside is not None:
-            around = brightness_of(surfaces, own_material + 1, self._cosine)
-            brightness = self._share * brightness + (1.0 - self._share) * around
+        if self._share is not None and side_material is not None:
+            side_brightness = brightness_of(surfaces, material_index + 1, self._cosine)
+            brightness = self._share * brightness + (1.0 - self._share) * side_brightness
         if surfaces.uneven[0]:
             place = self._place * material.spread_wavelength
-            brightness = brightness * spread_factors(surfaces, own_material, place, _SEED)
+            brightness = brightness * spread_factors(surfaces, material_index, place, _SEED)
         return self._receiver.at_range(brightness * (1.0 - material.transmission), self.distance)
 
     def _rays(self) -> tuple[Float, Float, Float]:
-        """Return where the footprint's rays fall, m, along and across the scan line (`SAMPLES`, K), and weights (K,).
+        """Return the places of a footprint's K rays about its middle, and the rays' shares of the energy.
 
         The scan line runs across the strip, where a slanting beam's footprint is longest.
+
+        Returns:
+            offsets along the scan line and across it (`SAMPLES`, K), m; weights (K,).
         """
         pattern = beam_pattern(RINGS[_RAYS])
         radius = [np.asarray(r * self.distance)[:, None] for r in beam_radii(self._receiver.divergence)]
-        along = pattern.across[:, 0] * radius[0] / np.maximum(self._cosine, 0.05)[:, None]
-        return along, pattern.across[:, 1] * radius[1], pattern.weights
+        line_offset = pattern.across[:, 0] * radius[0] / np.maximum(self._cosine, 0.05)[:, None]
+        return line_offset, pattern.across[:, 1] * radius[1], pattern.weights
 
     def _share_on_strip(self, width: float) -> Float:
-        """Return the share (`SAMPLES`,) of each pulse's energy on a strip, pulses being spread over its width (m)."""
-        along, _, weight = self._rays()
-        inside = np.abs(along + width * self._across[:, None]) <= width / 2.0
-        return np.asarray((inside * weight).sum(axis=1))
+        """Return the share (`SAMPLES`,) of each pulse's energy that falls on a strip.
+
+        Args:
+            width: of the strip, m, over which the pulses' middles are spread.
+        """
+        line_offset, _, weight = self._rays()
+        is_on_strip = np.abs(line_offset + width * self._across[:, None]) <= width / 2.0
+        return np.asarray((is_on_strip * weight).sum(axis=1))
 
     def _texture_factors(self, texture: Texture, rng: np.random.Generator) -> Float:
         """Return the texture's mean factor (`SAMPLES`,) over each footprint, at random places of the picture."""
-        along, across, weight = self._rays()
-        middle = rng.random((2, SAMPLES, 1)) * np.array(texture.size)[:, None, None]
-        return np.asarray((texture.factor(middle[0] + along, middle[1] + across) * weight).sum(axis=1))
+        line_offset, cross_offset, weight = self._rays()
+        centre = rng.random((2, SAMPLES, 1)) * np.array(texture.size)[:, None, None]
+        return np.asarray((texture.factor(centre[0] + line_offset, centre[1] + cross_offset) * weight).sum(axis=1))
 
 
 def chosen_views(incidence_deg: tuple[float, ...], ranges: tuple[float, ...]) -> Views:

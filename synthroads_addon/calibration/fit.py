@@ -66,8 +66,8 @@ def fit_level_and_spreads(
     material: Material,
     quantiles: Float,
     receiver: ReceiverModel,
-    beside: tuple[Material, float] | None = None,
-    spread: bool = True,
+    side: tuple[Material, float] | None = None,
+    with_spreads: bool = True,
 ) -> Fit:
     """Return level and spreads at which the expected quantiles fit the cloud's best (least squares).
 
@@ -78,59 +78,79 @@ def fit_level_and_spreads(
         material: to begin with.
         quantiles: (4,) `FITTED` quantiles as stored.
         receiver: the device.
-        beside: for a strip, the material beside it and its level.
-        spread: whether the spreads are fitted as well; else they are the material's.
+        side: for a strip, the material beside it and its level.
+        with_spreads: whether the spreads are fitted as well; else they are the material's.
     """
     width = interquartile_range(quantiles)
 
     def residual(x: Float) -> Float:
-        linear = apply_gain(expectation, material, _fit(x, material), beside)
+        """Return the errors (4,) of the expected quantiles, over the interquartile range, at parameters."""
+        linear = apply_gain(expectation, material, _fit(x, material), side)
         return np.asarray((np.quantile(receiver.to_stored(linear), FITTED) - quantiles) / width)
 
-    start = float(np.median(expectation.linear_intensities(material, beside[0] if beside else None)))
+    start = float(np.median(expectation.linear_intensities(material, side[0] if side else None)))
     if start <= 0.0:
         raise InputError("material", material.to_dict(), "gives nothing back at these incidence angles and ranges")
     level = np.log(float(receiver.to_linear(quantiles[1:2])[0]) / start)
-    if not spread:
+    if not with_spreads:
         return _fit(_levenberg_marquardt(residual, np.array([level])), material)
     # A quartile of a normal distribution lies 0.6745 standard deviations from its median; spreads are of logarithms.
     log_linear = np.log(receiver.to_linear(quantiles))
-    sigma = [max(0.02, abs(float(log_linear[1 + side] - log_linear[1])) / _QUARTILE) for side in (-1, 1)]
+    sigma = [max(0.02, abs(float(log_linear[1 + direction] - log_linear[1])) / _QUARTILE) for direction in (-1, 1)]
     return _fit(_levenberg_marquardt(residual, np.array([level, *np.log(sigma)])), material)
 
 
-def apply_gain(expectation: Expectation, material: Material, fit: Fit, beside: tuple[Material, float] | None) -> Float:
-    """Return linear intensities (`SAMPLES`,) by a fit's spreads, times its level; what is beside a strip keeps its."""
+def apply_gain(expectation: Expectation, material: Material, fit: Fit, side: tuple[Material, float] | None) -> Float:
+    """Return the linear intensities (`SAMPLES`,) of a material with a fit's spreads, times the fit's level.
+
+    Args:
+        expectation: the places of the class.
+        material: of the class.
+        fit: its level and spreads.
+        side: for a strip, the material beside it and its level, which stays as it is.
+    """
     uneven = material.model_copy(update={"spread_below": fit.below, "spread_above": fit.above})
-    if beside is None:
+    if side is None:
         return fit.level * expectation.linear_intensities(uneven)
-    return fit.level * expectation.linear_intensities(
-        uneven, brighten_material(beside[0], beside[1] / fit.level, limited=False)
-    )
+    # The side's level is divided by the fit's, by which all is multiplied afterwards.
+    side_material, side_level = side
+    side_material = brighten_material(side_material, side_level / fit.level, limited=False)
+    return fit.level * expectation.linear_intensities(uneven, side_material)
 
 
 def _fit(x: Float, material: Material) -> Fit:
+    """Return the fit that parameters of the search stand for.
+
+    Args:
+        x: (1,) or (3,) logarithms of the level and of the spreads below and above.
+        material: whose spreads are taken where there are none in ``x``.
+    """
     level = float(np.exp(np.clip(x[0], -200.0, 200.0)))
     if len(x) == 1:
         return Fit(level, material.spread_below, material.spread_above)
-    low, high = np.exp(np.clip(x[1:], *np.log(_SPREADS)))
-    return Fit(level, float(low), float(high))
+    spread_below, spread_above = np.exp(np.clip(x[1:], *np.log(_SPREADS)))
+    return Fit(level, float(spread_below), float(spread_above))
 
 
 def _levenberg_marquardt(residual: Function, x: Float) -> Float:
-    """Return the parameters at which the sum of squared residuals is least, from x (P,) downhill."""
+    """Return the parameters (P,) at which the sum of squared residuals is least, from ``x`` (P,) downhill.
+
+    Args:
+        residual: returns the residuals (M,) at parameters.
+        x: where the search begins.
+    """
     damping, r = 1e-3, residual(x)
     for _ in range(_STEPS):
-        # Quantiles of samples have steps: the derivative is taken over far more than one of these.
+        # Central differences. Quantiles of samples have steps: the derivative is taken over far more than one of these.
         jacobian = np.column_stack([(residual(x + h) - residual(x - h)) / 2e-3 for h in 1e-3 * np.eye(len(x))])
         normal = jacobian.T @ jacobian
         # Marquardt 1963: (J'J + lambda diag(J'J)) delta = -J'r; lambda falls with each success and rises with each
         # failure, by a factor of 5 (chosen).
         scale = np.diag(np.maximum(np.diag(normal), 1e-9))
         delta = np.clip(np.linalg.solve(normal + damping * scale, -jacobian.T @ r), -1.0, 1.0)
-        trial = residual(x + delta)
-        if trial @ trial < r @ r:
-            x, r, damping = x + delta, trial, max(damping / 5.0, 1e-9)
+        new_r = residual(x + delta)
+        if new_r @ new_r < r @ r:
+            x, r, damping = x + delta, new_r, max(damping / 5.0, 1e-9)
             if np.abs(delta).max() < _DONE:
                 break
         elif damping > 1e6:
@@ -141,23 +161,33 @@ def _levenberg_marquardt(residual: Function, x: Float) -> Float:
 
 
 def common_gain(
-    materials: Sequence[Material], levels: Sequence[float], hold: int | None = None, given: float | None = None
+    materials: Sequence[Material],
+    levels: Sequence[float],
+    held_index: int | None = None,
+    known_gain: float | None = None,
 ) -> float:
-    """Return the one gain of the device that explains the levels of all classes: given, held, or their mean.
+    """Return the one gain of the device that explains the levels of all classes.
 
-    The given one, or that of the held material; else the one that changes the materials' brightness least (the mean of
-    the levels' logarithms), but never so small that a material had to reflect more than `BRIGHTEST`.
+    It is the level of the held material, or the known gain. Without either it is the gain that changes the materials'
+    brightness least (the mean of the levels' logarithms), but never so small that a material had to reflect more than
+    `BRIGHTEST`.
+
+    Args:
+        materials: of the classes.
+        levels: fitted level of each.
+        held_index: index of the material whose brightness stays as it is.
+        known_gain: of the device.
 
     Raises:
-        InputError: with the given gain or the held material another one had to reflect more than that.
+        InputError: with the known gain or the held material another one had to reflect more than that.
     """
-    least = max(level * row.reflectivity / BRIGHTEST for row, level in zip(materials, levels, strict=True))
-    gain = levels[hold] if hold is not None else given
+    least_gain = max(level * row.reflectivity / BRIGHTEST for row, level in zip(materials, levels, strict=True))
+    gain = levels[held_index] if held_index is not None else known_gain
     if gain is None:
-        return max(float(np.exp(np.mean(np.log(levels)))), least)
-    if least > gain * (1.0 + 1e-9):
-        allowed = f"a material would have to reflect {least / gain * BRIGHTEST:.2f} of the light"
-        raise InputError("--gain" if hold is None else "--hold", gain, allowed)
+        return max(float(np.exp(np.mean(np.log(levels)))), least_gain)
+    if least_gain > gain * (1.0 + 1e-9):
+        requirement = f"a material would have to reflect {least_gain / gain * BRIGHTEST:.2f} of the light"
+        raise InputError("--gain" if held_index is None else "--hold", gain, requirement)
     return gain
 
 
@@ -173,6 +203,7 @@ def brighten_material(material: Material, change: float, limited: bool = True) -
     """
     reflectivity, metal = change * material.reflectivity, material.metallic
     luminance = float(np.array(material.base_color) @ LUMINANCE)
+    # `reflectivity` of the table is metal Y + (1 - metal) (specular + Y / 2), with the colour's luminance Y.
     specular = (reflectivity - metal * luminance) / max(1.0 - metal, 1e-9) - 0.5 * luminance
     update: dict[str, Any] = {"specular": specular, "retroreflection": change * material.retroreflection}
     if not limited:
@@ -214,7 +245,7 @@ def fitted_slope(incidence: Float, linear: Float) -> float | None:
 
 
 def fitted_wavelength(place: Float, intensity: Float, noise: float = 0.0) -> float:
-    """Return that of `WAVELENGTHS`, m, whose random field correlates over distance most like a real class.
+    """Return the one of `WAVELENGTHS`, m, whose random field correlates over distance most like a real class.
 
     Intensities are taken by rank, as normal scores, so that no model of the distribution is needed. What is compared
     are their variances within squares of several sizes, with the field's at the same places.
@@ -225,22 +256,28 @@ def fitted_wavelength(place: Float, intensity: Float, noise: float = 0.0) -> flo
         noise: share of the variance that is the single points' and no field's.
     """
     squares = [_members(place, size) for size in _CELLS]
-    real = np.maximum((_variance_within(_normal_scores(intensity), squares) - noise) / (1.0 - noise), 0.0)
+    real_variance = np.maximum((_variance_within(_normal_scores(intensity), squares) - noise) / (1.0 - noise), 0.0)
     misfits = []
     for wavelength in WAVELENGTHS:
         values = noise_field(place - place.min(axis=0), wavelength, 1, OCTAVES)
-        misfits.append(float(np.nansum((_variance_within(_normal_scores(values), squares) - real) ** 2)))
+        misfits.append(float(np.nansum((_variance_within(_normal_scores(values), squares) - real_variance) ** 2)))
     return WAVELENGTHS[int(np.argmin(misfits))]
 
 
 def _members(place: Float, size: float) -> Index:
+    """Return the number (N,) of the square of a size (m) that each point (N, 3) lies in."""
     cell = np.floor(place[:, :2] / size).astype(np.int64)
     _, owner = np.unique(cell[:, 0] * 2_000_003 + cell[:, 1], return_inverse=True)
     return np.asarray(owner.ravel(), dtype=np.intp)
 
 
 def _variance_within(values: Float, squares: list[Index]) -> Float:
-    """Return the variance within squares of each size as a share of the total; NaN where too few pairs are in one."""
+    """Return the variance within squares of each size as a share of the total; NaN where too few points share a square.
+
+    Args:
+        values: (N,).
+        squares: for each size the square (N,) of each value.
+    """
     result = []
     for owner in squares:
         count = np.bincount(owner)

@@ -169,14 +169,15 @@ class ClassComparison:
         """Return the errors of the `FITTED` quantiles (4,) over the real interquartile range; None without a cloud."""
         if self.real is None:
             return None
-        real = np.quantile(self.real.intensity, FITTED)
-        return np.asarray((np.quantile(self.expected, FITTED) - real) / interquartile_range(real))
+        real_quantiles = np.quantile(self.real.intensity, FITTED)
+        return np.asarray((np.quantile(self.expected, FITTED) - real_quantiles) / interquartile_range(real_quantiles))
 
     def to_dict(self) -> dict[str, Any]:
         """Return quantiles, errors, views and materials of the comparison as JSON data."""
         names = [f"{100 * share:g}" for share in SHOWN]
 
         def quantiles(values: Float) -> dict[str, float]:
+            """Return the `SHOWN` quantiles of values, by name."""
             return {name: _short(value) for name, value in zip(names, np.quantile(values, SHOWN), strict=True)}
 
         data: dict[str, Any] = {"material": self.target.material, "expected": quantiles(self.expected)}
@@ -204,8 +205,16 @@ class ClassComparison:
             return []
         rows = []
         for number, (angle, distance) in enumerate(views.T):
-            low, middle, high = np.quantile(self.expected[owner.ravel() == number], (0.25, 0.5, 0.75))
-            row = {"incidence_deg": np.rad2deg(angle), "range": distance, "25": low, "50": middle, "75": high}
+            lower_quartile, median, upper_quartile = np.quantile(
+                self.expected[owner.ravel() == number], (0.25, 0.5, 0.75)
+            )
+            row = {
+                "incidence_deg": np.rad2deg(angle),
+                "range": distance,
+                "25": lower_quartile,
+                "50": median,
+                "75": upper_quartile,
+            }
             rows.append({name: _short(value) for name, value in row.items()})
         return rows
 
@@ -262,26 +271,27 @@ def calibration_steps(job: CalibrationJob) -> Generator[float, None, Calibration
 
 
 def _calibration_steps(job: CalibrationJob) -> Generator[float, None, Calibration]:
+    """Run a calibration step by step: see `calibration_steps`, which also keeps linear algebra to one thread."""
     check_job(job)
     table = job.initial_materials()
     yield 0.02
-    real = _real_classes(job)
+    real_classes = _real_classes(job)
     yield 0.4
     if "compression" in job.parts and job.fit and job.real is not None:
-        job = replace(job, compression=_fitted_compression(job, table, real))
-    pairs = zip(job.targets, real, strict=True)
+        job = replace(job, compression=_fitted_compression(job, table, real_classes))
+    pairs = zip(job.targets, real_classes, strict=True)
     inputs = [_fit_input(job, target, table[target.material], points) for target, points in pairs]
     fits: list[Fit] = []
     for number, item in enumerate(inputs):
-        beside = _beside(job, inputs, fits, number)
-        fits.append(_level(job, item, beside))
+        side = _beside(job, inputs, fits, number)
+        fits.append(_level(job, item, side))
         yield 0.4 + 0.5 * (number + 1) / len(inputs)
     yield 0.95
     return _result(job, table, inputs, fits)
 
 
 def save_fitted(
-    result: Calibration, path: Path, overwrite: bool = False, fitted: Mapping[str, Material] | None = None
+    result: Calibration, path: Path, overwrite: bool = False, fitted_materials: Mapping[str, Material] | None = None
 ) -> None:
     """Write the fitted materials, with the others of the job's own table, to a material table file.
 
@@ -289,7 +299,7 @@ def save_fitted(
         result: of the calibration.
         path: of the table.
         overwrite: replace a file that is there.
-        fitted: the fitted materials by name, if others than the result's.
+        fitted_materials: the fitted materials by name, if others than the result's.
 
     Raises:
         InputError: nothing was fitted, or the file can't be written, see `write_material_table`.
@@ -297,7 +307,7 @@ def save_fitted(
     if result.job.real is None or not result.job.fit:
         raise InputError("--save", str(path), "needs a cloud that materials are fitted to")
     rows = dict(read_material_table(result.job.table)) if result.job.table else {}
-    rows |= fitted or {entry.target.material: entry.after for entry in result.compared}
+    rows |= fitted_materials or {entry.target.material: entry.after for entry in result.compared}
     write_material_table(path, rows, overwrite)
 
 
@@ -328,6 +338,7 @@ def check_job(job: CalibrationJob) -> None:
 
 
 def _check_views(job: CalibrationJob) -> None:
+    """Raise `InputError` if a job's response, angles, ranges or scanner are out of limits or contradict each other."""
     if job.device_response and (job.range_corrected or job.decibels is not None):
         raise InputError("--device-response", True, "can't be given with --range-corrected or --decibels")
     if not job.incidence_deg or not all(0.0 <= angle < 90.0 for angle in job.incidence_deg):
@@ -341,21 +352,24 @@ def _check_views(job: CalibrationJob) -> None:
 
 
 def _check_road(job: CalibrationJob, road: RoadClasses) -> None:
+    """Raise `InputError` if a job's classes beside an axis aren't told by the spans of pavement and lines."""
     for target in job.targets:
         if target.real_class not in _ROAD:
-            given = f"{target.material}={target.real_class}"
-            raise InputError("--material", given, "must be paved or line beside an axis")
-    if any(low >= high for low, high in road.paved):
+            assignment = f"{target.material}={target.real_class}"
+            raise InputError("--material", assignment, "must be paved or line beside an axis")
+    if any(begin >= end for begin, end in road.paved):
         raise InputError("--paved", [list(span) for span in road.paved], "must be FROM,TO, FROM being the smaller")
-    asked = {target.real_class for target in job.targets}
-    for name, there, option in (("paved", road.paved, "--paved"), ("line", road.lines, "--line")):
-        if name in asked and not there:
+    class_names = {target.real_class for target in job.targets}
+    for name, spans, option in (("paved", road.paved, "--paved"), ("line", road.lines, "--line")):
+        if name in class_names and not spans:
             raise InputError(option, None, f"is needed to tell what is {name}")
     if not 0.02 <= road.line_width <= 2.0:
         raise InputError("--line-width", road.line_width, "must be 0.02 to 2 m")
 
 
-def _fitted_compression(job: CalibrationJob, table: Mapping[str, Material], real: list[RealClass | None]) -> float:
+def _fitted_compression(
+    job: CalibrationJob, table: Mapping[str, Material], real_classes: list[RealClass | None]
+) -> float:
     """Return the exponent with which the table's materials explain how far the classes' medians lie apart.
 
     Raises:
@@ -363,11 +377,11 @@ def _fitted_compression(job: CalibrationJob, table: Mapping[str, Material], real
     """
     if len(job.targets) < 2 or job.decibels is not None:
         raise InputError("--fit", "compression", "needs two materials or more, and numbers that aren't decibels")
-    plain = replace(job.receiver, compression=1.0)
+    linear_receiver = replace(job.receiver, compression=1.0)
     powers, numbers = [], []
-    for target, points in zip(job.targets, real, strict=True):
+    for target, points in zip(job.targets, real_classes, strict=True):
         assert points is not None
-        expectation = Expectation(class_views(job, points), plain, job.reflection)
+        expectation = Expectation(class_views(job, points), linear_receiver, job.reflection)
         powers.append(float(np.log(np.median(expectation.linear_intensities(table[target.material])))))
         numbers.append(float(np.log(np.median(points.intensity))))
     if np.ptp(powers) < np.log(_LEAST_CONTRAST):
@@ -382,7 +396,16 @@ def _fitted_compression(job: CalibrationJob, table: Mapping[str, Material], real
 
 @dataclass(frozen=True)
 class _FitInput:
-    """Inputs of one class's fit."""
+    """Inputs of one class's fit.
+
+    Attributes:
+        target: the material and its class.
+        before: the material of the table.
+        material: that one with the texture's colour, and with facets and wavelength if these are fitted.
+        expectation: simulated samples of the class.
+        real: the class; None without a cloud.
+        strip: whether the class is a strip.
+    """
 
     target: MaterialTarget
     before: Material
@@ -393,6 +416,7 @@ class _FitInput:
 
 
 def _real_classes(job: CalibrationJob) -> list[RealClass | None]:
+    """Return the points of each target's class; None for each without a cloud."""
     if job.real is None:
         return [None] * len(job.targets)
     cloud: RealCloud = read_real_cloud(job.real, job.class_field)
@@ -408,10 +432,18 @@ def _real_classes(job: CalibrationJob) -> list[RealClass | None]:
 
 
 def _fit_input(job: CalibrationJob, target: MaterialTarget, before: Material, real: RealClass | None) -> _FitInput:
+    """Return the inputs of one class's fit.
+
+    Args:
+        job: the calibration.
+        target: the material and its class.
+        before: the material of the table.
+        real: the class; None without a cloud.
+    """
     material, texture, receiver = before, None, job.receiver
     if target.texture is not None:
-        given = target.texture
-        texture = given if isinstance(given, Texture) else read_texture(given, target.texture_width, before)
+        image = target.texture
+        texture = image if isinstance(image, Texture) else read_texture(image, target.texture_width, before)
         material = before.model_copy(update={"base_color": texture.mean_color})
     views = class_views(job, real)
     if job.fit and real is not None:
@@ -422,14 +454,23 @@ def _fit_input(job: CalibrationJob, target: MaterialTarget, before: Material, re
 
 
 def _with_facets(job: CalibrationJob, material: Material, real: RealClass, views: Views) -> Material:
-    """Return a material with the variation's wavelength and the facet slope fitted to a class, as the job asks."""
+    """Return a material with the variation's wavelength and the facet slope fitted to a class, as far as the job asks.
+
+    Args:
+        job: the calibration.
+        material: to begin with.
+        real: the class.
+        views: its incidence angles and ranges.
+    """
     update: dict[str, Any] = {}
     if "wavelength" in job.parts:
         update["spread_wavelength"] = fitted_wavelength(real.place, real.intensity)
     scattering = job.reflection == "oren_nayar" and material.retroreflection == 0.0
     if "slope" in job.parts and scattering and len(views.incidence) == len(real.intensity):
-        near = job.receiver.to_linear(real.intensity) * (1.0 if job.range_corrected else views.distance**2)
-        slope = fitted_slope(views.incidence, near)
+        range_free_intensity = job.receiver.to_linear(real.intensity) * (
+            1.0 if job.range_corrected else views.distance**2
+        )
+        slope = fitted_slope(views.incidence, range_free_intensity)
         update |= {} if slope is None else {"facet_slope": slope}
     return material.model_copy(update=update)
 
@@ -447,7 +488,14 @@ def class_views(job: CalibrationJob, real: RealClass | None) -> Views:
 def _beside(
     job: CalibrationJob, inputs: list[_FitInput], fits: list[Fit], number: int
 ) -> tuple[Material, float] | None:
-    """Return the pavement's material and level, seen beside a strip; None if the class is no strip."""
+    """Return the material and level of the pavement beside a strip; None if the class is no strip.
+
+    Args:
+        job: the calibration.
+        inputs: of all classes.
+        fits: of the classes before this one, among which the pavement must be.
+        number: of the class.
+    """
     if not inputs[number].strip:
         return None
     for item, fit in zip(inputs, fits, strict=False):
@@ -456,17 +504,26 @@ def _beside(
     raise InputError("--material", inputs[number].target.material, "the material of the pavement must come before it")
 
 
-def _level(job: CalibrationJob, item: _FitInput, beside: tuple[Material, float] | None) -> Fit:
+def _level(job: CalibrationJob, item: _FitInput, side: tuple[Material, float] | None) -> Fit:
+    """Return the fit of a class's level and spreads; without a cloud 1 and the material's own spreads."""
     if item.real is None:
         return Fit(1.0, item.material.spread_below, item.material.spread_above)
     quantiles = np.quantile(item.real.intensity, FITTED)
-    spread = job.fit and "spread" in job.parts
-    return fit_level_and_spreads(item.expectation, item.material, quantiles, job.receiver, beside, spread)
+    with_spreads = job.fit and "spread" in job.parts
+    return fit_level_and_spreads(item.expectation, item.material, quantiles, job.receiver, side, with_spreads)
 
 
 def _result(
     job: CalibrationJob, table: Mapping[str, Material], inputs: list[_FitInput], fits: list[Fit]
 ) -> Calibration:
+    """Return the calibration's result: the classes' common gain, their materials, and what these are expected to give.
+
+    Args:
+        job: the calibration.
+        table: the materials to begin with.
+        inputs: of all classes.
+        fits: of these.
+    """
     names = [item.target.material for item in inputs]
     rows = [item.material for item in inputs]
     hold = None if job.hold is None else names.index(job.hold)
@@ -492,12 +549,22 @@ def _compare_class(
 ) -> ClassComparison:
     """Return the comparison of a class with the intensities that its final material and the gain give."""
     pairs = zip(rows, inputs, strict=True)
-    beside = next((material for material, other in pairs if other.target.real_class == "paved"), None)
+    side_material = next(
+        (material for material, other_input in pairs if other_input.target.real_class == "paved"), None
+    )
     fit = Fit(gain, row.spread_below, row.spread_above)
-    seen = item.expectation
-    linear = apply_gain(seen, row, fit, (beside, gain) if item.strip and beside is not None else None)
+    expectation = item.expectation
+    linear = apply_gain(
+        expectation, row, fit, (side_material, gain) if item.strip and side_material is not None else None
+    )
     return ClassComparison(
-        item.target, item.before, row, job.receiver.to_stored(linear), seen.incidence, seen.distance, item.real
+        item.target,
+        item.before,
+        row,
+        job.receiver.to_stored(linear),
+        expectation.incidence,
+        expectation.distance,
+        item.real,
     )
 
 
@@ -512,6 +579,7 @@ def _round_material(row: Material) -> Material:
 
 
 def _mean(levels: list[float]) -> float:
+    """Return the geometric mean of levels."""
     return float(np.exp(np.mean(np.log(levels))))
 
 

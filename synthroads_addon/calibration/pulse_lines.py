@@ -57,7 +57,12 @@ def pulse_step(place: Float, density: float, strips: int) -> float | None:
 
 
 def _step_of_block(place: AnyArray, spacing: float) -> float | None:
-    """Return the distance of consecutive pulses in one block, m; None where it shows no lines."""
+    """Return the distance of consecutive pulses in one block, m; None where it shows no lines.
+
+    Args:
+        place: (N, 2) points of the block, m.
+        spacing: usual distance of neighbouring points, m.
+    """
     local = place - place.mean(axis=0)
     pairs = cKDTree(local).query_pairs(_FARTHEST * spacing, output_type="ndarray")
     difference = local[pairs[:, 1]] - local[pairs[:, 0]]
@@ -65,12 +70,14 @@ def _step_of_block(place: AnyArray, spacing: float) -> float | None:
     # Component across each direction: (dx, dy) . (-sin, cos).
     angle = np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS
     across = np.abs(np.outer(difference[:, 0], -np.sin(angle)) + np.outer(difference[:, 1], np.cos(angle)))
-    inside = across < _BAND * spacing
-    pairs_in_band = inside.sum(axis=0)
-    best = int(pairs_in_band.argmax())
-    if pairs_in_band[best] < _CLEAR * max(float(np.median(pairs_in_band)), 1.0):
+    in_band = across < _BAND * spacing
+    pairs_in_band = in_band.sum(axis=0)
+    fullest_direction = int(pairs_in_band.argmax())
+    if pairs_in_band[fullest_direction] < _CLEAR * max(float(np.median(pairs_in_band)), 1.0):
         return None
-    length = np.hypot(*difference[inside[:, best]].T)
+    # The peak of the distances in that direction, smoothed over five bins: an eighth of the spacing, as the pulses'
+    # noise.
+    length = np.hypot(*difference[in_band[:, fullest_direction]].T)
     count, edges = np.histogram(length, _BINS, (_NEAREST * spacing, _FARTHEST * spacing))
-    density = np.convolve(count, np.ones(5), "same")  # five bins, an eighth of the spacing: as the pulses' noise
+    density = np.convolve(count, np.ones(5), "same")
     return float((edges[:-1] + edges[1:])[int(density.argmax())] / 2.0)

@@ -120,42 +120,49 @@ def refine_settings(road: RealClass, settings: Sequence[Setting], simulate: Simu
         InputError: the real pavement, or a simulated one, has too few points in patches.
     """
     windows = _windows(road)
-    names, real = _moments(road)
+    names, real_moments = _moments(road)
 
     def moments(x: Float) -> Float:
+        """Return the statistics (W, M) of scans simulated in W windows, with settings at a place of the search."""
         values = {setting.path: setting.value(place) for setting, place in zip(settings, x, strict=True)}
         return np.array([_moments(window.cut(simulate(values, number)))[1] for number, window in enumerate(windows)])
 
-    first = moments(np.zeros(len(settings)))
-    if not np.isfinite(first).all(axis=1).any():
+    first_moments = moments(np.zeros(len(settings)))
+    if not np.isfinite(first_moments).all(axis=1).any():
         raise InputError(
             "--real", None, "has no window of pavement in which a simulated scan fills patches; see --formulas"
         )
-    scatter = np.maximum(np.nanstd(first, axis=0) / np.sqrt(len(windows)), _LEAST_SCATTER)
+    # Standard error of each statistic's mean over the windows.
+    scatter = np.maximum(np.nanstd(first_moments, axis=0) / np.sqrt(len(windows)), _LEAST_SCATTER)
 
     def residual(x: Float) -> Float:
-        return np.asarray((np.nanmean(moments(x), axis=0) - real) / scatter)
+        """Return the deviations (M,) of the mean statistics from the real ones, over their scatter."""
+        return np.asarray((np.nanmean(moments(x), axis=0) - real_moments) / scatter)
 
-    start = np.asarray((np.nanmean(first, axis=0) - real) / scatter)
-    x, end = _search(residual, start, np.array([setting.reach() for setting in settings]).T)
+    start_residual = np.asarray((np.nanmean(first_moments, axis=0) - real_moments) / scatter)
+    limits = np.array([setting.reach() for setting in settings]).T
+    x, end_residual = _search(residual, start_residual, limits)
     values = {setting.path: setting.value(place) for setting, place in zip(settings, x, strict=True)}
-    statistics = [dict(zip(names, map(float, real + scatter * r), strict=True)) for r in (0.0 * start, start, end)]
+    # A residual back to a statistic: that of the real cloud has none.
+    residuals = (0.0 * start_residual, start_residual, end_residual)
+    statistics = [dict(zip(names, map(float, real_moments + scatter * r), strict=True)) for r in residuals]
     return Refined(values, *statistics)
 
 
 def _search(residual: Callable[[Float], Float], start: Float, limits: Float) -> tuple[Float, Float]:
-    """Return where residuals (M,) are least, by Gauss and Newton with Broyden's updates, and the residuals there.
+    """Return the place (N,) at which residuals are least, by Gauss and Newton with Broyden's updates, and these (M,).
 
     Args:
         residual: over the statistics' scatter, at a place (N,) of the search.
-        start: the residuals at 0.
+        start: (M,) the residuals at 0.
         limits: (2, N) least and largest places.
     """
-    low, high = limits
-    x, r = np.zeros(len(low)), start
+    least_x, largest_x = limits
+    x, r = np.zeros(len(least_x)), start
     for _ in range(_ROUNDS):
-        # No farther than the limits, beyond which a setting stays what it is.
-        steps = np.where(high - x >= x - low, np.minimum(_STEP, high - x), -np.minimum(_STEP, x - low))
+        # One-sided differences, to the side with more room: beyond its limits a setting stays what it is.
+        up, down = largest_x - x, x - least_x
+        steps = np.where(up >= down, np.minimum(_STEP, up), -np.minimum(_STEP, down))
         jacobian = np.column_stack([(residual(x + step) - r) / step.sum() for step in np.diag(steps)])
         damping = 1.0
         for _ in range(_MOVES):
@@ -165,19 +172,20 @@ def _search(residual: Callable[[Float], Float], start: Float, limits: Float) -> 
             gradient = jacobian.T @ r + x / _PRIOR**2
             delta = np.linalg.solve(normal + (damping - 1.0) * np.diag(np.diag(normal)), -gradient)
             delta *= min(1.0, _LARGEST_MOVE / float(np.abs(delta).max()))
-            delta = np.clip(x + delta, low, high) - x
-            trial = residual(x + delta)
+            delta = np.clip(x + delta, least_x, largest_x) - x
+            new_r = residual(x + delta)
             # Broyden 1965: J += (change of r - J delta) delta' / |delta|^2; also where the step is refused, as a scan
             # is costly, and tells the slope all the same.
-            jacobian += np.outer(trial - r - jacobian @ delta, delta) / max(float(delta @ delta), 1e-12)
-            if _cost(trial, x + delta) < _cost(r, x):
-                x, r, damping = x + delta, trial, max(damping / 2.0, 1.0)
+            jacobian += np.outer(new_r - r - jacobian @ delta, delta) / max(float(delta @ delta), 1e-12)
+            if _cost(new_r, x + delta) < _cost(r, x):
+                x, r, damping = x + delta, new_r, max(damping / 2.0, 1.0)
             else:
                 damping *= 3.0
     return x, r
 
 
 def _cost(residual: Float, x: Float) -> float:
+    """Return the sum of squared residuals (M,), and of the places x (N,) over the prior's standard deviation."""
     return float(residual @ residual + x @ x / _PRIOR**2)
 
 
@@ -198,15 +206,15 @@ class _Window:
     fewest: float
 
     def cut(self, scan: RealClass) -> RealClass:
-        """Return the simulated points that lie on the window's pavement."""
-        inside = self.holds(scan.place[:, :2])
-        return replace(select_points(scan, inside), beside=scan.place[~inside, :2])
+        """Return the simulated points that lie on the window's pavement, with the others as points beside it."""
+        is_pavement = self.holds(scan.place[:, :2])
+        return replace(select_points(scan, is_pavement), beside=scan.place[~is_pavement, :2])
 
     def holds(self, place: Float) -> Bool:
-        """Return a mask (N,) of the places that are pavement."""
-        inside = (np.abs(place) < self.edge / 2.0).all(axis=1)
+        """Return a mask (N,) of the places (N, 2), m from the window's middle, that are pavement."""
+        is_inside = (np.abs(place) < self.edge / 2.0).all(axis=1)
         count = np.zeros(len(place))
-        count[inside] = self.tree.query_ball_point(place[inside], self.reach, return_length=True)
+        count[is_inside] = self.tree.query_ball_point(place[is_inside], self.reach, return_length=True)
         return np.asarray(count >= self.fewest)
 
 
@@ -216,49 +224,55 @@ def window_edge(density: float) -> float:
 
 
 def select_points(road: RealClass, keep: Bool) -> RealClass:
-    """Return some points of a class; its zeros are as many as before."""
+    """Return the points of a class that a mask (N,) keeps; its number of zeros stays."""
     per_point = ("place", "intensity", "distance", "incidence", "returns")
     parts = {name: getattr(road, name)[keep] for name in per_point}
     return replace(road, **parts, time=None if road.time is None else road.time[keep])
 
 
 def _windows(road: RealClass) -> list[_Window]:
-    """Return windows of a real pavement about some of its points, spread at random."""
+    """Return `_WINDOWS` windows of a real pavement about points that are drawn at random."""
     place = road.place[:, :2]
     tree = cKDTree(place)
     random = stream(0, "calibration windows")
-    middles = place[random.choice(len(place), _WINDOWS, replace=len(place) < _WINDOWS)]
+    centres = place[random.choice(len(place), _WINDOWS, replace=len(place) < _WINDOWS)]
     density = float(np.median(make_patches(road, "--real").density))
     edge, reach = window_edge(density), _REACH / np.sqrt(density)
-    near = (tree.query_ball_point(middle, edge) for middle in middles)
+    # A circle of that radius about a place of even pavement holds pi _REACH^2 points.
     fewest = _SHARE * np.pi * _REACH**2
+    window_rows = (tree.query_ball_point(centre, edge) for centre in centres)
     return [
-        _Window(edge, cKDTree(place[rows] - middle), reach, fewest) for middle, rows in zip(middles, near, strict=True)
+        _Window(edge, cKDTree(place[rows] - centre), reach, fewest)
+        for centre, rows in zip(centres, window_rows, strict=True)
     ]
 
 
 def _moments(road: RealClass) -> tuple[list[str], Float]:
-    """Return names and values of the statistics that are compared: medians over patches; NaN without any."""
+    """Return the names and values (M,) of the statistics that are compared: medians over patches, NaN without any."""
     names = [*_USED, "density", "faint_share"]
     try:
         patches = make_patches(road, "--real")
     except InputError:
         return names, np.full(len(names), np.nan)
-    middle = dict(zip(FEATURES, np.median(patches.values, axis=0), strict=True))
-    middle |= {name: float(np.log(max(middle[name], _LEAST_LOGARITHM))) for name in _LOGARITHMIC}
-    values = [float(middle[name]) for name in _USED]
+    medians = dict(zip(FEATURES, np.median(patches.values, axis=0), strict=True))
+    medians |= {name: float(np.log(max(medians[name], _LEAST_LOGARITHM))) for name in _LOGARITHMIC}
+    values = [float(medians[name]) for name in _USED]
     return names, np.array([*values, float(np.log(np.median(patches.density))), _faint_share(road)])
 
 
 def _faint_share(road: RealClass) -> float:
-    """Return by how much the spread of heights falls from the faintest to the brightest points, of its mean."""
+    """Return the change of the heights' deviation from the faintest to the brightest points, over its mean.
+
+    Heights and brightness are those about the mean of the square metre that a point lies in.
+    """
     level = np.log(road.intensity)
     cell = np.unique(np.floor(road.place[:, :2]).astype(np.int64), axis=0, return_inverse=True)[1].ravel()
     count = np.bincount(cell)
     height, brightness = (values - (np.bincount(cell, values) / count)[cell] for values in (road.place[:, 2], level))
-    dense = count[cell] >= _BRIGHTNESS_GROUPS
-    order = np.argsort(brightness[dense])
-    sigma = [float(part.std()) for part in np.array_split(height[dense][order], _BRIGHTNESS_GROUPS)]
+    in_full_cell = count[cell] >= _BRIGHTNESS_GROUPS
+    order = np.argsort(brightness[in_full_cell])
+    groups = np.array_split(height[in_full_cell][order], _BRIGHTNESS_GROUPS)
+    sigma = [float(group.std()) for group in groups]
     # Slope of a straight line from the faintest group, at -1/2, to the brightest, at 1/2.
     places = np.linspace(-0.5, 0.5, _BRIGHTNESS_GROUPS)
     return float(np.polyfit(places, sigma, 1)[0] / max(np.mean(sigma), 1e-9))

@@ -246,7 +246,7 @@ def _brightness_noise(
 
 
 def _strips(time: Float) -> Index:
-    """Return the strip (N,) of points by their times, s: strips are parted by pauses."""
+    """Return the strip (N,) of points by their times (N,), s: a pause of `_PAUSE` parts two strips."""
     order = np.argsort(time, kind="stable")
     strip = np.empty(len(time), dtype=np.int64)
     strip[order] = np.cumsum(np.diff(time[order], prepend=time[order[0]]) > _PAUSE)
@@ -254,7 +254,16 @@ def _strips(time: Float) -> Index:
 
 
 def _squares_of(place: Float, level: Float, strip: Index) -> tuple[Index, _Squares]:
-    """Return the points of one strip each in squares of `FEWEST` or more, and what is left of them there."""
+    """Return the rows (M,) of points in squares with `FEWEST` points of one strip or more, and their residuals.
+
+    Args:
+        place: (N, 3) m.
+        level: (N,) brightness, dB.
+        strip: (N,) of each point.
+
+    Raises:
+        InputError: there are too few such squares.
+    """
     cell = np.column_stack([np.floor(place[:, :2] / EDGE).astype(np.int64), strip])
     _, owner, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
     owner = owner.ravel()
@@ -267,8 +276,10 @@ def _squares_of(place: Float, level: Float, strip: Index) -> tuple[Index, _Squar
     # n / (n - 1): the mean that is taken off is of the same points.
     levels = [(level[rows] - level[rows].mean()) * np.sqrt(len(rows) / (len(rows) - 1.0)) for rows in groups]
     number = np.repeat(np.arange(len(groups)), [len(rows) for rows in groups])
-    fitted = _COEFFICIENTS * len(groups) / len(number)
-    return np.concatenate(groups), _Squares(number, np.concatenate(height), np.concatenate(levels), len(groups), fitted)
+    parabola_share = _COEFFICIENTS * len(groups) / len(number)
+    return np.concatenate(groups), _Squares(
+        number, np.concatenate(height), np.concatenate(levels), len(groups), parabola_share
+    )
 
 
 def _about_parabola(place: Float) -> Float:
@@ -303,49 +314,56 @@ def _range_noise(range_residual: Float, squares: _Squares) -> tuple[float, float
     return float(np.sqrt(a2)), float(np.sqrt(b2))
 
 
-def _range_delay(range_residual: Float, fitted: float) -> float:
+def _range_delay(range_residual: Float, parabola_share: float) -> float:
     """Return the share of the residuals' (N,) standard deviation that is an exponential delay, by their skewness.
 
-    Of a point's own deviation the share ``fitted`` is lost to the parabola: of its cube three times as much as of its
-    square.
+    Of a point's own deviation the share ``parabola_share`` is lost to the parabola: of its cube three times as much as
+    of its square.
     """
     iqr = float(np.diff(np.quantile(range_residual, (0.25, 0.75)))[0])
     inliers = range_residual[np.abs(range_residual) < _OUTLIER * iqr]
     third_moment = float(np.mean((inliers - inliers.mean()) ** 3))
-    skewness = third_moment / max(float(inliers.std()) ** 3, 1e-30) / (1.0 - fitted) ** 1.5
+    skewness = third_moment / max(float(inliers.std()) ** 3, 1e-30) / (1.0 - parabola_share) ** 1.5
     # An exponential distribution's third moment is twice its deviation cubed; late echoes lie lower: skewness = -2 q^3.
     return float(np.clip(np.cbrt(-skewness / 2.0), 0.0, _LARGEST_DELAY))
 
 
 def _gain_step(place: Float, level: Float, strip: Index) -> float:
-    """Return how far the brightness of two strips differs in one square, root mean square, dB; 0 of a single strip."""
+    """Return how far the brightness of two strips differs in one square, root mean square, dB; 0 of a single strip.
+
+    Args:
+        place: (N, 3) m.
+        level: (N,) brightness, dB.
+        strip: (N,) of each point.
+    """
     cell = np.floor(place[:, :2] / EDGE).astype(np.int64)
     rows, owner, count = np.unique(np.column_stack([cell, strip]), axis=0, return_inverse=True, return_counts=True)
     mean = np.bincount(owner.ravel(), level) / count
-    dense = count >= _FEWEST_OF_STRIP
-    rows, mean = rows[dense], mean[dense]
-    # Rows are sorted by square, then strip: neighbours in the same square are two strips in it.
-    first = np.flatnonzero((np.diff(rows[:, :2], axis=0) == 0).all(axis=1))
-    if not len(first):
+    is_dense = count >= _FEWEST_OF_STRIP
+    rows, mean = rows[is_dense], mean[is_dense]
+    # Rows (x, y, strip) are sorted by square, then strip: neighbours in the same square are two strips in it.
+    pair_rows = np.flatnonzero((np.diff(rows[:, :2], axis=0) == 0).all(axis=1))
+    if not len(pair_rows):
         return 0.0
-    difference = np.diff(mean)[first]
-    pairs = rows[first, 2] * _MOST_STRIPS + rows[first + 1, 2]
-    steps = [float(np.median(difference[pairs == pair])) for pair in np.unique(pairs)]
+    difference = np.diff(mean)[pair_rows]
+    # One number for each pair of strips, whose squares' median is taken.
+    strip_pair = rows[pair_rows, 2] * _MOST_STRIPS + rows[pair_rows + 1, 2]
+    steps = [float(np.median(difference[strip_pair == pair])) for pair in np.unique(strip_pair)]
     return float(np.sqrt(np.mean(np.square(steps))))
 
 
-def _gain_and_speckle(place: Float, squares: _Squares, mixed: bool) -> tuple[float, float]:
+def _gain_and_speckle(place: Float, squares: _Squares, strips_mixed: bool) -> tuple[float, float]:
     """Return the step of the gain between strips, dB, and the relative standard deviation of the speckle.
 
     Args:
         place: (N, 3) m.
         squares: with the points' brightness.
-        mixed: whether squares hold points of several strips, for all that is known.
+        strips_mixed: whether squares hold points of several strips, for all that is known.
     """
     variance = float(np.mean(squares.level**2))
     excess_kurtosis = float(np.mean(squares.level**4)) / variance**2 - 3.0
     # Two normal distributions G apart: excess kurtosis = -2 (G / 2)^4 / variance^2.
-    half_gain = (max(-excess_kurtosis, 0.0) / 2.0) ** 0.25 * np.sqrt(variance) if mixed else 0.0
+    half_gain = (max(-excess_kurtosis, 0.0) / 2.0) ** 0.25 * np.sqrt(variance) if strips_mixed else 0.0
     difference = _neighbour_steps(place, squares)
     # Half the mean square difference is the speckle's variance, and (G / 2)^2 more where neighbours are of any strip.
     speckle_db2 = max(0.5 * float(np.mean(difference**2)) - half_gain**2, 0.0)
@@ -353,15 +371,21 @@ def _gain_and_speckle(place: Float, squares: _Squares, mixed: bool) -> tuple[flo
 
 
 def _neighbour_steps(place: Float, squares: _Squares) -> Float:
-    """Return the difference (N,) of each point's brightness to that of its nearest one in the same square, dB."""
+    """Return the difference (N,) of each point's brightness to that of its nearest one in the same square, dB.
+
+    Args:
+        place: (N, 3) of the squares' points, square by square, m.
+        squares: with the points' brightness.
+    """
     begins = np.flatnonzero(np.diff(squares.owner, prepend=-1))
+    ends = np.append(begins[1:], len(squares.owner))
     steps = []
-    for first, end in zip(begins, np.append(begins[1:], len(squares.owner)), strict=True):
+    for begin, end in zip(begins, ends, strict=True):
         # From the first point: map coordinates squared would leave few digits to their differences.
-        x, y = (place[first:end, axis] - place[first, axis] for axis in (0, 1))
+        x, y = (place[begin:end, axis] - place[begin, axis] for axis in (0, 1))
         distance2 = (x[:, None] - x) ** 2 + (y[:, None] - y) ** 2
         np.fill_diagonal(distance2, np.inf)
-        level = squares.level[first:end]
+        level = squares.level[begin:end]
         steps.append(level[distance2.argmin(axis=1)] - level)
     return np.concatenate(steps)
 
@@ -391,16 +415,16 @@ def _rings(place: Float, level: Float) -> tuple[float | None, float | None]:
 
 def _range_exponent(level: Float, distance: Float) -> float | None:
     """Return the power of the range that the brightness goes with; None where ranges hardly differ."""
-    low, high = np.quantile(distance, (0.05, 0.95))
-    if not np.isfinite(distance).all() or high < _RANGE_FACTOR * low:
+    nearest_range, farthest_range = np.quantile(distance, (0.05, 0.95))
+    if not np.isfinite(distance).all() or farthest_range < _RANGE_FACTOR * nearest_range:
         return None
     # level = 10 n log10(range) + constant.
     return float(np.polyfit(np.log10(distance), level, 1)[0] / 10.0)
 
 
-def number_bits(stored: Float) -> int | None:
+def number_bits(stored_numbers: Float) -> int | None:
     """Return the bits of stored numbers (N,), shares of 65535, by the steps between those that occur; None if 16."""
-    values = np.unique(np.rint(stored))
+    values = np.unique(np.rint(stored_numbers))
     steps = np.diff(values)
     if len(steps) < 2:
         return None
@@ -411,23 +435,35 @@ def number_bits(stored: Float) -> int | None:
 
 
 def _density(place: Float) -> float:
-    """Return the points to the m2 of cells of 1 m whose neighbours hold points as well."""
+    """Return the points per m2 of cells of 1 m whose four neighbours hold points too, of all cells if there is none."""
     cell = np.floor(place[:, :2]).astype(np.int64)
     cells, count = np.unique(cell, axis=0, return_counts=True)
     keys = {tuple(row) for row in cells.tolist()}
     sides = ((1, 0), (-1, 0), (0, 1), (0, -1))
-    inner = [all((x + a, y + b) in keys for a, b in sides) for x, y in cells.tolist()]
-    return float(count[np.array(inner)].mean()) if any(inner) else float(count.mean())
+    is_inner = [all((x + a, y + b) in keys for a, b in sides) for x, y in cells.tolist()]
+    return float(count[np.array(is_inner)].mean()) if any(is_inner) else float(count.mean())
 
 
 def _pulse_spacing(place: Float, time: Float | None, density: float, strips: int) -> float | None:
-    """Return the distance on the ground between consecutive pulses, m; None where neither times nor places tell."""
+    """Return the distance on the ground between consecutive pulses, m; None where neither times nor places tell it.
+
+    Args:
+        place: (N, 3) m.
+        time: (N,) s; None without.
+        density: of the points, 1/m2.
+        strips: that overlap.
+    """
     spacing = None if time is None else pulse_spacing(place, time)
     return pulse_step(place, density, strips) if spacing is None else spacing
 
 
 def pulse_spacing(place: AnyArray, time: Float) -> float | None:
-    """Return the distance on the ground between consecutive pulses, m; None where times don't tell."""
+    """Return the distance on the ground between consecutive pulses, m; None where times don't tell it.
+
+    Args:
+        place: (N, 2 or more) m.
+        time: (N,) s.
+    """
     order = np.argsort(time, kind="stable")
     interval = np.diff(time[order])
     positive = interval[interval > 0.0]

@@ -152,72 +152,92 @@ class FittedSensor:
     def to_dict(self) -> dict[str, Any]:
         """Return the estimates and the settings that follow from them as JSON data."""
         refined = None if self.refined is None else self.refined.to_dict()
-        fitted = {"receiver": self.device.receiver.to_dict(), "scan": self.scan, "drawn": self.drawn}
-        return {"estimate": self.estimate.to_dict(), "refined": refined, **fitted}
+        settings = {"receiver": self.device.receiver.to_dict(), "scan": self.scan, "drawn": self.drawn}
+        return {"estimate": self.estimate.to_dict(), "refined": refined, **settings}
 
 
 @linear_algebra_on_one_thread(scipy=True)
-def fit_sensor(result: Calibration, simulated: bool = True) -> FittedSensor:
+def fit_sensor(result: Calibration, by_simulation: bool = True) -> FittedSensor:
     """Return the sensor that explains the first class of a calibration, which must be pavement.
 
     Args:
         result: of the calibration.
-        simulated: whether the settings of a scanner that moves are refined by simulated scans.
+        by_simulation: whether the settings of a scanner that moves are refined by simulated scans.
 
     Raises:
         InputError: there is no cloud or no device, or too little pavement.
     """
-    job, first = result.job, result.compared[0]
-    if first.real is None:
+    job, pavement = result.job, result.compared[0]
+    if pavement.real is None:
         raise InputError("--save-device", None, "needs a cloud that the sensor is fitted to")
-    setting, real = job.setting, first.real
     distance, incidence = _views_of_points(job, result)
-    receiver = job.receiver
-    linear = receiver.to_linear(real.intensity)
-    if receiver.range_corrected:
-        linear = linear + result.gain * receiver.pedestal * distance**2
-    else:
-        linear = (linear + result.gain * receiver.pedestal) * distance**2
+    linear = _linear_brightness(result, pavement.real.intensity, distance)
     scanner = None if job.scanner is None else np.array(job.scanner)
-    estimate = estimate_sensor(real, linear, distance, incidence, scanner)
-    device = _fitted_device(result, setting, estimate)
+    estimate = estimate_sensor(pavement.real, linear, distance, incidence, scanner)
+    device = _fitted_device(result, job.setting, estimate)
     surfaces = _surfaces_alone(result, estimate)
     if scanner is not None:
-        drawn = _drawn_values(_noise_of(estimate, device))
-        scenario, spacing = _standing(estimate, device, setting)
-        return FittedSensor(estimate, None, device, _FREE | spacing, drawn, {}, scenario, surfaces)
-    material = surfaces[first.target.material]
+        drawn_values = _drawn_values(_noise_of(estimate, device))
+        scenario, spacing = _standing(estimate, device, job.setting)
+        return FittedSensor(estimate, None, device, _FREE | spacing, drawn_values, {}, scenario, surfaces)
     # What isn't corrected by the device is by each point's range, where that is known.
-    corrected = receiver.range_corrected or len(distance) > 1
-    moving = _MovingSensor(estimate, device, setting, material, first.target.material, job.attenuation, corrected)
-    begin, refined = moving.settings(), None
-    values = {one.path: one.begin for one in begin}
-    if simulated:
-        refined = refine_settings(replace(real, intensity=linear), begin, moving.simulate)
-        values = refined.values
+    corrected = job.receiver.range_corrected or len(distance) > 1
+    name = pavement.target.material
+    moving = _MovingSensor(estimate, device, job.setting, surfaces[name], name, job.attenuation, corrected)
+    road = replace(pavement.real, intensity=linear) if by_simulation else None
+    return _fit_moving(moving, surfaces, road)
+
+
+def _linear_brightness(result: Calibration, intensity: Float, distance: Float) -> Float:
+    """Return real intensities (N,) in proportion to the light times the squared range.
+
+    Args:
+        result: of the calibration.
+        intensity: (N,) as stored.
+        distance: (N,) or (1,) ranges, m.
+    """
+    receiver = result.job.receiver
+    linear, pedestal = receiver.to_linear(intensity), result.gain * receiver.pedestal
+    return linear + pedestal * distance**2 if receiver.range_corrected else (linear + pedestal) * distance**2
+
+
+def _fit_moving(moving: _MovingSensor, surfaces: dict[str, Material], road: RealClass | None) -> FittedSensor:
+    """Return the fitted sensor of a scanner that moves.
+
+    Args:
+        moving: the scanner, with what formulas say of it.
+        surfaces: materials by name.
+        road: real pavement, by which simulated scans refine the settings; None to leave these as they begin.
+    """
+    begin, estimate = moving.settings(), moving.estimate
+    refined = None if road is None else refine_settings(road, begin, moving.simulate)
+    values = {setting.path: setting.begin for setting in begin} if refined is None else refined.values
     spacing, device = moving.scanner(values)
     # Without simulated scans the others are what a search would begin with, and no estimates.
-    told = values if simulated else (*_noise_of(estimate, device), _OF_STRIPS[0])
-    drawn = _drawn_values({path: value for path, value in values.items() if path.startswith("scan.") and path in told})
-    usual = {path: limits for path, limits in moving.usual.items() if path not in drawn}
-    spread = {"spread_below": round(moving.spreads(values)[0], 4), "spread_above": round(moving.spreads(values)[1], 4)}
-    surfaces |= {first.target.material: surfaces[first.target.material].model_copy(update=spread)}
+    estimated_paths = (*_noise_of(estimate, device), _OF_STRIPS[0]) if refined is None else values
+    drawn_values = _drawn_values(
+        {path: value for path, value in values.items() if path.startswith("scan.") and path in estimated_paths}
+    )
+    usual = {path: limits for path, limits in moving.usual.items() if path not in drawn_values}
+    below, above = (round(spread, 4) for spread in moving.spreads(values))
+    material = surfaces[moving.name].model_copy(update={"spread_below": below, "spread_above": above})
     # The materials' brightness was fitted for this air.
-    air = {"scan.attenuation": job.attenuation}
-    scan = _FREE | spacing | _same_surface(first.target.material) | air
-    return FittedSensor(estimate, refined, device, scan, drawn, usual, "airborne-1000m", surfaces)
+    air = {"scan.attenuation": moving.attenuation}
+    scan = _FREE | spacing | _same_surface(moving.name) | air
+    surfaces = surfaces | {moving.name: material}
+    return FittedSensor(estimate, refined, device, scan, drawn_values, usual, "airborne-1000m", surfaces)
 
 
 def _same_surface(material: str) -> dict[str, Any]:
-    """Return the limits of roads whose pavement is of a material as it is in the table: of one kind, age and wear."""
+    """Return settings of roads whose pavement is of one material as the table has it: of one kind, age and wear."""
     concrete = material in CONCRETES
     kinds = {"road.pavement.concretes" if concrete else "road.pavement.asphalts": [material]}
     usual = MaterialVariation()
     names = ("asphalt_age", "asphalt_brightness", "concrete_brightness", "paint_wear")
     values = ((name, getattr(usual, name)) for name in names)
-    aged = {f"road.materials.{name}": {"minimum": value, "maximum": value} for name, value in values}
-    same = {"road.environment.wet": 0, "road.pavement.concrete": float(concrete), "road.pavement.renewed": 0.0}
-    return same | (kinds if material in (*ASPHALTS, *CONCRETES) else {}) | aged
+    material_limits = {f"road.materials.{name}": {"minimum": value, "maximum": value} for name, value in values}
+    limits = {"road.environment.wet": 0, "road.pavement.concrete": float(concrete), "road.pavement.renewed": 0.0}
+    return limits | (kinds if material in (*ASPHALTS, *CONCRETES) else {}) | material_limits
 
 
 @dataclass(frozen=True)
@@ -244,50 +264,50 @@ class _MovingSensor:
 
     @property
     def distance(self) -> float:
-        """The usual range, m."""
+        """Return the usual range, m."""
         return self.estimate.distance or AIRBORNE
 
     @property
     def kind(self) -> str:
-        """The platform's kind, by the usual range."""
+        """Return the platform's kind, by the usual range."""
         return "airborne" if self.distance > AIRBORNE else "uav"
 
     @property
     def usual(self) -> dict[str, tuple[float, float]]:
-        """The ranges of `USUAL` for this kind of platform."""
+        """Return the ranges of `USUAL` for this kind of platform."""
         return USUAL[self.kind]
 
     @property
     def strips(self) -> int:
-        """How many strips overlap."""
-        least = 2 if self.estimate.gain_step_db > _LEAST_STEP_DB else 1
-        return min(max(self.estimate.strips, least), _MOST_STRIPS)
+        """Return the number of strips that overlap, as it is simulated."""
+        fewest = 2 if self.estimate.gain_step_db > _LEAST_STEP_DB else 1
+        return min(max(self.estimate.strips, fewest), _MOST_STRIPS)
 
     def settings(self) -> list[Setting]:
         """Return the settings that are refined, with the values that formulas give and the usual ones begin with."""
         estimate = self.estimate
-        ratio, room = _USUAL_RATIO, 3.0
+        ratio, factor = _USUAL_RATIO, 3.0
         if estimate.pulse_spacing is not None:
-            ratio, room = estimate.pulse_spacing**2 * estimate.density / self.strips, _KNOWN
+            ratio, factor = estimate.pulse_spacing**2 * estimate.density / self.strips, _KNOWN
         noise = _noise_of(estimate, self.device)
-        middle = {path: float(np.sqrt(low * high)) for path, (low, high) in self.usual.items()}
+        middle = {path: float(np.sqrt(minimum * maximum)) for path, (minimum, maximum) in self.usual.items()}
         rows = [
-            Setting(_RATIO, ratio, ratio / room, ratio * room),
+            Setting(_RATIO, ratio, ratio / factor, ratio * factor),
             Setting(_DENSITY, 1.0, 0.5, 2.0),
             Setting(_TEXTURE, 1.0, 0.1, 10.0),
         ]
         middle |= {_PERIOD: _SWAY[self.kind]["shortest_period"]}
         rows += [Setting(path, middle[path], *limits) for path, limits in _FITTED_SWAY[self.kind].items()]
-        for name, high in (("noise.range_sigma", 1.0), ("receiver.faint_range_sigma", 10.0), ("noise.speckle", 1.0)):
-            rows.append(Setting(f"scan.{name}", max(noise[f"scan.{name}"], 1e-4), 1e-4, high))
+        for name, maximum in (("noise.range_sigma", 1.0), ("receiver.faint_range_sigma", 10.0), ("noise.speckle", 1.0)):
+            rows.append(Setting(f"scan.{name}", max(noise[f"scan.{name}"], 1e-4), 1e-4, maximum))
         rows.append(Setting("scan.noise.speckle_normal", _USUAL_NORMAL, 0.0, 1.0, False, 0.5))
         rows.append(Setting("scan.receiver.range_delay", noise["scan.receiver.range_delay"], 0.0, 0.9, False, 0.3))
         rows.append(Setting("scan.receiver.range_walk", noise["scan.receiver.range_walk"], 0.0, 0.1, False, 0.003))
         if self.strips > 1:
             step, drift = _OF_STRIPS
-            half = 0.5 * np.rad2deg(self.setting.field_of_view) - _AT_THE_EDGE
-            aslant = min(_USUAL_ASLANT, half)
-            rows.append(Setting(_ASLANT, aslant, 0.0, max(half, 0.0), False, 6.0))
+            half_view = 0.5 * np.rad2deg(self.setting.field_of_view) - _AT_THE_EDGE
+            aslant = min(_USUAL_ASLANT, half_view)
+            rows.append(Setting(_ASLANT, aslant, 0.0, max(half_view, 0.0), False, 6.0))
             rows += [
                 Setting(step, self._unseen_step(aslant), 0.0, 10.0, False, 0.5),
                 Setting(drift, middle[drift], 1e-4, 1.0),
@@ -295,19 +315,27 @@ class _MovingSensor:
         return rows
 
     def _unseen_step(self, aslant: float) -> float:
-        """Return what of the gain's step between strips isn't the angles' doing, dB, with the second one's, deg."""
-        # By the angle of incidence once, and twice by the range, which grows with it.
+        """Return the part, dB, of the gain's step between strips that their angles don't explain.
+
+        Args:
+            aslant: angle at which the second strip sees the road, deg; the first one sees it at `_FROM_ABOVE`.
+        """
+        # The brightness goes with the cosine, by Lambert's law; without a correction for the range, which grows with
+        # 1 / cosine, with its cube.
         power = 10.0 if self.range_corrected else 30.0
-        near, far = (power * np.log10(np.cos(np.deg2rad(angle))) for angle in (_FROM_ABOVE, aslant))
-        return max(self.estimate.gain_step_db - float(near - far), 0.0)
+        level_above, level_aslant = (power * np.log10(np.cos(np.deg2rad(angle))) for angle in (_FROM_ABOVE, aslant))
+        return max(self.estimate.gain_step_db - float(level_above - level_aslant), 0.0)
 
     def spreads(self, values: Mapping[str, float]) -> tuple[float, float]:
-        """Return the material's spread below and above its median."""
-        factor, most = values[_TEXTURE], _MOST_SPREAD
-        return min(self.material.spread_below * factor, most), min(self.material.spread_above * factor, most)
+        """Return the material's spreads below and above its median, with values of `settings`."""
+        below, above = self.material.spread_below, self.material.spread_above
+        return min(below * values[_TEXTURE], _MOST_SPREAD), min(above * values[_TEXTURE], _MOST_SPREAD)
 
     def scanner(self, values: Mapping[str, float]) -> tuple[dict[str, Any], Device]:
-        """Return settings and device of the scanner with values of `settings`."""
+        """Return settings of a scenario, by path, and the device, for a scanner with values of `settings`.
+
+        Lines and pulse rate are those that give the density and the ratio of spacings at the usual range.
+        """
         estimate, device, distance, strips = self.estimate, self.device, self.distance, self.strips
         height = float(distance * np.cos(estimate.incidence))
         density = estimate.density * values[_DENSITY]
@@ -317,14 +345,17 @@ class _MovingSensor:
         lines = float(np.clip(SPEED / line, slowest, fastest))
         rate = distance * device.pattern.sweep(self.setting.field_of_view) * lines / step
         # The detection threshold stays: by it the noise of faint echoes was told.
-        reach = min(float(np.sqrt(0.2 / self.setting.threshold)), 0.999 * device.unambiguous_range(rate))
-        mode = device.modes[0].to_dict() | {"pulse_rate_khz": _short(rate / 1e3), "maximum_range": _short(reach)}
-        finest = min(device.finest_angle_deg, float(np.rad2deg(step / distance)) * 0.9)
+        maximum_range = min(float(np.sqrt(0.2 / self.setting.threshold)), 0.999 * device.unambiguous_range(rate))
+        mode = device.modes[0].to_dict() | {
+            "pulse_rate_khz": _short(rate / 1e3),
+            "maximum_range": _short(maximum_range),
+        }
+        finest_angle = min(device.finest_angle_deg, float(np.rad2deg(step / distance)) * 0.9)
         noise = {"faint_range_sigma": values["scan.receiver.faint_range_sigma"]}
         noise |= {name: values[f"scan.receiver.{name}"] for name in ("range_walk", "range_delay")}
         data = device.to_dict()
         receiver = dict(data["receiver"]) | {name: _short(value) for name, value in noise.items()}
-        data |= {"modes": [mode], "finest_angle_deg": _short(finest), "receiver": receiver}
+        data |= {"modes": [mode], "finest_angle_deg": _short(finest_angle), "receiver": receiver}
         data["range_sigma"] = _short(values["scan.noise.range_sigma"])
         angles = np.deg2rad(np.linspace(_FROM_ABOVE, values[_ASLANT], strips)) if strips > 1 else np.zeros(1)
         offsets = [_short(height * float(np.tan(angle))) for angle in angles]
@@ -339,26 +370,33 @@ class _MovingSensor:
         """Return a scan of level pavement with values of `settings`."""
         spacing, device = self.scanner(values)
         edge = window_edge(self.estimate.density)
-        middle = {path: float(np.sqrt(low * high)) for path, (low, high) in self.usual.items()}
-        given = {path: value for path, value in values.items() if path.startswith("scan.")}
-        changes = _FREE | spacing | middle | given | _POWER | {"scan.attenuation": self.attenuation}
+        middle = {path: float(np.sqrt(minimum * maximum)) for path, (minimum, maximum) in self.usual.items()}
+        scan_values = {path: value for path, value in values.items() if path.startswith("scan.")}
+        changes = _FREE | spacing | middle | scan_values | _POWER | {"scan.attenuation": self.attenuation}
         data = apply_values(load_scenario("airborne-1000m").to_dict(), changes)
         scan = ScanScenario.from_dict(data["scan"])
-        below, above = self.spreads(values)
+        spread_below, spread_above = self.spreads(values)
         pavement = LevelPavement(
-            edge, edge, self.material.model_copy(update={"spread_below": below, "spread_above": above})
+            edge, edge, self.material.model_copy(update={"spread_below": spread_below, "spread_above": spread_above})
         )
         setting = self._narrowed(device, scan, spacing["scan.platform"], edge)
         points = simulate_pavement(scan, setting, pavement, self.name, seed)
         return replace(points, intensity=points.intensity * points.distance**2) if self.range_corrected else points
 
     def _narrowed(self, device: Device, scan: ScanScenario, platform: Mapping[str, Any], edge: float) -> ScannerSetting:
-        """Return the scanner's setting with a view of the pavement alone where its optics can have one."""
+        """Return the scanner's setting, its field of view narrowed to the pavement where the optics allow that.
+
+        Args:
+            device: the scanner's.
+            scan: settings of the scan.
+            platform: kind, height and offsets.
+            edge: of the pavement, m.
+        """
         setting = setting_of(device, scan, scan.noise.range_sigma)
         if device.pattern.fixed_view:
             return setting
-        aside = max(map(abs, platform["lateral_offsets"])) + edge / 2.0
-        view = 2.0 * np.arctan(_VIEW_MARGIN * aside / platform["height"])
+        side_reach = max(map(abs, platform["lateral_offsets"])) + edge / 2.0
+        view = 2.0 * np.arctan(_VIEW_MARGIN * side_reach / platform["height"])
         view += 6.0 * np.deg2rad(scan.motion.attitude_sigma_deg)
         if view >= setting.field_of_view:
             return setting
@@ -379,11 +417,11 @@ def _surfaces_alone(result: Calibration, estimate: SensorEstimate) -> dict[str, 
         row, real, update = entry.after, entry.real, {}
         if real is None:
             continue
-        varying = float(np.log(np.maximum(result.job.receiver.to_linear(real.intensity), 1e-300)).var())
-        share = min(noise / max(varying, 1e-12), 1.0)
+        log_variance = float(np.log(np.maximum(result.job.receiver.to_linear(real.intensity), 1e-300)).var())
+        share = min(noise / max(log_variance, 1e-12), 1.0)
         for name in ("spread_below", "spread_above"):
-            fitted = getattr(row, name)
-            update[name] = round(min(max(fitted * np.sqrt(1.0 - share), _LEAST_SPREAD), fitted), 4)
+            fitted_spread = getattr(row, name)
+            update[name] = round(min(max(fitted_spread * np.sqrt(1.0 - share), _LEAST_SPREAD), fitted_spread), 4)
         if "wavelength" in result.job.parts:
             update["spread_wavelength"] = fitted_wavelength(real.place, real.intensity, min(share, _MOST_NOISE))
         rows[entry.target.material] = row.model_copy(update=update)
@@ -391,7 +429,7 @@ def _surfaces_alone(result: Calibration, estimate: SensorEstimate) -> dict[str, 
 
 
 def _views_of_points(job: CalibrationJob, result: Calibration) -> tuple[Float, Float]:
-    """Return ranges, m, and incidence angles, rad, of the first class's points, or the usual ones (1,)."""
+    """Return ranges, m, and incidence angles, rad, of the first class's points (N,), or one usual view (1,)."""
     views = class_views(job, result.compared[0].real)
     real = result.compared[0].real
     assert real is not None
@@ -401,7 +439,13 @@ def _views_of_points(job: CalibrationJob, result: Calibration) -> tuple[Float, F
 
 
 def _fitted_device(result: Calibration, setting: ScannerSetting, estimate: SensorEstimate) -> Device:
-    """Return the calibration's device with the fitted noise and response."""
+    """Return the calibration's device with the fitted noise and response.
+
+    Args:
+        result: of the calibration.
+        setting: of its device.
+        estimate: of the sensor.
+    """
     job, device = result.job, setting.device
     data = device.to_dict()
     receiver = dict(data.get("receiver") or {})
@@ -440,7 +484,14 @@ def _over_threshold(result: Calibration, setting: ScannerSetting, estimate: Sens
 
 
 def _noise_of(estimate: SensorEstimate, device: Device) -> dict[str, float]:
-    """Return the settings of a scan that follow from the noise, as formulas tell it."""
+    """Return the scan's settings of noise, by their paths in a scenario, as the formulas of `sensor` estimate them.
+
+    A compression is left so far below 1 that the range a recipe draws it from stays below 1.
+
+    Args:
+        estimate: of the sensor.
+        device: with the fitted response.
+    """
     noise = {
         "scan.noise.speckle": estimate.speckle,
         "scan.noise.range_sigma": estimate.range_sigma,
@@ -454,12 +505,18 @@ def _noise_of(estimate: SensorEstimate, device: Device) -> dict[str, float]:
 
 
 def _drawn_values(values: Mapping[str, float]) -> dict[str, float]:
-    """Return the values that a recipe draws about: all that aren't nearly 0."""
+    """Return the values that a recipe draws about, rounded, by path: all that aren't nearly 0."""
     return {path: _short(value) for path, value in values.items() if value > 1e-6}
 
 
 def _standing(estimate: SensorEstimate, device: Device, setting: ScannerSetting) -> tuple[str, dict[str, Any]]:
-    """Return scenario and settings of a head that turns once on the road, as finely as the cloud's."""
+    """Return scenario and settings of a head that stands on the road and turns once, as finely as the cloud's.
+
+    Args:
+        estimate: of the sensor.
+        device: with the fitted response.
+        setting: of the calibration's device.
+    """
     slowest, fastest = device.lines_per_second
     lines = setting.lines_per_second
     if estimate.azimuth_step is not None:
@@ -507,7 +564,7 @@ def save_recipe(sensor: FittedSensor, path: Path, device: Path, table: Path | No
             **sensor.scan,
         },
         "draw": {name: _about(name, value) for name, value in sensor.drawn.items()}
-        | {name: {"minimum": low, "maximum": high} for name, (low, high) in sensor.usual.items()},
+        | {name: {"minimum": minimum, "maximum": maximum} for name, (minimum, maximum) in sensor.usual.items()},
         "groups": [{"name": "roads", "scenes": 8, "split": {"train": 6, "validation": 1, "test": 1}}],
     }
     text = "# Written by synthroads calibrate; groups and roads are an example to be changed.\n"
@@ -517,11 +574,20 @@ def save_recipe(sensor: FittedSensor, path: Path, device: Path, table: Path | No
 
 
 def _about(path: str, value: float) -> dict[str, float]:
-    """Return the range that a recipe draws a setting from whose fitted value is given."""
+    """Return the range from which a recipe draws a setting, about its fitted value.
+
+    Args:
+        path: of the setting in a scenario.
+        value: the fitted one.
+    """
     share = SPREAD_OF_STRIPS if path in _OF_STRIPS else SPREAD
-    high = value * (1.0 + share)
-    return {"minimum": _short(value * (1.0 - share)), "maximum": _short(min(high, 1.0) if path in _SHARES else high)}
+    maximum = value * (1.0 + share)
+    return {
+        "minimum": _short(value * (1.0 - share)),
+        "maximum": _short(min(maximum, 1.0) if path in _SHARES else maximum),
+    }
 
 
 def _short(value: float) -> float:
+    """Return a number rounded to `_DIGITS` significant digits."""
     return float(f"{value:.{_DIGITS}g}")

@@ -63,7 +63,7 @@ class LevelPavement:
     kernels: str = "none: rays are met by a formula"
 
     def mesh(self, material: str) -> SceneMesh:
-        """Return its two triangles, whose material has a name."""
+        """Return the rectangle as a mesh of two triangles, of a material of this name."""
         x, y = self.length / 2.0, self.width / 2.0
         corners = [(-x, -y, 0.0), (x, -y, 0.0), (x, y, 0.0), (-x, y, 0.0)]
         return SceneMesh(
@@ -77,24 +77,31 @@ class LevelPavement:
         )
 
     def cast(self, origins: Float32, directions: Float32, maximum_range: float) -> NDArray[np.int32]:
-        """Return the triangle that each ray (N, 3) meets, -1 for none; see `scanning.scene.caster.Caster`."""
-        x, y = self._met(origins, directions, maximum_range)
-        above = y * self.length > x * self.width
-        return np.where(np.isfinite(x), above, -1).astype(np.int32)
+        """Return the triangle (N,) that each ray (N, 3) meets, -1 for none; see `scanning.scene.caster.Caster`."""
+        x, y = self._meeting_places(origins, directions, maximum_range)
+        above_diagonal = y * self.length > x * self.width
+        return np.where(np.isfinite(x), above_diagonal, -1).astype(np.int32)
 
     def occluded(self, origins: Float32, directions: Float32, maximum_range: float | Float32) -> Bool:
-        """Return which rays (N, 3) meet it within a range; see `scanning.scene.caster.Caster`."""
-        return np.asarray(np.isfinite(self._met(origins, directions, maximum_range)[0]))
+        """Return a mask (N,) of the rays (N, 3) that meet it within a range (m); see `scanning.scene.caster.Caster`."""
+        return np.asarray(np.isfinite(self._meeting_places(origins, directions, maximum_range)[0]))
 
-    def _met(self, origins: Float32, directions: Float32, reach: float | Float32) -> tuple[AnyArray, AnyArray]:
-        """Return where rays meet it, x and y, m; infinite where they don't."""
-        from_, to = origins.astype(np.float64), directions.astype(np.float64)
-        down = np.where(to[:, 2] < -_LEAST_SLOPE, to[:, 2], -_LEAST_SLOPE)
-        distance = -from_[:, 2] / down
-        x, y = (from_[:, axis] + distance * to[:, axis] for axis in (0, 1))
-        meets = (np.abs(x) <= self.length / 2.0) & (np.abs(y) <= self.width / 2.0)
-        meets &= (distance > 0.0) & (distance <= reach)
-        return np.where(meets, x, np.inf), np.where(meets, y, np.inf)
+    def _meeting_places(
+        self, origins: Float32, directions: Float32, reach: float | Float32
+    ) -> tuple[AnyArray, AnyArray]:
+        """Return the places x and y (N,), m, at which rays meet the rectangle; inf where they don't within their reach.
+
+        Args:
+            origins, directions: (N, 3) m, and unit vectors.
+            reach: of all rays, or (N,) of each, m.
+        """
+        origin, direction = origins.astype(np.float64), directions.astype(np.float64)
+        rise = np.where(direction[:, 2] < -_LEAST_SLOPE, direction[:, 2], -_LEAST_SLOPE)
+        distance = -origin[:, 2] / rise
+        x, y = (origin[:, axis] + distance * direction[:, axis] for axis in (0, 1))
+        is_met = (np.abs(x) <= self.length / 2.0) & (np.abs(y) <= self.width / 2.0)
+        is_met &= (distance > 0.0) & (distance <= reach)
+        return np.where(is_met, x, np.inf), np.where(is_met, y, np.inf)
 
 
 def simulate_pavement(
@@ -113,8 +120,8 @@ def simulate_pavement(
         InputError: nothing of the pavement is recorded.
     """
     mesh = pavement.mesh(name)
-    half = pavement.length / 2.0 + _OVERRUN
-    guide = PolylineGuide(np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]]))
+    half_length = pavement.length / 2.0 + _OVERRUN
+    guide = PolylineGuide(np.array([[-half_length, 0.0, 0.0], [half_length, 0.0, 0.0]]))
     plan = ScanPlan(
         Target(ScannedScene(mesh, ()), lambda _: pavement),
         Emission(setting, with_motion(scan.platform.make_path(guide), scan.motion, seed), rings=()),
@@ -127,17 +134,17 @@ def simulate_pavement(
     )
     stages, finish = BlockScan(plan), Finish(plan, MaterialLayers(surface_constants([pavement.material])))
     blocks = [finish.finish_block(stages.scan_block(*block)).points for block in plan.blocks()]
-    recorded = [block for block in blocks if len(block)]
-    if not recorded:
+    filled_blocks = [block for block in blocks if len(block)]
+    if not filled_blocks:
         raise InputError("--real", None, "has no pavement that the fitted scanner would see")
-    points = concatenate(recorded)
-    lit = np.flatnonzero(points.intensity > 0.0)
-    zeros, points = len(points) - len(lit), points.select(lit)
+    points = concatenate(filled_blocks)
+    numbered_rows = np.flatnonzero(points.intensity > 0.0)
+    zero_count, points = len(points) - len(numbered_rows), points.select(numbered_rows)
     return RealClass(
         selection="simulated",
         place=points.xyz,
         intensity=points.intensity.astype(np.float64),
-        zeros=zeros,
+        zeros=zero_count,
         distance=points.range.astype(np.float64),
         incidence=np.full(len(points), np.nan),
         returns=points.number_of_returns,

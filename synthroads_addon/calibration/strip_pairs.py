@@ -73,11 +73,11 @@ def strip_pairs(place: Float, owner: Index, height: Float, level: Float, edge: f
     if not len(rows):
         return None
     pairs = _pairs_of(place[rows], owner[rows], edge, count)
-    short = pairs.d < _SHORT * pairs.spacing
-    if not pairs.count[short].any():
+    is_short = pairs.d < _SHORT * pairs.spacing
+    if not pairs.count[is_short].any():
         return None
     # Pairs found over pairs expected, both summed over the short distances: 1 - 1 / S.
-    g_short = float(pairs.count[short].sum() / (pairs.count[short] / np.maximum(pairs.g[short], 1e-9)).sum())
+    g_short = float(pairs.count[is_short].sum() / (pairs.count[is_short] / np.maximum(pairs.g[is_short], 1e-9)).sum())
     if g_short > _RANDOM:
         return None
     strips = max(round(1.0 / (1.0 - g_short)), 1)
@@ -124,16 +124,26 @@ def _pairs_of(place: Float, owner: Index, edge: float, points: Float) -> _Pairs:
     position = np.column_stack([place % edge, square * 2.0 * edge])
     i, j = cKDTree(position).query_pairs(_REACH * spacing, output_type="ndarray").T
     distance = np.linalg.norm(position[i] - position[j], axis=1)
-    bounds = np.linspace(0.0, _REACH * spacing, _BINS + 1)
-    nth = np.minimum((distance / bounds[1]).astype(np.intp), _BINS - 1)
-    count = np.bincount(nth, minlength=_BINS)
+    bin_edges = np.linspace(0.0, _REACH * spacing, _BINS + 1)
+    bin_numbers = np.minimum((distance / bin_edges[1]).astype(np.intp), _BINS - 1)
+    count = np.bincount(bin_numbers, minlength=_BINS)
     # g(d) = pairs at d over pairs that as many points at random would have there (Ripley 1977).
-    expected = _pairs_at_random(bounds / edge) * np.sum(points * (points - 1.0) / 2.0)
-    return _Pairs(i, j, nth, count, (bounds[1:] + bounds[:-1]) / 2.0, count / np.maximum(expected, 1e-9), spacing)
+    random_pairs = _pairs_at_random(bin_edges / edge) * np.sum(points * (points - 1.0) / 2.0)
+    return _Pairs(
+        i,
+        j,
+        bin_numbers,
+        count,
+        (bin_edges[1:] + bin_edges[:-1]) / 2.0,
+        count / np.maximum(random_pairs, 1e-9),
+        spacing,
+    )
 
 
 def _variogram_fits(pairs: _Pairs, height: Float, level: Float, two_strips: float) -> tuple[Float, Float]:
-    """Return the coefficients of 1, c(d) and d that fit the semivariance of the level, and its covariance with height.
+    """Return the coefficients (T,) that fit the level's semivariance, and those that fit its covariance with height.
+
+    They are of the terms 1, c(d) and d; the third is left out where it would be negative.
 
     Args:
         pairs: of N points.
@@ -157,7 +167,16 @@ def _variogram_fits(pairs: _Pairs, height: Float, level: Float, two_strips: floa
 
 
 def _whole_squares(place: Float, owner: Index, edge: float) -> tuple[Index, Float]:
-    """Return the points (N,) of squares that points fill, and how many each holds: at most `_MOST_SQUARES`, spread."""
+    """Return the points (M,) of squares that are filled with points, and the number (Q,) of points in each.
+
+    A square is filled if each of its `_PARTS` x `_PARTS` parts holds points. Of more than `_MOST_SQUARES` squares that
+    many, spread evenly, are taken.
+
+    Args:
+        place: (N, 2) m.
+        owner: (N,) square of each point.
+        edge: of the squares, m.
+    """
     part = np.minimum((place % edge / edge * _PARTS).astype(np.int64), _PARTS - 1)
     occupancy = np.zeros((int(owner.max()) + 1, _PARTS**2), dtype=bool)
     occupancy[owner, part[:, 0] * _PARTS + part[:, 1]] = True

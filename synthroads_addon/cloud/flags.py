@@ -22,8 +22,8 @@ NOISE_CODES = (7, 18)
 
 def withheld_points(block: PointBlock) -> Bool:
     """Return a mask (N,) of the points that their file marks as not to be used, as good as deleted."""
-    marked = block.array(WITHHELD)
-    return np.zeros(len(block), dtype=bool) if marked is None else np.asarray(marked) != 0
+    flags = block.array(WITHHELD)
+    return np.zeros(len(block), dtype=bool) if flags is None else np.asarray(flags) != 0
 
 
 def noise_points(block: PointBlock, scheme: ClassScheme) -> Bool:
@@ -33,5 +33,5 @@ def noise_points(block: PointBlock, scheme: ClassScheme) -> Bool:
 
 def without_flags(block: PointBlock) -> PointBlock:
     """Return the block without the arrays of `FLAGS`."""
-    held = [name for name in FLAGS if name in block.more]
-    return block.with_arrays(dict.fromkeys(held)) if held else block
+    flag_names = [name for name in FLAGS if name in block.more]
+    return block.with_arrays(dict.fromkeys(flag_names)) if flag_names else block

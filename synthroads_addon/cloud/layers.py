@@ -54,10 +54,12 @@ class Column:
 
 
 def _scalar(name: str, array: str, dtype: str, scale: float | None, unit: str, description: str) -> tuple[Column, ...]:
+    """Return, in a tuple, the one column of an array of one dimension; see `Column`."""
     return (Column(name, array, None, dtype, scale, False, unit, description),)
 
 
 def _vector(names: tuple[str, ...], array: str, dtype: str, scale: float, unit: str, text: str) -> tuple[Column, ...]:
+    """Return the three columns of an array (N, 3), of map coordinates where the unit is m; see `Column`."""
     local = unit == "m"
     return tuple(
         Column(name, array, i, dtype, scale, local, unit, f"{text} {'xyz'[i]}") for i, name in enumerate(names)
@@ -98,6 +100,7 @@ LABELS: tuple[Column, ...] = (
 
 
 def _material_layer(name: str) -> Layer:
+    """Return the layer of a material's property, stored in steps of 1e-4."""
     column = _scalar(name, name, "uint16", 1e-4, "1", f"material {name}, 0 to 1")
     return Layer(name.capitalize(), column, {name: "float32"}, filler="material")
 
@@ -225,8 +228,8 @@ def make_points(stored: dict[str, AnyArray], attributes: tuple[Attribute, ...], 
         if column.name in stored:
             parts.setdefault(column.array, []).append(stored[column.name])
     for array, components in parts.items():
-        joined = components[0] if len(components) == 1 else np.stack(components, axis=1)
-        arrays[array] = joined.astype(_TYPES[array], copy=False)
+        values = components[0] if len(components) == 1 else np.stack(components, axis=1)
+        arrays[array] = values.astype(_TYPES[array], copy=False)
     for name, (kind, width) in POINT_TYPES.items():
         if name not in _TYPES:
             shape = (count, width) if width > 1 else (count,)

@@ -76,8 +76,8 @@ class PointBlock:
 
     def attributes(self) -> dict[str, AnyArray]:
         """Return the block's arrays by name, without those that are None."""
-        named = {name: array for name in FIELDS if (array := getattr(self, name)) is not None}
-        return named | dict(self.more)
+        field_arrays = {name: array for name in FIELDS if (array := getattr(self, name)) is not None}
+        return field_arrays | dict(self.more)
 
     def array(self, name: str) -> Any:
         """Return an array by its name; None if it isn't there."""

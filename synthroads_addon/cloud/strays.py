@@ -38,9 +38,10 @@ class Strays:
         keys, counts = np.unique(self._keys_of(xyz), return_counts=True)
         self._merge(np.concatenate([self._keys, keys]), np.concatenate([self._counts, counts]))
         while len(self._keys) > _MOST_CUBES:
+            # Four by four by four cubes become one: their three numbers are read from the keys and divided by four.
             self._edge *= 4.0
-            parts = [self._keys >> (_BITS * axis) & (2**_BITS - 1) for axis in range(3)]
-            numbers = [(part - 2 ** (_BITS - 1)) >> 2 for part in parts]
+            offset_numbers = [self._keys >> (_BITS * axis) & (2**_BITS - 1) for axis in range(3)]
+            numbers = [(number - 2 ** (_BITS - 1)) >> 2 for number in offset_numbers]
             self._merge(_cube_keys(np.stack(numbers, axis=1)), self._counts)
         self._body = None
 
@@ -48,14 +49,16 @@ class Strays:
         """Return the number of places added that stray from the rest."""
         return int(self._counts.sum() - self._counts[np.isin(self._keys, self._body_cubes())].sum())
 
-    def stay(self, xyz: NDArray[np.floating]) -> Bool:
+    def belongs(self, xyz: NDArray[np.floating]) -> Bool:
         """Return a mask (N,) of the places (N, 3), all of them added before, that don't stray."""
         return np.isin(self._keys_of(xyz), self._body_cubes())
 
     def _keys_of(self, xyz: NDArray[np.floating]) -> Keys:
+        """Return the keys (N,) of the cubes that places (N, 3), m, lie in."""
         return _cube_keys(np.floor(np.asarray(xyz, dtype=np.float64) / self._edge).astype(np.int64))
 
     def _merge(self, keys: Keys, counts: Keys) -> None:
+        """Set the cubes from keys (K,), which may repeat, and the number (K,) of places of each."""
         self._keys, owner = np.unique(keys, return_inverse=True)
         self._counts = np.bincount(owner.ravel(), counts, len(self._keys)).astype(np.int64)
 
@@ -64,29 +67,32 @@ class Strays:
         if self._body is None:
             parts = self._connected_parts()
             sizes = np.bincount(parts, self._counts, parts.max(initial=-1) + 1)
-            large = sizes > max(_FEW, _SHARE * self._counts.sum())
-            self._body = self._keys[large[parts]] if large.any() else self._keys
+            is_large = sizes > max(_FEW, _SHARE * self._counts.sum())
+            self._body = self._keys[is_large[parts]] if is_large.any() else self._keys
         return self._body
 
     def _connected_parts(self) -> Index:
-        """Return the number of the connected part (touching cubes) that each cube belongs to."""
-        place = {int(key): number for number, key in enumerate(self._keys)}
-        steps = _cube_keys(np.array(_STEPS)) - _cube_keys(np.zeros((1, 3), dtype=np.int64))
+        """Return the number (K,) of the connected part, of cubes that touch, that each cube belongs to."""
+        index_of_key = {int(key): index for index, key in enumerate(self._keys)}
+        # Differences between the keys of a cube and of its 26 neighbours.
+        steps = (_cube_keys(np.array(_STEPS)) - _cube_keys(np.zeros((1, 3), dtype=np.int64))).tolist()
         part = np.full(len(self._keys), -1, dtype=np.intp)
-        for first in range(len(part)):
-            if part[first] >= 0:
+        for seed in range(len(part)):
+            if part[seed] >= 0:
                 continue
-            number, waiting = part.max() + 1, [first]
-            part[first] = number
-            while waiting:
-                near = (place.get(int(self._keys[at]) + step) for at in [waiting.pop()] for step in steps.tolist())
-                new = [at for at in near if at is not None and part[at] < 0]
-                part[new] = number
-                waiting += new
+            # Flood fill from a cube that is in no part yet.
+            number, pending = part.max() + 1, [seed]
+            part[seed] = number
+            while pending:
+                key = int(self._keys[pending.pop()])
+                neighbours = (index_of_key.get(key + step) for step in steps)
+                unvisited = [index for index in neighbours if index is not None and part[index] < 0]
+                part[unvisited] = number
+                pending += unvisited
         return part
 
 
 def _cube_keys(numbers: Int) -> Keys:
-    """Return one integer key (N,) for each cube's three numbers (N, 3)."""
-    shifted = numbers + 2 ** (_BITS - 1)
-    return np.asarray(shifted[:, 0] | shifted[:, 1] << _BITS | shifted[:, 2] << 2 * _BITS)
+    """Return one integer key (N,) for each cube's three numbers (N, 3), with 21 bits for each of them."""
+    positive_numbers = numbers + 2 ** (_BITS - 1)
+    return np.asarray(positive_numbers[:, 0] | positive_numbers[:, 1] << _BITS | positive_numbers[:, 2] << 2 * _BITS)

@@ -160,7 +160,7 @@ def read_road_cloud(path: FilePath, progress: Progress = silent) -> RoadCloud:
     xyz, intensity, kind = map(np.concatenate, zip(*parts, strict=True))
     strays = Strays()
     strays.add(xyz)
-    stay = strays.stay(xyz) if strays.count() else np.ones(len(xyz), dtype=bool)
+    stay = strays.belongs(xyz) if strays.count() else np.ones(len(xyz), dtype=bool)
     points = xyz[stay], intensity[stay], kind[stay]
     classes = {names.get(int(c), f"class_{c}"): int(counts[c]) for c in np.flatnonzero(counts)}
     return replace(_sort_by_height(path, points, header.place, classes), strays=strays.count())

@@ -64,12 +64,12 @@ def beam_pattern(rings: tuple[int, ...]) -> BeamPattern:
             raise InputError("beam rings", count, "needs at least 3 rays on each ring")
     nodes, weights = _radau_laguerre(len(rings))
     radii = np.sqrt(nodes[1:] / 2.0)
-    across, shares = [np.zeros((1, 2))], [weights[:1]]
-    for count, radius, weight, turn in zip(rings, radii, weights[1:], _phases(rings, radii, weights[1:]), strict=True):
-        angle = 2.0 * np.pi * (np.arange(count) + turn) / count
-        across.append(radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
-        shares.append(np.full(count, weight / count))
-    pattern = BeamPattern(np.concatenate(across), np.concatenate(shares))
+    deflections, ray_weights = [np.zeros((1, 2))], [weights[:1]]
+    for count, radius, weight, phase in zip(rings, radii, weights[1:], _phases(rings, radii, weights[1:]), strict=True):
+        angle = 2.0 * np.pi * (np.arange(count) + phase) / count
+        deflections.append(radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+        ray_weights.append(np.full(count, weight / count))
+    pattern = BeamPattern(np.concatenate(deflections), np.concatenate(ray_weights))
     pattern.across.setflags(write=False)
     pattern.weights.setflags(write=False)
     return pattern
@@ -84,10 +84,13 @@ def _radau_laguerre(rings: int) -> tuple[Float, Float]:
     """
     if rings == 0:
         return np.zeros(1), np.ones(1)
+    # Recurrence of the generalised Laguerre polynomials for the weight u exp(-u): 2 n + 2 on the Jacobi matrix's
+    # diagonal, sqrt(n (n + 1)) beside it.
     order = np.arange(rings, dtype=np.float64)
-    aside = np.sqrt(order[1:] * (order[1:] + 1.0))
-    nodes, vectors = np.linalg.eigh(np.diag(2.0 * order + 2.0) + np.diag(aside, -1))
-    weights = np.concatenate([[1.0 / (rings + 1)], vectors[0] ** 2 / nodes])
+    diagonal, off_diagonal = 2.0 * order + 2.0, np.sqrt(order[1:] * (order[1:] + 1.0))
+    nodes, eigenvectors = np.linalg.eigh(np.diag(diagonal) + np.diag(off_diagonal, -1))
+    # Golub & Welsch: a node's weight is the square of the first component of its eigenvector.
+    weights = np.concatenate([[1.0 / (rings + 1)], eigenvectors[0] ** 2 / nodes])
     return np.concatenate([[0.0], nodes]), weights / weights.sum()
 
 
@@ -99,13 +102,14 @@ def _phases(rings: tuple[int, ...], radii: Float, weights: Float) -> Float:
     """
     turns = np.array([0.5 * (ring % 2 == 0) for ring in range(len(rings))])
     for count in set(rings):
-        same = [ring for ring, rays in enumerate(rings) if rays == count]
-        sizes = weights[same] * radii[same] ** count
-        left, first = 0.0, turns[same[0]]
-        for item in np.argsort(-sizes, kind="stable"):
-            sign = -1.0 if left > 0.0 else 1.0
-            turns[same[item]] = first if sign > 0.0 else 0.5 - first
-            left += sign * sizes[item]
+        ring_numbers = [ring for ring, rays in enumerate(rings) if rays == count]
+        sizes = weights[ring_numbers] * radii[ring_numbers] ** count
+        residual_moment, first_turn = 0.0, turns[ring_numbers[0]]
+        # From the largest moment down, each ring is turned so that its own moment makes the sum smaller.
+        for position in np.argsort(-sizes, kind="stable"):
+            sign = -1.0 if residual_moment > 0.0 else 1.0
+            turns[ring_numbers[position]] = first_turn if sign > 0.0 else 0.5 - first_turn
+            residual_moment += sign * sizes[position]
     return turns
 
 
@@ -126,7 +130,8 @@ def outer_radii(rings: tuple[int, ...], divergence: Sequence[float]) -> tuple[fl
         rings: rays on each ring.
         divergence: two full angles at 1/e2, rad.
     """
-    outermost = float(np.sqrt(np.square(beam_pattern(rings).across).sum(axis=1).max()))
+    deflections = beam_pattern(rings).across
+    outermost = float(np.sqrt(np.square(deflections).sum(axis=1).max()))  # in units of the beam's radius at 1/e^2
     radii = beam_radii(divergence)
     return outermost * radii[0], outermost * radii[1]
 
@@ -187,9 +192,9 @@ def cylindrical_offsets(
         (3, K, P) m.
     """
     radius = beam_radii(divergence)
-    reach = np.where((distance > 0.0) & (distance < np.inf), distance, 0.0)
+    range_of_footprint = np.where((distance > 0.0) & (distance < np.inf), distance, 0.0)
     x, y = pattern.across[:, 0] * radius[0], pattern.across[:, 1] * radius[1]
-    return _sum_products(((in_plane * reach, x), (across * reach, y)), len(pattern))
+    return _sum_products(((in_plane * range_of_footprint, x), (across * range_of_footprint, y)), len(pattern))
 
 
 def _sum_products(terms: Sequence[tuple[Float, Float]], rays: int) -> Float:

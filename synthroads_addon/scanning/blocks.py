@@ -53,8 +53,8 @@ class Blocks:
 
     def pulse_span(self, strip: Strip, block: int) -> tuple[int, int]:
         """Return the number, within its strip, of a block's first pulse, and how many pulses the block has."""
-        first = block * self.size
-        return first, min(self.size, self.pulse_count(strip) - first)
+        first_pulse = block * self.size
+        return first_pulse, min(self.size, self.pulse_count(strip) - first_pulse)
 
     def time(self, strip: Strip, pulse: int) -> float:
         """Return the time at which a strip's pulse is fired, s since the first strip's start."""

@@ -111,7 +111,7 @@ def apply_effect(
     setting: ScannerSetting,
     attenuation: float,
     pulses: Pulses,
-    traced: TracedRays,
+    traced_rays: TracedRays,
     signals: BothSignals,
 ) -> tuple[TracedRays, BothSignals]:
     """Return a block's traced rays and signals after an effect has added echoes and weakened what they meet.
@@ -124,29 +124,30 @@ def apply_effect(
         setting: the scanner's.
         attenuation: 1/m of range.
         pulses: the block's.
-        traced: what their rays meet.
+        traced_rays: what their rays meet.
         signals: what that adds to returns.
 
     Raises:
         ValueError: the effect's echoes are of no ray, or not finite numbers.
     """
-    hits = _pulse_hits(setting, attenuation, pulses, traced, signals)
+    hits = _pulse_hits(setting, attenuation, pulses, traced_rays, signals)
     changes = effect.change_echoes(hits, random)
     _check(effect.name, changes, hits.distance.shape)
     if changes.transmission is not None:
-        traced, signals = _weaken(traced, signals, np.broadcast_to(changes.transmission, hits.distance.shape))
-    return _add_echoes(setting, attenuation, traced, signals, changes)
+        traced_rays, signals = _weaken(traced_rays, signals, np.broadcast_to(changes.transmission, hits.distance.shape))
+    return _add_echoes(setting, attenuation, traced_rays, signals, changes)
 
 
 def _pulse_hits(
-    setting: ScannerSetting, attenuation: float, pulses: Pulses, traced: TracedRays, signals: BothSignals
+    setting: ScannerSetting, attenuation: float, pulses: Pulses, traced_rays: TracedRays, signals: BothSignals
 ) -> PulseHits:
-    ray, pulse = np.divmod(traced.ray, len(pulses.time))
+    """Return the hits of a block's rays as effects get them: with pulse and ray of what lies behind as two indices."""
+    ray, pulse = np.divmod(traced_rays.ray, len(pulses.time))
     return PulseHits(
         time=pulses.time,
         origin=pulses.origin,
         direction=pulses.direction,
-        share=traced.rays.share[:, 0],
+        share=traced_rays.rays.share[:, 0],
         behind_pulse=pulse,
         behind_ray=ray,
         setting=setting,
@@ -156,22 +157,24 @@ def _pulse_hits(
 
 
 def _add_echoes(
-    setting: ScannerSetting, attenuation: float, traced: TracedRays, signals: BothSignals, changes: EchoChanges
+    setting: ScannerSetting, attenuation: float, traced_rays: TracedRays, signals: BothSignals, changes: EchoChanges
 ) -> tuple[TracedRays, BothSignals]:
     """Return traced rays and signals with an effect's echoes added, less those out of the scanner's range."""
     distance = np.asarray(changes.distance, dtype=np.float64)
-    here = np.flatnonzero((distance >= setting.minimum_range) & (distance <= setting.maximum_range))
-    distance, brightness = distance[here], np.asarray(changes.brightness, dtype=np.float64)[here]
-    none = np.zeros(len(here), dtype=np.intp)
+    in_range = np.flatnonzero((distance >= setting.minimum_range) & (distance <= setting.maximum_range))
+    distance, brightness = distance[in_range], np.asarray(changes.brightness, dtype=np.float64)[in_range]
+    zeros = np.zeros(len(in_range), dtype=np.intp)
     # In the air there is no face; it counts as one that lies across the beam.
-    hits = Hits(none - 1, none, distance, none - 1.0, brightness)
-    added = HitSignals(
+    hits = Hits(zeros - 1, zeros, distance, zeros - 1.0, brightness)
+    added_signals = HitSignals(
         distance, np.maximum(brightness, LEAST_REFLECTANCE), received_intensity(brightness, distance, attenuation)
     )
-    first, behind = signals
-    ray = changes.ray[here] * len(traced.rays.time) + changes.pulse[here]
-    traced = replace(traced, behind=Hits.join([traced.behind, hits]), ray=np.concatenate([traced.ray, ray]))
-    return traced, (first, HitSignals.join([behind, added]))
+    first_signals, behind_signals = signals
+    ray = changes.ray[in_range] * len(traced_rays.rays.time) + changes.pulse[in_range]
+    traced_rays = replace(
+        traced_rays, behind=Hits.join([traced_rays.behind, hits]), ray=np.concatenate([traced_rays.ray, ray])
+    )
+    return traced_rays, (first_signals, HitSignals.join([behind_signals, added_signals]))
 
 
 def _brightness(signals: HitSignals, attenuation: float) -> Float:
@@ -181,24 +184,43 @@ def _brightness(signals: HitSignals, attenuation: float) -> Float:
 
 
 def _check(name: str, changes: EchoChanges, shape: tuple[int, ...]) -> None:
-    if not len(changes.pulse) == len(changes.ray) == len(changes.distance) == len(changes.brightness):
-        raise ValueError(f"effect {name}: pulse, ray, distance and brightness must be as many")
-    for index, count in ((changes.ray, shape[0]), (changes.pulse, shape[1])):
+    """Raise `ValueError` if the echoes that an effect adds don't fit a block of ``shape`` = (K rays, P pulses)."""
+    lengths = [len(array) for array in (changes.pulse, changes.ray, changes.distance, changes.brightness)]
+    if len(set(lengths)) > 1:
+        raise ValueError(
+            f"effect {name}: pulse, ray, distance and brightness must have one value for each added echo, but have "
+            f"{', '.join(map(str, lengths))} values"
+        )
+    for field_name, index, count in (("ray", changes.ray, shape[0]), ("pulse", changes.pulse, shape[1])):
         if len(index) and not 0 <= index.min() <= index.max() < count:
-            raise ValueError(f"effect {name}: echoes must be of one of {shape[0]} rays of {shape[1]} pulses")
-    if not (np.isfinite(changes.distance).all() and np.isfinite(changes.brightness).all()):
-        raise ValueError(f"effect {name}: distances and brightnesses must be finite numbers")
+            raise ValueError(
+                f"effect {name}: {field_name} of the added echoes must be 0 to {count - 1} (the block has {shape[0]} "
+                f"rays for each of {shape[1]} pulses), but is {index.min()} to {index.max()}"
+            )
+    for field_name, values in (("distance", changes.distance), ("brightness", changes.brightness)):
+        if not np.isfinite(values).all():
+            raise ValueError(f"effect {name}: {field_name} of the added echoes must be finite numbers")
 
 
-def _weaken(traced: TracedRays, signals: BothSignals, transmission: Float) -> tuple[TracedRays, BothSignals]:
-    """Return traced rays and signals with brightness times factors (K, P); hits behind that become 0 drop out."""
-    first, behind = signals
-    left = transmission.ravel()[traced.ray]
-    seen = np.flatnonzero(left > 0.0)
-    first = HitSignals(
-        distance=np.where(transmission > 0.0, first.distance, np.inf),
-        weight=np.where(transmission > 0.0, first.weight * transmission, first.weight),
-        intensity=first.intensity * transmission,
+def _weaken(traced_rays: TracedRays, signals: BothSignals, transmission: Float) -> tuple[TracedRays, BothSignals]:
+    """Return traced rays and signals whose brightness is multiplied by a ray's transmission (K, P).
+
+    Where a ray's transmission is 0, its first hit is set to no hit (range inf) and its hits behind are dropped.
+    """
+    first_signals, behind_signals = signals
+    hit_transmission = transmission.ravel()[traced_rays.ray]
+    visible_hits = np.flatnonzero(hit_transmission > 0.0)
+    first_signals = HitSignals(
+        distance=np.where(transmission > 0.0, first_signals.distance, np.inf),
+        weight=np.where(transmission > 0.0, first_signals.weight * transmission, first_signals.weight),
+        intensity=first_signals.intensity * transmission,
     )
-    behind = HitSignals(behind.distance[seen], behind.weight[seen] * left[seen], behind.intensity[seen] * left[seen])
-    return replace(traced, behind=traced.behind.select(seen), ray=traced.ray[seen]), (first, behind)
+    behind_signals = HitSignals(
+        behind_signals.distance[visible_hits],
+        behind_signals.weight[visible_hits] * hit_transmission[visible_hits],
+        behind_signals.intensity[visible_hits] * hit_transmission[visible_hits],
+    )
+    return replace(traced_rays, behind=traced_rays.behind.select(visible_hits), ray=traced_rays.ray[visible_hits]), (
+        first_signals,
+        behind_signals,
+    )

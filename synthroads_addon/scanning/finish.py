@@ -53,46 +53,55 @@ class Finish:
             changes["intensity"] = range_corrected(points.intensity, points.range, plan.setting)
         return replace(result, points=points.with_arrays(changes), seen=None)
 
-    def _with_relief(self, points: PointBlock, seen: SeenPoints, relief: MicroRelief) -> PointBlock:
-        """Return points shifted to where their beams meet the surface's relief, with its normals if they are wanted."""
-        plan, pavement, place = self.plan, self.plan.relief.pavement, seen.position + self.plan.target.origin
-        # What moves is smooth: for all that has a relief the beam is the one that the scene at time 0 was seen by.
-        ends = BeamEnds(seen.position + plan.reflection.frame_origin, seen.towards_scanner, plan.setting.beam_angle)
-        how = relief, plan.relief.strength, plan.run.seed, plan.relief.octaves
-        raised = None if pavement is None else pavement.heights(points.instance_id, place)
-        shifted = shift_by_relief(points, ends, *how, raised)
-        if not plan.relief.normals or shifted is points:
-            return shifted
-        field = ReliefField(points, ends, *how)
+    def _with_relief(self, points: PointBlock, seen_points: SeenPoints, relief: MicroRelief) -> PointBlock:
+        """Return points shifted to where their beams meet the surface's relief, and their normals if planned."""
+        plan, pavement = self.plan, self.plan.relief.pavement
+        map_place = seen_points.position + plan.target.origin
+        # Only what stands still has a relief, so that beams in the scene at time 0 are the true ones.
+        ends = BeamEnds(
+            seen_points.position + plan.reflection.frame_origin, seen_points.towards_scanner, plan.setting.beam_angle
+        )
+        relief_settings = relief, plan.relief.strength, plan.run.seed, plan.relief.octaves
+        pavement_heights = None if pavement is None else pavement.heights(points.instance_id, map_place)
+        shifted_points = shift_by_relief(points, ends, *relief_settings, pavement_heights)
+        if not plan.relief.normals or shifted_points is points:
+            return shifted_points
+        field = ReliefField(points, ends, *relief_settings)
 
-        def heights(rows: Index, beside: Float) -> Float:
-            of_pavement = 0.0 if pavement is None else pavement.heights(points.instance_id[rows], place[rows] + beside)
-            return field.heights(rows, beside) + of_pavement
+        def heights(rows: Index, offset: Float) -> Float:
+            """Return the heights (K,), m, of roughness and pavement together at offsets (K, 3), m, from points."""
+            pavement_height: Float | float = 0.0
+            if pavement is not None:
+                pavement_height = pavement.heights(points.instance_id[rows], map_place[rows] + offset)
+            return field.heights(rows, offset) + pavement_height
 
-        return turn_normals(shifted, field.rough, ends.towards, heights)
+        return turn_normals(shifted_points, field.rough_rows, ends.towards, heights)
 
-    def _tilts(self, points: PointBlock, seen: SeenPoints) -> tuple[Index, Float]:
-        """Return the points that normal images tilt, and by what; see `NormalImages.tilts`."""
+    def _tilts(self, points: PointBlock, seen_points: SeenPoints) -> tuple[Index, Float]:
+        """Return the indices (K,) of the points that normal images tilt, and their tilts: see `NormalImages.tilts`."""
         plan = self.plan
         assert plan.relief.images is not None
-        place, footprint = seen.position + plan.target.origin, points.range * plan.setting.beam_angle
-        local, normal = seen.position + plan.reflection.frame_origin, np.asarray(seen.normal, np.float64)
-        return plan.relief.images.tilts(seen.material, points.instance_id, place, local, normal, footprint)
+        map_place = seen_points.position + plan.target.origin
+        frame_place = seen_points.position + plan.reflection.frame_origin
+        normal = np.asarray(seen_points.normal, np.float64)
+        footprint = points.range * plan.setting.beam_angle  # m
+        return plan.relief.images.tilts(
+            seen_points.material, points.instance_id, map_place, frame_place, normal, footprint
+        )
 
-    def _with_layers(self, result: BlockResult, seen: SeenPoints) -> BlockResult:
+    def _with_layers(self, result: BlockResult, seen_points: SeenPoints) -> BlockResult:
         """Return a block with its points' colours and layers, and with the intensities that follow from these."""
         plan = self.plan
-        values = sample_points(
-            self.source, seen, plan.layers.coloured | (OF_INTENSITY if plan.reception.after_layers else set())
-        )
+        layer_names = plan.layers.coloured | (OF_INTENSITY if plan.reception.after_layers else set())
+        values = sample_points(self.source, seen_points, layer_names)
         changes: dict[str, Any] = {name: values.arrays[name] for name in plan.layers.coloured}
         changes["color_source"] = values.source
         if plan.reception.after_layers:
             assert plan.layers.means is not None
-            factors = layer_brightness(plan.layers.means, seen, values)
+            factors = layer_brightness(plan.layers.means, seen_points, values)
             if plan.relief.images is not None:
-                rows, tilts = self._tilts(result.points, seen)
-                factors[rows] *= tilted_brightness(seen.normal[rows], tilts, seen.towards_scanner[rows])
+                rows, tilts = self._tilts(result.points, seen_points)
+                factors[rows] *= tilted_brightness(seen_points.normal[rows], tilts, seen_points.towards_scanner[rows])
             changes["intensity"] = result.points.intensity * factors
             if (power := result.points.array("power_db")) is not None:
                 changes["power_db"] = np.maximum(power + decibels(factors), DARKEST_DB)
@@ -103,7 +112,7 @@ class Finish:
         return replace(result, sources=np.bincount(result.points.color_source, minlength=256))
 
 
-def layer_brightness(means: Surfaces, seen: SeenPoints, values: LayerValues) -> Float:
+def layer_brightness(means: Surfaces, seen_points: SeenPoints, values: LayerValues) -> Float:
     """Return factors (N,) by which points are brighter by their own layers than by their materials' means.
 
     A return has the layers of what gave most of it. Dirt, print and wear dim what beads and prisms send back as they
@@ -111,54 +120,56 @@ def layer_brightness(means: Surfaces, seen: SeenPoints, values: LayerValues) -> 
 
     Args:
         means: of the scene's materials, which the layers vary around.
-        seen: N points.
+        seen_points: N points.
         values: their layers.
     """
-    by_layers = reflectivity(*(values.arrays[name] for name in ("base_color", "metallic", "specular")))
-    usual = np.take(means.reflectivity, seen.material, mode="clip")
-    factor = np.asarray(by_layers / np.maximum(usual, _DARKEST))
-    factor[seen.material == NO_MATERIAL] = 1.0
+    layer_reflectivity = reflectivity(*(values.arrays[name] for name in ("base_color", "metallic", "specular")))
+    mean_reflectivity = np.take(means.reflectivity, seen_points.material, mode="clip")
+    factor = np.asarray(layer_reflectivity / np.maximum(mean_reflectivity, _DARKEST))
+    factor[seen_points.material == NO_MATERIAL] = 1.0
     return factor
 
 
-def tilted_brightness(normal: AnyArray, tilts: Float, towards: AnyArray) -> Float:
-    """Return factors (K,) by which points are brighter for the tilt of their normals, as a matt surface is (Lambert).
+def tilted_brightness(normal: AnyArray, tilts: Float, scanner_direction: AnyArray) -> Float:
+    """Return factors (K,) by which tilting their normals makes points brighter: Lambert's cos(tilted) / cos(face).
 
     Args:
         normal: (K, 3) unit normals of the faces.
-        tilts: (K, 3) along the faces.
-        towards: (K, 3) unit vectors to the scanner.
+        tilts: (K, 3) vectors along the faces that are added to the normals.
+        scanner_direction: (K, 3) unit vectors to the scanner.
     """
-    turned = normal + tilts
-    turned /= np.linalg.norm(turned, axis=1)[:, None]
-    before, after = (np.einsum("ij,ij->i", one, towards) for one in (normal, turned))
-    return np.asarray(np.maximum(after, 0.0) / np.maximum(before, _DARKEST))
+    tilted_normal = normal + tilts
+    tilted_normal /= np.linalg.norm(tilted_normal, axis=1)[:, None]
+    cosine_before, cosine_after = (
+        np.einsum("ij,ij->i", vectors, scanner_direction) for vectors in (normal, tilted_normal)
+    )
+    return np.asarray(np.maximum(cosine_after, 0.0) / np.maximum(cosine_before, _DARKEST))
 
 
 def read_echoes(result: BlockResult, plan: ScanPlan) -> BlockResult:
-    """Return a block as the detector records it: weak and surplus echoes lost, the rest renumbered and saturated.
+    """Return a block as the detector records it, once the layers have given its intensities.
 
-    Weak echoes are lost, those beyond the device's largest number as well, and what is left is numbered anew and
-    saturates. The returns of a pulse have one time and lie side by side.
+    Echoes below the threshold and those beyond the device's largest number of returns are lost; the others get new
+    return numbers, and their intensities saturate. The returns of a pulse have one time and lie side by side.
     """
     points, readout, setting = result.points, result.readout or Readout(), plan.setting
-    strong = np.flatnonzero(readout.detected(points.intensity, setting.threshold))
-    time, strip = np.take(points.gps_time, strong), np.take(points.strip, strong)
-    nth = np.take(points.return_number, strong)
-    begins = np.ones(len(strong), dtype=bool)
+    detected = np.flatnonzero(readout.detected(points.intensity, setting.threshold))
+    time, strip = np.take(points.gps_time, detected), np.take(points.strip, detected)
+    echo_number = np.take(points.return_number, detected)
+    begins_pulse = np.ones(len(detected), dtype=bool)
     # Some heads fire several lasers at once: pulses of one time are told apart by their numbers, which begin anew.
-    begins[1:] = (time[1:] != time[:-1]) | (strip[1:] != strip[:-1]) | (nth[1:] <= nth[:-1])
-    recorded, number, returns = number_returns(np.cumsum(begins), setting.device.maximum_returns)
-    rows, seen = strong if recorded.all() else strong[recorded], result.seen
+    begins_pulse[1:] = (time[1:] != time[:-1]) | (strip[1:] != strip[:-1]) | (echo_number[1:] <= echo_number[:-1])
+    recorded_mask, number, returns = number_returns(np.cumsum(begins_pulse), setting.device.maximum_returns)
+    rows, seen_points = detected if recorded_mask.all() else detected[recorded_mask], result.seen
     if len(rows) < len(points):
         points, readout = points.select(rows), readout.select(rows)
-        seen = None if seen is None else seen.select(rows)
+        seen_points = None if seen_points is None else seen_points.select(rows)
     intensity, clipped = readout.read(points.intensity, points.range, setting, plan.gains)
     return replace(
         result,
         points=replace(points, intensity=intensity, return_number=number, number_of_returns=returns),
-        seen=seen,
-        below_threshold=result.below_threshold + len(result.points) - len(strong),
+        seen=seen_points,
+        below_threshold=result.below_threshold + len(result.points) - len(detected),
         saturated=clipped,
         readout=None,
     )

@@ -24,9 +24,9 @@ _POINT = 13.0
 
 
 LONG = 30.0
-"""Seconds from which on a scan's forecast is told unasked."""
+"""Expected seconds from which on a scan's forecast is reported unasked: chosen."""
 _SHORT = 3.0
-"""Seconds from which on it is looked at how busy the machine is."""
+"""Expected seconds from which on the forecast takes into account how busy the machine is: chosen."""
 
 
 @dataclass(frozen=True)
@@ -48,18 +48,18 @@ class ScanForecast:
     workers: int = 1
 
     def beside_others(self) -> ScanForecast:
-        """Return the forecast with the seconds that it takes beside what else the machine does now.
+        """Return the forecast with the seconds that the scan takes beside the machine's other work of this moment.
 
-        Looking at that takes 0.1 s; what is short anyway is returned as it is.
+        Measuring that work takes 0.1 s; a forecast of less than `_SHORT` seconds is returned as it is.
         """
         if self.seconds < _SHORT:
             return self
-        busy = free_cores(self.workers, 1.0) / free_cores(self.workers, share_of_core())
-        return replace(self, seconds=self.seconds * busy)
+        slowdown = free_cores(self.workers, 1.0) / free_cores(self.workers, share_of_core())
+        return replace(self, seconds=self.seconds * slowdown)
 
     @property
     def is_long(self) -> bool:
-        """Return whether it takes so long that users are told beforehand."""
+        """Return whether the scan takes so long that users are told beforehand."""
         return self.seconds >= LONG
 
     def text(self) -> str:
@@ -71,20 +71,20 @@ class ScanForecast:
         )
 
 
-def forecast_scan(cut: Blocks, triangles: int, threads: int = 0) -> ScanForecast:
+def forecast_scan(division: Blocks, triangles: int, threads: int = 0) -> ScanForecast:
     """Return the expected pulses, computing time (s) and memory (bytes) of a scan on this machine.
 
     Args:
-        cut: its pulses.
+        division: its pulses.
         triangles: of the scene.
         threads: blocks that are worked on at once; 0 for every core.
     """
-    pulses = sum(cut.pulse_count(strip) for strip in cut.path.strips)
+    pulses = sum(division.pulse_count(strip) for strip in division.path.strips)
     workers = threads or available_cores()
-    seconds = pulses * (_PULSE + _RAY * cut.rays_per_pulse) / free_cores(workers, 1.0)
-    scene = _TRIANGLE * triangles
-    busy = min(workers + 1, cut.count())
-    return ScanForecast(pulses, seconds, _BASE + scene + _THREAD * busy, scene, workers)
+    seconds = pulses * (_PULSE + _RAY * division.rays_per_pulse) / free_cores(workers, 1.0)
+    scene_memory = _TRIANGLE * triangles
+    blocks_at_once = min(workers + 1, division.count())
+    return ScanForecast(pulses, seconds, _BASE + scene_memory + _THREAD * blocks_at_once, scene_memory, workers)
 
 
 def check_scan_size(forecast: ScanForecast, most_pulses: int | None = None) -> None:
@@ -97,19 +97,20 @@ def check_scan_size(forecast: ScanForecast, most_pulses: int | None = None) -> N
     Raises:
         InputError: it is larger; the message says how long it would take.
     """
-    if forecast.pulses > (MOST_PULSES if most_pulses is None else most_pulses):
-        allowed = (
+    limit = MOST_PULSES if most_pulses is None else most_pulses
+    if forecast.pulses > limit:
+        remedy = (
             f"{forecast.text()}: --allow-large or a larger number lets it be done; is the scene in another unit, or "
             "does a part of it lie astray?"
         )
-        raise InputError("scan.most_pulses", MOST_PULSES if most_pulses is None else most_pulses, allowed)
+        raise InputError("scan.most_pulses", limit, remedy)
     memory = physical_memory()
     if most_pulses is None and memory is not None and forecast.scene_memory > memory:
-        allowed = (
+        remedy = (
             f"its triangles take about {forecast.scene_memory / 1e9:,.0f} GB of memory, this machine has "
             f"{memory / 1e9:,.0f} GB: --allow-large tries all the same"
         )
-        raise InputError("scene", None, allowed)
+        raise InputError("scene", None, remedy)
 
 
 def _file_size(count: float) -> str:

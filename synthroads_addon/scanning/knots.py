@@ -43,24 +43,32 @@ class Track:
 
     @classmethod
     def between(cls, pose: Callable[[Float], Any], begin: float, end: float, spacing: float, every: int = 1) -> Self:
-        """Sample ``pose(time (K,)) -> (rotation (K, 3, 3), position (K, 3), present (K,))`` at knots, begin to end, s.
+        """Return the track of a body's poses at the knots that span two times.
 
         Knots are whole multiples of the spacing, so that no result depends on where a block begins.
 
         Args:
-            every: only so many knots apart the pose is worked out, between these by polynomials through `NODES` of
-                them: for poses that bend fast and smoothly.
+            pose: ``pose(time (K,)) -> (rotation (K, 3, 3), position (K, 3), present (K,))``.
+            begin, end: times, s.
+            spacing: s between two knots.
+            every: the pose is worked out at each knot whose number is a multiple of this (a node), and between nodes
+                by polynomials through `NODES` of them: for poses that bend fast and smoothly.
         """
-        first, last = _knot_numbers(begin, end, spacing)
+        first_knot, last_knot = _knot_numbers(begin, end, spacing)
         if every == 1:
-            return cls._at_knots(pose, first, last, spacing)
-        low, cells = first // every, last // every - first // every + 1
-        before = NODES // 2 - 1
-        nodes = cls._at_knots(pose, low - before, low + cells + before, spacing * every)
-        window = slice(first - low * every, last + 1 - low * every)
-        present = np.repeat(nodes.present[before : before + cells] & nodes.present[before + 1 :][:cells], every)
+            return cls._at_knots(pose, first_knot, last_knot, spacing)
+        # A cell is the stretch from one node to the next; each needs NODES // 2 - 1 more nodes on both sides of it.
+        first_node = first_knot // every
+        cells = last_knot // every - first_node + 1
+        margin = NODES // 2 - 1
+        nodes = cls._at_knots(pose, first_node - margin, first_node + cells + margin, spacing * every)
+        # Of the knots of all cells those from the first to the last one.
+        window = slice(first_knot - first_node * every, last_knot + 1 - first_node * every)
+        present_at_begin = nodes.present[margin : margin + cells]
+        present_at_end = nodes.present[margin + 1 : margin + 1 + cells]
+        present = np.repeat(present_at_begin & present_at_end, every)
         return cls(
-            first * spacing,
+            first_knot * spacing,
             spacing,
             _refine(nodes.rotation, every)[:, window],
             _refine(nodes.position, every)[:, window],
@@ -68,9 +76,9 @@ class Track:
         )
 
     @classmethod
-    def _at_knots(cls, pose: Callable[[Float], Any], first: int, last: int, spacing: float) -> Self:
-        """Return the poses at knots ``first`` to ``last``, inclusive, numbered in multiples of the spacing."""
-        times = np.arange(first, last + 1) * spacing
+    def _at_knots(cls, pose: Callable[[Float], Any], first_knot: int, last_knot: int, spacing: float) -> Self:
+        """Return the track of the poses at two knots and all between, numbered in multiples of the spacing (s)."""
+        times = np.arange(first_knot, last_knot + 1) * spacing
         rotation, position, present = pose(times)
         count = len(times)
         return cls(
@@ -94,7 +102,7 @@ class Track:
         """Return the local positions (3, K), m, at the knots, of a point (3,) fixed in the body frame."""
         return np.asarray(np.einsum("ijk,j->ik", self.rotation.reshape(3, 3, -1), point) + self.position)
 
-    def along(self, way: Float, times: Float) -> Float:
+    def interpolate(self, way: Float, times: Float) -> Float:
         """Interpolate values (C, K), one for each knot, at times (N,) within the track; return them (C, N)."""
         return _interpolate(way, *_locate(self, times))
 
@@ -105,11 +113,11 @@ class Track:
             centre: (3,) of the sphere in the body frame, m.
             radius: m.
         """
-        there = np.flatnonzero(self.present)
-        if not len(there):
+        present_knots = np.flatnonzero(self.present)
+        if not len(present_knots):
             return None
-        middle = self.way_of(centre)[:, there]
-        return np.array([middle.min(axis=1) - radius, middle.max(axis=1) + radius])
+        centre_way = self.way_of(centre)[:, present_knots]
+        return np.array([centre_way.min(axis=1) - radius, centre_way.max(axis=1) + radius])
 
 
 class PoseCache:
@@ -122,39 +130,40 @@ class PoseCache:
     def __init__(self, pose: Callable[[Float], Any]) -> None:
         @lru_cache(maxsize=_KEPT)
         def stretch(number: int, spacing: float) -> Track:
+            """Return the track of the stretch of `_AT_ONCE` knots with this number."""
             return Track._at_knots(pose, number * _AT_ONCE, (number + 1) * _AT_ONCE - 1, spacing)
 
         self._stretch = stretch
 
     def track(self, begin: float, end: float, spacing: float) -> Track:
         """Return the track of poses at knots that span two times, s, from cached stretches."""
-        first, last = _knot_numbers(begin, end, spacing)
-        before = first // _AT_ONCE
-        stretches = [self._stretch(number, spacing) for number in range(before, last // _AT_ONCE + 1)]
-        knots = slice(first - before * _AT_ONCE, last + 1 - before * _AT_ONCE)
+        first_knot, last_knot = _knot_numbers(begin, end, spacing)
+        first_stretch = first_knot // _AT_ONCE
+        stretches = [self._stretch(number, spacing) for number in range(first_stretch, last_knot // _AT_ONCE + 1)]
+        knots = slice(first_knot - first_stretch * _AT_ONCE, last_knot + 1 - first_stretch * _AT_ONCE)
         names = ("rotation", "position", "present")
-        joined = (np.concatenate([getattr(one, name) for one in stretches], axis=-1) for name in names)
-        return Track(first * spacing, spacing, *(array[..., knots] for array in joined))
+        joined_arrays = (np.concatenate([getattr(part, name) for part in stretches], axis=-1) for name in names)
+        return Track(first_knot * spacing, spacing, *(array[..., knots] for array in joined_arrays))
 
 
 def track_knots(begin: float, end: float, spacing: float) -> Float:
     """Return the times (K,) of the knots, at least two, that span two times, s: whole multiples of ``spacing``."""
-    first, last = _knot_numbers(begin, end, spacing)
-    return np.arange(first, last + 1) * spacing
+    first_knot, last_knot = _knot_numbers(begin, end, spacing)
+    return np.arange(first_knot, last_knot + 1) * spacing
 
 
 def _knot_numbers(begin: float, end: float, spacing: float) -> tuple[int, int]:
     """Return the first and the last of the knots that span two times, as multiples of ``spacing``."""
-    first = int(np.floor(begin / spacing))
-    return first, max(int(np.ceil(end / spacing)), first + 1)
+    first_knot = int(np.floor(begin / spacing))
+    return first_knot, max(int(np.ceil(end / spacing)), first_knot + 1)
 
 
 def _locate(track: Track, times: Float) -> tuple[Index, Float]:
     """Return the indices (N,) of the knots before times (N,), and the shares (N,) of the way to the next."""
-    knot = (times - track.begin) / track.spacing
-    index = np.clip(knot.astype(np.intp), 0, track.position.shape[1] - 2)
-    knot -= index
-    return index, knot
+    position = (times - track.begin) / track.spacing
+    index = np.clip(position.astype(np.intp), 0, track.position.shape[1] - 2)
+    position -= index
+    return index, position
 
 
 def _interpolate(values: Float, index: Index, share: Float) -> Float:
@@ -170,19 +179,25 @@ def _interpolate(values: Float, index: Index, share: Float) -> Float:
 
 @lru_cache(maxsize=64)
 def _node_weights(every: int) -> Float:
-    """Return the weights (every, NODES) of evenly spaced nodes at each knot between the middle two, by Lagrange."""
-    share, place = np.arange(every) / every, np.arange(NODES) - (NODES // 2 - 1)
+    """Return the weights (every, NODES) of evenly spaced nodes at each knot between the middle two.
+
+    They are Lagrange's basis polynomials: of node j the product of (x - x_m) / (x_j - x_m) over all other nodes m.
+    """
+    # In units of the nodes' spacing, from the node before the knots.
+    knot_shares, node_places = np.arange(every) / every, np.arange(NODES) - (NODES // 2 - 1)
     weights = np.ones((every, NODES))
     for node, other in product(range(NODES), repeat=2):
         if node != other:
-            weights[:, node] *= (share - place[other]) / (place[node] - place[other])
+            weights[:, node] *= (knot_shares - node_places[other]) / (node_places[node] - node_places[other])
     return weights
 
 
 def _refine(values: Float, every: int) -> Float:
     """Return values (C, N) at nodes as values (C, (N + 1 - NODES) * every) at the knots from the third node on."""
-    weights, cells = _node_weights(every), values.shape[1] + 1 - NODES
+    weights = _node_weights(every)
+    cells = values.shape[1] + 1 - NODES
     result = np.empty((len(values), cells, every))
+    # Knots in rows and cells in columns: rows are longer so, and sums of long rows faster.
     total, part = np.empty((2, every, cells))
     for row, refined in zip(values, result, strict=True):
         total[:] = 0.0

@@ -67,25 +67,30 @@ def mirrors_of(rows: Sequence[Material], films: Sequence[float]) -> Mirrors:
     slope = np.array([row.slope for row in rows])
     bare_reflectance = np.array([row.metallic * row.reflectivity + (1.0 - row.metallic) * COATED for row in rows])
     film = np.asarray(films, dtype=np.float64)
-    wet = film > 0.0
-    reflectance = np.where(wet, film * WATER, np.where(slope < MATT, bare_reflectance, 0.0))
-    return Mirrors(reflectance, np.where(wet, FILM_SLOPE, slope))
+    is_wet = film > 0.0
+    reflectance = np.where(is_wet, film * WATER, np.where(slope < MATT, bare_reflectance, 0.0))
+    return Mirrors(reflectance, np.where(is_wet, FILM_SLOPE, slope))
 
 
 def mirrored_share(reflectance: Float, cosine: Float) -> Float:
-    """Return the share (N,) of the light that a mirror reflects, by its reflectance at a right angle and cos t."""
+    """Return the share (N,) of the light that a mirror reflects, by Schlick's approximation; 0 for what isn't a mirror.
+
+    Args:
+        reflectance: (N,) at a right angle, F0 of the formula above.
+        cosine: (N,) cos t of the incidence angle.
+    """
     return np.asarray(reflectance + np.where(reflectance > 0.0, 1.0 - reflectance, 0.0) * (1.0 - cosine) ** 5)
 
 
-def seen_share(slope: Float, before: Float, beyond: Float, angle: float) -> Float:
+def seen_share(slope: Float, mirror_range: Float, range_beyond: Float, angle: float) -> Float:
     """Return the share (N,) of a blurred image that lies within the receiver's field of view.
 
     Args:
         slope: (N,) of the mirror's facets, rad.
-        before, beyond: (N,) range of the mirror, and what the light goes behind it, m.
+        mirror_range, range_beyond: (N,) range of the mirror, and what the light goes behind it, m.
         angle: the field of view, rad.
     """
-    blur = 4.0 * slope * beyond / np.maximum(before + beyond, 1e-9)
+    blur = 4.0 * slope * range_beyond / np.maximum(mirror_range + range_beyond, 1e-9)
     return np.asarray(1.0 / (1.0 + (blur / max(angle, 1e-9)) ** 2))
 
 
@@ -107,7 +112,7 @@ class Multipath:
         surfaces: Surfaces,
         setting: ScannerSetting,
         attenuation: float,
-        traced: TracedRays,
+        traced_rays: TracedRays,
         motions: list[Track],
     ) -> tuple[Hits, Index, HitSignals]:
         """Return the ghosts of a block's rays as hits in the air, the rays that they are of, and their signals.
@@ -117,43 +122,53 @@ class Multipath:
             surfaces: its materials.
             setting: the scanner's.
             attenuation: 1/m of range.
-            traced: what the rays meet first: only that mirrors.
+            traced_rays: what the rays meet first: only that mirrors.
             motions: of the target's moving parts.
         """
-        ray, share = self._mirroring(setting, surfaces, traced)
+        ray, share = self._mirroring(setting, surfaces, traced_rays)
         if not len(ray):
-            none, nothing = np.empty(0, dtype=np.intp), np.empty(0)
-            return Hits(none, none, nothing, nothing, nothing), none, HitSignals(nothing, nothing, nothing)
-        first, rays = traced.first, traced.rays
-        before, pulse = np.take(first.distance, ray), ray % len(rays.time)
-        normal = target.normals(np.take(first.face, ray), np.take(first.along, ray), rays.time[pulse], motions)
+            zeros, nothing = np.empty(0, dtype=np.intp), np.empty(0)
+            return Hits(zeros, zeros, nothing, nothing, nothing), zeros, HitSignals(nothing, nothing, nothing)
+        first_hits, rays = traced_rays.first, traced_rays.rays
+        mirror_range, pulse = np.take(first_hits.distance, ray), ray % len(rays.time)
+        normal = target.normals(
+            np.take(first_hits.face, ray), np.take(first_hits.cosine, ray), rays.time[pulse], motions
+        )
         origin, direction = rays.pick(ray)
-        place = origin + before * direction + _OFF_SURFACE * normal
-        away = direction - 2.0 * np.einsum("ij,ij->j", direction, normal) * normal
-        met = target.cast(place, away, setting.maximum_range, rays.time[pulse], motions)
-        distance = before + met.distance
-        here = np.flatnonzero((met.face >= 0) & (distance <= setting.maximum_range))
-        ray, share, distance = ray[here], share[here], distance[here]
-        material = np.take(target.material, met.face[here]).astype(np.intp)
-        slope = self.mirrors.slope[np.take(first.material, ray)]
-        share = share * seen_share(slope, before[here], met.distance[here], setting.beam_angle)
-        brightness = share * brightness_of(surfaces, material, np.abs(met.along[here]))
-        none = np.zeros(len(here), dtype=np.intp)
+        place = origin + mirror_range * direction + _OFF_SURFACE * normal
+        # Law of reflection: d' = d - 2 (d . n) n.
+        mirrored_direction = direction - 2.0 * np.einsum("ij,ij->j", direction, normal) * normal
+        mirrored_hits = target.cast(place, mirrored_direction, setting.maximum_range, rays.time[pulse], motions)
+        distance = mirror_range + mirrored_hits.distance
+        recorded_rows = np.flatnonzero((mirrored_hits.face >= 0) & (distance <= setting.maximum_range))
+        ray, share, distance = ray[recorded_rows], share[recorded_rows], distance[recorded_rows]
+        material = np.take(target.material, mirrored_hits.face[recorded_rows]).astype(np.intp)
+        slope = self.mirrors.slope[np.take(first_hits.material, ray)]
+        share = share * seen_share(
+            slope, mirror_range[recorded_rows], mirrored_hits.distance[recorded_rows], setting.beam_angle
+        )
+        brightness = share * brightness_of(surfaces, material, np.abs(mirrored_hits.cosine[recorded_rows]))
+        zeros = np.zeros(len(recorded_rows), dtype=np.intp)
         # What comes from nowhere has no face; it counts as one that lies across the beam.
-        hits = Hits(none - 1, none, distance, none - 1.0, brightness)
+        hits = Hits(zeros - 1, zeros, distance, zeros - 1.0, brightness)
         weight = np.maximum(brightness, LEAST_REFLECTANCE)
         return hits, ray, HitSignals(distance, weight, received_intensity(brightness, distance, attenuation))
 
-    def _mirroring(self, setting: ScannerSetting, surfaces: Surfaces, traced: TracedRays) -> tuple[Index, Float]:
-        """Return the rays (N,) whose light may come back over a mirror, and the share (N,) that does so at most."""
-        first = traced.first
-        material = first.material.ravel()
+    def _mirroring(self, setting: ScannerSetting, surfaces: Surfaces, traced_rays: TracedRays) -> tuple[Index, Float]:
+        """Return the rays (N,) whose light may come back over a mirror, and the share (N,) of it that does so at most.
+
+        Rays whose ghosts couldn't be detected even if all of this came back from the brightest surface are left out.
+        """
+        first_hits = traced_rays.first
+        material = first_hits.material.ravel()
         reflectance = np.take(self.mirrors.reflectance, material)
-        ray = np.flatnonzero((reflectance > 0.0) & (first.face.ravel() >= 0) & np.isfinite(first.distance.ravel()))
-        cosine = np.minimum(np.abs(np.take(first.along, ray)), 1.0)
-        ray_share = np.take(np.broadcast_to(traced.rays.share, first.face.shape), ray)
+        ray = np.flatnonzero(
+            (reflectance > 0.0) & (first_hits.face.ravel() >= 0) & np.isfinite(first_hits.distance.ravel())
+        )
+        cosine = np.minimum(np.abs(np.take(first_hits.cosine, ray)), 1.0)
+        ray_share = np.take(np.broadcast_to(traced_rays.rays.share, first_hits.face.shape), ray)
         share = ray_share * self.strength * mirrored_share(reflectance[ray], cosine) ** 2
         brightest = BRIGHTEST if surfaces.retroreflective else 1.0
-        faintest = PROVISIONAL_THRESHOLD * setting.threshold * np.take(first.distance, ray) ** 2
-        seen = np.flatnonzero(share * brightest > faintest)
-        return ray[seen], share[seen]
+        faintest = PROVISIONAL_THRESHOLD * setting.threshold * np.take(first_hits.distance, ray) ** 2
+        detectable = np.flatnonzero(share * brightest > faintest)
+        return ray[detectable], share[detectable]

@@ -93,28 +93,36 @@ def trajectory_errors(noise: Noise, seed: int, strip: Strip, time: Float) -> tup
     sigma = np.array([noise.position_sigma] * 3 + [attitude, attitude, heading])
     if not sigma.any():
         return np.zeros((len(time), 3)), np.zeros((len(time), 3))
-    run = np.maximum(time - strip.start_time, 0.0) / (noise.correlation_time / KNOTS_PER_CORRELATION_TIME)
-    knot = np.floor(run)
-    number, within = np.divmod(knot.astype(np.int64), BLOCK)
-    before, after = _weights(run - knot)
-    values = np.empty((len(time), _AXES))
-    for block in np.unique(number):
-        here = np.flatnonzero(number == block)
-        at, knots = within[here], _process_block(seed, strip.index, int(block))
-        values[here] = before[here, None] * knots[at] + after[here, None] * knots[at + 1]
-    values *= sigma
-    return values[:, :3], values[:, 3:]
+    knot_spacing = noise.correlation_time / KNOTS_PER_CORRELATION_TIME
+    knot_position = np.maximum(time - strip.start_time, 0.0) / knot_spacing
+    knot = np.floor(knot_position)
+    block_numbers, knots_within = np.divmod(knot.astype(np.int64), BLOCK)
+    weights_before, weights_after = _weights(knot_position - knot)
+    unit_errors = np.empty((len(time), _AXES))
+    for block in np.unique(block_numbers):
+        rows = np.flatnonzero(block_numbers == block)
+        process, knot_in_block = _process_block(seed, strip.index, int(block)), knots_within[rows]
+        value_before = weights_before[rows, None] * process[knot_in_block]
+        unit_errors[rows] = value_before + weights_after[rows, None] * process[knot_in_block + 1]
+    unit_errors *= sigma
+    return unit_errors[:, :3], unit_errors[:, 3:]
 
 
 @lru_cache(maxsize=16)
-def _process_block(seed: int, strip: int, number: int) -> Float:
-    """Return the unit-variance process (`BLOCK` + 1, 6) at a block's knots and the first of the next one.
+def _process_block(seed: int, strip: int, block: int) -> Float:
+    """Return the unit-variance process (`BLOCK` + 1, 6) at the knots of a block and the first knot of the next one.
 
-    It is kept, as many blocks of pulses share it.
+    The result is cached, as many blocks of pulses share it.
+
+    Args:
+        seed: of the scan.
+        strip: index of the strip.
+        block: number of the block of knots within the strip.
     """
-    parts = [(number - 1, BLOCK)] if number > 0 else []
-    parts += [(number, BLOCK), (number + 1, 1)]
-    streams = ((stream(seed, "trajectory noise", strip, part), count) for part, count in parts)
+    # (Block, its innovations): the block before, whose influence lasts, this one, and the first one of the next.
+    block_sizes = [(block - 1, BLOCK)] if block > 0 else []
+    block_sizes += [(block, BLOCK), (block + 1, 1)]
+    streams = ((stream(seed, "trajectory noise", strip, number), count) for number, count in block_sizes)
     innovations = np.concatenate([random.standard_normal((count, _AXES)) for random, count in streams])
     return _autoregression(innovations)[-BLOCK - 1 :]
 
@@ -140,7 +148,7 @@ def speckle_factors(random: np.random.Generator, count: int, sigma: float, norma
     The light of a rough surface within one pulse is the sum of m = 1 / s^2 independent speckles, s being their relative
     standard deviation (Goodman 2007, Speckle Phenomena in Optics, chapter 4). What a footprint's many grains reflect
     together, and the detector's noise, are sums of many small parts: normal, by the central limit theorem. In decibels
-    the one has the skewness -s, the other three times that.
+    the gamma part has the skewness -s, the normal part three times that.
 
     Args:
         random: the stream.
@@ -162,13 +170,13 @@ def speckle_factors(random: np.random.Generator, count: int, sigma: float, norma
 
 @lru_cache(maxsize=16)
 def mean_log_factor(sigma: float, normal: float = 0.0) -> float:
-    """Return the mean natural logarithm of `speckle_factors`: of gamma ones by formula, else of many that are drawn."""
+    """Return the mean natural logarithm of `speckle_factors`: for gamma factors by formula, else of many drawn ones."""
     if not normal:
         looks = 1.0 / sigma**2
         # digamma(m) - ln m, by its asymptotic series.
         return -0.5 / looks - 1.0 / (12.0 * looks**2) + 1.0 / (120.0 * looks**4)
-    drawn = speckle_factors(np.random.default_rng(0), _DRAWN, sigma, normal)
-    return float(np.mean(np.log(drawn, dtype=np.float64)))
+    factors = speckle_factors(np.random.default_rng(0), _DRAWN, sigma, normal)
+    return float(np.mean(np.log(factors, dtype=np.float64)))
 
 
 def measured_pose(position: Float, rotation: Float, errors: tuple[Float, Float]) -> tuple[Float, Float]:
@@ -187,23 +195,29 @@ def measured_pose(position: Float, rotation: Float, errors: tuple[Float, Float])
 
 
 def _weights(share: Float) -> tuple[Float, Float]:
-    """Return the weights (K,) of the knots before and after, at shares of the way, that keep the unit variance."""
-    h = 1.0 / KNOTS_PER_CORRELATION_TIME
-    before, after = np.sinh((1.0 - share) * h), np.sinh(share * h)
-    norm = np.sqrt(before**2 + after**2 + 2.0 * before * after * np.exp(-h))
-    return before / norm, after / norm
+    """Return the weights (K,) of the knots before and after times at shares (K,), 0 to 1, of the way between them.
+
+    They are those of the conditional expectation of the Gauss-Markov process, sinh((1 - s) h) and sinh(s h), divided
+    by the standard deviation of that mean, so that interpolated values have unit variance as well.
+    """
+    step = 1.0 / KNOTS_PER_CORRELATION_TIME  # h: between two knots, in correlation times
+    before_weight, after_weight = np.sinh((1.0 - share) * step), np.sinh(share * step)
+    # The correlation of two neighbouring knots is exp(-h).
+    deviation = np.sqrt(before_weight**2 + after_weight**2 + 2.0 * before_weight * after_weight * np.exp(-step))
+    return before_weight / deviation, after_weight / deviation
 
 
 def _autoregression(innovations: Float) -> Float:
     """Return the first-order process (N, 6) of unit variance that white innovations (N, 6) drive.
 
-    The sum over all earlier innovations is built by doubling its reach: log2(N) passes over the array.
+    x[i] is the sum of a^j w[i - j] over all j. It is built by doubling: sums over ``reach`` innovations, and a^reach
+    times the sums that lie ``reach`` before them, are the sums over twice as many. That takes log2(N) passes.
     """
-    a = np.exp(-1.0 / KNOTS_PER_CORRELATION_TIME)
+    correlation = np.exp(-1.0 / KNOTS_PER_CORRELATION_TIME)
     values = innovations.copy()
-    values[1:] *= np.sqrt(1.0 - a * a)
+    values[1:] *= np.sqrt(1.0 - correlation * correlation)
     reach = 1
     while reach < len(values):
-        values[reach:] += a**reach * values[:-reach].copy()
+        values[reach:] += correlation**reach * values[:-reach].copy()
         reach *= 2
     return values

@@ -93,12 +93,12 @@ class ScanPlan:
     def openings(self) -> Openings | None:
         """Return where the scene's materials are open; None where none is."""
         reflection = self.reflection
-        clear = reflection.transparency and replace(reflection.transparency, frame_origin=reflection.frame_origin)
-        return None if self.gaps is None and clear is None else Openings(self.gaps, clear)
+        see_through = reflection.transparency and replace(reflection.transparency, frame_origin=reflection.frame_origin)
+        return None if self.gaps is None and see_through is None else Openings(self.gaps, see_through)
 
     @cached_property
     def pulse_kernel(self) -> PulseKernel | NoKernelError:
-        """Return the compiled loops that follow the scan's pulses, or why NumPy does."""
+        """Return the compiled loops that follow the scan's pulses, or the reason why NumPy follows them instead."""
         emission, surfaces = self.emission, self.reflection.surfaces
         parallel = emission.beam == "cylindrical"
         beam = (emission.setting, emission.pattern, self.openings, self.atmosphere.attenuation, parallel)
@@ -109,25 +109,28 @@ class ScanPlan:
 
     @cached_property
     def noise_kernel(self) -> CompiledNoise | None:
-        """Return the compiled loop over random fields; None for NumPy, as where rays aren't cast in packets either."""
+        """Return the compiled loop over random fields; None where NumPy works them out.
+
+        NumPy does so as well where rays aren't cast in packets, whose speed the loops are made for.
+        """
         noise = usable_noise()
         return noise if isinstance(noise, CompiledNoise) and isinstance(self.target.caster, PacketScene) else None
 
     @cached_property
     def pose_kernel(self) -> CompiledPoses | None:
-        """Return the compiled loop over the pulses' poses; None for NumPy, likewise."""
+        """Return the compiled loop over the pulses' poses; None where NumPy works them out, as for `noise_kernel`."""
         poses = usable_poses()
         return poses if isinstance(poses, CompiledPoses) and isinstance(self.target.caster, PacketScene) else None
 
     @cached_property
     def point_loops(self) -> CompiledPoints | None:
-        """Return the compiled loops over points once they are measured; None for NumPy, likewise."""
+        """Return the compiled loops over measured points; None where NumPy is used, as for `noise_kernel`."""
         points = usable_points()
         return points if isinstance(points, CompiledPoints) and isinstance(self.target.caster, PacketScene) else None
 
     @property
     def _kernels(self) -> str:
-        """Return by what way rays are cast, pulses followed and random fields worked out, for the report."""
+        """Return a sentence for the report: how rays are cast, and whether NumPy or compiled loops do the rest."""
         caster = self.target.caster
         if not isinstance(caster, PacketScene):
             return caster.kernels
@@ -138,22 +141,23 @@ class ScanPlan:
             "points": usable_points(),
         }
         parts = [
-            f"{of} {f'by NumPy: {way}' if isinstance(way, NoKernelError) else 'compiled'}" for of, way in ways.items()
+            f"{subject} {f'by NumPy: {way}' if isinstance(way, NoKernelError) else 'compiled'}"
+            for subject, way in ways.items()
         ]
-        if isinstance(self.pulse_kernel, PulseKernel) and (left := self._left_to_numpy):
-            parts[0] += f", by NumPy: {', '.join(left)}"
+        if isinstance(self.pulse_kernel, PulseKernel) and (numpy_parts := self._left_to_numpy):
+            parts[0] += f", by NumPy: {', '.join(numpy_parts)}"
         return "; ".join([caster.kernels, *parts])
 
     @property
     def _left_to_numpy(self) -> list[str]:
-        """Return what of pulses that are followed by compiled loops is worked out by NumPy nonetheless."""
+        """Return the tasks, in words, that NumPy still does where compiled loops follow the pulses."""
         parts = {
             "what panes let through": self.openings is not None and self.openings.clear is not None,
             "which footprints are spared": self.spares,
             "echoes of the air": bool(self.atmosphere.effects),
             "what surfaces mirror": self.reflection.multipath is not None,
         }
-        return [part for part, there in parts.items() if there]
+        return [part for part, present in parts.items() if present]
 
     @property
     def rays_per_pulse(self) -> int:
@@ -162,13 +166,16 @@ class ScanPlan:
 
     @property
     def spares(self) -> bool:
-        """Return whether footprints that meet one plane alone are spared: none where echoes come from elsewhere too."""
+        """Return whether footprints that meet one plane alone are spared: not where air or mirrors give echoes too."""
         from_surfaces = not self.atmosphere.effects and self.reflection.multipath is None
         return self.emission.ground is not None and from_surfaces and self.rays_per_pulse > 1
 
     @property
     def most_returns(self) -> int:
-        """Return the largest number of returns kept of one pulse; twice the device's until the layers are known."""
+        """Return the largest number of returns kept of one pulse.
+
+        It is the device's, times `_SPARE` where intensities still change by the points' layers.
+        """
         return self.setting.device.maximum_returns * (_SPARE if self.reception.after_layers else 1)
 
     @property

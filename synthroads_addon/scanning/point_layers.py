@@ -46,66 +46,75 @@ def fills(array: str) -> Callable[[Filler], Filler]:
     """Return a decorator that registers a function as the one that fills a `PointBlock` array."""
 
     def register(filler: Filler) -> Filler:
+        """Register a function under the array's name, and return it."""
         FILLERS[array] = filler
         return filler
 
     return register
 
 
-def fill_layers(points: MeasuredPoints, wanted: frozenset[str]) -> dict[str, AnyArray]:
-    """Return the wanted per-point layers that the scan itself fills, as arrays by name."""
-    return {array: filler(points) for array, filler in FILLERS.items() if array in wanted}
+def fill_layers(points: MeasuredPoints, names: frozenset[str]) -> dict[str, AnyArray]:
+    """Return those of the named per-point layers that the scan itself fills, as arrays by name."""
+    return {array: filler(points) for array, filler in FILLERS.items() if array in names}
 
 
 def place_points(origin: Float, direction: Float, pulse: Index, distance: Float, map_origin: Float) -> Float:
     """Return the map coordinates (N, 3) of points at a distance (N,) along the beams (3, P) of their pulses, m."""
     result = np.empty((len(pulse), 3))
     for axis in range(3):
-        place = np.take(direction[axis], pulse)
-        place *= distance
-        place += np.take(origin[axis], pulse)
-        place += map_origin[axis]
-        result[:, axis] = place
+        coordinate = np.take(direction[axis], pulse)
+        coordinate *= distance
+        coordinate += np.take(origin[axis], pulse)
+        coordinate += map_origin[axis]
+        result[:, axis] = coordinate
     return result
 
 
 @fills("normal")
 def _normal(points: MeasuredPoints) -> AnyArray:
+    """Return the unit normals (N, 3), towards the scanner."""
     assert points.normal is not None
     return np.ascontiguousarray(points.normal.T, dtype=np.float32)
 
 
 @fills("scanner")
 def _scanner(points: MeasuredPoints) -> AnyArray:
+    """Return the map coordinates (N, 3), m, at which the points' pulses left the scanner."""
     return points.pulses.origin.T[points.pulse] + points.target.origin
 
 
 @fills("true_range")
 def _true_range(points: MeasuredPoints) -> AnyArray:
+    """Return the ranges (N,) without errors, m."""
     return points.distance
 
 
 @fills("true_xyz")
 def _true_xyz(points: MeasuredPoints) -> AnyArray:
+    """Return the map coordinates (N, 3) without errors, m."""
     pulses, origin = points.pulses, points.target.origin
     return place_points(pulses.origin, pulses.direction, points.pulse, points.distance, origin)
 
 
 @fills("power_db")
 def _power(points: MeasuredPoints) -> AnyArray:
+    """Return the received powers (N,), dB."""
     return decibels(points.intensity)
 
 
 @fills("channel")
 def _channel(points: MeasuredPoints) -> AnyArray:
+    """Return the numbers (N,) of the lasers that fired the points' pulses."""
     return points.pulses.channel[points.pulse]
 
 
 @fills("material")
 def _material(points: MeasuredPoints) -> AnyArray:
+    """Return the indices (N,) of the materials of the points' faces."""
     return points.target.face_values("material", points.face)
 
 
 @fills("damage")
 def _damage(points: MeasuredPoints) -> AnyArray:
+    """Return the codes (N,) of the damages of the points' faces."""
     return points.target.face_values("damage", points.face)

@@ -43,12 +43,12 @@ class Errors:
     delay: EchoValues | None = None
 
     def range_errors(self, pulse: Index, number: UInt8, delayed: float = 0.0) -> Float:
-        """Return (N,) range errors of returns, in units of one sigma.
+        """Return (N,) range errors of returns, in units of one sigma, with the tails and delays that the block has.
 
         Args:
             pulse: (N,) within the block.
-            number: (N,) from 1.
-            delayed: share of sigma that comes of delays.
+            number: (N,) of each return in its pulse, from 1.
+            delayed: share of sigma, 0 to 1, that comes of delays.
         """
         assert self.range is not None
         result = values_of_echoes(self.range, pulse, number)
@@ -103,13 +103,13 @@ class Pulses:
     def select(self, pulses: Index) -> Pulses:
         """Return the pulses of these indices."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
-        chosen: dict[str, Any] = {
+        selected_arrays: dict[str, Any] = {
             name: None if array is None else np.take(array, pulses, axis=-1) for name, array in values.items()
         }
         # What the scanner believes may be the very array of what is true: it stays so.
         if self.measured_origin is self.origin:
-            chosen["measured_origin"] = chosen["origin"]
-        return Pulses(**chosen)
+            selected_arrays["measured_origin"] = selected_arrays["origin"]
+        return Pulses(**selected_arrays)
 
 
 def turned_vectors(
@@ -124,8 +124,8 @@ def turned_vectors(
         columns: N of such tables.
     """
     rotation, position, _ = track.at(times)
-    chosen = vectors if columns is None else [columns.of(one, len(times)) for one in vectors]
-    return position, [turn_vectors(rotation, one) for one in chosen]
+    selected_vectors = vectors if columns is None else [columns.of(array, len(times)) for array in vectors]
+    return position, [turn_vectors(rotation, array) for array in selected_vectors]
 
 
 def turn_vectors(rotation: Float, vectors: Float) -> Float:
@@ -139,7 +139,7 @@ def turn_vectors(rotation: Float, vectors: Float) -> Float:
     return result
 
 
-def tilt_vectors(vectors: Float, first: Float, second: Float, angle: Float32) -> Float:
+def tilt_vectors(vectors: Float, first_axis: Float, second_axis: Float, angle: Float32) -> Float:
     """Return unit vectors (3, N) tilted towards two axes (3, N) at right angles to them and each other.
 
     Args:
@@ -149,8 +149,8 @@ def tilt_vectors(vectors: Float, first: Float, second: Float, angle: Float32) ->
     result = np.empty_like(vectors)
     product = np.empty(vectors.shape[1])
     for i in range(3):
-        np.multiply(angle[0], first[i], out=result[i])
-        result[i] += np.multiply(angle[1], second[i], out=product)
+        np.multiply(angle[0], first_axis[i], out=result[i])
+        result[i] += np.multiply(angle[1], second_axis[i], out=product)
         result[i] += vectors[i]
         result[i] *= scale
     return result
@@ -171,17 +171,20 @@ def may_hit_scene(
     boxes += target.moving_bounds(motions)
     if not boxes:
         return np.zeros(origins.shape[1], dtype=bool)
-    low, high = np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
+    lowest_corner = np.min([box[0] for box in boxes], axis=0)
+    highest_corner = np.max([box[1] for box in boxes], axis=0)
+    # Twice the full divergence, so that no ray of a footprint is missed: an angle, rad, and a width at the end, m.
     cone = max(setting.divergence) * 2.0
     width = cone * setting.maximum_range
-    towards: Bool | None = None
+    mask: Bool | None = None
     for axis in range(3):
         place, direction = origins[axis], directions[axis]
-        if place.min() > high[axis] + width:
-            turned = direction < cone
-        elif place.max() < low[axis] - width:
-            turned = direction > -cone
+        # Along an axis on which all pulses begin on one side of the box, only those that go towards it may hit it.
+        if place.min() > highest_corner[axis] + width:
+            heads_for_box = direction < cone
+        elif place.max() < lowest_corner[axis] - width:
+            heads_for_box = direction > -cone
         else:
             continue
-        towards = turned if towards is None else towards & turned
-    return None if towards is None or towards.all() else towards
+        mask = heads_for_box if mask is None else mask & heads_for_box
+    return None if mask is None or mask.all() else mask

@@ -171,14 +171,15 @@ class Receiver(ClosedModel):
 
     @model_validator(mode="after")
     def _check_tails(self) -> Self:
+        """Raise ValueError if Student's t would have too few degrees of freedom for a standard deviation."""
         if self.range_tails is not None and 0.0 < self.range_tails < FEWEST_FREEDOM:
             raise ValueError(f"range_tails must be 0, or {FEWEST_FREEDOM:g} or more (not {self.range_tails:g})")
         return self
 
     def over(self, device: Self) -> Self:
-        """Return the receiver with the device's values where it has none of its own."""
-        given = {name: value for name in type(self).model_fields if (value := getattr(self, name)) is not None}
-        return device.model_copy(update=given)
+        """Return a receiver that has this one's values where they are set, and the device's elsewhere."""
+        set_values = {name: value for name in type(self).model_fields if (value := getattr(self, name)) is not None}
+        return device.model_copy(update=set_values)
 
     def noise_sigma(self, threshold: float) -> float:
         """Return the standard deviation of the noise in the unit of the threshold; 0 without noise."""
@@ -190,11 +191,11 @@ EchoValues = tuple[Float32, Float32]
 
 
 def draw_values(draw: Callable[[int], Float32], pulses: int) -> EchoValues:
-    """Return random numbers of a block's echoes.
+    """Return random numbers of a block's echoes: of the first echo of each pulse, and of all later ones.
 
     Args:
-        draw: returns so many numbers.
-        pulses: of the block.
+        draw: returns as many random numbers as it is asked for.
+        pulses: number of pulses of the block.
     """
     values = draw(pulses + max(MOST_ECHOES, pulses))
     return values[:pulses], values[pulses:]
@@ -203,27 +204,29 @@ def draw_values(draw: Callable[[int], Float32], pulses: int) -> EchoValues:
 def values_of_echoes(values: EchoValues, pulse: Index, number: Index | UInt8) -> Float:
     """Return the random numbers of echoes (N,) out of a block's.
 
-    First echoes have a number each. Later ones take theirs by their pulse, the third and fourth of a pulse a good part
-    of the block away from the second: no two of one pulse share one, nor do neighbours.
+    The first echo of each pulse has a number of its own. The numbers of later echoes are taken from a second array, at
+    a place that follows from the pulse; the third and fourth echo of a pulse take theirs a good part of that array away
+    from the second one's: no two echoes of one pulse share a number, nor do those of neighbouring pulses.
 
     Args:
         values: the block's.
         pulse: (N,) within the block.
         number: (N,) of each echo in its pulse, from 1.
     """
-    first, others = values
-    result = np.take(first, pulse).astype(np.float64)
-    later = np.flatnonzero(number > 1)
-    place = pulse[later] + (number[later].astype(np.intp) - 2) * (len(others) // MOST_ECHOES)
-    result[later] = others[place % len(others)]
+    first_values, later_values = values
+    result = np.take(first_values, pulse).astype(np.float64)
+    later_rows = np.flatnonzero(number > 1)
+    shift = (number[later_rows].astype(np.intp) - 2) * (len(later_values) // MOST_ECHOES)
+    result[later_rows] = later_values[(pulse[later_rows] + shift) % len(later_values)]
     return result
 
 
 def number_echoes(pulse: Index) -> Index:
-    """Return the numbers (N,) of echoes in their pulses, from 1; pulses (N,) are non-decreasing."""
-    begins = np.ones(len(pulse), dtype=bool)
-    begins[1:] = pulse[1:] != pulse[:-1]
-    if begins.all():
+    """Return the number (N,), from 1, that each echo has in its pulse; pulses (N,) are non-decreasing."""
+    begins_pulse = np.ones(len(pulse), dtype=bool)
+    begins_pulse[1:] = pulse[1:] != pulse[:-1]
+    if begins_pulse.all():
         return np.ones(len(pulse), dtype=np.intp)
-    starts = np.flatnonzero(begins)
-    return np.asarray(np.arange(len(pulse)) - starts[np.cumsum(begins) - 1] + 1)
+    starts = np.flatnonzero(begins_pulse)
+    start_of_own_pulse = starts[np.cumsum(begins_pulse) - 1]
+    return np.asarray(np.arange(len(pulse)) - start_of_own_pulse + 1)

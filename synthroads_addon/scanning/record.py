@@ -52,33 +52,30 @@ class CollectedBlocks:
 
 
 def record(plan: ScanPlan, sink: Sink, timer: StageTimer | None = None) -> dict[str, Any]:
-    """Scan a plan block by block into a sink, with layers and noise, and return a summary of what was rendered.
+    """Scan a plan block by block into a sink, with layers and noise; return a summary of the renderings as JSON data.
 
-    Where something is rendered, it must run in the main thread.
+    Where anything is rendered, it must be called in the main thread.
 
     Args:
         plan: the scan.
         sink: gets the blocks in their order.
         timer: of the stages ``images`` and ``scan``; its progress may raise `Cancelled`.
-
-    Returns:
-        what was rendered, as JSON data.
     """
     timer, (begin, end) = timer or StageTimer(), plan.run.progress
-    total, done = plan.block_count(), 0
+    block_count, finished_blocks = plan.block_count(), 0
     with ExitStack() as stack:
         source = _open_layers(plan, stack, timer)
         # Closed at once after an error, and not when the last of its traceback is gone: its threads use the source.
         with timer.stage("scan"), closing(scan_blocks(plan, source)) as results:
             for result in results:
                 sink.write(result)
-                done += result.blocks
-                timer.progress("scan", begin + (end - begin) * done / total)
+                finished_blocks += result.blocks
+                timer.progress("scan", begin + (end - begin) * finished_blocks / block_count)
         return {} if source is None else source.report
 
 
 def record_as_measured(plan: ScanPlan) -> list[BlockResult]:
-    """Scan a plan without layers or relief; return its blocks, with normals, materials and seen points."""
+    """Return the blocks of a plan scanned without layers or relief, with normals, materials and seen points."""
     blocks = CollectedBlocks()
     measured = plan.layers.measured | {"normal", "material"}
     record(replace(plan, layers=replace(plan.layers, services=None, seen_points=True, measured=measured)), blocks)
@@ -115,10 +112,11 @@ def scan_blocks(plan: ScanPlan, source: LayerSource | None = None) -> Generator[
 
 
 def _results(plan: ScanPlan, source: LayerSource | None) -> Iterator[BlockResult]:
-    """Yield the results of a plan's blocks, see `scan_blocks`."""
+    """Yield the results of a plan's blocks in order, finished if there is a source of layers: see `scan_blocks`."""
     workers, block_scan = plan.run.threads or available_cores(), BlockScan(plan)
 
     def scan(block: Block) -> BlockResult:
+        """Return the result of a block."""
         return block_scan.scan_block(*block)
 
     if source is None:
@@ -141,25 +139,33 @@ def _results(plan: ScanPlan, source: LayerSource | None) -> Iterator[BlockResult
 
 
 def _nothing() -> None:
-    """Do nothing."""
+    """Do nothing: the default of `_map_side_by_side` for what it calls before it waits for its threads."""
 
 
 def _computed(
-    work: Callable[[Block], BlockResult], plan: ScanPlan, workers: int, ahead: int, wait: Wait
+    work: Callable[[Block], BlockResult], plan: ScanPlan, workers: int, items_ahead: int, wait: Wait
 ) -> Iterator[BlockResult]:
-    """Return an iterator over a plan's blocks' results, in their order, computed by threads if the caster allows."""
+    """Return an iterator over the results of a plan's blocks, in their order.
+
+    Args:
+        work: computes the result of a block.
+        plan: the scan.
+        workers: threads that compute side by side; where the caster needs the main thread, that one computes all.
+        items_ahead: see `_map_side_by_side`.
+        wait: waits for a result.
+    """
     blocks = plan.blocks()
     if plan.target.caster.main_thread_only:
         return map(work, blocks)
-    return _map_side_by_side(work, blocks, workers, ahead, wait)
+    return _map_side_by_side(work, blocks, workers, items_ahead, wait)
 
 
 def _join_into_batches(results: Iterator[BlockResult]) -> Iterator[BlockResult]:
-    """Yield the results joined, in order, into batches of `RETURNS_AT_ONCE` points or more; the last may have less."""
+    """Yield results joined, in order, into batches of `RETURNS_AT_ONCE` points or more; the last may have fewer."""
     batch: list[BlockResult] = []
     for result in results:
         batch.append(result)
-        if sum(len(one.points) for one in batch) >= RETURNS_AT_ONCE:
+        if sum(len(block.points) for block in batch) >= RETURNS_AT_ONCE:
             yield join_results(batch)
             batch = []
     if batch:
@@ -170,7 +176,7 @@ def _map_side_by_side(
     work: Callable[[T], BlockResult],
     items: Iterator[T],
     workers: int,
-    ahead: int,
+    items_ahead: int,
     wait: Wait,
     stop: Callable[[], None] = _nothing,
 ) -> Iterator[BlockResult]:
@@ -180,13 +186,13 @@ def _map_side_by_side(
         work: computes an item.
         items: blocks, or results of several.
         workers: threads.
-        ahead: items beyond these that may wait until they are taken.
+        items_ahead: items beyond these that may wait until they are taken.
         wait: waits for a result.
         stop: called before the threads are waited for in the end: they may wait for this one.
     """
     pool = ThreadPoolExecutor(workers)
     try:
-        pending: list[Future[BlockResult]] = [pool.submit(work, item) for item in islice(items, workers + ahead)]
+        pending: list[Future[BlockResult]] = [pool.submit(work, item) for item in islice(items, workers + items_ahead)]
         while pending:
             yield wait(pending.pop(0))
             pending += [pool.submit(work, item) for item in islice(items, 1)]

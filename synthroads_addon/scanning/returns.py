@@ -49,7 +49,7 @@ BothSignals = tuple[HitSignals, HitSignals]
 """Signals of what rays meet first, and of what they meet behind permeable surfaces."""
 
 
-def group_returns(first: HitSignals, behind: HitSignals, pulse: Index, resolution: float) -> Echoes:
+def group_returns(first_signals: HitSignals, late_signals: HitSignals, pulse: Index, resolution: float) -> Echoes:
     """Return the echoes of pulses: hits of one pulse merge where no gap in range exceeds the resolution (m).
 
     Sorted by range, a hit that lies farther than ``resolution`` behind the one before begins a new return. A return's
@@ -57,114 +57,146 @@ def group_returns(first: HitSignals, behind: HitSignals, pulse: Index, resolutio
     the footprint.
 
     Args:
-        first: (K, P) of what K rays of P pulses meet first.
-        behind: (B,) of what lies behind permeable surfaces.
+        first_signals: (K, P) of what K rays of P pulses meet first.
+        late_signals: (B,) of what lies behind permeable surfaces.
         pulse: (B,) pulses of these.
         resolution: m.
     """
-    nearest, farthest = first.distance.min(axis=0), first.distance.max(axis=0)
-    single = (farthest <= nearest + resolution) & (farthest < np.inf)
-    mixed = ~single & (nearest < np.inf)
+    nearest_range, farthest_range = first_signals.distance.min(axis=0), first_signals.distance.max(axis=0)
+    # All rays of a single pulse hit within the resolution; of a split pulse some do, and the rest hits elsewhere.
+    is_single = (farthest_range <= nearest_range + resolution) & (farthest_range < np.inf)
+    is_split = ~is_single & (nearest_range < np.inf)
     if len(pulse):
-        single[pulse] = False
-        mixed[pulse] = True
-    one = _whole_pulses(np.flatnonzero(single), np.where(single, nearest, 0.0), first)
-    chosen = np.flatnonzero(mixed)
-    if not len(chosen):
-        return one
-    return merge_echoes(one, _split_pulses(chosen, first, behind, pulse, resolution))
+        is_single[pulse] = False
+        is_split[pulse] = True
+    single_echoes = _whole_pulses(np.flatnonzero(is_single), np.where(is_single, nearest_range, 0.0), first_signals)
+    split_pulses = np.flatnonzero(is_split)
+    if not len(split_pulses):
+        return single_echoes
+    return merge_echoes(single_echoes, _split_pulses(split_pulses, first_signals, late_signals, pulse, resolution))
 
 
-def _whole_pulses(pulse: Index, nearest: Float, first: HitSignals) -> Echoes:
-    """Return one echo for each of the pulses whose rays all hit within the resolution."""
-    rays, pulses = first.distance.shape
+def _whole_pulses(pulse: Index, nearest_range: Float, first_signals: HitSignals) -> Echoes:
+    """Return one echo for each of the pulses whose rays all hit within the resolution.
+
+    Args:
+        pulse: (M,) these pulses.
+        nearest_range: (P,) range of the nearest hit of each of these, m; 0 for other pulses.
+        first_signals: (K, P) signals of what the rays of all P pulses meet first.
+    """
+    rays, pulses = first_signals.distance.shape
     if rays == 1:
-        columns = (np.take(array[0], pulse) for array in (first.distance, first.intensity, first.weight))
+        columns = (
+            np.take(array[0], pulse)
+            for array in (first_signals.distance, first_signals.intensity, first_signals.weight)
+        )
         return Echoes(pulse, pulse, *columns)
-    # Worked out for all pulses and taken of these: most are. Differences to the nearest keep the last digits.
-    near = first.distance - nearest
+    # Worked out for all pulses and then taken of these, as most pulses are among them. Differences to the nearest hit
+    # keep the last digits.
+    weighted_depth = first_signals.distance - nearest_range
     with np.errstate(invalid="ignore"):
-        near *= first.weight
-        total = first.weight.sum(axis=0)
-        mean = nearest + near.sum(axis=0) / total
-    energy = first.intensity.sum(axis=0)
-    strongest = _brightest_ray(first.intensity)
-    columns = (np.take(array, pulse) for array in (mean, energy, total))
-    return Echoes(pulse, np.take(strongest, pulse) * pulses + pulse, *columns)
+        weighted_depth *= first_signals.weight
+        total_weight = first_signals.weight.sum(axis=0)
+        mean_range = nearest_range + weighted_depth.sum(axis=0) / total_weight
+    energy = first_signals.intensity.sum(axis=0)
+    strongest_ray = _brightest_ray(first_signals.intensity)
+    columns = (np.take(array, pulse) for array in (mean_range, energy, total_weight))
+    return Echoes(pulse, np.take(strongest_ray, pulse) * pulses + pulse, *columns)
 
 
 def _brightest_ray(energy: Float) -> Index:
     """Return the index (P,) of each pulse's ray with the most energy (K, P), the first of equals."""
-    most, result = energy[0].copy(), np.zeros(energy.shape[1], dtype=np.intp)
+    largest_energy, result = energy[0].copy(), np.zeros(energy.shape[1], dtype=np.intp)
     for ray, row in enumerate(energy[1:], 1):
-        np.copyto(result, ray, where=row > most)
-        np.maximum(most, row, out=most)
+        np.copyto(result, ray, where=row > largest_energy)
+        np.maximum(largest_energy, row, out=largest_energy)
     return result
 
 
-def _split_pulses(chosen: Index, first: HitSignals, behind: HitSignals, pulse: Index, resolution: float) -> Echoes:
-    """Return the echoes of pulses that meet surfaces at several ranges, or partly nothing, or something behind."""
-    rays, pulses = first.distance.shape
-    near = np.take(first.distance, chosen, axis=1)
-    ray, column = np.nonzero(near < np.inf)
-    hit = np.concatenate([ray * pulses + chosen[column], rays * pulses + np.arange(len(pulse))])
-    owner = np.concatenate([chosen[column], pulse])
-    reach = np.concatenate([near[ray, column], behind.distance])
-    # One key for both: ranges of some kilometres keep a micrometre beside the pulses of a block.
-    order = np.argsort(owner * (2.0 * max(1.0, float(reach.max()))) + reach, kind="stable")
-    hit, owner, reach = hit[order], owner[order], reach[order]
-    begins = np.ones(len(hit), dtype=bool)
-    begins[1:] = (owner[1:] != owner[:-1]) | (np.diff(reach) > resolution)
-    starts = np.flatnonzero(begins)
-    group = np.cumsum(begins) - 1
-    share = _values_of_hits(first.weight, behind.weight, hit)
-    energy = _values_of_hits(first.intensity, behind.intensity, hit)
-    begin, total = reach[starts], np.add.reduceat(share, starts)
-    mean = begin + np.add.reduceat(share * (reach - begin[group]), starts) / total
-    strongest = hit[_strongest(energy, group, starts)]
-    return Echoes(owner[starts], strongest, mean, np.add.reduceat(energy, starts), total)
+def _split_pulses(
+    split_pulses: Index, first_signals: HitSignals, late_signals: HitSignals, pulse: Index, resolution: float
+) -> Echoes:
+    """Return the echoes of pulses that meet surfaces at several ranges, or partly nothing, or something behind.
+
+    Args:
+        split_pulses: (M,) these pulses.
+        first_signals: (K, P) signals of what K rays of P pulses meet first.
+        late_signals: (B,) signals of what lies behind permeable surfaces.
+        pulse: (B,) pulses of these; all are among ``split_pulses``.
+        resolution: gap in range from which on a hit begins a new echo, m.
+    """
+    rays, pulses = first_signals.distance.shape
+    ranges = np.take(first_signals.distance, split_pulses, axis=1)
+    ray, column = np.nonzero(ranges < np.inf)
+    # All hits of these pulses in one row: numbers as in `Echoes.hit`, pulses that they belong to, and ranges.
+    hits = np.concatenate([ray * pulses + split_pulses[column], rays * pulses + np.arange(len(pulse))])
+    owners = np.concatenate([split_pulses[column], pulse])
+    hit_ranges = np.concatenate([ranges[ray, column], late_signals.distance])
+    # Sorted by pulse, then by range. One key for both: ranges of some kilometres keep a micrometre beside the pulses of
+    # a block.
+    key_step = 2.0 * max(1.0, float(hit_ranges.max()))
+    order = np.argsort(owners * key_step + hit_ranges, kind="stable")
+    hits, owners, hit_ranges = hits[order], owners[order], hit_ranges[order]
+    begins_echo = np.ones(len(hits), dtype=bool)
+    begins_echo[1:] = (owners[1:] != owners[:-1]) | (np.diff(hit_ranges) > resolution)
+    starts = np.flatnonzero(begins_echo)
+    echo_of_hit = np.cumsum(begins_echo) - 1
+    weight = _values_of_hits(first_signals.weight, late_signals.weight, hits)
+    energy = _values_of_hits(first_signals.intensity, late_signals.intensity, hits)
+    echo_begin, total_weight = hit_ranges[starts], np.add.reduceat(weight, starts)
+    # Mean range by weight, as the mean difference to the echo's nearest hit: that keeps the last digits.
+    depth = np.add.reduceat(weight * (hit_ranges - echo_begin[echo_of_hit]), starts) / total_weight
+    strongest = hits[_strongest(energy, echo_of_hit, starts)]
+    total_energy = np.add.reduceat(energy, starts)
+    return Echoes(owners[starts], strongest, echo_begin + depth, total_energy, total_weight)
 
 
-def _values_of_hits(first: Float, behind: Float, hit: Index) -> Float:
-    """Return the values of hits, of the first ones (K, P) or of those behind (B,), by numbers as `Echoes.hit`."""
-    result = np.take(first.ravel(), hit, mode="clip")
-    late = np.flatnonzero(hit >= first.size)
-    result[late] = behind[hit[late] - first.size]
+def _values_of_hits(first_values: Float, late_values: Float, hit_numbers: Index) -> Float:
+    """Return values (N,) by hit numbers as in `Echoes.hit`: of first hits (K, P), or of those behind (B,)."""
+    result = np.take(first_values.ravel(), hit_numbers, mode="clip")
+    rows_behind = np.flatnonzero(hit_numbers >= first_values.size)
+    result[rows_behind] = late_values[hit_numbers[rows_behind] - first_values.size]
     return np.asarray(result)
 
 
 def _strongest(energy: Float, group: Index, starts: Index) -> Index:
-    """Return the index of each group's member with the most energy, the first of equals."""
+    """Return the index (G,) of the member with the most energy of each group, the first of equals.
+
+    Args:
+        energy: (N,) of the members, group by group.
+        group: (N,) that each is in.
+        starts: (G,) indices of the groups' first members.
+    """
     brightest = np.flatnonzero(energy == np.maximum.reduceat(energy, starts)[group])
-    owner = group[brightest]
-    first = np.ones(len(owner), dtype=bool)
-    first[1:] = owner[1:] != owner[:-1]
-    return np.asarray(brightest[first])
+    groups = group[brightest]
+    is_first = np.ones(len(groups), dtype=bool)
+    is_first[1:] = groups[1:] != groups[:-1]
+    return np.asarray(brightest[is_first])
 
 
-def merge_echoes(one: Echoes, several: Echoes) -> Echoes:
-    """Return two sets of echoes joined, in the order of pulses; no pulse is in both."""
-    echoes = Echoes.join([one, several])
-    return echoes.select(np.argsort(echoes.pulse, kind="stable"))
+def merge_echoes(echoes: Echoes, other_echoes: Echoes) -> Echoes:
+    """Return two sets of echoes as one, in the order of pulses; no pulse may be in both."""
+    joined_echoes = Echoes.join([echoes, other_echoes])
+    return joined_echoes.select(np.argsort(joined_echoes.pulse, kind="stable"))
 
 
 def number_returns(pulse: Index, maximum: int) -> tuple[Bool, UInt8, UInt8]:
-    """Return a mask (N,) of the echoes that are recorded, and for these the return number and number of returns.
+    """Return a mask (N,) of the echoes that are recorded, and for these (R,) the return number and number of returns.
 
     Args:
-        pulse: (N,) pulse of each echo, non-decreasing; within a pulse ordered by range.
+        pulse: (N,) pulse of each echo, non-decreasing; within a pulse echoes are ordered by range.
         maximum: most returns recorded of one pulse; farther ones are lost.
     """
     if not len(pulse):
         return np.empty(0, dtype=bool), np.empty(0, dtype=np.uint8), np.empty(0, dtype=np.uint8)
-    begins = np.ones(len(pulse), dtype=bool)
-    begins[1:] = pulse[1:] != pulse[:-1]
-    starts = np.flatnonzero(begins)
-    if len(starts) == len(pulse):
-        ones = np.ones(len(pulse), dtype=np.uint8)
-        return begins, ones, ones
-    length = np.diff(starts, append=len(pulse))
-    number = np.arange(len(pulse)) - np.repeat(starts, length) + 1
-    keep = number <= maximum
-    counts = np.repeat(np.minimum(length, maximum), length)
-    return keep, number[keep].astype(np.uint8), counts[keep].astype(np.uint8)
+    begins_pulse = np.ones(len(pulse), dtype=bool)
+    begins_pulse[1:] = pulse[1:] != pulse[:-1]
+    starts = np.flatnonzero(begins_pulse)
+    if len(starts) == len(pulse):  # each echo is the only one of its pulse: the mask is all true
+        first_numbers = np.ones(len(pulse), dtype=np.uint8)
+        return begins_pulse, first_numbers, first_numbers
+    echo_count = np.diff(starts, append=len(pulse))  # of each pulse
+    number = np.arange(len(pulse)) - np.repeat(starts, echo_count) + 1
+    recorded_mask = number <= maximum
+    returns = np.repeat(np.minimum(echo_count, maximum), echo_count)
+    return recorded_mask, number[recorded_mask].astype(np.uint8), returns[recorded_mask].astype(np.uint8)

@@ -51,84 +51,92 @@ class RoadSection:
     """A part of a road that is built and scanned at once, with the blocks of pulses that belong to it.
 
     Attributes:
-        start, end: stations that it is of, m.
-        low, high: stations between which the road is built for it, m.
+        start, end: stations between which the section lies, m.
+        build_start, build_end: stations between which the road is built for it, m.
         blocks: its blocks of pulses, in the order of time.
     """
 
     start: float
     end: float
-    low: float
-    high: float
+    build_start: float
+    build_end: float
     blocks: tuple[Block, ...]
 
 
-def sections(cut: Blocks, geometry: RoadGeometry, length: float, shadows: float = 0.0) -> Iterator[RoadSection]:
+def sections(division: Blocks, geometry: RoadGeometry, length: float, shadows: float = 0.0) -> Iterator[RoadSection]:
     """Yield the parts of a road to be built and scanned in turn, from its start on, that have any blocks.
 
     Args:
-        cut: the scan's blocks.
+        division: the scan's blocks.
         geometry: the road's.
         length: of a section along the road, m; the last one is shorter.
         shadows: how far something must be built, beside what the rays reach, for the shadow that it throws, m.
     """
+    # The small number keeps a length that rounding puts above a whole number of sections from adding an empty one.
     count = max(1, int(np.ceil(geometry.length / length - 1e-9)))
-    owned: list[list[Block]] = [[] for _ in range(count)]
-    for strip in cut.path.strips:
-        station = _block_stations(cut, geometry, strip)
-        for block, owner in enumerate(np.clip(station // length, 0, count - 1).astype(int)):
-            owned[owner].append((strip, block))
-    beyond = BORDER + shadows + _crossing_reach(geometry)
-    for number, blocks in enumerate(owned):
+    section_blocks: list[list[Block]] = [[] for _ in range(count)]
+    for strip in division.path.strips:
+        station = _block_stations(division, geometry, strip)
+        section_numbers = np.clip(station // length, 0, count - 1).astype(int)
+        for block, number in enumerate(section_numbers):
+            section_blocks[number].append((strip, block))
+    margin = BORDER + shadows + _crossing_reach(geometry)
+    for number, blocks in enumerate(section_blocks):
         if blocks:
-            low, high = reached_stations(cut, geometry, blocks)
+            lowest_station, highest_station = reached_stations(division, geometry, blocks)
             start, end = number * length, min((number + 1) * length, geometry.length)
-            yield RoadSection(start, end, max(low - beyond, 0.0), min(high + beyond, geometry.length), tuple(blocks))
+            build_start = max(lowest_station - margin, 0.0)
+            build_end = min(highest_station + margin, geometry.length)
+            yield RoadSection(start, end, build_start, build_end, tuple(blocks))
 
 
-def reached_stations(cut: Blocks, geometry: RoadGeometry, blocks: list[Block]) -> tuple[float, float]:
+def reached_stations(division: Blocks, geometry: RoadGeometry, blocks: list[Block]) -> tuple[float, float]:
     """Return the smallest and largest station, m, at which rays of some blocks can meet anything."""
     stations = []
     for strip, numbers in _by_strip(blocks):
-        chosen = np.unique(np.linspace(0, len(numbers) - 1, _PLACES).astype(int))
-        rays = [_sample_rays(cut, strip, numbers[i]) for i in chosen]
+        sample_indices = np.unique(np.linspace(0, len(numbers) - 1, _PLACES).astype(int))
+        rays = [_sample_rays(division, strip, numbers[i]) for i in sample_indices]
         origin, direction = (np.concatenate(parts) for parts in zip(*rays, strict=True))
-        stations.append(_stations_of_rays(cut, geometry, origin, direction))
-    return min(low for low, _ in stations), max(high for _, high in stations)
+        stations.append(_stations_of_rays(division, geometry, origin, direction))
+    return min(lowest_station for lowest_station, _ in stations), max(
+        highest_station for _, highest_station in stations
+    )
 
 
-def strip_parts(cut: Blocks, blocks: Sequence[Block]) -> tuple[Strip, ...]:
-    """Return the parts of strips, as shorter strips of the same index, that runs of blocks cover."""
+def strip_parts(division: Blocks, blocks: Sequence[Block]) -> tuple[Strip, ...]:
+    """Return the parts of strips that blocks cover, as shorter strips of the same index: one for each run of blocks."""
     parts = []
     for strip, numbers in _by_strip(blocks):
         for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
-            first, _ = cut.pulse_span(strip, int(run[0]))
-            last, count = cut.pulse_span(strip, int(run[-1]))
-            begin, end = cut.time(strip, first), cut.time(strip, last + count - 1)
+            first_pulse, _ = division.pulse_span(strip, int(run[0]))
+            last_pulse, count = division.pulse_span(strip, int(run[-1]))
+            begin, end = division.time(strip, first_pulse), division.time(strip, last_pulse + count - 1)
             parts.append(Strip(strip.index, begin, end - begin))
     return tuple(parts)
 
 
 def vehicles_through(
-    section: RoadSection, cut: Blocks, motions: Mapping[str, LaneMotion], speed_factor: float
+    section: RoadSection, division: Blocks, motions: Mapping[str, LaneMotion], speed_factor: float
 ) -> dict[str, LaneMotion]:
     """Return the motions, by id, of the vehicles that pass a section while its blocks are scanned.
 
     Args:
         section: of the scan.
-        cut: the scan's blocks.
+        division: the scan's blocks.
         motions: of all vehicles, by id.
-        speed_factor: on their speeds.
+        speed_factor: share of their speeds that they drive at.
     """
-    look = _LOOK / max(1.0, speed_factor)
+    interval = _LOOK / max(1.0, speed_factor)
     times = np.concatenate([
-        strip.start_time + np.linspace(0.0, strip.duration, int(np.ceil(strip.duration / look)) + 2)
-        for strip in strip_parts(cut, section.blocks)
+        strip.start_time + np.linspace(0.0, strip.duration, int(np.ceil(strip.duration / interval)) + 2)
+        for strip in strip_parts(division, section.blocks)
     ])  # fmt: skip
-    low, high = section.low - _AROUND, section.high + _AROUND
+    lowest_station, highest_station = section.build_start - _AROUND, section.build_end + _AROUND
     stations = {name: motion.station(times) for name, motion in motions.items()}
-    near = {name for name, station in stations.items() if ((station > low) & (station < high)).any()}
-    return {name: motion for name, motion in motions.items() if name in near}
+    passing_ids = {
+        name for name, station in stations.items() if ((station > lowest_station) & (station < highest_station)).any()
+    }
+    return {name: motion for name, motion in motions.items() if name in passing_ids}
 
 
 def _by_strip(blocks: Sequence[Block]) -> list[tuple[Strip, list[int]]]:
@@ -143,68 +151,84 @@ def shadow_length(geometry: RoadGeometry) -> float:
     return float(_tallest(geometry) / np.tan(elevation))
 
 
-def _block_stations(cut: Blocks, geometry: RoadGeometry, strip: Strip) -> Float:
+def _block_stations(division: Blocks, geometry: RoadGeometry, strip: Strip) -> Float:
     """Return the scanner's stations (B,), m, at the middle pulse of each of a strip's blocks."""
-    borders = [cut.pulse_span(strip, block) for block in cut.block_numbers(strip)]
-    times = np.array([cut.time(strip, first + count // 2) for first, count in borders])
-    return geometry.alignment.project(cut.path.pose(strip, times)[0][:, :2])[0]
+    borders = [division.pulse_span(strip, block) for block in division.block_numbers(strip)]
+    times = np.array([division.time(strip, first_pulse + count // 2) for first_pulse, count in borders])
+    return geometry.alignment.project(division.path.pose(strip, times)[0][:, :2])[0]
 
 
-def _sample_rays(cut: Blocks, strip: Strip, block: int) -> tuple[Float, Float]:
-    """Return local origins (N, 3), m, and directions (N, 3) of a sample of a block's pulses, its ends included."""
-    first, count = cut.pulse_span(strip, block)
-    starts = sorted({first, first + max(0, (count - _RUN) // 2), first + max(0, count - _RUN)})
+def _sample_rays(division: Blocks, strip: Strip, block: int) -> tuple[Float, Float]:
+    """Return local origins (N, 3), m, and unit directions (N, 3) of a sample of a block's pulses.
+
+    Up to `_TAKEN` pulses are taken of each of three runs of `_RUN` pulses: at the block's beginning, middle and end.
+    """
+    first_pulse, count = division.pulse_span(strip, block)
+    starts = sorted({first_pulse, first_pulse + max(0, (count - _RUN) // 2), first_pulse + max(0, count - _RUN)})
     origins, directions = [], []
     for start in starts:
-        run = min(_RUN, first + count - start)
-        taken = np.linspace(0, run - 1, min(run, _TAKEN)).astype(int)
-        shot = shots(cut.setting, start, run, False)
-        position, rotation = cut.path.pose(strip, strip.start_time + shot.time[taken])
+        run = min(_RUN, first_pulse + count - start)
+        sample_rows = np.linspace(0, run - 1, min(run, _TAKEN)).astype(int)
+        shot = shots(division.setting, start, run, False)
+        position, rotation = division.path.pose(strip, strip.start_time + shot.time[sample_rows])
         origins.append(position)
-        directions.append(np.einsum("nij,jn->ni", rotation, shot.direction[:, taken]))
+        directions.append(np.einsum("nij,jn->ni", rotation, shot.direction[:, sample_rows]))
     return np.concatenate(origins), np.concatenate(directions)
 
 
-def _stations_of_rays(cut: Blocks, geometry: RoadGeometry, origin: Float, direction: Float) -> tuple[float, float]:
-    """Return the smallest and largest station, m, at which rays can meet anything."""
-    farthest = cut.setting.maximum_range
-    begin, _ = geometry.alignment.project(origin[:, :2])
-    lowest, highest = _elevation_range(geometry, float(begin.min()) - farthest, float(begin.max()) + farthest)
+def _stations_of_rays(division: Blocks, geometry: RoadGeometry, origin: Float, direction: Float) -> tuple[float, float]:
+    """Return the smallest and largest station, m, at which rays can meet anything.
+
+    Args:
+        division: the scan's blocks.
+        geometry: the road's.
+        origin: (N, 3) where the rays begin, local, m.
+        direction: (N, 3) unit vectors.
+    """
+    farthest = division.setting.maximum_range
+    origin_stations, _ = geometry.alignment.project(origin[:, :2])
+    begin, end = float(origin_stations.min()) - farthest, float(origin_stations.max()) + farthest
+    lowest_elevation, highest_elevation = _elevation_range(geometry, begin, end)
     rise = direction[:, 2]
     with np.errstate(divide="ignore", invalid="ignore"):
-        down, up = (lowest - origin[:, 2]) / rise, (highest - origin[:, 2]) / rise
-    # From where to where a ray is between the lowest and the highest that there is.
-    level = np.abs(rise) < 1e-9
-    inside = (origin[:, 2] >= lowest) & (origin[:, 2] <= highest)
-    first = np.where(level, np.where(inside, 0.0, np.inf), np.clip(np.minimum(down, up), 0.0, None))
-    last = np.where(level, farthest, np.clip(np.maximum(down, up), None, farthest))
-    meets = np.flatnonzero(first <= last)
-    if not len(meets):
-        return float(begin.min()), float(begin.max())
+        range_to_lowest = (lowest_elevation - origin[:, 2]) / rise
+        range_to_highest = (highest_elevation - origin[:, 2]) / rise
+    # Ranges between which a ray is between the two elevations. A level ray is so everywhere or nowhere.
+    is_level = np.abs(rise) < 1e-9
+    starts_between = (origin[:, 2] >= lowest_elevation) & (origin[:, 2] <= highest_elevation)
+    entry, exit_ = np.minimum(range_to_lowest, range_to_highest), np.maximum(range_to_lowest, range_to_highest)
+    begin_range = np.where(is_level, np.where(starts_between, 0.0, np.inf), np.clip(entry, 0.0, None))
+    end_range = np.where(is_level, farthest, np.clip(exit_, None, farthest))
+    rows = np.flatnonzero(begin_range <= end_range)
+    if not len(rows):
+        return float(origin_stations.min()), float(origin_stations.max())
+    # Each of these rays is looked at in `_STEPS` places, of which those count that lie in the road's corridor.
     share = np.linspace(0.0, 1.0, _STEPS)
-    along = first[meets, None] + (last - first)[meets, None] * share
-    footprint = 0.5 * max(cut.setting.divergence) * float(along.max())
-    places = (origin[meets, None, :2] + along[..., None] * direction[meets, None, :2]).reshape(-1, 2)
-    station, offset = geometry.alignment.project(places)
-    near = station[np.abs(offset) <= _corridor(geometry) + footprint]
-    every = np.concatenate([near, begin])
-    return float(every.min()) - footprint, float(every.max()) + footprint
+    sample_ranges = begin_range[rows, None] + (end_range - begin_range)[rows, None] * share
+    footprint = 0.5 * max(division.setting.divergence) * float(sample_ranges.max())
+    places = origin[rows, None, :2] + sample_ranges[..., None] * direction[rows, None, :2]
+    station, offset = geometry.alignment.project(places.reshape(-1, 2))
+    in_corridor = station[np.abs(offset) <= _corridor(geometry) + footprint]
+    stations = np.concatenate([in_corridor, origin_stations])
+    return float(stations.min()) - footprint, float(stations.max()) + footprint
 
 
 def _crossing_reach(geometry: RoadGeometry) -> float:
     """Return how far, m, along the road an overpass, a power line or a building reaches at most from its station."""
     parameters = geometry.parameters
     bridges, lines = parameters.of_type(Overpass).values(), parameters.of_type(PowerLine).values()
-    lengths = [abs(np.sin(np.deg2rad(item.rotation_deg))) * _BRIDGE_SIDE + item.width for item in bridges]
+    buildings = parameters.of_type(Building).values()
+    # What crosses at a slant reaches sin(angle) of its length to the side along the road, and its own width at most.
+    reaches = [abs(np.sin(np.deg2rad(bridge.rotation_deg))) * _BRIDGE_SIDE + bridge.width for bridge in bridges]
     for line in lines:
-        aside = abs(np.sin(np.deg2rad(line.rotation_deg))) * max(line.left_distance, line.right_distance)
-        lengths.append(aside + line.height * HALF_ARM)
-    lengths += [math.hypot(item.width, item.depth) for item in parameters.of_type(Building).values()]
-    return float(max(lengths, default=0.0))
+        side_length = max(line.left_distance, line.right_distance)
+        reaches.append(abs(np.sin(np.deg2rad(line.rotation_deg))) * side_length + line.height * HALF_ARM)
+    reaches += [math.hypot(building.width, building.depth) for building in buildings]
+    return float(max(reaches, default=0.0))
 
 
 def _corridor(geometry: RoadGeometry) -> float:
-    """Return the largest offset from the axis, m, at which there is anything."""
+    """Return the largest offset from the axis, m, at which the road's model has anything."""
     parameters = geometry.parameters
     edges = [float(section.road_edge([0.0, *section.kinks()]).max()) for section in geometry.sections.values()]
     reach = [*edges, parameters.terrain.half_width if parameters.terrain else 0.0]
@@ -215,18 +239,18 @@ def _corridor(geometry: RoadGeometry) -> float:
 def _elevation_range(geometry: RoadGeometry, start: float, end: float) -> tuple[float, float]:
     """Return the lowest and highest local elevation, m, of anything between two stations."""
     station = np.linspace(max(start, 0.0), min(end, geometry.length), 60)
-    wide = _corridor(geometry)
-    offset = np.linspace(-wide, wide, 9)
+    half_width = _corridor(geometry)
+    offset = np.linspace(-half_width, half_width, 9)
     pairs: Any = np.meshgrid(station, offset)
     height = surface_elevation(geometry, *(part.ravel() for part in pairs))
     axis = geometry.profile.elevation(station)
-    lowest = min(float(np.nanmin(height)), float(axis.min()))
-    highest = max(float(np.nanmax(height)), float(axis.max()))
-    return lowest - _UNEVEN, highest + _UNEVEN + _tallest(geometry)
+    lowest_elevation = min(float(np.nanmin(height)), float(axis.min()))
+    highest_elevation = max(float(np.nanmax(height)), float(axis.max()))
+    return lowest_elevation - _UNEVEN, highest_elevation + _UNEVEN + _tallest(geometry)
 
 
 def _tallest(geometry: RoadGeometry) -> float:
     """Return the height of the tallest things beside or over a road, m."""
     plants = [item.height_max * 1.3 for item in geometry.parameters.of_type(Vegetation).values()]
-    others = [float(getattr(item, "height", 0.0)) for item in geometry.parameters.objects.values()]
-    return max([_TALLEST, *plants, *others])
+    heights = [float(getattr(item, "height", 0.0)) for item in geometry.parameters.objects.values()]
+    return max([_TALLEST, *plants, *heights])

@@ -45,17 +45,17 @@ class StripErrors(ClosedModel):
 
     @property
     def moves_points(self) -> bool:
-        """Whether any of the errors is one of position: not of brightness alone."""
+        """Return whether any of the errors changes positions, and not only brightness."""
         return any((self.boresight_sigma_deg, self.lever_arm_sigma, self.drift_sigma))
 
 
 def boresight(errors: StripErrors, seed: int) -> Float:
-    """Return the errors (3,) of roll, pitch and yaw, rad."""
+    """Return the errors (3,) of roll, pitch and yaw of the scanner against its navigation, rad, drawn from a seed."""
     return np.asarray(np.deg2rad(errors.boresight_sigma_deg) * stream(seed, "boresight").standard_normal(3))
 
 
 def lever_arm(errors: StripErrors, seed: int) -> Float:
-    """Return the errors (3,) of the scanner's place along its own axes, m."""
+    """Return the errors (3,) of the scanner's place along its own axes, m, drawn from a seed."""
     return np.asarray(errors.lever_arm_sigma * stream(seed, "lever arm").standard_normal(3))
 
 
@@ -66,7 +66,11 @@ def drift(errors: StripErrors, seed: int, strip: int) -> tuple[Float, Float]:
 
 
 def strip_gain(errors: StripErrors, seed: int, strip: int) -> float:
-    """Return the factor on the power of a strip's echoes: log-normal about half the step, up or down by turns."""
+    """Return the factor on the power of a strip's echoes, drawn from a seed.
+
+    It is log-normal. Its median in dB is half of ``gain_step_db`` above 0 for strips of even index, the first among
+    them, and as much below 0 for those of odd index.
+    """
     decibels = (0.5 - strip % 2) * errors.gain_step_db
     if errors.gain_sigma_db:
         decibels += errors.gain_sigma_db * stream(seed, "strip gain", strip).standard_normal()
@@ -91,8 +95,8 @@ def with_strip_errors(
     begin, end = drift(errors, seed, strip.index)
     share = np.clip((time - strip.start_time) / max(strip.duration, 1e-9), 0.0, 1.0)[:, None]
     roll, pitch, yaw = boresight(errors, seed)
-    moved = position + begin + share * (end - begin) + rotation @ lever_arm(errors, seed)
-    return moved, rotation @ rotation_matrix(np.array([yaw]), np.array([pitch]), np.array([roll]))[0]
+    measured_position = position + begin + share * (end - begin) + rotation @ lever_arm(errors, seed)
+    return measured_position, rotation @ rotation_matrix(np.array([yaw]), np.array([pitch]), np.array([roll]))[0]
 
 
 def strip_error_report(errors: StripErrors, seed: int, strips: tuple[Strip, ...]) -> dict[str, Any]:
@@ -109,4 +113,5 @@ def strip_error_report(errors: StripErrors, seed: int, strips: tuple[Strip, ...]
 
 
 def _rounded(values: Float) -> list[float]:
+    """Return values as a list of numbers with 7 digits after the point, for reports."""
     return [round(float(value), 7) for value in values]

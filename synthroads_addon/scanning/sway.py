@@ -40,6 +40,7 @@ class Motion(ClosedModel):
 
     @model_validator(mode="after")
     def _periods_in_order(self) -> "Motion":
+        """Raise ValueError if the shortest period exceeds the longest one."""
         if self.shortest_period > self.longest_period:
             raise ValueError(
                 f"shortest_period {self.shortest_period:g} must be at most longest_period, {self.longest_period:g}"
@@ -85,17 +86,25 @@ class SwayingPath:
     @property
     def knot_spacing(self) -> float:
         """Return the largest time between two knots, s, by the bends of path and sway together."""
-        return float((self.planned.knot_spacing**-2 + knot_spacing_for(self._bend(2)) ** -2) ** -0.5)
+        of_path, of_sway = self.planned.knot_spacing, knot_spacing_for(self._bend(2))
+        # A spacing goes with the bend to the power of -1/2, and bends add up.
+        return float((of_path**-2 + of_sway**-2) ** -0.5)
 
     @property
     def knots_per_node(self) -> int:
-        """Return of how many knots one is worked out; those between follow within a quarter of `KNOT_ERROR`."""
-        smooth = (KNOT_ERROR / 4.0 / (NODE_ERROR * self._bend(NODES))) ** (1.0 / NODES)
+        """Return the number of knots from one node, at which the pose is worked out, to the next.
+
+        The poses at knots between nodes follow from polynomials, within a quarter of `KNOT_ERROR`.
+        """
+        largest_spacing = (KNOT_ERROR / 4.0 / (NODE_ERROR * self._bend(NODES))) ** (1.0 / NODES)
         # Where the planned path bends at once, polynomials err about as much as straight lines do.
-        return max(1, int(min(smooth, self.planned.knot_spacing / 2.0) / self.knot_spacing))
+        return max(1, int(min(largest_spacing, self.planned.knot_spacing / 2.0) / self.knot_spacing))
 
     def _bend(self, order: int) -> float:
-        """Return a derivative by time of a place at `KNOT_RANGE`, m/s^order, that its sway hardly ever exceeds."""
+        """Return a derivative by time of a place at `KNOT_RANGE`, in m/s^order, that its sway hardly ever exceeds.
+
+        It is the `_CREST`-fold standard deviation of that place, times (2 pi / shortest period)^order and `_calmness`.
+        """
         # Where all sines are at their crests it would be sqrt(2 N) sigma.
         reach = np.array([1.0] * 3 + [KNOT_RANGE] * 3)
         size = _CREST * float(np.linalg.norm(self.motion.sigma * reach))
@@ -107,14 +116,17 @@ class SwayingPath:
 
 
 def _calmness(motion: Motion, order: int) -> float:
-    """Return the rms of a derivative of sway as a share of that with sines that are all alike, 0 to 1."""
-    low, high, exponent = motion.shortest_period, motion.longest_period, motion.period_exponent
+    """Return the rms of a derivative of sway as a share, 0 to 1, of that of sway whose sines all have one amplitude.
+
+    The periods T are even on a logarithmic scale; amplitudes go with T^exponent, a derivative multiplies by T^-order.
+    """
+    shortest, longest, exponent = motion.shortest_period, motion.longest_period, motion.period_exponent
 
     def mean_power(power: float) -> float:
         """Return the mean power of periods that are even on a logarithmic scale, times their span."""
-        return (high**power - low**power) / power if power else math.log(high / low)
+        return (longest**power - shortest**power) / power if power else math.log(longest / shortest)
 
-    if exponent == 0.0 or low == high:
+    if exponent == 0.0 or shortest == longest:
         return 1.0
     power_ratio = mean_power(2.0 * (exponent - order)) / mean_power(2.0 * exponent)
     return min(1.0, math.sqrt(power_ratio * mean_power(0.0) / mean_power(-2.0 * order)))
@@ -127,8 +139,8 @@ def sway_offsets(motion: Motion, seed: int, strip: int, time: Float) -> tuple[Fl
         position (K, 3), m, along the local axes; roll, pitch and heading (K, 3), rad.
     """
     random = stream(seed, "platform motion", strip)
-    low, high = math.log(motion.shortest_period), math.log(motion.longest_period)
-    periods = np.exp(random.uniform(low, high, (_AXES, _SINES)))
+    shortest_log, longest_log = math.log(motion.shortest_period), math.log(motion.longest_period)
+    periods = np.exp(random.uniform(shortest_log, longest_log, (_AXES, _SINES)))
     phases = random.uniform(0.0, 2.0 * np.pi, (_AXES, _SINES))
     weights = (periods / motion.longest_period) ** motion.period_exponent
     weights /= np.sqrt(np.mean(weights**2, axis=1, keepdims=True))

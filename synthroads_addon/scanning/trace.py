@@ -62,8 +62,8 @@ class Rays:
 
     def pick(self, ray: Index) -> tuple[Float, Float]:
         """Return origins and directions (3, N) of chosen rays, as k * P + p for ray k of pulse p."""
-        first = ray if self.origin.shape[1] > 1 else ray % len(self.time)
-        origin = np.take(self.origin.reshape(3, -1), first, axis=1)
+        origin_index = ray if self.origin.shape[1] > 1 else ray % len(self.time)
+        origin = np.take(self.origin.reshape(3, -1), origin_index, axis=1)
         return origin, np.take(self.direction.reshape(3, -1), ray, axis=1)
 
 
@@ -75,7 +75,7 @@ class Hits(ArrayRows):
         face: number among all faces of the target; -1 for none, as in the air where an effect has added an echo.
         material: of the face; any for none. As wide as indices are: looking tables up is several times faster then.
         distance: range from the ray's origin, m; inf for none, or where it is out of the device's reach.
-        along: n . d of the face's normal and the ray.
+        cosine: n . d of the face's normal and the ray.
         share: of the pulse's energy that the surface takes: what arrives less what goes through. It may spread to the
             shape of the others.
     """
@@ -83,7 +83,7 @@ class Hits(ArrayRows):
     face: Index
     material: Index
     distance: Float
-    along: Float
+    cosine: Float
     share: Float
 
 
@@ -132,19 +132,19 @@ class TracedRays:
 
     def ray_of(self, hits: Index) -> Index:
         """Return the ray k * P + p of each hit, by hit numbers as in `returns.Echoes`."""
-        late = np.flatnonzero(hits >= self.first.face.size)
+        rows_behind = np.flatnonzero(hits >= self.first.face.size)
         result = hits.copy()
-        result[late] = self.ray[hits[late] - self.first.face.size]
+        result[rows_behind] = self.ray[hits[rows_behind] - self.first.face.size]
         return result
 
     def pick(self, name: str, hits: Index) -> AnyArray:
         """Return the named attribute of chosen hits, by hit numbers as in `returns.Echoes`."""
-        first, behind = getattr(self.first, name).ravel(), getattr(self.behind, name)
-        if not len(behind):
-            return np.asarray(np.take(first, hits))
-        late = np.flatnonzero(hits >= len(first))
-        result = np.take(first, hits, mode="clip")
-        result[late] = behind[hits[late] - len(first)]
+        first_values, values_behind = getattr(self.first, name).ravel(), getattr(self.behind, name)
+        if not len(values_behind):
+            return np.asarray(np.take(first_values, hits))
+        rows_behind = np.flatnonzero(hits >= len(first_values))
+        result = np.take(first_values, hits, mode="clip")
+        result[rows_behind] = values_behind[hits[rows_behind] - len(first_values)]
         return np.asarray(result)
 
 
@@ -153,46 +153,49 @@ def trace(
     surfaces: Surfaces,
     rays: Rays,
     motions: list[Track],
-    nearest: float,
-    farthest: float,
+    nearest_range: float,
+    farthest_range: float,
     axis: FirstHits | None = None,
     openings: Openings | None = None,
 ) -> TracedRays:
-    """Return what rays meet between two ranges (m), through permeable surfaces, and the light that each hit takes.
+    """Return what rays meet between two ranges, through permeable surfaces, and the light that each hit takes.
 
-    The shares taken along one ray never add up to more than its own. What takes nothing isn't met: it is at inf.
+    The shares of energy that all hits of one ray take never add up to more than the ray's own share. A hit that takes
+    nothing, or that lies out of the ranges, has the distance inf.
 
     Args:
         target: what is scanned.
         surfaces: means of its materials.
-        rays: of pulses.
+        rays: K rays of each of P pulses.
         motions: tracks of the target's moving parts.
-        nearest, farthest: ranges, m.
+        nearest_range, farthest_range: m.
         axis: (P,) what the first ray of each pulse meets, where it has been cast already.
         openings: where materials are open; None: all of a material weakens rays alike.
     """
-    met = _first_hits(target, rays, motions, farthest, axis)
+    met = _first_hits(target, rays, motions, farthest_range, axis)
     material = np.take(target.material, met.face, mode="clip").astype(np.intp)
+    distance = _within(met.distance, nearest_range, np.inf)
     if not surfaces.permeable:
-        first = Hits(met.face, material, _within(met.distance, nearest, np.inf), met.along, rays.share)
-        return _gather_hits(rays, first, [], [])
-    on = np.flatnonzero(np.take(surfaces.pervious, material, mode="clip"))
-    on = on[np.take(met.distance, on) < farthest]
-    share = np.broadcast_to(rays.share, material.shape).copy()
-    left = np.take(share, on)
+        return _gather_hits(rays, Hits(met.face, material, distance, met.cosine, rays.share), [], [])
+    # Rays, as k * P + p, that meet a permeable material first. A miss has any material, but the distance inf.
+    ray = np.flatnonzero(np.take(surfaces.pervious, material, mode="clip"))
+    ray = ray[np.take(met.distance, ray) < farthest_range]
     onward = _Onward(target, surfaces, openings or Openings(), rays, motions)
-    kind, start = np.take(material, on), np.take(met.distance, on)
-    face, along = (np.take(met.face, on), np.take(met.along, on)) if onward.clear else (None, None)
-    through = onward.transmitted(on, face, kind, along, start)
-    share.ravel()[on] = left * (1.0 - through)
-    distance = _within(met.distance, nearest, np.inf)
-    if openings is not None and (through == 1.0).any():
+    ray_material, start = np.take(material, ray), np.take(met.distance, ray)
+    face, cosine = (np.take(met.face, ray), np.take(met.cosine, ray)) if onward.clear else (None, None)
+    transmission = onward.transmitted(ray, face, ray_material, cosine, start)
+    # The first surface takes what it doesn't let through; where that is nothing, it isn't recorded.
+    share = np.broadcast_to(rays.share, material.shape).copy()
+    arriving_light = np.take(share, ray)
+    share.ravel()[ray] = arriving_light * (1.0 - transmission)
+    if openings is not None and (transmission == 1.0).any():
         distance = distance.copy()
-        distance.ravel()[on[through == 1.0]] = np.inf
-    first = Hits(met.face, material, distance, met.along, share)
-    passed = _Passed(on, left * through, start, face, onward.steps(kind))
-    layers = list(onward.follow(passed, nearest, farthest))
-    return _gather_hits(rays, first, [hits for hits, _ in layers], [on for _, on in layers])
+        distance.ravel()[ray[transmission == 1.0]] = np.inf
+    first_hits = Hits(met.face, material, distance, met.cosine, share)
+    # The light that is left goes on to what lies behind, layer by layer.
+    passed_rays = _Passed(ray, arriving_light * transmission, start, face, onward.steps(ray_material))
+    layers = list(onward.follow(passed_rays, nearest_range, farthest_range))
+    return _gather_hits(rays, first_hits, [hits for hits, _ in layers], [layer_ray for _, layer_ray in layers])
 
 
 class Openings(NamedTuple):
@@ -212,15 +215,15 @@ class _Passed(ArrayRows):
     """Rays (N,) that have passed a surface.
 
     Attributes:
-        on: the rays, as k * P + p for ray k of pulse p.
-        left: light that they keep.
+        ray: k * P + p for ray k of pulse p.
+        light: that they keep, as a share of the pulse's energy.
         start: range of the surface, m.
         face: that was passed; None where no material is clear in places.
         step: how far behind it they go on, m; None likewise, for the usual distance.
     """
 
-    on: Index
-    left: Float
+    ray: Index
+    light: Float
     start: Float
     face: Index | None
     step: Float | None
@@ -249,39 +252,47 @@ class _Onward:
         """Return whether some materials are clear in places."""
         return self.openings.clear is not None
 
-    def follow(self, passed: _Passed, nearest: float, farthest: float) -> Iterator[tuple[Hits, Index]]:
-        """Yield what rays meet next, and which rays; again and again, until they are too faint or meet nothing.
+    def follow(self, passed_rays: _Passed, nearest_range: float, farthest_range: float) -> Iterator[tuple[Hits, Index]]:
+        """Yield, layer by layer, the next hits (N,) behind passed surfaces and the rays (N,) that they belong to.
+
+        The first layer is what rays meet behind the surfaces that they have passed, the next layer what lies behind
+        that, and so on. A ray ends where it meets nothing, or where less than `FAINTEST` of its own light is left.
 
         Args:
-            passed: rays behind what they have met first.
-            nearest, farthest: ranges, m.
+            passed_rays: rays behind what they have met first.
+            nearest_range, farthest_range: m; hits out of these have the distance inf, but rays go on behind them.
         """
         pulses = len(self.rays.time)
         for _ in range((CLEAR_LAYERS if self.clear else LAYERS) - 1):
-            bright = np.flatnonzero(passed.left > FAINTEST * np.take(self.rays.share, passed.on // pulses))
-            if not len(bright):
+            ray_share = np.take(self.rays.share, passed_rays.ray // pulses)
+            bright_rows = np.flatnonzero(passed_rays.light > FAINTEST * ray_share)
+            if not len(bright_rows):
                 break
-            before = passed.select(bright)
-            step: Float | float = BEYOND if before.step is None else before.step
-            start, (origin, direction) = before.start + step, self.rays.pick(before.on)
-            times = self.rays.time[before.on % pulses]
-            met = self.target.cast(origin + start * direction, direction, farthest, times, self.motions)
-            hit = np.flatnonzero(met.face >= 0)
-            before, start, face, along = (
-                before.select(hit),
-                start[hit] + met.distance[hit],
-                met.face[hit],
-                met.along[hit],
+            onward_rays = passed_rays.select(bright_rows)
+            # Each ray is cast anew from a little behind the surface that it has passed last.
+            step: Float | float = BEYOND if onward_rays.step is None else onward_rays.step
+            start, (origin, direction) = onward_rays.start + step, self.rays.pick(onward_rays.ray)
+            times = self.rays.time[onward_rays.ray % pulses]
+            next_hits = self.target.cast(origin + start * direction, direction, farthest_range, times, self.motions)
+            hit_rows = np.flatnonzero(next_hits.face >= 0)
+            onward_rays, face, cosine = (
+                onward_rays.select(hit_rows),
+                next_hits.face[hit_rows],
+                next_hits.cosine[hit_rows],
             )
-            surface = np.take(self.target.material, face).astype(np.intp)
-            through, steps = self.transmitted(before.on, face, surface, along, start), self.steps(surface)
-            if before.face is not None and steps is not None and (again := face == before.face).any():
+            distance = start[hit_rows] + next_hits.distance[hit_rows]
+            material = np.take(self.target.material, face).astype(np.intp)
+            transmission = self.transmitted(onward_rays.ray, face, material, cosine, distance)
+            steps = self.steps(material)
+            if onward_rays.face is not None and steps is not None and (same_face := face == onward_rays.face).any():
                 # No ray meets a flat face twice: rounding has put it before the face that it has passed.
-                through[again], steps[again] = 1.0, 4.0 * np.asarray(before.step)[again]
-            taken = before.left * (1.0 - through)
-            reached = np.where(taken > 0.0, _within(start, nearest, farthest), np.inf)
-            yield Hits(face, surface, reached, along, taken), before.on
-            passed = _Passed(before.on, before.left * through, start, None if steps is None else face, steps)
+                transmission[same_face], steps[same_face] = 1.0, 4.0 * np.asarray(onward_rays.step)[same_face]
+            taken_light = onward_rays.light * (1.0 - transmission)
+            recorded_distance = np.where(taken_light > 0.0, _within(distance, nearest_range, farthest_range), np.inf)
+            yield Hits(face, material, recorded_distance, cosine, taken_light), onward_rays.ray
+            passed_rays = _Passed(
+                onward_rays.ray, onward_rays.light * transmission, distance, None if steps is None else face, steps
+            )
 
     def steps(self, material: Index) -> Float | None:
         """Return how far (N,), m, rays go on behind surfaces that they have passed, by material; None: all alike."""
@@ -290,34 +301,33 @@ class _Onward:
         return np.where(np.take(self.surfaces.clear, material), BEYOND_CLEAR, BEYOND)
 
     def transmitted(
-        self, on: Index, face: Index | None, material: Index, along: Float | None, distance: Float
+        self, ray: Index, face: Index | None, material: Index, cosine: Float | None, distance: Float
     ) -> Float:
-        """Return the share (N,) of their light that rays keep behind what they meet.
+        """Return the share (N,) of their light that rays keep behind the surfaces that they meet.
 
         Args:
-            on: (N,) rays as k * P + p for ray k of pulse p.
+            ray: (N,) as k * P + p for ray k of pulse p.
             face: (N,) that they meet; None where no material is clear in places.
             material: (N,) of the faces.
-            along: (N,) n . d of their normals and the rays; None likewise.
+            cosine: (N,) n . d of the faces' normals and the rays; None likewise.
             distance: (N,) where they meet them, m.
         """
         result = np.take(self.surfaces.transmission, material)
-        gaps, clear = self.openings
+        gaps, see_through = self.openings
         if gaps is not None and len(leafy := np.flatnonzero(np.take(self.surfaces.gappy, material))):
-            ray, here = on[leafy], distance[leafy]
-            share = np.take(self.rays.share, ray // self.rays.direction.shape[2])
-            place = self._places(ray, here)
-            result[leafy] = gaps.transmitted(self.surfaces, material[leafy], place, here, share)
-        if (
-            clear is not None
-            and face is not None
-            and along is not None
-            and len(some := np.flatnonzero(np.take(self.surfaces.clear, material)))
-        ):
-            ray, times = on[some], np.take(self.rays.time, on[some] % len(self.rays.time))
-            place = self._places(ray, distance[some])
-            result[some] = clear.transmitted(
-                self.target, material[some], face[some], along[some], place, times, self.motions
+            leafy_ray, leafy_distance = ray[leafy], distance[leafy]
+            share = np.take(self.rays.share, leafy_ray // self.rays.direction.shape[2])
+            place = self._places(leafy_ray, leafy_distance)
+            result[leafy] = gaps.transmitted(self.surfaces, material[leafy], place, leafy_distance, share)
+        if see_through is None or face is None or cosine is None:
+            return result
+        rows = np.flatnonzero(np.take(self.surfaces.clear, material))  # materials that are clear in places
+        if len(rows):
+            clear_ray = ray[rows]
+            times = np.take(self.rays.time, clear_ray % len(self.rays.time))
+            place = self._places(clear_ray, distance[rows])
+            result[rows] = see_through.transmitted(
+                self.target, material[rows], face[rows], cosine[rows], place, times, self.motions
             )
         return result
 
@@ -327,31 +337,53 @@ class _Onward:
         return np.asarray(origin + distance * direction)
 
 
-def _first_hits(target: Target, rays: Rays, motions: list[Track], farthest: float, axis: FirstHits | None) -> FirstHits:
-    """Return what rays (K, P) meet first, without casting those again whose hits are known, see `trace`."""
-    if axis is None:
-        return target.cast(rays.origin, rays.direction, farthest, rays.time, motions)
-    origin = rays.origin[:, 1:] if rays.origin.shape[1] > 1 else rays.origin
-    others = target.cast(origin, rays.direction[:, 1:], farthest, rays.time, motions)
-    return FirstHits(*(np.concatenate([one[None], more]) for one, more in zip(axis, others, strict=True)))
+def _first_hits(
+    target: Target, rays: Rays, motions: list[Track], farthest_range: float, axis: FirstHits | None
+) -> FirstHits:
+    """Return what rays (K, P) meet first.
 
-
-def _gather_hits(rays: Rays, first: Hits, layers: list[Hits], on: list[Index]) -> TracedRays:
-    """Return first hits and those of all layers behind as one; of those behind only what is within reach."""
-    if not layers:
-        none, nothing = np.empty(0, dtype=np.intp), np.empty(0)
-        return TracedRays(rays, first, Hits(none, none, nothing, nothing, nothing), none)
-    behind = Hits.join(layers)
-    inside = np.flatnonzero(behind.distance < np.inf)
-    return TracedRays(rays, first, behind.select(inside), np.concatenate(on)[inside])
-
-
-def _within(distance: Float, nearest: float, farthest: float) -> Float:
-    """Return ranges (m) with inf where they are out of the limits and so not recorded.
-
-    What rays meet first is never farther than they were cast, so there ``farthest`` is inf.
+    Args:
+        target: what is scanned.
+        rays: of pulses.
+        motions: tracks of the target's moving parts.
+        farthest_range: range up to which rays are cast, m.
+        axis: (P,) known hits of the first ray of each pulse, which isn't cast again; None: all rays are cast.
     """
-    if distance.size == 0 or (farthest == np.inf and distance.min() >= nearest):
+    if axis is None:
+        return target.cast(rays.origin, rays.direction, farthest_range, rays.time, motions)
+    origin = rays.origin[:, 1:] if rays.origin.shape[1] > 1 else rays.origin
+    other_hits = target.cast(origin, rays.direction[:, 1:], farthest_range, rays.time, motions)
+    return FirstHits(
+        *(
+            np.concatenate([axis_values[None], other_values])
+            for axis_values, other_values in zip(axis, other_hits, strict=True)
+        )
+    )
+
+
+def _gather_hits(rays: Rays, first_hits: Hits, layers: list[Hits], layer_rays: list[Index]) -> TracedRays:
+    """Return the hits of rays: the first ones, and all layers of hits behind these, less hits at the distance inf.
+
+    Args:
+        rays: of pulses.
+        first_hits: (K, P) of all rays.
+        layers: hits (N,) of each layer.
+        layer_rays: rays (N,) that each layer's hits belong to, as k * P + p.
+    """
+    if not layers:
+        no_index, no_number = np.empty(0, dtype=np.intp), np.empty(0)
+        return TracedRays(rays, first_hits, Hits(no_index, no_index, no_number, no_number, no_number), no_index)
+    late_hits = Hits.join(layers)
+    recorded = np.flatnonzero(late_hits.distance < np.inf)
+    return TracedRays(rays, first_hits, late_hits.select(recorded), np.concatenate(layer_rays)[recorded])
+
+
+def _within(distance: Float, nearest_range: float, farthest_range: float) -> Float:
+    """Return ranges (N,), m, with inf in place of those out of two limits, m, which aren't recorded.
+
+    What rays meet first is never farther than they were cast, so there ``farthest_range`` is inf.
+    """
+    if distance.size == 0 or (farthest_range == np.inf and distance.min() >= nearest_range):
         return distance
-    outside = (distance < nearest) | (distance > farthest)
-    return np.where(outside, np.inf, distance) if outside.any() else distance
+    is_outside = (distance < nearest_range) | (distance > farthest_range)
+    return np.where(is_outside, np.inf, distance) if is_outside.any() else distance

@@ -154,13 +154,13 @@ def test_a_comparison_changes_nothing_and_shows_what_is_wrong(tmp_path: Path) ->
 def test_the_gain_is_one_for_all_and_changes_materials_least() -> None:
     rows = [even(), PAINT]
     assert common_gain(rows, [4.0, 4.41]) == pytest.approx(4.2)
-    assert common_gain(rows, [4.0, 4.41], hold=1) == 4.41
-    assert common_gain(rows, [4.0, 4.41], given=6.0) == 6.0
+    assert common_gain(rows, [4.0, 4.41], held_index=1) == 4.41
+    assert common_gain(rows, [4.0, 4.41], known_gain=6.0) == 6.0
     # The paint may not reflect more than all: the gain is as large as that needs.
     least = 50.0 * PAINT.reflectivity / BRIGHTEST
     assert common_gain(rows, [2.0, 50.0]) == pytest.approx(least)
     with pytest.raises(InputError, match="--hold"):
-        common_gain(rows, [2.0, 50.0], hold=0)
+        common_gain(rows, [2.0, 50.0], held_index=0)
 
 
 def test_the_specular_changes_and_the_colour_stays_as_long_as_it_can() -> None:

@@ -25,8 +25,8 @@ def test_a_place_far_from_all_others_strays(stray: tuple[float, float, float]) -
     body = around((0.0, 0.0, 0.0))
     strays = of(body[:2000], np.array([stray]), body[2000:])
     assert strays.count() == 1
-    assert strays.stay(body).all()
-    assert not strays.stay(np.array([stray])).any()
+    assert strays.belongs(body).all()
+    assert not strays.belongs(np.array([stray])).any()
 
 
 def test_nothing_strays_from_roads_stretches_of_roads_and_clouds_of_few_points() -> None:
@@ -50,4 +50,4 @@ def test_it_does_not_matter_how_places_come_in_blocks() -> None:
     places = np.concatenate([around((0.0, 0.0, 0.0)), around((1e5, 0.0, 0.0), 7), around((0.0, 3e5, 0.0), 4000)])
     whole, parts = of(places), of(*np.array_split(places, 13))
     assert whole.count() == parts.count() == 7
-    np.testing.assert_array_equal(whole.stay(places), parts.stay(places))
+    np.testing.assert_array_equal(whole.belongs(places), parts.belongs(places))

@@ -76,7 +76,7 @@ def test_dark_places_fall_below_the_threshold() -> None:
 
 
 def test_without_spread_nothing_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
-    from synthroads_addon.scanning import scan as module
+    from synthroads_addon.scanning.stages import echoes as module
 
     def fail(*_: object) -> None:
         raise AssertionError("computed")

@@ -160,10 +160,10 @@ def test_echoes_that_the_scanner_does_not_record_are_left_out() -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"pulse": np.array([FULL_LINE])}, "one of 1 rays of 1000 pulses"),
-        ({"ray": np.array([-1])}, "one of 1 rays"),
-        ({"distance": np.array([np.nan])}, "must be finite"),
-        ({"brightness": np.empty(0)}, "must be as many"),
+        ({"pulse": np.array([FULL_LINE])}, "pulse of the added echoes must be 0 to 999 .*, but is 1000 to 1000"),
+        ({"ray": np.array([-1])}, "ray of the added echoes must be 0 to 0"),
+        ({"distance": np.array([np.nan])}, "distance of the added echoes must be finite"),
+        ({"brightness": np.empty(0)}, "must have one value for each added echo, but have 1, 1, 1, 0 values"),
     ],
 )
 def test_wrong_echoes_are_refused(wrong: dict[str, np.ndarray], message: str) -> None:

@@ -30,8 +30,8 @@ class Striped:
         self.material = MaterialLayers(surface_constants([materials()[material]]))
         self.dark, self.bright = dark, bright
 
-    def sample(self, points, wanted):
-        values = self.material.sample(points, wanted)
+    def sample(self, points, names):
+        values = self.material.sample(points, names)
         values.arrays["base_color"] *= np.where(points.position[:, :1] < 0.0, self.dark, self.bright).astype(np.float32)
         return values
 
@@ -130,8 +130,8 @@ def test_what_passes_is_numbered_anew(most: int) -> None:
     )
 
     class HighIsDark(Striped):
-        def sample(self, points, wanted):
-            values = super().sample(points, wanted)
+        def sample(self, points, names):
+            values = super().sample(points, names)
             for name in ("base_color", "specular"):
                 values.arrays[name][points.position[:, 2] > 1.0] = 0.0
             return values

@@ -99,7 +99,7 @@ def test_every_echo_of_a_pulse_follows_the_laws() -> None:
     plan = scan_of(plane(), 1)
     setting = replace(plan.setting, threshold=1.0, receiver=NOISY)
     plan = altered(plan, setting=setting, noise=Noise(speckle=sigma, dropout=dropout))
-    errors = BlockScan(plan).draw_errors(plan.path.strips[0], pulses, 0)
+    errors = BlockScan(plan).emitter.draw_errors(plan.path.strips[0], pulses, 0)
     pulse = np.repeat(np.arange(pulses), echoes)
     power = np.full(len(pulse), 1.1)
     sent = Echoes(pulse, np.arange(len(pulse)), np.arange(len(pulse)) * 1.0, power, power)

@@ -111,7 +111,7 @@ def test_pointing_errors_are_normal_along_both_axes() -> None:
     """A chi-square test of twenty equal shares of where points lie beside their beams."""
     scan = altered(scan_of(plane()), noise=Noise(angle_sigma_mrad=2.0))
     strip = scan.path.strips[0]
-    errors = BlockScan(scan).draw_errors(strip, 8000, 0).angle
+    errors = BlockScan(scan).emitter.draw_errors(strip, 8000, 0).angle
     assert errors is not None
     for axis in errors:
         counts = np.bincount((stats.norm.cdf(axis / 2e-3) * 20).astype(int), minlength=20)

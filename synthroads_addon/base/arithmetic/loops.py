@@ -46,7 +46,7 @@ class EchoPlaces(NamedTuple):
     Attributes:
         pulse, hit: (N,) of each echo.
         range: (N,) measured, m.
-        face, along, distance: (M,) of the hits: faces, n . d of their normals and the rays, and true ranges, m.
+        face, cosine, distance: (M,) of the hits: faces, n . d of their normals and the rays, and true ranges, m.
         direction, begin: (3, M) of the hits' rays; no begin: where the pulses do, m.
         time, scan_angle: (P,) s, rad.
         origin, measured_origin, measured_direction: (3, P) m.
@@ -59,7 +59,7 @@ class EchoPlaces(NamedTuple):
     hit: Index
     range: Float
     face: Index
-    along: Float
+    cosine: Float
     distance: Float
     direction: Float
     begin: Float | None
@@ -145,13 +145,13 @@ class PointLoops(Protocol):
         ...
 
     def layer(
-        self, rows: Index | None, own: Float32 | None, material: UInt16, varies: Bool, means: Float32
+        self, rows: Index | None, point_values: Float32 | None, material: UInt16, varies: Bool, means: Float32
     ) -> Float32 | None:
         """Return a layer's values (K, ...) at rows (K,) of points; None where it can't.
 
         Args:
             rows: of the points; None for all of them.
-            own: (N, C) of the points, for materials that vary; None where none does.
+            point_values: (N, C) of the points, for materials that vary; None where none does.
             material: (N,) of the points.
             varies: (M,) whether a material does.
             means: (M, C) or (M,) of the materials.
@@ -202,7 +202,7 @@ class PointLoops(Protocol):
 
     def approached(
         self,
-        rough: Index,
+        rough_rows: Index,
         height: Float,
         cosine: Float,
         material: UInt16,
@@ -211,10 +211,12 @@ class PointLoops(Protocol):
         place: Float,
         distance: Float,
     ) -> tuple[Float, Float]:
-        """Return places (N, 3) and ranges (N,) of which rows ``rough`` (K,) are nearer along their beams by heights."""
+        """Return places (N, 3) and ranges (N,) of points, of which rough rows (K,) come nearer along their beams."""
         ...
 
-    def daylight(self, sun: Float32, color: Float32, normal: Float32, above: Float32, below: Float32) -> Float32:
+    def daylight(
+        self, sun: Float32, color: Float32, normal: Float32, light_above: Float32, light_below: Float32
+    ) -> Float32:
         """Return the light (N, 3), cut to 0 to 1, of the sun (N, 3) and what surfaces throw back of an even sky."""
         ...
 
@@ -242,17 +244,19 @@ class PointLoops(Protocol):
         """Return x, y, heading and curvature (4, N) at stations (N,) on the pieces of an alignment."""
         ...
 
-    def face_columns(self, faces: Faces, grid: ColumnGrid, most: int) -> tuple[AnyArray, AnyArray]:
+    def face_columns(self, faces: Faces, grid: ColumnGrid, most_faces: int) -> tuple[AnyArray, AnyArray]:
         """Return the faces of each cell of a grid that they may touch: where they begin (C + 1,), and their numbers.
 
         Args:
             faces: T of them.
             grid: across a direction.
-            most: faces of a cell: where there are more none is listed.
+            most_faces: faces of a cell: where there are more none is listed.
         """
         ...
 
-    def clear_places(self, places: Float, faces: Faces, grid: ColumnGrid, listed: tuple[AnyArray, AnyArray]) -> Bool:
+    def clear_places(
+        self, places: Float, faces: Faces, grid: ColumnGrid, column_faces: tuple[AnyArray, AnyArray]
+    ) -> Bool:
         """Return a mask (N,) of places (3, N), m, that no face listed in their cell hides from the grid's direction.
 
         What lies in a cell without faces isn't among them.
@@ -260,15 +264,15 @@ class PointLoops(Protocol):
         Args:
             places: (3, N).
             faces, grid: as they were for `face_columns`.
-            listed: what that returned.
+            column_faces: what that returned.
         """
         ...
 
-    def placed(self, echoes: EchoPlaces, seen: bool) -> PlacedPoints:
+    def placed(self, echoes: EchoPlaces, with_seen: bool) -> PlacedPoints:
         """Return the points of echoes; what is known of the places where they were seen only if asked, else empty."""
         ...
 
-    def facing(self, normal: Float, position: Float, direction: Float, off: float) -> tuple[Bool, Float]:
+    def facing(self, normal: Float, position: Float, direction: Float, clearance: float) -> tuple[Bool, Float]:
         """Return which normals (N, 3) face a direction (3,), and the places (3, N) so far (m) off positions (N, 3)."""
         ...
 
@@ -287,7 +291,7 @@ class PointLoops(Protocol):
         evaluate: Callable[[Float], tuple[Float, ...]],
         places: Sequence[Float],
         brackets: Sequence[Float],
-        most: int,
+        most_iterations: int,
     ) -> tuple[Float, Float, Float]:
         """Return the feet of points on an alignment, see `road.alignment.Alignment`: stations, rests and offsets (N,).
 
@@ -295,7 +299,7 @@ class PointLoops(Protocol):
             evaluate: gives x, y, heading and curvature (K,) at stations (K,).
             places: x and y (N,).
             brackets: first guesses of the stations, and the least and largest that they may be, (N,) each.
-            most: iterations.
+            most_iterations: iterations.
         """
         ...
 

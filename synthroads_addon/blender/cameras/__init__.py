@@ -167,7 +167,7 @@ def _node_layers(
 
 def node_layers(request: LayerRequest, constants: SurfaceConstants) -> tuple[str, ...]:
     """Return the names of the layers for which materials' nodes are evaluated: requested ones that vary somewhere."""
-    layers = needed_layers(request.wanted, request.settings.mode)
+    layers = needed_layers(request.names, request.settings.mode)
     if request.lit:
         layers |= set(MATERIAL_LAYERS)  # reflected light depends on all layers of the material
     return constants.varying_layers(frozenset(layers))
@@ -223,10 +223,10 @@ def _passes(request: LayerRequest, constants: SurfaceConstants, by_return: bool 
     """
     settings, lit = request.settings, request.lit
     light_paths = lit and settings.lighting == "path" and settings.engine == "cycles"
-    layers = needed_layers(request.wanted, settings.mode)
+    layers = needed_layers(request.names, settings.mode)
     if light_paths:
         # Cycles multiplies by the base colour itself: it is an output only where it is requested.
-        layers -= {"base_color"} - request.wanted
+        layers -= {"base_color"} - request.names
     returns = by_return or renders_returns(settings)
     return Passes(
         layers=constants.varying_layers(layers),

@@ -76,10 +76,10 @@ class ReturnCamera:
         stage = self._stage
         return {"images": stage.images, "pixels": stage.pixels, "layers": list(stage.passes.channels)}
 
-    def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
+    def sample(self, points: SeenPoints, names: frozenset[str]) -> LayerValues:
         """Return the wanted layers of N points, and how each point got them (its source)."""
         parts = [
-            self._block(points.select(slice(start, start + BLOCK)), wanted)
+            self._block(points.select(slice(start, start + BLOCK)), names)
             for start in range(0, max(len(points), 1), BLOCK)
         ]
         arrays = {name: np.concatenate([part.arrays[name] for part in parts]) for name in parts[0].arrays}

@@ -21,7 +21,7 @@ from ...base.rotations import quaternion_matrices
 from ..colours import SIXTEEN_BITS
 from ..layers import Column, columns
 from ..points import PointBlock
-from .header import header_from_notes, placed, system_of_text
+from .header import CloudHeader, header_from_notes, placed, system_of_text
 from .reader import CloudReader, check_coordinates, damage_error
 from .writer import CloudWriter
 
@@ -74,6 +74,7 @@ class E57Writer(CloudWriter):
     """Writer of point blocks to an E57 file, with 8-bit colours and unclipped intensities; see `CloudWriter`."""
 
     def _open(self) -> None:
+        """Create the file with its metadata, and the buffers that points are handed to the library in."""
         self._e57 = e57 = load_libe57()
         self.faults = (OSError, e57.E57Exception)
         with self._temporary.open("wb"):
@@ -93,13 +94,14 @@ class E57Writer(CloudWriter):
         self._points = points.writer(self._buffers)
 
     def _append(self, block: PointBlock) -> None:
-        first = 0
-        while first < len(block):
-            part = block.select(slice(first, first + _CAPACITY - self._held))
+        """Collect a block's points in the buffers, which are written whenever they are full."""
+        begin = 0
+        while begin < len(block):
+            part = block.select(slice(begin, begin + _CAPACITY - self._held))
             for name, values in self._pack_columns(part).items():
                 self._arrays[name][self._held : self._held + len(part)] = values
             self._held += len(part)
-            first += len(part)
+            begin += len(part)
             self._low = np.minimum(self._low, part.xyz.min(axis=0))
             self._high = np.maximum(self._high, part.xyz.max(axis=0))
             self._dimmest = min(self._dimmest, float(part.intensity.min()))
@@ -108,24 +110,28 @@ class E57Writer(CloudWriter):
                 self._flush()
 
     def _flush(self) -> None:
-        """Write the points held, always as many at a time, so that the file doesn't depend on the blocks' sizes."""
+        """Write the points in the buffers.
+
+        They are always as many at a time, so that the file doesn't depend on the blocks' sizes.
+        """
         if self._held:
             self._points.write(self._held)
             self._held = 0
 
     def _finish(self) -> None:
+        """Write what is left in the buffers, then bounds, limits and identifiers of the scan, and close the file."""
         self._flush()
         self._points.close()
-        real, whole = self._e57.FloatNode, self._e57.IntegerNode
+        float_node, integer_node = self._e57.FloatNode, self._e57.IntegerNode
         if self.count:
             spans = np.round([self._low - self.offset, self._high - self.offset], 4).T.tolist()
             axes = zip("xyz", spans, strict=True)
             bounds = {f"{axis}{end}": at for axis, span in axes for end, at in zip(_ENDS, span, strict=True)}
-            self._scan.set("cartesianBounds", self._structure(real, bounds))
+            self._scan.set("cartesianBounds", self._structure(float_node, bounds))
             limits = {"intensityMinimum": self._dimmest, "intensityMaximum": self._brightest}
-            self._scan.set("intensityLimits", self._structure(real, limits))
+            self._scan.set("intensityLimits", self._structure(float_node, limits))
         colors = {f"{name}{end}": at for name in _CHANNELS for end, at in zip(_ENDS, (0, 255), strict=True)}
-        self._scan.set("colorLimits", self._structure(whole, colors))
+        self._scan.set("colorLimits", self._structure(integer_node, colors))
         for node, what in ((self._scan, "scan"), (self._file.root(), "file")):
             digits = self.content_id(what, self._low.tolist(), self._high.tolist())
             groups = (digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:])
@@ -133,18 +139,21 @@ class E57Writer(CloudWriter):
         self._file.close()
 
     def _close(self) -> None:
+        """Close the writer of points and the file, in whatever state they are."""
         with suppress(Exception):
             self._points.close()
         self._file.close()
 
     def _pack_columns(self, part: PointBlock) -> dict[str, AnyArray]:
         """Return the stored values (n,) of at most `_CAPACITY` points, by the columns' names in E57."""
-        local = part.xyz - self.offset
-        packed = {f"cartesian{'XYZ'[i]}": self.to_integers(local[:, i], "int32", "xyz", SCALE) for i in range(3)}
+        local_place = part.xyz - self.offset
+        columns_of_part = {
+            f"cartesian{'XYZ'[i]}": self.to_integers(local_place[:, i], "int32", "xyz", SCALE) for i in range(3)
+        }
         rgb = self.to_integers(part.rgb, "uint16", "rgb") >> 8
-        packed |= dict(zip(_CHANNELS, rgb.T, strict=True))
+        columns_of_part |= dict(zip(_CHANNELS, rgb.T, strict=True))
         number, angle = self.to_integers(part.return_number, "uint8", "return_number"), f"{EXTENSION}:scan_angle"
-        packed |= {
+        columns_of_part |= {
             "intensity": self.check_finite(part.intensity, "intensity", self._types["intensity"]),
             "timeStamp": self.check_finite(part.gps_time, "gps_time", self._types["timeStamp"]),
             "returnIndex": np.maximum(number, 1) - 1,  # counts from 0
@@ -154,7 +163,7 @@ class E57Writer(CloudWriter):
             # Readers such as pye57's `read_scan` insist on it.
             "cartesianInvalidState": np.full(len(part), _VALID, dtype=np.uint8),
         }
-        return packed | {e57_name(column): self.stored_integers(column, part) for column in self.columns}
+        return columns_of_part | {e57_name(column): self.stored_integers(column, part) for column in self.columns}
 
     def _begin_root(self) -> None:
         """Write the file's metadata and those of its one scan, the offset as its pose."""
@@ -212,9 +221,11 @@ class E57Writer(CloudWriter):
         return prototype
 
     def _shift(self, column: Column) -> float:
+        """Return the offset, m, that a column's integers are stored less by: the file's for map coordinates, else 0."""
         return float(self.offset[column.component]) if column.local and column.component is not None else 0.0
 
     def _text(self, text: str) -> Any:
+        """Return an E57 node of a text."""
         return self._e57.StringNode(self._file, text)
 
 
@@ -249,54 +260,71 @@ class E57Reader(CloudReader):
     """
 
     def __init__(self, path: Path) -> None:
-        self._e57 = e57 = load_libe57()
+        self._e57 = load_libe57()
         try:
-            self._file = e57.ImageFile(str(path), "r")
+            self._file = self._e57.ImageFile(str(path), "r")
         except Exception as problem:
             raise InputError(str(path), None, f"is not an E57 file that can be read ({_error_text(problem)})") from None
         try:
-            root = self._file.root()
-            self._scans = [root["data3D"][i] for i in range(len(root["data3D"]))]
-            self._fields = [_field_names(e57.StructureNode(scan["points"].prototype())) for scan in self._scans]
-            counts = [int(scan["points"].childCount()) for scan in self._scans]
-            noted = f"{EXTENSION}:notes" in _field_names(root)
-            notes = json.loads(root[f"{EXTENSION}:notes"].value()) if noted else None
-            metadata = "coordinateMetadata"
-            text = str(root[metadata].value()) if not noted and metadata in _field_names(root) else None
-        except Exception as problem:
-            self.close()
-            raise InputError(str(path), None, f"is an E57 file that is damaged ({_error_text(problem)})") from None
-        names: set[str] = set().union(*self._fields)
-        if sum(counts) and not all({"cartesianX", "cartesianY", "cartesianZ"} <= fields for fields in self._fields):
-            self.close()
-            raise InputError(str(path), None, "has no Cartesian coordinates")
-        self._counts = counts
-        try:
-            header = header_from_notes(
-                path,
-                "E57",
-                sum(counts),
-                names,
-                notes,
-                name_of=e57_name,
-                usual={*_FIXED, *_FLAGGED},
-                has_color="colorRed" in names,
-            )
-            self.header = replace(header, place=_declared_place(path, text)) if text else header
+            notes, system_text = self._read_structure(path)
+            self.header = self._header(path, notes, system_text)
         except InputError:
             self.close()
             raise
-        self._intensities: list[Limits | None] = [None] * len(self._scans)
-        if not self.header.labelled:  # ours are in the unit of the notes, whatever the limits
-            self._intensities = [self._limits(scan, "intensity", fields) for scan, fields in self._scanned()]
-            pairs = zip(self._intensities, self._fields, strict=True)
-            given = [limits for limits, fields in pairs if "intensity" in fields]
-            if given and None not in given:
-                self.header = replace(self.header, intensity_scale=SIXTEEN_BITS)
-            elif any(given):
-                text = "only some of its scans name the limits of intensities: intensities are read unscaled"
-                assume(f"{path.name}: {text}")
-                self._intensities = [None] * len(self._scans)
+        self._intensities = self._intensity_limits()
+        if any(self._intensities):
+            self.header = replace(self.header, intensity_scale=SIXTEEN_BITS)
+
+    def _read_structure(self, path: Path) -> tuple[dict[str, Any] | None, str | None]:
+        """Find the scans with their fields and counts; return our notes, and the coordinate system that others declare.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        try:
+            root = self._file.root()
+            self._scans = [root["data3D"][i] for i in range(len(root["data3D"]))]
+            prototypes = [self._e57.StructureNode(scan["points"].prototype()) for scan in self._scans]
+            self._fields = [_field_names(prototype) for prototype in prototypes]
+            self._counts = [int(scan["points"].childCount()) for scan in self._scans]
+            names = _field_names(root)
+            if f"{EXTENSION}:notes" in names:
+                return json.loads(root[f"{EXTENSION}:notes"].value()), None
+            return None, str(root["coordinateMetadata"].value()) if "coordinateMetadata" in names else None
+        except Exception as problem:
+            raise InputError(str(path), None, f"is an E57 file that is damaged ({_error_text(problem)})") from None
+
+    def _header(self, path: Path, notes: dict[str, Any] | None, system_text: str | None) -> CloudHeader:
+        """Return the file's header; raise `InputError` if it has no Cartesian coordinates, or its notes are wrong.
+
+        Args:
+            path: of the file.
+            notes: ours; None if other software wrote the file.
+            system_text: coordinate system that the file declares.
+        """
+        count, names = sum(self._counts), set[str]().union(*self._fields)
+        if count and not all({"cartesianX", "cartesianY", "cartesianZ"} <= fields for fields in self._fields):
+            raise InputError(str(path), None, "has no Cartesian coordinates")
+        usual, has_color = {*_FIXED, *_FLAGGED}, "colorRed" in names
+        header = header_from_notes(path, "E57", count, names, notes, name_of=e57_name, usual=usual, has_color=has_color)
+        return replace(header, place=_declared_place(path, system_text)) if system_text else header
+
+    def _intensity_limits(self) -> list[Limits | None]:
+        """Return the limits of each scan's intensities; None where they are read as they are stored.
+
+        Ours are in the unit of the notes, whatever the limits. Those of other software are scaled only if all scans
+        that have intensities name their limits.
+        """
+        unscaled: list[Limits | None] = [None] * len(self._scans)
+        if self.header.labelled:
+            return unscaled
+        limits = [self._limits(scan, "intensity", fields) for scan, fields in self._scanned()]
+        known = [found is not None for found, fields in zip(limits, self._fields, strict=True) if "intensity" in fields]
+        if any(known) and not all(known):
+            text = "only some of its scans name the limits of intensities: intensities are read unscaled"
+            assume(f"{self.header.path.name}: {text}")
+            return unscaled
+        return limits
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
         """Yield the points of one scan after the other, in map coordinates, without invalid ones."""
@@ -304,31 +332,32 @@ class E57Reader(CloudReader):
         for number, (scan, fields, count) in enumerate(zip(self._scans, self._fields, self._counts, strict=True)):
             names = [name for name in sorted(_FIXED.keys() | _FLAGGED.keys() | self._layer_names()) if name in fields]
             intensities, colors = self._intensities[number], self._color_limits(scan, fields)
-            room = min(size, count)
-            arrays = {name: np.zeros(room) for name in names}
+            buffer_size = min(size, count)
+            arrays = {name: np.zeros(buffer_size) for name in names}
             buffers = self._buffers(arrays)
-            left, reader = count, None
-            while left:
+            remaining, reader = count, None
+            while remaining:
                 try:
                     reader = reader or scan["points"].reader(buffers)
-                    got = reader.read()
+                    count_read = reader.read()
                 except Exception:
                     raise damage_error(self.header.path, position, self.header.count) from None
-                if got == 0:
+                if count_read == 0:
                     raise damage_error(self.header.path, position, self.header.count)
-                part = {name: array[:got] for name, array in arrays.items()}
+                part = {name: array[:count_read] for name, array in arrays.items()}
                 self._scale(part, intensities, colors)
-                block = self._block(part, got, _pose(scan), position)
+                block = self._block(part, count_read, _pose(scan), position)
                 if "cartesianInvalidState" in part and (invalid := part["cartesianInvalidState"] != _VALID).any():
                     self._remarks["points have no valid coordinates and are left out"] += int(np.count_nonzero(invalid))
                     block = block.select(~invalid)
                 check_coordinates(self.header.path, position, block.xyz)
                 yield block
-                position, left = position + got, left - got
+                position, remaining = position + count_read, remaining - count_read
             if reader:
                 reader.close()
 
     def _layer_names(self) -> set[str]:
+        """Return the names, in E57, of the columns of all layers that the file holds."""
         return {e57_name(column) for column in columns(self.header.attributes)}
 
     def _scanned(self) -> Iterator[tuple[Any, set[str]]]:
@@ -336,29 +365,32 @@ class E57Reader(CloudReader):
         return zip(self._scans, self._fields, strict=True)
 
     def _limits(self, scan: Any, name: str, fields: set[str]) -> Limits | None:
-        """Return least and largest value that a field can have, by the scan's limits or the field's; None without."""
+        """Return the least and the largest value that a field can have, by the scan's limits or else the field's own.
+
+        None where the scan lacks the field, or where neither are limits of a quantity.
+        """
         if name not in fields:
             return None
         group = "colorLimits" if name in _CHANNELS else f"{name}Limits"
         limits: Limits | None = None
         try:
             if scan.isDefined(group) and all(scan[group].isDefined(f"{name}{end}") for end in _ENDS):
-                low, high = (_number_of(scan[group][f"{name}{end}"]) for end in _ENDS)
-                limits = (low, high)
-            if not _tells(limits):
+                minimum, maximum = (_number_of(scan[group][f"{name}{end}"]) for end in _ENDS)
+                limits = (minimum, maximum)
+            if not _are_limits(limits):
                 limits = _field_limits(self._e57.StructureNode(scan["points"].prototype())[name])
         except Exception as problem:
             raise InputError(
                 str(self.header.path), None, f"is an E57 file that is damaged ({_error_text(problem)})"
             ) from None
-        return limits if _tells(limits) else None
+        return limits if _are_limits(limits) else None
 
     def _color_limits(self, scan: Any, fields: set[str]) -> dict[str, Limits]:
         """Return the limits of a scan's colour channels; where none are declared, by the largest value there is."""
         limits = {name: self._limits(scan, name, fields) for name in _CHANNELS if name in fields}
         if None in limits.values():
-            full = self._assumed_brightness(self._colors(), whole=False)
-            return {name: bounds or (0.0, full) for name, bounds in limits.items()}
+            brightness = self._assumed_brightness(self._colors(), is_integer=False)
+            return {name: bounds or (0.0, brightness) for name, bounds in limits.items()}
         return {name: bounds for name, bounds in limits.items() if bounds}
 
     def _colors(self) -> Iterator[AnyArray]:
@@ -387,30 +419,44 @@ class E57Reader(CloudReader):
 
     def _scale(self, part: dict[str, AnyArray], intensities: Limits | None, colors: dict[str, Limits]) -> None:
         """Bring a part's intensities to shares of their limits and colours to 16 bits, in place; invalid ones to 0."""
-        void = {name: part[flag] != 0 for flag, names in _FLAGGED.items() if flag in part for name in names}
+        is_invalid = {name: part[flag] != 0 for flag, names in _FLAGGED.items() if flag in part for name in names}
         for flag, (name, *_) in _FLAGGED.items():
-            if name in void and (count := int(np.count_nonzero(void[name]))):
+            if name in is_invalid and (count := int(np.count_nonzero(is_invalid[name]))):
                 self._remarks[f"points have an invalid {_PLAIN[flag]}: it is read as 0"] += count
         spans = colors if intensities is None else {**colors, "intensity": intensities}
         for name in (*_CHANNELS, "intensity", "timeStamp"):
             if name not in part:
                 continue
-            values = np.where(void[name], np.nan, part[name]) if name in void else part[name]
+            values = np.where(is_invalid[name], np.nan, part[name]) if name in is_invalid else part[name]
             if name in spans:
                 values = self._share_of(values, spans[name], "an intensity" if name == "intensity" else "a colour")
                 values = np.rint(np.nan_to_num(values) * SIXTEEN_BITS) if name in _CHANNELS else values
-            part[name] = np.where(void[name], 0.0, values) if name in void else values
+            part[name] = np.where(is_invalid[name], 0.0, values) if name in is_invalid else values
 
-    def _share_of(self, values: AnyArray, limits: Limits, what: str) -> AnyArray:
-        """Return values (n,) as shares of what lies between their limits, to which those beyond are set."""
+    def _share_of(self, values: AnyArray, limits: Limits, quantity: str) -> AnyArray:
+        """Return values (n,) as shares, 0 to 1, of the span between limits; values beyond are clipped with a remark.
+
+        Args:
+            values: as stored.
+            limits: least and largest value.
+            quantity: what they are, for the remark.
+        """
         share = (values - limits[0]) / (limits[1] - limits[0])
         if count := int(np.count_nonzero((share < 0.0) | (share > 1.0))):
-            self._remarks[f"points have {what} beyond the file's limits: they are clipped to these limits"] += count
+            self._remarks[f"points have {quantity} beyond the file's limits: they are clipped to these limits"] += count
         return np.clip(share, 0.0, 1.0)
 
     def _block(
         self, arrays: dict[str, AnyArray], count: int, pose: tuple[AnyArray, AnyArray], position: int
     ) -> PointBlock:
+        """Return the block of points from the arrays of a scan's fields.
+
+        Args:
+            arrays: (n,) or more by the fields' names, brought to scale.
+            count: n.
+            pose: rotation (3, 3) and translation (3,), m, of the scan.
+            position: points before these, for messages.
+        """
         rotation, translation = pose
         present = [column for column in columns(self.header.attributes) if e57_name(column) in arrays]
         stored = {column.name: arrays[e57_name(column)].copy() for column in present}
@@ -420,13 +466,13 @@ class E57Reader(CloudReader):
             stored["return_number"] = arrays["returnIndex"] + 1.0
         else:
             stored["return_number"] = np.ones(count, dtype=np.uint8)
-        dark = np.zeros(count)
-        stored["rgb"] = np.stack([arrays.get(name, dark) for name in _CHANNELS], axis=1)
+        no_light = np.zeros(count)
+        stored["rgb"] = np.stack([arrays.get(name, no_light) for name in _CHANNELS], axis=1)
         return self._points(stored, count, position)
 
 
-def _tells(limits: Limits | None) -> bool:
-    """Return whether limits are some of a quantity, and not those of a number's type or of nothing."""
+def _are_limits(limits: Limits | None) -> bool:
+    """Return whether limits are those of a quantity: not the extremes of a number's type, and not equal."""
     return limits is not None and -_SANE < limits[0] < limits[1] < _SANE
 
 
@@ -446,12 +492,13 @@ def _declared_place(path: Path, text: str) -> Placement:
     """Return the placement that a file of others declares, whose coordinates are metres by the standard."""
     place = placed(path, *system_of_text(text))
     if place.declared is not None and place.scale is not None:
-        allowed = "isn't in metres, the unit of coordinates in the E57 standard: it is unclear which one is right"
-        raise InputError(f"{path}: coordinate system", place.declared.label, allowed)
+        requirement = "isn't in metres, the unit of coordinates in the E57 standard: it is unclear which one is right"
+        raise InputError(f"{path}: coordinate system", place.declared.label, requirement)
     return place
 
 
 def _field_names(prototype: Any) -> set[str]:
+    """Return the names of the elements of an E57 structure."""
     return {prototype.get(i).elementName() for i in range(prototype.childCount())}
 
 
@@ -469,4 +516,5 @@ def _pose(scan: Any) -> tuple[AnyArray, AnyArray]:
 
 
 def _error_text(problem: Exception) -> str:
+    """Return an error's message in one line of 80 characters at most."""
     return " ".join(str(problem).split())[:80]

@@ -79,7 +79,12 @@ class CloudHeader:
 
 
 def placed(path: Path, declared: MapSystem | None, notes: Sequence[str] = ()) -> Placement:
-    """Return the placement of a cloud by the system that its file declares, of which notes may have to be told.
+    """Return the placement of a cloud by the system that its file declares, with notes for the user.
+
+    Args:
+        path: the file.
+        declared: the system; None if the file declares none.
+        notes: remarks on it so far; those on units are added.
 
     Raises:
         InputError: its coordinates are degrees.
@@ -87,8 +92,8 @@ def placed(path: Path, declared: MapSystem | None, notes: Sequence[str] = ()) ->
     if declared is None:
         return Placement(notes=tuple(notes))
     if declared.unit is None:
-        allowed = "its coordinates are degrees: metres or feet of a projected system are needed"
-        raise InputError(f"{path}: coordinate system", declared.label, allowed)
+        requirement = "its coordinates are degrees: metres or feet of a projected system are needed"
+        raise InputError(f"{path}: coordinate system", declared.label, requirement)
     if declared.in_metres:
         return Placement(declared, declared, tuple(notes))
     system, units = declared.metric(), declared.scale
@@ -103,7 +108,7 @@ def placed(path: Path, declared: MapSystem | None, notes: Sequence[str] = ()) ->
 
 
 def system_of_text(text: str | None) -> tuple[MapSystem | None, list[str]]:
-    """Return the system that a file's text names, None without text, and what is to be said of text that names none.
+    """Return the system that a file's text names, and remarks for the user; None without text, or if it names none.
 
     Raises:
         InputError: the system isn't one of a map.
@@ -113,15 +118,15 @@ def system_of_text(text: str | None) -> tuple[MapSystem | None, list[str]]:
     try:
         return MapSystem.read(text), []
     except UnknownSystemError:
-        shown = " ".join(text.split())[:60]
-        return None, [f"its coordinate system can't be read ({shown}): it is ignored, coordinates are metres"]
+        text_beginning = " ".join(text.split())[:60]
+        return None, [f"its coordinate system can't be read ({text_beginning}): it is ignored, coordinates are metres"]
 
 
 def header_from_notes(
     path: Path,
     kind: str,
     count: int,
-    stored: set[str],
+    stored_names: set[str],
     notes: Any,
     *,
     name_of: Callable[[Column], str],
@@ -134,7 +139,7 @@ def header_from_notes(
         path: the file.
         kind: of file.
         count: number of points.
-        stored: names of what is stored of each point.
+        stored_names: names of what is stored of each point.
         notes: `CloudWriter.placed_notes`; None for a file of others.
         name_of: what the format calls a column.
         usual: names of what is read in any case.
@@ -143,9 +148,9 @@ def header_from_notes(
     Raises:
         InputError: the notes are damaged.
     """
-    names = {column.name for layer in LAYERS.values() for column in layer.columns if name_of(column) in stored}
+    names = {column.name for layer in LAYERS.values() for column in layer.columns if name_of(column) in stored_names}
     attributes = attributes_of(names)
-    left_out = tuple(sorted(stored - usual - {name_of(column) for column in columns(attributes)}))
+    left_out = tuple(sorted(stored_names - usual - {name_of(column) for column in columns(attributes)}))
     header = CloudHeader(path, kind, count, np.zeros(3), attributes=attributes, has_color=has_color, left_out=left_out)
     if not isinstance(notes, dict):
         return header

@@ -60,6 +60,7 @@ class LasWriter(CloudWriter):
     faults = (OSError, lazrs.LazrsError)
 
     def _open(self) -> None:
+        """Create the file with its header, and the buffer that records are packed in."""
         self._header = self._make_header()
         self._codes = self.scheme.las_codes()[self.scheme.ids]
         self._file = self._temporary.open("wb")
@@ -77,24 +78,26 @@ class LasWriter(CloudWriter):
         self._by_return = np.zeros(16, dtype=np.int64)
 
     def _append(self, block: PointBlock) -> None:
-        first = 0
-        while first < len(block):
-            last = min(first + _SLICE, first + _BUFFER - self._held, len(block))
-            self._make_room(self._held + last - first)
-            self._pack(block.select(slice(first, last)), self._buffer[self._held : self._held + last - first])
-            self._held += last - first
-            first = last
+        """Pack a block's points into records, slice by slice; the buffer is written whenever it is full."""
+        begin = 0
+        while begin < len(block):
+            end = min(begin + _SLICE, begin + _BUFFER - self._held, len(block))
+            self._make_room(self._held + end - begin)
+            self._pack(block.select(slice(begin, end)), self._buffer[self._held : self._held + end - begin])
+            self._held += end - begin
+            begin = end
             if self._held == _BUFFER:
                 self._flush()
 
     def _make_room(self, count: int) -> None:
         """Enlarge the buffer to a number of records; it grows by doubling, as many files of few points may be open."""
         if count > len(self._buffer):
-            larger = np.zeros(min(max(2 * len(self._buffer), count), _BUFFER), self._buffer.dtype)
-            larger[: self._held] = self._buffer[: self._held]
-            self._buffer = larger
+            new_buffer = np.zeros(min(max(2 * len(self._buffer), count), _BUFFER), self._buffer.dtype)
+            new_buffer[: self._held] = self._buffer[: self._held]
+            self._buffer = new_buffer
 
     def _finish(self) -> None:
+        """Write what is left in the buffer, and extent and numbers of points into the header, and close the file."""
         self._flush()
         header, count = self._writer.header, int(self._by_return.sum())
         header.mins = self._low * header.scales + header.offsets  # laspy writes 0 where there are no points
@@ -139,13 +142,13 @@ class LasWriter(CloudWriter):
             per_intensity=self.intensity_scale,
             per_degree=1.0 / SCAN_ANGLE_STEP,
         )
-        filled = loops.pack(record, points)
-        if filled is None:
+        extent_and_counts = loops.pack(record, points)
+        if extent_and_counts is None:
             return False
-        (low, high), by_return = filled
+        (least_steps, largest_steps), by_return = extent_and_counts
         self._low, self._high = (
-            np.minimum(self._low, low.astype(np.int64)),
-            np.maximum(self._high, high.astype(np.int64)),
+            np.minimum(self._low, least_steps.astype(np.int64)),
+            np.maximum(self._high, largest_steps.astype(np.int64)),
         )
         self._by_return += by_return
         return True
@@ -170,45 +173,50 @@ class LasWriter(CloudWriter):
         record["classification"] = np.take(self._codes, self.to_integers(block.class_id, "uint8", "class_id"))
 
     def _pack_coordinates(self, xyz: Float, record: AnyArray) -> None:
+        """Fill in, in place, the coordinates of records in steps of `SCALE`, and keep their extremes for the header."""
         steps = np.empty((3, len(xyz)))  # a row per axis: its extremes are found ten times as fast
         np.subtract(xyz.T, self._header.offsets[:, None], out=steps)
         np.rint(np.multiply(steps, 1.0 / SCALE, out=steps), out=steps)
-        low, high = steps.min(axis=1), steps.max(axis=1)
-        if not (np.all(low >= -(2**31)) and np.all(high < 2**31)):
-            worst = xyz[np.abs(steps).max(axis=0).argmax()]
-            raise OutputError(str(self.path), worst.tolist(), "coordinates must lie within 2147 km of the offset")
+        least_steps, largest_steps = steps.min(axis=1), steps.max(axis=1)
+        if not (np.all(least_steps >= -(2**31)) and np.all(largest_steps < 2**31)):
+            farthest_place = xyz[np.abs(steps).max(axis=0).argmax()]
+            raise OutputError(
+                str(self.path), farthest_place.tolist(), "coordinates must lie within 2147 km of the offset"
+            )
         record["X"], record["Y"], record["Z"] = steps
-        self._low = np.minimum(self._low, low.astype(np.int64))
-        self._high = np.maximum(self._high, high.astype(np.int64))
+        self._low = np.minimum(self._low, least_steps.astype(np.int64))
+        self._high = np.maximum(self._high, largest_steps.astype(np.int64))
 
     def _pack_returns(self, block: PointBlock, record: AnyArray) -> None:
         """Fill in, in place, return number and number of returns, four bits each, and count points by return."""
         number = self.to_integers(block.return_number, "uint8", "return_number")
-        of = self.to_integers(block.number_of_returns, "uint8", "number_of_returns")
-        most = max(number.max(), of.max())
-        if most > 15:
-            raise OutputError(str(self.path), int(most), "returns of a pulse must be at most 15")
-        record["bit_fields"] = number | (of << np.uint8(4))
+        return_count = self.to_integers(block.number_of_returns, "uint8", "number_of_returns")
+        most_returns = max(number.max(), return_count.max())
+        if most_returns > 15:
+            raise OutputError(str(self.path), int(most_returns), "returns of a pulse must be at most 15")
+        record["bit_fields"] = number | (return_count << np.uint8(4))
         self._by_return += [np.count_nonzero(number == k) for k in range(16)]  # faster than to sort them into bins
 
     def _pack_flags(self, block: PointBlock) -> AnyArray:
         """Return the byte (N,) of classification flags, scanner channel, scan direction and edge of the flight line."""
-        packed = np.zeros(len(block), dtype=np.uint8)
+        flag_byte = np.zeros(len(block), dtype=np.uint8)
         for name, (shift, bits) in _FLAG_BITS.items():
             if name in block.more:
                 value = self.to_integers(block.more[name], "uint8", name)
                 if value.max() >= 1 << bits:
                     raise OutputError(str(self.path), int(value.max()), f"{name} must be at most {(1 << bits) - 1}")
-                packed |= value << np.uint8(shift)
-        return packed
+                flag_byte |= value << np.uint8(shift)
+        return flag_byte
 
     def _scan_angle(self, block: PointBlock) -> NDArray[np.int16]:
+        """Return the scan angles (N,) in steps of `SCAN_ANGLE_STEP`; raise `OutputError` beyond 180 deg."""
         steps = self.to_integers(block.scan_angle_deg, "int16", "scan_angle", SCAN_ANGLE_STEP)
         if max(-int(steps.min()), int(steps.max())) > 30_000:
             raise OutputError(str(self.path), float(np.abs(block.scan_angle_deg).max()), "scan_angle is at most 180")
         return steps
 
     def _make_header(self) -> laspy.LasHeader:
+        """Return the header of the file: scales, extra bytes, our notes and the coordinate system."""
         header = laspy.LasHeader(point_format=7, version="1.4")
         header.offsets, header.scales = self.offset, np.full(3, SCALE)
         header.system_identifier = "SynthRoads simulation"
@@ -219,9 +227,9 @@ class LasWriter(CloudWriter):
         if self.standard_time:
             header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
         header.add_extra_dims([self._extra_bytes(column) for column in self.columns])
-        for extra in header.vlrs.get("ExtraBytesVlr")[0].extra_bytes_structs:
+        for attribute in header.vlrs.get("ExtraBytesVlr")[0].extra_bytes_structs:
             # Smallest and largest value are optional, and unknown until the end.
-            extra.options &= ~(extra.MIN_BIT_MASK | extra.MAX_BIT_MASK)
+            attribute.options &= ~(attribute.MIN_BIT_MASK | attribute.MAX_BIT_MASK)
         notes = _laid_out(json.dumps(self.notes()))
         header.vlrs.append(laspy.VLR(OWN, NOTES, "intensity scale, classes", notes.encode()))
         if self.crs_text:
@@ -229,6 +237,7 @@ class LasWriter(CloudWriter):
         return header
 
     def _extra_bytes(self, column: Column) -> laspy.ExtraBytesParams:
+        """Return the description of a column that is stored as extra bytes."""
         if column.scale is None:
             return laspy.ExtraBytesParams(column.name, column.dtype, column.description)
         shift = self.offset[column.component] if column.local and column.component is not None else 0.0
@@ -239,7 +248,7 @@ class LasWriter(CloudWriter):
 
 @lru_cache(maxsize=4)
 def _laid_out(notes: str) -> str:
-    """Return notes given as JSON in the project's layout, which takes ten times as long: tiles have the same."""
+    """Return notes, given as JSON, in the project's layout; cached, as it takes long and tiles share notes."""
     return canonical_json(json.loads(notes))
 
 
@@ -302,7 +311,7 @@ class LasReader(CloudReader):
         position, path = 0, self.header.path
         if self._reader.points_read:
             self._reader.seek(0)
-        full = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
+        brightness = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
         while position < self.header.count:
             count = min(size, self.header.count - position)
             try:
@@ -315,7 +324,7 @@ class LasReader(CloudReader):
                 raise
             if len(record) != count:
                 raise damage_error(path, position + len(record), self.header.count)
-            yield self._block(record, full, position)
+            yield self._block(record, brightness, position)
             position += count
 
     def _check_size(self, path: Path) -> None:
@@ -323,9 +332,9 @@ class LasReader(CloudReader):
         header, size = self._reader.header, path.stat().st_size
         start = header.offset_to_point_data
         if not header.are_points_compressed:
-            there = max(0, size - start) // header.point_format.size
-            if there < header.point_count:
-                raise damage_error(path, there, header.point_count)
+            available_points = max(0, size - start) // header.point_format.size
+            if available_points < header.point_count:
+                raise damage_error(path, available_points, header.point_count)
         elif header.point_count:
             _check_chunks(path, start, header.vlrs.get("LasZipVlr")[0].record_data)
 
@@ -334,35 +343,43 @@ class LasReader(CloudReader):
         channels = ("red", "green", "blue")
 
         def colors() -> Iterator[AnyArray]:
-            only = laspy.DecompressionSelection.base() | laspy.DecompressionSelection.RGB
+            """Yield the stored colours of the file's points, in parts (3, n)."""
+            selection = laspy.DecompressionSelection.base() | laspy.DecompressionSelection.RGB
             with (
                 suppress(*_FAULTS),  # damage is found where the points are read
-                laspy.open(self.header.path, read_evlrs=False, decompression_selection=only) as reader,
+                laspy.open(self.header.path, read_evlrs=False, decompression_selection=selection) as reader,
             ):
                 # Ours have 16 bits, but were converted as they stood by earlier versions: a few chunks tell.
-                few = _FEW_CHUNKS if self.header.labelled else None
-                for record in islice(reader.chunk_iterator(_CHUNK), few):
+                chunk_limit = _FEW_CHUNKS if self.header.labelled else None
+                for record in islice(reader.chunk_iterator(_CHUNK), chunk_limit):
                     yield np.stack([record[name] for name in channels])
 
-        return self._assumed_brightness(colors(), whole=True)
+        return self._assumed_brightness(colors(), is_integer=True)
 
-    def _block(self, record: Any, full: float, position: int) -> PointBlock:
+    def _block(self, record: Any, brightness: float, position: int) -> PointBlock:
+        """Return the block of points from a record.
+
+        Args:
+            record: of laspy, n points.
+            brightness: stored value of full brightness.
+            position: points before these, for messages.
+        """
         header = self._reader.header
         names = set(record.point_format.dimension_names)
         present = [column.name for column in columns(self.header.attributes) if column.name in names]
         present += [name for name in FLAGS if name in names]
         fields = [name for name in ("return_number", "number_of_returns", "gps_time") if name in names]
-        stored = {name: np.array(record[name]) for name in (*present, *fields)}
-        stored["class_id"] = np.array(record["class_id" if self.header.labelled else "classification"])
+        arrays = {name: np.array(record[name]) for name in (*present, *fields)}
+        arrays["class_id"] = np.array(record["class_id" if self.header.labelled else "classification"])
         steps = np.stack([record.array[axis] for axis in "XYZ"], axis=1)
-        stored["xyz"] = steps * header.scales + header.offsets
-        stored["intensity"] = np.asarray(record["intensity"]).astype(np.float64) / (self.header.intensity_scale or 1.0)
+        arrays["xyz"] = steps * header.scales + header.offsets
+        arrays["intensity"] = np.asarray(record["intensity"]).astype(np.float64) / (self.header.intensity_scale or 1.0)
         if self.header.has_color:
             rgb = np.stack([record[name] for name in ("red", "green", "blue")], axis=1)
-            stored["rgb"] = rgb if full == SIXTEEN_BITS else sixteen_bits(rgb, full)
-        stored["scan_angle_deg"] = _scan_angle(record, names)
-        stored["strip"] = np.asarray(record["point_source_id"]) - np.uint16(1)
-        block = self._points(stored, len(record), position)
+            arrays["rgb"] = rgb if brightness == SIXTEEN_BITS else sixteen_bits(rgb, brightness)
+        arrays["scan_angle_deg"] = _scan_angle(record, names)
+        arrays["strip"] = np.asarray(record["point_source_id"]) - np.uint16(1)
+        block = self._points(arrays, len(record), position)
         return block if self.header.predicted is None else block.with_arrays({PREDICTED: np.array(record[PREDICTED])})
 
 
@@ -395,12 +412,12 @@ def _check_attributes(path: Path, header: laspy.LasHeader) -> None:
 
 def _check_records_behind(path: Path, header: laspy.LasHeader) -> None:
     """Raise `InputError` if extended records (EVLRs) reach beyond the file's end, as laspy trusts their sizes."""
-    at, size = header.start_of_first_evlr or 0, path.stat().st_size
+    offset, size = header.start_of_first_evlr or 0, path.stat().st_size
     with path.open("rb") as file:
         for _ in range(header.number_of_evlrs or 0):
-            file.seek(min(at + 20, size))
-            at += 60 + int.from_bytes(file.read(8), "little")
-            if at > size:
+            file.seek(min(offset + 20, size))
+            offset += 60 + int.from_bytes(file.read(8), "little")
+            if offset > size:
                 raise InputError(str(path), None, "is truncated: the records behind its points reach beyond its end")
 
 
@@ -423,6 +440,11 @@ def _scan_angle(record: Any, names: set[str]) -> AnyArray:
 
 
 def _header(path: Path, las: laspy.LasHeader) -> CloudHeader:
+    """Return the header of a LAS file as that of a cloud.
+
+    Raises:
+        InputError: scales, offsets, coordinate system or our own notes are damaged.
+    """
     names = set(las.point_format.dimension_names)
     notes = _notes(path, las, NOTES)
     if not (np.isfinite(las.offsets).all() and np.isfinite(las.scales).all() and np.all(las.scales != 0.0)):
@@ -430,9 +452,9 @@ def _header(path: Path, las: laspy.LasHeader) -> CloudHeader:
         raise InputError(f"{path}: scales and offsets", scales, "must be finite numbers, the scales not 0")
     labelled = bool(notes) and "class_id" in names
     attributes = attributes_of(names) if notes else ()
-    read = _READ | {*FLAGS} | {column.name for column in columns(attributes)}
+    read_names = _READ | {*FLAGS} | {column.name for column in columns(attributes)}
     if not labelled:
-        read -= {"class_id"}
+        read_names -= {"class_id"}
     scheme = asprs_scheme(range(256))
     if labelled:
         rows = notes.get("classes")
@@ -450,7 +472,7 @@ def _header(path: Path, las: laspy.LasHeader) -> CloudHeader:
         attributes=attributes,
         has_color="red" in names,
         predicted=_predicted_classes(path, las),
-        left_out=tuple(sorted(names - read)),
+        left_out=tuple(sorted(names - read_names)),
         standard_time=las.global_encoding.gps_time_type == laspy.header.GpsTimeType.STANDARD,
     )
 
@@ -466,7 +488,9 @@ def _notes(path: Path, las: laspy.LasHeader, number: int) -> dict[str, Any]:
 
 def _predicted_classes(path: Path, las: laspy.LasHeader) -> ClassScheme | None:
     """Return the scheme of a file's predicted classes, of which only the numbers may be known; None if it has none."""
-    if not any(one.name == PREDICTED and one.dtype == np.uint8 for one in las.point_format.extra_dimensions):
+    if not any(
+        dimension.name == PREDICTED and dimension.dtype == np.uint8 for dimension in las.point_format.extra_dimensions
+    ):
         return None
     notes = _notes(path, las, PREDICTED_CLASSES)
     return stored_scheme(notes, str(path)) if notes else numbered_scheme()
@@ -505,14 +529,15 @@ def _check_chunks(path: Path, start: int, record: bytes) -> None:
         if start + 8 + sum(chunks) > table:
             raise _damage_error(path)
         layers = _layers_of(record)
-        at = start + 8
+        offset = start + 8
         for number, length in enumerate(chunks):
-            if layers and not _layers_add_up(file, at, length, *layers):
+            if layers and not _layers_add_up(file, offset, length, *layers):
                 raise InputError(str(path), None, f"is damaged in chunk {number + 1:,} of {len(chunks):,}")
-            at += length
+            offset += length
 
 
 def _damage_error(path: Path) -> InputError:
+    """Return, without raising, the `InputError` for a LAZ file whose table of chunks is damaged."""
     return InputError(str(path), None, "is damaged: its table of chunks doesn't match the file")
 
 
@@ -540,10 +565,18 @@ def _layers_of(record: bytes) -> tuple[int, int] | None:
     return sum(length for _, length, _ in kinds), layers
 
 
-def _layers_add_up(file: BinaryIO, at: int, length: int, point: int, layers: int) -> bool:
-    """Return whether a LAZ chunk's length is the sum of its first point, its point count and its layers."""
+def _layers_add_up(file: BinaryIO, offset: int, length: int, point: int, layers: int) -> bool:
+    """Return whether a chunk is as long as its first point, point count, list of layers' lengths and layers.
+
+    Args:
+        file: the LAZ file.
+        offset: at which the chunk begins, bytes.
+        length: of the chunk, bytes.
+        point: size of a point, bytes.
+        layers: number of layers.
+    """
     head = point + 4
-    file.seek(at + head)
+    file.seek(offset + head)
     lengths = file.read(4 * layers)
     if len(lengths) < 4 * layers:
         return False

@@ -26,25 +26,29 @@ _FORMER_VERTICAL = range(5101, 5113)
 
 
 def declared_system(path: Path, las: laspy.LasHeader) -> tuple[MapSystem | None, list[str]]:
-    """Return the system that a LAS file declares, None if it declares none, and what is to be said about it.
+    """Return the system that a LAS file declares, None if it declares none, and remarks on it for the user.
+
+    Where WKT and GeoTIFF keys name different systems, the header's flag says which one counts.
 
     Raises:
         InputError: its coordinates aren't those of a map: longitudes and latitudes, say.
     """
     text, keys = _wkt(path, las), _GeoKeys(path, las)
-    named, notes = system_of_text(text)
+    text_system, notes = system_of_text(text)
     if not keys.values:
-        return named, notes
-    other = keys.system(notes)
-    if named is None or other is None:
-        return named or other, notes
-    if named.label != other.label and other.epsg and named.epsg != other.epsg:
-        chosen, left = (named, other) if las.global_encoding.wkt else (other, named)
-        notes.append(f"it names two coordinate systems: {chosen.label} is used, {left.label} is ignored")
-        return chosen, notes
-    if named.height_unit is None and other.height_unit is not None:
-        return (other if named.same_as(other) else named), notes
-    return named, notes
+        return text_system, notes
+    key_system = keys.system(notes)
+    if text_system is None or key_system is None:
+        return text_system or key_system, notes
+    if text_system.label != key_system.label and key_system.epsg and text_system.epsg != key_system.epsg:
+        used_system, ignored_system = (
+            (text_system, key_system) if las.global_encoding.wkt else (key_system, text_system)
+        )
+        notes.append(f"it names two coordinate systems: {used_system.label} is used, {ignored_system.label} is ignored")
+        return used_system, notes
+    if text_system.height_unit is None and key_system.height_unit is not None:
+        return (key_system if text_system.same_as(key_system) else text_system), notes
+    return text_system, notes
 
 
 def _wkt(path: Path, las: laspy.LasHeader) -> str:
@@ -55,17 +59,17 @@ def _wkt(path: Path, las: laspy.LasHeader) -> str:
 
 def _wkt_behind(path: Path, las: laspy.LasHeader) -> str:
     """Return the WKT of the extended records (EVLRs), read without laspy, which trusts their sizes."""
-    at, size = las.start_of_first_evlr or 0, path.stat().st_size
+    offset, size = las.start_of_first_evlr or 0, path.stat().st_size
     with path.open("rb") as file:
         for _ in range(min(las.number_of_evlrs or 0, 10_000)):
-            if at + 60 > size:
+            if offset + 60 > size:
                 break
-            file.seek(at)
+            file.seek(offset)
             user, number, length = struct.unpack("<2x16sHQ", file.read(28))
             if user.rstrip(b"\0").decode("ascii", "replace") == _USER and number == _WKT:
-                file.seek(at + 60)
+                file.seek(offset + 60)
                 return file.read(min(length, _LONGEST)).decode("utf-8", "replace").strip("\0 ")
-            at += 60 + length
+            offset += 60 + length
     return ""
 
 
@@ -83,16 +87,23 @@ class _GeoKeys:
         self.values: dict[int, Any] = {}
         for record in las.vlrs.get("GeoKeyDirectoryVlr"):
             for key in record.geo_keys:
-                first = int(key.value_offset)
+                offset = int(key.value_offset)
                 if key.tiff_tag_location == 0:
-                    self.values[key.id] = first
-                elif key.tiff_tag_location == 34736 and first < len(doubles):
-                    self.values[key.id] = doubles[first]
+                    self.values[key.id] = offset
+                elif key.tiff_tag_location == 34736 and offset < len(doubles):
+                    self.values[key.id] = doubles[offset]
                 elif key.tiff_tag_location == 34737:
-                    self.values[key.id] = texts[first : first + int(key.count)].strip("| \0")
+                    self.values[key.id] = texts[offset : offset + int(key.count)].strip("| \0")
 
     def system(self, notes: list[str]) -> MapSystem | None:
-        """Return the system that the keys name, with the units that they name, and add notes, in place."""
+        """Return the system that the keys name, with the units that they name; None if they name none.
+
+        Args:
+            notes: remarks for the user; those on the keys are added, in place.
+
+        Raises:
+            InputError: its coordinates are degrees, or distances from the Earth's centre.
+        """
         projected, model = self.values.get(_PROJECTED), self.values.get(_MODEL)
         if projected is None and model not in _MODELS and _GEOGRAPHIC in self.values:
             model = 2
@@ -108,13 +119,15 @@ class _GeoKeys:
         return system if unit is None and height_unit is None else system.with_units(unit, height_unit)
 
     def _no_map(self, model: str) -> MapSystem:
+        """Raise `InputError` for coordinates of a model that is no map."""
         code = self.values.get(_GEOGRAPHIC)
-        shown = f"{model}, EPSG:{code}" if code and code != _OWN else model
+        model_text = f"{model}, EPSG:{code}" if code and code != _OWN else model
         unit = "degrees" if model == "geographic" else "distances from the Earth's centre"
-        allowed = f"its coordinates are {unit}: metres or feet of a projected system are needed"
-        raise InputError(f"{self._path}: coordinate system", shown, allowed)
+        requirement = f"its coordinates are {unit}: metres or feet of a projected system are needed"
+        raise InputError(f"{self._path}: coordinate system", model_text, requirement)
 
     def _projected(self, code: Any, notes: list[str]) -> MapSystem | None:
+        """Return the projected system of a code; None without a code, or for an unknown one, which is noted."""
         if code is None:
             return None
         try:
@@ -124,6 +137,7 @@ class _GeoKeys:
         return None
 
     def _nameless(self, unit: float, height_unit: float | None) -> MapSystem:
+        """Return a local system that only units are known of, m."""
         title = str(self.values.get(_PROJECTED_CITATION) or "unnamed").replace('"', "'")
         system = MapSystem.read(f'LOCAL_CS["{title}",UNIT["unit",{unit!r}],AXIS["X",EAST],AXIS["Y",NORTH]]')
         return system if height_unit is None else replace(system, height_unit=height_unit)
@@ -133,9 +147,9 @@ class _GeoKeys:
         code = self.values.get(_VERTICAL)
         if not isinstance(code, int) or not 0 < code < _OWN or system.epsg is None:
             return system
-        for known in (code, code + 600 if code in _FORMER_VERTICAL else code):
+        for candidate in (code, code + 600 if code in _FORMER_VERTICAL else code):
             try:
-                return MapSystem.of(system.epsg, known)
+                return MapSystem.of(system.epsg, candidate)
             except InputError:
                 continue
         notes.append(f"its vertical coordinate system {code} is unknown: it is ignored")

@@ -45,6 +45,7 @@ class NpzWriter(CloudWriter):
     """Writer of point blocks to an NPZ file, neither rounded nor clipped; see `CloudWriter`."""
 
     def _open(self) -> None:
+        """Create a file for each array, in which its values are gathered."""
         names = {column.array for column in self.columns}
         self._arrays = POINT_TYPES | {name: kind for name, kind in _ON_REQUEST.items() if name in names}
         self._parts = self._temporary.with_name("parts")
@@ -54,11 +55,13 @@ class NpzWriter(CloudWriter):
             self._files[name] = (self._parts / name).open("wb")
 
     def _append(self, block: PointBlock) -> None:
+        """Append the block's values to the arrays' files."""
         for name, (kind, _) in self._arrays.items():
             values = self.file_class_ids(block) if name == "class_id" else block.array(name)
             self._files[name].write(np.ascontiguousarray(self.fit_values(values, kind, name), dtype=kind).data)
 
     def _finish(self) -> None:
+        """Put the arrays' files together into one archive, with headers and notes."""
         for file in self._files.values():
             file.close()
         with zipfile.ZipFile(self._temporary, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
@@ -73,6 +76,7 @@ class NpzWriter(CloudWriter):
                 npy.write_array(member, np.array(json.dumps(self.placed_notes())), allow_pickle=False)
 
     def _close(self) -> None:
+        """Close the arrays' files, in whatever state they are."""
         for file in self._files.values():
             with suppress(OSError):
                 file.close()
@@ -103,12 +107,12 @@ class NpzReader(CloudReader):
             self.close()
             raise
         arrays = set(self._kinds)
-        stored = {name.removesuffix(".npy") for name in self._file.namelist()}
+        stored_names = {name.removesuffix(".npy") for name in self._file.namelist()}
         self.header = header_from_notes(
             path,
             "NPZ",
             self._kinds["xyz"][0][0],
-            stored,
+            stored_names,
             notes,
             name_of=lambda column: column.array,
             usual=arrays | {"notes"},
@@ -117,7 +121,7 @@ class NpzReader(CloudReader):
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
         """Yield the points as blocks of at most ``size``, read in step from all arrays."""
-        full = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
+        brightness = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
         members = {name: self._file.open(f"{name}.npy") for name in self._kinds}
         try:
             for member in members.values():
@@ -129,8 +133,8 @@ class NpzReader(CloudReader):
                 except ARCHIVE_FAULTS:
                     raise damage_error(self.header.path, position, self.header.count) from None
                 check_coordinates(self.header.path, position, arrays["xyz"])
-                if "rgb" in arrays and (full != SIXTEEN_BITS or arrays["rgb"].dtype.kind == "f"):
-                    arrays["rgb"] = sixteen_bits(arrays["rgb"], full)
+                if "rgb" in arrays and (brightness != SIXTEEN_BITS or arrays["rgb"].dtype.kind == "f"):
+                    arrays["rgb"] = sixteen_bits(arrays["rgb"], brightness)
                 yield self._block(arrays, rows, position)
         finally:
             for member in members.values():
@@ -143,20 +147,29 @@ class NpzReader(CloudReader):
             return EIGHT_BITS
 
         def colors() -> Iterator[AnyArray]:
+            """Yield the stored colours (n, 3) of the file's points, in parts."""
             with self._file.open("rgb.npy") as member, suppress(*ARCHIVE_FAULTS):  # damage is found with the points
                 _npy_header(member)
                 for position in range(0, self.header.count, PEEK):
                     yield self._rows(member, "rgb", min(PEEK, self.header.count - position))
 
-        return self._assumed_brightness(colors(), whole=kind.kind in "iu")
+        return self._assumed_brightness(colors(), is_integer=kind.kind in "iu")
 
     def _rows(self, member: IO[bytes], name: str, count: int) -> AnyArray:
+        """Return the next ``count`` rows of an array from its open member."""
         shape, kind = self._kinds[name]
         rows = (count, *shape[1:])
         data = np.frombuffer(member.read(int(np.prod(rows)) * kind.itemsize), dtype=kind)
         return data.reshape(rows).copy()
 
     def _block(self, arrays: dict[str, AnyArray], count: int, position: int) -> PointBlock:
+        """Return the block of points from arrays by their names.
+
+        Args:
+            arrays: n rows each.
+            count: n.
+            position: points before these, for messages.
+        """
         stored = {
             c.name: arrays[c.array] if c.component is None else arrays[c.array][:, c.component]
             for c in columns(self.header.attributes)
@@ -177,11 +190,12 @@ class NpzReader(CloudReader):
         for name, (shape, kind) in kinds.items():
             width = _KNOWN[name][1]
             if shape != ((count, width) if width > 1 else (count,)) or kind.kind not in "fiub":
-                expected = f"({count}, {width})" if width > 1 else f"({count},)"
-                raise InputError(f"{path}: {name}", shape, f"must be numbers of shape {expected}")
+                expected_shape = f"({count}, {width})" if width > 1 else f"({count},)"
+                raise InputError(f"{path}: {name}", shape, f"must be numbers of shape {expected_shape}")
         return kinds
 
     def _read_notes(self) -> Any:
+        """Return the file's notes; None without. Raise ValueError if they are too long or no text."""
         if "notes.npy" not in self._file.namelist():
             return None
         if self._file.getinfo("notes.npy").file_size > _LONGEST_NOTES:
@@ -194,10 +208,10 @@ class NpzReader(CloudReader):
 
 
 def _npy_header(member: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Read an NPY header from an open member and return the array's shape and type."""
+    """Read the header of an NPY array from an open member; return the array's shape and type."""
     version = npy.read_magic(member)
-    read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-    shape, fortran_order, kind = read(member)
+    read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    shape, fortran_order, kind = read_header(member)
     if fortran_order and len(shape) > 1:
         raise ValueError("arrays must be in C order")
     return shape, kind

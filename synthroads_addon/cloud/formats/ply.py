@@ -99,12 +99,14 @@ class PlyWriter(CloudWriter):
     """Writer of point blocks to a binary PLY file, with 8-bit colours and unclipped intensities."""
 
     def _open(self) -> None:
+        """Create the file with a header for no points, which is written again in the end."""
         self._fields = [*_FIXED, *((ply_name(column), _ply_type(column)) for column in self.columns)]
         self._type = np.dtype(self._fields)
         self._file = self._temporary.open("wb")
         self._file.write(self._header(0))
 
     def _append(self, block: PointBlock) -> None:
+        """Append a block's points as records."""
         record = np.zeros(len(block), dtype=self._type)
         record["x"], record["y"], record["z"] = self.check_finite(block.xyz, "xyz").T
         for name, channel in zip(_CHANNELS, block.rgb.T, strict=True):
@@ -123,6 +125,7 @@ class PlyWriter(CloudWriter):
         self._file.write(record)
 
     def _finish(self) -> None:
+        """Write the header again with the number of points, and close the file."""
         self._file.seek(0)
         self._file.write(self._header(self.count))
         self._file.close()
@@ -160,38 +163,43 @@ class PlyReader(CloudReader):
             if not {"x", "y", "z"} <= self._names:
                 raise InputError(str(path), None, "has no x, y, z")
             self._start = self._file.tell()
-            there = (path.stat().st_size - self._start) // self._type.itemsize
-            if there < count:
-                raise damage_error(path, max(0, there), count)
+            available_points = (path.stat().st_size - self._start) // self._type.itemsize
+            if available_points < count:
+                raise damage_error(path, max(0, available_points), count)
         except BaseException:
             self._file.close()
             raise
         self._own = {name: label for name in _own_names() if (label := self._stored_name(name))}
         self._others = {} if isinstance(notes, dict) else self._names_of_others()
-        used = {*"xyz", *self._own.values(), *self._others.values()}
-        colored = all(name in self._own or name in self._others for name in _CHANNELS)
-        stored, usual = {*self._own, *(self._names - used)}, {*_own_names()}
+        used_names = {*"xyz", *self._own.values(), *self._others.values()}
+        has_color = all(name in self._own or name in self._others for name in _CHANNELS)
+        names_for_header, usual = {*self._own, *(self._names - used_names)}, {*_own_names()}
         self.header = header_from_notes(
-            path, "PLY", count, stored, notes, name_of=ply_name, usual=usual, has_color=colored
+            path, "PLY", count, names_for_header, notes, name_of=ply_name, usual=usual, has_color=has_color
         )
         self._assumed_scheme = not self.header.labelled and {ply_name(column) for column in LABELS} <= self._own.keys()
         if self._assumed_scheme:  # one of ours that other software wrote again, without its notes
             self.header = replace(self.header, scheme=class_scheme("17"), labelled=True)
 
     def _stored_name(self, name: str) -> str | None:
-        """Return what a property of ours is called in the file: older files lack the prefix; None without it."""
-        return next((one for one in (name, name.removeprefix(_SCALAR)) if one in self._names), None)
+        """Return the file's name of one of our properties, in older files without the prefix; None if it lacks it."""
+        return next((candidate for candidate in (name, name.removeprefix(_SCALAR)) if candidate in self._names), None)
 
     def _names_of_others(self) -> dict[str, str]:
-        """Return the properties of a file of others by the quantity that they are, as far as ours aren't there."""
-        plain = {_plain(name): name for name in sorted(self._names, reverse=True)}
+        """Return the names of properties in others' files by the quantity that they are, where ours are missing."""
+        names_by_plain = {_plain(name): name for name in sorted(self._names, reverse=True)}
         names_by_kind = {
-            what: next((plain[name] for name in names if name in plain), None) for what, names in _OTHERS.items()
+            quantity: next((names_by_plain[name] for name in names if name in names_by_plain), None)
+            for quantity, names in _OTHERS.items()
         }
         if not all(names_by_kind[name] for name in _CHANNELS):
             names_by_kind |= dict.fromkeys(_CHANNELS)
-        mine = {**{array: name for array, (name, _) in _FIELDS.items()}, "source": f"{_SCALAR}strip"}
-        return {what: name for what, name in names_by_kind.items() if name and mine.get(what, what) not in self._own}
+        own_quantities = {**{array: name for array, (name, _) in _FIELDS.items()}, "source": f"{_SCALAR}strip"}
+        return {
+            quantity: name
+            for quantity, name in names_by_kind.items()
+            if name and own_quantities.get(quantity, quantity) not in self._own
+        }
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
         """Yield the points as blocks of at most ``size``, from the file's first point on."""
@@ -200,14 +208,14 @@ class PlyReader(CloudReader):
             assume(f"{self.header.path.name}: its class_id is read as numbers of the 17 classes")
         elif label and _plain(label) != _CLASSES[0]:
             assume(f"{self.header.path.name}: its property {label} is read as LAS codes of classes")
-        full = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
+        brightness = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
         self._file.seek(self._start)
         for position in range(0, self.header.count, size):
             rows = min(size, self.header.count - position)
             data = self._file.read(rows * self._type.itemsize)
             if len(data) != rows * self._type.itemsize:
                 raise damage_error(self.header.path, position, self.header.count)
-            yield self._block(np.frombuffer(data, dtype=self._type), full, position)
+            yield self._block(np.frombuffer(data, dtype=self._type), brightness, position)
 
     def _channels(self) -> list[str]:
         """Return the names of the properties of red, green and blue."""
@@ -220,6 +228,7 @@ class PlyReader(CloudReader):
             return EIGHT_BITS
 
         def colors() -> Iterator[AnyArray]:
+            """Yield the stored colours of the file's points, in parts (3, n)."""
             self._file.seek(self._start)
             for position in range(0, self.header.count, PEEK):
                 rows = min(PEEK, self.header.count - position)
@@ -227,35 +236,46 @@ class PlyReader(CloudReader):
                 record = np.frombuffer(data[: len(data) // self._type.itemsize * self._type.itemsize], dtype=self._type)
                 yield np.stack([record[name] for name in self._channels()])
 
-        return self._assumed_brightness(colors(), whole=all(kind.kind in "iu" for kind in kinds))
+        return self._assumed_brightness(colors(), is_integer=all(kind.kind in "iu" for kind in kinds))
 
-    def _block(self, record: AnyArray, full: float, position: int) -> PointBlock:
-        stored_names, others = self._own, self._others
-        stored = {
+    def _block(self, record: AnyArray, brightness: float, position: int) -> PointBlock:
+        """Return the block of points from records.
+
+        Args:
+            record: (n,) of the file's type.
+            brightness: stored value of full brightness.
+            position: points before these, for messages.
+        """
+        stored_names, properties_of_others = self._own, self._others
+        arrays = {
             c.name: record[stored_names[ply_name(c)]]
             for c in columns(self.header.attributes)
             if ply_name(c) in stored_names
         }
-        stored |= {
+        arrays |= {
             array: record[stored_names[name]].copy() for array, (name, _) in _FIELDS.items() if name in stored_names
         }
-        stored |= {name: record[field].copy() for name, field in others.items() if name in (*_FIELDS, *FLAGS)}
-        if "source" in others:  # from 1, as in LAS; 0 is none, which strips count as 65535
-            source = self._fit(record[others["source"]], "strip", position)
-            stored["strip"] = source - np.uint16(1)
+        arrays |= {
+            name: record[field].copy() for name, field in properties_of_others.items() if name in (*_FIELDS, *FLAGS)
+        }
+        if "source" in properties_of_others:  # from 1, as in LAS; 0 is none, which strips count as 65535
+            source = self._fit(record[properties_of_others["source"]], "strip", position)
+            arrays["strip"] = source - np.uint16(1)
         if not self.header.labelled:
-            stored["class_id"] = record[others["class"]] if "class" in others else np.zeros(len(record))
+            arrays["class_id"] = (
+                record[properties_of_others["class"]] if "class" in properties_of_others else np.zeros(len(record))
+            )
         xyz = np.stack([record[name].astype(np.float64) for name in "xyz"], axis=1)
-        stored["xyz"] = check_coordinates(self.header.path, position, xyz)
+        arrays["xyz"] = check_coordinates(self.header.path, position, xyz)
         if self.header.has_color:
-            stored["rgb"] = sixteen_bits(np.stack([record[name] for name in self._channels()], axis=1), full)
-        return self._points(stored, len(record), position)
+            arrays["rgb"] = sixteen_bits(np.stack([record[name] for name in self._channels()], axis=1), brightness)
+        return self._points(arrays, len(record), position)
 
 
 def _own_names() -> tuple[str, ...]:
     """Return the names of all properties of our own files."""
-    every = (column for layer in LAYERS.values() for column in layer.columns)
-    return (*(name for name, _ in _FIXED), *map(ply_name, LABELS), *map(ply_name, every))
+    layer_columns = (column for layer in LAYERS.values() for column in layer.columns)
+    return (*(name for name, _ in _FIXED), *map(ply_name, LABELS), *map(ply_name, layer_columns))
 
 
 def read_ply_header(path: Path, file: BinaryIO) -> tuple[int, np.dtype[Any], Any]:
@@ -285,8 +305,8 @@ def read_ply_header(path: Path, file: BinaryIO) -> tuple[int, np.dtype[Any], Any
 
 def _header_lines(path: Path, file: BinaryIO) -> Iterator[str]:
     """Yield the lines of a PLY header up to ``end_header``; raise `InputError` if the file ends first."""
-    while raw := file.readline(_LONGEST_LINE):
-        line = raw.decode("ascii", errors="replace").rstrip("\r\n")
+    while line_bytes := file.readline(_LONGEST_LINE):
+        line = line_bytes.decode("ascii", errors="replace").rstrip("\r\n")
         if line.strip() == "end_header":
             return
         yield line
@@ -294,12 +314,14 @@ def _header_lines(path: Path, file: BinaryIO) -> Iterator[str]:
 
 
 def _number_of_points(path: Path, words: list[str]) -> int:
+    """Return the number of points of an ``element`` line, split into words; raise `InputError` if it is none."""
     if not words[2].isdecimal() or len(words[2]) > _MOST_DIGITS:
         raise InputError(str(path), words[2], "must be a number of points")
     return int(words[2])
 
 
 def _notes(path: Path, text: str) -> Any:
+    """Return the notes that the comments hold as JSON; None without."""
     try:
         return json.loads(text) if text else None
     except (ValueError, RecursionError):

@@ -76,11 +76,11 @@ class CloudReader(ABC):
             InputError: see `blocks`.
         """
         for block in self.blocks(size):
-            usable = self.usable_points(block)
-            yield without_flags(block if usable.all() else block.select(usable))
+            is_usable = self.usable_points(block)
+            yield without_flags(block if is_usable.all() else block.select(is_usable))
 
     def usable_points(self, block: PointBlock, *, noise: bool = False) -> Bool:
-        """Return a mask (N,) of a block's points that may be worked with; the user is told how many may not.
+        """Return a mask (N,) of a block's points that may be worked with; the others are counted in a remark.
 
         Withheld points count as deleted, and points of a class of noise (LAS codes 7 and 18) lie on nothing.
 
@@ -88,12 +88,12 @@ class CloudReader(ABC):
             block: of `blocks`, which is being run through.
             noise: whether points of a class of noise may be worked with: where other numbers tell the classes.
         """
-        withheld = withheld_points(block)
-        bad = np.zeros(len(block), dtype=bool) if noise else noise_points(block, self.header.scheme) & ~withheld
-        for points, remark in ((withheld, WITHHELD_REMARK), (bad, NOISE_REMARK)):
+        is_withheld = withheld_points(block)
+        is_noise = np.zeros(len(block), dtype=bool) if noise else noise_points(block, self.header.scheme) & ~is_withheld
+        for points, remark in ((is_withheld, WITHHELD_REMARK), (is_noise, NOISE_REMARK)):
             if points.any():
                 self._remarks[remark] += int(np.count_nonzero(points))
-        return ~(withheld | bad)
+        return ~(is_withheld | is_noise)
 
     @abstractmethod
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
@@ -110,54 +110,65 @@ class CloudReader(ABC):
         Raises:
             InputError: a number doesn't fit into its array: nothing wraps.
         """
-        fitted = {name: self._fit(values, name, position) for name, values in stored.items()}
-        return make_points(fitted, self.header.attributes, count)
+        checked_arrays = {name: self._fit(values, name, position) for name, values in stored.items()}
+        return make_points(checked_arrays, self.header.attributes, count)
 
     def _fit(self, values: AnyArray, name: str, position: int) -> AnyArray:
         """Return values (N, ...) in the type of whole numbers that their name has in blocks, where it has one.
 
-        What is NaN, and a class of -1, stands for no value in the files of others: it becomes 0 and is remarked on.
+        NaN, and a class of -1, stand for no value in the files of others: they become 0 and are remarked on.
+
+        Args:
+            values: as stored.
+            name: of the array or column.
+            position: points before these, for messages.
+
+        Raises:
+            InputError: a value isn't a whole number of that type.
         """
         kind = np.dtype(STORED_TYPES.get(name, "f8"))
         if kind.kind not in "iu" or values.dtype == kind or not values.size:
             return values
-        none = np.isnan(values) if values.dtype.kind == "f" else np.zeros(values.shape, dtype=bool)
+        is_missing = np.isnan(values) if values.dtype.kind == "f" else np.zeros(values.shape, dtype=bool)
         if name == "class_id" and values.dtype.kind != "u":
-            none |= values == -1
-        if none.any():
-            self._remarks[f"points have no {name} (NaN or -1): it is read as 0"] += int(np.count_nonzero(none))
-            values = np.where(none, 0, values)
+            is_missing |= values == -1
+        if is_missing.any():
+            self._remarks[f"points have no {name} (NaN or -1): it is read as 0"] += int(np.count_nonzero(is_missing))
+            values = np.where(is_missing, 0, values)
         if values.dtype.kind == "b":
             return values.astype(kind)
-        whole = np.rint(values) if values.dtype.kind == "f" else values
+        rounded = np.rint(values) if values.dtype.kind == "f" else values
         limits = np.iinfo(kind)
-        faults = (whole < limits.min) | (whole > limits.max)
+        is_wrong = (rounded < limits.min) | (rounded > limits.max)
         if values.dtype.kind == "f":
-            faults |= np.abs(whole - values) > _NOT_WHOLE
-        if faults.any():
-            point = int(np.argwhere(faults)[0][0])
-            worst = values[faults].flat[0]
-            allowed = f"must be a whole number from {limits.min} to {limits.max}"
-            raise InputError(f"{self.header.path}: {name} of point {position + point:,}", worst, allowed)
-        return whole.astype(kind)
+            is_wrong |= np.abs(rounded - values) > _NOT_WHOLE
+        if is_wrong.any():
+            point = int(np.argwhere(is_wrong)[0][0])
+            wrong_value = values[is_wrong].flat[0]
+            requirement = f"must be a whole number from {limits.min} to {limits.max}"
+            raise InputError(f"{self.header.path}: {name} of point {position + point:,}", wrong_value, requirement)
+        return rounded.astype(kind)
 
-    def _assumed_brightness(self, colors: Iterable[AnyArray], *, whole: bool) -> float:
-        """Return the stored value of full brightness where the file declares none, and tell what was assumed; cached.
+    def _assumed_brightness(self, colors: Iterable[AnyArray], *, is_integer: bool) -> float:
+        """Return the stored value of full brightness, assumed from the largest colour and remarked on; cached.
 
         Args:
             colors: all that the file holds, in parts; no more of them are looked at than it takes.
-            whole: whether they are whole numbers.
+            is_integer: whether they are whole numbers.
         """
         if self._brightness is None:
-            largest = 0.0
+            largest_value = 0.0
             for part in colors:
-                largest = max(largest, float(np.nanmax(part, initial=0.0)))
-                if full_brightness(largest, whole=whole) >= SIXTEEN_BITS and not largest > SIXTEEN_BITS:
+                largest_value = max(largest_value, float(np.nanmax(part, initial=0.0)))
+                if (
+                    full_brightness(largest_value, is_integer=is_integer) >= SIXTEEN_BITS
+                    and not largest_value > SIXTEEN_BITS
+                ):
                     break
-            self._brightness = full_brightness(largest, whole=whole) if largest else SIXTEEN_BITS
-            if largest and not (whole and self._brightness == SIXTEEN_BITS):
+            self._brightness = full_brightness(largest_value, is_integer=is_integer) if largest_value else SIXTEEN_BITS
+            if largest_value and not (is_integer and self._brightness == SIXTEEN_BITS):
                 scale = brightness_text(self._brightness)
-                assume(f"{self.header.path.name}: its colours, {largest:g} at most, are read as {scale}")
+                assume(f"{self.header.path.name}: its colours, {largest_value:g} at most, are read as {scale}")
         return self._brightness
 
     def close(self) -> None:
@@ -189,14 +200,14 @@ def _check_block(path: Path, position: int, block: PointBlock) -> PointBlock:
     xyz = check_coordinates(path, position, block.xyz)
     if max(xyz.max(), -xyz.min()) > FARTHEST:
         point, axis = divmod(int(np.abs(xyz).argmax()), 3)
-        allowed = f"must be a map coordinate, at most {FARTHEST:g} m"
-        raise InputError(f"{path}: {'xyz'[axis]} of point {position + point:,}", float(xyz[point, axis]), allowed)
+        requirement = f"must be a map coordinate, at most {FARTHEST:g} m"
+        raise InputError(f"{path}: {'xyz'[axis]} of point {position + point:,}", float(xyz[point, axis]), requirement)
     if not np.isfinite(block.intensity).all():
         point = int(np.argmin(np.isfinite(block.intensity)))
         raise InputError(f"{path}: intensity of point {position + point:,}", block.intensity[point], "must be finite")
     return block
 
 
-def damage_error(path: Path, at: int, count: int) -> InputError:
-    """Return, without raising, the `InputError` for a file that is damaged from its point number ``at`` on."""
-    return InputError(str(path), None, f"is truncated or damaged after {at:,} of {count:,} points")
+def damage_error(path: Path, position: int, count: int) -> InputError:
+    """Return, without raising, the `InputError` for a file that is damaged from its point number ``position`` on."""
+    return InputError(str(path), None, f"is truncated or damaged after {position:,} of {count:,} points")

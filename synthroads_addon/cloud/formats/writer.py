@@ -129,10 +129,10 @@ class CloudWriter(ABC):
         self.count += len(block)
 
     def _without_flags(self, block: PointBlock) -> PointBlock:
-        """Return the block without flags and withheld points, which nothing would tell from others; count them."""
+        """Return the block without flags and withheld points, for which the format has no fields; count them."""
         for name in FLAGS:
-            if name in block.more and (marked := int(np.count_nonzero(block.more[name]))):
-                self.lost[name] = self.lost.get(name, 0) + marked
+            if name in block.more and (marked_count := int(np.count_nonzero(block.more[name]))):
+                self.lost[name] = self.lost.get(name, 0) + marked_count
         if WITHHELD in block.more and block.more[WITHHELD].any():
             block = block.select(~withheld_points(block))
         return without_flags(block)
@@ -151,7 +151,13 @@ class CloudWriter(ABC):
         return {**self.notes(), "offset": self.offset.tolist(), "crs": self.crs_text}
 
     def to_integers(self, values: AnyArray, kind: str, name: str, scale: float | None = None) -> AnyArray:
-        """Return values (N,), divided by the scale and rounded, in the integer type ``kind``.
+        """Return values (N,), divided by the scale and rounded, in an integer type.
+
+        Args:
+            values: to be stored.
+            kind: name of the type.
+            name: of the values, for messages.
+            scale: value of one step; None for whole numbers.
 
         Raises:
             OutputError: a value is NaN or doesn't fit.
@@ -168,22 +174,39 @@ class CloudWriter(ABC):
         if not (minimum >= limits.min and maximum <= limits.max):
             culprit = minimum if not minimum >= limits.min else maximum
             unit = scale or 1
-            allowed = f"{name} must lie from {limits.min * unit:g} to {limits.max * unit:g}"
-            raise OutputError(str(self.path), float(culprit * unit), allowed)
+            requirement = f"{name} must lie from {limits.min * unit:g} to {limits.max * unit:g}"
+            raise OutputError(str(self.path), float(culprit * unit), requirement)
         return quotients.astype(kind)
 
     def check_finite(self, values: AnyArray, name: str, kind: str = "f8") -> AnyArray:
-        """Return the values unchanged; raise `OutputError` if one isn't finite, or wouldn't be as a float of a kind."""
-        most = float(np.finfo(kind).max)
-        fits = np.abs(values) <= most  # NaN isn't
+        """Return the values unchanged.
+
+        Args:
+            values: (N, ...).
+            name: of the values, for messages.
+            kind: type of the floats that they are stored in.
+
+        Raises:
+            OutputError: one isn't finite, or is too large for that type.
+        """
+        largest_value = float(np.finfo(kind).max)
+        fits = np.abs(values) <= largest_value  # NaN isn't
         if not fits.all():
-            worst = values[~fits.reshape(len(values), -1).all(axis=1)][0]
-            allowed_range = "finite" if not np.isfinite(worst).all() else f"at most {most:.2g}, as the format stores it"
-            raise OutputError(str(self.path), worst.tolist(), f"{name} must be {allowed_range}")
+            wrong_value = values[~fits.reshape(len(values), -1).all(axis=1)][0]
+            allowed_range = (
+                "finite"
+                if not np.isfinite(wrong_value).all()
+                else f"at most {largest_value:.2g}, as the format stores it"
+            )
+            raise OutputError(str(self.path), wrong_value.tolist(), f"{name} must be {allowed_range}")
         return values
 
     def fit_values(self, values: AnyArray, kind: str, name: str) -> AnyArray:
-        """Return values for a field of a type: floats unchanged, integers rounded; `OutputError` if they don't fit."""
+        """Return values for a field of a type: floats unchanged, others rounded to integers.
+
+        Raises:
+            OutputError: a value doesn't fit into the type.
+        """
         if np.dtype(kind).kind == "f":
             return self.check_finite(values, name, kind)
         return self.to_integers(values, kind, name)

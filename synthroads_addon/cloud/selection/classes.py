@@ -133,45 +133,54 @@ def class_by_label(cloud: RealCloud, code: str, field: str) -> RealClass:
 
 
 def _number(cloud: RealCloud, code: str, field: str) -> tuple[int, str]:
-    there = {int(value) for value in np.unique(cloud.label)}
+    """Return the number of a class, given by its number or name, and how it is called in messages.
+
+    Raises:
+        InputError: no point of the cloud has it.
+    """
+    present_numbers = {int(value) for value in np.unique(cloud.label)}
     if code.lstrip("-").isdigit():
         number = int(code)
-        if number not in there:
-            values_text = ", ".join(str(value) for value in sorted(there)[:40])
+        if number not in present_numbers:
+            values_text = ", ".join(str(value) for value in sorted(present_numbers)[:40])
             raise InputError(field, number, f"no point has it; the file has {values_text}")
         return number, str(number)
     names = {row.name: row.id for row in cloud.scheme.rows} if cloud.scheme else {}
-    named = {name: row for name, row in names.items() if row in there}
-    if code not in named:
-        values_text = f"one of {', '.join(sorted(named))}" if named else "a number: the attribute has no names"
-        raise InputError(field, code, f"must be {values_text}{nearest_name(code, named)}")
-    return named[code], f"{code} ({named[code]})"
+    present_names = {name: row for name, row in names.items() if row in present_numbers}
+    if code not in present_names:
+        values_text = (
+            f"one of {', '.join(sorted(present_names))}" if present_names else "a number: the attribute has no names"
+        )
+        raise InputError(field, code, f"must be {values_text}{nearest_name(code, present_names)}")
+    return present_names[code], f"{code} ({present_names[code]})"
 
 
-def select_class(cloud: RealCloud, chosen: Index, selection: str, field: str) -> RealClass:
+def select_class(cloud: RealCloud, indices: Index, selection: str, field: str) -> RealClass:
     """Return the points at these indices as a class; those of intensity 0 are only counted.
 
     Args:
         cloud: that they are of.
-        chosen: (N,) their indices.
+        indices: (N,) their indices.
         selection: in words, how they were chosen.
         field: what asks for them, for errors.
 
     Raises:
         InputError: fewer than `FEWEST` have an intensity.
     """
-    bright = chosen[cloud.intensity[chosen] > 0.0]
-    if len(bright) < FEWEST:
-        raise InputError(field, selection, f"{len(bright)} points have an intensity, at least {FEWEST} are needed")
+    bright_indices = indices[cloud.intensity[indices] > 0.0]
+    if len(bright_indices) < FEWEST:
+        raise InputError(
+            field, selection, f"{len(bright_indices)} points have an intensity, at least {FEWEST} are needed"
+        )
     return RealClass(
         selection=selection,
-        place=cloud.xyz[bright],
-        intensity=cloud.intensity[bright],
-        zeros=len(chosen) - len(bright),
-        distance=cloud.distance[bright],
-        incidence=cloud.incidence[bright],
-        returns=cloud.returns[bright],
-        time=None if cloud.time is None else cloud.time[bright],
+        place=cloud.xyz[bright_indices],
+        intensity=cloud.intensity[bright_indices],
+        zeros=len(indices) - len(bright_indices),
+        distance=cloud.distance[bright_indices],
+        incidence=cloud.incidence[bright_indices],
+        returns=cloud.returns[bright_indices],
+        time=None if cloud.time is None else cloud.time[bright_indices],
     )
 
 
@@ -196,20 +205,25 @@ _CELL = 3.0
 
 
 def _normals(place: Float) -> Float:
-    """Return unit normals (N, 3) of points on ground-like surfaces: of a plane fitted in each square cell."""
+    """Return unit normals (N, 3) of points (N, 3) on ground-like surfaces: those of a plane fitted in each square cell.
+
+    Where a cell has few points, or points in line, the normal is upright.
+    """
     cell = np.floor(place[:, :2] / _CELL).astype(np.int64)
     _, owner, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
     owner = owner.ravel()
 
     def mean(values: AnyArray) -> Float:
+        """Return the mean (C,) of values (N,) in each cell."""
         return np.asarray(np.bincount(owner, values) / count)
 
+    # Least squares of z = slope_x x + slope_y y about each cell's mean, by Cramer's rule.
     x, y, z = (place[:, i] - mean(place[:, i])[owner] for i in range(3))
     xx, xy, yy, xz, yz = mean(x * x), mean(x * y), mean(y * y), mean(x * z), mean(y * z)
-    fit = xx * yy - xy * xy
-    flat: Bool = (count < 12) | (fit < 1e-2 * np.maximum(xx, yy) ** 2)
-    fit[flat] = np.inf  # upright
-    slope_x, slope_y = (xz * yy - yz * xy) / fit, (yz * xx - xz * xy) / fit
+    determinant = xx * yy - xy * xy
+    is_upright: Bool = (count < 12) | (determinant < 1e-2 * np.maximum(xx, yy) ** 2)
+    determinant[is_upright] = np.inf
+    slope_x, slope_y = (xz * yy - yz * xy) / determinant, (yz * xx - xz * xy) / determinant
     normal = np.stack([-slope_x, -slope_y, np.ones(len(count))], axis=1)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     return np.asarray(normal[owner])

@@ -68,16 +68,17 @@ class Patches:
 
 
 def with_points_beside(cloud: RealCloud, points: RealClass) -> RealClass:
-    """Return a class with all other points of its cloud that lie near it in plan and on the same surface.
+    """Return a class with the places of all other points of its cloud that lie near it and on the same surface.
 
     How points are spread then doesn't depend on where the class ends, at a marking or an edge.
     """
-    low, high = points.place.min(axis=0) - _BESIDE, points.place.max(axis=0) + _BESIDE
-    near = cloud.xyz[((cloud.xyz > low) & (cloud.xyz < high)).all(axis=1)]
-    distance, neighbour = cKDTree(points.place[:, :2]).query(near[:, :2], distance_upper_bound=_BESIDE)
-    others = np.isfinite(distance) & (distance > 0.0)
-    rise = near[others, 2] - points.place[neighbour[others], 2]
-    return replace(points, beside=near[others, :2][np.abs(rise) < _RISE])
+    lowest, highest = points.place.min(axis=0) - _BESIDE, points.place.max(axis=0) + _BESIDE
+    nearby = cloud.xyz[((cloud.xyz > lowest) & (cloud.xyz < highest)).all(axis=1)]
+    distance, neighbour = cKDTree(points.place[:, :2]).query(nearby[:, :2], distance_upper_bound=_BESIDE)
+    # Beyond the bound the distance is inf; at 0 it is a point of the class itself.
+    is_other = np.isfinite(distance) & (distance > 0.0)
+    rise = nearby[is_other, 2] - points.place[neighbour[is_other], 2]
+    return replace(points, beside=nearby[is_other, :2][np.abs(rise) < _RISE])
 
 
 def join_patches(parts: list[Patches]) -> Patches:
@@ -103,14 +104,14 @@ def make_patches(road: RealClass, name: str) -> Patches:
     cell = np.floor(road.place[:, :2] / EDGE).astype(np.int64)
     corners, owner, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
     rows = np.split(np.argsort(owner.ravel(), kind="stable"), np.cumsum(count)[:-1])
-    whole = [
+    patch_numbers = [
         number for number in np.flatnonzero(count >= FEWEST) if _is_whole(road.place[rows[number]], corners[number])
     ]
-    if not whole:
+    if not patch_numbers:
         raise InputError(name, None, f"has no {EDGE:g} m of pavement with {FEWEST} points or more")
-    values = np.array([points.describe(rows[number]) for number in whole])
-    places = tuple(_above_plane(road.place[rows[number]], corners[number] * EDGE) for number in whole)
-    return Patches(corners[whole] * EDGE, count[whole] / EDGE**2, values, places)
+    values = np.array([points.describe(rows[number]) for number in patch_numbers])
+    places = tuple(_above_plane(road.place[rows[number]], corners[number] * EDGE) for number in patch_numbers)
+    return Patches(corners[patch_numbers] * EDGE, count[patch_numbers] / EDGE**2, values, places)
 
 
 def _above_plane(place: Float, corner: AnyArray) -> Float:
@@ -152,8 +153,8 @@ class _Neighbourhood:
         if road.beside is not None:
             surface = np.concatenate([surface, road.beside - road.place[0, :2]])
             distance, nearest = cKDTree(surface).query(place[:, :2], k=_NEIGHBOURS + 1)
-        away = surface[nearest[:, 1]] - place[:, :2]
-        angle = np.arctan2(away[:, 1], away[:, 0]) % np.pi
+        offset = surface[nearest[:, 1]] - place[:, :2]
+        angle = np.arctan2(offset[:, 1], offset[:, 0]) % np.pi
         sector = np.minimum((angle / np.pi * _SECTORS).astype(np.int64), _SECTORS - 1)
         level = 10.0 * np.log10(road.intensity)
         return cls(place, level - np.median(level), distance[:, 1:], neighbour[:, 1:], sector)
@@ -169,39 +170,41 @@ class _Neighbourhood:
         The ratio of Clark and Evans (1954) is 1 where points lie at random, 2 for a square lattice; the entropy of the
         directions to the nearest neighbours is 1 where all occur alike.
         """
-        nearest, second, last = (np.maximum(self.distance[rows, k], 1e-4) for k in (0, 1, _NEIGHBOURS - 1))
+        nearest, second_nearest, eighth_nearest = (
+            np.maximum(self.distance[rows, k], 1e-4) for k in (0, 1, _NEIGHBOURS - 1)
+        )
         share = np.bincount(self.sector[rows], minlength=_SECTORS) / len(rows)
         share = share[share > 0.0]
         return [
             2.0 * nearest.mean() * np.sqrt(len(rows)) / EDGE,
             nearest.std() / nearest.mean(),
             -(share * np.log(share)).sum() / np.log(_SECTORS),
-            np.median(second / nearest),
-            last.std() / last.mean(),
+            np.median(second_nearest / nearest),
+            eighth_nearest.std() / eighth_nearest.mean(),
         ]
 
     def _geometry(self, rows: Index, residual: Float, curvature: float) -> list[float]:
         """Return the statistics of how a patch's points lie about their plane; roughness in mm."""
         skew, kurtosis = _shape(residual)
         steps = self.place[self.neighbour[rows, 0], 2] - self.place[rows, 2]
-        spread = max(float(residual.std()), 1e-6)
-        return [1e3 * spread, skew, kurtosis, curvature, float(np.sqrt(np.mean(steps**2))) / spread]
+        deviation = max(float(residual.std()), 1e-6)
+        return [1e3 * deviation, skew, kurtosis, curvature, float(np.sqrt(np.mean(steps**2))) / deviation]
 
     def _intensity(self, rows: Index, residual: Float) -> list[float]:
         """Return the statistics of a patch's intensities, in dB, among each other and to the cloud's median."""
         level = self.level[rows]
         skew, kurtosis = _shape(level)
-        low, middle, high = np.quantile(level, (0.25, 0.5, 0.75))
+        lower_quartile, median, upper_quartile = np.quantile(level, (0.25, 0.5, 0.75))
         differences = self.level[self.neighbour[rows, :3]] - level[:, None]
         variance = float(level.var())
         return [
-            high - low,
+            upper_quartile - lower_quartile,
             skew,
             kurtosis,
             float(np.abs(differences[:, 0]).mean()),
             0.5 * float(np.mean(differences**2)) / max(variance, 1e-9),
             _correlation(level, residual),
-            middle,
+            median,
         ]
 
 
@@ -217,33 +220,39 @@ def _fit_surface(place: Float) -> tuple[Float, float]:
 
 def _shape(values: Float) -> tuple[float, float]:
     """Return skewness and (non-excess) kurtosis of values (N,); 0 for both if all are alike."""
-    spread = values.std()
-    if spread < 1e-9:
+    deviation = values.std()
+    if deviation < 1e-9:
         return 0.0, 0.0
-    scaled = (values - values.mean()) / spread
-    return float(np.mean(scaled**3)), float(np.mean(scaled**4))
+    standardised = (values - values.mean()) / deviation
+    return float(np.mean(standardised**3)), float(np.mean(standardised**4))
 
 
-def _correlation(one: Float, other: Float) -> float:
+def _correlation(a: Float, b: Float) -> float:
     """Return Pearson's correlation of two arrays (N,); 0 where one of them doesn't vary."""
-    if one.std() < 1e-9 or other.std() < 1e-9:
+    if a.std() < 1e-9 or b.std() < 1e-9:
         return 0.0
-    return float(np.corrcoef(one, other)[0, 1])
+    return float(np.corrcoef(a, b)[0, 1])
 
 
-def match_density(one: Patches, other: Patches, seed: int, most: int) -> tuple[Patches, Patches]:
-    """Return equally many random patches of both, at most ``most``, with like densities (bins of 10 %).
+def match_density(a: Patches, b: Patches, seed: int, most_patches: int) -> tuple[Patches, Patches]:
+    """Return equally many random patches of two sets, with like densities (bins of 10 %).
 
-    A denser cloud has other statistics for that alone. Which ones are taken is drawn by the seed.
+    A denser cloud has other statistics for that alone.
+
+    Args:
+        a, b: the sets.
+        seed: by which patches are drawn.
+        most_patches: number of patches at most.
     """
     random = np.random.default_rng(seed)
-    chosen: tuple[list[AnyArray], list[AnyArray]] = ([], [])
-    bins = [np.floor(np.log(patches.density) / _STEP).astype(np.int64) for patches in (one, other)]
-    for number in np.intersect1d(*bins):
-        rows = [random.permutation(np.flatnonzero(which == number)) for which in bins]
-        fewer = min(map(len, rows))
-        for taken, its_rows in zip(chosen, rows, strict=True):
-            taken.append(its_rows[:fewer])
-    all_rows = [np.concatenate([*taken, np.zeros(0, np.int64)]) for taken in chosen]
-    use = random.permutation(len(all_rows[0]))[:most]
-    return one.select(all_rows[0][use]), other.select(all_rows[1][use])
+    rows_a, rows_b = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    bins_a, bins_b = (np.floor(np.log(patches.density) / _STEP).astype(np.int64) for patches in (a, b))
+    for number in np.intersect1d(bins_a, bins_b):
+        candidates_a = random.permutation(np.flatnonzero(bins_a == number))
+        candidates_b = random.permutation(np.flatnonzero(bins_b == number))
+        common_count = min(len(candidates_a), len(candidates_b))
+        rows_a.append(candidates_a[:common_count])
+        rows_b.append(candidates_b[:common_count])
+    all_a, all_b = np.concatenate(rows_a), np.concatenate(rows_b)
+    order = random.permutation(len(all_a))[:most_patches]
+    return a.select(all_a[order]), b.select(all_b[order])

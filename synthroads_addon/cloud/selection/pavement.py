@@ -61,64 +61,87 @@ def road_classes(cloud: RealCloud, road: RoadClasses, owner: str | None = None) 
         InputError: the axis can't be read, or too few points lie where pavement or markings should be.
     """
     station, offset = MeasuredAxis.read(road.axis, place=cloud.place).beside(cloud.xyz, _FARTHEST)
-    free = np.isfinite(offset)
+    is_clear = np.isfinite(offset)
     for line in road.lines:
-        free &= ~(np.abs(offset - line) < CLEAR)
-    on = np.zeros(len(offset), dtype=bool)
-    for low, high in road.paved:
-        on |= (offset > low) & (offset < high)
-    spans = " and ".join(f"{low:g} to {high:g}" for low, high in road.paved)
+        is_clear &= ~(np.abs(offset - line) < CLEAR)
+    is_paved = np.zeros(len(offset), dtype=bool)
+    for begin, end in road.paved:
+        is_paved |= (offset > begin) & (offset < end)
+    spans = " and ".join(f"{begin:g} to {end:g}" for begin, end in road.paved)
     fields = ("--paved", "--line") if owner is None else (f"{owner}paved", f"{owner}lines")
     result = {}
     if road.paved:
         selection = f"{spans} m from the axis, more than {CLEAR:g} m from the lines" if road.lines else f"{spans} m"
-        result["paved"] = select_class(cloud, np.flatnonzero(on & free), selection, fields[0])
+        result["paved"] = select_class(cloud, np.flatnonzero(is_paved & is_clear), selection, fields[0])
     if road.lines:
-        chosen, threshold = _points_on_dashes(cloud.intensity, station, offset, road, fields[1])
+        dash_points, threshold = _points_on_dashes(cloud.intensity, station, offset, road, fields[1])
         selection = (
             f"within {road.line_width / 2:g} m of the lines at {', '.join(f'{line:g}' for line in road.lines)} m, "
             f"each {STRETCH:g} m of them moved by up to {REACH:g} m to where it is brightest, where the "
             f"median intensities of {ALONG:g} m of the line before and behind exceed {threshold:,.0f} (Otsu)"
         )
-        result["line"] = select_class(cloud, chosen, selection, fields[1])
+        result["line"] = select_class(cloud, dash_points, selection, fields[1])
     return result
 
 
 def _points_on_dashes(
     intensity: Float, station: Float, offset: Float, road: RoadClasses, field: str
 ) -> tuple[Index, float]:
-    """Return the indices of points on dashes, and Otsu's threshold of median intensities that told them apart."""
-    half = road.line_width / 2.0
+    """Return the indices of points on dashes, and Otsu's threshold of median intensities that told them apart.
+
+    Args:
+        intensity: (N,) of all points.
+        station, offset: (N,) along and from the axis, m; NaN far from it.
+        road: with the lines.
+        field: that names the lines, for errors.
+
+    Raises:
+        InputError: no points lie at the lines.
+    """
+    half_width = road.line_width / 2.0
     points, medians = [], []
     for line in road.lines:
-        near = np.flatnonzero(np.abs(offset - line) < REACH + half)
-        stretch = np.floor(station[near] / STRETCH)
+        nearby = np.flatnonzero(np.abs(offset - line) < REACH + half_width)
+        stretch = np.floor(station[nearby] / STRETCH)
         for number in np.unique(stretch):
-            rows = near[stretch == number]
+            rows = nearby[stretch == number]
             distance = offset[rows] - line
-            shift = _brightest_shift(distance, intensity[rows], half)
-            rows = rows[np.abs(distance - shift) <= half]
+            shift = _brightest_shift(distance, intensity[rows], half_width)
+            rows = rows[np.abs(distance - shift) <= half_width]
             if len(rows) >= _FEWEST_OF_LINE // 2:
                 points.append(rows)
                 medians.append(_median_along(station[rows], intensity[rows]))
     if not points:
         raise InputError(field, list(road.lines), "no points lie there")
-    chosen, level = np.concatenate(points), np.concatenate(medians)
+    line_points, level = np.concatenate(points), np.concatenate(medians)
     threshold = otsu_threshold(level)
-    return chosen[level > threshold], threshold
+    return line_points[level > threshold], threshold
 
 
-def _brightest_shift(distance: Float, intensity: Float, half: float) -> float:
-    """Return the lateral shift, m, that maximises the mean intensity within half a line's width of it."""
+def _brightest_shift(distance: Float, intensity: Float, half_width: float) -> float:
+    """Return the lateral shift of a line, m, at which the mean intensity of its points is largest.
+
+    Args:
+        distance: (N,) of the points from the line's nominal middle, m.
+        intensity: (N,).
+        half_width: of the line, m.
+    """
     shifts = np.arange(-REACH, REACH + 1e-9, 0.02)
-    inside = np.abs(distance[:, None] - shifts) <= half
-    count = inside.sum(axis=0)
-    mean = (intensity[:, None] * inside).sum(axis=0) / np.maximum(count, 1)
-    return float(shifts[np.argmax(np.where(count >= max(5, count.max() // 3), mean, -np.inf))])
+    is_on_line = np.abs(distance[:, None] - shifts) <= half_width
+    count = is_on_line.sum(axis=0)
+    mean = (intensity[:, None] * is_on_line).sum(axis=0) / np.maximum(count, 1)
+    # Shifts at which the line would have few points don't count.
+    is_dense = count >= max(5, count.max() // 3)
+    return float(shifts[np.argmax(np.where(is_dense, mean, -np.inf))])
 
 
 def _median_along(station: Float, intensity: Float) -> Float:
-    """Return for each point (N,) the smaller of the median intensities within `ALONG` before and behind it."""
+    """Return for each point (N,) the smaller of the median intensities within `ALONG` before and behind it.
+
+    Args:
+        station: (N,) m.
+        intensity: (N,).
+    """
     order = np.argsort(station, kind="stable")
     place, value = station[order], intensity[order]
     begin, end = np.searchsorted(place, place - ALONG), np.searchsorted(place, place + ALONG, side="right")

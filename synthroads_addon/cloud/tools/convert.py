@@ -36,13 +36,17 @@ def convert(
     classes: str | None = None,
     overwrite: bool = False,
     progress: Progress = silent,
-    block: int = BLOCK,
+    block_size: int = BLOCK,
 ) -> dict[str, Any]:
     """Write a cloud in the format of another ending, or with merged classes; return what was done as JSON data.
 
     Args:
+        source: the cloud.
+        output: file to write.
         classes: scheme for `class_scheme`; the cloud's own if None.
-        block: points that are read at a time; the output doesn't depend on it.
+        overwrite: whether the output may be replaced.
+        progress: is told how far it is.
+        block_size: points that are read at a time; the output doesn't depend on it.
 
     Raises:
         InputError: a file can't be read, or the scheme is unknown or doesn't suit the cloud.
@@ -61,7 +65,7 @@ def convert(
     with open_cloud(source) as cloud:
         scheme = scheme_of(cloud, classes)
         with writer_like(cloud, output, scheme) as writer:
-            for points in pass_with_progress(cloud.blocks(block), cloud.header.count, progress, "convert"):
+            for points in pass_with_progress(cloud.blocks(block_size), cloud.header.count, progress, "convert"):
                 writer.write(points)
         return summary_of(cloud, writer)
 
@@ -73,13 +77,23 @@ def subsample(
     classes: str | None = None,
     overwrite: bool = False,
     progress: Progress = silent,
-    block: int = BLOCK,
+    block_size: int = BLOCK,
 ) -> dict[str, Any]:
-    """Write one point per occupied cell (edge in m) of a cubic grid; return what was done as JSON data."""
+    """Write one point per occupied cell (edge in m) of a cubic grid; return what was done as JSON data.
+
+    Args:
+        source: the cloud.
+        output: file to write.
+        cell: edge of the cells, m.
+        classes: scheme for `class_scheme`; the cloud's own if None.
+        overwrite: whether the output may be replaced.
+        progress: is told how far it is.
+        block_size: points that are read at a time; the output doesn't depend on it.
+    """
     check_output(source, output, overwrite)
     with open_cloud(source) as cloud, made_folder(output.parent), GridSubsampler(cell, output.parent) as grid:
         scheme = scheme_of(cloud, classes)
-        for points in pass_with_progress(cloud.usable_blocks(block), cloud.header.count, progress, "read"):
+        for points in pass_with_progress(cloud.usable_blocks(block_size), cloud.header.count, progress, "read"):
             grid.add(points)
         with writer_like(cloud, output, scheme) as writer:
             for points in grid.blocks():
@@ -98,13 +112,13 @@ def map_intensity(
     """Write a cloud with its intensities mapped onto another's distribution; return what was done as JSON data."""
     check_output(source, output, overwrite)
     check_output(target, output, overwrite)
-    with open_cloud(source) as cloud, open_cloud(target) as other:
-        mapping = IntensityMapping(cloud, other, per_class)
+    with open_cloud(source) as cloud, open_cloud(target) as target_cloud:
+        mapping = IntensityMapping(cloud, target_cloud, per_class)
         with writer_like(cloud, output, scheme_of(cloud, None), mapping.scale) as writer:
             for block in pass_with_progress(mapping.blocks(cloud), cloud.header.count, progress, "map"):
                 writer.write(block)
         result = summary_of(cloud, writer) | {
-            "target": other.header.path.name,
+            "target": target_cloud.header.path.name,
             "distance_before": mapping.distance_before(),
             "distance_after": mapping.distance_after(),
         }
@@ -128,18 +142,18 @@ def draw_previews(
     centerline: Float | None = None,
     depth: float = 1.0,
     overwrite: bool = False,
-    only: str | None = None,
+    picture: str | None = None,
 ) -> dict[str, Any]:
     """Draw a cloud from above and in cross-section into PNG files; return what was drawn as JSON data.
 
     Args:
         output: folder for the pictures, `KINDS`; those by predicted class and by colour only if the cloud has these.
-            With ``only`` a .png file for this picture.
+            With ``picture`` a .png file for this picture.
         line: x, y of the ends of the cut, from left to right; across the cloud's long axis if not given.
         station: where to cut, m along the centreline or the long axis; in its middle if not given.
         centerline: (N, 2) map coordinates that stations count along.
         depth: thickness of the slab that is cut out, m.
-        only: the one picture of `KINDS` that is wanted; all if None.
+        picture: the one picture of `KINDS` that is wanted; all if None.
 
     Raises:
         InputError: the cloud can't be read, has no points or not what a picture shows, or the cut lies outside of it.
@@ -147,33 +161,38 @@ def draw_previews(
     """
     single_file = output if output.suffix.lower() == ".png" and not output.is_dir() else None
     folder = output.parent if single_file else output
-    if single_file and only is None:
+    if single_file and picture is None:
         raise OutputError("--output", str(output), _one_of_several())
     with open_cloud(source) as cloud:
-        kinds = _kinds_of(cloud, only)
+        kinds = _kinds_of(cloud, picture)
         if single_file:
             check_file_target(single_file, overwrite=overwrite)
         names = {kind: single_file.name if single_file else preview_file(kind) for kind in kinds}
         with output_folder(folder, names.values(), overwrite) as work:
-            drawn, shown = _draw(cloud, work, kinds, line, station, centerline, depth)
+            counts, fields_by_kind = _draw(cloud, work, kinds, line, station, centerline, depth)
             for kind, name in names.items():
                 (work / preview_file(kind)).rename(work / name)
-    fields = {name: shown[kind] for kind, name in names.items()}
-    return {"file": source.name, "pictures": list(names.values()), "fields": fields} | drawn
+    fields = {name: fields_by_kind[kind] for kind, name in names.items()}
+    return {"file": source.name, "pictures": list(names.values()), "fields": fields} | counts
 
 
 def _one_of_several() -> str:
+    """Return the remedy for a single file that is to hold one picture of several."""
     kinds = ", ".join(KINDS[:-1])
     return f"names one picture of several: --picture {kinds} or {KINDS[-1]} says which; a folder gets all of them"
 
 
-def _kinds_of(cloud: CloudReader, only: str | None) -> list[str]:
-    """Return the pictures that are drawn of a cloud: those of what it has, or the one that is wanted."""
+def _kinds_of(cloud: CloudReader, picture: str | None) -> list[str]:
+    """Return the kinds of pictures to draw of a cloud: all that it has content for, or the one asked for.
+
+    Raises:
+        InputError: it lacks the content of that one.
+    """
     absent = {"predicted": cloud.header.predicted is None, "rgb": not cloud.header.has_color}
-    if only and absent.get(only):
-        what = "predicted classes: `synthroads predict` adds them" if only == "predicted" else "colours"
-        raise InputError("--picture", only, f"{cloud.header.path.name} has no {what}")
-    return [only] if only else [kind for kind in KINDS if not absent.get(kind)]
+    if picture and absent.get(picture):
+        content = "predicted classes: `synthroads predict` adds them" if picture == "predicted" else "colours"
+        raise InputError("--picture", picture, f"{cloud.header.path.name} has no {content}")
+    return [picture] if picture else [kind for kind in KINDS if not absent.get(kind)]
 
 
 def _draw(
@@ -189,37 +208,54 @@ def _draw(
     header, strays = cloud.header, _strays_of(cloud)
     extent = _Extent(header.path, _staying_blocks(cloud, strays))
     start, end = (extent.start, extent.end) if centerline is None else (centerline[0], centerline[-1])
-    low, high = extent.across(start, end)
-    view = TopView(start, end, low, high, header.scheme)
-    predicted = TopView(start, end, low, high, header.predicted) if "predicted" in kinds else None
+    right_reach, left_reach = extent.across(start, end)
+    view = TopView(start, end, right_reach, left_reach, header.scheme)
+    predicted = TopView(start, end, right_reach, left_reach, header.predicted) if "predicted" in kinds else None
     path = extent.axis() if centerline is None else centerline
-    middle, right, reach = _cross_cut(line, station, path, max(1.0, (high - low) / 2), extent)
+    middle, rightward, reach = _cross_cut(line, station, path, max(1.0, (left_reach - right_reach) / 2), extent)
     slab: list[PointBlock] = []
     for block in _staying_blocks(cloud, strays):
         view.add(block)
         if predicted:
             predicted.add(block.with_arrays({"class_id": block.array(PREDICTED)}))
-        away = (block.xyz[:, :2] - middle) @ np.array([-right[1], right[0]])
-        slab.append(block.select(np.abs(away) <= depth / 2))
+        distance = (block.xyz[:, :2] - middle) @ np.array([-rightward[1], rightward[0]])
+        slab.append(block.select(np.abs(distance) <= depth / 2))
     fields = {kind: {"class": header.class_field, "predicted": PREDICTED}.get(kind, kind) for kind in kinds}
     view.save(folder, header.epsg, [kind for kind in kinds if kind not in ("predicted", "section")], fields)
     if predicted:
         predicted.save(folder, header.epsg, ["predicted"], fields)
-    drawn = {"points": int(view.raster.count.sum())} | ({"strays_left_out": strays.count()} if strays else {})
+    counts = {"points": int(view.raster.count.sum())} | ({"strays_left_out": strays.count()} if strays else {})
     if "section" not in kinds:
-        return drawn, fields
-    cut = concatenate(slab)
-    if len(cut) == 0:
+        return counts, fields
+    slab_points = concatenate(slab)
+    if len(slab_points) == 0:
         raise InputError("--line" if line else "--station", line or station, "meets no points of the cloud")
-    heights = float(cut.xyz[:, 2].min()), float(cut.xyz[:, 2].max())
-    if line is None:
-        reach = 1.02 * float(np.abs((cut.xyz[:, :2] - middle) @ right).max()) + 0.5
-    by_class = len(np.unique(cut.class_id)) > 1
-    section = CrossSection(middle, right, reach, depth, heights, header.scheme, by_class)
-    section.add(cut)
-    fields["section"] = header.class_field if by_class else "intensity"
+    section = _cross_section(slab_points, header.scheme, middle, rightward, depth, None if line is None else reach)
+    fields["section"] = header.class_field if section.by_class else "intensity"
     section.save(folder / preview_file("section"), fields["section"])
-    return drawn | {"section_points": len(cut)}, fields
+    return counts | {"section_points": len(slab_points)}, fields
+
+
+def _cross_section(
+    points: PointBlock, scheme: ClassScheme, middle: Float, rightward: Float, depth: float, reach: float | None
+) -> CrossSection:
+    """Return a cross-section with its points; coloured by intensity where all of them have one class.
+
+    Args:
+        points: at least one, of a slice of the cloud.
+        scheme: of their classes.
+        middle: (2,) of the section, m.
+        rightward: (2,) unit vector along it.
+        depth: of the slice, m.
+        reach: to either side of the middle, m; as far as the points lie if None.
+    """
+    heights = float(points.xyz[:, 2].min()), float(points.xyz[:, 2].max())
+    if reach is None:
+        reach = 1.02 * float(np.abs((points.xyz[:, :2] - middle) @ rightward).max()) + 0.5
+    by_class = len(np.unique(points.class_id)) > 1
+    section = CrossSection(middle, rightward, reach, depth, heights, scheme, by_class)
+    section.add(points)
+    return section
 
 
 def _strays_of(cloud: CloudReader) -> Strays | None:
@@ -233,7 +269,7 @@ def _strays_of(cloud: CloudReader) -> Strays | None:
 def _staying_blocks(cloud: CloudReader, strays: Strays | None) -> Iterator[PointBlock]:
     """Yield a cloud's blocks without their stray points."""
     for block in cloud.usable_blocks():
-        yield block if strays is None else block.select(np.flatnonzero(strays.stay(block.xyz)))
+        yield block if strays is None else block.select(np.flatnonzero(strays.belongs(block.xyz)))
 
 
 def read_centerline(path: Path, place: Placement | None = None) -> Float:
@@ -270,6 +306,7 @@ class _Extent:
     def __init__(self, path: Path, blocks: Iterable[PointBlock]) -> None:
         angle = np.arange(24) * (np.pi / 24)
         directions = np.stack([np.cos(angle), np.sin(angle)])
+        # Sums about the first point, so that map coordinates leave enough digits to the covariance.
         count, origin = 0, np.zeros(2)
         total, products = np.zeros(2), np.zeros((2, 2))
         outermost = []
@@ -277,50 +314,66 @@ class _Extent:
             if not len(block):
                 continue
             origin = origin if count else block.xyz[0, :2].copy()
-            local = block.xyz[:, :2] - origin
-            count += len(local)
-            total += local.sum(axis=0)
-            products += local.T @ local
-            along = local @ directions
-            outermost.append(local[np.r_[along.argmin(axis=0), along.argmax(axis=0)]])
+            offsets = block.xyz[:, :2] - origin
+            count += len(offsets)
+            total += offsets.sum(axis=0)
+            products += offsets.T @ offsets
+            projections = offsets @ directions
+            outermost.append(offsets[np.r_[projections.argmin(axis=0), projections.argmax(axis=0)]])
         if count == 0:
             raise InputError(str(path), None, "has no points")
         self._outermost = np.concatenate(outermost) + origin
         self.middle = origin + total / count
-        spread = products / count - np.outer(total / count, total / count)
-        axis = np.linalg.eigh(spread)[1][:, 1]
+        covariance = products / count - np.outer(total / count, total / count)
+        axis = np.linalg.eigh(covariance)[1][:, 1]  # eigenvector of the larger eigenvalue
         self.along: Float = axis if axis[0] >= 0 else -axis
-        low, high = self._reach(self.middle, self.along)
-        self.start, self.end = self.middle + low * self.along, self.middle + high * self.along
+        begin, end = self._reach(self.middle, self.along)
+        self.start, self.end = self.middle + begin * self.along, self.middle + end * self.along
 
     def across(self, start: Float, end: Float) -> tuple[float, float]:
-        """Return the cloud's extent across a line, m: to the right (negative) and to the left, 1 m added to each."""
-        along = np.asarray(end) - np.asarray(start)
-        length = float(np.hypot(*along))
-        along = along / length if length else np.array([1.0, 0.0])
-        low, high = self._reach(np.asarray(start), np.array([-along[1], along[0]]))
-        return low - 1.0, high + 1.0
+        """Return the cloud's extent across a line, m: to the right (negative) and to the left, 1 m added to each.
+
+        Args:
+            start, end: (2,) of the line, map coordinates, m.
+        """
+        direction = np.asarray(end) - np.asarray(start)
+        length = float(np.hypot(*direction))
+        direction = direction / length if length else np.array([1.0, 0.0])
+        right_reach, left_reach = self._reach(np.asarray(start), np.array([-direction[1], direction[0]]))
+        return right_reach - 1.0, left_reach + 1.0
 
     def axis(self) -> Float:
         """Return both ends (2, 2) of the cloud's long axis, map coordinates, m."""
         return np.stack([self.start, self.end])
 
     def _reach(self, origin: Float, direction: Float) -> tuple[float, float]:
-        along = (self._outermost - origin) @ direction
+        """Return the least and the largest place, m, of the cloud along a unit vector (2,) from an origin (2,)."""
+        projections = (self._outermost - origin) @ direction
         slack = self._SLACK * float(np.ptp(self._outermost, axis=0).max())
-        return float(along.min()) - slack, float(along.max()) + slack
+        return float(projections.min()) - slack, float(projections.max()) + slack
 
 
 def _cross_cut(
     line: tuple[float, float, float, float] | None, station: float | None, path: Float, reach: float, extent: _Extent
 ) -> tuple[Float, Float, float]:
-    """Return a cross-section's middle (2,), direction (2,) to the right, and reach (m) to either side."""
+    """Return a cross-section's middle (2,), direction (2,) to the right, and reach (m) to either side.
+
+    Args:
+        line: x, y of its ends, from left to right; None: it lies across a path.
+        station: along the path, m; None: in its middle.
+        path: (N, 2) map coordinates, m.
+        reach: to either side where it lies across a path, m.
+        extent: of the cloud.
+
+    Raises:
+        InputError: the line has no length, or the station isn't on the path.
+    """
     if line is not None:
-        left, right = np.array(line[:2]), np.array(line[2:])
-        length = float(np.hypot(*(right - left)))
+        left_end, right_end = np.array(line[:2]), np.array(line[2:])
+        length = float(np.hypot(*(right_end - left_end)))
         if not 0 < length < np.inf:
             raise InputError("--line", list(line), "must be two different points x y x y")
-        return (left + right) / 2, (right - left) / length, length / 2
+        return (left_end + right_end) / 2, (right_end - left_end) / length, length / 2
     steps = np.hypot(*np.diff(path, axis=0).T)
     stations = np.r_[0.0, np.cumsum(steps)]
     length = float(stations[-1])
@@ -329,11 +382,11 @@ def _cross_cut(
     station = length / 2 if station is None else station
     if not 0 <= station <= length:
         raise InputError("--station", station, f"must be 0 to {length:.1f} m")
-    at = int(np.clip(np.searchsorted(stations, station, side="right") - 1, 0, len(steps) - 1))
-    while steps[at] == 0:
-        at -= 1
-    along = (path[at + 1] - path[at]) / steps[at]
-    return path[at] + along * (station - stations[at]), np.array([along[1], -along[0]]), reach
+    segment = int(np.clip(np.searchsorted(stations, station, side="right") - 1, 0, len(steps) - 1))
+    while steps[segment] == 0:
+        segment -= 1
+    direction = (path[segment + 1] - path[segment]) / steps[segment]
+    return path[segment] + direction * (station - stations[segment]), np.array([direction[1], -direction[0]]), reach
 
 
 def scheme_of(cloud: CloudReader, classes: str | None) -> ClassScheme:
@@ -343,11 +396,11 @@ def scheme_of(cloud: CloudReader, classes: str | None) -> ClassScheme:
         return header.scheme.as_stored()
     scheme = class_scheme(classes)
     if any(scheme.selectors()):
-        finer = ", ".join(row.name for row in scheme.fine.values() if any(row.selectors()))
-        raise InputError("--classes", classes, f"has {finer}, which the cloud doesn't distinguish: scan with it")
+        finer_names = ", ".join(row.name for row in scheme.fine.values() if any(row.selectors()))
+        raise InputError("--classes", classes, f"has {finer_names}, which the cloud doesn't distinguish: scan with it")
     if not header.labelled or header.scheme.name != "17":
-        held = f"the classes {header.scheme.name}" if header.labelled else "LAS codes only"
-        raise InputError(str(header.path), None, f"holds {held}: only the 17 classes can be merged into {classes}")
+        content = f"the classes {header.scheme.name}" if header.labelled else "LAS codes only"
+        raise InputError(str(header.path), None, f"holds {content}: only the 17 classes can be merged into {classes}")
     return scheme
 
 
@@ -396,7 +449,12 @@ def summary_of(cloud: CloudReader, writer: CloudWriter) -> dict[str, Any]:
 
 
 def report_losses(name: str, writers: Iterable[CloudWriter]) -> None:
-    """Tell the user of how many points which flags were lost, for want of a field in the format written."""
+    """Warn the user of flags that were lost, and of how many points, as the format written has no field for them.
+
+    Args:
+        name: of the cloud's file.
+        writers: of the output.
+    """
     losses: Counter[str] = Counter()
     kind = ""
     for writer in writers:
@@ -405,8 +463,8 @@ def report_losses(name: str, writers: Iterable[CloudWriter]) -> None:
     if withheld := losses.pop(WITHHELD, 0):
         warn(f"{name}: {withheld:,} withheld points left out: {kind} has no field for the flag")
     if losses:
-        listed = ", ".join(f"{flag} of {count:,} points" for flag, count in losses.items())
-        warn(f"{name}: {listed} lost: {kind} has no field for them")
+        flag_counts = ", ".join(f"{flag} of {count:,} points" for flag, count in losses.items())
+        warn(f"{name}: {flag_counts} lost: {kind} has no field for them")
 
 
 def check_output(source: Path, output: Path, overwrite: bool) -> None:
@@ -421,7 +479,14 @@ def check_output(source: Path, output: Path, overwrite: bool) -> None:
 def pass_with_progress(
     blocks: Iterable[PointBlock], count: int, progress: Progress, stage: str
 ) -> Iterator[PointBlock]:
-    """Yield blocks, and tell which share of a number of points is done."""
+    """Yield blocks, and report the share of a number of points that has been passed on.
+
+    Args:
+        blocks: of points.
+        count: points of all of them.
+        progress: is told the share, 0 to 1, after each block.
+        stage: name of the stage that it is told.
+    """
     count_passed = 0
     for block in blocks:
         yield block

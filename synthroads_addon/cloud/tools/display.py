@@ -83,8 +83,8 @@ class DisplayCloud:
         """Return the 0.5 and 99.5 % quantiles that the first and last colour stand for; heights in map m; cached."""
         if by not in self._limits:
             values, shift = (self.brightness, 0.0) if by == "intensity" else (self.xyz[:, 2], self.origin[2])
-            low, high = np.quantile(values, [0.005, 0.995])
-            self._limits[by] = (float(low + shift), float(high + shift))
+            minimum, maximum = np.quantile(values, [0.005, 0.995])
+            self._limits[by] = (float(minimum + shift), float(maximum + shift))
         return self._limits[by]
 
     def colors(self, by: ColourBy) -> UInt8:
@@ -94,6 +94,7 @@ class DisplayCloud:
         return self._colors[by]
 
     def _rgb_by(self, by: ColourBy) -> UInt8:
+        """Return the points' colours (N, 3), 8-bit sRGB, by a quantity."""
         if by == "class":
             return self.header.scheme.colors()[self.class_id]
         if by == "rgb":
@@ -101,16 +102,18 @@ class DisplayCloud:
         if by == "intensity":
             shades, _ = grays(self.brightness.astype(np.float64), np.ones(len(self), dtype=bool), self.brightness_text)
             return shades.astype(np.uint8)
-        low, high = (value - self.origin[2] for value in self.limits("height"))
-        share = np.clip((self.xyz[:, 2] - low) / max(high - low, 1e-9), 0.0, 1.0)
+        minimum, maximum = (value - self.origin[2] for value in self.limits("height"))
+        share = np.clip((self.xyz[:, 2] - minimum) / max(maximum - minimum, 1e-9), 0.0, 1.0)
         return height_colors()[np.nan_to_num(share * 255.0).astype(np.uint8)]
 
 
 def height_colors() -> UInt8:
     """Return a colour table (256, 3), 8-bit sRGB, from low to high: Viridis."""
     stops = np.array([[int(stop[i : i + 2], 16) for i in (1, 3, 5)] for stop in _HEIGHT_STOPS], dtype=np.float64)
-    at = np.linspace(0.0, len(stops) - 1.0, 256)
-    return np.column_stack([np.interp(at, np.arange(len(stops)), stops[:, i]) for i in range(3)]).astype(np.uint8)
+    positions = np.linspace(0.0, len(stops) - 1.0, 256)
+    return np.column_stack([np.interp(positions, np.arange(len(stops)), stops[:, i]) for i in range(3)]).astype(
+        np.uint8
+    )
 
 
 def chosen_points(count: int, budget: int) -> Int:
@@ -153,23 +156,23 @@ def read_display(
     if budget < 1:
         raise InputError("points", budget, "must be at least 1")
     with open_cloud(path) as cloud:
-        chosen = chosen_points(cloud.header.count, budget)
-        if len(chosen) == 0:
+        indices = chosen_points(cloud.header.count, budget)
+        if len(indices) == 0:
             raise InputError(str(path), None, "has no points")
-        size, places = len(chosen), drawing_order(len(chosen))
+        size, places = len(indices), drawing_order(len(indices))
         xyz, class_id = np.empty((size, 3), np.float32), np.empty(size, np.uint8)
         rgb, brightness, counts = np.empty((size, 3), np.uint16), np.empty(size, np.float32), np.zeros(256, np.int64)
-        measure, position, filled = Brightness(), 0, 0
+        measure, position, filled_count = Brightness(), 0, 0
         for points in cloud.blocks(block):
             origin = np.floor(points.xyz[0]) if origin is None else np.asarray(origin, np.float64)
             counts += np.bincount(points.class_id, minlength=256)
-            last = int(np.searchsorted(chosen, position + len(points)))
-            here, into = chosen[filled:last] - position, places[filled:last]
-            xyz[into] = points.xyz[here] - origin
-            class_id[into] = points.class_id[here]
-            rgb[into] = points.rgb[here]
-            brightness[into] = np.nan_to_num(measure.values(points)[here])
-            position, filled = position + len(points), last
+            filled_end = int(np.searchsorted(indices, position + len(points)))
+            block_rows, display_rows = indices[filled_count:filled_end] - position, places[filled_count:filled_end]
+            xyz[display_rows] = points.xyz[block_rows] - origin
+            class_id[display_rows] = points.class_id[block_rows]
+            rgb[display_rows] = points.rgb[block_rows]
+            brightness[display_rows] = np.nan_to_num(measure.values(points)[block_rows])
+            position, filled_count = position + len(points), filled_end
             progress(position / cloud.header.count)
         assert origin is not None
         rgb_8 = (rgb >> 8).astype(np.uint8)
@@ -177,5 +180,6 @@ def read_display(
 
 
 def _rgb_of(scheme: ClassScheme, number: int) -> tuple[int, int, int]:
+    """Return the colour of a class number in a scheme, 8-bit sRGB."""
     red, green, blue = (int(value) for value in scheme.colors()[number])
     return red, green, blue

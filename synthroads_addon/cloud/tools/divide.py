@@ -108,7 +108,14 @@ def _inside(
     heights: tuple[float, float] | None,
     rings: list[Float] | None,
 ) -> Bool:
-    """Return which points (N, 3) lie within all that is given."""
+    """Return a mask (N,) of the points that lie within all limits that are given.
+
+    Args:
+        xyz: (N, 3) map coordinates, m.
+        box: least x and y, then largest, m; None without.
+        heights: least and largest z, m; None without.
+        rings: of polygons, see `points_in_rings`; None without.
+    """
     mask = np.ones(len(xyz), dtype=bool)
     if box is not None:
         mask &= np.all((xyz[:, :2] >= box[:2]) & (xyz[:, :2] <= box[2:]), axis=1)
@@ -152,7 +159,7 @@ def tile(
         raise InputError("--size", size, "must be 1 to 100000 m")
     if grid is not None and not 0.0005 <= grid <= size:
         raise InputError("--grid", grid, "must be 0.0005 m to the tiles' size")
-    written: list[dict[str, Any]] = []
+    tile_entries: list[dict[str, Any]] = []
     writers: list[CloudWriter] = []
     with writable_folder(folder), open_cloud(source) as cloud, ExitStack() as stack:
         files = stack.enter_context(TileFiles(folder))
@@ -171,12 +178,12 @@ def tile(
                 if len(tile_points) >= fewest:
                     with writer_like(cloud, work / names[key], scheme, offset=offset) as writer:
                         writer.write(tile_points)
-                    written.append({"file": names[key], "points": writer.count})
+                    tile_entries.append({"file": names[key], "points": writer.count})
                     writers.append(writer)
             report_losses(source.name, writers)
-            if not written:
+            if not tile_entries:
                 raise InputError("--fewest", fewest, "is more than the points of any tile")
-    return {"file": source.name, "output": str(folder), "size": size, "grid": grid, "tiles": written}
+    return {"file": source.name, "output": str(folder), "size": size, "grid": grid, "tiles": tile_entries}
 
 
 def read_polygon(path: Path, place: Placement | None = None) -> list[Float]:
@@ -204,7 +211,9 @@ def read_polygon(path: Path, place: Placement | None = None) -> list[Float]:
 
 
 def points_in_rings(points: Float, rings: list[Float]) -> Bool:
-    """Return which points (N, 2) lie in an odd number of rings: within polygons, but not within their holes.
+    """Return a mask (N,) of the points (N, 2) in an odd number of rings: within polygons, but not within their holes.
+
+    A ray from the point to the right crosses the sides of a ring that it lies in an odd number of times.
 
     Example:
         >>> import numpy as np
@@ -213,18 +222,19 @@ def points_in_rings(points: Float, rings: list[Float]) -> Bool:
         >>> points_in_rings(np.array([[1.0, 1.0], [5.0, 5.0], [11.0, 5.0]]), [outer, hole]).tolist()
         [True, False, False]
     """
-    inside = np.zeros(len(points), dtype=bool)
+    is_inside = np.zeros(len(points), dtype=bool)
     x, y = points.T
     for ring in rings:
         begin, end = ring, np.roll(ring, -1, axis=0)
-        near = np.flatnonzero((y >= ring[:, 1].min()) & (y <= ring[:, 1].max()) & (x <= ring[:, 0].max()))
+        candidates = np.flatnonzero((y >= ring[:, 1].min()) & (y <= ring[:, 1].max()) & (x <= ring[:, 0].max()))
         for (x1, y1), (x2, y2) in zip(begin, end, strict=True):
             if y1 == y2:
                 continue
-            crossed = near[(y[near] >= min(y1, y2)) & (y[near] < max(y1, y2))]
-            right = x1 + (y[crossed] - y1) / (y2 - y1) * (x2 - x1) > x[crossed]
-            inside[crossed[right]] ^= True
-    return inside
+            # Points at the height of the side, of its lower end included and its upper one not.
+            rows = candidates[(y[candidates] >= min(y1, y2)) & (y[candidates] < max(y1, y2))]
+            side_x = x1 + (y[rows] - y1) / (y2 - y1) * (x2 - x1)
+            is_inside[rows[side_x > x[rows]]] ^= True
+    return is_inside
 
 
 def _corner(number: int, size: float) -> str:
@@ -233,21 +243,29 @@ def _corner(number: int, size: float) -> str:
 
 
 def _system_of(header: CloudHeader) -> object:
-    """Return what tells a cloud's coordinate system from another's: its codes, or its text without them."""
+    """Return a value that is equal for clouds of the same coordinate system: its codes, or its text if it has none."""
     system = header.system
     return system and ((system.epsg, system.height_epsg) if system.epsg else system.text)
 
 
-def _check_alike(first: CloudReader, other: CloudReader) -> None:
-    """Refuse a cloud that can't stand in one file with the first."""
-    one, two = first.header, other.header
-    for what, mine, theirs in (
-        ("attributes", sorted(one.attributes), sorted(two.attributes)),
-        ("classes", one.scheme.to_dict() if one.labelled else None, two.scheme.to_dict() if two.labelled else None),
-        ("coordinate system", _system_of(one), _system_of(two)),
-        ("colours", one.has_color, two.has_color),
-        ("unit of intensity", one.intensity_scale is None, two.intensity_scale is None),
-        ("epoch of GPS time", one.standard_time, two.standard_time),
+def _check_alike(reference: CloudReader, other: CloudReader) -> None:
+    """Raise `InputError` if a cloud can't stand in one file with a reference cloud."""
+    reference_header, header = reference.header, other.header
+    for property_name, expected, value in (
+        ("attributes", sorted(reference_header.attributes), sorted(header.attributes)),
+        (
+            "classes",
+            reference_header.scheme.to_dict() if reference_header.labelled else None,
+            header.scheme.to_dict() if header.labelled else None,
+        ),
+        ("coordinate system", _system_of(reference_header), _system_of(header)),
+        ("colours", reference_header.has_color, header.has_color),
+        ("unit of intensity", reference_header.intensity_scale is None, header.intensity_scale is None),
+        ("epoch of GPS time", reference_header.standard_time, header.standard_time),
     ):
-        if mine != theirs:
-            raise InputError(str(two.path), None, f"has a different {what} from {one.path.name}: convert one first")
+        if expected != value:
+            raise InputError(
+                str(header.path),
+                None,
+                f"has a different {property_name} from {reference_header.path.name}: convert one first",
+            )

@@ -81,23 +81,24 @@ class Raster:
 
         Args:
             block: N points.
-            place: their two coordinates (N,) in the picture, m; what lies outside is left out.
+            place: their two coordinates (N,) in the picture, m.
             depth: (N,) the larger, the further in front.
         """
         brightness = self.brightness.values(block)
         column = np.floor((place[0] - self.axes.left) / self.axes.across)
         row = self.height - 1 - np.floor((place[1] - self.axes.low) / self.axes.up)
-        inside = np.flatnonzero((column >= 0) & (column < self.width) & (row >= 0) & (row < self.height))
-        if len(inside) == 0:
+        rows_inside = np.flatnonzero((column >= 0) & (column < self.width) & (row >= 0) & (row < self.height))
+        if len(rows_inside) == 0:
             return
-        cell = (row[inside] * self.width + column[inside]).astype(np.intp)
-        first, last = int(cell.min()), int(cell.max()) + 1
-        window, size, within = slice(first, last), last - first, cell - first
-        self.count[window] += np.bincount(within, minlength=size)
-        self._intensity[window] += np.bincount(within, brightness[inside], size)
+        cell = (row[rows_inside] * self.width + column[rows_inside]).astype(np.intp)
+        # Sums over the cells from the first to the last that the block touches: `bincount` needs no larger arrays.
+        first_cell, end_cell = int(cell.min()), int(cell.max()) + 1
+        window, size, cell_in_window = slice(first_cell, end_cell), end_cell - first_cell, cell - first_cell
+        self.count[window] += np.bincount(cell_in_window, minlength=size)
+        self._intensity[window] += np.bincount(cell_in_window, brightness[rows_inside], size)
         for channel in range(3):
-            self._rgb[channel, window] += np.bincount(within, block.rgb[inside, channel], size)
-        self._keep_foremost(cell, depth[inside], block.class_id[inside])
+            self._rgb[channel, window] += np.bincount(cell_in_window, block.rgb[rows_inside, channel], size)
+        self._keep_foremost(cell, depth[rows_inside], block.class_id[rows_inside])
 
     def intensity(self) -> Float:
         """Return the mean intensity of each cell (cells,); 0 where there are no points."""
@@ -117,28 +118,34 @@ class Raster:
         result._intensity = self._blocks(self._intensity, factor).sum(axis=1)
         result._rgb = np.stack([self._blocks(channel, factor).sum(axis=1) for channel in self._rgb])
         front = self._blocks(self._front, factor, -np.inf)
-        first = front.argmax(axis=1)[:, None]
-        result._front = np.take_along_axis(front, first, axis=1)[:, 0]
-        result.label = np.take_along_axis(self._blocks(self.label, factor, 255), first, axis=1)[:, 0]
+        foremost_index = front.argmax(axis=1)[:, None]
+        result._front = np.take_along_axis(front, foremost_index, axis=1)[:, 0]
+        result.label = np.take_along_axis(self._blocks(self.label, factor, 255), foremost_index, axis=1)[:, 0]
         return result
 
     def density_factor(self) -> int:
-        """Return by what the cells have to be merged so that the points are hardly farther apart than they are wide.
+        """Return the factor by which cells must be merged so that points are hardly farther apart than cells.
 
         That is the smallest of `_FACTORS` with which four of five neighbours of filled cells are filled, along both
         axes: lines of a scanner are near each other in one direction only.
         """
         for factor in _FACTORS:
-            filled = self._blocks(self.count, factor).any(axis=1).reshape(-1, -(-self.width // factor))
-            if min(_shared(filled, axis) for axis in (0, 1)) >= _FILLED:
+            is_filled = self._blocks(self.count, factor).any(axis=1).reshape(-1, -(-self.width // factor))
+            if min(_shared(is_filled, axis) for axis in (0, 1)) >= _FILLED:
                 return factor
         return _FACTORS[-1]
 
-    def _blocks(self, cells: AnyArray, factor: int, rest: float = 0) -> AnyArray:
-        """Return cells (cells,) as (merged cells, factor ** 2); those beyond the raster's edge are ``rest``."""
+    def _blocks(self, cells: AnyArray, factor: int, fill_value: float = 0) -> AnyArray:
+        """Return values of cells (cells,) as (merged cells, factor ** 2).
+
+        Args:
+            cells: (cells,) values.
+            factor: cells along each edge of a merged one.
+            fill_value: of cells beyond the raster's edge.
+        """
         up, right = -self.height % factor, -self.width % factor  # row 0 is the highest: the lowest stay where they are
-        padded = np.pad(cells.reshape(self.height, self.width), ((up, 0), (0, right)), constant_values=rest)
-        parts = padded.reshape(padded.shape[0] // factor, factor, padded.shape[1] // factor, factor)
+        padded_cells = np.pad(cells.reshape(self.height, self.width), ((up, 0), (0, right)), constant_values=fill_value)
+        parts = padded_cells.reshape(padded_cells.shape[0] // factor, factor, padded_cells.shape[1] // factor, factor)
         return parts.swapaxes(1, 2).reshape(-1, factor**2)
 
     def picture(self, colors: AnyArray, paper: tuple[int, int, int]) -> UInt8:
@@ -151,61 +158,93 @@ class Raster:
             paper: colour of cells without points.
         """
         shape = (self.height, self.width)
-        filled = (self.count > 0).reshape(shape)
+        is_filled = (self.count > 0).reshape(shape)
         result = np.where(self.count[:, None] > 0, colors, paper).astype(np.uint8).reshape(*shape, 3)
-        growth = self._dot_growth(filled)
+        growth = self._dot_growth(is_filled)
         for _ in range(growth):
-            result, filled = _grow_cells(result, filled)
+            result, is_filled = _grow_cells(result, is_filled)
         for _ in range(0 if growth else _GAP):
-            result, filled = _close_gaps(result, filled)
+            result, is_filled = _close_gaps(result, is_filled)
         return result
 
-    def _dot_growth(self, filled: Bool) -> int:
-        """Return by how many cells, 0 to 2, the points' dots are enlarged; 0 where most cells are filled."""
-        rows, columns = filled.any(axis=1), filled.any(axis=0)
-        used = filled[rows][:, columns]
-        share = float(used.mean()) if used.size else 1.0
-        neighbours = float((used[:, 1:] & used[:, :-1]).sum() / max(1, used.sum())) if used.size else 1.0
-        return 0 if share > 0.35 or neighbours > 0.8 else 1 if neighbours > 0.4 else 2
+    def _dot_growth(self, is_filled: Bool) -> int:
+        """Return the number of cells, 0 to 2, by which the points' dots are enlarged; 0 where most cells are filled.
+
+        Args:
+            is_filled: (height, width) whether a cell holds points.
+        """
+        rows, columns = is_filled.any(axis=1), is_filled.any(axis=0)
+        occupied_part = is_filled[rows][:, columns]
+        if not occupied_part.size:
+            return 0
+        share = float(occupied_part.mean())
+        neighbours = float((occupied_part[:, 1:] & occupied_part[:, :-1]).sum() / max(1, occupied_part.sum()))
+        # Chosen: dots grow where hardly any cells are filled, the more the fewer of them are next to each other.
+        if share > 0.35 or neighbours > 0.8:
+            return 0
+        return 1 if neighbours > 0.4 else 2
 
     def _keep_foremost(self, cell: Index, depth: Float, label: UInt8) -> None:
+        """Set the classes of cells whose foremost point is among new ones.
+
+        Args:
+            cell: (N,) of the new points.
+            depth: (N,) the larger, the further in front.
+            label: (N,) classes.
+        """
         np.maximum.at(self._front, cell, depth)
         foremost = depth == self._front[cell]
         self.label[cell[foremost]] = label[foremost]
 
 
-def _shared(filled: Bool, axis: int) -> float:
-    """Return the share of filled cells (rows, columns) whose next neighbour along an axis is filled as well."""
-    first = filled[:-1] if axis == 0 else filled[:, :-1]
-    second = filled[1:] if axis == 0 else filled[:, 1:]
-    return float((first & second).sum() / max(1, first.sum()))
+def _shared(is_filled: Bool, axis: int) -> float:
+    """Return the share of filled cells whose next neighbour along an axis is filled as well.
+
+    Args:
+        is_filled: (rows, columns).
+        axis: 0 or 1.
+    """
+    cells = is_filled[:-1] if axis == 0 else is_filled[:, :-1]
+    next_cells = is_filled[1:] if axis == 0 else is_filled[:, 1:]
+    return float((cells & next_cells).sum() / max(1, cells.sum()))
 
 
-def _close_gaps(picture: UInt8, filled: Bool) -> tuple[UInt8, Bool]:
-    """Return copies of a picture and its mask in which empty cells between two filled ones take the colour of one."""
-    result, mask = picture.copy(), filled.copy()
+def _close_gaps(picture: UInt8, is_filled: Bool) -> tuple[UInt8, Bool]:
+    """Return copies of a picture and its mask in which empty cells between two filled ones take the colour of one.
+
+    Args:
+        picture: (height, width, 3).
+        is_filled: (height, width) whether a cell holds points.
+    """
+    result, mask = picture.copy(), is_filled.copy()
     for axis in (0, 1):
-        ends: list[slice] = [slice(None), slice(None)]
-        before, between, behind = (
-            tuple(ends[:axis] + [part] + ends[axis + 1 :]) for part in (slice(-2), slice(1, -1), slice(2, None))
+        # All cells but the outermost along the axis, the cells before these, and those behind.
+        whole: list[slice] = [slice(None), slice(None)]
+        before, middle, behind = (
+            tuple(whole[:axis] + [part] + whole[axis + 1 :]) for part in (slice(-2), slice(1, -1), slice(2, None))
         )
-        gap = filled[before] & filled[behind] & ~mask[between]
-        result[between][gap] = picture[before][gap]
-        mask[between] |= gap
+        gap = is_filled[before] & is_filled[behind] & ~mask[middle]
+        result[middle][gap] = picture[before][gap]
+        mask[middle] |= gap
     return result, mask
 
 
-def _grow_cells(picture: UInt8, filled: Bool) -> tuple[UInt8, Bool]:
-    """Return copies of a picture and its mask in which empty cells beside filled ones take their colours."""
-    result, mask = picture.copy(), filled.copy()
+def _grow_cells(picture: UInt8, is_filled: Bool) -> tuple[UInt8, Bool]:
+    """Return copies of a picture and its mask in which empty cells beside filled ones take their colours.
+
+    Args:
+        picture: (height, width, 3).
+        is_filled: (height, width) whether a cell holds points.
+    """
+    result, mask = picture.copy(), is_filled.copy()
     for axis, step in ((1, 1), (1, -1), (0, 1), (0, -1)):
-        near, color = np.roll(filled, step, axis), np.roll(picture, step, axis)
+        beside_filled, color = np.roll(is_filled, step, axis), np.roll(picture, step, axis)
         edge: list[slice | int] = [slice(None), slice(None)]
         edge[axis] = 0 if step == 1 else -1
-        near[tuple(edge)] = False  # nothing comes round from the other side
-        new = near & ~mask
-        result[new] = color[new]
-        mask |= new
+        beside_filled[tuple(edge)] = False  # nothing comes round from the other side
+        grown_mask = beside_filled & ~mask
+        result[grown_mask] = color[grown_mask]
+        mask |= grown_mask
     return result, mask
 
 
@@ -240,11 +279,17 @@ def class_legend(rows: Sequence[PointClass], labels: UInt8) -> list[tuple[str, C
     return [(row.name.replace("_", " "), row.color) for row in rows if row.id in ids]
 
 
-def grays(values: Float, filled: Bool, text: str) -> tuple[Float, GrayBar]:
-    """Return values (N,) as grays (N, 3), 0 to 255, stretched between their 0.5 and 99.5 % quantiles, with a legend."""
-    low, high = np.quantile(values[filled], [0.005, 0.995]) if filled.any() else (0.0, 1.0)
-    shade = np.clip((values - low) / max(high - low, 1e-300), 0, 1) * 255
-    return np.repeat(shade[:, None], 3, axis=1), GrayBar(float(low), float(high), text)
+def grays(values: Float, is_filled: Bool, text: str) -> tuple[Float, GrayBar]:
+    """Return values as grays (N, 3), 0 to 255, stretched between their 0.5 and 99.5 % quantiles, with a legend.
+
+    Args:
+        values: (N,).
+        is_filled: (N,) of which values the quantiles are.
+        text: name of the quantity.
+    """
+    black_value, white_value = np.quantile(values[is_filled], [0.005, 0.995]) if is_filled.any() else (0.0, 1.0)
+    shade = np.clip((values - black_value) / max(white_value - black_value, 1e-300), 0, 1) * 255
+    return np.repeat(shade[:, None], 3, axis=1), GrayBar(float(black_value), float(white_value), text)
 
 
 def add_frame(
@@ -258,16 +303,16 @@ def add_frame(
         ticks: mark heights and distances at the edges, in place of the scale.
     """
     height, width = pixels.shape[:2]
-    left = _MARGIN + (52 if ticks else 0)
-    size = (max(width + left, 900) + _MARGIN, height + 2 * _MARGIN + (_LINE if ticks else 0))
+    left_margin = _MARGIN + (52 if ticks else 0)
+    size = (max(width + left_margin, 900) + _MARGIN, height + 2 * _MARGIN + (_LINE if ticks else 0))
     lines = _wrap_entries(legend, size[0] - 2 * _MARGIN) if isinstance(legend, Sequence) else [[]] if legend else []
     picture = Image.new("RGB", (size[0], size[1] + _LINE * (1 + len(lines)) + 10), PAPER)
-    picture.paste(Image.fromarray(pixels), (left, _MARGIN))
+    picture.paste(Image.fromarray(pixels), (left_margin, _MARGIN))
     draw = ImageDraw.Draw(picture)
     y = float(size[1])
     if ticks:
-        _draw_ticks(draw, axes, (left, _MARGIN, width, height))
-        x = float(left)
+        _draw_ticks(draw, axes, (left_margin, _MARGIN, width, height))
+        x = float(left_margin)
     else:
         x = _draw_scale(draw, axes.across, width, (_MARGIN, y))
     if north is not None:
@@ -289,24 +334,32 @@ def nice_step(reach: float) -> float:
 
 
 def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    """Return the font of a size, pixels."""
     return ImageFont.load_default(size=size)
 
 
 def _wrap_entries(legend: Sequence[tuple[str, Color]], width: float) -> list[list[tuple[str, Color]]]:
     """Return the legend's entries, broken into lines no wider than ``width`` (pixels)."""
     lines: list[list[tuple[str, Color]]] = []
-    used = np.inf
+    line_width = np.inf
     for entry in legend:
-        needed = 40 + _font(_SMALL).getlength(entry[0])
-        if used + needed > width:
+        entry_width = 40 + _font(_SMALL).getlength(entry[0])
+        if line_width + entry_width > width:
             lines.append([])
-            used = 0.0
+            line_width = 0.0
         lines[-1].append(entry)
-        used += needed
+        line_width += entry_width
     return lines
 
 
 def _draw_swatches(draw: ImageDraw.ImageDraw, entries: list[tuple[str, Color]], y: float) -> None:
+    """Draw a line of a legend: a square of its colour and the name of each entry.
+
+    Args:
+        draw: where to.
+        entries: names and colours.
+        y: top of the line, pixels.
+    """
     x = float(_MARGIN)
     for text, color in entries:
         draw.rectangle([x, y + 2, x + 16, y + 18], fill=color, outline=INK)
@@ -315,15 +368,24 @@ def _draw_swatches(draw: ImageDraw.ImageDraw, entries: list[tuple[str, Color]], 
 
 
 def _draw_bar(draw: ImageDraw.ImageDraw, bar: GrayBar, corner: tuple[float, float]) -> None:
+    """Draw the legend of a grey picture: a bar from black to white between its two values.
+
+    Args:
+        draw: where to.
+        bar: the legend.
+        corner: upper left corner, pixels.
+    """
     x, y = corner
-    low, high = (f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}" for value in (bar.low, bar.high))
-    draw.text((x, y + 2), low, fill=INK, font=_font(_SMALL))
-    x += draw.textlength(low, font=_font(_SMALL)) + 8
+    lowest_text, highest_text = (
+        f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}" for value in (bar.low, bar.high)
+    )
+    draw.text((x, y + 2), lowest_text, fill=INK, font=_font(_SMALL))
+    x += draw.textlength(lowest_text, font=_font(_SMALL)) + 8
     for step in range(160):
         shade = round(step / 159 * 255)
         draw.line([(x + step, y + 3), (x + step, y + 18)], fill=(shade, shade, shade))
     draw.rectangle([x - 1, y + 2, x + 160, y + 19], outline=INK)
-    draw.text((x + 168, y + 2), f"{high}   {bar.text}", fill=INK, font=_font(_SMALL))
+    draw.text((x + 168, y + 2), f"{highest_text}   {bar.text}", fill=INK, font=_font(_SMALL))
 
 
 def _draw_scale(draw: ImageDraw.ImageDraw, pixel: float, width: int, corner: tuple[float, float]) -> float:

@@ -44,16 +44,18 @@ class PredictedCounts:
         return {"predicted_classes": shares, "agreement": self._agreement()}
 
     def _agreement(self) -> dict[str, Any] | None:
+        """Return the number of points with both classes, the share whose classes agree, and the IoU of each class."""
         if self._truth is None:
             return None
+        # (truth, predicted) in the classes of the prediction.
         matrix = np.zeros((256, 256), dtype=np.int64)
         np.add.at(matrix, self._truth, self._counts)
         matrix[UNLABELLED] = matrix[:, UNLABELLED] = 0
-        right, truth, predicted = matrix.diagonal(), matrix.sum(axis=1), matrix.sum(axis=0)
-        union = truth + predicted - right
-        ious = {row.name: right[row.id] / union[row.id] for row in self._predicted.rows if union[row.id]}
+        agreeing, truth, predicted = matrix.diagonal(), matrix.sum(axis=1), matrix.sum(axis=0)
+        union = truth + predicted - agreeing  # intersection over union: agreeing / union
+        ious = {row.name: agreeing[row.id] / union[row.id] for row in self._predicted.rows if union[row.id]}
         points = int(truth.sum())
-        return {"points": points, "share": right.sum() / points if points else None, "iou": ious}
+        return {"points": points, "share": agreeing.sum() / points if points else None, "iou": ious}
 
 
 def truth_table(header: CloudHeader) -> UInt8 | None:

@@ -33,15 +33,20 @@ class TopView:
         scheme: what the points' classes are; the 17 if not given.
     """
 
-    def __init__(self, start: Float, end: Float, low: float, high: float, scheme: ClassScheme | None = None) -> None:
+    def __init__(
+        self, start: Float, end: Float, right_reach: float, left_reach: float, scheme: ClassScheme | None = None
+    ) -> None:
         chord = np.asarray(end) - np.asarray(start)
         length = max(float(np.hypot(*chord)), 1.0)
         self.along = chord / length if length > 1.0 else np.array([1.0, 0.0])
         self.start = np.asarray(start, dtype=np.float64)
         border = 0.02 * length + 1.0
-        pixel = max(length + 2 * border, high - low) / WIDTH
-        size = (max(1, int(np.ceil((length + 2 * border) / pixel))), max(1, int(np.ceil((high - low) / pixel))))
-        self.raster = Raster(Axes(-border, low, pixel, pixel), size)
+        pixel = max(length + 2 * border, left_reach - right_reach) / WIDTH
+        size = (
+            max(1, int(np.ceil((length + 2 * border) / pixel))),
+            max(1, int(np.ceil((left_reach - right_reach) / pixel))),
+        )
+        self.raster = Raster(Axes(-border, right_reach, pixel, pixel), size)
         self.scheme = scheme or class_scheme("17")
         # A line is thinner than a pixel: let it win over the pavement.
         self._lift = np.zeros(256)
@@ -55,18 +60,18 @@ class TopView:
         terrain = geometry.parameters.terrain
         reach = terrain.half_width if terrain else float(np.abs(geometry.offsets(stations)).max())
         plan, heading, _ = geometry.alignment.frame(stations)
-        left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+        leftward = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
         chord = plan[-1] - plan[0]
         normal = np.array([-chord[1], chord[0]]) / max(np.hypot(*chord), 1e-9)
-        edges = np.concatenate([plan + reach * left, plan - reach * left])
-        across = (edges - plan[0]) @ normal
-        low, high = float(across.min()) - _BORDER, float(across.max()) + _BORDER
-        return cls(plan[0] + origin, plan[-1] + origin, low, high, scheme)
+        edges = np.concatenate([plan + reach * leftward, plan - reach * leftward])
+        offsets = (edges - plan[0]) @ normal
+        right_reach, left_reach = float(offsets.min()) - _BORDER, float(offsets.max()) + _BORDER
+        return cls(plan[0] + origin, plan[-1] + origin, right_reach, left_reach, scheme)
 
     @classmethod
-    def over_box(cls, low: Float, high: Float, scheme: ClassScheme | None = None) -> Self:
+    def over_box(cls, lowest_corner: Float, highest_corner: Float, scheme: ClassScheme | None = None) -> Self:
         """Return an empty view that holds a box (corners in map coordinates), its longer side from left to right."""
-        start, end = low[:2].copy(), high[:2].copy()
+        start, end = lowest_corner[:2].copy(), highest_corner[:2].copy()
         axis = int(np.argmax(end - start))
         reach = float((end - start)[1 - axis]) / 2.0 + _BORDER
         start[1 - axis] = end[1 - axis] = (start + end)[1 - axis] / 2.0
@@ -75,9 +80,9 @@ class TopView:
     def add(self, block: PointBlock) -> None:
         """Add a block's points to the view; higher points hide lower ones."""
         relative = block.xyz[:, :2] - self.start
-        across = relative @ np.array([-self.along[1], self.along[0]])
+        offset = relative @ np.array([-self.along[1], self.along[0]])
         height = block.xyz[:, 2] + self._lift[block.class_id]
-        self.raster.add(block, (relative @ self.along, across), height)
+        self.raster.add(block, (relative @ self.along, offset), height)
 
     def save(
         self,
@@ -103,8 +108,8 @@ class TopView:
         paths = []
         for kind in kinds:
             colors, legend = self._colors(raster, kind)
-            shown = f"{int(raster.count.sum()):,} points{system}   pixel {raster.axes.across:.3g} m"
-            title = f"{fields.get(kind, kind)}   {shown}"
+            counts_text = f"{int(raster.count.sum()):,} points{system}   pixel {raster.axes.across:.3g} m"
+            title = f"{fields.get(kind, kind)}   {counts_text}"
             paths.append(folder / f"preview_{kind}.png")
             pixels = raster.picture(colors, PAPER).repeat(factor, axis=0).repeat(factor, axis=1)
             add_frame(pixels, title, legend, self.raster.axes, north).save(paths[-1])
@@ -145,24 +150,24 @@ class CrossSection:
         self.depth = depth
         self.by_class = by_class
         pixel = 2 * reach / WIDTH
-        low, high = heights[0] - 0.5, heights[1] + 0.5
-        needed = _LOWEST * pixel / (high - low)
-        self.exaggeration = 1.0 if needed <= 1 else min(10.0, nice_step(1.4 * needed))
-        up = max(pixel / self.exaggeration, (high - low) / _MOST_PIXELS)
-        self.exaggeration = pixel / up
-        size = (WIDTH, max(1, int(np.ceil((high - low) / up))))
-        self.raster = Raster(Axes(-reach, low, pixel, up), size)
+        bottom_height, top_height = heights[0] - 0.5, heights[1] + 0.5
+        usual_exaggeration = _LOWEST * pixel / (top_height - bottom_height)
+        self.exaggeration = 1.0 if usual_exaggeration <= 1 else min(10.0, nice_step(1.4 * usual_exaggeration))
+        row_height = max(pixel / self.exaggeration, (top_height - bottom_height) / _MOST_PIXELS)
+        self.exaggeration = pixel / row_height
+        size = (WIDTH, max(1, int(np.ceil((top_height - bottom_height) / row_height))))
+        self.raster = Raster(Axes(-reach, bottom_height, pixel, row_height), size)
         self.scheme = scheme or class_scheme("17")
 
     def add(self, block: PointBlock) -> None:
         """Add a block's points to the section; those outside the slab are left out."""
         relative = block.xyz[:, :2] - self.middle
-        away = np.abs(relative @ np.array([-self.right[1], self.right[0]]))
-        inside = np.flatnonzero(away <= self.depth / 2)
-        if len(inside):
-            part = block.select(inside)
-            place = (relative[inside] @ self.right, part.xyz[:, 2])
-            self.raster.add(part, place, -away[inside])
+        distance = np.abs(relative @ np.array([-self.right[1], self.right[0]]))
+        inside_rows = np.flatnonzero(distance <= self.depth / 2)
+        if len(inside_rows):
+            part = block.select(inside_rows)
+            place = (relative[inside_rows] @ self.right, part.xyz[:, 2])
+            self.raster.add(part, place, -distance[inside_rows])
 
     def save(self, path: Path, field: str = "") -> Path:
         """Write the section as a picture to a path and return the path; its title names the field that it shows."""
@@ -177,8 +182,8 @@ class CrossSection:
 
 def _class_colors(raster: Raster, scheme: ClassScheme) -> tuple[AnyArray, Legend]:
     """Return the class colours (cells, 3) of a raster's foremost points, with their legend."""
-    shown = raster.label[raster.count > 0]
-    return scheme.colors()[raster.label], class_legend(scheme.rows, shown)
+    labels = raster.label[raster.count > 0]
+    return scheme.colors()[raster.label], class_legend(scheme.rows, labels)
 
 
 def _grays(raster: Raster) -> tuple[AnyArray, Legend]:

@@ -19,7 +19,10 @@ _GOLDEN = 0.6180339887498949
 
 
 def steps_per_unit(cloud: CloudReader) -> float:
-    """Return the 16-bit steps per unit of a cloud's intensity; if unknown, so that the brightest point has all."""
+    """Return the 16-bit steps per unit of a cloud's intensity.
+
+    Where the file doesn't say them, LAS has 1, and of other formats the brightest point is given the largest number.
+    """
     header = cloud.header
     if header.intensity_scale is not None:
         return header.intensity_scale
@@ -76,7 +79,11 @@ class QuantileMap:
         self.mapped = np.zeros(LEVELS, dtype=np.int64)
 
     def map(self, level: Index) -> Index:
-        """Return the target levels (N,) of points with given levels, in the cloud's order, and count them as mapped."""
+        """Return the target's levels (N,) of points, and count them as mapped.
+
+        Args:
+            level: (N,) of the points in the cloud's order.
+        """
         turn = self._seen[level] + _occurrence(level)
         self._seen += np.bincount(level, minlength=LEVELS)
         quantile = self._begin[level] + self._share[level] * ((turn + 0.5) * _GOLDEN % 1.0)
@@ -103,29 +110,29 @@ class IntensityMapping:
 
     def __init__(self, source: CloudReader, target: CloudReader, per_class: bool = False) -> None:
         self._steps, self.scale = steps_per_unit(source), steps_per_unit(target)
-        have, want = histograms(source, self._steps), histograms(target, self.scale)
-        for cloud, counts in ((source, have), (target, want)):
+        source_counts, target_counts = histograms(source, self._steps), histograms(target, self.scale)
+        for cloud, counts in ((source, source_counts), (target, target_counts)):
             if not counts:
                 raise InputError(str(cloud.header.path), None, "has no points")
-        self._have, self._want = _total(have), _total(want)
+        self._have, self._want = _total(source_counts), _total(target_counts)
         self.classes_without_target: list[str] = []
         self._class_targets: dict[int, Int] = {}
         if per_class:
-            self._maps = self._class_maps(source, target, have, want)
+            self._maps = self._class_maps(source, target, source_counts, target_counts)
         else:
-            whole = QuantileMap(self._have, self._want)
-            self._maps = dict.fromkeys(have, whole)
+            common_map = QuantileMap(self._have, self._want)
+            self._maps = dict.fromkeys(source_counts, common_map)
 
     def blocks(self, source: CloudReader) -> Iterator[PointBlock]:
         """Yield the source's points with mapped intensities; the distances afterwards count these."""
         for block in source.usable_blocks():
             level = levels(block.intensity, self._steps)
-            mapped = np.zeros(len(level), dtype=np.intp)
+            mapped_levels = np.zeros(len(level), dtype=np.intp)
             for table in {id(table): table for table in self._maps.values()}.values():
-                labels = [label for label, used in self._maps.items() if used is table]
-                chosen = np.isin(block.class_id, labels)
-                mapped[chosen] = table.map(level[chosen])
-            yield replace(block, intensity=mapped / self.scale)
+                labels = [label for label, map_of_label in self._maps.items() if map_of_label is table]
+                is_of_table = np.isin(block.class_id, labels)
+                mapped_levels[is_of_table] = table.map(level[is_of_table])
+            yield replace(block, intensity=mapped_levels / self.scale)
 
     def distance_before(self) -> float:
         """Return the Kolmogorov-Smirnov distance of the two clouds' intensities before mapping."""
@@ -138,33 +145,49 @@ class IntensityMapping:
 
     def class_distances(self) -> dict[int, float]:
         """Return the Kolmogorov-Smirnov distances after mapping of classes with maps of their own, by source id."""
-        return {label: ks_distance(self._maps[label].mapped, want) for label, want in self._class_targets.items()}
+        return {
+            label: ks_distance(self._maps[label].mapped, target_counts)
+            for label, target_counts in self._class_targets.items()
+        }
 
     def _class_maps(
-        self, source: CloudReader, target: CloudReader, have: dict[int, Int], want: dict[int, Int]
+        self, source: CloudReader, target: CloudReader, source_counts: dict[int, Int], target_counts: dict[int, Int]
     ) -> dict[int, QuantileMap]:
-        theirs = {name: label for label, name in target.header.scheme.names().items() if label in want}
+        """Return the map of each class of the source, by its number; classes that the target lacks share one.
+
+        Args:
+            source, target: the clouds.
+            source_counts, target_counts: their histograms, by class.
+        """
+        target_labels = {name: label for label, name in target.header.scheme.names().items() if label in target_counts}
         names = source.header.scheme.names()
-        pairs = {label: theirs.get(names.get(label, "")) for label in have}
-        self._class_targets = {label: want[other] for label, other in pairs.items() if other is not None}
-        maps = {label: QuantileMap(have[label], counts) for label, counts in self._class_targets.items()}
-        rest = [label for label in have if label not in maps]
-        self.classes_without_target = [names.get(label, str(label)) for label in rest]
-        if rest:
-            common_map = QuantileMap(_total({label: have[label] for label in rest}), self._want)
-            maps |= dict.fromkeys(rest, common_map)
+        pairs = {label: target_labels.get(names.get(label, "")) for label in source_counts}
+        self._class_targets = {
+            label: target_counts[target_label] for label, target_label in pairs.items() if target_label is not None
+        }
+        maps = {label: QuantileMap(source_counts[label], counts) for label, counts in self._class_targets.items()}
+        other_labels = [label for label in source_counts if label not in maps]
+        self.classes_without_target = [names.get(label, str(label)) for label in other_labels]
+        if other_labels:
+            common_map = QuantileMap(_total({label: source_counts[label] for label in other_labels}), self._want)
+            maps |= dict.fromkeys(other_labels, common_map)
         return maps
 
 
 def _total(parts: dict[int, Int]) -> Int:
+    """Return the sum of histograms."""
     return np.sum(list(parts.values()), axis=0)
 
 
 def _occurrence(values: Index) -> Index:
-    """Return for each value (N,) the number of equal values before it."""
+    """Return for each value (N,) the number of equal values that come before it."""
     order = np.argsort(values, kind="stable")
-    ordered = values[order]
-    starts = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]]) if len(values) else np.zeros(0, dtype=np.intp)
+    ordered_values = values[order]
+    starts = (
+        np.flatnonzero(np.r_[True, ordered_values[1:] != ordered_values[:-1]])
+        if len(values)
+        else np.zeros(0, dtype=np.intp)
+    )
     lengths = np.diff(np.r_[starts, len(values)])
     result = np.empty(len(values), dtype=np.intp)
     result[order] = np.arange(len(values)) - np.repeat(starts, lengths)

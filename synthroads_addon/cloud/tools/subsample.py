@@ -36,7 +36,7 @@ class TileFiles:
         self._paths: dict[tuple[int, int], Path] = {}
 
     def __enter__(self) -> Self:
-        self._made = self._scratch.enter_context(scratch_folder(self._folder))
+        self._scratch_path = self._scratch.enter_context(scratch_folder(self._folder))
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -54,11 +54,11 @@ class TileFiles:
         order = np.lexsort(tile.T)
         tile, record = tile[order], record[order]
         starts = np.flatnonzero(np.r_[True, np.any(tile[1:] != tile[:-1], axis=1)])
-        for first, last in zip(starts, np.r_[starts[1:], len(tile)], strict=True):
-            key = (int(tile[first, 0]), int(tile[first, 1]))
-            path = self._paths.setdefault(key, self._made / f"{key[0]}_{key[1]}")
+        for begin, end in zip(starts, np.r_[starts[1:], len(tile)], strict=True):
+            key = (int(tile[begin, 0]), int(tile[begin, 1]))
+            path = self._paths.setdefault(key, self._scratch_path / f"{key[0]}_{key[1]}")
             with path.open("ab") as file:
-                file.write(record[first:last].tobytes())
+                file.write(record[begin:end].tobytes())
 
     def by_tile(self) -> Iterator[tuple[tuple[int, int], PointBlock]]:
         """Yield each tile's (column, row) and its points, in the order added, and remove its file."""
@@ -103,32 +103,45 @@ class GridSubsampler(TileFiles):
 
 
 def keep_one_per_cell(block: PointBlock, cell: float) -> Index:
-    """Return the indices of the points nearest to their cells' centres, one per cell, ordered by z, y, x."""
+    """Return the indices of the points nearest to their cells' centres, one per cell, ordered by z, y, x.
+
+    Args:
+        block: of points.
+        cell: edge of a cell, m.
+    """
     cells = np.floor(block.xyz / cell)
-    away = ((block.xyz - (cells + 0.5) * cell) ** 2).sum(axis=1)
+    squared_distance = ((block.xyz - (cells + 0.5) * cell) ** 2).sum(axis=1)
     # A step of a billionth of the cell's square: roundings of equal distances must not decide.
-    nearness = np.rint(away / (cell * cell) * 1e9)
+    nearness = np.rint(squared_distance / (cell * cell) * 1e9)
     order = _order(block, cells, nearness)
     cells = cells[order]
-    first = np.r_[True, np.any(cells[1:] != cells[:-1], axis=1)] if len(cells) else np.zeros(0, dtype=bool)
-    return order[first]
+    begins_cell = np.r_[True, np.any(cells[1:] != cells[:-1], axis=1)] if len(cells) else np.zeros(0, dtype=bool)
+    return order[begins_cell]
 
 
 def _order(block: PointBlock, cells: Float, nearness: Float) -> Index:
-    """Return the indices that sort points by cell, then nearness, then position and attributes where they tie."""
-    low = cells.min(axis=0) if len(cells) else np.zeros(3)
-    spans = (cells.max(axis=0) - low + 1 if len(cells) else np.ones(3)).astype(np.int64)
+    """Return the indices that sort points by cell, then nearness, then position and attributes where they tie.
+
+    Args:
+        block: N points.
+        cells: (N, 3) numbers of their cells.
+        nearness: (N,) the less, the nearer to the cell's centre.
+    """
+    least_numbers = cells.min(axis=0) if len(cells) else np.zeros(3)
+    spans = (cells.max(axis=0) - least_numbers + 1 if len(cells) else np.ones(3)).astype(np.int64)
     if float(np.prod(spans.astype(np.float64))) < 2**62:
-        relative = (cells - low).astype(np.int64)
+        # The three numbers as one, which sorts faster.
+        relative = (cells - least_numbers).astype(np.int64)
         key = (relative[:, 2] * spans[1] + relative[:, 1]) * spans[0] + relative[:, 0]
         order = np.lexsort((nearness, key))
-        tied = (np.diff(key[order]) == 0) & (np.diff(nearness[order]) == 0)
+        has_ties = (np.diff(key[order]) == 0) & (np.diff(nearness[order]) == 0)
         keys: tuple[AnyArray, ...] = (nearness, key)
     else:
         order = np.lexsort((nearness, *cells.T))
-        tied = np.all(np.diff(cells[order], axis=0) == 0, axis=1) & (np.diff(nearness[order]) == 0)
+        has_ties = np.all(np.diff(cells[order], axis=0) == 0, axis=1) & (np.diff(nearness[order]) == 0)
         keys = (nearness, *cells.T)
-    if not tied.any():
+    if not has_ties.any():
         return order
+    # Only now, as it is slow: sorted by all attributes as well, of which `lexsort` takes the last one first.
     ties = tuple(np.asarray(getattr(block, name)) for name in reversed(_TIE_ORDER))
     return np.lexsort((*ties, *block.xyz.T, *keys))

@@ -118,7 +118,7 @@ class Trial:
             for result in self.scan_lines(RINGS[1], _COLOURED)
             if result.seen is not None and len(result.seen)
         ]
-        request = replace(self.layer_request({}), wanted=layers, pick=lambda views: views_near(views, seen_points))
+        request = replace(self.layer_request({}), names=layers, pick=lambda views: views_near(views, seen_points))
         true_settings = truest_settings(request)
         truth = render_layers(replace(request, settings=true_settings), seen_points)
         errors = {}

@@ -108,7 +108,7 @@ def truest_settings(request: LayerRequest) -> ColourSettings:
 def render_layers(request: LayerRequest, parts: Sequence[SeenPoints]) -> list[LayerValues]:
     """Render and return the requested colours and layers at the seen points of each part."""
     with layer_source(request) as source:
-        return [sample_points(source, points, request.wanted) for points in parts]
+        return [sample_points(source, points, request.names) for points in parts]
 
 
 def colour_errors(measured: Sequence[LayerValues], truth: Sequence[LayerValues], kinds: frozenset[str]) -> Errors:

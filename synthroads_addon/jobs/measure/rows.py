@@ -129,7 +129,7 @@ def _measure_stretches(site: Site, knob: Knob, plan: ScanPlan) -> tuple[dict[str
     request, is_coloured = plan.layers.request, "colour" in knob.errors
     assert request is not None
     if is_coloured:
-        request = replace(request, wanted=LAYERS)
+        request = replace(request, names=LAYERS)
     path = spread_stretches(plan.path, _STRETCHES, _SECONDS)
     stretch_plan = replace(plan, emission=replace(plan.emission, path=path))
     result = join_results(record_as_measured(stretch_plan))
@@ -221,7 +221,7 @@ def _colour_errors(knob: Knob, sample: StretchPoints) -> tuple[dict[str, float],
     if knob.whole_paths:
         settings = replace(settings, lighting="path", samples=TRUE_SAMPLES)
         rows, name = rows[::_TENTH], f"a pixel per return with {TRUE_SAMPLES} samples of whole light paths"
-    (truth,) = render_layers(replace(request, settings=settings, wanted=LAYERS), [seen_points.select(rows)])
+    (truth,) = render_layers(replace(request, settings=settings, names=LAYERS), [seen_points.select(rows)])
     arrays = {name: array[rows] for name, array in sample.values.arrays.items()}
     errors, by_source = errors_by_source(LayerValues(arrays, sample.values.source[rows]), truth)
     return errors, {"colour_truth": name, "errors_by_source": by_source}

@@ -146,12 +146,12 @@ class LayerSource(Protocol):
     def report(self) -> dict[str, Any]:
         """Return a summary of what was rendered, as JSON data; empty if nothing was."""
 
-    def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
-        """Return the wanted colour and material layers of N points.
+    def sample(self, points: SeenPoints, names: frozenset[str]) -> LayerValues:
+        """Return the named colour and material layers of N points.
 
         Args:
             points: none of which lies in the air.
-            wanted: ``rgb`` and layers of `MATERIAL_LAYERS`; none other is computed.
+            names: ``rgb`` and layers of `MATERIAL_LAYERS`; none other is computed.
         """
         ...
 
@@ -169,60 +169,67 @@ class SurfaceConstants:
     varies: dict[str, Bool]
 
     def complete(self, name: str, values: Float32, rendered: Bool, material: UInt16) -> Float32:
-        """Return the values of a layer at N points, filled in, in place, with means where they weren't rendered.
+        """Return the values of a layer at N points, with means filled in, in place, where nothing was rendered.
 
         Args:
             name: of the layer.
-            values: (N, C) rendered; any elsewhere.
-            rendered: (N,) which they are: mostly nearly all.
+            values: (N, C) rendered; any numbers elsewhere.
+            rendered: (N,) which of them are rendered, mostly nearly all.
             material: (N,) indices.
         """
         means = self.values[name]
         result = values.reshape(-1, *means.shape[1:])
-        rest = np.flatnonzero(~rendered)
-        if len(rest):
-            result[rest] = take_rows(means, np.take(material, rest))
+        missing_rows = np.flatnonzero(~rendered)
+        if len(missing_rows):
+            result[missing_rows] = take_rows(means, np.take(material, missing_rows))
         return result
 
-    def chosen(self, name: str, rows: Index | None, own: Float32 | None, material: UInt16) -> Float32 | None:
-        """Return a layer's values (K, ...) at points by compiled loops, the means where materials don't vary; or None.
+    def chosen(self, name: str, rows: Index | None, point_values: Float32 | None, material: UInt16) -> Float32 | None:
+        """Return a layer's values (K, ...) at points by compiled loops: their own, or means of even materials.
+
+        None where no compiled loops are in use, or a row or a material isn't there.
 
         Args:
             name: of the layer.
             rows: (K,) of the points; None for all.
-            own: (N, C) values of all N points; None to have means alone.
+            point_values: (N, C) values of all N points; None to have means alone.
             material: (N,) indices.
         """
         if (loops := point_loops()) is None:
             return None
-        return loops.layer(rows, own, material, self.varies[name], self.values[name])
+        return loops.layer(rows, point_values, material, self.varies[name], self.values[name])
 
-    def varying_layers(self, wanted: frozenset[str]) -> tuple[str, ...]:
-        """Return the names of the wanted layers that vary in some material, in the order of `MATERIAL_LAYERS`."""
-        return tuple(name for name in MATERIAL_LAYERS if name in wanted and bool(self.varies[name].any()))
+    def varying_layers(self, names: frozenset[str]) -> tuple[str, ...]:
+        """Return those of the named layers that vary in some material, in the order of `MATERIAL_LAYERS`."""
+        return tuple(name for name in MATERIAL_LAYERS if name in names and bool(self.varies[name].any()))
 
 
 def surface_constants(rows: Sequence[Material], varies: dict[str, Bool] | None = None) -> SurfaceConstants:
-    """Return the mean layer values of materials, in the given order; without `varies` no layer counts as varying."""
+    """Return the mean layer values of materials, in their order.
+
+    Args:
+        rows: M materials.
+        varies: (M,) by layer, whether it varies over the material's surface; None: no layer does.
+    """
     values = {
         name: np.array([getattr(row, name) for row in rows], np.float32).reshape((-1, 3) if parts == 3 else (-1,))
         for name, parts in MATERIAL_LAYERS.items()
     }
-    none = {name: np.zeros(len(rows), bool) for name in MATERIAL_LAYERS}
-    return SurfaceConstants(values, none if varies is None else varies)
+    no_flags = {name: np.zeros(len(rows), bool) for name in MATERIAL_LAYERS}
+    return SurfaceConstants(values, no_flags if varies is None else varies)
 
 
-def needed_layers(wanted: frozenset[str], mode: ColourMode) -> frozenset[str]:
-    """Return the names of the surface layers from which the wanted ones are computed, `rgb` by its mode."""
-    needed = wanted - {"rgb"}
-    if "rgb" in wanted:
-        needed |= set(_FALSE_COLOUR) if mode == "false_colour" else {"base_color"}
-    return frozenset(needed)
+def needed_layers(names: frozenset[str], mode: ColourMode) -> frozenset[str]:
+    """Return the names of the surface layers from which the named ones are computed, `rgb` by its mode."""
+    layer_names = names - {"rgb"}
+    if "rgb" in names:
+        layer_names |= set(_FALSE_COLOUR) if mode == "false_colour" else {"base_color"}
+    return frozenset(layer_names)
 
 
-def decode_srgb(stored: Float) -> Float:
+def decode_srgb(encoded: Float) -> Float:
     """Return the linear values of sRGB-encoded ones (IEC 61966-2-1), both 0 to 1."""
-    return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
 
 
 def encode_srgb(linear: NDArray[np.floating]) -> UInt16:
@@ -235,21 +242,21 @@ def encode_srgb(linear: NDArray[np.floating]) -> UInt16:
     return np.asarray(encoded * np.float32(65535.0) + np.float32(0.5), dtype=np.uint16)
 
 
-def sample_points(source: LayerSource, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
-    """Return the wanted layers of N points; those in the air get zeros and `FROM_MATERIAL` as their source."""
-    solid = np.flatnonzero(points.material != NO_MATERIAL)
-    on = points if len(solid) == len(points) else points.select(solid)
-    values = source.sample(on, wanted)
-    if on is points:
-        return values
+def sample_points(source: LayerSource, points: SeenPoints, names: frozenset[str]) -> LayerValues:
+    """Return the named layers of N points; those in the air get zeros and `FROM_MATERIAL` as their source."""
+    surface_rows = np.flatnonzero(points.material != NO_MATERIAL)
+    if len(surface_rows) == len(points):
+        return source.sample(points, names)
+    values = source.sample(points.select(surface_rows), names)
 
-    def spread(array: NDArray[np.generic], rest: int) -> AnyArray:
-        result = np.full((len(points), *array.shape[1:]), rest, array.dtype)
-        result[solid] = array
+    def fill(array: NDArray[np.generic], fill_value: int) -> AnyArray:
+        """Return values (K, ...) of the points on surfaces as (N, ...) of all points."""
+        result = np.full((len(points), *array.shape[1:]), fill_value, array.dtype)
+        result[surface_rows] = array
         return result
 
-    arrays = {name: spread(array, 0) for name, array in values.arrays.items()}
-    return LayerValues(arrays, spread(values.source, FROM_MATERIAL))
+    arrays = {name: fill(array, 0) for name, array in values.arrays.items()}
+    return LayerValues(arrays, fill(values.source, FROM_MATERIAL))
 
 
 @dataclass(frozen=True)
@@ -271,26 +278,26 @@ class MaterialLayers:
     report: dict[str, Any] = field(default_factory=dict)
     calls = None
 
-    def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
-        """Return the wanted layers of N points from their materials' mean values."""
-        return self.layer_values(points, {}, np.full(len(points), FROM_MATERIAL, np.uint8), wanted)
+    def sample(self, points: SeenPoints, names: frozenset[str]) -> LayerValues:
+        """Return the named layers of N points from their materials' mean values."""
+        return self.layer_values(points, {}, np.full(len(points), FROM_MATERIAL, np.uint8), names)
 
     def layer_values(
-        self, points: SeenPoints, channels: dict[str, Float32], source: UInt8, wanted: frozenset[str]
+        self, points: SeenPoints, channels: dict[str, Float32], source: UInt8, names: frozenset[str]
     ) -> LayerValues:
-        """Return the wanted layers of N points: rendered values where given and the material varies, else the means.
+        """Return the named layers of N points: rendered values where given and the material varies, else the means.
 
         Args:
             points: N points; their times are those at which they were seen.
             channels: rendered layers (N, C) by name, and ``sun`` and ``sky``, the exposed light of each that the
                 surfaces reflect. Rows of points that nothing was rendered for aren't read.
             source: (N,) of `LayerValues`.
-            wanted: layers.
+            names: of the layers.
         """
         rendered = source != FROM_MATERIAL
         everywhere = bool(rendered.all())
         layers: dict[str, Float32] = {}
-        for name in sorted(needed_layers(wanted, self.mode)):
+        for name in sorted(needed_layers(names, self.mode)):
             values = self.constants.chosen(name, None, channels.get(name), points.material) if everywhere else None
             if values is not None:
                 layers[name] = values
@@ -299,14 +306,22 @@ class MaterialLayers:
                 layers[name] = self.constants.complete(name, channels[name].copy(), use, points.material)
             else:
                 layers[name] = take_rows(self.constants.values[name], points.material)
-        arrays: dict[str, NDArray[np.generic]] = {name: layers[name] for name in layers.keys() & wanted}
-        if "rgb" in wanted:
+        arrays: dict[str, NDArray[np.generic]] = {name: layers[name] for name in layers.keys() & names}
+        if "rgb" in names:
             arrays["rgb"] = self._rgb(points, layers, channels, rendered)
         return LayerValues(arrays, source)
 
     def _rgb(
         self, points: SeenPoints, layers: dict[str, Float32], channels: dict[str, Float32], rendered: Bool
     ) -> UInt16:
+        """Return the RGB colours (N, 3), 16-bit sRGB, of points by the mode.
+
+        Args:
+            points: N points.
+            layers: values of the surface layers that the mode needs.
+            channels: see `layer_values`.
+            rendered: (N,) whether anything was rendered for a point.
+        """
         if self.mode == "false_colour":
             return encode_srgb(np.stack([layers[name] for name in _FALSE_COLOUR], axis=1))
         color = layers["base_color"]
@@ -320,10 +335,12 @@ class MaterialLayers:
             if "sun" in channels:
                 sun[rendered] = channels["sun"][rendered]
         if everywhere and "sky" not in channels and self.clouds is None and (loops := point_loops()) is not None:
-            light, normal = self.light, np.asarray(points.normal, np.float32)
-            linear = loops.daylight(
-                sun, color, normal, *(np.asarray(one, np.float32) for one in (light.above, light.below))
+            normal = np.asarray(points.normal, np.float32)
+            light_above, light_below = (
+                np.asarray(self.light.above, np.float32),
+                np.asarray(self.light.below, np.float32),
             )
+            linear = loops.daylight(sun, color, normal, light_above, light_below)
             return loops.encoded(linear, np.power(linear, _SRGB_POWER))
         sky = color * self.light.sky(points.normal)
         if "sky" in channels:

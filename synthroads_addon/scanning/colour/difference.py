@@ -21,10 +21,10 @@ def cie_lab(rgb: UInt16) -> Float:
     return np.stack([116 * f[:, 1] - 16, 500 * (f[:, 0] - f[:, 1]), 200 * (f[:, 1] - f[:, 2])], axis=1)
 
 
-def ciede2000(one: Float, other: Float) -> Float:
+def ciede2000(colour: Float, other_colour: Float) -> Float:
     """Return the CIEDE2000 differences (N,) of L*a*b* colours (N, 3) (CIE 142-2001, form of Sharma et al. 2005)."""
     # Their symbols: c1, c2 are C'_1, C'_2, and so for h; a bar is a mean of both colours.
-    (l1, a1, b1), (l2, a2, b2) = one.T, other.T
+    (l1, a1, b1), (l2, a2, b2) = colour.T, other_colour.T
     c_bar = (np.hypot(a1, b1) + np.hypot(a2, b2)) / 2.0
     # a' = (1 + G) a, G = (1 - sqrt(C^7 / (C^7 + 25^7))) / 2: greys differ by more than their a* says.
     scale = 1.5 - 0.5 * np.sqrt(c_bar**7 / (c_bar**7 + 25.0**7))
@@ -58,16 +58,16 @@ def ciede2000(one: Float, other: Float) -> Float:
 
 
 def known_rows(truth: LayerValues) -> Bool:
-    """Return a mask (N,) of the points whose layers were rendered at the very point, not means nor taken nearby."""
+    """Return a mask (N,) of the points whose layers were rendered at the very point: neither means nor taken nearby."""
     return ~np.isin(truth.source, (FROM_MATERIAL, NEARBY))
 
 
 def colour_difference(mine: LayerValues, truth: LayerValues, rows: Bool) -> Float:
-    """Return the CIEDE2000 differences (n,) between two sets' RGB at the n points chosen by a mask."""
+    """Return the CIEDE2000 differences (n,) of the RGB in two sets of layers, at the n points of a mask (N,)."""
     return ciede2000(cie_lab(mine.arrays["rgb"][rows]), cie_lab(truth.arrays["rgb"][rows]))  # type: ignore[arg-type]
 
 
 def squared_error(name: str, mine: LayerValues, truth: LayerValues, rows: Bool) -> Float:
-    """Return the squared errors (n, components) of a material layer at the n points chosen by a mask."""
+    """Return the squared errors (n, components) of a material layer at the n points that a mask (N,) chooses."""
     difference = mine.arrays[name][rows].astype(np.float64) - truth.arrays[name][rows].astype(np.float64)
     return np.square(difference).reshape(len(difference), -1)

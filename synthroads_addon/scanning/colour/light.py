@@ -62,10 +62,10 @@ class SunAndSky:
         A surface sees a share (1 + n_z) / 2 of an even sky.
         """
         share = (1.0 + np.asarray(normal, np.float32)[:, 2]) / 2.0
-        rest, result = 1.0 - share, np.empty((len(share), 3), np.float32)
+        ground_share, result = 1.0 - share, np.empty((len(share), 3), np.float32)
         colours = zip(self.above.astype(np.float32), self.below.astype(np.float32), strict=True)
-        for column, (above, below) in enumerate(colours):  # long rows are several times as fast
-            np.add(share * above, rest * below, out=result[:, column])
+        for column, (sky_light, ground_light) in enumerate(colours):  # long rows are several times as fast
+            np.add(share * sky_light, ground_share * ground_light, out=result[:, column])
         return result
 
 
@@ -79,8 +79,8 @@ def expose_light(direction: Float, sun: Float, sky: Float) -> tuple[SunAndSky, f
     """
     horizontal = sun * max(float(direction[2]), 0.0) + sky
     exposure = WHITE / max(float(horizontal.mean()), 1e-9)
-    below = GROUND_ALBEDO * horizontal
-    return SunAndSky(direction, sun * exposure, sky * exposure, below * exposure), exposure
+    ground_light = GROUND_ALBEDO * horizontal
+    return SunAndSky(direction, sun * exposure, sky * exposure, ground_light * exposure), exposure
 
 
 class CloudShadows:
@@ -108,28 +108,36 @@ class CloudShadows:
         # Along the sun's ray down to height 0, where the field is; then back with the wind to where it was at time 0.
         plan = position[:, :2] - position[:, 2:3] * self._slope
         plan = plan - np.asarray(time, np.float64).reshape(-1, 1) * self.drift
-        scaled = plan / self._cell
-        low = np.floor(scaled).astype(np.int64)
-        u, v = (scaled - low).T.astype(np.float32)
-        i, j = (low % _CELLS).T
-        k, m = (i + 1) % _CELLS, (j + 1) % _CELLS
-        f = self._field
-        return np.asarray((1 - v) * ((1 - u) * f[i, j] + u * f[k, j]) + v * ((1 - u) * f[i, m] + u * f[k, m]))
+        cell_place = plan / self._cell
+        corner = np.floor(cell_place).astype(np.int64)
+        # Bilinear between the four lattice points around each place; the lattice is periodic.
+        u, v = (cell_place - corner).T.astype(np.float32)
+        i, j = (corner % _CELLS).T
+        next_i, next_j = (i + 1) % _CELLS, (j + 1) % _CELLS
+        field = self._field
+        value_before = (1 - u) * field[i, j] + u * field[next_i, j]
+        value_after = (1 - u) * field[i, next_j] + u * field[next_i, next_j]
+        return np.asarray((1 - v) * value_before + v * value_after)
 
 
 def _cloud_field(cover: float, seed: int) -> Float32:
-    """Return the transmission of the direct sun, `SHADE` to 1, on a periodic lattice (C, C) with a cover of clouds."""
+    """Return the transmission of the direct sun, `SHADE` to 1, on a periodic lattice (`_CELLS`, `_CELLS`).
+
+    Args:
+        cover: share of the lattice that clouds shade, 0 to 1.
+        seed: of the clouds.
+    """
     random = stream(seed, "cloud shadows")
-    total = np.zeros((_CELLS, _CELLS))
+    density = np.zeros((_CELLS, _CELLS))
     for cells, weight in _OCTAVES:
-        coarse = random.normal(size=(_CELLS // cells,) * 2)
-        total += weight * _upsample(_upsample(coarse, cells).T, cells).T
-    rank = np.argsort(np.argsort(total, axis=None)).reshape(total.shape) / total.size
-    # The densest share of the field is cloud: ranks are even, so the cover is met exactly.
-    edge = np.clip((rank - (1.0 - cover)) / (2.0 * _PENUMBRA) + 0.5, 0.0, 1.0)
+        coarse_noise = random.normal(size=(_CELLS // cells,) * 2)
+        density += weight * _upsample(_upsample(coarse_noise, cells).T, cells).T
+    # The densest share of the field is cloud: ranks are even from 0 to 1, so the cover is met exactly.
+    rank = np.argsort(np.argsort(density, axis=None)).reshape(density.shape) / density.size
+    cloud = np.clip((rank - (1.0 - cover)) / (2.0 * _PENUMBRA) + 0.5, 0.0, 1.0)
     if cover in (0.0, 1.0):
-        edge = np.full(total.shape, cover)
-    return np.asarray(1.0 - (1.0 - SHADE) * edge, np.float32)
+        cloud = np.full(density.shape, cover)
+    return np.asarray(1.0 - (1.0 - SHADE) * cloud, np.float32)
 
 
 def _upsample(values: Float, cells: int) -> Float:
@@ -137,6 +145,6 @@ def _upsample(values: Float, cells: int) -> Float:
     t = (np.arange(cells) / cells)[:, None]
     # Cubic Hermite step 3 t^2 - 2 t^3: without slope at both ends, so that the field has no creases.
     step = t * t * (3.0 - 2.0 * t)
-    following = np.roll(values, -1, axis=0)
-    blended = values[:, None, :] * (1.0 - step) + following[:, None, :] * step
-    return np.asarray(blended.reshape(-1, values.shape[1]))
+    next_values = np.roll(values, -1, axis=0)
+    rows = values[:, None, :] * (1.0 - step) + next_values[:, None, :] * step
+    return np.asarray(rows.reshape(-1, values.shape[1]))

@@ -56,11 +56,11 @@ def reflected_sunlight(
     lobe = _gloss(rough, n_l, n_v, np.clip(n_h, 0.0, 1.0))
     tables = _tables()
     place = tables.place(rough, n_v)
-    single = tables.single(place), tables.average(place)
+    one_bounce = tables.single(place), tables.average(place)
     f0 = np.minimum(_MATT_F0 * specular, _BRIGHTEST)
     root = np.sqrt(f0)
     albedo, f_avg = tables.albedo(place, root), _mean_fresnel(f0, root)
-    gloss = (1.0 - metallic) * lobe * _dielectric(f0, v_h) * _compensation(f_avg, single)
+    gloss = (1.0 - metallic) * lobe * _dielectric(f0, v_h) * _compensation(f_avg, one_bounce)
     # The matt base gets what the gloss leaves: (1 - albedo of the gloss) N.L, by Lambert.
     matt = ((1.0 - metallic) * (1.0 - albedo) * n_l)[:, None]
     result = color * matt + gloss[:, None]
@@ -71,7 +71,7 @@ def reflected_sunlight(
         metal_f0 = color[metal]
         fresnel = metal_f0 + (1.0 - metal_f0) * schlick[:, None]
         metal_f_avg = metal_f0 + (1.0 - metal_f0) / 21.0
-        metal_single = single[0][metal, None], single[1][metal, None]
+        metal_single = one_bounce[0][metal, None], one_bounce[1][metal, None]
         result[metal] += (metallic[metal] * lobe[metal])[:, None] * fresnel * _compensation(metal_f_avg, metal_single)
     return np.asarray(result, np.float32)
 
@@ -128,18 +128,18 @@ def _dielectric(f0: NDArray[np.floating], cosine: NDArray[np.floating]) -> NDArr
     return np.asarray(np.where(f0 > 0.0, 0.5 * a * a * (1.0 + b * b), 0.0))
 
 
-def _compensation(f_avg: NDArray[np.floating], single: _SingleScatter) -> NDArray[np.floating]:
+def _compensation(f_avg: NDArray[np.floating], one_bounce: _SingleScatter) -> NDArray[np.floating]:
     """Return the factor by which light that bounces between microfacets makes a gloss brighter.
 
     Args:
         f_avg: mean Fresnel reflectance over all directions.
-        single: see `_SingleScatter`.
+        one_bounce: see `_SingleScatter`.
     """
-    e, e_avg = single
+    e, e_avg = one_bounce
     # Turquin 2019: the lobe times 1 + F_ms (1 - E) / E, with the share F_ms of the missing light that isn't absorbed
     # on its further bounces (Kulla and Conty 2017): F_ms = F_avg^2 E_avg / (1 - F_avg (1 - E_avg)).
-    missing = (1.0 - e) / e
-    return np.asarray(1.0 + missing * f_avg * f_avg * e_avg / (1.0 - f_avg * (1.0 - e_avg)))
+    missing_light = (1.0 - e) / e
+    return np.asarray(1.0 + missing_light * f_avg * f_avg * e_avg / (1.0 - f_avg * (1.0 - e_avg)))
 
 
 def _mean_fresnel(f0: Float32, root: Float32) -> Float32:
@@ -211,18 +211,18 @@ class _AlbedoTables:
 
     def average(self, place: _Place) -> Float32:
         """Return the one-bounce albedo's cosine-weighted mean over all directions (N,), interpolated."""
-        low, share = place.rough
-        below, above = np.take(self._average, low), np.take(self._average, low + 1)
-        return np.asarray(below * (1.0 - share) + above * share, np.float32)
+        step, share = place.rough
+        value_below, value_above = np.take(self._average, step), np.take(self._average, step + 1)
+        return np.asarray(value_below * (1.0 - share) + value_above * share, np.float32)
 
     def albedo(self, place: _Place, root: Float32) -> Float32:
         """Return a dielectric gloss's albedo relative to a mirror's (N,); `root` squared is its normal reflectance."""
-        low, share = _grid_step(root, self._root)
-        entry = place.entry * _LEVELS + low
-        below = _bilinear(self._albedo, place, entry, _LEVELS)
+        step, share = _grid_step(root, self._root)
+        entry = place.entry * _LEVELS + step
+        value_below = _bilinear(self._albedo, place, entry, _LEVELS)
         entry += 1
-        above = _bilinear(self._albedo, place, entry, _LEVELS)
-        return np.asarray(below * (1.0 - share) + above * share, np.float32)
+        value_above = _bilinear(self._albedo, place, entry, _LEVELS)
+        return np.asarray(value_below * (1.0 - share) + value_above * share, np.float32)
 
 
 _building = Lock()
@@ -236,6 +236,7 @@ def _tables() -> _AlbedoTables:
 
 @lru_cache(maxsize=1)
 def _built_tables() -> _AlbedoTables:
+    """Return the tables, made by the first call and cached."""
     return _AlbedoTables()
 
 
@@ -243,11 +244,16 @@ _Axis = tuple[float, float, int]
 
 
 def _grid_step(values: Float32, axis: _Axis) -> _GridStep:
-    """Return the index of the grid step below each value (N,), and the fraction of the way to the next (N,)."""
-    first, scale, last = axis
-    scaled = np.clip((values - np.float32(first)) * np.float32(scale), 0.0, last)
-    low = np.minimum(scaled.astype(np.intp), last - 1)
-    return low, np.asarray(scaled - low, np.float32)
+    """Return the index (N,) of the grid step below each value (N,), and the fraction (N,) of the way to the next.
+
+    Args:
+        values: (N,).
+        axis: first value of the grid, steps per unit, and index of the last step.
+    """
+    first_value, scale, last_step = axis
+    position = np.clip((values - np.float32(first_value)) * np.float32(scale), 0.0, last_step)
+    step = np.minimum(position.astype(np.intp), last_step - 1)
+    return step, np.asarray(position - step, np.float32)
 
 
 def _bilinear(table: Float32, place: _Place, entry: NDArray[np.intp], levels: int = 1) -> Float32:
@@ -261,9 +267,9 @@ def _bilinear(table: Float32, place: _Place, entry: NDArray[np.intp], levels: in
     """
     u, v = place.rough[1], place.view[1]
     flat, row = table.ravel(), _COSINES * levels
-    low = np.take(flat, entry) * (1.0 - v) + np.take(flat, entry + levels) * v
-    high = np.take(flat, entry + row) * (1.0 - v) + np.take(flat, entry + (row + levels)) * v
-    return np.asarray(low * (1.0 - u) + high * u, np.float32)
+    value_below = np.take(flat, entry) * (1.0 - v) + np.take(flat, entry + levels) * v
+    value_above = np.take(flat, entry + row) * (1.0 - v) + np.take(flat, entry + (row + levels)) * v
+    return np.asarray(value_below * (1.0 - u) + value_above * u, np.float32)
 
 
 def _visible_facets(alpha: float, cosine: Float, u1: Float, u2: Float) -> tuple[Float, Float]:

@@ -19,7 +19,7 @@ class LayerRequest:
 
     Attributes:
         settings: how they are rendered.
-        wanted: layers: ``rgb``, ``base_color``, ``roughness``, ``metallic``, ``specular``.
+        names: of the layers: ``rgb``, ``base_color``, ``roughness``, ``metallic``, ``specular``.
         mesh: what is scanned, without what moves.
         moving: what moves.
         kernels: ``auto`` to have a kernel work materials out where this machine and their nodes let it, else ``off``.
@@ -32,7 +32,7 @@ class LayerRequest:
     """
 
     settings: ColourSettings
-    wanted: frozenset[str]
+    names: frozenset[str]
     mesh: SceneMesh
     environment: Environment
     path: Path
@@ -46,7 +46,7 @@ class LayerRequest:
     @property
     def lit(self) -> bool:
         """Return whether RGB colours lit by sun and sky are wanted."""
-        return "rgb" in self.wanted and self.settings.mode == "lit"
+        return "rgb" in self.names and self.settings.mode == "lit"
 
 
 def material_layers(
@@ -55,7 +55,7 @@ def material_layers(
     """Return the layer source of the materials' mean values, with drifting cloud shadows if lit and cloudy.
 
     Args:
-        request: colours and layers that are wanted.
+        request: which colours and layers.
         constants: means of the scene's materials.
         light: that of the images; the usual one if None.
     """

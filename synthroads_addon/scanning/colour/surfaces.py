@@ -32,9 +32,9 @@ class SceneSurfaces:
         """Return each surface input's values (K, 4) at rows (K,) of points; 0 where the surface lacks it."""
         if points.face is None:
             return {what: np.zeros((len(rows), 4), np.float32) for what in sorted(inputs)}
-        asked = list(inputs)
-        normal = take_rows(points.normal, rows) if any(what.kind in NORMALS for what in asked) else None
-        return self.read_places(asked, take_rows(points.face, rows), take_rows(points.position, rows), normal)
+        input_list = list(inputs)
+        normal = take_rows(points.normal, rows) if any(what.kind in NORMALS for what in input_list) else None
+        return self.read_places(input_list, take_rows(points.face, rows), take_rows(points.position, rows), normal)
 
     def read_places(
         self, inputs: Iterable[SurfaceInput], face: Index, place: Float, normal: NDArray[np.floating] | None = None
@@ -51,15 +51,15 @@ class SceneSurfaces:
         if not result:
             return result
         for number, mesh in enumerate(self._meshes):
-            low, high = self._firsts[number], self._firsts[number + 1]
-            mine = np.flatnonzero((face >= low) & (face < high))
-            if len(mine) == len(face):
+            first_face, end_face = self._firsts[number], self._firsts[number + 1]
+            rows = np.flatnonzero((face >= first_face) & (face < end_face))
+            if len(rows) == len(face):
                 return self._read_mesh(number, mesh, (face, place, normal), list(result))
-            if len(mine):
-                towards = None if normal is None else take_rows(normal, mine)
-                places = (take_rows(face, mine), take_rows(place, mine), towards)
+            if len(rows):
+                towards = None if normal is None else take_rows(normal, rows)
+                places = (take_rows(face, rows), take_rows(place, rows), towards)
                 for what, values in self._read_mesh(number, mesh, places, list(result)).items():
-                    result[what][mine] = values
+                    result[what][rows] = values
         return result
 
     def _read_mesh(
@@ -69,7 +69,15 @@ class SceneSurfaces:
         places: tuple[Index, Float, NDArray[np.floating] | None],
         inputs: Sequence[SurfaceInput],
     ) -> dict[SurfaceInput, Float32]:
-        """Return the surface inputs' values (N, 4) of places (face, place, normal) on one of the meshes."""
+        """Return the surface inputs' values (N, 4), by input, at places on one of the meshes.
+
+        Args:
+            number: of the mesh.
+            mesh: the mesh.
+            places: faces (N,) of the scene, places (N, 3) in the scene at time 0, local, m, and unit normals (N, 3)
+                there or None.
+            inputs: that are read.
+        """
         faces, place, towards = places[0] - self._firsts[number], places[1], places[2]
         rotation, begin = self._poses[number]
         normal = None if towards is None else np.asarray(towards, np.float64)
@@ -84,13 +92,13 @@ class SceneSurfaces:
         located = None if mesh.surface is None else mesh.surface.locate(faces)
         result: dict[SurfaceInput, Float32] = {}
         for what in inputs:
-            values, known = np.zeros((len(faces), 4), np.float32), np.zeros(len(faces), bool)
+            values, is_known = np.zeros((len(faces), 4), np.float32), np.zeros(len(faces), bool)
             if mesh.surface is not None and located is not None:
-                values, known = mesh.surface.read(what, located, shares, place, normal)
+                values, is_known = mesh.surface.read(what, located, shares, place, normal)
             if what.kind == "normal" and towards is not None:
                 # Where the shading isn't smooth it is the face's own.
-                values[known, :3] = values[known, :3] @ rotation.T
-                values[~known, :3] = towards[~known]
+                values[is_known, :3] = values[is_known, :3] @ rotation.T
+                values[~is_known, :3] = towards[~is_known]
             result[what] = values
         return result
 

@@ -54,7 +54,7 @@ class SeeThrough:
         target: Target,
         material: Index,
         face: Index,
-        along: Float,
+        cosine: Float,
         place: Float,
         times: Float,
         motions: list[Track],
@@ -65,7 +65,7 @@ class SeeThrough:
             target: what is scanned.
             material: (N,) of the faces; transparent ones.
             face: (N,).
-            along: (N,) n . d of the face's normal and the ray.
+            cosine: (N,) n . d of the face's normal and the ray.
             place: (3, N) where the ray meets it, local, m.
             times: (N,) s.
             motions: tracks of the target's moving parts.
@@ -75,21 +75,28 @@ class SeeThrough:
             (place,) = target.at_time_zero(face, place, times, motions)
         for number in np.unique(material).tolist():
             rows, entry = np.flatnonzero(material == number), self.materials[number]
-            values = self._values(entry.inputs, face[rows], along[rows], place[:, rows].T)
+            values = self._values(entry.inputs, face[rows], cosine[rows], place[:, rows].T)
             result[rows] = np.clip(np.nan_to_num(entry.share(values)), 0.0, 1.0)
         return result
 
     def _values(
-        self, inputs: frozenset[SurfaceInput], face: Index, along: Float, place: Float
+        self, inputs: frozenset[SurfaceInput], face: Index, cosine: Float, place: Float
     ) -> dict[SurfaceInput, Float]:
-        """Return the values (N, 4) of inputs at places (N, 3) on faces."""
-        asked = inputs - {POSITION, ALONG}
+        """Return the values (N, 4) of inputs at places on faces, by input.
+
+        Args:
+            inputs: that materials ask for.
+            face: (N,) that the places are on.
+            cosine: (N,) n . d of the face's normal and the ray.
+            place: (N, 3) local, m.
+        """
+        surface_inputs = inputs - {POSITION, ALONG}
         result: dict[SurfaceInput, Float] = {}
-        if asked:
-            read = self.surfaces.read_places(asked, face, place)
-            result = {what: values.astype(np.float64) for what, values in read.items()}
+        if surface_inputs:
+            read_values = self.surfaces.read_places(surface_inputs, face, place)
+            result = {what: values.astype(np.float64) for what, values in read_values.items()}
         if POSITION in inputs:
             result[POSITION] = np.pad((place + self.frame_origin) / self.unit, ((0, 0), (0, 1)))
         if ALONG in inputs:
-            result[ALONG] = np.repeat(along[:, None], 4, axis=1)
+            result[ALONG] = np.repeat(cosine[:, None], 4, axis=1)
         return result

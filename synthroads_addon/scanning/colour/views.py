@@ -55,8 +55,8 @@ class View:
         Depth is measured along the axis; points behind the camera have none above 0, and columns and rows that mean
         nothing.
         """
-        right, up, back = ((points - self.position) @ self.rotation).T
-        depth = -back
+        right, up, backward = ((points - self.position) @ self.rotation).T
+        depth = -backward
         with np.errstate(divide="ignore", invalid="ignore"):
             scale = self.focal / depth
             return self.centre[0] + right * scale, self.centre[1] - up * scale, depth
@@ -70,15 +70,22 @@ class View:
     def crop_to(self, points: Float, margin: int) -> View | None:
         """Return the camera cropped to the pixels that show points (N, 3), plus a margin, px; None if it shows none."""
         x, y, depth = self.project(points)
-        shown = (depth > 0.0) & (x >= 0.0) & (x <= self.size[0]) & (y >= 0.0) & (y <= self.size[1])
-        if not shown.any():
+        is_shown = (depth > 0.0) & (x >= 0.0) & (x <= self.size[0]) & (y >= 0.0) & (y <= self.size[1])
+        if not is_shown.any():
             return None
-        left, top = (max(0, int(values[shown].min()) - margin) for values in (x, y))
-        right, bottom = (
-            min(size, int(values[shown].max()) + 1 + margin) for values, size in zip((x, y), self.size, strict=True)
+        left_edge, top_edge = (max(0, int(values[is_shown].min()) - margin) for values in (x, y))
+        right_edge, bottom_edge = (
+            min(size, int(values[is_shown].max()) + 1 + margin) for values, size in zip((x, y), self.size, strict=True)
         )
-        centre = (self.centre[0] - left, self.centre[1] - top)
-        return View(self.position, self.rotation, self.focal, centre, (right - left, bottom - top), self.time)
+        centre = (self.centre[0] - left_edge, self.centre[1] - top_edge)
+        return View(
+            self.position,
+            self.rotation,
+            self.focal,
+            centre,
+            (right_edge - left_edge, bottom_edge - top_edge),
+            self.time,
+        )
 
     @property
     def pixels(self) -> int:
@@ -103,7 +110,9 @@ class RenderedImage:
     material: UInt16
 
 
-def views_along(path: Path, points: Float, settings: ColourSettings, field_of_view: float, largest: int) -> list[View]:
+def views_along(
+    path: Path, points: Float, settings: ColourSettings, field_of_view: float, largest_side: int
+) -> list[View]:
     """Return the cameras along a path, each cut to what it can see of the scene.
 
     High platforms look straight down, with images as wide as the swath. Others look around: ahead, back, to both
@@ -114,7 +123,7 @@ def views_along(path: Path, points: Float, settings: ColourSettings, field_of_vi
         points: (N, 3) places on the scene's surfaces, local, m; see `scene_sample`.
         settings: spacing and resolution of the images.
         field_of_view: of the scanner, all of it, rad.
-        largest: largest side of an image, px.
+        largest_side: largest side of an image, px.
     """
     if not len(points):
         return []
@@ -125,7 +134,9 @@ def views_along(path: Path, points: Float, settings: ColourSettings, field_of_vi
         for place, forward, time in zip(position, heading, times, strict=True):
             level = np.array([[*forward, 0.0], [-forward[1], forward[0], 0.0], [0.0, 0.0, 1.0]]).T
             focal, limits, cameras = _cameras(points - place, level, path.typical_range, settings, field_of_view)
-            views += [_cut_view(place, level @ axes, focal, float(time), points, limits, largest) for axes in cameras]
+            views += [
+                _cut_view(place, level @ axes, focal, float(time), points, limits, largest_side) for axes in cameras
+            ]
     return [view for view in views if view is not None]
 
 
@@ -133,16 +144,16 @@ def scene_sample(mesh: SceneMesh) -> Float:
     """Return places (N, 3) that a mesh extends over: some of its vertices, and others spread evenly over its faces."""
     if not len(mesh):
         return np.empty((0, 3))
-    used = mesh.vertices[:: max(1, len(mesh.vertices) // _SAMPLE)]
-    reached = np.cumsum(mesh.areas())
+    vertices = mesh.vertices[:: max(1, len(mesh.vertices) // _SAMPLE)]
+    summed_area = np.cumsum(mesh.areas())
     number = np.arange(_SAMPLE)
-    face = np.minimum(np.searchsorted(reached, (number + 0.5) / _SAMPLE * reached[-1]), len(mesh) - 1)
+    face = np.minimum(np.searchsorted(summed_area, (number + 0.5) / _SAMPLE * summed_area[-1]), len(mesh) - 1)
     # Even over a triangle: two shares that fill the square evenly, folded at its diagonal.
     a, b = (number * 0.7548776662466927) % 1.0, (number * 0.5698402909980532) % 1.0
     a, b = np.where(a + b > 1.0, [1.0 - a, 1.0 - b], [a, b])
     corner = mesh.vertices[mesh.triangles[face]].astype(np.float64)
-    inside = corner[:, 0] + a[:, None] * (corner[:, 1] - corner[:, 0]) + b[:, None] * (corner[:, 2] - corner[:, 0])
-    return np.concatenate([used.astype(np.float64), inside])
+    face_places = corner[:, 0] + a[:, None] * (corner[:, 1] - corner[:, 0]) + b[:, None] * (corner[:, 2] - corner[:, 0])
+    return np.concatenate([vertices.astype(np.float64), face_places])
 
 
 def _image_times(path: Path, strip: Strip, spacing: float) -> Float:
@@ -157,44 +168,47 @@ def _image_times(path: Path, strip: Strip, spacing: float) -> Float:
 
 
 def _travel_directions(path: Path, strip: Strip, times: Float) -> tuple[Float, Float]:
-    """Return positions (K, 3), m, and horizontal unit directions of travel (K, 2), of the scanner's axis if still."""
+    """Return positions (K, 3), m, and horizontal unit directions of travel (K, 2), at times (K,), s.
+
+    Where the platform stands still the direction is that of its forward axis, in plan.
+    """
     position, rotation = path.pose(strip, times)
     step = min(0.05, strip.duration / 4.0)
-    low, high = strip.start_time, strip.start_time + strip.duration
-    before, _ = path.pose(strip, np.clip(times - step, low, high))
-    after, _ = path.pose(strip, np.clip(times + step, low, high))
-    travel = (after - before)[:, :2]
-    still = np.linalg.norm(travel, axis=1) < 1e-6
-    travel[still] = rotation[still, :2, 0]
+    begin, end = strip.start_time, strip.start_time + strip.duration
+    place_before, _ = path.pose(strip, np.clip(times - step, begin, end))
+    place_after, _ = path.pose(strip, np.clip(times + step, begin, end))
+    travel = (place_after - place_before)[:, :2]
+    is_still = np.linalg.norm(travel, axis=1) < 1e-6
+    travel[is_still] = rotation[is_still, :2, 0]
     length = np.linalg.norm(travel, axis=1, keepdims=True)
     return position, np.where(length > 1e-9, travel / np.maximum(length, 1e-9), [1.0, 0.0])
 
 
 def _cameras(
-    near: Float, level: Float, typical_range: float, settings: ColourSettings, field_of_view: float
+    offsets: Float, level: Float, typical_range: float, settings: ColourSettings, field_of_view: float
 ) -> tuple[float, tuple[float, float], Sequence[Float]]:
     """Return the focal length (px), limits (tangents aside and along) and axes of the cameras at one place.
 
     Args:
-        near: (N, 3) places on the scene's surfaces from there, m.
+        offsets: (N, 3) places on the scene's surfaces from there, m.
         level: (3, 3) axes of the level frame: forward, left and up.
         typical_range: of the scanner, m.
         settings: spacing and resolution of the images.
         field_of_view: of the scanner, all of it, rad.
     """
-    below = -near[np.abs(near @ level[:, 0]) < settings.image_spacing, 2]
-    ground = float(np.median(below)) if len(below) else typical_range
-    if ground < _HIGH:
+    heights = -offsets[np.abs(offsets @ level[:, 0]) < settings.image_spacing, 2]
+    height_above_ground = float(np.median(heights)) if len(heights) else typical_range
+    if height_above_ground < _HIGH:
         return max(8.0, typical_range / settings.ground_sampling_distance), (1.0, 1.0), _AROUND
-    aside = min(_STEEPEST, np.tan(min(field_of_view / 2.0, 1.5)) * 1.05)
-    along = min(_STEEPEST, OVERLAP * settings.image_spacing / 2.0 / ground)
-    return ground / settings.ground_sampling_distance, (aside, along), (_NADIR,)
+    side_limit = min(_STEEPEST, np.tan(min(field_of_view / 2.0, 1.5)) * 1.05)
+    length_limit = min(_STEEPEST, OVERLAP * settings.image_spacing / 2.0 / height_above_ground)
+    return height_above_ground / settings.ground_sampling_distance, (side_limit, length_limit), (_NADIR,)
 
 
 def _turned_ahead(cos: float, sin: float) -> Float:
     """Return the axes (3, 3) of a level camera that looks ahead, turned about the vertical by an angle's cos, sin."""
-    ahead = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    return np.asarray(np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ ahead)
+    forward_axes = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    return np.asarray(np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ forward_axes)
 
 
 _UP = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -206,25 +220,41 @@ _AROUND: Sequence[Float] = (*(_turned_ahead(*quarter) for quarter in _QUARTERS),
 
 
 def _cut_view(
-    place: Float, rotation: Float, focal: float, time: float, points: Float, limits: tuple[float, float], largest: int
+    place: Float,
+    rotation: Float,
+    focal: float,
+    time: float,
+    points: Float,
+    limits: tuple[float, float],
+    largest_side: int,
 ) -> View | None:
-    """Return a camera whose image holds the scene within its limits (tangents aside and along), or None if empty."""
-    right, up, back = ((points - place) @ rotation).T
-    near = (back < -0.1) & (np.abs(up) <= -_BESIDE * limits[1] * back)
-    if not near.any():
+    """Return a camera whose image holds what it sees of the scene within its limits; None if it sees nothing.
+
+    Args:
+        place: (3,) of the camera, m.
+        rotation: (3, 3) its axes.
+        focal: focal length, px; less where the image would be too large.
+        time: s.
+        points: (N, 3) places on the scene's surfaces, m.
+        limits: tangents of the largest angles aside and along.
+        largest_side: of the image, px.
+    """
+    right, up, backward = ((points - place) @ rotation).T
+    in_limits = (backward < -0.1) & (np.abs(up) <= -_BESIDE * limits[1] * backward)
+    if not in_limits.any():
         return None
-    x, y = right[near] / -back[near], up[near] / -back[near]
-    left, aside = _padded_range(x, limits[0])
-    bottom, top = _padded_range(y, limits[1])
-    if aside <= left or top <= bottom:
+    x, y = right[in_limits] / -backward[in_limits], up[in_limits] / -backward[in_limits]
+    left_edge, right_edge = _padded_range(x, limits[0])
+    bottom_edge, top_edge = _padded_range(y, limits[1])
+    if right_edge <= left_edge or top_edge <= bottom_edge:
         return None
-    focal = min(focal, largest / max(aside - left, top - bottom))
-    size = (int(np.ceil((aside - left) * focal)), int(np.ceil((top - bottom) * focal)))
-    return View(place, rotation, focal, (float(-left * focal), float(top * focal)), size, time)
+    focal = min(focal, largest_side / max(right_edge - left_edge, top_edge - bottom_edge))
+    size = (int(np.ceil((right_edge - left_edge) * focal)), int(np.ceil((top_edge - bottom_edge) * focal)))
+    return View(place, rotation, focal, (float(-left_edge * focal), float(top_edge * focal)), size, time)
 
 
 def _padded_range(values: Float, limit: float) -> tuple[float, float]:
     """Return the range of sampled values, widened by a margin and cut at plus and minus the limit."""
-    low, high = float(values.min()), float(values.max())
-    spare = 0.02 * (1.0 + high - low)
-    return max(low - spare, -limit), min(high + spare, limit)
+    least_value, largest_value = float(values.min()), float(values.max())
+    margin = 0.02 * (1.0 + largest_value - least_value)
+    return max(least_value - margin, -limit), min(largest_value + margin, limit)

@@ -135,6 +135,7 @@ class Device(Model):
 
     @model_validator(mode="after")
     def _check_modes(self) -> Self:
+        """Raise ValueError if lines, beams or modes contradict each other or the pattern."""
         slowest, fastest = self.lines_per_second
         if slowest > fastest:
             raise ValueError(
@@ -294,6 +295,7 @@ def setting_of(device: Device, scan: DeviceChoice, range_sigma: float | None = N
 
 
 def _mode(device: Device, pulse_rate_khz: float | None) -> PulseMode:
+    """Return the mode of a pulse rate, the first one for None; raise `InputError` if the device lacks it."""
     if pulse_rate_khz is None:
         return device.modes[0]
     for mode in device.modes:
@@ -304,42 +306,56 @@ def _mode(device: Device, pulse_rate_khz: float | None) -> PulseMode:
 
 
 def _field_of_view(device: Device, mode: PulseMode, view: float | None) -> float:
-    """Return the field of view, deg: the chosen one if the device allows it, else the mode's."""
+    """Return the field of view, deg: the chosen one if there is one, else the mode's.
+
+    Raises:
+        InputError: the device doesn't see the chosen one.
+    """
     if view is None:
         return mode.field_of_view_deg
     if device.pattern.fixed_view and not math.isclose(view, mode.field_of_view_deg):
-        allowed = f"{device.title} always sees {mode.field_of_view_deg:g} deg: its optics are fixed"
-        raise InputError("scan.field_of_view_deg", view, allowed)
+        requirement = f"{device.title} always sees {mode.field_of_view_deg:g} deg: its optics are fixed"
+        raise InputError("scan.field_of_view_deg", view, requirement)
     if view > mode.field_of_view_deg:
-        allowed = f"{device.title} sees {mode.field_of_view_deg:g} deg at {mode.pulse_rate_khz:g} kHz"
-        raise InputError("scan.field_of_view_deg", view, allowed)
+        requirement = f"{device.title} sees {mode.field_of_view_deg:g} deg at {mode.pulse_rate_khz:g} kHz"
+        raise InputError("scan.field_of_view_deg", view, requirement)
     return view
 
 
 def _lines_per_second(device: Device, mode: PulseMode, view: float, scan: DeviceChoice) -> float:
-    """Return the scan lines per second: as chosen, else from the chosen angle step, else the device's fastest."""
+    """Return the scan lines per second: as chosen, else from the chosen angle step, else the device's fastest.
+
+    Args:
+        device: the device.
+        mode: its pulse rate.
+        view: the field of view, rad.
+        scan: what is chosen.
+
+    Raises:
+        InputError: the device doesn't scan so fast or slowly, or lines and angle step contradict each other.
+    """
     slowest, fastest = device.lines_per_second
     step_of_a_line = math.degrees(device.pattern.sweep(view)) / (mode.pulse_rate_khz * 1e3)
-    at = f"at {mode.pulse_rate_khz:g} kHz"
+    rate_text = f"at {mode.pulse_rate_khz:g} kHz"
     if scan.lines_per_second is None and scan.angle_step_deg is not None:
         lines = scan.angle_step_deg / step_of_a_line
         # A data sheet's angle is rounded, and may miss a limit by that.
         for limit in device.lines_per_second:
             lines = limit if math.isclose(lines, limit, rel_tol=1e-3) else lines
         if not slowest <= lines <= fastest:
-            allowed = (
+            requirement = (
                 f"{device.title} scans {slowest:g} to {fastest:g} lines/s, "
-                f"that is {slowest * step_of_a_line:.4g} to {fastest * step_of_a_line:.4g} deg {at}"
+                f"that is {slowest * step_of_a_line:.4g} to {fastest * step_of_a_line:.4g} deg {rate_text}"
             )
-            raise InputError("scan.angle_step_deg", scan.angle_step_deg, allowed)
+            raise InputError("scan.angle_step_deg", scan.angle_step_deg, requirement)
         return lines
     lines = fastest if scan.lines_per_second is None else scan.lines_per_second
     if not slowest <= lines <= fastest:
         raise InputError("scan.lines_per_second", lines, f"{device.title} scans {slowest:g} to {fastest:g} lines/s")
     step = step_of_a_line * lines
     if scan.angle_step_deg is not None and not math.isclose(scan.angle_step_deg, step, rel_tol=1e-3):
-        allowed = f"{lines:g} lines/s {at} give {step:.6g} deg: leave one of the two out"
-        raise InputError("scan.angle_step_deg", scan.angle_step_deg, allowed)
+        requirement = f"{lines:g} lines/s {rate_text} give {step:.6g} deg: leave one of the two out"
+        raise InputError("scan.angle_step_deg", scan.angle_step_deg, requirement)
     return lines
 
 

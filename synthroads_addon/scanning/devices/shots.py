@@ -36,7 +36,7 @@ def shot_count(setting: ScannerSetting, duration: float, ends: bool = False) -> 
     return heads * max(1, math.floor(duration * setting.lines_per_second + 1e-9)) * setting.pulses_per_line
 
 
-def shots(setting: ScannerSetting, first: int, count: int, with_frame: bool = False) -> PulseRays:
+def shots(setting: ScannerSetting, first_shot: int, count: int, with_frame: bool = False) -> PulseRays:
     """Return ``count`` pulses from number ``first`` on in the scanner's frame: x forward, y left, z up.
 
     They are the same, to the bit, as that slice of all pulses. Shot i is pulse i // H of head i mod H of a device with
@@ -46,7 +46,7 @@ def shots(setting: ScannerSetting, first: int, count: int, with_frame: bool = Fa
     Args:
         with_frame: whether the axes across the beam are wanted.
     """
-    return shot_run(setting, first, count, with_frame).shots()
+    return shot_run(setting, first_shot, count, with_frame).shots()
 
 
 class Columns(NamedTuple):
@@ -61,12 +61,12 @@ class Columns(NamedTuple):
     rows: Index | None = None
 
     def of(self, table: AnyArray, count: int) -> AnyArray:
-        """Return the ``count`` columns of a table."""
+        """Return ``count`` columns (..., count) of a table (..., M) that repeats."""
         if self.rows is None:
             return _repeated(table, self.first, count)
         # Repeated up to the last one: remainders of all would take longer.
-        most = int(self.rows[-1]) + 1 if count else 0
-        return np.take(_repeated(table, self.first, most), self.rows, axis=-1)
+        column_count = int(self.rows[-1]) + 1 if count else 0
+        return np.take(_repeated(table, self.first, column_count), self.rows, axis=-1)
 
 
 @dataclass(frozen=True)
@@ -90,46 +90,56 @@ class ShotRun:
         return None if values is None else Columns(self.first, rows).of(values, count)
 
     def shots(self) -> PulseRays:
-        """Return all of them."""
+        """Return the times and directions of all shots of the run."""
         names = ("scan_angle", "direction", "in_plane", "across", "beam")
         return PulseRays(self.time, *(self.column(name) for name in names))
 
 
-def shot_run(setting: ScannerSetting, first: int, count: int, with_frame: bool = False) -> ShotRun:
-    """Return what `shots` does, most of it not worked out yet."""
+def shot_run(setting: ScannerSetting, first_shot: int, count: int, with_frame: bool = False) -> ShotRun:
+    """Return the shots that `shots` returns, as columns of a cached table where their directions repeat.
+
+    Args:
+        setting: the scanner's.
+        first_shot: number of the first pulse.
+        count: of pulses.
+        with_frame: whether the axes across the beam are worked out.
+    """
     lines = setting.device.pattern.cycle_lines
-    length = lines * setting.pulses_per_line * len(setting.device.heads)
+    length = lines * setting.pulses_per_line * len(setting.device.heads)  # shots of a cycle
     if 0 < length <= _LARGEST_TABLE and not setting.free_mirror:
         table = _cycle_table(setting, with_frame)
-        cycle, column = divmod(first, length)
-        cycles = np.arange(cycle, cycle + -(-(column + count) // length), dtype=np.int64)
+        first_cycle, column = divmod(first_shot, length)
+        cycle_count = -(-(column + count) // length)
+        cycles = np.arange(first_cycle, first_cycle + cycle_count, dtype=np.int64)
         time = table.time + (cycles * lines / setting.lines_per_second)[:, None]
         return ShotRun(table, column, time.ravel()[column : column + count].copy())
-    number = np.arange(first, first + count, dtype=np.int64)
+    # Directions that don't repeat, or too many to keep, are worked out shot by shot.
+    numbers = np.arange(first_shot, first_shot + count, dtype=np.int64)
     if lines == 0 or setting.free_mirror:
-        alone = _shots(setting, number, with_frame)
+        rays = _shots(setting, numbers, with_frame)
     else:
-        cycle_of = number // length
-        number -= cycle_of * length
-        alone = _shots(setting, number, with_frame)
-        alone.time[:] += cycle_of * lines / setting.lines_per_second
-    return ShotRun(alone, 0, alone.time)
+        cycles = numbers // length
+        numbers -= cycles * length
+        rays = _shots(setting, numbers, with_frame)
+        rays.time[:] += cycles * lines / setting.lines_per_second
+    return ShotRun(rays, 0, rays.time)
 
 
-def _repeated(table: AnyArray, first: int, count: int) -> AnyArray:
-    """Return the columns (..., count) from ``first`` on of a table (..., M) that repeats, a copy.
+def _repeated(table: AnyArray, first_column: int, count: int) -> AnyArray:
+    """Return columns (..., count) of a table (..., M) that repeats, from ``first_column`` on, as a copy.
 
     All whole repetitions are copied at once: NumPy lets go of Python's lock for each copy, and threads wait to have it
     back.
     """
     length = table.shape[-1]
-    if first + count <= length:
-        return table[..., first : first + count].copy()
-    begin = length - first
-    whole, rest = divmod(count - begin, length)
-    result, end = np.empty((*table.shape[:-1], count), table.dtype), begin + whole * length
-    result[..., :begin], result[..., end:] = table[..., first:], table[..., :rest]
-    result[..., begin:end].reshape(*table.shape[:-1], whole, length)[...] = table[..., None, :]
+    if first_column + count <= length:
+        return table[..., first_column : first_column + count].copy()
+    # What is left of the table from the first column on, whole repetitions, and the beginning of one more.
+    head = length - first_column
+    repetitions, tail = divmod(count - head, length)
+    result, tail_begin = np.empty((*table.shape[:-1], count), table.dtype), head + repetitions * length
+    result[..., :head], result[..., tail_begin:] = table[..., first_column:], table[..., :tail]
+    result[..., head:tail_begin].reshape(*table.shape[:-1], repetitions, length)[...] = table[..., None, :]
     return result
 
 
@@ -144,19 +154,24 @@ def _shots(setting: ScannerSetting, number: Numbers, with_frame: bool) -> PulseR
     """Compute the shots of all heads by their numbers (P,), in the scanner's frame."""
     heads = len(setting.device.heads)
     pulse, head = np.divmod(number, heads) if heads > 1 else (number, None)
-    part = setting.device.pattern.rays(setting.timing, pulse, with_frame)
-    beam = np.zeros(len(number), dtype=np.int64) if part.beam is None else part.beam
+    head_rays = setting.device.pattern.rays(setting.timing, pulse, with_frame)
+    beam = np.zeros(len(number), dtype=np.int64) if head_rays.beam is None else head_rays.beam
     if head is not None:
         beam = beam + head * setting.device.pattern.beams
-        part.time[:] += head / (heads * setting.pulse_rate)
+        head_rays.time[:] += head / (heads * setting.pulse_rate)
     turn = _mounting(setting, head)
-    in_plane, across = (None if axis is None else turn(axis) for axis in (part.in_plane, part.across))
-    direction = turn(part.direction)
-    return PulseRays(part.time, part.scan_angle, direction, in_plane, across, beam.astype(np.uint8))
+    in_plane, across = (None if axis is None else turn(axis) for axis in (head_rays.in_plane, head_rays.across))
+    direction = turn(head_rays.direction)
+    return PulseRays(head_rays.time, head_rays.scan_angle, direction, in_plane, across, beam.astype(np.uint8))
 
 
 def _mounting(setting: ScannerSetting, head: Numbers | None) -> Callable[[Float], Float]:
-    """Return the function that turns vectors (3, P) from the frames of their heads (P,) to the scanner's frame."""
+    """Return a function that turns vectors (3, P) from the frames of their heads to the scanner's frame.
+
+    Args:
+        setting: the scanner's.
+        head: (P,) number of each vector's head; None where there is only one.
+    """
     angles = np.deg2rad([(h.yaw_deg, h.pitch_deg, h.roll_deg) for h in setting.device.heads])
     if not angles.any():
         return lambda vectors: vectors

@@ -91,13 +91,16 @@ class BeamRays:
         names = ("origin", "direction", *(("in_plane", "across") if shape.rays > 1 else ()))
         vectors, count = [getattr(pulses, name) for name in names], len(pulses.time)
         if any(vector is None or vector.shape != (3, count) for vector in vectors):
-            shapes = [vector.shape for vector in vectors if vector is not None]
-            raise ValueError(f"vectors of pulses {shapes}: {len(names)} of (3, {count})")
+            shapes = {
+                name: None if vector is None else vector.shape for name, vector in zip(names, vectors, strict=True)
+            }
+            raise ValueError(f"vectors of pulses must each have the shape (3, {count}), but have {shapes}")
         if reach is not None:
             assert pulses.in_plane is not None
             assert pulses.across is not None
-            placed = np.where((reach > 0.0) & (reach < np.inf), reach, 0.0)
-            pulses = replace(pulses, in_plane=pulses.in_plane * placed, across=pulses.across * placed)
+            footprint_range = np.where((reach > 0.0) & (reach < np.inf), reach, 0.0)
+            in_plane, across = pulses.in_plane * footprint_range, pulses.across * footprint_range
+            pulses = replace(pulses, in_plane=in_plane, across=across)
         return cls(shape, pulses)
 
     @property
@@ -112,28 +115,30 @@ class BeamRays:
 
     def pick(self, ray: Index) -> tuple[Float, Float]:
         """Return origins and directions (3, N) of chosen rays, as k * P + p for ray k of pulse p."""
-        k, p = np.divmod(ray, len(self.time))
-        pulses, (stretch, x, y) = self.pulses, (np.take(factor, k) for factor in self.shape.factors)
-        origin, direction = (np.take(vectors, p, axis=1) for vectors in (pulses.origin, pulses.direction))
+        ray_number, pulse = np.divmod(ray, len(self.time))
+        pulses = self.pulses
+        length, x, y = (np.take(factor, ray_number) for factor in self.shape.factors)
+        origin, direction = (np.take(vectors, pulse, axis=1) for vectors in (pulses.origin, pulses.direction))
         if self.shape.rays == 1:
             return origin, direction
         assert pulses.in_plane is not None
         assert pulses.across is not None
-        offset, across = np.take(pulses.in_plane, p, axis=1), np.take(pulses.across, p, axis=1)
-        if self.shape.parallel:
-            offset *= x
-            offset += across * y
-            return origin + offset, direction
-        direction *= stretch
-        direction += offset * x
+        in_plane, across = np.take(pulses.in_plane, pulse, axis=1), np.take(pulses.across, pulse, axis=1)
+        if self.shape.parallel:  # origins lie side by side
+            in_plane *= x
+            in_plane += across * y
+            return origin + in_plane, direction
+        # Rays diverge: length times the axis, and the two deflections.
+        direction *= length
+        direction += in_plane * x
         direction += across * y
         return origin, direction
 
     def native(self) -> tuple[Beams, list[AnyArray]]:
-        """Return the pulses for kernels, and the arrays that must stay meanwhile."""
-        pulses, several = self.pulses, self.shape.rays > 1
-        vectors = (pulses.origin, pulses.direction, *((pulses.in_plane, pulses.across) if several else ()))
-        kept = [np.ascontiguousarray(vector, np.float64) for vector in (*vectors, pulses.time)]
-        address = [array.ctypes.data for array in kept]
-        frame = address[2:4] if several else address[:2]
-        return Beams(len(pulses.time), *address[:2], *frame, address[-1]), kept
+        """Return the pulses for kernels, and the arrays that must be kept as long as these use them."""
+        pulses, has_frame = self.pulses, self.shape.rays > 1
+        vectors = (pulses.origin, pulses.direction, *((pulses.in_plane, pulses.across) if has_frame else ()))
+        arrays = [np.ascontiguousarray(vector, np.float64) for vector in (*vectors, pulses.time)]
+        address = [array.ctypes.data for array in arrays]
+        frame = address[2:4] if has_frame else address[:2]
+        return Beams(len(pulses.time), *address[:2], *frame, address[-1]), arrays

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,10 +20,10 @@ from .beams import POINTER, pointers
 
 
 class Met(ctypes.Structure):
-    """Hits; as `Met` in pulses.c."""
+    """Hits; as `Met` in pulses.c, where the cosine is named `along`."""
 
     _fields_ = tuple(
-        (name, POINTER) for name in ("face", "distance", "intensity", "weight", "fading", "along", "share")
+        (name, POINTER) for name in ("face", "distance", "intensity", "weight", "fading", "cosine", "share")
     )
 
 
@@ -39,15 +39,15 @@ def address_of(array: AnyArray | None) -> int | None:
 
 
 class Passed(ctypes.Structure):
-    """Light that goes on; as `Passed` in pulses.c."""
+    """Light that goes on; as `Passed` in pulses.c, where light is named `left`."""
 
-    _fields_ = tuple((name, POINTER) for name in ("ray", "left", "start", "step", "face"))
+    _fields_ = tuple((name, POINTER) for name in ("ray", "light", "start", "step", "face"))
 
 
 class Ahead(ctypes.Structure):
-    """Hits of rays that go on, before they are weighed; as `Ahead` in pulses.c."""
+    """Hits of rays that go on, before they are weighed; as `Ahead` in pulses.c, where the cosine is named `along`."""
 
-    _fields_ = tuple((name, POINTER) for name in ("face", "distance", "along", "through"))
+    _fields_ = tuple((name, POINTER) for name in ("face", "distance", "cosine", "through"))
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class HitRows:
         intensity: received, without what the air takes.
         weight: in mean ranges.
         fading: exponent of what the air leaves; None where it takes nothing.
-        along: n . d of the face's normal and the ray; None where it is worked out again for those that are asked for.
+        cosine: n . d of the face's normal and the ray; None where it is worked out again for those that are asked for.
         share: of the pulse's energy that the surface takes; None where nobody asks.
     """
 
@@ -69,35 +69,41 @@ class HitRows:
     intensity: Float
     weight: Float
     fading: Float | None
-    along: Float | None
+    cosine: Float | None
     share: Float | None
 
     @classmethod
-    def of(cls, count: int, fades: bool, along: bool, share: bool) -> HitRows:
-        """Return room for so many hits."""
+    def of(cls, count: int, fades: bool, cosine: bool, share: bool) -> HitRows:
+        """Return uninitialised arrays for ``count`` hits.
+
+        Args:
+            count: of hits.
+            fades: whether the air weakens light, so that ``fading`` is needed.
+            cosine, share: whether these arrays are needed.
+        """
         distance, intensity, weight = (np.empty(count) for _ in range(3))
-        others = (np.empty(count) if flag else None for flag in (fades, along, share))
-        return cls(np.empty(count, np.int32), distance, intensity, weight, *others)
+        optional_arrays = (np.empty(count) if flag else None for flag in (fades, cosine, share))
+        return cls(np.empty(count, np.int32), distance, intensity, weight, *optional_arrays)
 
     @property
     def native(self) -> Met:
-        """Return the addresses of the arrays."""
-        return Met(*(address_of(getattr(self, one[0])) for one in Met._fields_))
+        """Return the addresses of the arrays, as pulses.c takes them."""
+        return Met(*(address_of(getattr(self, item[0])) for item in Met._fields_))
 
     def select(self, count: int) -> HitRows:
-        """Return the first hits."""
+        """Return the first ``count`` hits, as views."""
         arrays: list[Any] = [getattr(self, field.name) for field in fields(self)]
-        chosen: list[Any] = [None if array is None else array[:count] for array in arrays]
-        return HitRows(*chosen)
+        selected_arrays: list[Any] = [None if array is None else array[:count] for array in arrays]
+        return HitRows(*selected_arrays)
 
     def fade(self) -> None:
-        """Turn the exponents of what the air leaves into factors, in place."""
+        """Replace the exponents of what the air leaves of the light by factors, in place."""
         if self.fading is not None:
             with np.errstate(under="ignore"):
                 np.exp(self.fading, out=self.fading)
 
     def signals(self, shape: tuple[int, ...]) -> HitSignals:
-        """Return what hits send back, less what the air takes, in a shape; `fade` has been called."""
+        """Return the signals that hits send back, less what the air takes, in a shape; call `fade` before."""
         intensity = self.intensity if self.fading is None else self.intensity * self.fading
         return HitSignals(*(array.reshape(shape) for array in (self.distance, self.weight, intensity)))
 
@@ -108,7 +114,7 @@ class LateHits:
 
     Attributes:
         ray: k * P + p for ray k of pulse p.
-        hits: the rest; they always have ``along``.
+        hits: the rest; they always have ``cosine``.
     """
 
     ray: Index
@@ -116,54 +122,80 @@ class LateHits:
 
     @classmethod
     def of(cls, count: int, fades: bool, share: bool) -> LateHits:
-        """Return room for so many hits."""
-        return cls(np.empty(count, np.int64), HitRows.of(count, fades, along=True, share=share))
+        """Return uninitialised arrays for ``count`` hits, see `HitRows.of`."""
+        return cls(np.empty(count, np.int64), HitRows.of(count, fades, cosine=True, share=share))
 
     @property
     def native(self) -> Behind:
-        """Return the addresses of the arrays."""
+        """Return the addresses of the arrays, as pulses.c takes them."""
         return Behind(self.ray.ctypes.data, self.hits.native)
 
     @classmethod
     def join(cls, parts: list[LateHits], fades: bool, share: bool) -> LateHits:
-        """Return hits in the order of the parts."""
+        """Return hits of several parts as one, in the order of the parts; the flags tell the arrays of no hits."""
         if not parts:
             return cls.of(0, fades, share)
         hits = [part.hits for part in parts]
-        columns = ([getattr(one, field.name) for one in hits] for field in fields(HitRows))
-        joined: list[Any] = [None if column[0] is None else np.concatenate(column) for column in columns]
-        return cls(np.concatenate([part.ray for part in parts]), HitRows(*joined))
+        columns = ([getattr(part_hits, field.name) for part_hits in hits] for field in fields(HitRows))
+        joined_columns: list[Any] = [None if column[0] is None else np.concatenate(column) for column in columns]
+        return cls(np.concatenate([part.ray for part in parts]), HitRows(*joined_columns))
+
+
+class OnwardRays(NamedTuple):
+    """Rays (N,) that go on behind surfaces.
+
+    Attributes:
+        ray: k * P + p for ray k of pulse p.
+        start: range of the surface that it has passed, m.
+        step: how far behind that it goes on, m; None where all go on as far.
+        usual_step: that distance, m.
+    """
+
+    ray: Index
+    start: Float
+    step: Float | None
+    usual_step: float
 
 
 @dataclass(frozen=True)
 class OnwardLight:
-    """Room for rays that go on behind surfaces, (N,) each; see `trace.Passed`.
+    """Room for rays that go on behind surfaces, (N,) each.
 
     Attributes:
-        ray, left, start: as there.
-        step, face: likewise; None where no material is clear in places.
+        ray: k * P + p for ray k of pulse p.
+        light: that it keeps, as a share of the pulse's energy.
+        start: range of the surface that it has passed, m.
+        step: how far behind that it goes on, m; None where no material is clear in places.
+        face: that it has passed; None likewise.
     """
 
     ray: Index
-    left: Float
+    light: Float
     start: Float
     step: Float | None
     face: AnyArray | None
 
     @classmethod
     def of(cls, count: int, clear: bool) -> OnwardLight:
-        """Return room for so many rays."""
-        seen = (np.empty(count), np.empty(count, np.int32)) if clear else (None, None)
-        return cls(np.empty(count, np.int64), np.empty(count), np.empty(count), *seen)
+        """Return uninitialised arrays for ``count`` rays.
+
+        Args:
+            count: of rays.
+            clear: whether some materials are clear in places, so that steps and faces are needed.
+        """
+        optional_arrays = (np.empty(count), np.empty(count, np.int32)) if clear else (None, None)
+        return cls(np.empty(count, np.int64), np.empty(count), np.empty(count), *optional_arrays)
 
     @property
     def native(self) -> Passed:
-        """Return the addresses of the arrays."""
-        return Passed(*(address_of(getattr(self, one[0])) for one in Passed._fields_))
+        """Return the addresses of the arrays, as pulses.c takes them."""
+        return Passed(*(address_of(getattr(self, item[0])) for item in Passed._fields_))
 
-    def onward(self, count: int) -> tuple[Index, Float, Float | None, float]:
-        """Return the first so many rays, see `MovingParts.cast`."""
-        return self.ray[:count], self.start[:count], None if self.step is None else self.step[:count], BEYOND
+    def onward(self, count: int) -> OnwardRays:
+        """Return the first ``count`` rays, as views."""
+        return OnwardRays(
+            self.ray[:count], self.start[:count], None if self.step is None else self.step[:count], BEYOND
+        )
 
 
 @dataclass(frozen=True)
@@ -175,7 +207,7 @@ class TracedPulses:
         pulses: the block's.
         pulse: (N,) of each hit.
         face: (N,) that was hit.
-        along: (N,) n . d of its normal and the ray.
+        cosine: (N,) n . d of its normal and the ray.
         distance: (N,) range of the hit, m.
         direction: (3, N) of its ray.
         begin: (3, N) where its ray begins, local, m; None for where its pulse does.
@@ -185,7 +217,7 @@ class TracedPulses:
     pulses: Pulses
     pulse: Index
     face: Index
-    along: Float
+    cosine: Float
     distance: Float
     direction: Float
     begin: Float | None
@@ -235,7 +267,13 @@ class ShiningHits:
         self.native = pointers(self._hit, self._cosine, self._brightness, self._share, self._material)
 
     def shine(self, surfaces: Surfaces, hits: HitRows, count: int) -> None:
-        """Add, in place, to the intensities of hits what their surfaces send back; ``count`` of them do."""
+        """Add what their surfaces send back the way that it came to the intensities of hits, in place.
+
+        Args:
+            surfaces: the materials.
+            hits: all hits of the call.
+            count: number of those, noted in this object, whose surfaces do so.
+        """
         if not count:
             return
         hit, material = self._hit[:count], self._material[:count]

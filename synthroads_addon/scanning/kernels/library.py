@@ -45,12 +45,15 @@ def load_kernel(name: str, folder: Path = FOLDER) -> ctypes.CDLL:
 
 
 def source_digest(source: Path) -> str:
-    """Return the SHA-256 of a kernel's source and of what it includes of its own, as tools/build_kernels.py has it."""
-    waiting, seen = [source], list[Path]()
-    while waiting:
-        path = waiting.pop(0)
-        if path not in seen:
-            seen.append(path)
+    """Return the SHA-256 of a kernel's source and of the project's files that it includes, one after the other.
+
+    tools/build_kernels.py puts the same digest into what it compiles.
+    """
+    pending, included = [source], list[Path]()
+    while pending:
+        path = pending.pop(0)
+        if path not in included:
+            included.append(path)
             names = _INCLUDED.findall(path.read_text(encoding="utf-8"))
-            waiting += [(path.parent / name).resolve() for name in names]
-    return hashlib.sha256(b"".join(path.read_bytes() for path in seen)).hexdigest()
+            pending += [(path.parent / name).resolve() for name in names]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in included)).hexdigest()

@@ -83,7 +83,7 @@ class ReadyProgram:
         self._registers = np.zeros((program.registers + SCRATCH, LANES), np.float32)
         for number, value in program.constants:
             self._registers[number] = value
-        self._pictures = (_Picture * max(1, len(program.pictures)))(*map(_told, program.pictures))
+        self._pictures = (_Picture * max(1, len(program.pictures)))(*map(_picture_structure, program.pictures))
         self._widths = np.array([parts for _, parts in program.outputs], np.int32)
         self._native = _Program(
             program.code.ctypes.data,
@@ -115,14 +115,16 @@ class ReadyProgram:
         inputs = [np.ascontiguousarray(values[what], np.float32) for what in program.inputs]
         if any(array.shape != (count, 4) for array in inputs):
             raise ValueError(f"values of {[array.shape for array in inputs]}: must be ({count}, 4)")
-        for one, (name, parts) in zip(results, program.outputs, strict=True):
-            if one.shape != (count, parts) or one.dtype != np.float32 or not one.flags.c_contiguous:
-                raise ValueError(f"{name} {one.dtype} {one.shape}: must be float32 ({count}, {parts}), side by side")
+        for result, (name, parts) in zip(results, program.outputs, strict=True):
+            if result.shape != (count, parts) or result.dtype != np.float32 or not result.flags.c_contiguous:
+                raise ValueError(
+                    f"{name} {result.dtype} {result.shape}: must be float32 ({count}, {parts}), side by side"
+                )
         if not count:
             return
         registers = self._registers.copy()
         pointers = [
-            (_POINTER * max(1, len(arrays)))(*(one.ctypes.data for one in arrays)) for arrays in (inputs, results)
+            (_POINTER * max(1, len(arrays)))(*(result.ctypes.data for result in arrays)) for arrays in (inputs, results)
         ]
         places = _Places(ctypes.addressof(pointers[0]), ctypes.addressof(pointers[1]), self._widths.ctypes.data, count)
         kernel.synthroads_materials(
@@ -151,8 +153,8 @@ def run_program(
     return outputs
 
 
-def _told(picture: Picture) -> _Picture:
-    """Return an image as the kernel takes it."""
+def _picture_structure(picture: Picture) -> _Picture:
+    """Return an image as the structure that the kernel reads."""
     pixels = picture.pixels
     height, width = pixels.shape[:2]
     bytes_ = int(pixels.dtype == np.uint8)

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ...base.arrays import AnyArray, Float, Index
+from ...base.arrays import AnyArray, Float
 from ..knots import Track
 from ..scene.target import Target, TargetPart
 from .beams import DOUBLE, INT64, POINTER, BeamShape, pointers
+from .hits import OnwardRays
 from .library import NoKernelError, load_kernel
 from .packets import PacketScene
 
@@ -34,13 +35,13 @@ class _Part(ctypes.Structure):
 
 
 class _Rays(ctypes.Structure):
-    """Rays and what they have met; as `Rays` in moving.c."""
+    """Rays and what they have met; as `Rays` in moving.c, where the cosine is named `along`."""
 
     _fields_ = (
         *((name, INT64) for name in ("from", "count")),
         *((name, POINTER) for name in ("list", "start", "step")),
         ("beyond", DOUBLE),
-        *((name, POINTER) for name in ("reach", "face", "distance", "along")),
+        *((name, POINTER) for name in ("reach", "face", "distance", "cosine")),
         ("limit", ctypes.c_float),
     )
 
@@ -65,60 +66,61 @@ class MovingParts:
         return len(self._bodies)
 
     def _add(self, part: TargetPart, track: Track) -> None:
-        """Keep a part that is there."""
+        """Add a part that is there, as the kernel takes it, and hold on to the arrays that it points to."""
         assert isinstance(part.caster, PacketScene)
         way = track.way_of(part.centre)
-        fastest = float(np.sqrt(np.square(np.diff(way, axis=1)).sum(axis=0).max())) / track.spacing
+        fastest = float(np.sqrt(np.square(np.diff(way, axis=1)).sum(axis=0).max())) / track.spacing  # m/s
         arrays = [np.ascontiguousarray(array, np.float64) for array in (track.rotation, track.position, way)]
         arrays.append(np.ascontiguousarray(track.present, np.bool_))
         cast, scene = part.caster.native
         planes = part.planes.planes
         self._kept += [*arrays, planes]
         self._casters.append(part.caster)
-        track_numbers = (way.shape[1], track.begin, track.spacing, *(array.ctypes.data for array in arrays))
-        numbers = (part.radius, part.radius**2, fastest)
-        self._bodies.append(_Part(cast, None, scene, part.first, planes.ctypes.data, *track_numbers, *numbers))
+        track_fields = (way.shape[1], track.begin, track.spacing, *(array.ctypes.data for array in arrays))
+        sphere_fields = (part.radius, part.radius**2, fastest)
+        self._bodies.append(_Part(cast, None, scene, part.first, planes.ctypes.data, *track_fields, *sphere_fields))
 
     def cast(
         self,
         shape: BeamShape,
         beams: ctypes.Structure,
-        begin: int,
-        onward: tuple[Index, Float, Float | None, float] | None,
-        met: tuple[AnyArray, Float, Float],
+        first_ray: int,
+        onward: OnwardRays | None,
+        hit_arrays: tuple[AnyArray, Float, Float],
         maximum_range: float,
     ) -> None:
-        """Replace, in place, what rays have met by what they meet nearer, of all that moves.
+        """Replace, in place, what rays have met by what moves, where they meet that nearer.
 
         Args:
             shape: of the beam.
             beams: the pulses, `Beams`.
-            begin: the first of a pulse's rays that is cast.
-            onward: (N,) rays that go on in place of all, as k * P + p, where they do on each, m, and how much farther
-                than that, or that of all; None for the rays (K, P) of the pulses.
-            met: (K, P) or (N,) faces, int32, ranges, m, and n . d; ranges count from where a ray goes on.
+            first_ray: number of the first of each pulse's rays that is cast.
+            onward: (N,) rays that go on behind surfaces; None for the rays (K, P) of the pulses.
+            hit_arrays: (K, P) or (N,) faces, int32, ranges, m, and n . d; ranges count from where a ray goes on.
             maximum_range: m.
         """
         if not self._bodies:
             return
-        face, distance, along = met
+        face, distance, cosine = hit_arrays
         reach = np.minimum(distance, maximum_range)
-        members = beams.pulses if onward is None else len(onward[0])
-        bundles = -(-members // _BUNDLE)
-        listed: tuple[Any, ...] = (0, None, None, None, 0.0)
+        ray_count = beams.pulses if onward is None else len(onward.ray)
+        bundles = -(-ray_count // _BUNDLE)
+        onward_fields: tuple[Any, ...] = (0, None, None, None, 0.0)
         if onward is not None:
-            ray, start, step, beyond = onward
-            listed = (members, ray.ctypes.data, start.ctypes.data, None if step is None else step.ctypes.data, beyond)
-        rays = _Rays(begin, *listed, *(array.ctypes.data for array in (reach, face, distance, along)), maximum_range)
+            step = None if onward.step is None else onward.step.ctypes.data
+            onward_fields = (ray_count, onward.ray.ctypes.data, onward.start.ctypes.data, step, onward.usual_step)
+        met_fields = (array.ctypes.data for array in (reach, face, distance, cosine))
+        rays = _Rays(first_ray, *onward_fields, *met_fields, maximum_range)
+        # Room that the loop works in: bounds of the bundles, rays near a body, and these as a caster takes them.
         work: list[AnyArray] = [np.empty((bundles, _BOUNDS)), np.empty((_BUFFER, 6)), np.empty(bundles, np.uint8)]
         work += [np.empty(_BUFFER, np.int64), *np.empty((2, _BUFFER, 3), np.float32), np.empty(_BUFFER, np.int32)]
         # From call to call a packet's rays are judged by those before them of the same call alone.
-        casts = [caster.casting() for caster in self._casters]
-        bodies = (_Part * len(casts))(*self._bodies)
-        for body, one in zip(bodies, casts, strict=True):
-            body.casts = ctypes.addressof(one)
+        castings = [caster.casting() for caster in self._casters]
+        bodies = (_Part * len(castings))(*self._bodies)
+        for body, casting in zip(bodies, castings, strict=True):
+            body.casts = ctypes.addressof(casting)
         self._kernel.call(
-            ctypes.byref(shape.native), ctypes.byref(beams), len(casts), bodies, ctypes.byref(rays), pointers(*work)
+            ctypes.byref(shape.native), ctypes.byref(beams), len(castings), bodies, ctypes.byref(rays), pointers(*work)
         )
 
 

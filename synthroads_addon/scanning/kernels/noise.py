@@ -44,12 +44,15 @@ class CompiledNoise:
         result = np.empty(len(position))
         position, cells = np.ascontiguousarray(position, np.float64), np.ascontiguousarray(cells, np.float64)
         sides = () if patch is None else tuple(np.ascontiguousarray(side, np.float64) for side in patch)
-        if position.shape != (len(result), 3) or any(side.shape != result.shape for side in sides):
-            raise ValueError(f"places {position.shape}, patches {[side.shape for side in sides]}: (N, 3), (N,) each")
-        if cells.shape not in ((1,), result.shape):
-            raise ValueError(f"cells {cells.shape}: (1,) or {result.shape}")
+        count = len(result)
+        if position.shape != (count, 3):
+            raise ValueError(f"places must have the shape (N, 3), but have {position.shape}")
+        if any(side.shape != (count,) for side in sides):
+            raise ValueError(f"patches must have the shape ({count},) each, but have {[side.shape for side in sides]}")
+        if cells.shape not in ((1,), (count,)):
+            raise ValueError(f"cells must have the shape (1,) or ({count},), but have {cells.shape}")
         self._fill(
-            *(len(result), position.ctypes.data, cells.ctypes.data, int(len(cells) > 1)),
+            *(count, position.ctypes.data, cells.ctypes.data, int(len(cells) > 1)),
             *(keys.ctypes.data, gains.ctypes.data, len(gains)),
             *((side.ctypes.data for side in sides) if sides else (None, None)),
             *(SPREAD, result.ctypes.data),

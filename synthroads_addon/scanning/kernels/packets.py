@@ -114,7 +114,13 @@ USUAL = Packing()
 
 @dataclass(frozen=True)
 class Packets:
-    """Embree's library, the kernel that calls it, and the number of rays that the processor casts at once."""
+    """Embree's library, the kernel that calls it, and the number of rays that the processor casts at once.
+
+    Attributes:
+        embree: Embree's library.
+        kernel: packets.c, compiled.
+        width: rays per packet, 4, 8 or 16.
+    """
 
     embree: ctypes.CDLL
     kernel: ctypes.CDLL
@@ -123,9 +129,9 @@ class Packets:
 
 @cache
 def usable_packets() -> Packets | NoKernelError:
-    """Return what casts rays in packets, or why this machine has nothing that does; found out once.
+    """Return the libraries that cast rays in packets, or why this machine has none; found out once.
 
-    What should work and doesn't is warned of.
+    Where packets should work but differ from single rays, a warning is given.
     """
     try:
         packets = _load()
@@ -171,10 +177,16 @@ def _load() -> Packets:
 
 
 def _functions(embree: ctypes.CDLL, width: int, occluded: bool) -> tuple[int | None, int | None]:
-    """Return the addresses of the functions that cast one ray, and a packet of them."""
+    """Return the addresses of Embree's functions that cast one ray, and a packet of rays.
+
+    Args:
+        embree: the library.
+        width: rays per packet.
+        occluded: functions that only tell whether anything is hit; else those that find the first face.
+    """
     name = "rtcOccluded" if occluded else "rtcIntersect"
-    one, packet = (ctypes.cast(getattr(embree, f"{name}{number}"), _POINTER).value for number in (1, width))
-    return one, packet
+    single_ray, ray_packet = (ctypes.cast(getattr(embree, f"{name}{number}"), _POINTER).value for number in (1, width))
+    return single_ray, ray_packet
 
 
 class PacketScene:
@@ -205,19 +217,19 @@ class PacketScene:
         if not self._triangles:
             return
         # Embree reads 16 bytes at each vertex: of the last, 4 beyond it.
-        padded = np.zeros((len(vertices) + 1, 3), np.float32)
-        padded[:-1] = vertices
+        padded_vertices = np.zeros((len(vertices) + 1, 3), np.float32)
+        padded_vertices[:-1] = vertices
         indices = np.ascontiguousarray(triangles, np.int32)
         embree = packets.embree
         device = embree.rtcNewDevice(None)
         try:
             self._scene = embree.rtcNewScene(device)
             # The arrays are Embree's as long as the scene is.
-            weakref.finalize(self, _release, embree, self._scene, padded, indices)
+            weakref.finalize(self, _release, embree, self._scene, padded_vertices, indices)
             embree.rtcSetSceneFlags(self._scene, _ROBUST if robust else 0)
             mesh = embree.rtcNewGeometry(device, _TRIANGLES)
             for kind, form, array, count in (
-                (_VERTEX, _FLOAT3, padded, len(vertices)),
+                (_VERTEX, _FLOAT3, padded_vertices, len(vertices)),
                 (_INDEX, _UINT3, indices, len(indices)),
             ):
                 embree.rtcSetSharedGeometryBuffer(mesh, kind, 0, form, array.ctypes.data, 0, _ROW, count)
@@ -225,11 +237,11 @@ class PacketScene:
             embree.rtcAttachGeometry(self._scene, mesh)
             embree.rtcReleaseGeometry(mesh)
             embree.rtcCommitScene(self._scene)
-            wrong = embree.rtcGetDeviceError(device)
+            error_code = embree.rtcGetDeviceError(device)
         finally:
             embree.rtcReleaseDevice(device)
-        if wrong:
-            raise MemoryError if wrong == _OUT_OF_MEMORY else RuntimeError(f"Embree's error {wrong}")
+        if error_code:
+            raise MemoryError if error_code == _OUT_OF_MEMORY else RuntimeError(f"Embree's error {error_code}")
 
     def cast(self, origins: Float32, directions: Float32, maximum_range: float | Float32) -> NDArray[np.int32]:
         """Return the index (N,) of the first face that each ray (N, 3) hits within its range (m), -1 for none."""
@@ -242,13 +254,23 @@ class PacketScene:
     def _cast(
         self, origins: Float32, directions: Float32, maximum_range: float | Float32, occluded: bool
     ) -> NDArray[np.int32]:
+        """Return a face (N,) that each ray hits, -1 for none.
+
+        Args:
+            origins, directions: (N, 3) m, and unit vectors.
+            maximum_range: of all rays, or (N,) of each, m.
+            occluded: any face will do, with 1 in place of its number; else it is the first one.
+        """
         faces = np.full(len(origins), -1, np.int32)
         if not self._triangles or not len(origins):
             return faces
         origins, directions = (np.ascontiguousarray(array, np.float32) for array in (origins, directions))
         limits = np.ascontiguousarray(maximum_range, np.float32)
         if origins.shape != (len(faces), 3) or directions.shape != origins.shape or limits.size not in (1, len(faces)):
-            raise ValueError(f"rays {origins.shape}, {directions.shape}, ranges {limits.shape}: (N, 3), (N, 3), 1 or N")
+            raise ValueError(
+                f"origins, directions and ranges of rays must have the shapes (N, 3), (N, 3), 1 or N, but have "
+                f"{origins.shape}, {directions.shape}, {limits.shape}"
+            )
         rays = _Rays(origins.ctypes.data, directions.ctypes.data, limits.ctypes.data, int(limits.size > 1))
         self._packets.kernel.synthroads_cast(
             ctypes.byref(self.casting(occluded)), self._scene, len(faces), ctypes.byref(rays), faces.ctypes.data
@@ -256,7 +278,11 @@ class PacketScene:
         return faces
 
     def casting(self, occluded: bool = False) -> ctypes.Structure:
-        """Return how rays are cast, `Casts` of packets.c, from the first of them on."""
+        """Return the settings of casting, `Casts` of packets.c, for a call that begins with no ray cast yet.
+
+        Args:
+            occluded: see `_cast`.
+        """
         packing = self._packing
         width = packing.width or self._packets.width
         functions = _functions(self._packets.embree, width, occluded)
@@ -265,13 +291,14 @@ class PacketScene:
 
     @property
     def native(self) -> tuple[int, int]:
-        """Return the addresses of the function that casts rays, packets.c's, and of Embree's scene; it has faces."""
+        """Return the addresses of packets.c's casting function and of Embree's scene, which must have faces."""
         function = ctypes.cast(self._packets.kernel.synthroads_cast, _POINTER).value
         assert function is not None
         return function, self._scene
 
 
 def _release(embree: ctypes.CDLL, scene: int, *_arrays: Any) -> None:
+    """Free a scene of Embree; the arrays that it reads live as long as this call is due."""
     embree.rtcReleaseScene(scene)
 
 
@@ -287,11 +314,11 @@ def _same_as_embreex(packets: Packets) -> bool:
     scene = PacketScene(packets, vertices, triangles, packing=replace(USUAL, most_changes=1.0))
     TriangleMesh(reference, vertices, triangles)
     for origins, directions, limits in _test_rays(vertices[triangles].mean(axis=1)):
-        expected = reference.run(origins, directions, dists=limits.copy())
-        hidden = reference.run(origins, directions, dists=limits.copy(), query="OCCLUDED") == 0
-        if (scene.cast(origins, directions, limits) != expected).any():
+        reference_faces = reference.run(origins, directions, dists=limits.copy())
+        reference_occlusion = reference.run(origins, directions, dists=limits.copy(), query="OCCLUDED") == 0
+        if (scene.cast(origins, directions, limits) != reference_faces).any():
             return False
-        if (scene.occluded(origins, directions, limits) != hidden).any():
+        if (scene.occluded(origins, directions, limits) != reference_occlusion).any():
             return False
     return True
 
@@ -301,27 +328,29 @@ _SIDE = 7
 
 
 def _waves() -> tuple[Float32, NDArray[np.int32]]:
-    """Return the vertices and 72 triangles of a mesh with hills, 6 m x 6 m."""
+    """Return the vertices (49, 3), m, and triangles (72, 3) of a mesh with hills, 6 m x 6 m, to compare casters at."""
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(_SIDE), np.arange(_SIDE), indexing="ij"))
     vertices = np.column_stack([x, y, np.sin(2.0 * x) * np.cos(3.0 * y)]).astype(np.float32)
     corner = (np.arange(_SIDE - 1)[:, None] * _SIDE + np.arange(_SIDE - 1)).ravel()
-    first = np.column_stack([corner, corner + _SIDE, corner + 1])
-    second = np.column_stack([corner + 1, corner + _SIDE, corner + _SIDE + 1])
-    return vertices, np.concatenate([first, second]).astype(np.int32)
+    lower_triangles = np.column_stack([corner, corner + _SIDE, corner + 1])
+    upper_triangles = np.column_stack([corner + 1, corner + _SIDE, corner + _SIDE + 1])
+    return vertices, np.concatenate([lower_triangles, upper_triangles]).astype(np.int32)
 
 
 def _test_rays(targets: Float32) -> Iterator[tuple[Float32, Float32, Float32]]:
-    """Yield origins, directions and ranges of rays at places (N, 3), which miss edges; every fifth falls short of its.
+    """Yield origins (N, 3), directions (N, 3) and ranges (N,), m, of rays at places (N, 3) within faces.
 
-    First from one place high above, so that all run side by side, then from places on all sides.
+    First all rays come from one place high above, so that they run side by side, then from places on all sides. Every
+    fifth ray is too short to reach its place.
     """
     steps: Index = np.arange(len(targets))
-    for height in (200.0, 2.5):
+    for height, radius in ((200.0, 0.0), (2.5, 4.0)):
         origins = np.empty((len(targets), 3), np.float32)
         turn = 2.4 * steps  # from each ray to the next, rad
-        origins[:, 0], origins[:, 1] = (3.0 + (height < 9.0) * 4.0 * np.cos(turn + phase) for phase in (0.0, 1.6))
+        # Around the middle of the mesh; the phase of 1.6 makes a sine, nearly, of the cosine.
+        origins[:, 0], origins[:, 1] = (3.0 + radius * np.cos(turn + phase) for phase in (0.0, 1.6))
         origins[:, 2] = height
-        towards = targets - origins
-        length = np.sqrt(np.einsum("ij,ij->i", towards, towards))
+        offset = targets - origins
+        length = np.sqrt(np.einsum("ij,ij->i", offset, offset))
         limits = np.where(steps % 5 == 4, 0.2, 2.0) * length
-        yield origins, (towards / length[:, None]).astype(np.float32), limits.astype(np.float32)
+        yield origins, (offset / length[:, None]).astype(np.float32), limits.astype(np.float32)

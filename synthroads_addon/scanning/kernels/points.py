@@ -91,10 +91,10 @@ class _Pieces(ctypes.Structure):
 
 
 class _Echoes(ctypes.Structure):
-    """Echoes and their pulses; as `Echoes` in points.c."""
+    """Echoes and their pulses; as `Echoes` in points.c, where the cosine is named `along`."""
 
     _fields_ = (
-        *((name, _POINTER) for name in ("pulse", "hit", "range", "face", "along", "distance", "direction", "begin")),
+        *((name, _POINTER) for name in ("pulse", "hit", "range", "face", "cosine", "distance", "direction", "begin")),
         ("hits", _INT64),
         *((name, _POINTER) for name in ("time", "scan_angle", "origin", "measured_origin", "measured_direction")),
         ("pulses", _INT64),
@@ -126,16 +126,16 @@ class _Columns(ctypes.Structure):
 
     @classmethod
     def of(cls, grid: ColumnGrid) -> _Columns:
-        """Return a grid for C."""
-        axes, low, direction = (np.ravel(one).tolist() for one in (grid.axes, grid.low, grid.direction))
+        """Return a grid in the structure that points.c takes."""
+        axes, corner, direction = (np.ravel(array).tolist() for array in (grid.axes, grid.low, grid.direction))
         return cls(
-            *((ctypes.c_double * 6)(*axes), (ctypes.c_double * 2)(*low), (_INT64 * 2)(*grid.cells), grid.margin),
+            *((ctypes.c_double * 6)(*axes), (ctypes.c_double * 2)(*corner), (_INT64 * 2)(*grid.cells), grid.margin),
             *((ctypes.c_double * 3)(*direction), grid.above),
         )
 
 
 def _as(kind: Any, shape: tuple[int, ...], **arrays: AnyArray) -> list[AnyArray]:
-    """Return arrays of this shape, C-contiguous and of this type; raise ValueError for another shape."""
+    """Return arrays as C-contiguous ones of a type; raise ValueError if one has another shape than ``shape``."""
     for name, array in arrays.items():
         if array.shape != shape:
             raise ValueError(f"{name} {array.shape}: must be {shape}")
@@ -143,7 +143,7 @@ def _as(kind: Any, shape: tuple[int, ...], **arrays: AnyArray) -> list[AnyArray]
 
 
 def _faces(faces: Faces) -> tuple[AnyArray, ...]:
-    """Return vertices, triangles and planes for C."""
+    """Return vertices (V, 3), triangles (T, 3) and planes (T, 4) of faces in the types that points.c takes."""
     (vertices,) = _as(np.float32, (len(faces.vertices), 3), vertices=faces.vertices)
     (triangles,) = _as(np.int32, (len(faces.triangles), 3), triangles=faces.triangles)
     (planes,) = _as(np.float64, (len(triangles), 4), planes=faces.planes)
@@ -176,47 +176,59 @@ class CompiledPoints:
         return result
 
     def layer(
-        self, rows: Index | None, own: Float32 | None, material: UInt16, varies: Bool, means: Float32
+        self, rows: Index | None, point_values: Float32 | None, material: UInt16, varies: Bool, means: Float32
     ) -> Float32 | None:
-        """Return a layer's values (K, ...) at rows (K,) of points; None where rows or materials aren't there.
+        """Return a layer's values (K, ...) at rows (K,) of points; None where a row or a material isn't there.
 
         Args:
             rows: of the points; None for all of them.
-            own: (N, C) of the points, for materials that vary; None where none does.
+            point_values: (N, C) the points' own, for materials that vary; None where none does.
             material: (N,) of the points.
             varies: (M,) whether a material does.
-            means: (M, C) or (M,) of the materials.
+            means: (M, C) or (M,) of the materials, for the others.
         """
-        kinds, width = len(means), means.size // max(1, len(means))
-        chosen = len(material) if rows is None else len(rows)
-        if not chosen:
+        material_count, width = len(means), means.size // max(1, len(means))
+        row_count = len(material) if rows is None else len(rows)
+        if not row_count:
             return np.empty((0, *means.shape[1:]), np.float32)
-        if int(material.max()) >= kinds or not (rows is None or (rows.min() >= 0 and rows.max() < len(material))):
+        if int(material.max()) >= material_count or not (
+            rows is None or (rows.min() >= 0 and rows.max() < len(material))
+        ):
             return None
-        (varies,), (material,) = _as(np.bool_, (kinds,), varies=varies), _as(np.uint16, material.shape, all=material)
+        (varies,), (material,) = (
+            _as(np.bool_, (material_count,), varies=varies),
+            _as(np.uint16, material.shape, all=material),
+        )
         rows = None if rows is None else np.ascontiguousarray(rows, np.int64)
         means = np.ascontiguousarray(means, np.float32)
-        values = None if own is None else _as(np.float32, (len(material), width), own=own)[0]
-        result = np.empty((chosen, *means.shape[1:]), np.float32)
+        values = None if point_values is None else _as(np.float32, (len(material), width), point_values=point_values)[0]
+        result = np.empty((row_count, *means.shape[1:]), np.float32)
         rows_at, values_at = (None if array is None else array.ctypes.data for array in (rows, values))
         self._functions["layer"](
-            *(chosen, rows_at, width, values_at),
+            *(row_count, rows_at, width, values_at),
             *(array.ctypes.data for array in (material, varies, means, result)),
         )
         return result
 
     def halves(self, normal: Float32, view: Float32, sun: Float32) -> tuple[Float32, Float32, Float32]:
-        """Return cosines (N,) of the view, of the half vector to the normal, both cut, and of it to the view."""
+        """Return three cosines (N,): of normal and view, of normal and half vector, and of half vector and view.
+
+        The half vector is the unit vector midway between sun and view. The first two are cut to 0 and more.
+
+        Args:
+            normal, view: (N, 3) unit vectors, of surfaces and towards the eye.
+            sun: (3,) unit vector towards the sun.
+        """
         count = len(normal)
         normal, view = _as(np.float32, (count, 3), normal=normal, view=view)
         (sun,) = _as(np.float32, (3,), sun=sun)
-        seen, across, between = np.empty((3, count), np.float32)
-        arrays = (normal, view, sun, seen, across, between)
+        view_cosine, normal_cosine, half_view_cosine = np.empty((3, count), np.float32)
+        arrays = (normal, view, sun, view_cosine, normal_cosine, half_view_cosine)
         self._functions["halves"](count, *(array.ctypes.data for array in arrays))
-        return seen, across, between
+        return view_cosine, normal_cosine, half_view_cosine
 
     def reflected(self, tables: Sequence[AnyArray], limits: Sequence[float], surfaces: Sequence[Float32]) -> Float32:
-        """Return what surfaces throw back (N, 3).
+        """Return the light (N, 3) of the sun that surfaces reflect.
 
         Args:
             tables: the albedo after one bounce (R, V), that of dielectrics (R, V, L), and the former's mean (R,).
@@ -230,18 +242,18 @@ class CompiledPoints:
         """
         once, albedo = (np.ascontiguousarray(table, np.float32) for table in tables[:2])
         average = np.ascontiguousarray(tables[2], np.float64)
-        first, scale = ((ctypes.c_float * 3)(*limits[part:6:2]) for part in (0, 1))
+        first_values, scale = ((ctypes.c_float * 3)(*limits[part:6:2]) for part in (0, 1))
         count = len(surfaces[0])
         (color,) = _as(np.float32, (count, 3), color=surfaces[0])
-        rest = [_as(np.float32, (count,), surfaces=array)[0] for array in surfaces[1:]]
-        told = _Tables(
-            *(table.ctypes.data for table in (once, albedo, average)), *albedo.shape, first, scale, *limits[6:]
+        other_columns = [_as(np.float32, (count,), surfaces=array)[0] for array in surfaces[1:]]
+        native_tables = _Tables(
+            *(table.ctypes.data for table in (once, albedo, average)), *albedo.shape, first_values, scale, *limits[6:]
         )
-        if once.shape != albedo.shape[:2] or average.shape != once.shape[:1] or len(rest) != 9:
-            raise ValueError(f"tables {once.shape}, {albedo.shape}, {average.shape}, {len(rest)} values")
+        if once.shape != albedo.shape[:2] or average.shape != once.shape[:1] or len(other_columns) != 9:
+            raise ValueError(f"tables {once.shape}, {albedo.shape}, {average.shape}, {len(other_columns)} values")
         result = np.empty((count, 3), np.float32)
-        addresses = (_POINTER * 10)(*(array.ctypes.data for array in (color, *rest)))
-        if self._functions["reflected"](count, ctypes.byref(told), addresses, result.ctypes.data):
+        addresses = (_POINTER * 10)(*(array.ctypes.data for array in (color, *other_columns)))
+        if self._functions["reflected"](count, ctypes.byref(native_tables), addresses, result.ctypes.data):
             raise IndexError("a roughness or a cosine is no number")
         return result
 
@@ -273,13 +285,16 @@ class CompiledPoints:
         values: Float32,
         result: Float32,
     ) -> bool:
-        """Write values between corners into rows (K,) of a result (N, 4); return False where the types are others.
+        """Write values, interpolated between the corners of triangles, into rows (K,) of a result (N, 4).
 
-        The rows, the uses and the triangles must be there: only the types are looked at.
+        The arguments are those of `scene.surface_values`. Rows, uses and triangles must be there: that isn't checked.
+
+        Returns:
+            False, with nothing written, where an array has another type than the loop takes.
         """
         kinds = (np.int64, np.int64, np.int64, np.int32, np.bool_, np.float64, np.float32, np.float32)
         arrays: tuple[AnyArray, ...] = (rows, use, triangle, elements, mirrored, shares, values, result)
-        if any(one.dtype != kind or not one.flags.c_contiguous for one, kind in zip(arrays, kinds, strict=True)):
+        if any(item.dtype != kind or not item.flags.c_contiguous for item, kind in zip(arrays, kinds, strict=True)):
             return False
         self._functions["interpolate"](len(rows), *(array.ctypes.data for array in arrays))
         return True
@@ -287,18 +302,25 @@ class CompiledPoints:
     def raised(
         self, height: Float, cosine: Float, normal: Float32, place: Float, distance: Float
     ) -> tuple[Float, Float]:
-        """Return places (N, 3) and ranges (N,) shifted along normals (N, 3) by heights (N,), 0 for those that stay."""
+        """Return places (N, 3) and ranges (N,) of points that are shifted along their normals by heights.
+
+        Args:
+            height: (N,) m; 0 for points that stay.
+            cosine: (N,) of the incidence angles.
+            normal: (N, 3) unit vectors.
+            place, distance: (N, 3), (N,) m.
+        """
         count = len(height)
         height, cosine, distance = _as(np.float64, (count,), height=height, cosine=cosine, distance=distance)
         (normal,), (place,) = _as(np.float32, (count, 3), normal=normal), _as(np.float64, (count, 3), place=place)
-        moved, after = np.empty((count, 3)), np.empty(count)
-        arrays = (height, cosine, normal, place, distance, moved, after)
+        shifted_place, shifted_distance = np.empty((count, 3)), np.empty(count)
+        arrays = (height, cosine, normal, place, distance, shifted_place, shifted_distance)
         self._functions["raise"](count, *(array.ctypes.data for array in arrays))
-        return moved, after
+        return shifted_place, shifted_distance
 
     def approached(
         self,
-        rough: Index,
+        rough_rows: Index,
         height: Float,
         cosine: Float,
         material: UInt16,
@@ -307,41 +329,57 @@ class CompiledPoints:
         place: Float,
         distance: Float,
     ) -> tuple[Float, Float]:
-        """Return places (N, 3) and ranges (N,) of which rows ``rough`` (K,) are nearer along their beams by heights.
+        """Return places (N, 3) and ranges (N,) of points, some of which a relief brings nearer along their beams.
 
         Args:
-            rough: (K,) ascending.
+            rough_rows: (K,) rows of these points, ascending.
             height, cosine: (K,) heights of the relief, m, and cosines of the incidence angles.
             material: (N,) indices; of rough ones there is a reach.
             reach: (M,) by material, within which a beam that grazes the relief meets some peak, m.
             towards: (N, 3) unit vectors to the scanner.
             place, distance: (N, 3), (N,) m.
         """
-        chosen, count = len(rough), len(distance)
-        height, cosine = _as(np.float64, (chosen,), height=height, cosine=cosine)
-        (rough,), (reach,) = _as(np.int64, (chosen,), rough=rough), _as(np.float64, (len(reach),), reach=reach)
+        rough_count, count = len(rough_rows), len(distance)
+        height, cosine = _as(np.float64, (rough_count,), height=height, cosine=cosine)
+        (rough_rows,), (reach,) = (
+            _as(np.int64, (rough_count,), rough=rough_rows),
+            _as(np.float64, (len(reach),), reach=reach),
+        )
         (material,), (distance,) = (
             _as(np.uint16, (count,), material=material),
             _as(np.float64, (count,), range=distance),
         )
         (towards,), (place,) = _as(np.float32, (count, 3), towards=towards), _as(np.float64, (count, 3), place=place)
-        moved, after = np.empty((count, 3)), np.empty(count)
-        arrays = (rough, height, cosine, material, reach, towards, place, distance, moved, after)
-        self._functions["approach"](count, chosen, *(array.ctypes.data for array in arrays))
-        return moved, after
+        shifted_place, shifted_distance = np.empty((count, 3)), np.empty(count)
+        arrays = (
+            rough_rows,
+            height,
+            cosine,
+            material,
+            reach,
+            towards,
+            place,
+            distance,
+            shifted_place,
+            shifted_distance,
+        )
+        self._functions["approach"](count, rough_count, *(array.ctypes.data for array in arrays))
+        return shifted_place, shifted_distance
 
-    def daylight(self, sun: Float32, color: Float32, normal: Float32, above: Float32, below: Float32) -> Float32:
-        """Return the light (N, 3), cut to 0 to 1, of the sun (N, 3) and what surfaces throw back of an even sky.
+    def daylight(
+        self, sun: Float32, color: Float32, normal: Float32, light_above: Float32, light_below: Float32
+    ) -> Float32:
+        """Return the light (N, 3), cut to 0 to 1, that surfaces reflect of the sun and of an even sky.
 
         Args:
-            sun: thrown back of it.
+            sun: (N, 3) reflected light of the sun.
             color, normal: (N, 3) of the surfaces.
-            above, below: (3,) light on a surface that faces straight up, and down.
+            light_above, light_below: (3,) light of the sky on a surface that faces straight up, and down.
         """
         sun, color, normal = _as(np.float32, (len(sun), 3), sun=sun, color=color, normal=normal)
-        above, below = _as(np.float32, (3,), above=above, below=below)
+        light_above, light_below = _as(np.float32, (3,), above=light_above, below=light_below)
         result = np.empty(sun.shape, np.float32)
-        arrays = (sun, color, normal, above, below, result)
+        arrays = (sun, color, normal, light_above, light_below, result)
         self._functions["daylight"](len(sun), *(array.ctypes.data for array in arrays))
         return result
 
@@ -372,7 +410,13 @@ class CompiledPoints:
         self._functions["spread"](count, width, rows.ctypes.data, values.ctypes.data, at, result.ctypes.data)
 
     def inputs(self, rows: Index, source: Float, shift: Float | None, unit: float) -> Float32:
-        """Return vectors (K, 3) of rows (K,) of others (N, 3) as (K, 4), the last 0; with a shift (3,), in a unit.
+        """Return vectors (K, 4) whose first three components are rows of other vectors, the last 0.
+
+        Args:
+            rows: (K,).
+            source: (N, 3) m.
+            shift: (3,) added to each, m, before it is divided by ``unit``; None: they are taken as they are.
+            unit: m.
 
         Raises:
             IndexError: a row isn't there.
@@ -386,8 +430,12 @@ class CompiledPoints:
         self._functions["inputs"](len(rows), rows.ctypes.data, source.ctypes.data, at, unit, result.ctypes.data)
         return result
 
-    def placed(self, echoes: EchoPlaces, seen: bool) -> PlacedPoints:
-        """Return the points of echoes; what is known of the places where they were seen only if asked, else empty.
+    def placed(self, echoes: EchoPlaces, with_seen: bool) -> PlacedPoints:
+        """Return the points of echoes.
+
+        Args:
+            echoes: of a block.
+            with_seen: whether the arrays that tell where each point was seen are filled in; else they are empty.
 
         Raises:
             IndexError: a pulse, a hit or a face isn't there.
@@ -399,7 +447,7 @@ class CompiledPoints:
             *_as(np.int64, (count,), pulse=e.pulse, hit=e.hit),
             *_as(np.float64, (count,), range=e.range),
             *_as(np.int64, (hits,), face=e.face),
-            *_as(np.float64, (hits,), along=e.along, distance=e.distance),
+            *_as(np.float64, (hits,), cosine=e.cosine, distance=e.distance),
             *_as(np.float64, (3, hits), direction=e.direction),
             begin,
         ]
@@ -416,42 +464,51 @@ class CompiledPoints:
         ]
         if len(e.class_id) < faces:
             raise ValueError(f"class_id {e.class_id.shape}: must be of {faces} faces")
-        told = _Echoes(
-            *(None if one is None else one.ctypes.data for one in of_hits),
-            *(hits, *(one.ctypes.data for one in of_pulses)),
-            *(pulses, planes.ctypes.data, faces, *(one.ctypes.data for one in of_faces)),
+        native_echoes = _Echoes(
+            *(None if array is None else array.ctypes.data for array in of_hits),
+            *(hits, *(array.ctypes.data for array in of_pulses)),
+            *(pulses, planes.ctypes.data, faces, *(array.ctypes.data for array in of_faces)),
             (ctypes.c_double * 3)(*e.map_origin),
             e.epoch,
         )
-        known = count if seen else 0
-        placed = PlacedPoints(
+        seen_count = count if with_seen else 0
+        points = PlacedPoints(
             *(np.empty((count, 3)), np.empty(count), np.empty(count, np.float32)),
             *(np.empty(count, np.uint8), np.empty(count, np.uint32), np.empty(count, np.uint16)),
-            *(np.empty((known, 3)), np.empty((known, 3)), np.empty((known, 3))),
-            *(np.empty((known, 3), np.float32), np.empty(known)),
+            *(np.empty((seen_count, 3)), np.empty((seen_count, 3)), np.empty((seen_count, 3))),
+            *(np.empty((seen_count, 3), np.float32), np.empty(seen_count)),
         )
-        addresses = [one.ctypes.data if len(one) else None for one in placed]
-        if not self._functions["place"](count, ctypes.byref(told), ctypes.byref(_Placed(*addresses))):
+        addresses = [array.ctypes.data if len(array) else None for array in points]
+        if not self._functions["place"](count, ctypes.byref(native_echoes), ctypes.byref(_Placed(*addresses))):
             raise IndexError(f"a pulse of {pulses}, a hit of {hits} or a face of {faces} isn't there")
-        return placed
+        return points
 
-    def facing(self, normal: Float, position: Float, direction: Float, off: float) -> tuple[Bool, Float]:
-        """Return which normals (N, 3) face a direction (3,), and the places (3, N) so far (m) off positions (N, 3)."""
+    def facing(self, normal: Float, position: Float, direction: Float, clearance: float) -> tuple[Bool, Float]:
+        """Return a mask (N,) of the normals that face a direction, and places (3, N) a little off the surfaces.
+
+        Args:
+            normal: (N, 3) unit vectors.
+            position: (N, 3) on the surfaces, m.
+            direction: (3,) unit vector.
+            clearance: how far off, along the normals, the places are, m.
+        """
         count = len(normal)
         normal, position = _as(np.float64, (count, 3), normal=normal, position=position)
         (direction,) = _as(np.float64, (3,), direction=direction)
         facing, begin = np.empty(count, np.bool_), np.empty((3, count))
         arrays = (normal, position, direction)
         self._functions["face_sun"](
-            count, *(one.ctypes.data for one in arrays), off, facing.ctypes.data, begin.ctypes.data
+            count, *(array.ctypes.data for array in arrays), clearance, facing.ctypes.data, begin.ctypes.data
         )
         return facing, begin
 
     def candidate_nodes(self, places: Sequence[Float], nodes: Sequence[Float], spacing: float) -> tuple[Int, Int]:
-        """Return (point, node) index pairs, sorted by point, see `road.alignment`.
+        """Return the points and nodes (C,) of pairs, sorted by point, of which one is next to the point's foot.
+
+        See `road.alignment`.
 
         Args:
-            places: x and y (N,).
+            places: x and y (N,) of the points.
             nodes: x and y (M,), M > 0.
             spacing: between two nodes at most, m.
         """
@@ -459,7 +516,7 @@ class CompiledPoints:
         node_x, node_y = _as(np.float64, (len(nodes[0]),), node_x=nodes[0], node_y=nodes[1])
         middle, square = np.array([node_x.mean(), node_y.mean()]), np.empty(len(node_x))
         owner, column = np.empty((2, len(x) * ((len(node_x) + 1) // 2)), np.int64)
-        addresses = [one.ctypes.data for one in (x, y, node_x, node_y, middle, square, owner, column)]
+        addresses = [array.ctypes.data for array in (x, y, node_x, node_y, middle, square, owner, column)]
         count = self._functions["candidates"](
             *(len(x), *addresses[:2], len(node_x), *addresses[2:5], spacing, *addresses[5:])
         )
@@ -470,70 +527,92 @@ class CompiledPoints:
         evaluate: Callable[[Float], tuple[Float, ...]],
         places: Sequence[Float],
         brackets: Sequence[Float],
-        most: int,
+        most_iterations: int,
     ) -> tuple[Float, Float, Float]:
-        """Return the feet of points on an alignment, see `road.alignment.Alignment`: stations, rests and offsets (N,).
+        """Return the feet of points on an alignment: stations (N,), what remains along it (N,), and offsets (N,), m.
+
+        See `road.alignment.Alignment`.
 
         Args:
             evaluate: gives x, y, heading and curvature (K,) at stations (K,).
             places: x and y (N,).
             brackets: first guesses of the stations, and the least and largest that they may be, (N,) each.
-            most: iterations.
+            most_iterations: steps of the iteration at most.
         """
         count = len(places[0])
         x, y = _as(np.float64, (count,), x=places[0], y=places[1])
-        station, low, high = (np.array(one, np.float64) for one in brackets)
-        _as(np.float64, (count,), station=station, low=low, high=high)
-        along, offset, active, left = np.empty(count), np.empty(count), np.arange(count), count
-        for _ in range(most):
-            px, py, heading, bend = (np.ascontiguousarray(one) for one in evaluate(station[active[:left]]))
-            cosine, sine, turn, lever = np.cos(heading), np.sin(heading), np.empty(left), np.empty(left)
-            arrays = (x, y, station, low, high, along, offset, active, px, py, cosine, sine, bend, turn, lever)
-            told = _Feet(*(one.ctypes.data for one in arrays))
-            self._functions["measure"](left, ctypes.byref(told))
+        station, least_station, largest_station = (np.array(array, np.float64) for array in brackets)
+        _as(np.float64, (count,), station=station, low=least_station, high=largest_station)
+        remainder, offset, active, active_count = np.empty(count), np.empty(count), np.arange(count), count
+        for _ in range(most_iterations):
+            px, py, heading, bend = (np.ascontiguousarray(array) for array in evaluate(station[active[:active_count]]))
+            cosine, sine, turn, lever = np.cos(heading), np.sin(heading), np.empty(active_count), np.empty(active_count)
+            arrays = (
+                x,
+                y,
+                station,
+                least_station,
+                largest_station,
+                remainder,
+                offset,
+                active,
+                px,
+                py,
+                cosine,
+                sine,
+                bend,
+                turn,
+                lever,
+            )
+            native_feet = _Feet(*(array.ctypes.data for array in arrays))
+            self._functions["measure"](active_count, ctypes.byref(native_feet))
             angle = np.arctan2(turn, lever)
-            left = self._functions["step"](left, ctypes.byref(told), angle.ctypes.data)
-            if not left:
+            active_count = self._functions["step"](active_count, ctypes.byref(native_feet), angle.ctypes.data)
+            if not active_count:
                 break
-        return station, along, offset
+        return station, remainder, offset
 
-    def face_columns(self, faces: Faces, grid: ColumnGrid, most: int) -> tuple[AnyArray, AnyArray]:
-        """Return the faces of each cell of a grid that they may touch: where they begin (C + 1,), and their numbers.
+    def face_columns(self, faces: Faces, grid: ColumnGrid, most_faces: int) -> tuple[AnyArray, AnyArray]:
+        """Return the faces that may touch each cell of a grid: indices (C + 1,) into a list of faces, and this list.
+
+        The faces of cell i are ``numbers[starts[i]:starts[i + 1]]``.
 
         Args:
             faces: T of them.
             grid: across a direction.
-            most: faces of a cell, 255 at most: where there are more none is listed.
+            most_faces: of a cell, 255 at most: where there are more none is listed.
         """
         vertices, triangles, _ = _faces(faces)
-        if most > np.iinfo(np.uint8).max:
-            raise ValueError(f"most {most}: must be 255 or less")
-        told, cells = _Columns.of(grid), grid.cells[0] * grid.cells[1]
-        head = (ctypes.byref(told), len(triangles), vertices.ctypes.data, triangles.ctypes.data)
+        if most_faces > np.iinfo(np.uint8).max:
+            raise ValueError(f"most {most_faces}: must be 255 or less")
+        native_grid, cells = _Columns.of(grid), grid.cells[0] * grid.cells[1]
+        head = (ctypes.byref(native_grid), len(triangles), vertices.ctypes.data, triangles.ctypes.data)
         starts = np.zeros(cells + 1, np.uint32)
         counts = starts[1:]
         self._functions["sort_faces"](*head, counts.ctypes.data, None, None, None)
-        counts[counts > most] = 0
+        counts[counts > most_faces] = 0
         np.cumsum(counts, out=counts)
-        numbers, filled = np.empty(int(starts[-1]), np.int32), np.zeros(cells, np.uint8)
-        self._functions["sort_faces"](*head, None, *(one.ctypes.data for one in (starts, filled, numbers)))
+        numbers, fill_counts = np.empty(int(starts[-1]), np.int32), np.zeros(cells, np.uint8)
+        self._functions["sort_faces"](*head, None, *(array.ctypes.data for array in (starts, fill_counts, numbers)))
         return starts, numbers
 
-    def clear_places(self, places: Float, faces: Faces, grid: ColumnGrid, listed: tuple[AnyArray, AnyArray]) -> Bool:
+    def clear_places(
+        self, places: Float, faces: Faces, grid: ColumnGrid, column_faces: tuple[AnyArray, AnyArray]
+    ) -> Bool:
         """Return a mask (N,) of places (3, N), m, that no face listed in their cell hides from the grid's direction.
 
         Args:
             places: (3, N).
             faces, grid: as they were for `face_columns`.
-            listed: what that returned.
+            column_faces: what that returned.
         """
         count = places.shape[1]
         (places,) = _as(np.float64, (3, count), places=places)
-        (starts,) = _as(np.uint32, (grid.cells[0] * grid.cells[1] + 1,), starts=listed[0])
-        (numbers,) = _as(np.int32, (int(starts[-1]),), numbers=listed[1])
-        told, result = _Columns.of(grid), np.empty(count, np.bool_)
+        (starts,) = _as(np.uint32, (grid.cells[0] * grid.cells[1] + 1,), starts=column_faces[0])
+        (numbers,) = _as(np.int32, (int(starts[-1]),), numbers=column_faces[1])
+        native_grid, result = _Columns.of(grid), np.empty(count, np.bool_)
         arrays = (places, *_faces(faces), starts, numbers, result)
-        self._functions["clear"](ctypes.byref(told), count, *(one.ctypes.data for one in arrays))
+        self._functions["clear"](ctypes.byref(native_grid), count, *(array.ctypes.data for array in arrays))
         return result
 
     def pack(self, record: AnyArray, points: PackedPoints) -> tuple[Float, Int] | None:
@@ -552,40 +631,40 @@ class CompiledPoints:
         shapes = ((count, 3), (count,), (count,), (count, 3), *[(count,)] * 3, points.codes.shape, (count,), (count,))
         kinds = [*[np.float64] * 3, np.uint16, *[np.uint8] * 4, np.float32, np.uint16]
         if any(
-            one.dtype != kind or one.shape != shape or not one.flags.c_contiguous
-            for one, kind, shape in zip(arrays, kinds, shapes, strict=True)
+            array.dtype != kind or array.shape != shape or not array.flags.c_contiguous
+            for array, kind, shape in zip(arrays, kinds, shapes, strict=True)
         ):
             return None
         if not record.flags.c_contiguous or record.itemsize < _RECORD:
             raise ValueError(f"records of {record.itemsize} bytes")
-        told = _Records(
-            *(one.ctypes.data for one in arrays),
+        native_points = _Records(
+            *(array.ctypes.data for array in arrays),
             (ctypes.c_double * 3)(*points.offset),
             *(points.per_metre, points.per_intensity, points.per_degree, len(points.codes)),
         )
         extremes, by_return = np.array([[np.inf] * 3, [-np.inf] * 3]), np.zeros(16, np.int64)
-        filled = (record.ctypes.data, extremes.ctypes.data, by_return.ctypes.data)
-        fits = self._functions["pack"](count, ctypes.byref(told), record.itemsize, *filled)
+        output_addresses = (record.ctypes.data, extremes.ctypes.data, by_return.ctypes.data)
+        fits = self._functions["pack"](count, ctypes.byref(native_points), record.itemsize, *output_addresses)
         return (extremes, by_return) if fits else None
 
     def evaluate_pieces(self, station: Float, pieces: Sequence[Float]) -> Float:
-        """Return x, y, heading and curvature (4, N) at stations (N,) on P pieces of an alignment.
+        """Return x, y, heading and curvature (4, N) at stations (N,) on the P pieces of an alignment.
 
         Args:
             station: m.
             pieces: their borders (P - 1,), ascending; middles, half lengths, bends, slopes and headings (P,); and
                 the series (T + 1, P) of x and y.
         """
-        kept = [np.ascontiguousarray(array, np.float64) for array in (station, *pieces)]
-        station, borders, *columns, series_x, series_y = kept
+        arrays = [np.ascontiguousarray(item, np.float64) for item in (station, *pieces)]
+        station, borders, *columns, series_x, series_y = arrays
         terms, count = len(series_x) - 1, len(columns[0])
-        if len(borders) != count - 1 or any(one.shape != (count,) for one in columns) or len(columns) != 5:
-            raise ValueError(f"pieces {[one.shape for one in kept[1:]]}")
+        if len(borders) != count - 1 or any(item.shape != (count,) for item in columns) or len(columns) != 5:
+            raise ValueError(f"pieces {[item.shape for item in arrays[1:]]}")
         if series_x.shape != (terms + 1, count) or series_y.shape != series_x.shape:
             raise ValueError(f"series {series_x.shape}, {series_y.shape}: ({terms + 1}, {count})")
-        told = _Pieces(*(array.ctypes.data for array in kept[1:]), count, terms)
+        native_pieces = _Pieces(*(item.ctypes.data for item in arrays[1:]), count, terms)
         result = np.empty((4, len(station)))
-        self._functions["evaluate"](len(station), station.ctypes.data, ctypes.byref(told), result.ctypes.data)
+        self._functions["evaluate"](len(station), station.ctypes.data, ctypes.byref(native_pieces), result.ctypes.data)
         return result
 
 

@@ -45,27 +45,35 @@ class CompiledPoses:
             vectors: `MOST_SETS` at most, (3, N), or tables (3, M) of which columns are turned.
             columns: N of such tables; rows are ascending.
         """
-        count, sets = len(times), [np.ascontiguousarray(one, np.float64) for one in vectors]
+        count, sets = len(times), [np.ascontiguousarray(array, np.float64) for array in vectors]
         times, rotation, position = (
             np.ascontiguousarray(array, np.float64) for array in (times, track.rotation, track.position)
         )
-        knots, first, width = position.shape[1], 0, count
+        knots, first_column, width = position.shape[1], 0, count
         rows: Index | None = None
         if columns is not None and sets:
-            first, width = columns.first, sets[0].shape[1]
+            first_column, width = columns.first, sets[0].shape[1]
             rows = None if columns.rows is None else np.ascontiguousarray(columns.rows, np.int64)
-            if first < 0 or not width or (rows is not None and (rows.shape != (count,) or rows.min(initial=0) < 0)):
-                raise ValueError(f"columns from {first} of {width}, rows {rows}: {count} of them, none below 0")
-        if len(sets) > MOST_SETS or any(one.shape != (3, width) for one in sets) or rotation.shape != (9, knots):
-            raise ValueError(f"vectors {[one.shape for one in sets]}: {MOST_SETS} sets of (3, {width}) at most")
-        place, turned = np.empty((3, count)), [np.empty((3, count)) for _ in sets]
-        addresses = [(_POINTER * MOST_SETS)(*(one.ctypes.data for one in arrays)) for arrays in (sets, turned)]
+            rows_fit = rows is None or (rows.shape == (count,) and rows.min(initial=0) >= 0)
+            if first_column < 0 or not width or not rows_fit:
+                raise ValueError(
+                    f"columns must begin at 0 or later and have {count} rows, none below 0, of a table with columns, "
+                    f"but begin at {first_column} of {width}, with rows {rows}"
+                )
+        shapes = [array.shape for array in sets]
+        if len(sets) > MOST_SETS or any(shape != (3, width) for shape in shapes) or rotation.shape != (9, knots):
+            raise ValueError(
+                f"vectors must be {MOST_SETS} arrays of shape (3, {width}) at most, but have the shapes {shapes}; "
+                f"rotations must be (9, {knots}), but are {rotation.shape}"
+            )
+        place, results = np.empty((3, count)), [np.empty((3, count)) for _ in sets]
+        addresses = [(_POINTER * MOST_SETS)(*(array.ctypes.data for array in arrays)) for arrays in (sets, results)]
         self._turn(
             *(count, times.ctypes.data, track.begin, track.spacing, knots, rotation.ctypes.data, position.ctypes.data),
-            *(first, width, None if rows is None else rows.ctypes.data),
+            *(first_column, width, None if rows is None else rows.ctypes.data),
             *(len(sets), *addresses, place.ctypes.data),
         )
-        return place, turned
+        return place, results
 
 
 @cache

@@ -142,61 +142,75 @@ class ProgramBuilder:
     _size: int = 0
 
     def constant(self, number: float) -> int:
-        """Return the value of a number, as float32 has it."""
+        """Return the value that stands for a number, as float32 has it."""
         bits = struct.pack("<f", np.float32(number))
         if bits not in self._known:
-            self._known[bits] = self._new(1)
+            self._known[bits] = self._reserve(1)
             self._constants[self._known[bits]] = struct.unpack("<f", bits)[0]
         return self._known[bits]
 
     def number_of(self, value: int) -> float | None:
-        """Return the number that a value is; None if it is worked out."""
+        """Return the number that a value stands for; None if it is the result of an operation."""
         return self._constants.get(value)
 
     def load(self, what: SurfaceInput, part: int) -> int:
-        """Return a component of what is read of the places."""
+        """Return the value of a component of an input that is read at each place.
+
+        Args:
+            what: the input.
+            part: number of its component.
+        """
         if what not in self.inputs:
             self.inputs.append(what)
         return self._add(Op.LOAD, (), (self.inputs.index(what), part), 1, uniform=False)
 
     def add(self, op: Op, *operands: int, settings: Sequence[int] = (), results: int = 1) -> int:
-        """Return the first of the results of an operation, which are values one after the other."""
+        """Return the first of the results of an operation; the others are the values that follow.
+
+        Args:
+            op: the operation.
+            operands: values that it reads.
+            settings: whole numbers that it has besides.
+            results: how many values it gives.
+        """
         uniform = all(self._is_uniform(value) for value in operands)
         return self._add(op, operands, tuple(settings), results, uniform)
 
     def table(self, numbers: Sequence[float] | Float32) -> int:
-        """Return where numbers begin among those of the program's tables."""
+        """Add numbers to the program's tables; return the index at which they begin there."""
         start = sum(len(table) for table in self._tables)
         self._tables.append(np.asarray(numbers, np.float32))
         return start
 
     def picture(self, picture: Picture) -> int:
-        """Return the number of an image."""
-        for number, other in enumerate(self.pictures):
-            if other.pixels is picture.pixels and other[1:] == picture[1:]:
+        """Return the number of an image, which is added to the program if it isn't there yet."""
+        for number, known_picture in enumerate(self.pictures):
+            if known_picture.pixels is picture.pixels and known_picture[1:] == picture[1:]:
                 return number
         self.pictures.append(picture)
         return len(self.pictures) - 1
 
     def output(self, layer: str, values: Sequence[int]) -> None:
-        """Have a layer be these values, one for each of its components."""
+        """Set the values of a layer, one for each of its components."""
         self._outputs[layer] = list(values)
 
     def build(self, layers: Sequence[str]) -> MaterialProgram:
-        """Return the program for some of the outputs; what none of these needs is left out."""
+        """Return the program for some of the outputs; operations that none of these needs are left out."""
         outputs = {name: values for name, values in self._outputs.items() if name in layers}
-        needed = self._needed(outputs)
-        order = [first for first in self._steps if first in needed]
+        needed_steps = self._needed(outputs)
+        step_order = [step for step in self._steps if step in needed_steps]
         # Those that are the same everywhere come first.
-        order.sort(key=lambda first: not self._steps[first].uniform)
-        return _Allocation(self, order, outputs).program()
+        step_order.sort(key=lambda step: not self._steps[step].uniform)
+        return _Allocation(self, step_order, outputs).program()
 
-    def _new(self, results: int) -> int:
-        first = self._size
-        self._size += results
-        return first
+    def _reserve(self, count: int) -> int:
+        """Number the next values of the program, and return the first number."""
+        first_value = self._size
+        self._size += count
+        return first_value
 
     def _is_uniform(self, value: int) -> bool:
+        """Return whether a value is the same at all places."""
         step = self._steps.get(self._owner(value))
         return value in self._constants or (step is not None and step.uniform)
 
@@ -205,27 +219,28 @@ class ProgramBuilder:
         return self._owners.get(value, value)
 
     def _add(self, op: Op, operands: tuple[int, ...], settings: tuple[int, ...], results: int, uniform: bool) -> int:
+        """Return the first result of an operation; one with the same operands and settings is added only once."""
         key = (op, operands, settings)
         if key not in self._known:
-            first = self._known[key] = self._new(results)
-            self._steps[first] = _Step(op, operands, settings, results, uniform)
-            self._owners.update(dict.fromkeys(range(first, first + results), first))
+            first_value = self._known[key] = self._reserve(results)
+            self._steps[first_value] = _Step(op, operands, settings, results, uniform)
+            self._owners.update(dict.fromkeys(range(first_value, first_value + results), first_value))
         return self._known[key]
 
     def _needed(self, outputs: dict[str, list[int]]) -> set[int]:
         """Return the first results of all operations that outputs depend on."""
-        needed: set[int] = set()
-        waiting = [value for values in outputs.values() for value in values]
-        while waiting:
-            first = self._owner(waiting.pop())
-            if first in self._steps and first not in needed:
-                needed.add(first)
-                waiting += self._steps[first].operands
-        return needed
+        needed_steps: set[int] = set()
+        pending = [value for values in outputs.values() for value in values]
+        while pending:
+            step = self._owner(pending.pop())
+            if step in self._steps and step not in needed_steps:
+                needed_steps.add(step)
+                pending += self._steps[step].operands
+        return needed_steps
 
 
 class _Allocation:
-    """Gives the values of a program registers: anew as soon as nothing needs what is in one."""
+    """Assignment of registers to the values of a program; registers of values that no one reads any more are reused."""
 
     def __init__(self, builder: ProgramBuilder, order: list[int], outputs: dict[str, list[int]]) -> None:
         self._builder, self._order, self._outputs = builder, order, outputs
@@ -234,22 +249,22 @@ class _Allocation:
         self._count = 0
 
     def program(self) -> MaterialProgram:
-        """Return the program."""
+        """Return the program: operations that are the same everywhere first, then the others with their stores."""
         builder = self._builder
         targets: dict[int, list[tuple[int, int]]] = {}
         for number, values in enumerate(self._outputs.values()):
             for part, value in enumerate(values):
                 targets.setdefault(value, []).append((number, part))
-        uses = Counter(value for first in self._order for value in builder._steps[first].operands)
+        uses = Counter(value for step in self._order for value in builder._steps[step].operands)
         constants = sorted(value for value in builder._constants if uses[value] or value in targets)
         for value in constants:
             self._take(value, 1)
-        uniform = sum(builder._steps[first].uniform for first in self._order)
-        rows = [self._row(first) for first in self._order[:uniform]]
+        uniform = sum(builder._steps[step].uniform for step in self._order)
+        rows = [self._row(step) for step in self._order[:uniform]]
         # What is the same everywhere is kept, but has to be written for all places.
         rows += self._stores([value for value in targets if builder._is_uniform(value)], targets)
-        for first in self._order[uniform:]:
-            rows += self._varying_rows(first, uses, targets)
+        for step in self._order[uniform:]:
+            rows += self._varying_rows(step, uses, targets)
         inputs = self._count_inputs_anew(rows)
         code = np.zeros((len(rows), WORDS), np.int32)
         for number, row in enumerate(rows):
@@ -265,27 +280,27 @@ class _Allocation:
             pictures=tuple(builder.pictures),
         )
 
-    def _row(self, first: int) -> tuple[int, ...]:
-        """Return the instruction of an operation, whose results are given registers."""
-        step = self._builder._steps[first]
-        self._take(first, step.results)
-        operands = (self._register[value] for value in step.operands)
-        return (int(step.op), self._register[first], *operands, *step.settings)
+    def _row(self, first_value: int) -> tuple[int, ...]:
+        """Return the instruction of the operation with a first result, whose results are given registers."""
+        operation = self._builder._steps[first_value]
+        self._take(first_value, operation.results)
+        operands = (self._register[value] for value in operation.operands)
+        return (int(operation.op), self._register[first_value], *operands, *operation.settings)
 
     def _varying_rows(
-        self, first: int, uses: Counter[int], targets: dict[int, list[tuple[int, int]]]
+        self, first_value: int, uses: Counter[int], targets: dict[int, list[tuple[int, int]]]
     ) -> list[tuple[int, ...]]:
         """Return the instructions of an operation that differs between places: its own, and stores of its outputs.
 
         Registers of values that no later operation reads are free afterwards.
 
         Args:
-            first: the operation's first result.
+            first_value: the operation's first result.
             uses: how many operations still read each value; this one's reads are taken off.
             targets: (output, component) that each value is stored to.
         """
-        operation, rows = self._builder._steps[first], [self._row(first)]
-        results = range(first, first + operation.results)
+        operation, rows = self._builder._steps[first_value], [self._row(first_value)]
+        results = range(first_value, first_value + operation.results)
         rows += self._stores([value for value in results if value in targets], targets)
         uses.subtract(operation.operands)
         # Only now: so no result of the operation is given the register of one of its operands.
@@ -295,7 +310,7 @@ class _Allocation:
         return rows
 
     def _count_inputs_anew(self, rows: list[tuple[int, ...]]) -> tuple[SurfaceInput, ...]:
-        """Return the inputs that instructions read, and have these read them by their places, in place."""
+        """Return the inputs that instructions read, in the order of first use; renumber them in the rows, in place."""
         inputs: dict[SurfaceInput, int] = {}
         for number, row in enumerate(rows):
             if row[0] == Op.LOAD:
@@ -303,16 +318,17 @@ class _Allocation:
                 rows[number] = (*row[:2], inputs.setdefault(what, len(inputs)), *row[3:])
         return tuple(inputs)
 
-    def _take(self, first: int, count: int) -> None:
-        """Give values one after the other registers one after the other."""
+    def _take(self, first_value: int, count: int) -> None:
+        """Give registers to ``count`` values that follow on each other: a free one to a single value, else new ones."""
         if count == 1 and self._free:
-            self._register[first] = self._free.pop()
+            self._register[first_value] = self._free.pop()
             return
         for number in range(count):
-            self._register[first + number] = self._count
+            self._register[first_value + number] = self._count
             self._count += 1
 
     def _stores(self, values: Sequence[int], targets: dict[int, list[tuple[int, int]]]) -> list[tuple[int, ...]]:
+        """Return the instructions that store values to all (output, component) that they are targets of."""
         return [
             (int(Op.STORE), 0, self._register[value], number, part)
             for value in values

@@ -44,5 +44,5 @@ class ScanConditions:
 
     @cached_property
     def pavement(self) -> PavementRelief | None:
-        """The heights of the road's pavement; None if there is no road."""
+        """Return the heights of the road's pavement; None if there is no road."""
         return None if self.road is None else PavementRelief(RoadGeometry(self.road))

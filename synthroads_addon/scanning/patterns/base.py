@@ -42,7 +42,7 @@ class PulseTiming:
     free_mirror: bool = False
 
     def delays(self, line: Numbers) -> Float | None:
-        """Return how late (P,) each line's first pulse is, 0 to 1 pulse intervals, pseudo-random; None if never late.
+        """Return the delays (P,) of lines' first pulses, pseudo-random, 0 to 1 pulse intervals; None without.
 
         Clocks that run free of each other drift by many steps from line to line, so that a line's delay says nothing of
         the next one's: it is a hash of the line's number.
@@ -101,14 +101,19 @@ class Pattern(Model):
 
     @property
     def beams(self) -> int:
+        """Return the number of pulses that share one step of the mirror or of the head: here one."""
         return 1
 
     @property
     def cycle_lines(self) -> int:
+        """Return the number of lines after which a head's directions repeat, 0 if they don't: here one."""
         return 1
 
     def sweep(self, field_of_view: float) -> float:
-        """Return the angle (rad) swept per line at the speed of the line's middle: step = sweep x lines/s / rate."""
+        """Return the angle (rad) swept per line at the speed of the line's middle.
+
+        A step, from one pulse to the next, is that angle times lines per second / pulse rate.
+        """
         raise NotImplementedError
 
     def firing_share(self, field_of_view: float) -> float:

@@ -24,8 +24,8 @@ class LinePattern(Pattern):
 
     def fault(self, field_of_view_deg: float, pulse_rate: float) -> str:
         """Return a message if the field of view reaches beyond the zenith, else an empty string."""
-        largest = abs(self.centre_from_nadir_deg) + field_of_view_deg / 2.0
-        return f"reaches {largest:g} deg from the nadir, beyond 180" if largest > 180.0 + 1e-9 else ""
+        largest_angle = abs(self.centre_from_nadir_deg) + field_of_view_deg / 2.0
+        return f"reaches {largest_angle:g} deg from the nadir, beyond 180" if largest_angle > 180.0 + 1e-9 else ""
 
     def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> PulseRays:
         """Return times and directions of the pulses with numbers (P,), in lines across the forward direction.
@@ -34,12 +34,12 @@ class LinePattern(Pattern):
         steps from the middle of the field of view; where the mirror goes by a clock of its own, up to half a step to
         either side of that.
         """
-        line, within = np.divmod(pulse, timing.pulses_per_line)
-        place = within - (timing.pulses_per_line - 1) / 2.0
+        line, pulse_in_line = np.divmod(pulse, timing.pulses_per_line)
+        place = pulse_in_line - (timing.pulses_per_line - 1) / 2.0  # steps from the middle
         delays = timing.delays(line)
         if delays is not None:
-            within, place = within + delays, place + (delays - 0.5)
-        time = line / timing.lines_per_second + within / timing.pulse_rate
+            pulse_in_line, place = pulse_in_line + delays, place + (delays - 0.5)
+        time = line / timing.lines_per_second + pulse_in_line / timing.pulse_rate
         angle = self.angles(timing, line, place)
         angle += math.radians(self.centre_from_nadir_deg)
         return make_rays(time, angle, self.tilts(line), with_frame)
@@ -142,22 +142,29 @@ class Grid(LinePattern):
         return row * (math.radians(self.along_field_deg) / self.rows)
 
 
-def make_rays(time: Float, angle: Float, forward: Float | None, with_frame: bool) -> PulseRays:
-    """Return rays at angles (P,) from the nadir, in planes that are tilted forward by angles (P,), None for 0.
+def make_rays(time: Float, angle: Float, tilt: Float | None, with_frame: bool) -> PulseRays:
+    """Return rays at angles from the nadir, in planes across the forward direction that are tilted forward.
 
-    direction = cos(angle) down + sin(angle) right, where down = (sin(forward), 0, -cos(forward)).
+    direction = cos(angle) down + sin(angle) right, where down = (sin(tilt), 0, -cos(tilt)) and right = (0, -1, 0).
+
+    Args:
+        time: (P,) s.
+        angle: (P,) positive to the right, rad.
+        tilt: (P,) rad; None for 0.
+        with_frame: whether the axes across the beam are worked out.
     """
     sine, cosine = np.sin(angle), np.cos(angle)
-    nodding = (0.0, 1.0) if forward is None else (np.sin(forward), np.cos(forward))
+    tilt_sine, tilt_cosine = (0.0, 1.0) if tilt is None else (np.sin(tilt), np.cos(tilt))
     direction = np.empty((3, len(angle)))
-    np.multiply(cosine, nodding[0], out=direction[0])
+    np.multiply(cosine, tilt_sine, out=direction[0])
     np.negative(sine, out=direction[1])
-    np.multiply(cosine, -nodding[1], out=direction[2])
+    np.multiply(cosine, -tilt_cosine, out=direction[2])
     if not with_frame:
         return PulseRays(time, angle, direction)
+    # in_plane is the direction's derivative by the angle, across the plane's normal.
     in_plane, across = np.empty_like(direction), np.zeros_like(direction)
-    np.multiply(sine, -nodding[0], out=in_plane[0])
+    np.multiply(sine, -tilt_sine, out=in_plane[0])
     np.negative(cosine, out=in_plane[1])
-    np.multiply(sine, nodding[1], out=in_plane[2])
-    across[0], across[2] = nodding[1], nodding[0]
+    np.multiply(sine, tilt_cosine, out=in_plane[2])
+    across[0], across[2] = tilt_cosine, tilt_sine
     return PulseRays(time, angle, direction, in_plane, across)

@@ -39,12 +39,13 @@ class RotatingHead(Pattern):
 
     @model_validator(mode="after")
     def _check_beams(self) -> Self:
-        for name, values, of in (
+        """Raise ValueError unless azimuths and firing times, where they are given, are as many as the beams."""
+        for name, values, quantity_name in (
             ("azimuths_deg", self.azimuths_deg, "angles"),
             ("firing_times_us", self.firing_times_us, "times"),
         ):
             if values is not None and len(values) != self.beams:
-                raise ValueError(f"{name} must be {self.beams} {of}, one for each beam (not {len(values)})")
+                raise ValueError(f"{name} must be {self.beams} {quantity_name}, one for each beam (not {len(values)})")
         return self
 
     @property
@@ -75,30 +76,30 @@ class RotatingHead(Pattern):
         own begins up to half a step earlier or later in each turn.
         """
         sequence_time = self.beams / timing.pulse_rate
-        delays = np.arange(self.beams) * (sequence_time / self.beams)
+        beam_delays = np.arange(self.beams) * (sequence_time / self.beams)  # within the sequence, s
         if self.firing_times_us is not None:
-            delays = np.array(self.firing_times_us) * 1e-6
-        order = np.argsort(delays, kind="stable")
-        turn, within = np.divmod(pulse, timing.pulses_per_line)
-        sequence, place = np.divmod(within, self.beams)
-        beam = order[place]
-        since = sequence * sequence_time + delays[beam]
-        middle = timing.pulses_per_line / self.beams / 2.0
-        turned = sequence - middle
-        late = timing.delays(turn)
-        if late is not None:
-            since, turned = since + late * sequence_time, turned + (late - 0.5)
-        azimuth = turned * timing.angle_step + delays[beam] * (FULL_TURN * timing.lines_per_second)
+            beam_delays = np.array(self.firing_times_us) * 1e-6
+        firing_order = np.argsort(beam_delays, kind="stable")
+        turn, pulse_in_turn = np.divmod(pulse, timing.pulses_per_line)
+        sequence, place_in_sequence = np.divmod(pulse_in_turn, self.beams)
+        beam = firing_order[place_in_sequence]
+        time_in_turn = sequence * sequence_time + beam_delays[beam]
+        step = sequence - timing.pulses_per_line / self.beams / 2.0  # from the forward direction
+        turn_delay = timing.delays(turn)
+        if turn_delay is not None:
+            time_in_turn, step = time_in_turn + turn_delay * sequence_time, step + (turn_delay - 0.5)
+        azimuth = step * timing.angle_step + beam_delays[beam] * (FULL_TURN * timing.lines_per_second)
         if self.azimuths_deg is not None:
             azimuth = azimuth + np.deg2rad(self.azimuths_deg)[beam]
             azimuth -= FULL_TURN * np.round(azimuth / FULL_TURN)
         elevation = np.deg2rad(self.elevations_deg)
-        up, out = np.sin(elevation)[beam], np.cos(elevation)[beam]
+        vertical, horizontal = np.sin(elevation)[beam], np.cos(elevation)[beam]
         sine, cosine = np.sin(azimuth), np.cos(azimuth)
-        time = turn / timing.lines_per_second + since
-        direction = np.stack([out * cosine, -out * sine, up])
+        time = turn / timing.lines_per_second + time_in_turn
+        direction = np.stack([horizontal * cosine, -horizontal * sine, vertical])
         if not with_frame:
             return PulseRays(time, azimuth, direction, beam=beam)
+        # Axes across the beam: to the right along the turn, and up.
         in_plane = np.stack([-sine, -cosine, np.zeros_like(sine)])
-        across = np.stack([-up * cosine, up * sine, out])
+        across = np.stack([-vertical * cosine, vertical * sine, horizontal])
         return PulseRays(time, azimuth, direction, in_plane, across, beam)

@@ -20,6 +20,7 @@ class Wedge(Model):
 
     @model_validator(mode="after")
     def _check_turns(self) -> Self:
+        """Raise ValueError if the wedge doesn't turn."""
         if self.turns == 0:
             raise ValueError("turns must not be 0")
         return self
@@ -75,12 +76,12 @@ class WedgePrism(Pattern):
         Pulse p is fired at p / pulse rate. Wedge i has then turned by p x lines/s x turns_i / (turns_1 x pulse rate)
         turns.
         """
-        first = self.wedges[0].turns
+        first_turns = self.wedges[0].turns
         forward, right = np.zeros(len(pulse)), np.zeros(len(pulse))
         for wedge in self.wedges:
-            turned = pulse * (timing.lines_per_second * wedge.turns / first / timing.pulse_rate)
+            turns = pulse * (timing.lines_per_second * wedge.turns / first_turns / timing.pulse_rate)
             # Only the fraction counts: the sine of a large angle would lose what the product still has.
-            phase = FULL_TURN * (turned - np.floor(turned))
+            phase = FULL_TURN * (turns - np.floor(turns))
             forward, right = _refract(forward, right, phase, math.radians(wedge.angle_deg), wedge.refractive_index)
         down = np.sqrt(1.0 - forward * forward - right * right)
         time, angle = pulse / timing.pulse_rate, np.arctan2(right, down)

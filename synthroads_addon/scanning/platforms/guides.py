@@ -59,17 +59,26 @@ class Guide:
         return self.profile.elevation(station)
 
     def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
-        """Return the ground's local elevation (K,), m, below, with or without ruts and potholes; NaN where unknown."""
+        """Return the ground's local elevation (K,), m, at stations and offsets (K,), m; NaN where it is unknown.
+
+        Args:
+            station, offset: (K,) m.
+            damaged: whether ruts and potholes lower it.
+        """
         return self.elevation(station)
 
     def known_ground(self, station: Float, offset: Float, damaged: bool) -> Float:
-        """Return the ground's local elevation (K,), m; raise `InputError`, naming an offset, where it is unknown."""
+        """Return the ground's local elevation (K,), m, at stations and offsets (K,), m.
+
+        Raises:
+            InputError: it is unknown at one of them; the message names the offset.
+        """
         ground = self.ground(station, offset, damaged)
-        unknown = np.flatnonzero(~np.isfinite(ground))
-        if len(unknown):
-            at, beside = float(station[unknown[0]]), float(offset[unknown[0]])
-            allowed = f"there is no ground known at station {at:.1f} m; a smaller one is needed"
-            raise InputError("scan.platform.lateral_offsets", beside, allowed)
+        unknown_rows = np.flatnonzero(~np.isfinite(ground))
+        if len(unknown_rows):
+            row = unknown_rows[0]
+            requirement = f"there is no ground known at station {station[row]:.1f} m; a smaller one is needed"
+            raise InputError("scan.platform.lateral_offsets", float(offset[row]), requirement)
         return ground
 
     def project(self, plan: Float) -> tuple[Float, Float]:
@@ -98,7 +107,12 @@ class RoadGuide(Guide):
         return Placement.of(self.geometry.parameters.metadata.system)
 
     def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
-        """Return the local elevation (K,), m, of the road, its batter or the ground; NaN beyond an elevation model."""
+        """Return the local elevation (K,), m, of the road, its batter or the ground; NaN beyond an elevation model.
+
+        Args:
+            station, offset: (K,) m.
+            damaged: whether ruts and potholes lower it.
+        """
         height = surface_elevation(self.geometry, station, offset)
         if not damaged:
             for section in self.geometry.sections.values():
@@ -148,12 +162,15 @@ class SmoothedGuide(Guide):
             self._derivatives.append(fit.chebder(self._derivatives[-1]) * (2.0 / self.length))
         stretch = self.frame(station)[3]
         if stretch.min() < 0.02:
-            at = float(station[stretch.argmin()])
+            turning_station = float(station[stretch.argmin()])
             raise InputError(
-                "scan.platform.polynomial_degree", degree, f"the smoothed path turns back at station {at:.1f} m"
+                "scan.platform.polynomial_degree",
+                degree,
+                f"the smoothed path turns back at station {turning_station:.1f} m",
             )
 
     def _fit_variable(self, station: Float) -> Float:
+        """Return stations (K,), m, scaled to -1 to 1."""
         return 2.0 * station / self.length - 1.0
 
     def frame(self, station: Float) -> tuple[Float, Float, Float, Float]:
@@ -161,14 +178,20 @@ class SmoothedGuide(Guide):
         u = self._fit_variable(station)
         (x, y), (dx, dy), (ddx, ddy) = (np.polynomial.chebyshev.chebval(u, part) for part in self._derivatives)
         stretch = np.hypot(dx, dy)
+        # Curvature of a curve in plan: (x' y'' - y' x'') / (x'^2 + y'^2)^(3/2).
         curvature = (dx * ddy - dy * ddx) / np.maximum(stretch, 1e-12) ** 3
         return np.stack([x, y], axis=1) + self._mean, np.arctan2(dy, dx), curvature, stretch
 
     def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
-        """Return the guide's ground elevation (K,), m, below points at offsets from the smoothed line."""
+        """Return the guide's ground elevation (K,), m, below points at offsets from the smoothed line.
+
+        Args:
+            station, offset: (K,) m, of the smoothed line.
+            damaged: whether ruts and potholes lower it.
+        """
         plan, heading, _, _ = self.frame(station)
-        left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-        return self._guide.ground(*self._guide.project(plan + offset[:, None] * left), damaged)
+        leftward = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+        return self._guide.ground(*self._guide.project(plan + offset[:, None] * leftward), damaged)
 
     def driving_offsets(self) -> tuple[float, ...]:
         """Return the driving offsets of the guide that is smoothed, m."""
@@ -180,13 +203,23 @@ class SmoothedGuide(Guide):
 
 
 def _lane_middle(section: CarriagewaySection, length: float) -> float:
+    """Return the offset, m, of the middle of a carriageway's outermost usual lane, as the median along the road.
+
+    A usual lane is one for through traffic that is as wide as a lane along half of the road or more; if there is none,
+    the lane that comes nearest to that is taken.
+
+    Args:
+        section: the carriageway.
+        length: of the road, m.
+    """
     station = np.arange(_SAMPLES) * (length / (_SAMPLES - 1))
-    boundaries = section.lane_boundaries(station)
-    full = boundaries[:, :-1] - boundaries[:, 1:] >= _FULL_LANE
-    through = [lane.kind == "through" for lane in section.carriageway.lanes]
-    share = full.mean(axis=0) * np.where(through, 1.0, 1e-3)
-    wide = np.flatnonzero(share >= 0.5)
-    lane = int(wide[0]) if len(wide) else int(share.argmax())
+    boundaries = section.lane_boundaries(station)  # (stations, lanes + 1), the outermost lane first
+    is_full = boundaries[:, :-1] - boundaries[:, 1:] >= _FULL_LANE
+    is_through = [lane.kind == "through" for lane in section.carriageway.lanes]
+    # Other lanes count so little that any through lane comes before them.
+    share = is_full.mean(axis=0) * np.where(is_through, 1.0, 1e-3)
+    usual_lanes = np.flatnonzero(share >= 0.5)
+    lane = int(usual_lanes[0]) if len(usual_lanes) else int(share.argmax())
     middle = (boundaries[:, lane] + boundaries[:, lane + 1]) / 2.0
-    there = full[:, lane] if full[:, lane].any() else np.ones(len(station), dtype=bool)
-    return section.carriageway.sign * float(np.median(middle[there]))
+    rows = is_full[:, lane] if is_full[:, lane].any() else np.ones(len(station), dtype=bool)
+    return section.carriageway.sign * float(np.median(middle[rows]))

@@ -132,15 +132,17 @@ class MovingPath:
         """Return local positions (K, 3), m, and rotations (K, 3, 3) at times (K,) since the first strip's start."""
         track = self._strip_track(strip.index)
         distance = (np.asarray(time, dtype=np.float64) - strip.start_time) * self._speed
-        within = np.clip(distance, 0.0, track.length)
-        plan, course, _, _ = track.place(within)
-        beyond = (distance - within)[:, None]
-        plan = plan + beyond * np.stack([np.cos(course), np.sin(course)], axis=1)
+        distance_on_track = np.clip(distance, 0.0, track.length)
+        plan, course, _, _ = track.place(distance_on_track)
+        # Before its beginning and after its end the track goes on straight.
+        distance_beyond = (distance - distance_on_track)[:, None]
+        plan = plan + distance_beyond * np.stack([np.cos(course), np.sin(course)], axis=1)
         height, attitude = self._eased_functions(track)
         position = np.column_stack([plan, height(distance)])
         return position, rotation_matrix(*attitude(distance).T) @ self._mounting
 
     def _make_track(self, index: int) -> StripTrack:
+        """Return the track of the strip with this index."""
         field = f"scan.platform.lateral_offsets[{index}]" if self._named else "scan.platform.lateral_offsets"
         return StripTrack(self._guide, self._offsets[index], self._sway, self._forward[index], field)
 
@@ -161,24 +163,31 @@ class MovingPath:
         course = track.place(distance)[1]
         return np.column_stack([course, np.zeros((len(course), 2))])
 
-    def surface(self, track: StripTrack, distance: Float, left: float) -> Float:
-        """Return the undamaged surface's elevation (K,), m, at ``left`` metres to the left in the direction of travel.
+    def surface(self, track: StripTrack, distance: Float, leftward: float) -> Float:
+        """Return the undamaged surface's elevation (K,), m, beside the track.
+
+        Args:
+            track: of a strip.
+            distance: (K,) travelled, m.
+            leftward: how far to the left in the direction of travel, m.
 
         Raises:
             InputError: there is no ground known.
         """
         station = track.stations(distance)
-        offset = track.offsets(station)[0] + (left if track.forward else -left)
+        offset = track.offsets(station)[0] + (leftward if track.forward else -leftward)
         return self._guide.known_ground(station, offset, False)
 
     def _knots(self, index: int) -> float:
+        """Return the largest time between two knots, s, of the strip with this index: see `Path.knot_spacing`."""
         track = self._strip_track(index)
         height, attitude = self._eased_functions(track)
-        rate, turn = attitude.bends()
+        turn_rate, turn_bend = attitude.bends()  # rad/m and rad/m^2, largest of heading, pitch and roll
         curvature, jump = track.bend
         # A rotation's second derivative is at most the angular velocity squared plus the angular acceleration.
-        swing = float(rate.sum() ** 2 + turn.sum())
+        swing = float(turn_rate.sum() ** 2 + turn_bend.sum())
         bend = np.hypot(curvature, float(height.bends()[1][0])) + KNOT_RANGE * swing
+        # By the distance; by time they are the speed's square and the speed as much.
         return knot_spacing_for(bend * self._speed**2, jump * self._speed)
 
 
@@ -189,6 +198,6 @@ def _guide_and_sway(platform: MovingPlatform, guide: Guide) -> tuple[Guide, Sway
     if platform.path == "direct" or platform.zigzag_amplitude == 0.0:
         return guide, None
     if platform.zigzag_wavelength < platform.zigzag_amplitude:
-        allowed = f"at least the amplitude, {platform.zigzag_amplitude:g} m, is needed: a shorter sway runs across"
-        raise InputError("scan.platform.zigzag_wavelength", platform.zigzag_wavelength, allowed)
+        requirement = f"at least the amplitude, {platform.zigzag_amplitude:g} m, is needed: a shorter sway runs across"
+        raise InputError("scan.platform.zigzag_wavelength", platform.zigzag_wavelength, requirement)
     return guide, Sway(platform.zigzag_amplitude, platform.zigzag_wavelength)

@@ -98,11 +98,11 @@ def as_tripod(platform: Platform) -> Tripod:
 
 def _scanner_place(tripod: Tripod, place: Sequence[float], mesh: SceneMesh) -> list[float]:
     """Return the local position (3,), m, of a tripod's scanner: above the highest surface unless z is given."""
-    local = [value - base for value, base in zip(place, mesh.origin, strict=False)]
-    if len(local) == 3:
-        return local
-    ground = elevation_at(mesh, *local)
+    local_place = [value - base for value, base in zip(place, mesh.origin, strict=False)]
+    if len(local_place) == 3:
+        return local_place
+    ground = elevation_at(mesh, *local_place)
     if ground is None:
-        shown = ",".join(f"{value:g}" for value in place)
-        raise InputError("--tripod", shown, "there is no surface below: give the scanner's elevation, X,Y,Z")
-    return [*local, ground + tripod.value("height")]
+        place_text = ",".join(f"{value:g}" for value in place)
+        raise InputError("--tripod", place_text, "there is no surface below: give the scanner's elevation, X,Y,Z")
+    return [*local_place, ground + tripod.value("height")]

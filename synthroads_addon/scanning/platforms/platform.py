@@ -53,8 +53,8 @@ class Platform(ClosedModel):
 
     def value(self, field: str) -> Any:
         """Return a field's value, or its usual one while it isn't given."""
-        given = getattr(self, field)
-        return self.usual.get(field) if given is None else given
+        set_value = getattr(self, field)
+        return self.usual.get(field) if set_value is None else set_value
 
     def typical_range(self) -> float | None:
         """Return the usual distance to what is scanned, m; None where only the path shows it."""

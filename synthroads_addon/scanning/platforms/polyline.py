@@ -97,54 +97,72 @@ class PolylineGuide(Guide):
 
 
 def _thin_points(points: Float, tolerance: float) -> Index:
-    """Return the indices of the points that are kept: without repetitions, thinned to the tolerance (m) in 3D."""
-    distinct = np.concatenate(([True], np.hypot(*np.diff(points[:, :2], axis=0).T) > _REPEATED))[: len(points)]
-    kept = np.flatnonzero(distinct)
-    if len(kept) < 2:
+    """Return the indices of the points that are kept: without repetitions, thinned to a tolerance (m) in 3D.
+
+    Thinning is that of Douglas and Peucker (1973): of a stretch between two kept points the point that lies farthest
+    from their chord is kept as well if it is farther than the tolerance, and so on for both parts.
+    """
+    is_distinct = np.concatenate(([True], np.hypot(*np.diff(points[:, :2], axis=0).T) > _REPEATED))[: len(points)]
+    distinct_points = np.flatnonzero(is_distinct)
+    if len(distinct_points) < 2:
         raise InputError("points", len(points), "at least two points, more than 1 mm apart in plan, are needed")
     if tolerance <= 0.0:
-        return kept
-    line, needed = points[kept], np.zeros(len(kept), dtype=bool)
-    needed[[0, -1]] = True
-    stack = [(0, len(kept) - 1)]
-    while stack:
-        first, last = stack.pop()
-        chord, inner = line[last] - line[first], line[first + 1 : last] - line[first]
-        if not len(inner):
+        return distinct_points
+    line, keep_mask = points[distinct_points], np.zeros(len(distinct_points), dtype=bool)
+    keep_mask[[0, -1]] = True
+    stretches = [(0, len(distinct_points) - 1)]
+    while stretches:
+        begin, end = stretches.pop()
+        chord, offsets = line[end] - line[begin], line[begin + 1 : end] - line[begin]
+        if not len(offsets):
             continue
-        share = np.clip(inner @ chord / max(float(chord @ chord), 1e-300), 0.0, 1.0)
-        distance = np.linalg.norm(inner - share[:, None] * chord, axis=1)
-        farthest = int(distance.argmax())
-        if distance[farthest] > tolerance:
-            middle = first + 1 + farthest
-            needed[middle] = True
-            stack += [(first, middle), (middle, last)]
-    return kept[needed]
+        share = np.clip(offsets @ chord / max(float(chord @ chord), 1e-300), 0.0, 1.0)
+        distance = np.linalg.norm(offsets - share[:, None] * chord, axis=1)
+        farthest_row = int(distance.argmax())
+        if distance[farthest_row] > tolerance:
+            middle = begin + 1 + farthest_row
+            keep_mask[middle] = True
+            stretches += [(begin, middle), (middle, end)]
+    return distinct_points[keep_mask]
 
 
 def _clothoid_lengths(turn: Float, reach: Float) -> Float:
-    """Return the length (C,), m, of either clothoid at corners of turns (C,), rad, that begin `reach` before.
+    """Return the length (C,), m, of either clothoid at corners.
 
-    With the deflection f and unit length, one clothoid ends at x = int cos(f u^2 / 2), y = int sin(f u^2 / 2); the
-    tangent from the corner is x + y tan(f / 2) long.
+    With the deflection f = |turn| / 2 and unit length, one clothoid ends at x = int cos(f u^2), y = int sin(f u^2); the
+    tangent from the corner is x + y tan(f) long.
+
+    Args:
+        turn: (C,) at the corners, rad.
+        reach: (C,) how far before the corner the first clothoid begins, m.
     """
     nodes, weights = np.polynomial.legendre.leggauss(20)
     # Gauss and Legendre's rule of 20 nodes on 0 to 1 is exact to rounding for any turn that isn't refused.
     angle = np.abs(turn)[:, None] / 2.0 * ((nodes + 1.0) / 2.0) ** 2
     x, y = np.cos(angle) @ weights / 2.0, np.sin(angle) @ weights / 2.0
-    half = np.abs(turn) / 2.0
-    return np.asarray(reach / (x + y * np.tan(half)))
+    half_turn = np.abs(turn) / 2.0
+    return np.asarray(reach / (x + y * np.tan(half_turn)))
 
 
-def _refuse_sharp(points: Float, kept: Index, turn: Float, lengths: Float) -> None:
-    sharp = (np.abs(turn) > CURVATURE_LIMIT * lengths) | (np.abs(turn) > np.deg2rad(170.0))
-    if not sharp.any():
+def _refuse_sharp(points: Float, point_indices: Index, turn: Float, lengths: Float) -> None:
+    """Raise `InputError`, naming the point, if a corner is too sharp to be rounded.
+
+    Args:
+        points: (N, 2 or 3) of the line.
+        point_indices: (C + 2,) those that are kept.
+        turn: (C,) at the corners between, rad.
+        lengths: (C,) of the clothoids that round them, m.
+    """
+    is_sharp = (np.abs(turn) > CURVATURE_LIMIT * lengths) | (np.abs(turn) > np.deg2rad(170.0))
+    if not is_sharp.any():
         return
-    at = int(np.argmax(sharp))
-    index = int(kept[at + 1])
-    degrees = abs(float(np.rad2deg(turn[at])))
-    allowed = f"the line turns by {degrees:.0f} degrees here, too sharply to be rounded with a radius of 1 m or more"
-    raise InputError(f"points[{index}]", [float(value) for value in points[index]], allowed)
+    corner = int(np.argmax(is_sharp))
+    index = int(point_indices[corner + 1])
+    degrees = abs(float(np.rad2deg(turn[corner])))
+    requirement = (
+        f"the line turns by {degrees:.0f} degrees here, too sharply to be rounded with a radius of 1 m or more"
+    )
+    raise InputError(f"points[{index}]", [float(value) for value in points[index]], requirement)
 
 
 def _straight_lengths(chord: Float, tangent: Float) -> Float:

@@ -33,17 +33,21 @@ def read_records(name: str, data: bytes) -> Float:
         InputError: a value is none of a trajectory, or the time doesn't increase.
     """
     records = np.frombuffer(data, dtype="<f8").reshape(-1, 17)
-    what = "records of 17 doubles are needed, as SBET has them: time, latitude and longitude in radians, ..."
+    requirement = "records of 17 doubles are needed, as SBET has them: time, latitude and longitude in radians, ..."
     limits = {1: np.pi / 2.0, 2: 2.0 * np.pi, 3: 2.0 * HIGHEST, 7: np.pi, 8: np.pi / 2.0, 9: 4.0 * np.pi}
-    for column, most in limits.items():
-        wrong = ~(np.abs(records[:, column]) <= most)
-        if wrong.any():
-            row = int(wrong.argmax())
-            raise InputError(f"{name}: value {column + 1} of record {row + 1}", float(records[row, column]), what)
-    late = np.flatnonzero(~(np.diff(records[:, 0]) > 0.0))
-    if len(late):
-        row = int(late[0]) + 1
-        raise InputError(f"{name}: time of record {row + 1}", float(records[row, 0]), f"times must increase: {what}")
+    for column, limit in limits.items():
+        is_wrong = ~(np.abs(records[:, column]) <= limit)
+        if is_wrong.any():
+            row = int(is_wrong.argmax())
+            raise InputError(
+                f"{name}: value {column + 1} of record {row + 1}", float(records[row, column]), requirement
+            )
+    late_rows = np.flatnonzero(~(np.diff(records[:, 0]) > 0.0))
+    if len(late_rows):
+        row = int(late_rows[0]) + 1
+        raise InputError(
+            f"{name}: time of record {row + 1}", float(records[row, 0]), f"times must increase: {requirement}"
+        )
     return records
 
 
@@ -59,20 +63,21 @@ def poses_on_map(name: str, records: Float, place: Placement) -> tuple[Float, Fl
     """
     system = place.system
     if system is None:
-        allowed = "the map's coordinate system must be named (--epsg), as SBET holds longitudes and latitudes"
-        raise InputError(name, None, allowed)
+        requirement = "the map's coordinate system must be named (--epsg), as SBET holds longitudes and latitudes"
+        raise InputError(name, None, requirement)
     degrees = np.column_stack([np.rad2deg(records[:, [2, 1]]), records[:, 3]])
     source = MapSystem.read(LONGITUDE_LATITUDE)
-    points, exact = moved(degrees, source, system)
+    points, accuracy = moved(degrees, source, system)
     check_area(name, points, system, may_be_local=False)
+    # True north on the map, as an angle clockwise from grid north: the way of a place that is moved a little north.
     north = moved(degrees + (0.0, _NORTHWARD, 0.0), source, system)[0] - points
-    to_grid = np.arctan2(north[:, 0], north[:, 1])  # of true north, clockwise from grid north
+    north_angle = np.arctan2(north[:, 0], north[:, 1])
     wander = records[:, 10] if np.abs(records[:, 10]).max() > _NO_WANDER else np.zeros(len(records))
     step = np.diff(points[:, :2], axis=0)
     course = np.arctan2(step[:, 0], step[:, 1])
-    headings = [records[:, 9] + sign * wander + to_grid for sign in (-1.0, 1.0)]
+    headings = [records[:, 9] + sign * wander + north_angle for sign in (-1.0, 1.0)]
     heading = min(headings, key=lambda angle: float(np.abs(wrap_angle(angle[:-1] - course)).mean()))
-    assume("%s names no datum: WGS 84 is assumed, moved to %s to within %g m", name, system.label, exact)
-    said = f": EPSG:{system.height_epsg} counts from another surface" if system.height_epsg else ""
-    warn("%s counts heights from the ellipsoid, scan.platform.height_shift moves them%s", name, said)
+    assume("%s names no datum: WGS 84 is assumed, moved to %s to within %g m", name, system.label, accuracy)
+    remark = f": EPSG:{system.height_epsg} counts from another surface" if system.height_epsg else ""
+    warn("%s counts heights from the ellipsoid, scan.platform.height_shift moves them%s", name, remark)
     return points, np.rad2deg(heading)

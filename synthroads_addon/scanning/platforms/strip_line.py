@@ -49,13 +49,17 @@ class Sway:
     def at(self, station: Float) -> tuple[Float, Float]:
         """Return the zigzag's offset (K,), m, and slope (K,), m/m, at stations (K,), m."""
         phase = station / self.wavelength
-        nearest = np.round(2.0 * phase - 0.5)  # turning point: even ones to the left, odd ones to the right
-        side = np.where(np.mod(nearest, 2.0) == 0.0, 1.0, -1.0)
-        before = (phase - (nearest + 0.5) / 2.0) / self.ROUNDED  # from the turning point, in lengths of its rounding
-        within = np.clip(before, -0.5, 0.5)
-        fall = self.ROUNDED * (1.0 - np.cos(np.pi * within)) / np.pi + self.ROUNDED * (np.abs(before) - np.abs(within))
+        turning_point = np.round(2.0 * phase - 0.5)  # the nearest one: even ones to the left, odd ones to the right
+        side = np.where(np.mod(turning_point, 2.0) == 0.0, 1.0, -1.0)
+        # From the turning point, in lengths of its rounding, which reaches from -1/2 to 1/2.
+        distance = (phase - (turning_point + 0.5) / 2.0) / self.ROUNDED
+        distance_in_rounding = np.clip(distance, -0.5, 0.5)
+        # By how much less than the amplitude the offset is, in wavelengths of the straight legs' slope: the integral
+        # of the rounding's sine, then a straight leg.
+        rounded_fall = self.ROUNDED * (1.0 - np.cos(np.pi * distance_in_rounding)) / np.pi
+        fall = rounded_fall + self.ROUNDED * (np.abs(distance) - np.abs(distance_in_rounding))
         offset = side * (self.amplitude - self.slope * self.wavelength * fall)
-        return offset, -side * self.slope * np.sin(np.pi * within)
+        return offset, -side * self.slope * np.sin(np.pi * distance_in_rounding)
 
 
 @dataclass(frozen=True)
@@ -110,14 +114,14 @@ class StripTrack:
     def stations(self, distance: Float) -> Float:
         """Return the guide's stations (K,), m, at distances travelled (K,), m, from 0 to `length`."""
         table = self._table
-        run = distance if self.forward else self.length - distance
-        cell = np.clip(np.searchsorted(table.distance, run, side="right") - 1, 0, len(table.rate) - 1)
+        table_distance = distance if self.forward else self.length - distance
+        cell = np.clip(np.searchsorted(table.distance, table_distance, side="right") - 1, 0, len(table.rate) - 1)
         size = table.distance[cell + 1] - table.distance[cell]
         # Cubic Hermite interpolation: p0 + t (m0 + t (3 d - 2 m0 - m1 + t (m0 + m1 - 2 d))), d = p1 - p0.
-        t = (run - table.distance[cell]) / size
-        before, after = table.station[cell], table.station[cell + 1]
-        (start, end), rise = table.rate[cell].T * size, after - before
-        return np.asarray(before + t * (start + t * (3.0 * rise - 2.0 * start - end + t * (start + end - 2.0 * rise))))
+        t = (table_distance - table.distance[cell]) / size
+        p0, p1 = table.station[cell], table.station[cell + 1]
+        (m0, m1), d = table.rate[cell].T * size, p1 - p0
+        return np.asarray(p0 + t * (m0 + t * (3.0 * d - 2.0 * m0 - m1 + t * (m0 + m1 - 2.0 * d))))
 
     def place(self, distance: Float) -> tuple[Float, Float, Float, Float]:
         """Return plan position (K, 2), course (K,) rad, station (K,) and offset (K,) at distances 0 to `length`.
@@ -125,10 +129,10 @@ class StripTrack:
         The course is the direction of travel; it isn't wrapped, but may differ by whole turns between calls.
         """
         station = self.stations(distance)
-        plan, heading, along, across, offset = self._frame(station)
-        left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-        course = heading + np.arctan2(across, along) + (0.0 if self.forward else np.pi)
-        return plan + offset[:, None] * left, course, station, offset
+        plan, heading, advance, sideways, offset = self._frame(station)
+        leftward = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+        course = heading + np.arctan2(sideways, advance) + (0.0 if self.forward else np.pi)
+        return plan + offset[:, None] * leftward, course, station, offset
 
     @cached_property
     def bend(self) -> tuple[float, float]:
@@ -139,7 +143,11 @@ class StripTrack:
         return float(turn.max()), float(jump.max(initial=0.0))
 
     def _frame(self, station: Float) -> tuple[Float, Float, Float, Float, Float]:
-        """Return plan and heading of the guide, the track's advance along and across it by station, and its offset."""
+        """Return the guide's plan position (K, 2) and heading (K,), and the track's advance, slope and offset (K,).
+
+        Advance and slope are what the track goes along the guide and to its left, m per m of station; the offset is in
+        m.
+        """
         plan, heading, curvature, stretch = self.guide.frame(station)
         offset, slope = self.offsets(station)
         # A line at an offset n beside curvature kappa is (1 - kappa n) times as long.
@@ -148,32 +156,42 @@ class StripTrack:
         return plan, heading, stretch * lever, slope, offset
 
     def _refuse_fold(self, station: Float, offset: Float, curvature: Float, lever: Float) -> None:
+        """Raise `InputError` if the track turns back on itself, where a bend's radius is hardly larger than its offset.
+
+        Args:
+            station, offset: (K,) m.
+            curvature: (K,) of the guide, 1/m.
+            lever: (K,) length of the track by that of the guide.
+        """
         if not len(lever) or lever.min() >= 1.0 - FOLD:
             return
-        worst = int(lever.argmin())
-        side = "left" if curvature[worst] > 0.0 else "right"
-        radius = 1.0 / abs(float(curvature[worst]))
-        allowed = (
-            f"at most {FOLD * radius:.2f} m to the {side} are possible at station {station[worst]:.1f} m, where the"
+        worst_row = int(lever.argmin())
+        side = "left" if curvature[worst_row] > 0.0 else "right"
+        radius = 1.0 / abs(float(curvature[worst_row]))
+        requirement = (
+            f"at most {FOLD * radius:.2f} m to the {side} are possible at station {station[worst_row]:.1f} m, where the"
             f" radius is {radius:.2f} m: beyond it the path would turn back"
         )
-        raise InputError(self._field, float(offset[worst]), allowed)
+        raise InputError(self._field, float(offset[worst_row]), requirement)
 
     def _build(self) -> _Table:
+        """Return the table of the track's cells; lengths by Gauss and Legendre's rule."""
         station = self._borders()
         # The cell ends just before a break: there the curvature is still that of the element before.
-        before, after = station[:-1], np.nextafter(station[1:], -np.inf)  # curvature on this side of a break
-        distance, rate, course = np.zeros(len(station)), np.empty((len(before), 2)), np.empty((len(before), 2))
-        for start in range(0, len(before), _BLOCK):
+        cell_begin, cell_end = station[:-1], np.nextafter(station[1:], -np.inf)
+        cell_count = len(cell_begin)
+        distance, rate, course = np.zeros(len(station)), np.empty((cell_count, 2)), np.empty((cell_count, 2))
+        for start in range(0, cell_count, _BLOCK):
             cells = slice(start, start + _BLOCK)
-            half = np.diff(station)[cells] / 2.0
-            at = (before[cells] + half) + half * _NODES[:, None]
-            _, _, along, across, _ = self._frame(at.ravel())
-            distance[1:][cells] = half * (_WEIGHTS @ np.hypot(along, across).reshape(at.shape))
-            for end, border in enumerate((before[cells], after[cells])):
-                _, heading, along, across, _ = self._frame(border)
-                rate[cells, end] = 1.0 / np.hypot(along, across)
-                course[cells, end] = heading + np.arctan2(across, along)
+            half_length = np.diff(station)[cells] / 2.0
+            node_station = (cell_begin[cells] + half_length) + half_length * _NODES[:, None]
+            _, _, advance, sideways, _ = self._frame(node_station.ravel())
+            speed = np.hypot(advance, sideways).reshape(node_station.shape)  # metres of track per metre of station
+            distance[1:][cells] = half_length * (_WEIGHTS @ speed)
+            for end, border in enumerate((cell_begin[cells], cell_end[cells])):
+                _, heading, advance, sideways, _ = self._frame(border)
+                rate[cells, end] = 1.0 / np.hypot(advance, sideways)
+                course[cells, end] = heading + np.arctan2(sideways, advance)
         return _Table(station, np.cumsum(distance), rate, course)
 
     def _borders(self) -> Float:
@@ -181,16 +199,19 @@ class StripTrack:
         size = min(_CELL, self.sway.wavelength / 100.0) if self.sway else _CELL
         length = self.guide.length
         count = int(np.ceil(length / size))
-        even = np.arange(count + 1) * (length / count)
-        even[-1] = length
+        even_borders = np.arange(count + 1) * (length / count)
+        even_borders[-1] = length
+        # Breaks at the ends, and such as repeat the one before, make no cell.
         breaks = self.guide.breaks
         breaks = breaks[(breaks > 1e-6) & (breaks < length - 1e-6)]
         breaks = breaks[np.concatenate(([True], np.diff(breaks) > 1e-9))[: len(breaks)]]
         if len(breaks):
-            after = np.minimum(np.searchsorted(breaks, even), len(breaks) - 1)
-            near = np.minimum(np.abs(breaks[after] - even), np.abs(breaks[np.maximum(after - 1, 0)] - even))
-            even = even[near > 1e-6]
-        return np.sort(np.concatenate((even, breaks)))
+            # Even borders next to a break are left out.
+            next_break = np.minimum(np.searchsorted(breaks, even_borders), len(breaks) - 1)
+            distance_to_next = np.abs(breaks[next_break] - even_borders)
+            distance_to_last = np.abs(breaks[np.maximum(next_break - 1, 0)] - even_borders)
+            even_borders = even_borders[np.minimum(distance_to_next, distance_to_last) > 1e-6]
+        return np.sort(np.concatenate((even_borders, breaks)))
 
 
 Function = Callable[[Float], Float]
@@ -219,22 +240,23 @@ class EasedFunction:
         cell = np.floor(distance / self.step)
         numbers = np.unique(cell[:, None] + np.arange(-1.0, 3.0))
         nodes = self._at_nodes(numbers)
-        first = np.searchsorted(numbers, cell - 1.0)
-        before, start, end, after = (self._near(nodes[first + 1], nodes[first + k]) for k in range(4))
+        row = np.searchsorted(numbers, cell - 1.0)
+        # The four nodes around each distance, p1 and p2 at the ends of its cell; angles without whole turns.
+        p0, p1, p2, p3 = (self._without_turns(nodes[row + 1], nodes[row + k]) for k in range(4))
         # Catmull and Rom 1974: slopes at nodes are half the difference of their neighbours.
         t = (distance / self.step - cell)[:, None]
-        m0, m1, rise = (end - before) / 2.0, (after - start) / 2.0, end - start
-        return start + t * (m0 + t * (3.0 * rise - 2.0 * m0 - m1 + t * (m0 + m1 - 2.0 * rise)))
+        m1, m2, d = (p2 - p0) / 2.0, (p3 - p1) / 2.0, p2 - p1
+        return p1 + t * (m1 + t * (3.0 * d - 2.0 * m1 - m2 + t * (m1 + m2 - 2.0 * d)))
 
     def bends(self) -> tuple[Float, Float]:
         """Return the largest absolute first and second derivatives (C,) by the distance."""
-        last = int(np.floor(self._length / self.step)) + 1
+        last_node = int(np.floor(self._length / self.step)) + 1
         rate: Float = np.zeros(1)
         bend: Float = np.zeros(1)
-        for start in range(-1, last + 1, _BLOCK):
-            numbers = np.arange(start - 1, min(start + _BLOCK, last + 1) + 3, dtype=np.float64)
+        for start in range(-1, last_node + 1, _BLOCK):
+            numbers = np.arange(start - 1, min(start + _BLOCK, last_node + 1) + 3, dtype=np.float64)
             values = self._at_nodes(numbers)
-            rises = self._near(np.zeros(1), np.diff(values, axis=0)) / self.step
+            rises = self._without_turns(np.zeros(1), np.diff(values, axis=0)) / self.step
             slopes, rise = (rises[1:] + rises[:-1]) / 2.0, rises[1:-1]
             m0, m1 = slopes[:-1], slopes[1:]
             # A cubic's second derivative is largest at an end; its first there or, at most 1.5 times the rise, within.
@@ -243,19 +265,28 @@ class EasedFunction:
             rate = np.maximum(rate, np.maximum(np.abs(slopes).max(axis=0), 1.5 * np.abs(rise).max(axis=0)))
         return rate, bend
 
-    def _near(self, centre: Float, values: Float) -> Float:
+    def _without_turns(self, centre: Float, values: Float) -> Float:
+        """Return values, angles less the whole turns by which they differ from a centre."""
         return centre + wrap_angle(values - centre) if self._angles else values
 
     def _at_nodes(self, numbers: Float) -> Float:
-        """Return the function's values at nodes, continued beyond the ends with the slope of a parabola there."""
+        """Return the function's values (K, C) at nodes, continued beyond the ends with the slope of a parabola there.
+
+        Args:
+            numbers: (K,) of the nodes, which lie a step apart.
+        """
         distance = numbers * self.step
-        within = np.clip(distance, 0.0, self._length)
-        values = self._function(within)
-        reach = min(0.5, self._length / 4.0)
-        for outside, end, inwards in ((distance < 0.0, 0.0, reach), (distance > self._length, self._length, -reach)):
-            if outside.any():
-                last, middle, first = self._function(end + inwards * np.arange(3.0))
-                middle, first = self._near(last, middle), self._near(last, first)
-                slope = (4.0 * middle - 3.0 * last - first) / (2.0 * inwards)
-                values[outside] += (distance - within)[outside, None] * slope
+        inside_distance = np.clip(distance, 0.0, self._length)
+        values = self._function(inside_distance)
+        spacing = min(0.5, self._length / 4.0)
+        for is_outside, end, inwards in (
+            (distance < 0.0, 0.0, spacing),
+            (distance > self._length, self._length, -spacing),
+        ):
+            if is_outside.any():
+                # The parabola through the end and two places inside has the slope (4 f1 - 3 f0 - f2) / (2 h) there.
+                f0, f1, f2 = self._function(end + inwards * np.arange(3.0))
+                f1, f2 = self._without_turns(f0, f1), self._without_turns(f0, f2)
+                slope = (4.0 * f1 - 3.0 * f0 - f2) / (2.0 * inwards)
+                values[is_outside] += (distance - inside_distance)[is_outside, None] * slope
         return values

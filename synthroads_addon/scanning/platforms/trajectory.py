@@ -135,27 +135,36 @@ class TrajectoryPath:
         share = (time - self._time[row]) / (self._time[row + 1] - self._time[row])
         step = self._position[row + 1] - self._position[row]
         position = self._position[row] + share[:, None] * step
-        turned = slerp(self._attitude[row], self._attitude[row + 1], np.clip(share, 0.0, 1.0))
-        return position, quaternion_matrices(turned) @ self._mounting
+        attitude = slerp(self._attitude[row], self._attitude[row + 1], np.clip(share, 0.0, 1.0))
+        return position, quaternion_matrices(attitude) @ self._mounting
 
     def _height_above(self, guide: Guide) -> Float:
+        """Return the heights (K,), m, of a thousand rows at most above a guide."""
         rows = np.unique(np.linspace(0, len(self._time) - 1, 1000).astype(np.int64))
         station, _ = guide.project(self._position[rows, :2])
         return self._position[rows, 2] - guide.elevation(np.clip(station, 0.0, guide.length))
 
     def _knots(self) -> float:
+        """Return the time between two knots, s: a step of an even grid on which all rows lie, if there is one.
+
+        Else it is as short as the corners of the trajectory ask.
+        """
         interval = np.diff(self._time)
-        turning = angle_between(self._attitude[:-1], self._attitude[1:]) / interval
+        turn_rate = angle_between(self._attitude[:-1], self._attitude[1:]) / interval
         # Between rows positions are linear, so only the turning bends; it does so evenly.
-        within = knot_spacing_for(KNOT_RANGE * float(turning.max()) ** 2)
+        bend = KNOT_RANGE * float(turn_rate.max()) ** 2
+        largest_spacing = knot_spacing_for(bend)
+        duration = float(self._time[-1])
         for parts in range(1, _SUBDIVISIONS + 1):
-            grid = float(interval.min()) / parts
-            grid = float(self._time[-1]) / max(round(float(self._time[-1]) / grid), 1)
-            if np.abs(self._time - np.round(self._time / grid) * grid).max() <= _GRID:
-                return grid / np.ceil(grid / within)
+            # A part of the shortest interval, rounded so that whole steps fill the duration.
+            step = float(interval.min()) / parts
+            step = duration / max(round(duration / step), 1)
+            if np.abs(self._time - np.round(self._time / step) * step).max() <= _GRID:
+                return step / np.ceil(step / largest_spacing)
         velocity = np.diff(self._position, axis=0) / interval[:, None]
-        corner = np.linalg.norm(np.diff(velocity, axis=0), axis=1) + KNOT_RANGE * (turning[1:] + turning[:-1])
-        return knot_spacing_for(KNOT_RANGE * float(turning.max()) ** 2, float(corner.max(initial=0.0)))
+        velocity_jump = np.linalg.norm(np.diff(velocity, axis=0), axis=1)
+        jump = velocity_jump + KNOT_RANGE * (turn_rate[1:] + turn_rate[:-1])
+        return knot_spacing_for(bend, float(jump.max(initial=0.0)))
 
 
 def check_headings(name: str, rows: Trajectory) -> None:
@@ -166,25 +175,27 @@ def check_headings(name: str, rows: Trajectory) -> None:
         rows: the poses; where the platform stands still it has no course.
     """
     step, interval = np.diff(rows.position[:, :2], axis=0), np.diff(rows.time)
-    moves = np.hypot(*step.T) > _STILL * interval
-    if not moves.any():
+    is_moving = np.hypot(*step.T) > _STILL * interval
+    if not is_moving.any():
         return
-    course = np.rad2deg(np.arctan2(step[moves, 0], step[moves, 1]))
-    heading = rows.heading[:-1][moves]
+    course = np.rad2deg(np.arctan2(step[is_moving, 0], step[is_moving, 1]))
+    heading = rows.heading[:-1][is_moving]
 
-    def across(angle: Float) -> float:
+    def median_deviation(angle: Float) -> float:
+        """Return the median angle, deg, between directions (K,) and the course."""
         return float(np.median(np.abs(np.rad2deg(wrap_angle(np.deg2rad(angle - course))))))
 
-    deviation, others = across(heading), {what: across(angle) for what, angle in _conventions(heading).items()}
-    best = min(others, key=lambda what: others[what])
-    if deviation > _ACROSS or (deviation > _BESIDE and others[best] < _ALONG):
-        looks = f"; they look like {best}" if others[best] < _ALONG + 0.1 * deviation else ""
+    deviation = median_deviation(heading)
+    deviations = {convention: median_deviation(angle) for convention, angle in _conventions(heading).items()}
+    best = min(deviations, key=lambda convention: deviations[convention])
+    if deviation > _ACROSS or (deviation > _BESIDE and deviations[best] < _ALONG):
+        suggestion = f"; they look like {best}" if deviations[best] < _ALONG + 0.1 * deviation else ""
         text = "%s: headings lie %.0f degrees across the course (median); %s is needed, and roll and pitch in degrees%s"
-        warn(text, name, deviation, _CONVENTION, looks)
+        warn(text, name, deviation, _CONVENTION, suggestion)
 
 
 def _conventions(heading: Float) -> dict[str, Float]:
-    """Return headings (K,) read by other conventions than ours, in ours."""
+    """Return headings (K,), read by each of some other conventions, in ours: degrees clockwise from north."""
     degrees = np.rad2deg(heading)
     return {
         "radians clockwise from north": degrees,
@@ -197,11 +208,18 @@ def _conventions(heading: Float) -> dict[str, Float]:
 
 
 def _refuse_wide_turns(file: str, rows: Trajectory, attitude: Float) -> None:
+    """Raise `InputError` if the platform turns so far from one row to the next that its sense isn't known.
+
+    Args:
+        file: name of the file.
+        rows: R poses.
+        attitude: (R, 4) quaternions of these.
+    """
     turn = angle_between(attitude[:-1], attitude[1:])
     if turn.max() > _LARGEST_TURN:
         row = int(turn.argmax()) + 1
-        allowed = f"the platform turns by {np.rad2deg(turn[row - 1]):.0f} degrees since the row before, at most 150"
-        raise InputError(f"{file}:{rows.lines[row]} heading", float(rows.heading[row]), allowed)
+        requirement = f"the platform turns by {np.rad2deg(turn[row - 1]):.0f} degrees since the row before, at most 150"
+        raise InputError(f"{file}:{rows.lines[row]} heading", float(rows.heading[row]), requirement)
 
 
 @dataclass(frozen=True)
@@ -295,50 +313,63 @@ class TrajectoryContent:
 
 def _read_csv(name: str, text: str) -> tuple[Float, Int]:
     """Return the values (R, 7) of `COLUMNS` in the text of a CSV file, and the numbers (R,) of their lines."""
-    numbered = enumerate(text.splitlines(), 1)
-    lines = [(number, line) for number, line in numbered if line.strip() and not line.lstrip().startswith("#")]
+    numbered_lines = enumerate(text.splitlines(), 1)
+    lines = [(number, line) for number, line in numbered_lines if line.strip() and not line.lstrip().startswith("#")]
     if not lines:
         raise InputError(name, None, f"the file is empty: a header with {', '.join(COLUMNS)} is needed")
     separator = next((mark for mark in (";", ",", "\t") if mark in lines[0][1]), " ")
-    head = f"{name}:{lines[0][0]}"
-    places = _columns(head, fields_of(lines[0][1], separator, head))
+    header_place = f"{name}:{lines[0][0]}"
+    column_numbers = _columns(header_place, fields_of(lines[0][1], separator, header_place))
     if len(lines) < 3:
         raise InputError(name, None, f"at least two rows below the header are needed, the file has {len(lines) - 1}")
-    below = ((f"{name}:{number}", line) for number, line in lines[1:])
-    rows = np.array([_row(place, fields_of(line, separator, place), places) for place, line in below])
+    numbered_rows = ((f"{name}:{number}", line) for number, line in lines[1:])
+    rows = np.array([_row(place, fields_of(line, separator, place), column_numbers) for place, line in numbered_rows])
     numbers = np.array([number for number, _ in lines[1:]])
-    late = np.flatnonzero(np.diff(rows[:, 0]) <= 0.0)
-    if len(late):
-        before, row = late[0], late[0] + 1
-        allowed = f"times must increase: more than {float(rows[before, 0])!r} s is needed"
-        raise InputError(f"{name}:{numbers[row]} time", float(rows[row, 0]), allowed)
+    late_rows = np.flatnonzero(np.diff(rows[:, 0]) <= 0.0)
+    if len(late_rows):
+        row_before, row = late_rows[0], late_rows[0] + 1
+        requirement = f"times must increase: more than {float(rows[row_before, 0])!r} s is needed"
+        raise InputError(f"{name}:{numbers[row]} time", float(rows[row, 0]), requirement)
     return rows, numbers
 
 
-def _columns(place: str, head: list[str]) -> list[int]:
-    names = [entry.lower() for entry in head]
+def _columns(place: str, header: list[str]) -> list[int]:
+    """Return the places, in a header, of the columns in `COLUMNS`; raise `InputError` if one is missing or there twice.
+
+    Args:
+        place: of the header in its file, for messages.
+        header: its entries.
+    """
+    names = [entry.lower() for entry in header]
     for column in COLUMNS:
         if names.count(column) != 1:
-            often = "is missing" if column not in names else f"is there {names.count(column)} times"
+            fault = "is missing" if column not in names else f"is there {names.count(column)} times"
             hint = nearest_name(column, set(names) - set(COLUMNS)) if column not in names else ""
-            allowed = f"a header with the columns {', '.join(COLUMNS)} is needed: {column} {often}{hint}"
-            raise InputError(place, ", ".join(head), allowed)
+            requirement = f"a header with the columns {', '.join(COLUMNS)} is needed: {column} {fault}{hint}"
+            raise InputError(place, ", ".join(header), requirement)
     return [names.index(column) for column in COLUMNS]
 
 
-def _row(place: str, entries: list[str], places: list[int]) -> list[float]:
-    if len(entries) <= max(places):
-        allowed = f"at least {max(places) + 1} columns are needed, this line has {len(entries)}"
-        raise InputError(place, " ".join(entries), allowed)
+def _row(place: str, entries: list[str], column_numbers: list[int]) -> list[float]:
+    """Return the values of `COLUMNS` in a row of a CSV file; raise `InputError` for what is no number or too large.
+
+    Args:
+        place: of the row in its file, for messages.
+        entries: of the row.
+        column_numbers: see `_columns`.
+    """
+    if len(entries) <= max(column_numbers):
+        requirement = f"at least {max(column_numbers) + 1} columns are needed, this line has {len(entries)}"
+        raise InputError(place, " ".join(entries), requirement)
     values = []
-    for column, at in zip(COLUMNS, places, strict=True):
+    for column, number in zip(COLUMNS, column_numbers, strict=True):
         try:
-            value = float(entries[at])
+            value = float(entries[number])
         except ValueError:
             value = math.nan
-        largest = FARTHEST if column in "xyz" else _LARGEST
-        if not abs(value) <= largest:
-            raise InputError(f"{place} {column}", entries[at], f"a finite number is needed, at most {largest:g}")
+        limit = FARTHEST if column in "xyz" else _LARGEST
+        if not abs(value) <= limit:
+            raise InputError(f"{place} {column}", entries[number], f"a finite number is needed, at most {limit:g}")
         if column == "pitch" and abs(value) > 90.0:
             raise InputError(f"{place} {column}", value, "from -90 to 90 deg")
         values.append(value)

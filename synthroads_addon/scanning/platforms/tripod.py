@@ -72,9 +72,9 @@ class Tripod(Platform):
         else:
             offset = np.resize(np.array(self.lateral_offsets, dtype=np.float64), len(station))
         plan, heading, _, _ = guide.frame(station)
-        left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+        leftward = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
         ground = guide.known_ground(station, offset, True)
-        positions = np.column_stack([plan + offset[:, None] * left, ground + self.value("height")])
+        positions = np.column_stack([plan + offset[:, None] * leftward, ground + self.value("height")])
         return TripodPath(self, positions, heading)
 
 
@@ -111,13 +111,18 @@ class TripodPath:
 
 
 def _stations(platform: Tripod, length: float) -> Float:
+    """Return the stations (S,) of a tripod along a line, m: the given ones, else by the spacing, centred on the line.
+
+    Raises:
+        InputError: a given station isn't on the line.
+    """
     if platform.stations is None:
         spaces = int(length / platform.station_spacing + 1e-9)
-        first = (length - spaces * platform.station_spacing) / 2.0
-        return np.clip(first + np.arange(spaces + 1) * platform.station_spacing, 0.0, length)
+        first_station = (length - spaces * platform.station_spacing) / 2.0
+        return np.clip(first_station + np.arange(spaces + 1) * platform.station_spacing, 0.0, length)
     station = np.array(platform.stations, dtype=np.float64)
-    outside = np.flatnonzero((station < 0.0) | (station > length))
-    if len(outside):
-        field = f"scan.platform.stations[{outside[0]}]"
-        raise InputError(field, float(station[outside[0]]), f"from 0 to {length:g} m, the length of the road")
+    outside_rows = np.flatnonzero((station < 0.0) | (station > length))
+    if len(outside_rows):
+        field = f"scan.platform.stations[{outside_rows[0]}]"
+        raise InputError(field, float(station[outside_rows[0]]), f"from 0 to {length:g} m, the length of the road")
     return station

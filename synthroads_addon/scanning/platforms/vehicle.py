@@ -47,13 +47,13 @@ class DrivenPath(MovingPath):
         return self.height + self.surface(track, distance, 0.0)
 
     def attitudes(self, track: StripTrack, distance: Float) -> Float:
-        """Return heading, pitch, roll (K, 3), rad, of a body on four wheels."""
+        """Return heading, pitch, roll (K, 3), rad, of a body on four wheels, at distances travelled (K,), m."""
         course = track.place(distance)[1]
-        reach = min(AXLES, track.length) / 2.0
+        half_base = min(AXLES, track.length) / 2.0
         # At the ends the axles stay on the track.
-        middle = np.clip(distance, reach, track.length - reach)
-        rise = self.surface(track, middle + reach, 0.0) - self.surface(track, middle - reach, 0.0)
-        pitch = np.arctan(rise / (2.0 * reach))
-        across = self.surface(track, distance, WHEELS / 2.0) - self.surface(track, distance, -WHEELS / 2.0)
+        middle = np.clip(distance, half_base, track.length - half_base)
+        rise = self.surface(track, middle + half_base, 0.0) - self.surface(track, middle - half_base, 0.0)
+        pitch = np.arctan(rise / (2.0 * half_base))
+        left_rise = self.surface(track, distance, WHEELS / 2.0) - self.surface(track, distance, -WHEELS / 2.0)
         # Left of the body is a tangent of the surface: tan(roll) is the slope across times cos(pitch).
-        return np.column_stack([course, pitch, np.arctan(across / WHEELS * np.cos(pitch))])
+        return np.column_stack([course, pitch, np.arctan(left_rise / WHEELS * np.cos(pitch))])

@@ -46,7 +46,12 @@ class Readout(ArrayRows):
         return (number if self.unread is None else np.where(self.unread, 0.0, number)), clipped
 
     def detected(self, intensity: Float, threshold: float) -> Bool:
-        """Return which of the points (N,) are detected."""
+        """Return a mask (N,) of the points that are detected.
+
+        Args:
+            intensity: (N,) received power without the receiver's noise.
+            threshold: of detection.
+        """
         return np.asarray(intensity >= (threshold if self.noise is None else threshold - self.noise))
 
 
@@ -60,7 +65,7 @@ def detect_echoes(
     dropout: float = 0.0,
     provisional: bool,
 ) -> tuple[Echoes, Readout, int]:
-    """Return the echoes that are detected and not lost at random, what is still to be read of them, and the weak ones.
+    """Return the echoes that are detected and not lost at random, their readout, and the number of weak ones.
 
     Args:
         echoes: of a block.
@@ -73,26 +78,26 @@ def detect_echoes(
     """
     if (share := overlap_share(setting, echoes.range)) is not None:
         echoes = replace(echoes, intensity=echoes.intensity * share)
-    speckle, noise, shares, lost = _values_of_errors(echoes, errors, number)
+    speckle, noise, unread_shares, lost_shares = _values_of_errors(echoes, errors, number)
     if speckle is not None:
         echoes = replace(echoes, intensity=echoes.intensity * speckle)
     if noise is not None:
         noise *= setting.receiver.noise_sigma(setting.threshold)
-    unread = None if shares is None else shares < (setting.receiver.lost_numbers or 0.0)
+    unread = None if unread_shares is None else unread_shares < (setting.receiver.lost_numbers or 0.0)
     readout = Readout(noise, channel[echoes.pulse] if setting.receiver.gain_sigma_db else None, speckle, unread)
     brightest = echoes.intensity / PROVISIONAL_THRESHOLD if provisional else echoes.intensity
-    seen = readout.detected(brightest, setting.threshold)
-    weak = len(echoes.pulse) - int(np.count_nonzero(seen))
-    if lost is not None:
-        seen &= lost >= dropout
-    if not seen.all():
-        kept = np.flatnonzero(seen)
-        echoes, readout = echoes.select(kept), readout.select(kept)
-    return echoes, readout, weak
+    is_recorded = readout.detected(brightest, setting.threshold)
+    weak_count = len(echoes.pulse) - int(np.count_nonzero(is_recorded))
+    if lost_shares is not None:
+        is_recorded &= lost_shares >= dropout
+    if not is_recorded.all():
+        rows = np.flatnonzero(is_recorded)
+        echoes, readout = echoes.select(rows), readout.select(rows)
+    return echoes, readout, weak_count
 
 
 def _values_of_errors(echoes: Echoes, errors: Errors, number: Index) -> tuple[Float | None, ...]:
-    """Return the echoes' (N,) factors by speckle, noise, and shares that say whose number and who is lost.
+    """Return the echoes' random numbers (N,): speckle, noise, and shares for lost numbers and lost echoes.
 
     Each is None where there is no such error.
 
@@ -101,8 +106,8 @@ def _values_of_errors(echoes: Echoes, errors: Errors, number: Index) -> tuple[Fl
         errors: of the block.
         number: (P,) of the echoes' pulses in the block.
     """
-    drawn = (errors.speckle, errors.receiver, errors.number, errors.lost)
-    if all(values is None for values in drawn):
+    block_values = (errors.speckle, errors.receiver, errors.number, errors.lost)
+    if all(values is None for values in block_values):
         return None, None, None, None
-    pulse, nth = np.take(number, echoes.pulse), number_echoes(echoes.pulse)
-    return tuple(None if values is None else values_of_echoes(values, pulse, nth) for values in drawn)
+    pulse, echo_number = np.take(number, echoes.pulse), number_echoes(echoes.pulse)
+    return tuple(None if values is None else values_of_echoes(values, pulse, echo_number) for values in block_values)

@@ -29,15 +29,15 @@ def received_intensity(share: ArrayLike, distance: ArrayLike, attenuation: float
         [0.002, 2e-05]
     """
     distance = np.asarray(distance, dtype=np.float64)
-    far = bool(np.all(distance >= NEAREST))
-    reach = distance if far else np.maximum(distance, NEAREST)
+    all_in_law = bool(np.all(distance >= NEAREST))
+    law_range = distance if all_in_law else np.maximum(distance, NEAREST)
     # Underflow in dense fog is a true zero, and so is what comes back from infinitely far away.
     with np.errstate(under="ignore", over="ignore"):
-        intensity = np.asarray(np.asarray(share, dtype=np.float64) / (reach * reach))
+        intensity = np.asarray(np.asarray(share, dtype=np.float64) / (law_range * law_range))
         if attenuation > 0.0:
-            left = np.asarray(reach * -attenuation)
-            intensity *= np.exp(left, out=left)
-    return intensity if far else np.where(distance > 0.0, intensity, 0.0)
+            transmission = np.asarray(law_range * -attenuation)
+            intensity *= np.exp(transmission, out=transmission)
+    return intensity if all_in_law else np.where(distance > 0.0, intensity, 0.0)
 
 
 def decibels(power: ArrayLike) -> Float32:

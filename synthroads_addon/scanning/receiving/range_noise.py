@@ -55,18 +55,23 @@ def range_sigma(setting: ScannerSetting, distance: Float, cosine: Float, intensi
         cosine: (N,) of the incidence angle.
         intensity: (N,) received power.
     """
-    faint, slant = setting.receiver.faint_range_sigma or 0.0, setting.receiver.incidence_range_noise or 0.0
-    if not setting.range_sigma or not (faint or slant):
-        return setting.range_sigma
+    strong_sigma = setting.range_sigma
+    faint_sigma, slant_share = (
+        setting.receiver.faint_range_sigma or 0.0,
+        setting.receiver.incidence_range_noise or 0.0,
+    )
+    if not strong_sigma or not (faint_sigma or slant_share):
+        return strong_sigma
     depth = footprint_depth(setting, distance, cosine)
-    pulse = setting.range_resolution / FULL_WIDTH
-    weakness = setting.threshold / np.maximum(intensity, max(setting.threshold, 1e-300))
-    variance = setting.range_sigma**2 + (faint * weakness) ** 2 * (1.0 + (depth / pulse) ** 2) + (slant * depth) ** 2
+    pulse_length = setting.range_resolution / FULL_WIDTH
+    weakness = setting.threshold / np.maximum(intensity, max(setting.threshold, 1e-300))  # T / S, at most 1
+    faint_variance = (faint_sigma * weakness) ** 2 * (1.0 + (depth / pulse_length) ** 2)
+    variance = strong_sigma**2 + faint_variance + (slant_share * depth) ** 2
     return np.asarray(np.sqrt(variance))
 
 
 def range_walk(setting: ScannerSetting, speckle: Float | None, noise: Noise, gain: float) -> Float | float:
-    """Return by how much farther echoes (N,) are ranged for what changes their power unknown to the scanner, m.
+    """Return by how much farther echoes (N,) are ranged, m, as their power differs from what the scanner expects.
 
     Args:
         setting: the scanner's.
@@ -82,6 +87,14 @@ def range_walk(setting: ScannerSetting, speckle: Float | None, noise: Noise, gai
 
 
 def tail_factors(random: np.random.Generator, count: int, freedom: float) -> Float32:
-    """Return factors (N,) that make normal errors Student's t of the same standard deviation, float32."""
+    """Return factors (N,) that make normal errors Student's t of the same standard deviation.
+
+    A normal number over sqrt(chi^2 / n), of n degrees of freedom, follows Student's t, whose variance is n / (n - 2).
+
+    Args:
+        random: the stream.
+        count: N.
+        freedom: degrees of freedom n.
+    """
     squares = np.float32(2.0) * random.standard_gamma(freedom / 2.0, count, dtype=np.float32)
     return np.asarray(np.sqrt(np.float32(freedom - 2.0) / squares), dtype=np.float32)

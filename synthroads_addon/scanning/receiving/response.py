@@ -43,10 +43,10 @@ def laser_gains(setting: ScannerSetting, seed: int) -> Float:
 
 def overlap_share(setting: ScannerSetting, distance: Float) -> Float | None:
     """Return the share (N,) of the power that the receiver sees at ranges (N,), m; None if it is all."""
-    begin, full = setting.receiver.overlap_begin or 0.0, setting.receiver.overlap_full
-    if not full:
+    begin_range, full_range = setting.receiver.overlap_begin or 0.0, setting.receiver.overlap_full
+    if not full_range:
         return None
-    return np.clip((distance - begin) / max(full - begin, 1e-9), 0.0, 1.0)
+    return np.clip((distance - begin_range) / max(full_range - begin_range, 1e-9), 0.0, 1.0)
 
 
 def read_power(
@@ -85,7 +85,15 @@ def read_power(
 
 
 def range_corrected(number: Float, distance: Float, setting: ScannerSetting) -> Float:
-    """Return what software makes of numbers (N,): the power that they stand for, times the squared range."""
+    """Return the power times squared range, m^2, that numbers (N,) of the receiver stand for.
+
+    It undoes `read_power` as far as that is possible.
+
+    Args:
+        number: (N,).
+        distance: (N,) measured ranges, m.
+        setting: the scanner's.
+    """
     receiver, limit, threshold = setting.receiver, setting.saturation, setting.threshold
     if receiver.response in (None, "power"):
         return np.asarray(number * distance**2)
@@ -104,16 +112,19 @@ def range_corrected(number: Float, distance: Float, setting: ScannerSetting) -> 
 
 
 def _saturated(power: Float, setting: ScannerSetting) -> tuple[Float, int]:
-    """Return powers (N,) as the receiver passes them on, and how many lie above its saturation."""
+    """Return powers (N,) as the receiver passes them on, and how many lie above its saturation.
+
+    They are clipped, or, with a softness p, saturate as S / (1 + (S / M)^(2 p))^(1 / (2 p)) (Rapp 1991).
+    """
     softness, limit = setting.receiver.soft_saturation, setting.saturation
     if not softness:
         return saturate(power, limit)
     share = power / limit
-    # Of what is fainter the share's power is lost beside 1.
-    bright = np.flatnonzero(share > (np.finfo(np.float64).eps / 4.0) ** (0.5 / softness))
-    soft = np.array(power)
-    soft[bright] /= (1.0 + share[bright] ** (2.0 * softness)) ** (0.5 / softness)
-    return soft, int(np.count_nonzero(power > limit))
+    # For smaller shares (S / M)^(2 p) is lost beside 1.
+    bright_rows = np.flatnonzero(share > (np.finfo(np.float64).eps / 4.0) ** (0.5 / softness))
+    result = np.array(power)
+    result[bright_rows] /= (1.0 + share[bright_rows] ** (2.0 * softness)) ** (0.5 / softness)
+    return result, int(np.count_nonzero(power > limit))
 
 
 def _full_scale(setting: ScannerSetting) -> float:
@@ -122,5 +133,5 @@ def _full_scale(setting: ScannerSetting) -> float:
 
 
 def _steps(setting: ScannerSetting) -> float:
-    """Return how many steps the full scale has."""
+    """Return the number of steps of the full scale, 2^bits - 1."""
     return float(2 ** (setting.receiver.bits or 16) - 1)

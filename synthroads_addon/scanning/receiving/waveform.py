@@ -26,87 +26,102 @@ _MOST_MERGED = 8
 
 
 def have_one_peak(ratio: Float, separation: Float) -> Bool:
-    """Return whether two pulses have one peak together.
+    """Return a mask (N,) of the pairs of pulses that have one peak together: Behboodian's condition above.
 
     Args:
         ratio: (N,) logarithm of the powers' ratio.
         separation: (N,) of the pulses, in rms lengths.
     """
-    half = np.maximum(separation / 2.0, 1.0)
-    root = np.sqrt(half**2 - 1.0)
-    return np.asarray(np.abs(ratio) >= 2.0 * half * root - 2.0 * np.log(half + root))
+    half_separation = np.maximum(separation / 2.0, 1.0)
+    root = np.sqrt(half_separation**2 - 1.0)
+    return np.asarray(np.abs(ratio) >= 2.0 * half_separation * root - 2.0 * np.log(half_separation + root))
 
 
 def merge_peaks(echoes: Echoes, resolution: float) -> Echoes:
-    """Return the echoes of pulses (ordered by pulse and range) with those as one that have one peak together.
+    """Return the echoes of a block with those as one that have one peak together.
 
     Args:
-        echoes: a block's.
+        echoes: a block's, ordered by pulse and range.
         resolution: full width at half height of the pulse as a range, m.
     """
     length = resolution / FULL_WIDTH
     for _ in range(_MOST_MERGED - 1):
-        first = _unparted(echoes, length)
-        if not len(first):
+        front_echoes = _pairs_with_one_peak(echoes, length)
+        if not len(front_echoes):
             break
-        echoes = _merged(echoes, first, length)
+        echoes = _merge_pairs(echoes, front_echoes, length)
     return echoes
 
 
-def _unparted(echoes: Echoes, length: float) -> Index:
-    """Return the first of each two neighbours that have one peak together; no echo is in two of the pairs."""
+def _pairs_with_one_peak(echoes: Echoes, length: float) -> Index:
+    """Return the front echo of each two neighbours that have one peak together; no echo is in two of the pairs.
+
+    Args:
+        echoes: of a block, ordered by pulse and range.
+        length: rms length of a pulse, m.
+    """
     pulse, power = echoes.pulse, np.maximum(echoes.intensity, 1e-300)
-    near = np.flatnonzero((pulse[1:] == pulse[:-1]) & (np.diff(echoes.range) < 40.0 * length))
-    distance = (echoes.range[near + 1] - echoes.range[near]) / length
-    together = have_one_peak(np.log(power[near] / power[near + 1]), distance)
-    first = near[together]
+    # Beyond 40 lengths no ratio of powers that numbers can have makes one peak of two.
+    candidates = np.flatnonzero((pulse[1:] == pulse[:-1]) & (np.diff(echoes.range) < 40.0 * length))
+    separation = (echoes.range[candidates + 1] - echoes.range[candidates]) / length
+    log_ratio = np.log(power[candidates] / power[candidates + 1])
+    front = candidates[have_one_peak(log_ratio, separation)]
     # Of a chain of pairs every second one, beginning with its first.
-    begins = np.ones(len(first), dtype=bool)
-    begins[1:] = np.diff(first) > 1
-    starts = np.flatnonzero(begins)
-    place = np.arange(len(first)) - starts[np.cumsum(begins) - 1]
-    return np.asarray(first[place % 2 == 0])
+    begins_chain = np.ones(len(front), dtype=bool)
+    begins_chain[1:] = np.diff(front) > 1
+    chain_starts = np.flatnonzero(begins_chain)
+    place_in_chain = np.arange(len(front)) - chain_starts[np.cumsum(begins_chain) - 1]
+    return np.asarray(front[place_in_chain % 2 == 0])
 
 
-def _merged(echoes: Echoes, first: Index, length: float) -> Echoes:
-    """Return the echoes with each of the chosen (N,) and the one behind it as one."""
-    near, far = echoes.select(first), echoes.select(first + 1)
-    shift, power = peak_of(near.intensity, far.intensity, far.range - near.range, length)
-    stronger = far.intensity > near.intensity
-    others = np.ones(len(echoes.pulse), dtype=bool)
-    others[first + 1] = False
-    result = echoes.select(others)
-    # Where what was behind them is gone, each lies farther ahead by the number of pairs before it.
-    place = first - np.arange(len(first))
-    result.hit[place] = np.where(stronger, far.hit, near.hit)
-    result.range[place] = near.range + shift
+def _merge_pairs(echoes: Echoes, front_index: Index, length: float) -> Echoes:
+    """Return echoes in which pairs of neighbours are one echo each, at the peak of their sum.
+
+    Args:
+        echoes: of a block, ordered by pulse and range.
+        front_index: (N,) the front echo of each pair, ascending; the rear one follows it.
+        length: rms length of a pulse, m.
+    """
+    front, rear = echoes.select(front_index), echoes.select(front_index + 1)
+    shift, power = peak_of(front.intensity, rear.intensity, rear.range - front.range, length)
+    rear_is_stronger = rear.intensity > front.intensity
+    keep_mask = np.ones(len(echoes.pulse), dtype=bool)
+    keep_mask[front_index + 1] = False
+    result = echoes.select(keep_mask)
+    # With the rear echoes gone, each front echo lies farther ahead by the number of pairs before it.
+    place = front_index - np.arange(len(front_index))
+    result.hit[place] = np.where(rear_is_stronger, rear.hit, front.hit)
+    result.range[place] = front.range + shift
     result.intensity[place] = power
-    result.weight[place] = near.weight + far.weight
+    result.weight[place] = front.weight + rear.weight
     return result
 
 
-def peak_of(near: Float, far: Float, separation: Float, length: float) -> tuple[Float, Float]:
-    """Return where (N,) behind the near pulse the sum of two pulses peaks, m, and how high.
+def peak_of(front_power: Float, rear_power: Float, separation: Float, length: float) -> tuple[Float, Float]:
+    """Return where (N,) behind the front pulse the sum of two pulses peaks, m, and how high.
 
     Args:
-        near, far: (N,) powers.
+        front_power, rear_power: (N,).
         separation: (N,) m.
         length: rms length of a pulse, m.
     """
     scale = 0.5 / length**2
 
     def weights(place: Float, pair: Index | slice) -> tuple[Float, Float]:
-        behind = place - separation[pair]
-        return near[pair] * np.exp(-scale * place**2), far[pair] * np.exp(-scale * behind**2)
+        """Return the powers of both pulses of pairs at places behind the front one, m."""
+        behind_rear = place - separation[pair]
+        return front_power[pair] * np.exp(-scale * place**2), rear_power[pair] * np.exp(-scale * behind_rear**2)
 
-    place, climbing = np.where(far > near, separation, 0.0), np.arange(len(near))
+    # The fixed point of the module's formula, from the stronger pulse; `climbing` are the pairs that still move.
+    place, climbing = np.where(rear_power > front_power, separation, 0.0), np.arange(len(front_power))
     for _ in range(_STEPS):
         if not len(climbing):
             break
-        before = place[climbing]
-        one, other = weights(before, climbing)
-        after = separation[climbing] * other / np.maximum(one + other, 1e-300)
-        place[climbing] = after
-        climbing = climbing[np.abs(after - before) > _NEAR_PEAK * length]
-    one, other = weights(place, slice(None))
-    return place, one + other
+        old_place = place[climbing]
+        front_weight, rear_weight = weights(old_place, climbing)
+        total_weight = np.maximum(front_weight + rear_weight, 1e-300)
+        new_place = separation[climbing] * rear_weight / total_weight
+        place[climbing] = new_place
+        climbing = climbing[np.abs(new_place - old_place) > _NEAR_PEAK * length]
+    front_weight, rear_weight = weights(place, slice(None))
+    return place, front_weight + rear_weight

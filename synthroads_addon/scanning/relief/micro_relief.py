@@ -97,18 +97,19 @@ def micro_relief(names: Sequence[str], rows: Sequence[Material]) -> MicroRelief:
 
 
 def _relief(name: str, row: Material) -> Relief:
+    """Return the relief of a material: `RELIEF`'s by its name or the name's last word, else that of its roughness."""
     name = entry_of(name)
-    known = RELIEF.get(name) or RELIEF.get(name.rpartition("_")[2])
-    if known is not None:
-        return known
+    relief = RELIEF.get(name) or RELIEF.get(name.rpartition("_")[2])
+    if relief is not None:
+        return relief
     return SMOOTH if name in materials() and name != UNKNOWN else relief_of_roughness(row)
 
 
 def relief_of_roughness(row: Material) -> Relief:
-    """Return a relief estimated from a material's roughness; smooth up to 0.5, for metals and for glass.
+    """Return a relief estimated from a material's roughness.
 
-    None up to a roughness of 0.5, then growing with the square; asphalt's at asphalt's. None for metals and for what
-    light goes through.
+    It is smooth up to a roughness of 0.5, then its amplitude grows with the square of the excess and is asphalt's at
+    asphalt's roughness. Metals and materials that let light through are smooth.
     """
     if row.metallic > 0.5 or row.transmission > 0.0:
         return SMOOTH
@@ -138,7 +139,7 @@ def shift_by_relief(
     strength: float,
     seed: int,
     octaves: int = 4,
-    raised: Float | None = None,
+    surface_heights: Float | None = None,
 ) -> PointBlock:
     """Return the points with `xyz` shifted along their beams, and `range` to match; all else is kept.
 
@@ -154,9 +155,9 @@ def shift_by_relief(
         strength: factor on every amplitude, 0 to `MAX_STRENGTH`.
         seed: the scene's.
         octaves: see `OCTAVES`.
-        raised: (N,) heights of the surface by which points move along its normal, whatever the strength, m; the range
-            is then the distance to there, less by the height times the cosine of the incidence angle. `true_xyz` and
-            `true_range` have these as well.
+        surface_heights: (N,) heights of the surface by which points move along its normal, whatever the strength, m;
+            the range is then the distance to there, less by the height times the cosine of the incidence angle.
+            `true_xyz` and `true_range` have these as well.
 
     Raises:
         InputError: strength out of range.
@@ -168,34 +169,34 @@ def shift_by_relief(
         return points
     if points.normal is None or points.material is None:
         raise ValueError("the roughness adjustment needs the points' normals and materials")
-    rough = ReliefField(points, ends, relief, strength, seed, octaves).rough
+    rough_rows = ReliefField(points, ends, relief, strength, seed, octaves).rough_rows
     # Angles stay as they are while points move.
     cosine = np.cos(np.radians(points.incidence_deg.astype(np.float64)))
-    if raised is not None:
+    if surface_heights is not None:
         for arrays in (("xyz", "range"), ("true_xyz", "true_range")):
-            points = _shift_along_normals(points, raised, cosine, arrays)
-    if not len(rough):
+            points = _shift_along_normals(points, surface_heights, cosine, arrays)
+    if not len(rough_rows):
         return points
     assert points.material is not None
-    cosine = np.take(cosine, rough)
-    height = ReliefField(points, ends, relief, strength, seed, octaves).heights(rough, cosine=cosine)
+    cosine = np.take(cosine, rough_rows)
+    height = ReliefField(points, ends, relief, strength, seed, octaves).heights(rough_rows, cosine=cosine)
     if (loops := point_loops()) is not None:
         reach = _NEXT_PEAK * relief.wavelength
         place, distance = loops.approached(
-            *(rough, height, cosine, points.material, reach, ends.towards, points.xyz, points.range)
+            *(rough_rows, height, cosine, points.material, reach, ends.towards, points.xyz, points.range)
         )
         return points.with_arrays({"xyz": place, "range": distance})
-    wavelength = np.take(relief.wavelength, np.take(points.material, rough))
+    wavelength = np.take(relief.wavelength, np.take(points.material, rough_rows))
     # The sine times the height over the way to the next peak.
-    least = np.sqrt(1.0 - cosine**2)
-    least *= np.abs(height)
-    least /= _NEXT_PEAK * wavelength
-    nearer = np.zeros(len(points))
-    nearer[rough] = height / np.maximum(cosine, least, out=least)
+    least_cosine = np.sqrt(1.0 - cosine**2)
+    least_cosine *= np.abs(height)
+    least_cosine /= _NEXT_PEAK * wavelength
+    beam_shift = np.zeros(len(points))
+    beam_shift[rough_rows] = height / np.maximum(cosine, least_cosine, out=least_cosine)
     # Rows of three numbers are slow to choose: all points are moved, smooth ones by nothing.
-    place = nearer[:, None] * ends.towards
+    place = beam_shift[:, None] * ends.towards
     place += points.xyz
-    return points.with_arrays({"xyz": place, "range": points.range - nearer})
+    return points.with_arrays({"xyz": place, "range": points.range - beam_shift})
 
 
 @dataclass(frozen=True)
@@ -214,18 +215,18 @@ class ReliefField:
     octaves: int
 
     @property
-    def rough(self) -> Index:
-        """Return the rows (K,) of the points whose material has a relief; those in the air have none."""
+    def rough_rows(self) -> Index:
+        """Return the rows (K,) of the points whose material has a relief; points in the air have none."""
         assert self.points.material is not None
         return np.flatnonzero(np.take(np.append(self.relief.amplitude, 0.0), self.points.material, mode="clip"))
 
-    def heights(self, rows: Index, beside: Float | None = None, cosine: Float | None = None) -> Float:
-        """Return the heights (K,) above the smooth surface at rough points, or at places beside them.
+    def heights(self, rows: Index, offset: Float | None = None, cosine: Float | None = None) -> Float:
+        """Return the heights (K,), m, above the smooth surface at rough points, or at places beside them.
 
         Args:
             rows: (K,) of the points.
-            beside: (K, 3) from them, m.
-            cosine: (K,) of their incidence angles, where it has been worked out.
+            offset: (K, 3) from the points to these places, m; None for the points themselves.
+            cosine: (K,) of the points' incidence angles, where it has been worked out.
         """
         assert self.points.material is not None
         material, footprint = np.take(self.points.material, rows), None
@@ -235,8 +236,8 @@ class ReliefField:
             footprint = _footprint(np.take(self.points.range, rows), cosine, self.ends.divergence)
         # Choosing rows of three numbers by `take` is several times as fast as by indexing.
         place = np.take(self.ends.position, rows, axis=0)
-        if beside is not None:
-            place += beside
+        if offset is not None:
+            place += offset
         wavelength = np.take(self.relief.wavelength, material)
         height = noise_field(place, wavelength, self.seed, self.octaves, footprint)
         return np.asarray(height * (self.strength * np.take(self.relief.amplitude, material)))
@@ -244,8 +245,8 @@ class ReliefField:
 
 def _footprint(distance: Float, cosine: Float, divergence: float) -> tuple[Float, Float]:
     """Return the standard deviations (K,) of footprints on the surface along and across the slant, m."""
-    across = distance * (divergence / 4.0)
-    return across / np.maximum(cosine, _LEAST_COSINE), across
+    across_sigma = distance * (divergence / 4.0)
+    return across_sigma / np.maximum(cosine, _LEAST_COSINE), across_sigma
 
 
 def _shift_along_normals(points: PointBlock, height: Float, cosine: Float, arrays: tuple[str, str]) -> PointBlock:
@@ -262,11 +263,12 @@ def _shift_along_normals(points: PointBlock, height: Float, cosine: Float, array
         return points
     assert points.normal is not None
     if (loops := point_loops()) is not None:
-        moved = loops.raised(height, cosine, points.normal, place, distance)
-        return points.with_arrays(dict(zip(arrays, moved, strict=True)))
+        shifted_arrays = loops.raised(height, cosine, points.normal, place, distance)
+        return points.with_arrays(dict(zip(arrays, shifted_arrays, strict=True)))
     rows = np.flatnonzero(height)
     place, distance = place.copy(), distance.copy()
-    height, cosine, before = (np.take(values, rows) for values in (height, cosine, distance))
+    height, cosine, old_distance = (np.take(values, rows) for values in (height, cosine, distance))
     place[rows] = np.take(place, rows, axis=0) + height[:, None] * np.take(points.normal, rows, axis=0)
-    distance[rows] = np.sqrt(before**2 - 2.0 * before * height * cosine + height**2)
+    # Law of cosines: the beam and the normal, along which the point moves, enclose the incidence angle.
+    distance[rows] = np.sqrt(old_distance**2 - 2.0 * old_distance * height * cosine + height**2)
     return points.with_arrays({arrays[0]: place, arrays[1]: distance})

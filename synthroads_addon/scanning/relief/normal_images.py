@@ -22,33 +22,42 @@ class NormalImage:
         levels: tilts (H, W, 2) of the normals to the image's right and upwards, for an upward part of 1, lowest row
             first; each level is the mean of two by two pixels of the one before.
         tile: length that the image's width covers, m.
-        along: whether it lies by station and offset on pavements, else by the place in the world.
+        follows_road: whether it lies by station and offset on pavements, else by the place in the world.
     """
 
     levels: tuple[Float32, ...]
     tile: float
-    along: bool
+    follows_road: bool
 
     @classmethod
-    def of(cls, pixels: Float, tile: float, along: bool) -> NormalImage:
-        """Return the image of pixels (H, W, 3), 0 to 1, lowest row first: tangential normals, green upwards."""
+    def of(cls, pixels: Float, tile: float, follows_road: bool) -> NormalImage:
+        """Return the image of pixels (H, W, 3), 0 to 1, lowest row first: tangential normals, green upwards.
+
+        Args:
+            pixels: a normal's components, from -1 to 1, as (1 + n) / 2.
+            tile: length that the image's width covers, m.
+            follows_road: see the attribute.
+        """
         normal = 2.0 * pixels - 1.0
         level = (normal[..., :2] / np.maximum(normal[..., 2:], _STEEPEST)).astype(np.float32)
         levels = [level]
         while min(level.shape[:2]) > 1:
-            even = level[: level.shape[0] // 2 * 2, : level.shape[1] // 2 * 2]
-            level = even.reshape(even.shape[0] // 2, 2, even.shape[1] // 2, 2, 2).mean(axis=(1, 3), dtype=np.float32)
+            rows, columns = level.shape[0] // 2, level.shape[1] // 2
+            # An odd last row or column is left out.
+            pairs = level[: rows * 2, : columns * 2].reshape(rows, 2, columns, 2, 2)
+            level = pairs.mean(axis=(1, 3), dtype=np.float32)
             levels.append(level)
-        return cls(tuple(levels), tile, along)
+        return cls(tuple(levels), tile, follows_road)
 
     def tilts(self, place: Float, footprint: Float) -> Float:
-        """Return the tilts (N, 2) at places (N, 2) along the image's width and height, m.
+        """Return the tilts (N, 2) of normals at places, to the image's right and upwards.
 
         Args:
-            place: from its lower left corner.
+            place: (N, 2) along the image's width and height from its lower left corner, m.
             footprint: (N,) width over which tilts are averaged, m.
         """
         pixel = self.tile / self.levels[0].shape[1]
+        # The level whose pixels are nearest to the footprint's width, on a logarithmic scale.
         number = np.rint(np.log2(np.maximum(footprint / pixel, 1.0))).astype(np.intp)
         number = np.minimum(number, len(self.levels) - 1)
         result = np.empty((len(place), 2))
@@ -65,9 +74,9 @@ def _interpolate(image: Float32, place: Float) -> Float:
     column, row = (corner[:, axis].astype(np.int64) for axis in range(2))
     height, width = image.shape[:2]
     result = np.zeros((len(place), image.shape[2]))
-    for right, x in ((0, 1.0 - share[:, 0]), (1, share[:, 0])):
-        for up, y in ((0, 1.0 - share[:, 1]), (1, share[:, 1])):
-            result += (x * y)[:, None] * image[(row + up) % height, (column + right) % width]
+    for step_right, share_x in ((0, 1.0 - share[:, 0]), (1, share[:, 0])):
+        for step_up, share_y in ((0, 1.0 - share[:, 1]), (1, share[:, 1])):
+            result += (share_x * share_y)[:, None] * image[(row + step_up) % height, (column + step_right) % width]
     return result
 
 
@@ -84,7 +93,7 @@ class NormalImages:
     pavement: PavementRelief | None
 
     def tilts(
-        self, material: AnyArray, instance: AnyArray, place: Float, local: Float, normal: Float, footprint: Float
+        self, material: AnyArray, instance: AnyArray, place: Float, road_place: Float, normal: Float, footprint: Float
     ) -> tuple[Index, Float]:
         """Return the rows (K,) of points whose material has a normal image, and by what these tilt their normals.
 
@@ -92,7 +101,7 @@ class NormalImages:
             material: (N,) indices of materials.
             instance: (N,) instance numbers.
             place: (N, 3) map coordinates, m.
-            local: (N, 3) the same in the frame of the whole road, m.
+            road_place: (N, 3) the same in the frame of the whole road, m.
             normal: (N, 3) unit normals of the faces.
             footprint: (N,) diameter of the beams on the surface, m.
 
@@ -103,34 +112,38 @@ class NormalImages:
         rows = np.flatnonzero(np.isin(material, list(self.images)))
         result = np.zeros((len(rows), 3))
         for number, image in self.images.items():
-            mine = np.flatnonzero(material[rows] == number)
-            chosen = rows[mine]
-            on_image, width, height = _mapping_by_world(local[chosen], normal[chosen])
-            if image.along and self.pavement is not None:
-                lies = self.pavement.on_pavement(instance[chosen])
-                station, offset, forwards = self.pavement.along_road(place[chosen[lies]])
-                left = np.cross(normal[chosen[lies]], forwards)
-                left *= np.where(normal[chosen[lies], 2:] < 0.0, -1.0, 1.0)
-                left /= np.linalg.norm(left, axis=1)[:, None]
-                on_image[lies] = np.column_stack([station, offset])
-                height[lies] = left
-                width[lies] = np.cross(left, normal[chosen[lies]])
-            tilt = image.tilts(on_image, footprint[chosen])
-            result[mine] = tilt[:, :1] * width + tilt[:, 1:] * height
+            result_rows = np.flatnonzero(material[rows] == number)
+            point_rows = rows[result_rows]
+            on_image, width, height = _mapping_by_world(road_place[point_rows], normal[point_rows])
+            if image.follows_road and self.pavement is not None:
+                # On pavements the image's width lies along the road, and its height to the left of that.
+                paved = self.pavement.on_pavement(instance[point_rows])
+                paved_normal = normal[point_rows[paved]]
+                station, offset, forwards = self.pavement.along_road(place[point_rows[paved]])
+                leftwards = np.cross(paved_normal, forwards)
+                leftwards *= np.where(paved_normal[:, 2:] < 0.0, -1.0, 1.0)
+                leftwards /= np.linalg.norm(leftwards, axis=1)[:, None]
+                on_image[paved] = np.column_stack([station, offset])
+                height[paved] = leftwards
+                width[paved] = np.cross(leftwards, paved_normal)
+            tilt = image.tilts(on_image, footprint[point_rows])
+            result[result_rows] = tilt[:, :1] * width + tilt[:, 1:] * height
         return rows, result
 
 
 def _mapping_by_world(place: Float, normal: Float) -> tuple[Float, Float, Float]:
     """Return where places (N, 3) lie on an image, (N, 2) m, and the directions (N, 3) of its width and height there.
 
-    Seen from above on what lies, from the side on what stands: as the nodes of textures have it
-    (`blender.materials.texture_nodes`).
+    Level surfaces are mapped from above (width east, height north), upright ones from the side that they face most
+    (height up): as the nodes of textures do it (`blender.materials.texture_nodes`).
     """
     east, north, up = np.abs(normal).T
-    lies, beside = up > np.maximum(east, north), east > north
-    standing_across = np.where(beside, place[:, 1], place[:, 0])
-    on_image = np.column_stack([np.where(lies, place[:, 0], standing_across), np.where(lies, place[:, 1], place[:, 2])])
+    is_level, faces_east = up > np.maximum(east, north), east > north
+    upright_width = np.where(faces_east, place[:, 1], place[:, 0])
+    on_image = np.column_stack(
+        [np.where(is_level, place[:, 0], upright_width), np.where(is_level, place[:, 1], place[:, 2])]
+    )
     width, height = np.zeros_like(place), np.zeros_like(place)
-    width[:, 0], width[:, 1] = lies | ~beside, ~lies & beside
-    height[:, 1], height[:, 2] = lies, ~lies
+    width[:, 0], width[:, 1] = is_level | ~faces_east, ~is_level & faces_east
+    height[:, 1], height[:, 2] = is_level, ~is_level
     return on_image, width, height

@@ -30,11 +30,12 @@ def turn_normals(points: PointBlock, rows: Index, towards: AnyArray, heights: He
     """
     assert points.normal is not None
     normal = points.normal[rows].astype(np.float64)
-    turned = normal.copy()
-    for along in _tangents(normal):
-        slope = (heights(rows, STEP * along) - heights(rows, -STEP * along)) / (2.0 * STEP)
-        turned -= slope[:, None] * along
-    return _with_normals(points, rows, turned, towards)
+    raised_normal = normal.copy()
+    for tangent in _tangents(normal):
+        # Central difference along the tangent.
+        slope = (heights(rows, STEP * tangent) - heights(rows, -STEP * tangent)) / (2.0 * STEP)
+        raised_normal -= slope[:, None] * tangent
+    return _with_normals(points, rows, raised_normal, towards)
 
 
 def tilt_normals(points: PointBlock, rows: Index, tilts: Float, towards: AnyArray) -> PointBlock:
@@ -50,15 +51,23 @@ def tilt_normals(points: PointBlock, rows: Index, tilts: Float, towards: AnyArra
     return _with_normals(points, rows, points.normal[rows].astype(np.float64) + tilts, towards)
 
 
-def _with_normals(points: PointBlock, rows: Index, turned: Float, towards: AnyArray) -> PointBlock:
-    """Return the points of which some rows (K,) have other normals (K, 3), of any length, seen by the scanner."""
+def _with_normals(points: PointBlock, rows: Index, normal: Float, towards: AnyArray) -> PointBlock:
+    """Return the points with other normals and incidence angles in some rows; all else is kept.
+
+    Args:
+        points: N points.
+        rows: (K,).
+        normal: (K, 3) of any length; where one looks away from the scanner it is turned until it is at a right angle.
+        towards: (N, 3) unit vectors to the scanner.
+    """
     assert points.normal is not None
-    turned = turned / np.linalg.norm(turned, axis=1)[:, None]
-    cosine = np.einsum("ij,ij->i", turned, towards[rows])
-    turned -= np.minimum(cosine, 0.0)[:, None] * towards[rows]
-    turned /= np.linalg.norm(turned, axis=1)[:, None]
+    normal = normal / np.linalg.norm(normal, axis=1)[:, None]
+    cosine = np.einsum("ij,ij->i", normal, towards[rows])
+    # What a normal has against the direction to the scanner is taken off.
+    normal -= np.minimum(cosine, 0.0)[:, None] * towards[rows]
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
     normals, incidence = points.normal.copy(), points.incidence_deg.copy()
-    normals[rows] = turned
+    normals[rows] = normal
     incidence[rows] = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
     return points.with_arrays({"normal": normals, "incidence_deg": incidence})
 
@@ -66,6 +75,6 @@ def _with_normals(points: PointBlock, rows: Index, turned: Float, towards: AnyAr
 def _tangents(normal: Float) -> tuple[Float, Float]:
     """Return two unit vectors (N, 3) at right angles to unit normals (N, 3) and to each other."""
     axis = np.where(np.abs(normal[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
-    first = np.cross(axis, normal)
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    return first, np.cross(normal, first)
+    tangent = np.cross(axis, normal)
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    return tangent, np.cross(normal, tangent)

@@ -75,13 +75,13 @@ class PavementRelief:
             place: (N, 3) where they are, map coordinates, m.
         """
         result = np.zeros(len(instance))
-        block, known = self._blocks_of(instance)
-        kinds = np.take(self._kind, np.take(block, known)) if len(known) else known
+        block, paved_rows = self._blocks_of(instance)
+        kinds = np.take(self._kind, np.take(block, paved_rows)) if len(paved_rows) else paved_rows
         for number in np.flatnonzero(np.bincount(kinds)).tolist():
-            rows = known[kinds == number]
+            rows = paved_rows[kinds == number]
             # By columns: choosing rows of three numbers takes several times as long.
-            local = np.column_stack([np.take(place[:, axis], rows) for axis in (0, 1)]) - self._origin
-            result[rows] = self._height[block[rows]] + self._kind_heights(_KINDS[number], local)
+            road_place = np.column_stack([np.take(place[:, axis], rows) for axis in (0, 1)]) - self._origin
+            result[rows] = self._height[block[rows]] + self._kind_heights(_KINDS[number], road_place)
         return result
 
     def on_pavement(self, instance: NDArray[np.integer]) -> Index:
@@ -96,26 +96,32 @@ class PavementRelief:
         return station, offset, np.column_stack([np.cos(heading), np.sin(heading), np.zeros(len(station))])
 
     def _blocks_of(self, instance: NDArray[np.integer]) -> tuple[Index, Index]:
-        """Return the blocks (N,) that instance numbers may be in, and the rows (K,) of those that are in one."""
+        """Return the block (N,) that each instance number may be in, and the rows (K,) of those that are in one."""
         if not len(self._first):
             return np.zeros(len(instance), np.intp), np.zeros(0, np.intp)
         block = np.searchsorted(self._first, instance, "right") - 1
         return block, np.flatnonzero((block >= 0) & (instance < self._end[block]))
 
     def _kind_heights(self, kind: _Kind, place: Float) -> Float:
-        """Return the heights (K,) of the pavement at places (K, 2) in the road's local frame, as a kind has it."""
+        """Return the heights (K,), m, of the pavement under things of a kind, as far as these follow it.
+
+        Args:
+            kind: see `_Kind`.
+            place: (K, 2) in the road's local frame, m.
+        """
         surface = self._surface
         waves = surface.waves(surface.geometry.sections[kind.side].carriageway.pavement, place)
         if not kind.tracks:
             return waves
         station, offset = surface.geometry.alignment.project(place)
-        worn = surface.worn_height(kind.side, station, offset, kind.joints)
+        height = surface.worn_height(kind.side, station, offset, kind.joints)
         if kind.lifted:
-            worn = worn - self._films[kind.side].thickness(station, offset)
-        return np.where(surface.is_paved(kind.side, station, offset), waves + worn, 0.0)
+            height = height - self._films[kind.side].thickness(station, offset)
+        return np.where(surface.is_paved(kind.side, station, offset), waves + height, 0.0)
 
 
 def _blocks(geometry: RoadGeometry) -> Iterator[_Block]:
+    """Yield the blocks of instance numbers of carriageways, turnouts and markings, and of what lies on these."""
     parameters, parts = geometry.parameters, geometry.numbers.parts
     for name, item in parameters.objects.items():
         if isinstance(item, Carriageway):
@@ -125,23 +131,29 @@ def _blocks(geometry: RoadGeometry) -> Iterator[_Block]:
         elif isinstance(item, Turnout | Arrow | Hatching | LineMarking):
             side = parameters.carriageway_of(item).side
             # Traffic seldom drives along lines, and paint fills joints.
-            kind = _Kind(side, isinstance(item, Turnout | Arrow), isinstance(item, Turnout))
+            kind = _Kind(side, tracks=isinstance(item, Turnout | Arrow), joints=isinstance(item, Turnout))
             yield _Block(item.instance, item.instance + 1, kind)
             if name in parts:
                 yield _Block(parts[name].first, parts[name].first + parts[name].room, kind)
 
 
-def _damage_blocks(carriageway: Carriageway, first: int) -> Iterator[_Block]:
+def _damage_blocks(carriageway: Carriageway, first_number: int) -> Iterator[_Block]:
+    """Yield the blocks of a carriageway's damages: ruts and potholes, then each patch, crack and removed marking.
+
+    Args:
+        carriageway: the carriageway.
+        first_number: instance number of its first damage.
+    """
     pavement, side = carriageway.pavement, carriageway.side
-    number = first + len(pavement.ruts) + len(pavement.potholes)
-    if number > first:
-        yield _Block(first, number, _Kind(side))
+    number = first_number + len(pavement.ruts) + len(pavement.potholes)
+    if number > first_number:
+        yield _Block(first_number, number, _Kind(side))
     for patch in pavement.patches:
-        yield _Block(number, number + 1, _Kind(side, False, False), damage_height(patch) - PATCH_FILM)
+        yield _Block(number, number + 1, _Kind(side, tracks=False, joints=False), damage_height(patch) - PATCH_FILM)
         number += 1
     for crack in pavement.cracks:
-        yield _Block(number, number + 1, _Kind(side, True, False, True), damage_height(crack) - CRACK_FILM)
+        yield _Block(number, number + 1, _Kind(side, joints=False, lifted=True), damage_height(crack) - CRACK_FILM)
         number += 1
     for marking in pavement.removed_markings:
-        yield _Block(number, number + 1, _Kind(side, True, False), damage_height(marking) - REMOVED_FILM)
+        yield _Block(number, number + 1, _Kind(side, joints=False), damage_height(marking) - REMOVED_FILM)
         number += 1

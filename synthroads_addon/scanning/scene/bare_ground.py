@@ -49,103 +49,129 @@ class BareGround:
         kinds = np.isin(mesh.class_id, [class_id(name) for name in CLASSES])
         ground = np.flatnonzero(kinds & ~permeable[mesh.material])
         normal = _normals(mesh, ground)
-        flat = normal[:, 2] >= _STEEPEST
-        ground, normal = ground[flat], normal[flat]
+        is_flat = normal[:, 2] >= _STEEPEST
+        ground, normal = ground[is_flat], normal[is_flat]
         self.face: Bool = np.zeros(len(mesh), bool)
         self.face[ground] = True
         if not len(ground):
             return
-        turned = self._turn_vertices(mesh, ground)
-        bounds = np.array([turned.min(axis=1), turned.max(axis=1)], np.float64)
+        turned_vertices = self._turn_vertices(mesh, ground)
+        bounds = np.array([turned_vertices.min(axis=1), turned_vertices.max(axis=1)], np.float64)
         self._corner, self._size = bounds[0], bounds[1] - bounds[0]
-        turned -= turned.min(axis=1)[:, None]
-        self._faces, self._corners = ground, turned[:2, mesh.triangles[ground]]
+        turned_vertices -= turned_vertices.min(axis=1)[:, None]
+        self._faces, self._corners = ground, turned_vertices[:2, mesh.triangles[ground]]
         area = float(np.prod(bounds[1, :2] - bounds[0, :2]))
         cell = max(FINEST, _CELL * footprint, (area / most_cells) ** 0.5)
         self._edges = PlanGrids(bounds[1, :2] - bounds[0, :2], cell, np.uint8, 0)
         self._things = HeightGrids(bounds, cell)
         for edges, kind in zip(_plane_edges(mesh, ground, normal), (_BESIDE, _ABOVE), strict=True):
-            self._draw_edges(turned, edges, cell, kind)
+            self._draw_edges(turned_vertices, edges, cell, kind)
         plant = mesh.class_id == class_id("vegetation")
-        self._things.draw_triangles(turned, mesh.triangles[~self.face & ~plant], _LONGEST_PIECE)
-        self._things.draw_triangles(turned, mesh.triangles[plant], _LONGEST_PLANT_PIECE, _PLANT_CELL)
+        self._things.draw_triangles(turned_vertices, mesh.triangles[~self.face & ~plant], _LONGEST_PIECE)
+        self._things.draw_triangles(turned_vertices, mesh.triangles[plant], _LONGEST_PLANT_PIECE, _PLANT_CELL)
         self._edges.finish()
         self._things.finish()
 
     def _turn_vertices(self, mesh: SceneMesh, ground: Index) -> Float32:
-        """Return the vertices (3, V), m, turned about the vertical so that the ground's longer side lies along x."""
+        """Return the vertices (3, V), m, turned about the vertical so that the ground's longer side lies along x.
+
+        It keeps the cosine and sine of the turn for `_turn`. The longer side is the principal axis of the ground's
+        vertices in plan, at the angle 1/2 atan2(2 c_xy, c_xx - c_yy) for their covariance c.
+        """
         x, y = mesh.vertices[np.unique(mesh.triangles[ground]), :2].T.astype(np.float64)
-        spread = np.cov(x, y)
-        angle = 0.5 * np.arctan2(2.0 * spread[0, 1], spread[0, 0] - spread[1, 1])
+        covariance = np.cov(x, y)
+        angle = 0.5 * np.arctan2(2.0 * covariance[0, 1], covariance[0, 0] - covariance[1, 1])
         self._cosine, self._sine = float(np.cos(angle)), float(np.sin(angle))
         x, y, z = mesh.vertices.T
         return np.array(self._turn(x, y) + (z,), np.float32)
 
     def _turn(self, x: Float, y: Float) -> tuple[Float, Float]:
+        """Return the coordinates x and y (N,) of places in the frame of the grids, before its origin is subtracted."""
         return self._cosine * x + self._sine * y, self._cosine * y - self._sine * x
 
     def _draw_edges(self, vertices: Float32, edges: Index, cell: float, kind: int) -> None:
-        """Draw edges (E, 2) of a kind, the vertices' numbers, cut into pieces no longer than a cell."""
+        """Draw edges into the grids of edges and of things, cut into pieces no longer than a cell.
+
+        Args:
+            vertices: (3, V) m.
+            edges: (E, 2) numbers of the vertices at their ends.
+            cell: width of the finest grid's cells, m.
+            kind: `_BESIDE` or `_ABOVE`.
+        """
         begins, ends = vertices[:, edges[:, 0]], vertices[:, edges[:, 1]]
         length = np.hypot(*(ends - begins)[:2])
         count = np.maximum(np.ceil(length / cell), 1.0).astype(np.intp)
+        # Of each piece: the edge that it is of, and its number on that.
         edge = np.repeat(np.arange(len(count)), count)
-        place = (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)).astype(np.float32)
-        way = ((ends - begins) / count.astype(np.float32))[:, edge]
-        one = begins[:, edge] + place * way
-        other = one + way
-        low, high = np.minimum(one, other), np.maximum(one, other)
-        self._edges.draw(0, low[:2], high[:2], kind)
-        high[2] -= np.float32(_LOWERED)
-        self._things.draw_boxes(low, high)
+        number = (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)).astype(np.float32)
+        step = ((ends - begins) / count.astype(np.float32))[:, edge]
+        piece_begins = begins[:, edge] + number * step
+        piece_ends = piece_begins + step
+        lowest_corners, highest_corners = np.minimum(piece_begins, piece_ends), np.maximum(piece_begins, piece_ends)
+        self._edges.draw(0, lowest_corners[:2], highest_corners[:2], kind)
+        highest_corners[2] -= np.float32(_LOWERED)
+        self._things.draw_boxes(lowest_corners, highest_corners)
 
     def check_footprints(
-        self, face: Index, place: Float, spans: tuple[Float, Float], towards: Float
+        self, face: Index, place: Float, half_axes: tuple[Float, Float], towards: Float
     ) -> tuple[Bool, Bool]:
         """Return which footprints (N,) lie on one plane, and which of these beams surely meet nothing before it.
 
         Args:
             face: (N,) that the footprints' middles are on.
             place: (3, N) middle of the footprints, local, m.
-            spans: (3, N) each, half the footprints' axes on the plane that they are on, m.
+            half_axes: (3, N) each, half axes of the footprints, ellipses on the planes of their faces, m.
             towards: (3, N) unit vectors back to the scanner; the third component is positive.
         """
         if not place.shape[1]:
             return np.zeros(0, bool), np.zeros(0, bool)
-        one, other = ((*self._turn(span[0], span[1]), span[2]) for span in spans)
-        half = [np.sqrt(a * a + b * b) for a, b in zip(one, other, strict=True)]
+        # In the grids' frame: half axes, and the boxes around the footprints, whose half size along an axis is the
+        # root of the summed squares of both half axes' components.
+        axis_a, axis_b = ((*self._turn(axis[0], axis[1]), axis[2]) for axis in half_axes)
         middle = (*self._turn(place[0], place[1]), place[2])
-        corner = np.array([m - h - c for m, h, c in zip(middle, half, self._corner, strict=True)])
-        width = 2.0 * np.maximum(half[0], half[1])
-        level, last = self._edges.level_of(width), len(self._edges.cells) - 1
-        nearest = self._edges.largest(np.minimum(level, last), corner[0], corner[1])
-        whole = (level <= last) & (nearest == 0)
-        beside = np.flatnonzero((level <= last) & (nearest == _BESIDE))
-        half_axes = [np.array(axis[:2])[:, beside] for axis in (one, other)]
-        whole[beside] = self._within_faces(face[beside], np.array(middle[:2])[:, beside], *half_axes)
-        rows = np.flatnonzero(whole)
-        back = np.array([*self._turn(towards[0, rows], towards[1, rows]), towards[2, rows]])
-        alone = np.zeros(len(whole), bool)
-        alone[rows] = self._things.passed_by(corner[:, rows], width[rows], back)
-        return whole, alone
+        half_size = [np.sqrt(a * a + b * b) for a, b in zip(axis_a, axis_b, strict=True)]
+        corner = np.array([middle[i] - half_size[i] - self._corner[i] for i in range(3)])
+        width = 2.0 * np.maximum(half_size[0], half_size[1])
+        # One plane: no edge of a plane near the footprint, or the footprint within the face despite edges beside it.
+        level, coarsest_level = self._edges.level_of(width), len(self._edges.cells) - 1
+        fits_grid = level <= coarsest_level
+        edge_kind = self._edges.largest(np.minimum(level, coarsest_level), corner[0], corner[1])
+        one_plane = fits_grid & (edge_kind == 0)
+        near_edge = np.flatnonzero(fits_grid & (edge_kind == _BESIDE))
+        plan_axes = [np.array(axis[:2])[:, near_edge] for axis in (axis_a, axis_b)]
+        one_plane[near_edge] = self._within_faces(face[near_edge], np.array(middle[:2])[:, near_edge], *plan_axes)
+        rows = np.flatnonzero(one_plane)
+        direction_back = np.array([*self._turn(towards[0, rows], towards[1, rows]), towards[2, rows]])
+        unblocked = np.zeros(len(one_plane), bool)
+        unblocked[rows] = self._things.passed_by(corner[:, rows], width[rows], direction_back)
+        return one_plane, unblocked
 
-    def _within_faces(self, face: Index, middle: Float, one: Float, other: Float) -> Bool:
-        """Return which footprints (N,), ellipses in plan with half axes (2, N), lie within the face of their middle."""
+    def _within_faces(self, face: Index, middle: Float, axis_a: Float, axis_b: Float) -> Bool:
+        """Return a mask (N,) of the footprints that lie within the face of their middle, in plan.
+
+        Args:
+            face: (N,) of their middles.
+            middle: (2, N) in the grids' frame before its origin is subtracted, m.
+            axis_a, axis_b: (2, N) half axes of the footprints, which are ellipses in plan, m.
+        """
         corners = self._corners[:, np.searchsorted(self._faces, face)] + self._corner[:2, None, None]
-        within = np.ones(len(face), bool)
+        is_within = np.ones(len(face), bool)
         for i in range(3):
+            # The side from a to b, with a unit vector at a right angle to it that points to the third corner c.
             a, b, c = (corners[:, :, (i + step) % 3] for step in range(3))
             inward = np.array([a[1] - b[1], b[0] - a[0]])
             inward *= np.sign((inward * (c - a)).sum(axis=0)) / np.maximum(np.hypot(*inward), _ROUNDING)
-            reach = np.hypot((inward * one).sum(axis=0), (inward * other).sum(axis=0))
-            within &= (inward * (middle - a)).sum(axis=0) >= reach + _ROUNDING
-        return within
+            # Half the width of an ellipse along a unit vector: the root of the summed squares of its half axes'
+            # products.
+            half_width = np.hypot((inward * axis_a).sum(axis=0), (inward * axis_b).sum(axis=0))
+            is_within &= (inward * (middle - a)).sum(axis=0) >= half_width + _ROUNDING
+        return is_within
 
     def passed_by(self, origins: Float, directions: Float, spread: float) -> Bool:
         """Return a mask (N,) of the beams that surely pass by all of the scene, of those whose axis meets nothing.
 
         Args:
-            origins: (3, N) where they begin, local, m; those that begin beside the scene aren't known to.
+            origins: (3, N) where they begin, local, m; of beams that begin beside the scene the mask is False.
             directions: (3, N) unit vectors of their axes.
             spread: radius of the beam, m per metre of range.
         """
@@ -154,20 +180,22 @@ class BareGround:
             return result
         x, y = self._turn(origins[0], origins[1])
         begin = np.array([x - self._corner[0], y - self._corner[1], origins[2] - self._corner[2]])
-        ahead, aside = self._turn(directions[0], directions[1])
+        direction_x, direction_y = self._turn(directions[0], directions[1])
         rise, size = directions[2], self._size
-        inside = (begin[0] >= 0.0) & (begin[0] <= size[0]) & (begin[1] >= 0.0) & (begin[1] <= size[1])
-        steep = np.where(np.abs(rise) > _LEVEL, rise, _LEVEL)
-        # Up to where they leave the scene's sides, or its highest or lowest place.
-        length = np.where(steep > 0.0, np.maximum(size[2] - begin[2], 0.0), -begin[2]) / steep
-        for speed, place, side in ((ahead, begin[0], size[0]), (aside, begin[1], size[1])):
+        starts_inside = (begin[0] >= 0.0) & (begin[0] <= size[0]) & (begin[1] >= 0.0) & (begin[1] <= size[1])
+        # Range at which they leave the scene's box: first by its top or bottom, then by its sides if that is nearer.
+        slope = np.where(np.abs(rise) > _LEVEL, rise, _LEVEL)
+        length = np.where(slope > 0.0, np.maximum(size[2] - begin[2], 0.0), -begin[2]) / slope
+        for speed, place, side in ((direction_x, begin[0], size[0]), (direction_y, begin[1], size[1])):
             with np.errstate(divide="ignore"):
                 np.minimum(length, np.where(speed > 0.0, side - place, -place) / speed, where=speed != 0.0, out=length)
-        rows = np.flatnonzero(inside & (np.abs(rise) > _LEVEL) & (length >= 0.0))
-        up, radius = rise[rows] > 0.0, spread * length[rows]
-        back = np.array([ahead[rows], aside[rows], rise[rows]])
-        lowest = begin[:, rows] + np.where(up, 0.0, length[rows]) * back - radius
-        result[rows] = self._things.passed_by(lowest, 2.0 * radius, back * np.where(up, 1.0, -1.0))
+        rows = np.flatnonzero(starts_inside & (np.abs(rise) > _LEVEL) & (length >= 0.0))
+        # A beam that goes up is followed from its beginning, one that goes down back from where it leaves the box:
+        # either from its lowest place to its highest.
+        goes_up, radius = rise[rows] > 0.0, spread * length[rows]
+        direction = np.array([direction_x[rows], direction_y[rows], rise[rows]])
+        lowest_place = begin[:, rows] + np.where(goes_up, 0.0, length[rows]) * direction - radius
+        result[rows] = self._things.passed_by(lowest_place, 2.0 * radius, direction * np.where(goes_up, 1.0, -1.0))
         return result
 
 
@@ -180,22 +208,31 @@ def _normals(mesh: SceneMesh, faces: Index) -> Float:
 
 
 def _plane_edges(mesh: SceneMesh, faces: Index, normal: Float) -> tuple[Index, Index]:
-    """Return the vertices (E, 2) of the edges at which a plane of ground ends, in two parts.
+    """Return the edges at which a plane of ground ends, as numbers (E, 2) of their vertices, in two parts.
 
-    That is between two faces of which one is of another material, or at an angle of more than `CREASE`, and where a
-    face has no neighbour. The second part is where pavement or what is painted on it has none: it may lie on another.
+    A plane ends between two faces of different materials or at an angle of more than `CREASE`, and where a face has no
+    neighbour or several. The second part are such edges without one neighbour that pavement or paint on it has: it may
+    lie on another face.
+
+    Args:
+        mesh: the scene's.
+        faces: (N,) of the ground.
+        normal: (N, 3) their unit normals.
     """
     triangles = mesh.triangles[faces]
     sides = np.sort(np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1).astype(np.intp)
     owner = np.tile(np.arange(len(faces)), 3)
+    # Sides of the same two vertices have one key; sorted by key, those of one edge follow on each other.
     key = sides[:, 0] * len(mesh.vertices) + sides[:, 1]
     order = np.argsort(key, kind="stable")
     key, owner = key[order], owner[order]
     starts = np.flatnonzero(np.diff(key, prepend=-1))
-    count = np.diff(starts, append=len(key))
-    first, second = owner[starts], owner[starts + (count > 1)]
+    face_count = np.diff(starts, append=len(key))
+    face_a, face_b = owner[starts], owner[starts + (face_count > 1)]
     material = mesh.material[faces]
-    level = np.linalg.norm(np.cross(normal[first], normal[second]), axis=1) <= np.sin(CREASE)
-    ends = ~((count == 2) & level & (material[first] == material[second]))
-    thin = np.isin(mesh.class_id[faces[first]], [class_id("road"), class_id("road_marking")]) & (count != 2)
-    return sides[order[starts[ends & ~thin]]], sides[order[starts[ends & thin]]]
+    # The length of two unit normals' cross product is the sine of the angle between them.
+    is_flat = np.linalg.norm(np.cross(normal[face_a], normal[face_b]), axis=1) <= np.sin(CREASE)
+    ends_plane = ~((face_count == 2) & is_flat & (material[face_a] == material[face_b]))
+    paved = np.isin(mesh.class_id[faces[face_a]], [class_id("road"), class_id("road_marking")])
+    is_thin = paved & (face_count != 2)
+    return sides[order[starts[ends_plane & ~is_thin]]], sides[order[starts[ends_plane & is_thin]]]

@@ -47,9 +47,11 @@ class Bundles:
         time, delay = _box(times[None], starts)
         apex, ball = _box(origins, starts)
         # All directions lie in a ball around the middle of their box: seen from the origin it has this angle.
-        axis, spread = _box(directions, starts)
+        axis, direction_radius = _box(directions, starts)
         length = np.sqrt(np.einsum("ib,ib->b", axis, axis))
-        angle = np.where(spread < length, np.arcsin(np.minimum(spread / np.maximum(length, 1e-300), 1.0)), np.pi)
+        angle = np.where(
+            direction_radius < length, np.arcsin(np.minimum(direction_radius / np.maximum(length, 1e-300), 1.0)), np.pi
+        )
         axis /= np.maximum(length, 1e-300)
         farthest = np.maximum.reduceat(reach, starts)
         return cls(origins, directions, times, reach, time[0], delay, apex, ball, axis, angle + _SLACK, farthest)
@@ -66,23 +68,31 @@ class Bundles:
         bundles = self._bundles_near(track, way, radius)
         rays = (bundles[:, None] * RAYS + np.arange(RAYS)).ravel()
         rays = rays[rays < len(self.times)]
-        towards = track.along(way, self.times[rays]) - self.origins[:, rays]
+        # From the point of each ray that is nearest to the ball's centre to this.
+        offset = track.interpolate(way, self.times[rays]) - self.origins[:, rays]
         direction = self.directions[:, rays]
-        ahead = dot(towards, direction)
-        towards -= np.clip(ahead, 0.0, self.reach[rays]) * direction
-        return rays[dot(towards, towards) <= radius**2]
+        nearest_range = np.clip(dot(offset, direction), 0.0, self.reach[rays])
+        offset -= nearest_range * direction
+        return rays[dot(offset, offset) <= radius**2]
 
     def _bundles_near(self, track: Track, way: Float, radius: float) -> Index:
-        """Return the indices of the bundles whose cone touches a ball with centres ``way`` (3, K) at the knots."""
-        towards = track.along(way, self.time) - self.apex
-        fastest = float(np.sqrt(np.square(np.diff(way, axis=1)).sum(axis=0).max())) / track.spacing
-        away = np.sqrt(np.einsum("ib,ib->b", towards, towards))
-        room = radius + self.ball + fastest * self.delay
-        ahead = np.einsum("ib,ib->b", towards, self.axis)
-        off_axis = np.arccos(np.clip(ahead / np.maximum(away, 1e-300), -1.0, 1.0))
-        seen_under = np.arcsin(np.minimum(room / np.maximum(away, 1e-300), 1.0))
-        touched = (away <= room) | (off_axis <= self.angle + seen_under)
-        return np.flatnonzero(touched & (away <= self.farthest + room))
+        """Return the indices of the bundles whose cone touches a moving ball.
+
+        Args:
+            track: of the body.
+            way: (3, K) centres of the ball at the track's knots, m.
+            radius: of the ball, m.
+        """
+        offset = track.interpolate(way, self.time) - self.apex
+        fastest = float(np.sqrt(np.square(np.diff(way, axis=1)).sum(axis=0).max())) / track.spacing  # m/s
+        distance = np.sqrt(np.einsum("ib,ib->b", offset, offset))
+        # One ball stands for all rays of a bundle: larger by where these begin, and by the body's way meanwhile.
+        reach_of_ball = radius + self.ball + fastest * self.delay
+        cosine = np.einsum("ib,ib->b", offset, self.axis) / np.maximum(distance, 1e-300)
+        off_axis = np.arccos(np.clip(cosine, -1.0, 1.0))
+        angular_radius = np.arcsin(np.minimum(reach_of_ball / np.maximum(distance, 1e-300), 1.0))
+        touches_cone = (distance <= reach_of_ball) | (off_axis <= self.angle + angular_radius)
+        return np.flatnonzero(touches_cone & (distance <= self.farthest + reach_of_ball))
 
 
 def dot(a: Float, b: Float) -> Float:
@@ -95,5 +105,9 @@ def dot(a: Float, b: Float) -> Float:
 
 def _box(values: Float, starts: Index) -> tuple[Float, Float]:
     """Return the centres (C, B) of the bounding boxes of bundles of values (C, N), and their half diagonals (B,)."""
-    low, high = (np.stack([ends.reduceat(row, starts) for row in values]) for ends in (np.minimum, np.maximum))
-    return (low + high) / 2.0, np.sqrt(np.square(high - low).sum(axis=0)) / 2.0
+    lowest_corners, highest_corners = (
+        np.stack([extreme.reduceat(row, starts) for row in values]) for extreme in (np.minimum, np.maximum)
+    )
+    return (lowest_corners + highest_corners) / 2.0, np.sqrt(
+        np.square(highest_corners - lowest_corners).sum(axis=0)
+    ) / 2.0

@@ -50,6 +50,7 @@ class FacePlanes:
             self._fill(mesh, slice(start, start + _BLOCK))
 
     def _fill(self, mesh: SceneMesh, block: slice) -> None:
+        """Work out the planes of a block of faces: unit normals n, from the cross product of two sides, and n . a."""
         a, b, c = (mesh.vertices[mesh.triangles[block, i]].T.astype(np.float64) for i in range(3))
         b -= a
         c -= a
@@ -62,7 +63,9 @@ class FacePlanes:
         self.planes[block, 3] = np.einsum("ij,ij->j", normal, a)
 
     def intersect(self, faces: Index, origins: Float, directions: Float) -> tuple[Float, Float]:
-        """Return rays' ranges (m) to the planes of ``faces``, and n . d, the signed cosine of incidence.
+        """Return the ranges (m) at which rays meet the planes of faces, and the cosines n . d at which they do.
+
+        A ray o + t d meets the plane n . x = c at t = (c - n . o) / (n . d).
 
         Args:
             faces: (...); where negative the result has no meaning.
@@ -75,20 +78,25 @@ class FacePlanes:
         """
         # Clipped, indices needn't be checked one by one before.
         plane, product = np.take(self.planes, faces, axis=0, mode="clip"), np.empty(faces.shape)
-        height = plane[..., 3].copy()
-        along = plane[..., 0] * directions[0]
-        height -= np.multiply(plane[..., 0], origins[0], out=product)
+        ranges = plane[..., 3].copy()  # c, then c - n . o, then the range
+        cosine = plane[..., 0] * directions[0]
+        ranges -= np.multiply(plane[..., 0], origins[0], out=product)
         for i in (1, 2):
-            along += np.multiply(plane[..., i], directions[i], out=product)
-            height -= np.multiply(plane[..., i], origins[i], out=product)
+            cosine += np.multiply(plane[..., i], directions[i], out=product)
+            ranges -= np.multiply(plane[..., i], origins[i], out=product)
         with np.errstate(divide="ignore", invalid="ignore"):
-            height /= along
-        return height, along
+            ranges /= cosine
+        return ranges, cosine
 
-    def normals(self, faces: Index, along: Float) -> Float:
-        """Return (3, H) unit normals of faces, turned towards rays with n . d = ``along`` (H,); of -1 any."""
+    def normals(self, faces: Index, cosine: Float) -> Float:
+        """Return the unit normals (3, H) of faces, on the side that rays came from; for the face -1 any normal.
+
+        Args:
+            faces: (H,).
+            cosine: (H,) n . d of the faces' normals and the rays that met them.
+        """
         result = np.ascontiguousarray(np.take(self.planes, faces, axis=0, mode="clip")[:, :3].T)
-        result *= np.where(along > 0.0, -1.0, 1.0)
+        result *= np.where(cosine > 0.0, -1.0, 1.0)
         return result
 
 

@@ -32,26 +32,27 @@ def check_selectors(scheme: ClassScheme, source: str) -> None:
         source: its file.
     """
     for number, selector in scheme.selectors():
-        where = f"{source}: {scheme.fine[number].name}.of"
+        field = f"{source}: {scheme.fine[number].name}.of"
         if selector.thing and selector.thing not in _TYPES:
             hint = nearest_name(selector.thing, _TYPES)
-            raise InputError(f"{where}.thing", selector.thing, f"must be one of {', '.join(_TYPES)}{hint}")
+            raise InputError(f"{field}.thing", selector.thing, f"must be one of {', '.join(_TYPES)}{hint}")
         for name in selector.where:
             fields = _TYPES[selector.thing or ""].model_fields
             if name not in fields:
                 hint = nearest_name(name, fields)
-                raise InputError(f"{where}.where", name, f"must be a field of {selector.thing}{hint}")
+                raise InputError(f"{field}.where", name, f"must be a field of {selector.thing}{hint}")
 
 
 def check_asset_classes(scheme: ClassScheme, road: RoadParameters) -> None:
     """Raise `InputError`, naming the asset, if a road's free asset has a class that the scheme lacks."""
-    known = scheme.source_ids()
+    class_names = scheme.source_ids()
     for name, item in road.of_type(Asset).items():
-        if item.class_name not in known:
-            hint = nearest_name(item.class_name, known)
-            of = f"{item.name} of {item.library}"
-            allowed = f"{of}: must be a class of the scheme {scheme.name} (cloud.classes): {', '.join(known)}{hint}"
-            raise InputError(f"objects.{name}.class_name", item.class_name, allowed)
+        if item.class_name not in class_names:
+            hint = nearest_name(item.class_name, class_names)
+            asset_title = f"{item.name} of {item.library}"
+            choices = ", ".join(class_names)
+            remedy = f"{asset_title}: must be a class of the scheme {scheme.name} (cloud.classes): {choices}{hint}"
+            raise InputError(f"objects.{name}.class_name", item.class_name, remedy)
 
 
 def classify_scene(scene: ScannedScene, scheme: ClassScheme, road: RoadParameters | None) -> ScannedScene:
@@ -103,6 +104,7 @@ class _Rule:
 
 
 def _classify(mesh: SceneMesh, rules: Iterable[_Rule]) -> SceneMesh:
+    """Return a mesh with the class of the first rule that fits each face; other faces keep theirs."""
     class_ids = mesh.class_id.copy()
     for rule in reversed(list(rules)):
         class_ids[rule.fits(mesh)] = rule.number
@@ -118,6 +120,7 @@ def _object_ids(selector: ClassSelector, road: RoadParameters | None) -> frozens
 
 
 def _means(selector: ClassSelector, item: RoadObject) -> bool:
+    """Return whether a selector matches an object: its asset, its type, and its fields' values."""
     if selector.asset is not None and not (isinstance(item, Asset) and fits_pattern(item.name, selector.asset)):
         return False
     if selector.thing is not None and not isinstance(item, _TYPES[selector.thing]):

@@ -14,9 +14,9 @@ WIDE = 20_000.0
 
 def bounds(mesh: SceneMesh) -> Float:
     """Return the smallest and the largest local coordinates (2, 3) of the triangles, m; there must be one."""
-    used = np.zeros(len(mesh.vertices), dtype=bool)
-    used[mesh.triangles.ravel()] = True
-    vertices = mesh.vertices[used]
+    is_used = np.zeros(len(mesh.vertices), dtype=bool)
+    is_used[mesh.triangles.ravel()] = True
+    vertices = mesh.vertices[is_used]
     return np.array([vertices.min(axis=0), vertices.max(axis=0)], dtype=np.float64)
 
 
@@ -26,8 +26,8 @@ def body_bounds(mesh: SceneMesh) -> Float:
     if strays is None:
         return bounds(mesh)
     vertices = mesh.vertices[np.unique(mesh.triangles)]
-    stay = strays.stay(vertices)
-    return np.array([vertices[stay].min(axis=0), vertices[stay].max(axis=0)], dtype=np.float64)
+    body_mask = strays.belongs(vertices)
+    return np.array([vertices[body_mask].min(axis=0), vertices[body_mask].max(axis=0)], dtype=np.float64)
 
 
 def strays_of(mesh: SceneMesh) -> Strays | None:
@@ -46,21 +46,21 @@ def strays_of(mesh: SceneMesh) -> Strays | None:
 def middle_line(mesh: SceneMesh) -> Float:
     """Return both ends (2, 3) of the line over the middle of the scene along the longer of x and y, local, m.
 
-    It spans the scene's extent, without what strays from it, but a metre at least, at the scene's `median_elevation`.
+    It spans the scene's extent without stray vertices, `_SHORTEST` at least, at the scene's `median_elevation`.
     """
-    low, high = body_bounds(mesh)
-    ends = np.repeat(((low + high) / 2.0)[None], 2, axis=0)
-    axis = int(np.argmax((high - low)[:2]))
-    reach = max(high[axis] - low[axis], _SHORTEST) / 2.0
-    ends[:, axis] += [-reach, reach]
+    lowest_corner, highest_corner = body_bounds(mesh)
+    ends = np.repeat(((lowest_corner + highest_corner) / 2.0)[None], 2, axis=0)
+    axis = int(np.argmax((highest_corner - lowest_corner)[:2]))
+    half_length = max(highest_corner[axis] - lowest_corner[axis], _SHORTEST) / 2.0
+    ends[:, axis] += [-half_length, half_length]
     ends[:, 2] = median_elevation(mesh)
     return ends
 
 
 def median_elevation(mesh: SceneMesh) -> float:
-    """Return the elevation (local, m) below which half of the scene's area lies, as it shows in plan.
+    """Return the elevation (local, m) below which half of the scene's area in plan lies.
 
-    A scene without any area in plan, one of walls alone, has its lowest elevation here.
+    Where the scene has no area in plan, as one of walls alone, it is the lowest elevation.
     """
     area, height = np.empty(len(mesh)), np.empty(len(mesh))
     for start in range(0, len(mesh), _BLOCK):
@@ -71,8 +71,8 @@ def median_elevation(mesh: SceneMesh) -> float:
     if not area.any():
         return float(bounds(mesh)[0, 2])
     order = np.argsort(height, kind="stable")
-    below = np.cumsum(area[order])
-    return float(height[order][np.searchsorted(below, below[-1] / 2.0)])
+    area_below = np.cumsum(area[order])
+    return float(height[order][np.searchsorted(area_below, area_below[-1] / 2.0)])
 
 
 def elevation_at(mesh: SceneMesh, x: float, y: float) -> float | None:
@@ -81,16 +81,18 @@ def elevation_at(mesh: SceneMesh, x: float, y: float) -> float | None:
     for start in range(0, len(mesh), _BLOCK):
         corners = mesh.vertices[mesh.triangles[start : start + _BLOCK]].astype(np.float64)
         a, b, c = (corners[:, i, :2] - [x, y] for i in range(3))
-        # Twice the areas that the place makes with the sides: all of one sign where it lies inside.
-        areas = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)])
-        whole = areas.sum(axis=0)
-        inside = ((areas >= 0.0).all(axis=0) | (areas <= 0.0).all(axis=0)) & (whole != 0.0)
-        if inside.any():
-            shares = areas[:, inside] / whole[inside]
-            highest = max(highest, float((shares * corners[inside, :, 2].T).sum(axis=0).max()))
+        # Barycentric coordinates: twice the areas that the place makes with the sides, by twice the triangle's area.
+        # They are all of one sign where the place lies inside.
+        side_areas = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)])
+        area = side_areas.sum(axis=0)
+        is_inside = ((side_areas >= 0.0).all(axis=0) | (side_areas <= 0.0).all(axis=0)) & (area != 0.0)
+        if is_inside.any():
+            shares = side_areas[:, is_inside] / area[is_inside]
+            elevations = (shares * corners[is_inside, :, 2].T).sum(axis=0)
+            highest = max(highest, float(elevations.max()))
     return highest if np.isfinite(highest) else None
 
 
 def _cross(a: Float, b: Float) -> Float:
-    """Return the cross products (N,) of plane vectors (N, 2 or more)."""
+    """Return the third component (N,) of the cross products of plane vectors (N, 2 or more)."""
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

@@ -44,12 +44,12 @@ class LeafGaps:
     @classmethod
     def of(cls, setting: ScannerSetting, seed: int, frame_origin: Float) -> LeafGaps:
         """Return the gaps that a scanner's beam meets in the scene of a seed."""
-        across, along = beam_radii(setting.divergence)
+        radii = beam_radii(setting.divergence)
         key = int(stream(seed, "leaf gaps").integers(0, 2**32, dtype=np.uint32))
-        return cls(math.pi * across * along, key, frame_origin)
+        return cls(math.pi * radii[0] * radii[1], key, frame_origin)
 
     def transmitted(self, surfaces: Surfaces, material: Index, place: Float, distance: Float, share: Float) -> Float:
-        """Return the share (N,) of its light that each of N rays keeps behind a face with gaps.
+        """Return the share (N,) of its light that each of N rays keeps behind a face with gaps: 0, 1/4, 1/2, 3/4 or 1.
 
         Args:
             surfaces: the materials.
@@ -58,14 +58,16 @@ class LeafGaps:
             distance: (N,) from the scanner, m.
             share: (N,) of the pulse's energy that the ray stands for, light lost on its way not counted.
         """
-        size = np.take(surfaces.gap_size, material)
+        cell_size = np.take(surfaces.gap_size, material)
+        # Hashes are even from 0 to 2^32: a cell is open with the probability of the material's transmission.
         open_below = np.take(surfaces.transmission, material) * 2.0**32
-        # As far from the ray, on average of the squares, as the places of a disc of its cross-section.
+        # The mean squared distance of the corners from the ray is that of a disc of the ray's cross-section A, in three
+        # dimensions in place of two: r^2 = 3/2 (A / pi) / 2.
         radius = np.sqrt(0.75 / math.pi * self.solid_angle * share) * distance
-        middle = (place + self.frame_origin[:, None]) / size
-        spread = radius / size
-        result = np.zeros(len(material))
+        centre = (place + self.frame_origin[:, None]) / cell_size
+        scaled_radius = radius / cell_size
+        open_corners = np.zeros(len(material))
         for corner in CORNERS:
-            cells = np.floor(middle + corner[:, None] * spread).astype(np.int64)
-            result += hash_cells(cells, self.key) < open_below
-        return result / len(CORNERS)
+            cells = np.floor(centre + corner[:, None] * scaled_radius).astype(np.int64)
+            open_corners += hash_cells(cells, self.key) < open_below
+        return open_corners / len(CORNERS)

@@ -17,9 +17,9 @@ def mesh_height_errors(
 ) -> Float:
     """Return signed height errors (N,), m, of random points of a mesh's road against the analytic surface.
 
-    Without the centimetres along which the pavement changes at once, at noses and ends of ramps: faces there go
-    slantwise from one cross-section to quite another one. And without patches and cracks, thin faces that lie on the
-    surface as paint does; the heights of points on them come from the pavement itself.
+    Two kinds of places are left out. At noses and ends of ramps the pavement changes at once, and faces go slantwise
+    from one cross-section to quite another one: that is a matter of centimetres along the road. Patches and cracks are
+    thin faces that lie on the surface as paint does; the heights of points on them come from the pavement itself.
 
     Args:
         mesh: scene mesh in local coordinates.
@@ -28,18 +28,19 @@ def mesh_height_errors(
         names: classes of the faces that belong to the analytic surface.
     """
     rng = stream(0, "mesh height errors")
-    laid_on = geometry.numbers.laid_on()
-    of_surface = np.isin(mesh.class_id, [class_id(name) for name in names]) & ~np.isin(mesh.instance_id, laid_on)
-    faces = np.flatnonzero(of_surface)
+    film_instances = geometry.numbers.laid_on()
+    of_class = np.isin(mesh.class_id, [class_id(name) for name in names])
+    faces = np.flatnonzero(of_class & ~np.isin(mesh.instance_id, film_instances))
     area = mesh.areas()[faces]
-    chosen = faces[rng.choice(len(faces), size=samples, p=area / area.sum())]
-    corners = mesh.vertices[mesh.triangles[chosen]].astype(np.float64)
+    sample_faces = faces[rng.choice(len(faces), size=samples, p=area / area.sum())]
+    corners = mesh.vertices[mesh.triangles[sample_faces]].astype(np.float64)
+    # Even in a triangle: points of the square's upper half are folded back onto the lower one.
     u, v = rng.random((2, samples))
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     points = corners[:, 0] + u[:, None] * (corners[:, 1] - corners[:, 0]) + v[:, None] * (corners[:, 2] - corners[:, 0])
     station, offset = geometry.alignment.project(points[:, :2])
-    inside = (station >= 0) & (station <= geometry.length)
-    for low, high in (step for section in geometry.sections.values() for step in section.steps()):
-        inside &= (station < low - _BESIDE_STEPS) | (station > high + _BESIDE_STEPS)
-    error = points[inside, 2] - geometry.elevation(station[inside], offset[inside])
+    keep_mask = (station >= 0) & (station <= geometry.length)
+    for step_begin, step_end in (step for section in geometry.sections.values() for step in section.steps()):
+        keep_mask &= (station < step_begin - _BESIDE_STEPS) | (station > step_end + _BESIDE_STEPS)
+    error = points[keep_mask, 2] - geometry.elevation(station[keep_mask], offset[keep_mask])
     return np.asarray(error[np.isfinite(error)])

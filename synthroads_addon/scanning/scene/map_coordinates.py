@@ -44,12 +44,12 @@ def step_at(coordinate: float) -> float:
 
 
 def rounding_warnings(mesh: SceneMesh, name: str, remedy: str = _REMEDY) -> list[str]:
-    """Return what is to be said about the rounding of a scene's coordinates; raise `InputError` if it is too coarse.
+    """Return warnings about the rounding of a scene's coordinates; raise `InputError` if it is too coarse.
 
     Args:
         mesh: the scene, its local coordinates as they were read.
         name: of its file, for messages.
-        remedy: what is said to be done where it is refused.
+        remedy: what users can do where the scene is refused.
 
     Raises:
         InputError: it lies so far from its origin that steps exceed 1 cm.
@@ -57,16 +57,17 @@ def rounding_warnings(mesh: SceneMesh, name: str, remedy: str = _REMEDY) -> list
     if not len(mesh.triangles):
         return []
     bounds = body_bounds(mesh)
-    away = float(distance_from_origin(bounds).max())
-    largest = float(np.abs(bounds).max())
-    if away > FARTHEST:
-        step = step_at(largest)
-        allowed = f"single precision, in which meshes are held, has steps of {step:g} m there: "
-        allowed += remedy
-        raise InputError(f"{name}: coordinates", [round(value) for value in bounds.mean(axis=0).tolist()], allowed)
-    if away <= _TOLD:
+    distance = float(distance_from_origin(bounds).max())
+    largest_coordinate = float(np.abs(bounds).max())
+    if distance > FARTHEST:
+        step = step_at(largest_coordinate)
+        message = f"single precision, in which meshes are held, has steps of {step:g} m there: "
+        message += remedy
+        raise InputError(f"{name}: coordinates", [round(value) for value in bounds.mean(axis=0).tolist()], message)
+    if distance <= _TOLD:
         return []
-    return [f"coordinates of up to {largest:,.0f} m are held in steps of {1000.0 * step_at(largest):.0f} mm"]
+    step_mm = 1000.0 * step_at(largest_coordinate)
+    return [f"coordinates of up to {largest_coordinate:,.0f} m are held in steps of {step_mm:.0f} mm"]
 
 
 def shift_of(bounds: Float) -> Float:
@@ -77,8 +78,8 @@ def shift_of(bounds: Float) -> Float:
 def moved_copy(path: Path, folder: Path) -> tuple[Path, Float]:
     """Return a copy of a mesh file with its vertices near the origin, and what was subtracted (3,), in the file's axes.
 
-    The file itself, and zeros, where it lies near the origin already or holds its coordinates in single precision.
-    Files beside it, which it may name, are linked into the folder.
+    Where the file lies near the origin already, or holds its coordinates in single precision, the file itself and zeros
+    are returned. Files beside it, which it may name, are linked into the folder.
 
     Args:
         path: an existing .obj, .ply or .stl; others are returned as they are.
@@ -102,7 +103,13 @@ def moved_copy(path: Path, folder: Path) -> tuple[Path, Float]:
 
 
 def to_scene_axes(shift: Float, suffix: str, up: str | None) -> Float:
-    """Return a vector (3,) of a file's axes in the scene's, z up; an .obj has y up where nothing else is said."""
+    """Return a vector (3,) of a file's axes in the axes of the scene, whose z points up.
+
+    Args:
+        shift: (3,) in the file's axes.
+        suffix: of the file; an .obj has y up where ``up`` is None, others z.
+        up: the file's axis that points up, ``y`` or ``z``.
+    """
     upward = up or ("y" if suffix == ".obj" else "z")
     return np.array([shift[0], -shift[2], shift[1]]) if upward == "y" else shift
 
@@ -116,18 +123,20 @@ class _Text:
         first, count: lines with vertices, of a PLY.
     """
 
-    def __init__(self, path: Path, word: bytes | None, first: int = 0, count: int = 0) -> None:
+    def __init__(self, path: Path, word: bytes | None, first_line: int = 0, count: int = 0) -> None:
         self._path, self._word = path, word
-        self._lines = range(first, first + count)
+        self._lines = range(first_line, first_line + count)
 
     def bounds(self) -> Float:
-        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        """Return the smallest and the largest coordinates (2, 3) of the vertices; inf and -inf without any."""
+        least_place, largest_place = np.full(3, np.inf), np.full(3, -np.inf)
         for place, _ in self._vertices():
             if place is not None:
-                low, high = np.minimum(low, place), np.maximum(high, place)
-        return np.array([low, high])
+                least_place, largest_place = np.minimum(least_place, place), np.maximum(largest_place, place)
+        return np.array([least_place, largest_place])
 
     def write(self, output: BinaryIO, shift: Float) -> None:
+        """Write the file with a vector (3,) subtracted from each vertex."""
         for place, line in self._vertices():
             if place is None:
                 output.write(line)
@@ -147,11 +156,12 @@ class _Text:
                 yield (self._numbers(words[at : at + 3], number) if is_vertex else None), line
 
     def _numbers(self, words: list[bytes], number: int) -> Float:
+        """Return the three numbers of a vertex from its words; raise `InputError` for anything else."""
         try:
             return np.array([float(word) for word in words]).reshape(3)
         except ValueError:
-            shown = b" ".join(words).decode("ascii", "replace")
-            raise InputError(f"{self._path}:{number + 1}", shown, "three numbers of a vertex are needed") from None
+            words_text = b" ".join(words).decode("ascii", "replace")
+            raise InputError(f"{self._path}:{number + 1}", words_text, "three numbers of a vertex are needed") from None
 
 
 class _Doubles:
@@ -162,29 +172,33 @@ class _Doubles:
         self._rows = np.memmap(path, np.dtype([(name, kind) for kind, name in fields]), "r", start, (count,))
 
     def bounds(self) -> Float:
+        """Return the smallest and the largest coordinates (2, 3) of the vertices."""
         columns = [self._rows[axis] for axis in "xyz"]
         return np.array([[float(column.min()) for column in columns], [float(column.max()) for column in columns]])
 
     def write(self, output: BinaryIO, shift: Float) -> None:
+        """Write the file with a vector (3,) subtracted from each vertex, and the coordinates in single precision."""
         with self._path.open("rb") as file:
-            head = file.read(self._start)
-            output.write(_DOUBLE_AXIS.sub(rb"property float \1\2", head, count=3))
-            order = str(self._rows.dtype["x"].byteorder).replace("=", "<")
-            kinds = {name: self._rows.dtype[name] for name in self._rows.dtype.names or ()}
-            single = np.zeros(
+            header = file.read(self._start)
+            output.write(_DOUBLE_AXIS.sub(rb"property float \1\2", header, count=3))
+            byte_order = str(self._rows.dtype["x"].byteorder).replace("=", "<")
+            types = {name: self._rows.dtype[name] for name in self._rows.dtype.names or ()}
+            axis_shift = dict(zip("xyz", shift.tolist(), strict=True))
+            rounded_rows = np.zeros(
                 len(self._rows),
-                [(name, f"{order}f4" if name in ("x", "y", "z") else kind) for name, kind in kinds.items()],
+                [(name, f"{byte_order}f4" if name in axis_shift else kind) for name, kind in types.items()],
             )
-            for name in kinds:
-                base = dict(zip("xyz", shift.tolist(), strict=True)).get(name)
-                single[name] = self._rows[name] if base is None else self._rows[name] - base
-            output.write(single.tobytes())
+            for name in types:
+                values = self._rows[name]
+                rounded_rows[name] = values - axis_shift[name] if name in axis_shift else values
+            output.write(rounded_rows.tobytes())
+            # What follows the vertices is copied as it is.
             file.seek(self._start + self._rows.nbytes)
             shutil.copyfileobj(file, output, _COPIED)
 
 
 def _kind_of(path: Path) -> _Text | _Doubles | None:
-    """Return how a file's vertices are read and moved; None where single precision is all that it has."""
+    """Return how a file's vertices are read and moved; None where the file holds them in single precision."""
     suffix = path.suffix.lower()
     if suffix == ".ply":
         return _ply_kind(path)
@@ -198,27 +212,33 @@ def _kind_of(path: Path) -> _Text | _Doubles | None:
 
 
 def _bytes_at(file: BinaryIO, at: int) -> bytes:
+    """Return the four bytes at an offset of a file."""
     file.seek(at)
     return file.read(4)
 
 
 def _ply_kind(path: Path) -> _Text | _Doubles | None:
+    """Return how the vertices of a PLY are read and moved; None where it holds them in single precision.
+
+    Only files whose first element are vertices that begin with x, y and z, without lists, are moved.
+    """
     with path.open("rb") as file:
-        kind, elements = read_ply_header(file)
-        start = file.tell()
+        file_format, elements = read_ply_header(file)
+        header_size = file.tell()
         file.seek(0)
-        head = file.read(start).count(b"\n")
+        header_lines = file.read(header_size).count(b"\n")
     if not elements or elements[0][0] != "vertex":
         return None
     _, count, properties = elements[0]
     names = [name for _, _, name in properties]
-    if any(length for length, _, _ in properties) or names[:3] != ["x", "y", "z"] or not count:
+    has_lists = any(length_type for length_type, _, _ in properties)
+    if has_lists or names[:3] != ["x", "y", "z"] or not count:
         return None
-    if kind == "ascii":
-        return _Text(path, None, head, count)
-    order = "<" if kind == "binary_little_endian" else ">"
-    fields = [(order + code, name) for _, code, name in properties]
-    return _Doubles(path, start, count, fields) if fields[0][0].endswith("f8") else None
+    if file_format == "ascii":
+        return _Text(path, None, header_lines, count)
+    byte_order = "<" if file_format == "binary_little_endian" else ">"
+    fields = [(byte_order + value_type, name) for _, value_type, name in properties]
+    return _Doubles(path, header_size, count, fields) if fields[0][0].endswith("f8") else None
 
 
 def _link_neighbours(path: Path, folder: Path) -> None:

@@ -52,17 +52,17 @@ class SceneMesh:
     unit: float = 1.0
 
     def __post_init__(self) -> None:
+        """Raise `InputError` for a field of another type or shape, of another length, or with impossible values."""
         for name, (dtype, shape) in _SHAPES.items():
             array = np.asarray(getattr(self, name))
             fits = array.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
             if not fits or array.dtype != dtype:
-                allowed = f"must be {np.dtype(dtype)} of shape {shape} with None for any length"
-                raise InputError(f"scene mesh: {name}", f"{array.dtype} {array.shape}", allowed)
+                requirement = f"must be {np.dtype(dtype)} of shape {shape} with None for any length"
+                raise InputError(f"scene mesh: {name}", f"{array.dtype} {array.shape}", requirement)
         for name in ("class_id", "instance_id", "material"):
             if len(getattr(self, name)) != len(self.triangles):
-                raise InputError(
-                    f"scene mesh: {name}", len(getattr(self, name)), f"must have {len(self.triangles)} values"
-                )
+                requirement = f"must have {len(self.triangles)} values, one for each triangle"
+                raise InputError(f"scene mesh: {name}", len(getattr(self, name)), requirement)
         for name in ("vertices", "origin"):
             if not np.isfinite(getattr(self, name)).all():
                 raise InputError(f"scene mesh: {name}", None, "must be finite numbers")
@@ -72,15 +72,27 @@ class SceneMesh:
 
     def _check_extent(self) -> None:
         """Raise `InputError` if a vertex lies beyond any map, as in a wrong unit or astray."""
-        if self.vertices.size and (worst := float(max(self.vertices.max(), -self.vertices.min()))) > FARTHEST:
-            allowed = f"must lie within {FARTHEST:g} m of the scene's origin: is its unit another, or a vertex astray?"
-            raise InputError("scene mesh: vertices", worst, allowed)
+        if (
+            self.vertices.size
+            and (farthest_coordinate := float(max(self.vertices.max(), -self.vertices.min()))) > FARTHEST
+        ):
+            requirement = (
+                f"must lie within {FARTHEST:g} m of the scene's origin: is its unit another, or a vertex astray?"
+            )
+            raise InputError("scene mesh: vertices", farthest_coordinate, requirement)
 
     def _check_indices(self, name: str, count: int, target: str) -> None:
+        """Raise `InputError` unless the indices in the named field are 0 to ``count`` - 1.
+
+        Args:
+            name: of the field.
+            count: of the things that it indexes.
+            target: these things, in words.
+        """
         array = getattr(self, name)
         if array.size and (array.min() < 0 or array.max() >= count):
-            worst = int(array.min() if array.min() < 0 else array.max())
-            raise InputError(f"scene mesh: {name}", worst, f"must index one of {count} {target}")
+            wrong_index = int(array.min() if array.min() < 0 else array.max())
+            raise InputError(f"scene mesh: {name}", wrong_index, f"must index one of {count} {target}")
 
     def __len__(self) -> int:
         """Return the number of triangles."""
@@ -89,7 +101,8 @@ class SceneMesh:
     @property
     def nbytes(self) -> int:
         """Return the size of all arrays, bytes."""
-        return sum(value.nbytes for f in fields(self) if hasattr(value := getattr(self, f.name), "nbytes"))
+        values = (getattr(self, field.name) for field in fields(self))
+        return sum(value.nbytes for value in values if hasattr(value, "nbytes"))
 
     def vertex_bounds(self) -> Float | None:
         """Return the smallest and the largest local coordinates (2, 3) of the vertices, m; None without any."""

@@ -60,7 +60,7 @@ def check_mesh_file(path: Path, also_from: Sequence[Path] = (), remedy: str = RE
     Args:
         path: a .ply, .stl, .obj, .glb or .gltf that exists; files of other kinds aren't looked into.
         also_from: further folders in which files that it names may lie.
-        remedy: what is said to be done where it names one that lies elsewhere.
+        remedy: what users can do where it names a file that lies elsewhere, for the message.
 
     Raises:
         InputError: it is damaged, or its address of a part leaves its folder or names no regular file.
@@ -78,17 +78,17 @@ def check_mesh_file(path: Path, also_from: Sequence[Path] = (), remedy: str = RE
 
 
 def refuse_outside(path: Path, address: str, folders: Sequence[Path], remedy: str) -> None:
-    """Raise `InputError` if something is at an address that a file names, and lies in none of some folders.
+    """Raise `InputError` if there is something at an address that a file names, and it lies in none of some folders.
 
     Args:
         path: the file; relative addresses count from its folder.
         address: as it stands in the file.
         folders: from which may be read, links resolved.
-        remedy: what is said to be done.
+        remedy: what users can do about it, for the message.
     """
     if not file_in_one_of(folders, address, path.parent):
-        shown = address if len(address) < _SHOWN else f"{address[:_SHOWN]}..."
-        raise InputError(str(path), shown, f"{STAY}: {remedy}")
+        address_text = address if len(address) < _SHOWN else f"{address[:_SHOWN]}..."
+        raise InputError(str(path), address_text, f"{STAY}: {remedy}")
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,14 @@ class _Reach:
     folders: tuple[Path, ...]
     remedy: str
 
-    def refuse(self, address: str, beside: Path | None = None) -> None:
-        refuse_outside(beside or self.path, address, self.folders, self.remedy)
+    def refuse(self, address: str, source: Path | None = None) -> None:
+        """Raise `InputError` if something is at an address that lies outside of the folders.
+
+        Args:
+            address: as it stands in a file.
+            source: that file; None: the file itself.
+        """
+        refuse_outside(source or self.path, address, self.folders, self.remedy)
 
 
 # --- STL ------------------------------------------------------------------------------------------------------------
@@ -121,6 +127,7 @@ def _check_stl(path: Path, _: _Reach) -> None:
 
 
 def _check_ply(path: Path, _: _Reach) -> None:
+    """Raise ValueError if a PLY ends too early, or a face of it names a vertex that it doesn't have."""
     with path.open("rb") as file:
         kind, elements = read_ply_header(file)
         rows = _ply_text(file, elements) if kind == "ascii" else _ply_bytes(path, file, kind, elements)
@@ -161,8 +168,8 @@ def _ply_text(file: BinaryIO, elements: list[tuple[str, int, list[_Property]]]) 
             if not words:
                 raise ValueError("it ends before its elements do")
             if name == "face":
-                at = next(place for place, (length, _, _) in enumerate(properties) if length)
-                yield np.array(words[at + 1 : at + 1 + int(words[at])], dtype=np.int64)
+                list_position = next(position for position, (length, _, _) in enumerate(properties) if length)
+                yield np.array(words[list_position + 1 : list_position + 1 + int(words[list_position])], dtype=np.int64)
 
 
 def _ply_bytes(
@@ -170,44 +177,58 @@ def _ply_bytes(
 ) -> Iterator[AnyArray]:
     """Yield the vertex indices of a binary PLY's faces, as one array for each run of faces of equal size."""
     order = {"binary_little_endian": "<", "binary_big_endian": ">"}[kind]
-    data, at = np.memmap(path, np.uint8, "r"), file.tell()
+    data, offset = np.memmap(path, np.uint8, "r"), file.tell()
     for name, count, properties in elements:
-        lists = [place for place, (length, _, _) in enumerate(properties) if length]
+        lists = [position for position, (length, _, _) in enumerate(properties) if length]
         if count < 0 or (len(lists) > 1 and name == "face"):
             raise ValueError(f"its element {name} isn't understood")
         if not lists:
-            at += count * sum(np.dtype(kind).itemsize for _, kind, _ in properties)
+            offset += count * sum(np.dtype(kind).itemsize for _, kind, _ in properties)
         else:
-            ordered = [(length and order + length, order + kind, name) for length, kind, name in properties]
-            for numbers, end in _ply_lists(data, at, count, ordered):
-                at = end
+            ordered_properties = [(length and order + length, order + kind, name) for length, kind, name in properties]
+            for numbers, end_offset in _ply_lists(data, offset, count, ordered_properties):
+                offset = end_offset
                 if name == "face":
                     yield numbers
-        if at > len(data):
+        if offset > len(data):
             raise ValueError("it ends before its elements do")
 
 
-def _ply_lists(data: UInt8, at: int, count: int, properties: list[_Property]) -> Iterator[tuple[AnyArray, int]]:
-    """Yield runs of an element's lists of equal length (n, length), and the byte offset at which each run ends."""
-    place = next(place for place, (length, _, _) in enumerate(properties) if length)
-    before = sum(np.dtype(kind).itemsize for _, kind, _ in properties[:place])
-    after = sum(np.dtype(kind).itemsize for _, kind, _ in properties[place + 1 :])
-    length, values = np.dtype(properties[place][0]), np.dtype(properties[place][1])
-    most = _FEW
+def _ply_lists(data: UInt8, offset: int, count: int, properties: list[_Property]) -> Iterator[tuple[AnyArray, int]]:
+    """Yield runs of an element's lists of equal length (n, length), and the byte offset at which each run ends.
+
+    Args:
+        data: bytes of the file.
+        offset: at which the element begins.
+        count: rows of the element.
+        properties: of a row, one of which is a list.
+    """
+    list_position = next(position for position, (length, _, _) in enumerate(properties) if length)
+    bytes_before = sum(np.dtype(kind).itemsize for _, kind, _ in properties[:list_position])
+    bytes_after = sum(np.dtype(kind).itemsize for _, kind, _ in properties[list_position + 1 :])
+    length_type, value_type = np.dtype(properties[list_position][0]), np.dtype(properties[list_position][1])
+    # Rows are read as if all had lists as long as the next one's: few at first, the more the longer that holds.
+    row_limit = _FEW
     while count:
-        first = int(np.frombuffer(data[at + before : at + before + length.itemsize], length)[0])
-        entry = np.dtype(
-            [("before", np.uint8, before), ("length", length), ("values", values, (first,)), ("after", np.uint8, after)]
+        length_bytes = data[offset + bytes_before : offset + bytes_before + length_type.itemsize]
+        list_length = int(np.frombuffer(length_bytes, length_type)[0])
+        row_type = np.dtype(
+            [
+                ("before", np.uint8, bytes_before),
+                ("length", length_type),
+                ("values", value_type, (list_length,)),
+                ("after", np.uint8, bytes_after),
+            ]
         )
-        room = min(count, most, (len(data) - at) // entry.itemsize)
-        if room == 0:
+        row_count = min(count, row_limit, (len(data) - offset) // row_type.itemsize)
+        if row_count == 0:
             raise ValueError("it ends before its elements do")
-        rows = np.frombuffer(data[at : at + room * entry.itemsize], entry)
-        others = np.flatnonzero(rows["length"] != first)
-        same = int(others[0]) if len(others) else room
-        most = 2 * most if same == room else _FEW
-        at, count = at + same * entry.itemsize, count - same
-        yield rows["values"][:same], at
+        rows = np.frombuffer(data[offset : offset + row_count * row_type.itemsize], row_type)
+        other_rows = np.flatnonzero(rows["length"] != list_length)
+        run_length = int(other_rows[0]) if len(other_rows) else row_count
+        row_limit = 2 * row_limit if run_length == row_count else _FEW
+        offset, count = offset + run_length * row_type.itemsize, count - run_length
+        yield rows["values"][:run_length], offset
 
 
 # --- OBJ ------------------------------------------------------------------------------------------------------------
@@ -216,12 +237,12 @@ def _ply_lists(data: UInt8, at: int, count: int, properties: list[_Property]) ->
 def material_libraries(path: Path) -> Iterator[str]:
     """Yield the names of an .obj's material libraries, of the whole file, which may be large."""
     with path.open("rb") as file:
-        rest = b"\n"
+        remainder = b"\n"
         while block := file.read(_BLOCK):
-            text, _, rest = (rest + block).rpartition(b"\n")
+            text, _, remainder = (remainder + block).rpartition(b"\n")
             yield from _libraries_in(text)
-            rest = b"\n" + rest
-        yield from _libraries_in(rest)
+            remainder = b"\n" + remainder
+        yield from _libraries_in(remainder)
 
 
 def _libraries_in(text: bytes) -> Iterator[str]:
@@ -239,16 +260,16 @@ def _check_obj(path: Path, reach: _Reach) -> None:
         if not library.is_file():
             continue
         for line in library.read_text(encoding="utf-8", errors="replace").splitlines():
-            statement, _, rest = line.strip().partition(" ")
+            statement, _, arguments = line.strip().partition(" ")
             if statement.lower().startswith(_PICTURES):
-                for address in _addresses(rest):
+                for address in _addresses(arguments):
                     reach.refuse(address, library)
 
 
-def _addresses(rest: str) -> Iterator[str]:
-    """Yield what may be the address in a material's line about a picture: all of it, and it without its options."""
-    words = rest.split()
-    yield rest.strip().strip('"')
+def _addresses(statement: str) -> Iterator[str]:
+    """Yield what may be the address in a material's line about a picture: all of it, then it without options."""
+    words = statement.split()
+    yield statement.strip().strip('"')
     while words and words[0].startswith("-"):
         count = _OPTIONS.get(words[0].lower(), 1)
         words = words[1:]
@@ -261,6 +282,7 @@ def _addresses(rest: str) -> Iterator[str]:
 
 
 def _check_glb(path: Path, reach: _Reach) -> None:
+    """Raise an error if a binary glTF is shorter than it says, or its content can't be read: see `_check_content`."""
     size = path.stat().st_size
     with path.open("rb") as file:
         magic, _, length, chunk, kind = struct.unpack("<5I", file.read(20))
@@ -273,6 +295,7 @@ def _check_glb(path: Path, reach: _Reach) -> None:
 
 
 def _check_gltf(path: Path, reach: _Reach) -> None:
+    """Raise an error if the content of a glTF can't be read: see `_check_content`."""
     _check_content(reach, json.loads(path.read_bytes()), 0)
 
 
@@ -285,9 +308,14 @@ def _check_content(reach: _Reach, content: dict[str, Any], binary: int) -> None:
         binary: bytes of the file's own buffer.
     """
     for number, buffer in enumerate(content.get("buffers", [])):
-        there = _part_size(reach, buffer["uri"]) if "uri" in buffer else binary if number == 0 else None
-        if there is not None and buffer["byteLength"] > there:
-            raise ValueError(f"its buffer has {there:,} bytes of {buffer['byteLength']:,}")
+        if "uri" in buffer:
+            available_bytes = _part_size(reach, buffer["uri"])
+        elif number == 0:  # only the first buffer may be the file's own
+            available_bytes = binary
+        else:
+            continue
+        if buffer["byteLength"] > available_bytes:
+            raise ValueError(f"its buffer has {available_bytes:,} bytes of {buffer['byteLength']:,}")
     for image in content.get("images", []):
         if "uri" in image:
             _part_size(reach, image["uri"], optional=True)
@@ -303,16 +331,16 @@ def _part_size(reach: _Reach, address: str, optional: bool = False) -> int:
     """
     if address[:5].lower() == "data:":
         return 3 * len(address.partition(",")[2]) // 4
-    shown = address if len(address) < _SHOWN else f"{address[:_SHOWN]}..."
+    address_text = address if len(address) < _SHOWN else f"{address[:_SHOWN]}..."
     name = unquote(address).replace("\\", "/")
     folders = [Path(os.path.realpath(folder)) for folder in reach.folders]
     place = Path(os.path.realpath(folders[0] / name))
     if _SCHEME.match(name) or name.startswith("//") or not any(place.is_relative_to(folder) for folder in folders):
-        raise InputError(str(reach.path), shown, f"{STAY}: {reach.remedy}")
+        raise InputError(str(reach.path), address_text, f"{STAY}: {reach.remedy}")
     if not place.exists() and optional:
         return 0
     if not place.is_file():
-        raise InputError(str(reach.path), shown, "a regular file is needed at this address")
+        raise InputError(str(reach.path), address_text, "a regular file is needed at this address")
     return place.stat().st_size
 
 
@@ -329,15 +357,15 @@ def _check_views(content: dict[str, Any]) -> None:
         else:
             view = views[accessor["bufferView"]]
             step = max(view.get("byteStride", 0), width)
-            last = accessor.get("byteOffset", 0) + step * (accessor["count"] - 1) + width
-            fits = accessor["count"] > 0 and last <= view["byteLength"]
+            end_byte = accessor.get("byteOffset", 0) + step * (accessor["count"] - 1) + width
+            fits = accessor["count"] > 0 and end_byte <= view["byteLength"]
         if not fits:
             raise ValueError(f"an accessor claims {accessor['count']:,} values")
 
 
 def _check_nodes(nodes: list[dict[str, Any]]) -> None:
     """Raise ValueError if a glTF's nodes form cycles, have several parents, or are nested too deeply."""
-    parents = {}
+    parents: dict[int, int] = {}
     for number, node in enumerate(nodes):
         for child in node.get("children", []):
             if child in parents or not 0 <= child < len(nodes):
@@ -345,12 +373,14 @@ def _check_nodes(nodes: list[dict[str, Any]]) -> None:
             parents[child] = number
     depths: dict[int, int] = {}
     for number in range(len(nodes)):
-        way = [number]
-        while way[-1] in parents and way[-1] not in depths:
-            if len(way) > len(nodes):
+        # From a node up to the root, or to the first ancestor whose depth is known already.
+        lineage = [number]
+        while lineage[-1] in parents and lineage[-1] not in depths:
+            if len(lineage) > len(nodes):
                 raise ValueError(f"node {number} lies below itself")
-            way.append(parents[way[-1]])
-        for below, passed in enumerate(reversed(way)):
-            depths[passed] = depths.get(way[-1], 0) + below
+            lineage.append(parents[lineage[-1]])
+        top_depth = depths.get(lineage[-1], 0)
+        for levels_down, ancestor in enumerate(reversed(lineage)):
+            depths[ancestor] = top_depth + levels_down
         if depths[number] > _DEEPEST:
             raise ValueError(f"its nodes lie more than {_DEEPEST} deep")

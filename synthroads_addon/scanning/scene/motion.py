@@ -99,21 +99,21 @@ class ShiftedMotion:
     """A motion expressed in a local frame with another origin; see `BodyMotion`.
 
     Attributes:
-        whole: the motion in the road's local frame.
+        motion: in the road's local frame.
         origin: (3,) where the frame begins in the road's, m.
     """
 
-    whole: BodyMotion
+    motion: BodyMotion
     origin: Float
 
     def pose(self, time: Float) -> Pose:
         """Return rotations (K, 3, 3), positions (K, 3) in this frame, m, and presence (K,), at times (K,), s."""
-        rotation, place, present = self.whole.pose(time)
+        rotation, place, present = self.motion.pose(time)
         return rotation, place - self.origin, present
 
     def passes(self, time: Float) -> Int:
         """Return how many times (K,) the body has left and come in again before times (K,), s."""
-        return self.whole.passes(time)
+        return self.motion.passes(time)
 
 
 class LaneMotion:
@@ -179,21 +179,21 @@ class LaneMotion:
         return self._way.passes(np.asarray(time, dtype=np.float64) * self.speed_factor)
 
     def from_elsewhere(self, place: Float) -> LaneMotion:
-        """Return the same vehicle's motion if at time 0 it is beside a place (3,) of the local frame, m."""
+        """Return the motion of the same vehicle if at time 0 it were beside a place (3,) of the local frame, m."""
         plan = (place + self._origin)[None, :2]
         station = float(np.clip(self._alignment.project(plan)[0][0], 0.0, self._alignment.length))
         vehicle = self.vehicle.model_copy(update={"station": station})
-        moved = LaneMotion(self.line.geometry, vehicle, self.speed_factor, origin=self._origin, line=self.line)
-        if self._way is not None and moved._way is not None and (moved._low, moved._high) == (self._low, self._high):
-            moved._way = self._way.from_elsewhere(moved._way.start)
-        return moved
+        motion = LaneMotion(self.line.geometry, vehicle, self.speed_factor, origin=self._origin, line=self.line)
+        if self._way is not None and motion._way is not None and (motion._low, motion._high) == (self._low, self._high):
+            motion._way = self._way.from_elsewhere(motion._way.start)
+        return motion
 
     def _place(self, time: Float) -> tuple[Float, Bool]:
         """Return the vehicle's stations (K,), m, and whether (K,) it is on the road, at times (K,), s."""
         if self._way is None or self.speed_factor == 0.0:
             return np.full(time.shape, self.vehicle.station), np.ones(time.shape, dtype=bool)
-        along, present = self._way.at(time * self.speed_factor)
-        station = self.line.station(self._low + along if self._traffic > 0 else self._high - along)
+        distance, present = self._way.at(time * self.speed_factor)
+        station = self.line.station(self._low + distance if self._traffic > 0 else self._high - distance)
         # The way there and back through distances leaves a nanometre: at the time 0 it is where it was put.
         return np.where(time == 0.0, self.vehicle.station, station), present
 
@@ -238,11 +238,11 @@ def checked_factor(speed_factor: float) -> float:
 
 def _passes_in_lane(vehicles: list[Vehicle], line: LaneLine) -> list[VehiclePasses]:
     """Return the passes of vehicles that share one open range of a lane, in their order."""
-    low, high = line.distance(np.array(line.range_at(vehicles[0].station))).tolist()
+    lane_begin, lane_end = line.distance(np.array(line.range_at(vehicles[0].station))).tolist()
     middle = line.distance(np.array([vehicle.station for vehicle in vehicles]))
-    start = middle - low if line.carriageway.traffic > 0 else high - middle
+    start = middle - lane_begin if line.carriageway.traffic > 0 else lane_end - middle
     lengths = [VEHICLE_TYPES[vehicle.model].length for vehicle in vehicles]
-    return lane_passes(start.tolist(), [vehicle.speed for vehicle in vehicles], lengths, high - low)
+    return lane_passes(start.tolist(), [vehicle.speed for vehicle in vehicles], lengths, lane_end - lane_begin)
 
 
 @dataclass(frozen=True)
@@ -252,15 +252,15 @@ class VehiclePasses:
     Attributes:
         start: distance of its middle from the lane's beginning, in the direction of traffic, at the time 0, m.
         speed: m/s, > 0.
-        whole: length of the lane, m.
+        lane_length: m.
         length: of the vehicle, m.
         entry: when its middle comes in for the first time, s; after it has left.
-        period: s from one entry to the next, at least ``whole / speed``.
+        period: s from one entry to the next, at least ``lane_length / speed``.
     """
 
     start: float
     speed: float
-    whole: float
+    lane_length: float
     length: float
     entry: float
     period: float
@@ -268,32 +268,34 @@ class VehiclePasses:
     @property
     def leave(self) -> float:
         """Return the time, s, at which the vehicle's middle first reaches the lane's end."""
-        return max(0.0, (self.whole - self.start) / self.speed)
+        return max(0.0, (self.lane_length - self.start) / self.speed)
 
     def at(self, time: Float) -> tuple[Float, Bool]:
         """Return the vehicle's distances (K,) along the lane, m, and whether (K,) it is there, at times (K,), s.
 
-        Where it waits to come in again it is at the lane's end.
+        While it waits to come in again its distance is that of the lane's end.
         """
-        since = np.mod(time - self.entry, self.period)
-        again = np.where(time < self.entry, self.whole, np.minimum(since * self.speed, self.whole))
-        distance = np.where(time <= self.leave, self.start + self.speed * time, again)
-        half = self.length / 2.0 - OVERHANG
-        return distance, (distance >= half) & (distance <= self.whole - half)
+        time_since_entry = np.mod(time - self.entry, self.period)
+        distance_again = np.where(
+            time < self.entry, self.lane_length, np.minimum(time_since_entry * self.speed, self.lane_length)
+        )
+        distance = np.where(time <= self.leave, self.start + self.speed * time, distance_again)
+        inset = self.length / 2.0 - OVERHANG
+        return distance, (distance >= inset) & (distance <= self.lane_length - inset)
 
     def passes(self, time: Float) -> Int:
         """Return the number (K,) of the pass that the vehicle is on at times (K,), s; 0 is that at time 0."""
-        again = 1 + np.floor_divide(time - self.entry, self.period)
-        return np.where(time <= self.leave, 0, np.maximum(again, 0)).astype(np.int64)
+        pass_number = 1 + np.floor_divide(time - self.entry, self.period)
+        return np.where(time <= self.leave, 0, np.maximum(pass_number, 0)).astype(np.int64)
 
     def from_elsewhere(self, start: float) -> VehiclePasses:
-        """Return the passes if it is at ``start`` (m) at time 0; its entry is delayed as its leaving is."""
-        moved = replace(self, start=start)
-        return replace(moved, entry=self.entry + max(0.0, moved.leave - self.leave))
+        """Return the passes of the vehicle if it were at ``start`` (m) at time 0, delayed as its leaving is."""
+        passes = replace(self, start=start)
+        return replace(passes, entry=self.entry + max(0.0, passes.leave - self.leave))
 
 
 def lane_passes(
-    start: Sequence[float], speed: Sequence[float], length: Sequence[float], whole: float
+    start: Sequence[float], speed: Sequence[float], length: Sequence[float], lane_length: float
 ) -> list[VehiclePasses]:
     """Return the passes of all vehicles of one lane, in their order, timed so that none overtakes another.
 
@@ -305,23 +307,26 @@ def lane_passes(
         start: (N,) distances of their middles from the lane's beginning, in the direction of traffic, at time 0, m.
         speed: (N,) m/s, > 0.
         length: (N,) m.
-        whole: length of the lane, m.
+        lane_length: length of the lane, m.
     """
-    order = sorted(range(len(start)), key=lambda i: -start[i])
-    leave = [max(0.0, (whole - x) / v) for x, v in zip(start, speed, strict=True)]
+    order = sorted(range(len(start)), key=lambda i: -start[i])  # the one that leaves first comes first
+    leave_time = [max(0.0, (lane_length - x) / v) for x, v in zip(start, speed, strict=True)]
 
-    def behind(ahead: int, entry: float, follower: int) -> float:
-        """Return the time, s, at which the follower may come in behind one whose middle came in at ``entry``."""
-        gap = (length[ahead] + length[follower]) / 2.0 + VEHICLE_GAP
-        at_end = whole / speed[ahead] - (whole - gap) / speed[follower]
-        return entry + max(gap / speed[ahead], at_end)
+    def entry_behind(leader: int, leader_entry: float, follower: int) -> float:
+        """Return the time, s, at which the follower may come in behind one whose middle came in at ``leader_entry``."""
+        gap = (length[leader] + length[follower]) / 2.0 + VEHICLE_GAP
+        # Of a faster follower the gap shrinks up to the lane's end, of a slower one it is least at the beginning.
+        least_delay = lane_length / speed[leader] - (lane_length - gap) / speed[follower]
+        return leader_entry + max(gap / speed[leader], least_delay)
 
     entry = [0.0] * len(start)
-    ahead, came_in = order[-1], -start[order[-1]] / speed[order[-1]]
+    # At time 0 the last one of the lane is on its way: its middle came in before that.
+    leader, entry_time = order[-1], -start[order[-1]] / speed[order[-1]]
     for number in order:
-        entry[number] = came_in = max(leave[number], behind(ahead, came_in, number))
-        ahead = number
-    once = behind(order[-1], came_in, order[0]) - entry[order[0]]
-    period = max(once, *(whole / v for v in speed))
+        entry[number] = entry_time = max(leave_time[number], entry_behind(leader, entry_time, number))
+        leader = number
+    # The first one may come in for the second time behind the last one.
+    period = entry_behind(order[-1], entry_time, order[0]) - entry[order[0]]
+    period = max(period, *(lane_length / v for v in speed))
     rows = zip(start, speed, length, entry, strict=True)
-    return [VehiclePasses(x, v, whole, size, when, period) for x, v, size, when in rows]
+    return [VehiclePasses(x, v, lane_length, size, entry_time, period) for x, v, size, entry_time in rows]

@@ -39,19 +39,22 @@ class Outline:
         self._caster = make_caster(_box_mesh(*_boxes(mesh, margin), mesh.origin))
 
     def passed_by(self, origins: Float, directions: Float, reach: float) -> Bool:
-        """Return a mask (N,) of the beams that surely pass by all of the scene; of few it isn't told.
+        """Return a mask (N,) of the beams that surely pass by all of the scene.
+
+        Where few beams of a sample do, the others aren't cast and the mask is False for all.
 
         Args:
             origins: (3, N) where they begin, local, m.
             directions: (3, N) unit vectors of their axes.
             reach: how far they go, m.
         """
-        few = self._free(origins[:, ::_PROBED], directions[:, ::_PROBED], reach)
-        if np.count_nonzero(few) <= _WORTH_ASKING * len(few):
+        probe_passes = self._free(origins[:, ::_PROBED], directions[:, ::_PROBED], reach)
+        if np.count_nonzero(probe_passes) <= _WORTH_ASKING * len(probe_passes):
             return np.zeros(origins.shape[1], bool)
         return self._free(origins, directions, reach)
 
     def _free(self, origins: Float, directions: Float, reach: float) -> Bool:
+        """Return a mask (N,) of the rays (3, N) that meet none of the boxes within their reach (m)."""
         return ~self._caster.occluded(as_rows(origins), as_rows(directions), reach)
 
 
@@ -61,36 +64,40 @@ def _boxes(mesh: SceneMesh, margin: float) -> tuple[Float, Float]:
     assert bounds is not None
     size = bounds[1] - bounds[0]
     cell = max(_CELL, float((size[0] * size[1] / _MOST_CELLS) ** 0.5), float(size[:2].max()) / _MOST_CELLS)
+    # Both grids keep largest values: the one of heights, the other of heights with the opposite sign.
     tops, bottoms = (PlanGrids(size[:2], cell, np.float32, -np.inf) for _ in range(2))
-    corner = bounds[0, :2].astype(np.float32)[:, None]
+    origin = bounds[0, :2].astype(np.float32)[:, None]
     for start in range(0, len(mesh.triangles), _AT_ONCE):
-        low, high = extremes(mesh.vertices.T[:, mesh.triangles[start : start + _AT_ONCE].T])
-        begin, end = low[:2] - corner, high[:2] - corner
-        level = np.searchsorted(2.0 * tops.cells[:-1], (end - begin).max(axis=0))
-        for number in np.unique(level).tolist():
-            mine = np.flatnonzero(level == number)
-            tops.draw(number, begin[:, mine], end[:, mine], high[2, mine])
-            bottoms.draw(number, begin[:, mine], end[:, mine], -low[2, mine])
-    highest, lowest = tops.spread(), bottoms.spread()
-    cells = np.array(np.nonzero(highest > -np.inf))
+        lowest_places, highest_places = extremes(mesh.vertices.T[:, mesh.triangles[start : start + _AT_ONCE].T])
+        begin, end = lowest_places[:2] - origin, highest_places[:2] - origin
+        triangle_levels = np.searchsorted(2.0 * tops.cells[:-1], (end - begin).max(axis=0))
+        for level in np.unique(triangle_levels).tolist():
+            rows = np.flatnonzero(triangle_levels == level)
+            tops.draw(level, begin[:, rows], end[:, rows], highest_places[2, rows])
+            bottoms.draw(level, begin[:, rows], end[:, rows], -lowest_places[2, rows])
+    top_heights, negative_bottom = tops.spread(), bottoms.spread()
+    cells = np.array(np.nonzero(top_heights > -np.inf))
     margin += _ROUNDING * float(np.abs(bounds).max() + size.max())
-    beside = bounds[0, :2, None] + cell * cells
-    first = np.array([*(beside - margin), -lowest[*cells] - margin], np.float64)
-    last = np.array([*(beside + cell + margin), highest[*cells] + margin], np.float64)
-    return first, last
+    cell_begin = bounds[0, :2, None] + cell * cells
+    lowest_corners = np.array([*(cell_begin - margin), -negative_bottom[*cells] - margin], np.float64)
+    highest_corners = np.array([*(cell_begin + cell + margin), top_heights[*cells] + margin], np.float64)
+    return lowest_corners, highest_corners
 
 
-def _box_mesh(low: Float, high: Float, origin: Float) -> SceneMesh:
+def _box_mesh(lowest_corners: Float, highest_corners: Float, origin: Float) -> SceneMesh:
     """Return boxes between corners (3, B), m, as a mesh of unlabelled triangles."""
-    numbers: Index = np.arange(8)
-    corners: list[Float32] = [
-        np.where(numbers[:, None] & bit, high[axis], low[axis]).astype(np.float32) for axis, bit in enumerate((4, 2, 1))
+    corner_numbers: Index = np.arange(8)
+    # (8, B) of each coordinate: which of both corners it is taken from, a bit of the corner's number tells.
+    coordinates: list[Float32] = [
+        np.where(corner_numbers[:, None] & bit, highest_corners[axis], lowest_corners[axis]).astype(np.float32)
+        for axis, bit in enumerate((4, 2, 1))
     ]
-    boxes = low.shape[1]
+    boxes = lowest_corners.shape[1]
+    # The vertices are ordered by corner, then by box.
     triangles = (np.array(_SIDES, np.int32)[:, :, None] * boxes + np.arange(boxes, dtype=np.int32)).transpose(2, 0, 1)
     count = boxes * len(_SIDES)
     return SceneMesh(
-        vertices=np.stack(corners, axis=-1).reshape(-1, 3),
+        vertices=np.stack(coordinates, axis=-1).reshape(-1, 3),
         triangles=np.ascontiguousarray(triangles.reshape(-1, 3)),
         class_id=np.zeros(count, np.uint8),
         instance_id=np.zeros(count, np.uint32),

@@ -40,23 +40,31 @@ class SunColumns:
         self._made: _Columns | None = None
 
     def clear(self, places: Float, direction: Float) -> Bool | None:
-        """Return a mask of places (3, N) that surely nothing shades from this direction (3,); None where none is told.
+        """Return a mask (N,) of the places (3, N), m, that surely nothing shades from a direction (3,), a unit vector.
 
-        Only of the direction that is asked for first anything is told, and only where compiled loops are in use.
+        None where the columns can't tell: for directions other than the first one, without compiled loops, and until as
+        many places have been asked about as there are faces.
         """
         loops = point_loops()
-        if loops is None or not len(self._mesh) or (made := self._columns(loops, places.shape[1], direction)) is None:
+        if loops is None or not len(self._mesh):
             return None
-        if not np.array_equal(made.grid.direction, direction):
+        columns = self._columns(loops, places.shape[1], direction)
+        if columns is None or not np.array_equal(columns.grid.direction, direction):
             return None
-        return loops.clear_places(places, self._faces, made.grid, made.listed)
+        return loops.clear_places(places, self._faces, columns.grid, columns.listed)
 
-    def _columns(self, loops: PointLoops, asked: int, direction: Float) -> _Columns | None:
-        """Return the columns; None while another thread makes them, or too few places have been asked about."""
+    def _columns(self, loops: PointLoops, place_count: int, direction: Float) -> _Columns | None:
+        """Return the columns; None while another thread makes them, or too few places have been asked about.
+
+        Args:
+            loops: that make them.
+            place_count: places that are asked about now.
+            direction: (3,) unit vector towards the sun.
+        """
         if self._made is not None or not self._making.acquire(blocking=False):
             return self._made
         try:
-            self._asked += asked
+            self._asked += place_count
             if self._asked >= len(self._mesh):
                 self._made = _Columns(self._mesh, self._faces, direction, loops)
         finally:
@@ -82,20 +90,22 @@ class _Columns:
         bounds = mesh.vertex_bounds()
         assert bounds is not None
         size = float(np.abs(bounds).max() + (bounds[1] - bounds[0]).max())
+        # The scene's box seen from the sun: its corners (8, 3), projected onto two axes (2, 8).
         axes = _axes_across(direction)
         corners = np.array([[bounds[bit >> axis & 1, axis] for axis in range(3)] for bit in range(8)])
-        seen = axes @ corners.T
-        margin = _MARGIN + _ROUNDING * size
-        low, extent = seen.min(axis=1) - margin, np.ptp(seen, axis=1) + 2.0 * margin
+        projected = axes @ corners.T
+        margin, clearance = _MARGIN + _ROUNDING * size, _ABOVE + _ROUNDING * size
+        corner, extent = projected.min(axis=1) - margin, np.ptp(projected, axis=1) + 2.0 * margin
         cell = max(_CELL, float((extent[0] * extent[1] / _MOST_CELLS) ** 0.5), float(extent.max()) / _MOST_CELLS)
         count = np.floor(extent / cell).astype(np.int64) + 1
-        above = _ABOVE + _ROUNDING * size
-        self.grid = ColumnGrid(axes / cell, low / cell, (int(count[0]), int(count[1])), margin / cell, direction, above)
+        cells = (int(count[0]), int(count[1]))
+        # Lengths across are in units of a cell.
+        self.grid = ColumnGrid(axes / cell, corner / cell, cells, margin / cell, direction, clearance)
         self.listed = loops.face_columns(faces, self.grid, _MOST_FACES)
 
 
 def _axes_across(direction: Float) -> Float:
     """Return two unit vectors (2, 3) at right angles to a direction (3,) and to each other."""
-    first = np.cross(direction, np.eye(3)[int(np.abs(direction).argmin())])
-    first /= np.linalg.norm(first)
-    return np.array([first, np.cross(direction, first)])
+    first_axis = np.cross(direction, np.eye(3)[int(np.abs(direction).argmin())])
+    first_axis /= np.linalg.norm(first_axis)
+    return np.array([first_axis, np.cross(direction, first_axis)])

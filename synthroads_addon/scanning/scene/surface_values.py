@@ -106,45 +106,49 @@ class SurfaceValues:
         return np.array([part.first for part in self.parts], np.int64)
 
     def locate(self, faces: Index) -> list[PlacesOnPart]:
-        """Return where triangles (N,) of the scene's mesh are, part by part; some may be on none."""
+        """Return, part by part, which of the triangles (N,) of the scene's mesh are on it; some may be on none."""
         number = faces if self.kept is None else np.take(self.kept, faces).astype(np.intp)
-        # Meshes may be many: only those are looked at that the triangles are of.
-        owner, result = np.searchsorted(self._firsts, number, side="right") - 1, list[PlacesOnPart]()
-        for at in np.flatnonzero(np.bincount(owner + 1)[1:]).tolist():
-            part = self.parts[at]
-            mine = np.flatnonzero((owner == at) & (number < part.first + len(part.corners) * part.uses))
-            if len(mine):
-                place = np.take(number, mine) - part.first
-                use = place // len(part.corners)  # several times as fast as what gives the remainder as well
-                result.append(PlacesOnPart(part, mine, use, place - use * len(part.corners)))
-        return result
+        # The last part that begins at or before each triangle; -1 if none does. Of many parts only these are looked at.
+        part_number = np.searchsorted(self._firsts, number, side="right") - 1
+        located: list[PlacesOnPart] = []
+        for candidate in np.flatnonzero(np.bincount(part_number + 1)[1:]).tolist():
+            part = self.parts[candidate]
+            end = part.first + len(part.corners) * part.uses
+            rows = np.flatnonzero((part_number == candidate) & (number < end))
+            if len(rows):
+                number_in_part = np.take(number, rows) - part.first
+                use = number_in_part // len(part.corners)  # several times as fast as what gives the remainder as well
+                located.append(PlacesOnPart(part, rows, use, number_in_part - use * len(part.corners)))
+        return located
 
     def read(
         self, what: SurfaceInput, located: list[PlacesOnPart], shares: Float, place: Float, normal: Float | None
     ) -> tuple[Float32, Bool]:
-        """Return an input's values (N, 4) on triangles, and a mask (N,) of those that have it; zeros elsewhere.
+        """Return an input's values (N, 4) at places on triangles, and a mask (N,) of those whose part has it.
+
+        Where the part lacks the input the values are 0.
 
         Args:
             what: the input.
             located: where the triangles are, see `locate`.
             shares: (N, 3) weights of their corners.
             place: (N, 3) on the triangles, in the mesh's frame, m.
-            normal: (N, 3) unit normals there; None if the input is none.
+            normal: (N, 3) unit normals there; None if the input is no normal.
         """
         result, mask = np.zeros((len(place), 4), np.float32), np.zeros(len(place), bool)
-        for part, mine, use, triangle in located:
+        for part, rows, use, triangle in located:
             if what.kind == "object":
-                values = _in_frame(part, use, place[mine])
+                values = _in_frame(part, use, place[rows])
             else:
-                if _interpolate_into(result, part, what, (mine, use, triangle), shares):
-                    mask[mine] = True
+                if _interpolate_into(result, part, what, (rows, use, triangle), shares):
+                    mask[rows] = True
                     continue
-                values = _interpolate(part, what, use, triangle, take_rows(shares, mine))
+                values = _interpolate(part, what, use, triangle, take_rows(shares, rows))
                 if values is not None and what.kind in NORMALS:
                     assert normal is not None
-                    values[:, :3] = _oriented_normals(part, use, values[:, :3], normal[mine], what.kind == "normal")
+                    values[:, :3] = _oriented_normals(part, use, values[:, :3], normal[rows], what.kind == "normal")
             if values is not None:
-                result[mine], mask[mine] = values, True
+                result[rows], mask[rows] = values, True
         return result, mask
 
 
@@ -159,32 +163,35 @@ def _in_frame(part: PartValues, use: Index, place: Float) -> Float32 | None:
 
 
 def _oriented_normals(part: PartValues, use: Index, normal: Float32, towards: Float, into_mesh: bool) -> Float:
-    """Return unit normals (H, 3) of the part, flipped to the side that ``towards`` (H, 3), in the mesh's frame, points.
+    """Return unit normals (H, 3) of a part, flipped to the side that vectors ``towards`` point to.
 
     Args:
         part: the part.
         use: (H,) places of it.
         normal: (H, 3) in its own frame.
-        towards: (H, 3).
+        towards: (H, 3) in the mesh's frame.
         into_mesh: return them in the mesh's frame; else in its own.
     """
     assert part.frames is not None
     inverse = np.linalg.inv(part.frames[:, :3, :3])[use]
-    turned = np.einsum("nji,nj->ni", inverse, normal)
-    sign = np.where(np.einsum("ij,ij->i", turned, towards) < 0.0, -1.0, 1.0)
-    result = turned if into_mesh else normal.astype(np.float64)
+    mesh_normal = np.einsum("nji,nj->ni", inverse, normal)
+    sign = np.where(np.einsum("ij,ij->i", mesh_normal, towards) < 0.0, -1.0, 1.0)
+    result = mesh_normal if into_mesh else normal.astype(np.float64)
     return np.asarray(result * (sign / np.maximum(np.linalg.norm(result, axis=1), 1e-12))[:, None])
 
 
 def _interpolate_into(
     result: Float32, part: PartValues, what: SurfaceInput, places: tuple[Index, Index, Index], shares: Float
 ) -> bool:
-    """Interpolate an input's values in a part's triangles by compiled loops, see `_interpolate`; return whether it was.
+    """Write an input's values, interpolated in a part's triangles, by compiled loops; return False where these can't.
+
+    They can't where none are in use, where the part lacks the input, and for values of objects and faces and for
+    normals: `_interpolate` does what is left.
 
     Args:
         result: (N, 4) where they go.
         part: the part.
-        what: the input; no normals, which are turned afterwards.
+        what: the input.
         places: rows of the result (H,), places that the part stands at, and its triangles.
         shares: (N, 3) weights of the corners.
     """
@@ -197,40 +204,52 @@ def _interpolate_into(
 
 
 def _interpolate(part: PartValues, what: SurfaceInput, use: Index, triangle: Index, shares: Float) -> Float32 | None:
-    """Return an input's values (H, 4), interpolated in the part's triangles; None if the part lacks it."""
+    """Return an input's values (H, 4), interpolated in a part's triangles; None if the part lacks it.
+
+    Args:
+        part: the part.
+        what: the input.
+        use: (H,) at which of the places that the part stands at the triangles are.
+        triangle: (H,) of the part.
+        shares: (H, 3) weights of the corners.
+    """
     entry = part.values.get(what)
     if entry is None:
         return None
     if entry.domain in ("object", "face"):
         return take_rows(entry.values, use if entry.domain == "object" else triangle)
     numbers = take_rows(part.corners if entry.domain == "corner" else part.points, triangle)
-    turned = part.mirrored[use]
-    if turned.any():
-        shares = np.where(turned[:, None], shares[:, ::-1], shares)
+    is_mirrored = part.mirrored[use]
+    if is_mirrored.any():
+        shares = np.where(is_mirrored[:, None], shares[:, ::-1], shares)
     # From the first corner on: what all three have alike stays exactly that.
-    first = take_rows(entry.values, numbers[:, 0]).astype(np.float64)
-    result = first.copy()
+    first_values = take_rows(entry.values, numbers[:, 0]).astype(np.float64)
+    result = first_values.copy()
     for corner in (1, 2):
-        result += shares[:, corner, None] * (take_rows(entry.values, numbers[:, corner]) - first)
+        result += shares[:, corner, None] * (take_rows(entry.values, numbers[:, corner]) - first_values)
     return result.astype(np.float32)
 
 
 def corner_shares(corners: Float, place: Float) -> Float:
-    """Return the barycentric weights (N, 3) of places (N, 3) in triangles (N, 3, 3); outside ones are moved inside."""
+    """Return the barycentric weights (N, 3) of places (N, 3) in triangles (N, 3, 3); outside ones are moved inside.
+
+    With sides u = b - a, v = c - a and w = place - a, the weights of b and c solve the normal equations of
+    s u + t v = w (Cramer's rule); the weight of a is the rest. In triangles without area each corner has a third.
+    """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     u, v, w = b - a, c - a, place - a
-    (uu, uv, vv), (wu, wv) = (_dot(u, u), _dot(u, v), _dot(v, v)), (_dot(w, u), _dot(w, v))
+    uu, uv, vv, wu, wv = _dot(u, u), _dot(u, v), _dot(v, v), _dot(w, u), _dot(w, v)
     with np.errstate(divide="ignore", invalid="ignore"):
-        below = uu * vv - uv * uv
-        second, third = (vv * wu - uv * wv) / below, (uu * wv - uv * wu) / below
-    shares = np.stack([1.0 - second - third, second, third], axis=1)
+        determinant = uu * vv - uv * uv
+        share_b, share_c = (vv * wu - uv * wv) / determinant, (uu * wv - uv * wu) / determinant
+    shares = np.stack([1.0 - share_b - share_c, share_b, share_c], axis=1)
     shares = np.clip(np.nan_to_num(shares, nan=1.0 / 3.0), 0.0, None)
     return np.asarray(shares / np.maximum(shares.sum(axis=1, keepdims=True), 1e-30))
 
 
-def _dot(one: Float, other: Float) -> Float:
-    """Return the dot products (N,) of vectors (N, 3), in an order of their own: einsum's depends on the processor."""
-    return np.asarray(one[:, 0] * other[:, 0] + one[:, 2] * other[:, 2] + one[:, 1] * other[:, 1])
+def _dot(a: Float, b: Float) -> Float:
+    """Return the dot products (N,) of vectors (N, 3), summed in a fixed order: einsum's depends on the processor."""
+    return np.asarray(a[:, 0] * b[:, 0] + a[:, 2] * b[:, 2] + a[:, 1] * b[:, 1])
 
 
 @dataclass
@@ -239,9 +258,9 @@ class ValuesBuilder:
 
     parts: list[PartValues] = field(default_factory=list)
 
-    def table(self, kept: Bool | None) -> SurfaceValues | None:
-        """Return the values gathered, with triangles renumbered by the mask ``kept``; None if there are none."""
+    def table(self, keep_mask: Bool | None) -> SurfaceValues | None:
+        """Return the values gathered, with triangles renumbered by the mask ``keep_mask``; None if there are none."""
         if not self.parts:
             return None
-        number = None if kept is None else np.flatnonzero(kept).astype(np.int32)
+        number = None if keep_mask is None else np.flatnonzero(keep_mask).astype(np.int32)
         return SurfaceValues(tuple(self.parts), number)

@@ -51,17 +51,17 @@ class FirstHits(NamedTuple):
     Attributes:
         face: number among all faces of the target, -1 for none.
         distance: m, inf for none.
-        along: n . d of the face's normal and the ray.
+        cosine: n . d of the face's normal and the ray.
     """
 
     face: Index
     distance: Float
-    along: Float
+    cosine: Float
 
     def take(self, rays: Index) -> "FirstHits":
-        """Return the hits of some rays, by indices into the last axis."""
+        """Return the hits of chosen rays, by indices into the last axis."""
         take = partial(np.take, indices=rays, axis=-1)
-        return FirstHits(take(self.face), take(self.distance), take(self.along))
+        return FirstHits(take(self.face), take(self.distance), take(self.cosine))
 
 
 class Target:
@@ -118,28 +118,30 @@ class Target:
         return np.asarray(result)
 
     def instances(self, faces: Index, times: Float) -> AnyArray:
-        """Return the instance numbers of faces (H,) met at times (H,), s; on later passes a vehicle has another."""
+        """Return the instance numbers (H,) of faces (H,) met at times (H,), s; a vehicle has one for each pass."""
         result = np.array(self.face_values("instance_id", faces), dtype=np.uint32)
-        for number, mine in self._on_moving(faces):
-            moving = self.moving[number]
-            if moving.again is None:
+        for number, rows in self._on_moving(faces):
+            part = self.moving[number]
+            if part.again is None:
                 continue
-            passes = moving.motion.passes(times[mine])
-            later = passes > 0
-            result[mine[later]] = moving.again.first + (passes[later] - 1) * moving.again.step
+            passes = part.motion.passes(times[rows])
+            returned = passes > 0
+            result[rows[returned]] = part.again.first + (passes[returned] - 1) * part.again.step
         return result
 
-    def motions(self, begin: float, end: float, spacing: float, driven: Track | None = None) -> list[Track]:
-        """Return the tracks of the moving parts between two times, on knots ``spacing`` (s) apart.
+    def motions(self, begin: float, end: float, spacing: float, carrier: Track | None = None) -> list[Track]:
+        """Return the tracks of the moving parts between two times, s, on knots ``spacing`` (s) apart.
 
         Args:
-            driven: the scanner's, if a vehicle carries it. What drives through this vehicle isn't there meanwhile:
-                others' ways know nothing of it.
+            begin, end: times, s.
+            spacing: s.
+            carrier: track of the scanner, if a vehicle carries it. Vehicles that would drive through this one are
+                absent meanwhile, as their ways take no account of it.
         """
         tracks = [poses.track(begin, end, spacing) for poses in self._poses]
-        if driven is None or not tracks:
+        if carrier is None or not tracks:
             return tracks
-        _, scanner, _ = driven.at(track_knots(begin, end, spacing))
+        _, scanner, _ = carrier.at(track_knots(begin, end, spacing))
         return [_clear_scanner(track, part, scanner) for track, part in zip(tracks, self._parts[1:], strict=True)]
 
     def moving_bounds(self, motions: list[Track]) -> list[Float]:
@@ -160,19 +162,25 @@ class Target:
             times: (...) when each ray is cast, s; spreads likewise.
             motions: see `motions`; they must span ``times``.
         """
-        met = _cast(self._parts[0], origins, directions, maximum_range)
+        static_hits = _cast(self._parts[0], origins, directions, maximum_range)
         if not self.moving:
-            return met
+            return static_hits
         shape = directions.shape
         flat_origins = np.broadcast_to(origins, shape).reshape(3, -1)
         flat_directions, flat_times = directions.reshape(3, -1), np.broadcast_to(times, shape[1:]).ravel()
-        nearest = FirstHits(met.face.ravel(), met.distance.ravel(), met.along.ravel())
-        rays = Bundles.gather(flat_origins, flat_directions, flat_times, np.minimum(nearest.distance, maximum_range))
+        nearest_hits = FirstHits(static_hits.face.ravel(), static_hits.distance.ravel(), static_hits.cosine.ravel())
+        rays = Bundles.gather(
+            flat_origins, flat_directions, flat_times, np.minimum(nearest_hits.distance, maximum_range)
+        )
         for part, track in zip(self._parts[1:], motions, strict=True):
             if track.present.any():
-                _cast_moving(part, track, rays, maximum_range, nearest)
-        to = shape[1:]
-        return FirstHits(nearest.face.reshape(to), nearest.distance.reshape(to), nearest.along.reshape(to))
+                _cast_moving(part, track, rays, maximum_range, nearest_hits)
+        ray_shape = shape[1:]
+        return FirstHits(
+            nearest_hits.face.reshape(ray_shape),
+            nearest_hits.distance.reshape(ray_shape),
+            nearest_hits.cosine.reshape(ray_shape),
+        )
 
     def unobstructed(
         self, origins: Float, direction: Float, times: Float, motions: list[Track], reach: float = SUN_REACH
@@ -187,19 +195,20 @@ class Target:
             reach: how far is looked, m.
         """
         towards = np.broadcast_to(direction[:, None], origins.shape)
-        free = self._columns.clear(origins, direction)
-        if free is None:
-            free = ~self.caster.occluded(as_rows(origins), as_rows(towards), reach)
-        elif len(rows := np.flatnonzero(~free)):
+        # Columns clear most places without a ray; rays are cast from the others.
+        is_free = self._columns.clear(origins, direction)
+        if is_free is None:
+            is_free = ~self.caster.occluded(as_rows(origins), as_rows(towards), reach)
+        elif len(rows := np.flatnonzero(~is_free)):
             begin = as_rows(np.take(origins, rows, axis=1))
-            free[rows] = ~self.caster.occluded(begin, as_rows(towards[:, : len(rows)]), reach)
+            is_free[rows] = ~self.caster.occluded(begin, as_rows(towards[:, : len(rows)]), reach)
         if not self.moving or not len(times):
-            return free
+            return is_free
         rays = Bundles.gather(origins, towards, times, np.full(len(times), reach))
         for part, track in zip(self._parts[1:], motions, strict=True):
             if track.present.any():
-                _clear_blocked(part, track, rays, reach, free)
-        return free
+                _clear_blocked(part, track, rays, reach, is_free)
+        return is_free
 
     def unblocked(self, origins: Float, directions: Float, reach: Float) -> Bool:
         """Return a mask (K, N) of the rays that meet nothing of the static mesh within their reach.
@@ -216,7 +225,7 @@ class Target:
     def near_moving(
         self, origins: Float, directions: Float, reach: Float, times: Float, motions: list[Track], radius: float
     ) -> Bool:
-        """Return a mask (N,) of the rays that pass through the box around a moving part, or by less than a radius (m).
+        """Return a mask (N,) of the rays that pass a moving part's box by less than a radius (m), or through it.
 
         Args:
             origins: (3, N) local, m.
@@ -226,9 +235,9 @@ class Target:
             motions: see `motions`.
             radius: m.
         """
-        near = np.zeros(len(times), bool)
+        is_near = np.zeros(len(times), bool)
         if not self.moving or not len(times):
-            return near
+            return is_near
         rays = Bundles.gather(origins, directions, times, reach)
         for part, track in zip(self.moving_parts, motions, strict=True):
             if not track.present.any():
@@ -240,8 +249,8 @@ class Target:
             # Rays in the part's frame at their times, p' = R^T (p - t), from the box's centre.
             start = _unrotate(rotation, origins[:, indices] - position) - part.centre[:, None]
             direction = _unrotate(rotation, directions[:, indices])
-            near[indices[_crosses_box(start, direction, reach[indices], part.half + radius)]] = True
-        return near
+            is_near[indices[_crosses_box(start, direction, reach[indices], part.half + radius)]] = True
+        return is_near
 
     def at_time_zero(
         self, faces: Index, places: Float, times: Float, motions: list[Track], vectors: tuple[Float, ...] = ()
@@ -256,13 +265,13 @@ class Target:
             vectors: (3, H) each; turned only.
         """
         results = (places.copy(), *(vector.copy() for vector in vectors))
-        for number, mine in self._on_moving(faces):
-            rotation, place, _ = motions[number].at(times[mine])
+        for number, rows in self._on_moving(faces):
+            rotation, place, _ = motions[number].at(times[rows])
             begin_rotation, begin_place, _ = self.moving[number].motion.pose(np.zeros(1))
-            local = _unrotate(rotation, places[:, mine] - place)
-            results[0][:, mine] = begin_rotation[0] @ local + begin_place[0][:, None]
+            local = _unrotate(rotation, places[:, rows] - place)
+            results[0][:, rows] = begin_rotation[0] @ local + begin_place[0][:, None]
             for result, vector in zip(results[1:], vectors, strict=True):
-                result[:, mine] = begin_rotation[0] @ _unrotate(rotation, vector[:, mine])
+                result[:, rows] = begin_rotation[0] @ _unrotate(rotation, vector[:, rows])
         return results
 
     @property
@@ -279,72 +288,97 @@ class Target:
         """Return the local unit normals (3, H) of faces of the static mesh, on the side that these are seen from."""
         return np.ascontiguousarray(np.take(self._parts[0].planes.planes, faces, axis=0)[:, :3].T)
 
-    def normals(self, faces: Index, along: Float, times: Float, motions: list[Track]) -> Float:
-        """Return the local unit normals (3, H) of faces at times (H,), turned towards the rays that met them.
+    def normals(self, faces: Index, cosine: Float, times: Float, motions: list[Track]) -> Float:
+        """Return the local unit normals (3, H) of faces on the side that rays came from; for the face -1 any normal.
 
-        Those of no face, -1, are any.
+        Args:
+            faces: (H,).
+            cosine: (H,) n . d of the faces' normals and the rays that met them.
+            times: (H,) when they did, s.
+            motions: see `motions`.
         """
         static = self._parts[0]
-        # Of faces that move these are of none; they are replaced.
-        result = static.planes.normals(faces, along) if static.count else np.empty((3, len(faces)))
-        for number, mine in self._on_moving(faces):
+        # Of faces that move these mean nothing, and are replaced below.
+        result = static.planes.normals(faces, cosine) if static.count else np.empty((3, len(faces)))
+        for number, rows in self._on_moving(faces):
             part = self._parts[number + 1]
-            normal = part.planes.normals(faces[mine] - part.first, along[mine])
-            rotation, _, _ = motions[number].at(times[mine])
-            result[:, mine] = np.einsum("ijn,jn->in", rotation.reshape(3, 3, -1), normal)
+            normal = part.planes.normals(faces[rows] - part.first, cosine[rows])
+            rotation, _, _ = motions[number].at(times[rows])
+            result[:, rows] = np.einsum("ijn,jn->in", rotation.reshape(3, 3, -1), normal)
         return result
 
     def _on_moving(self, faces: Index) -> Iterator[tuple[int, Index]]:
-        """Yield the number of each moving part of which there are faces, and which (M,) of the faces (H,) these are."""
+        """Yield, for each moving part that is among faces (H,), its number and the rows (M,) of its faces."""
         if not self.moving:
             return
         rows = np.flatnonzero(faces >= self._parts[1].first)
-        some = faces[rows]
+        moving_faces = faces[rows]
         for number, part in enumerate(self._parts[1:]):
-            mine = rows[(some >= part.first) & (some < part.first + part.count)]
-            if len(mine):
-                yield number, mine
+            part_rows = rows[(moving_faces >= part.first) & (moving_faces < part.first + part.count)]
+            if len(part_rows):
+                yield number, part_rows
 
 
 def _join_arrays(arrays: list[AnyArray]) -> AnyArray:
+    """Return arrays joined along the first axis; a single one as it is, not copied."""
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
-def _part(mesh: SceneMesh, caster: Caster, first: int) -> TargetPart:
+def _part(mesh: SceneMesh, caster: Caster, first_face: int) -> TargetPart:
+    """Return a mesh as a part of the target.
+
+    Args:
+        mesh: static, or a moving one in its body frame.
+        caster: of the mesh.
+        first_face: number of its first face among all.
+    """
     bounds = mesh.vertex_bounds()
-    low, high = np.zeros((2, 3)) if bounds is None else bounds
-    centre = (low + high) / 2.0
-    half = (high - low) / 2.0
-    radius = float(np.linalg.norm(half)) + 1e-3
-    return TargetPart(caster, FacePlanes(mesh), first, len(mesh.triangles), centre, half, radius)
+    lowest_corner, highest_corner = np.zeros((2, 3)) if bounds is None else bounds
+    centre = (lowest_corner + highest_corner) / 2.0
+    half_size = (highest_corner - lowest_corner) / 2.0
+    radius = float(np.linalg.norm(half_size)) + 1e-3
+    return TargetPart(caster, FacePlanes(mesh), first_face, len(mesh.triangles), centre, half_size, radius)
 
 
 def _clear_scanner(track: Track, part: TargetPart, scanner: Float) -> Track:
-    """Return a moving part's track, absent where it meets the scanner's vehicle, whose places are (3, K)."""
+    """Return a moving part's track, absent at the knots at which it meets the vehicle that carries the scanner.
+
+    Args:
+        track: the part's.
+        part: a moving one.
+        scanner: (3, K) places of the scanner at the track's knots, m.
+    """
     offset = _unrotate(track.rotation, scanner - track.position)
-    away = (np.abs(offset.T - part.centre) > part.half + CLEARANCE).any(axis=1)
-    return replace(track, present=track.present & away)
+    is_apart = (np.abs(offset.T - part.centre) > part.half + CLEARANCE).any(axis=1)
+    return replace(track, present=track.present & is_apart)
 
 
 def _cast(part: TargetPart, origins: Float, directions: Float, maximum_range: float) -> FirstHits:
-    """Return rays' first hits on one part, in its body frame; faces are numbered among those of all parts."""
+    """Return rays' first hits on one part, in its body frame; faces are numbered among those of all parts.
+
+    Args:
+        part: static or moving.
+        origins: (3, ...) in the body frame, m; of the directions' shape, or one that spreads to it.
+        directions: (3, ...) unit vectors.
+        maximum_range: m.
+    """
     shape = directions.shape[1:]
     hits = part.caster.cast(*_as_rays(origins, directions), maximum_range)
     face = np.array(hits.reshape(shape[::-1]).T, np.intp, order="C")
     if not part.count:
         return FirstHits(face, np.full(shape, np.inf), np.zeros(shape))
     # A miss is worked out with some face and then forgotten: that is less work than to sort them out before.
-    distance, along = part.planes.intersect(face, origins, directions)
-    missed = face < 0
-    finite = np.isfinite(distance)
-    edge_on = not finite.all()  # in the face's plane, or a face without area
+    distance, cosine = part.planes.intersect(face, origins, directions)
+    is_miss = face < 0
+    is_finite = np.isfinite(distance)
+    edge_on = not is_finite.all()  # a ray in the plane of its face, or a face without area
     if edge_on:
-        missed |= ~finite
-    np.copyto(distance, np.inf, where=missed)
+        is_miss |= ~is_finite
+    np.copyto(distance, np.inf, where=is_miss)
     face += part.first
     if part.first or edge_on:
-        face[missed] = -1
-    return FirstHits(face, distance, along)
+        face[is_miss] = -1
+    return FirstHits(face, distance, cosine)
 
 
 def _as_rays(origins: Float, directions: Float) -> tuple[Float32, Float32]:
@@ -372,44 +406,61 @@ def _as_rows(vectors: Float, shape: tuple[int, ...]) -> Float32:
     return result.reshape(-1, 3)
 
 
-def _cast_moving(part: TargetPart, track: Track, rays: Bundles, maximum_range: float, nearest: FirstHits) -> None:
-    """Replace, in place, farther hits in ``nearest`` by those on a moving part; all arrays are flat."""
-    near = rays.rays_near(track, part.centre, part.radius)
-    if not len(near):
+def _cast_moving(part: TargetPart, track: Track, rays: Bundles, maximum_range: float, nearest_hits: FirstHits) -> None:
+    """Replace hits by nearer ones on a moving part, in place.
+
+    Args:
+        part: a moving one.
+        track: its.
+        rays: N of them.
+        maximum_range: m.
+        nearest_hits: (N,) hits so far.
+    """
+    ray_index = rays.rays_near(track, part.centre, part.radius)
+    if not len(ray_index):
         return
-    rotation, place, present = track.at(rays.times[near])
-    near, rotation, place = near[present], rotation[:, present], place[:, present]
-    begin, towards = rays.origins[:, near] - place, rays.directions[:, near]
-    met = _cast(part, _unrotate(rotation, begin), _unrotate(rotation, towards), maximum_range)
-    closer = np.flatnonzero(met.distance < nearest.distance[near])
-    for values, closer_values in zip(nearest, met, strict=True):
-        values[near[closer]] = closer_values[closer]
+    rotation, place, present = track.at(rays.times[ray_index])
+    ray_index, rotation, place = ray_index[present], rotation[:, present], place[:, present]
+    begin, towards = rays.origins[:, ray_index] - place, rays.directions[:, ray_index]
+    part_hits = _cast(part, _unrotate(rotation, begin), _unrotate(rotation, towards), maximum_range)
+    closer_rows = np.flatnonzero(part_hits.distance < nearest_hits.distance[ray_index])
+    for values, closer_values in zip(nearest_hits, part_hits, strict=True):
+        values[ray_index[closer_rows]] = closer_values[closer_rows]
 
 
-def _clear_blocked(part: TargetPart, track: Track, rays: Bundles, reach: float, free: Bool) -> None:
-    """Clear, in place, ``free`` of the rays that a moving part blocks within their reach (m)."""
-    near = rays.rays_near(track, part.centre, part.radius)
-    near = near[free[near]]
-    if not len(near):
+def _clear_blocked(part: TargetPart, track: Track, rays: Bundles, reach: float, is_free: Bool) -> None:
+    """Set ``is_free`` (N,) to False, in place, for the rays that a moving part blocks within their reach (m)."""
+    ray_index = rays.rays_near(track, part.centre, part.radius)
+    ray_index = ray_index[is_free[ray_index]]
+    if not len(ray_index):
         return
-    rotation, place, present = track.at(rays.times[near])
-    near, rotation, place = near[present], rotation[:, present], place[:, present]
-    begin, towards = _unrotate(rotation, rays.origins[:, near] - place), _unrotate(rotation, rays.directions[:, near])
-    free[near[part.caster.occluded(as_rows(begin), as_rows(towards), reach)]] = False
+    rotation, place, present = track.at(rays.times[ray_index])
+    ray_index, rotation, place = ray_index[present], rotation[:, present], place[:, present]
+    # In the part's own frame, p' = R^T (p - t).
+    begin = _unrotate(rotation, rays.origins[:, ray_index] - place)
+    direction = _unrotate(rotation, rays.directions[:, ray_index])
+    is_blocked = part.caster.occluded(as_rows(begin), as_rows(direction), reach)
+    is_free[ray_index[is_blocked]] = False
 
 
-def _crosses_box(begin: Float, towards: Float, reach: Float, half: Float) -> Bool:
-    """Return which rays (3, N) cross the box around the origin of half the size (3,), m, within their reach (N,), m."""
+def _crosses_box(begin: Float, direction: Float, reach: Float, half_size: Float) -> Bool:
+    """Return a mask (N,) of the rays that cross a box around the origin within their reach: the slab method.
+
+    Args:
+        begin, direction: (3, N) m, and unit vectors.
+        reach: (N,) m.
+        half_size: (3,) of the box, m.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
-        sides = np.stack([(-side * half[:, None] - begin) / towards for side in (1.0, -1.0)])
+        side_ranges = np.stack([(-side * half_size[:, None] - begin) / direction for side in (1.0, -1.0)])
     # A ray in the plane of a side, and no farther out than it, is between both: what isn't a number doesn't count.
-    first = np.fmax.reduce(np.fmin(*sides), axis=0)
-    last = np.fmin.reduce(np.fmax(*sides), axis=0)
-    return np.asarray((first <= last) & (last >= 0.0) & (first <= reach))
+    entry_range = np.fmax.reduce(np.fmin(*side_ranges), axis=0)
+    exit_range = np.fmin.reduce(np.fmax(*side_ranges), axis=0)
+    return np.asarray((entry_range <= exit_range) & (exit_range >= 0.0) & (entry_range <= reach))
 
 
 def _unrotate(rotation: Float, vectors: Float) -> Float:
-    """Return vectors (3, N), each rotated by the inverse of its matrix (9, N)."""
+    """Return vectors (3, N), each rotated by the inverse, that is the transpose, of its matrix (9, N), row by row."""
     result = np.empty_like(vectors)
     product = np.empty(vectors.shape[1])
     for i in range(3):
@@ -420,11 +471,11 @@ def _unrotate(rotation: Float, vectors: Float) -> Float:
 
 
 def _damage_of(instance: NDArray[np.uint32], damages: Mapping[int, int]) -> UInt8:
-    """Return the code of damage (F,) of faces by their instance numbers; 0 for none."""
+    """Return the code of damage (F,) of faces by their instance numbers (F,); 0 for those that ``damages`` lacks."""
     result = np.zeros(len(instance), np.uint8)
     if damages:
         numbers = np.array(sorted(damages), np.int64)
         kinds = np.array([damages[number] for number in numbers.tolist()], np.uint8)
-        at = np.minimum(np.searchsorted(numbers, instance), len(numbers) - 1)
-        result = np.where(numbers[at] == instance, kinds[at], result)
+        position = np.minimum(np.searchsorted(numbers, instance), len(numbers) - 1)
+        result = np.where(numbers[position] == instance, kinds[position], result)
     return result

@@ -52,7 +52,7 @@ class Fog(Weather):
     echoes: bool = Field(False, description="Whether the droplets give an echo of their own.")
 
     def effects(self) -> tuple[EchoEffect, ...]:
-        """Return the droplets' echo if it is wanted."""
+        """Return the droplets' echo if it is switched on."""
         return (self,) if self.echoes else ()
 
     def change_echoes(self, hits: PulseHits, random: np.random.Generator) -> EchoChanges:
@@ -85,6 +85,7 @@ class Precipitation(Weather):
 
     @model_validator(mode="after")
     def _refuse_two_measures(self) -> Self:
+        """Raise ValueError if both a rate and a visibility are given."""
         if self.rate_mm_h is not None and self.visibility is not None:
             raise ValueError("rate_mm_h and visibility can't both be given")
         return self
@@ -107,11 +108,13 @@ class Precipitation(Weather):
         """Return the rate, mm of water per hour; without one that whose extinction is that of the visibility."""
         if self.rate_mm_h is not None:
             return self.rate_mm_h
-        one, two = (self.rate_extinction(rate, wavelength_nm) for rate in (1.0, 2.0))
-        return float((self.extinction(wavelength_nm) / one) ** (1.0 / math.log2(two / one)))
+        # Extinction is a R^b: two rates give a = extinction_at_1 and b, of which the rate follows.
+        extinction_at_1, extinction_at_2 = (self.rate_extinction(rate, wavelength_nm) for rate in (1.0, 2.0))
+        exponent = math.log2(extinction_at_2 / extinction_at_1)
+        return float((self.extinction(wavelength_nm) / extinction_at_1) ** (1.0 / exponent))
 
     def effects(self) -> tuple[EchoEffect, ...]:
-        """Return the particles' echoes if they are wanted."""
+        """Return the particles' echoes if they are switched on."""
         return (self,) if self.echoes else ()
 
     def change_echoes(self, hits: PulseHits, random: np.random.Generator) -> EchoChanges:

@@ -59,6 +59,7 @@ def kruse_exponent(visibility: float) -> float:
 
 
 def _clear_exponent(kilometres: float) -> float:
+    """Return the exponent q above 6 km, by Kruse and Kim alike: 1.3, and 1.6 above 50 km."""
     return 1.6 if kilometres > 50.0 else 1.3
 
 

@@ -45,22 +45,29 @@ class ParticleSpectrum:
 
 
 def fresnel_reflectance(refractive_index: float) -> float:
-    """Return the share of light that a surface reflects at a right angle."""
+    """Return the share of light that a surface reflects at a right angle: Fresnel's ((n - 1) / (n + 1))^2."""
     return ((refractive_index - 1.0) / (refractive_index + 1.0)) ** 2
 
 
 def rain_spectrum(rate_mm_h: float) -> ParticleSpectrum:
-    """Return Marshall and Palmer's drops at a rate of rain."""
+    """Return Marshall and Palmer's drops at a rate of rain, mm/h: N0 = 8000, s = 4.1 R^-0.21."""
     return ParticleSpectrum(8000.0, 4.1 * rate_mm_h**-0.21, fresnel_reflectance(1.328))
 
 
 def snow_spectrum(rate_mm_h: float) -> ParticleSpectrum:
-    """Return Gunn and Marshall's flakes at a rate of snow in mm of water an hour."""
+    """Return Gunn and Marshall's flakes at a rate of snow, mm/h of water: N0 = 3800 R^-0.87, s = 2.55 R^-0.48."""
     return ParticleSpectrum(3800.0 * rate_mm_h**-0.87, 2.55 * rate_mm_h**-0.48, fresnel_reflectance(1.3031))
 
 
-def smallest_seen(spectrum: ParticleSpectrum, setting: ScannerSetting, distance: Float, intensity: float) -> Float:
-    """Return the diameters (N,) of particles at ranges (N,), m, that give an intensity without attenuation, mm."""
+def smallest_diameters(spectrum: ParticleSpectrum, setting: ScannerSetting, distance: Float, intensity: float) -> Float:
+    """Return the diameters (N,), mm, of the smallest particles that give an intensity; inf where none does.
+
+    Args:
+        spectrum: of the particles.
+        setting: the scanner's.
+        distance: (N,) ranges, m.
+        intensity: without attenuation.
+    """
     brightness = intensity * distance**2
     beam = _beam_width(setting, distance)
     diameter = beam * np.sqrt(brightness / spectrum.reflectance)
@@ -69,9 +76,16 @@ def smallest_seen(spectrum: ParticleSpectrum, setting: ScannerSetting, distance:
 
 
 def echoes_per_metre(spectrum: ParticleSpectrum, setting: ScannerSetting, distance: Float, intensity: float) -> Float:
-    """Return how many echoes (N,) a pulse has to the metre at ranges (N,), m, that are at least as intense."""
+    """Return the number (N,) of a pulse's echoes per metre that are at least as intense as ``intensity``.
+
+    Args:
+        spectrum: of the particles.
+        setting: the scanner's.
+        distance: (N,) ranges, m.
+        intensity: without attenuation.
+    """
     area = np.pi / 4.0 * (_beam_width(setting, distance) / _MILLIMETRES) ** 2
-    smallest = smallest_seen(spectrum, setting, distance, intensity)
+    smallest = smallest_diameters(spectrum, setting, distance, intensity)
     return np.asarray(area * spectrum.intercept / spectrum.slope * np.exp(-spectrum.slope * smallest))
 
 
@@ -82,28 +96,36 @@ def particle_echoes(spectrum: ParticleSpectrum, hits: PulseHits, random: np.rand
     """
     setting = hits.setting
     faintest = PROVISIONAL_THRESHOLD * setting.threshold
-    grid, number = _echoes_before(spectrum, setting, faintest)
-    free = hits.distance.min(axis=0)
+    ranges, echoes_before = _echoes_before(spectrum, setting, faintest)
+    free_range = hits.distance.min(axis=0)
     # A Poisson process of all pulses as far as the freest one goes, thinned to those that lie before what is met: its
     # cost grows with the echoes, not with the pulses.
-    most = np.interp(free.max(initial=0.0), grid, number)
-    count = random.poisson(most * len(free))
-    pulse = random.integers(max(len(free), 1), size=count)
-    distance = np.interp(most * random.random(count), number, grid)
-    diameter = smallest_seen(spectrum, setting, distance, faintest)
+    mean_count = np.interp(free_range.max(initial=0.0), ranges, echoes_before)  # of the freest pulse
+    count = random.poisson(mean_count * len(free_range))
+    pulse = random.integers(max(len(free_range), 1), size=count)
+    # Ranges by inversion of the number of echoes before each range.
+    distance = np.interp(mean_count * random.random(count), echoes_before, ranges)
+    # Diameters beyond the smallest one that is seen are exponential.
+    diameter = smallest_diameters(spectrum, setting, distance, faintest)
     diameter += random.exponential(1.0 / spectrum.slope, count)
-    taken = np.minimum(diameter / np.maximum(_beam_width(setting, distance), 1e-9), 1.0) ** 2
-    kept = np.flatnonzero(distance < free[pulse])
-    none = np.zeros(len(kept), dtype=np.intp)
-    return EchoChanges(pulse[kept], none, distance[kept], spectrum.reflectance * taken[kept])
+    beam_share = np.minimum(diameter / np.maximum(_beam_width(setting, distance), 1e-9), 1.0) ** 2
+    rows = np.flatnonzero(distance < free_range[pulse])
+    first_ray = np.zeros(len(rows), dtype=np.intp)
+    return EchoChanges(pulse[rows], first_ray, distance[rows], spectrum.reflectance * beam_share[rows])
 
 
 @lru_cache(maxsize=8)
 def _echoes_before(spectrum: ParticleSpectrum, setting: ScannerSetting, faintest: float) -> tuple[Float, Float]:
-    """Return ranges (N,), m, and how many echoes a pulse has before each of them that are at least as intense."""
-    grid = np.geomspace(max(setting.minimum_range, _NEAREST), setting.maximum_range, _STEPS)
-    density = echoes_per_metre(spectrum, setting, grid, faintest)
-    return grid, np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(grid))])
+    """Return ranges (N,), m, and the mean number (N,) of a pulse's echoes before each, by the trapezium rule.
+
+    Args:
+        spectrum: of the particles.
+        setting: the scanner's.
+        faintest: least intensity of an echo.
+    """
+    ranges = np.geomspace(max(setting.minimum_range, _NEAREST), setting.maximum_range, _STEPS)
+    density = echoes_per_metre(spectrum, setting, ranges, faintest)
+    return ranges, np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(ranges))])
 
 
 def _beam_width(setting: ScannerSetting, distance: Float) -> Float:

@@ -24,8 +24,7 @@ def weather_of(environment: Environment) -> Weather:
     A visibility that its parameter set leaves at the default, that of a clear day, is the usual one of its condition:
     fog of 23 km is none.
     """
-    given = environment.visibility != Environment.model_fields["visibility"].default
     model = WEATHERS[environment.weather]
-    return model(
-        condition=environment.weather, visibility=environment.visibility if given else model.usual["visibility"]
-    )
+    is_default = environment.visibility == Environment.model_fields["visibility"].default
+    visibility = model.usual["visibility"] if is_default else environment.visibility
+    return model(condition=environment.weather, visibility=visibility)

@@ -36,16 +36,24 @@ def backscatter(extinction: float) -> float:
 
 
 def soft_power(setting: ScannerSetting, extinction: float, distance: Float) -> Float:
-    """Return the power (N,) that a fog sends back at the times of ranges (N,), m, by the middle of the pulse."""
+    """Return the power (N,) that a fog sends back at the times of ranges, counted from the middle of the pulse.
+
+    Args:
+        setting: the scanner's.
+        extinction: of the fog, 1/m.
+        distance: (N,) ranges, m.
+    """
     width = setting.range_resolution  # as a range, the pulse's full width at half height
-    behind = (np.arange(_PULSE_STEPS) + 0.5) / _PULSE_STEPS * 2.0 * width
-    shape = np.sin(0.5 * np.pi * behind / width) ** 2
-    place = distance[:, None] + width - behind
-    lit = place >= max(setting.minimum_range, 1e-2)
+    # The integral above by the midpoint rule, over the pulse's length 2 T, which is 2 widths as a range.
+    pulse_place = (np.arange(_PULSE_STEPS) + 0.5) / _PULSE_STEPS * 2.0 * width
+    pulse_shape = np.sin(0.5 * np.pi * pulse_place / width) ** 2
+    place = distance[:, None] + width - pulse_place
+    is_recorded = place >= max(setting.minimum_range, 1e-2)
     place = np.maximum(place, 1e-2)
     share = overlap_share(setting, place)
-    back = received_intensity(1.0, place, 2.0 * extinction) * lit * (1.0 if share is None else share)
-    return np.asarray(np.pi * backscatter(extinction) * (back * shape).sum(axis=1) * 2.0 * width / _PULSE_STEPS)
+    returned_light = received_intensity(1.0, place, 2.0 * extinction) * is_recorded * (1.0 if share is None else share)
+    total = (returned_light * pulse_shape).sum(axis=1)
+    return np.asarray(np.pi * backscatter(extinction) * total * 2.0 * width / _PULSE_STEPS)
 
 
 @lru_cache(maxsize=8)
@@ -58,10 +66,15 @@ def soft_peak(setting: ScannerSetting, extinction: float) -> tuple[float, float]
 
 
 def soft_echoes(extinction: float, hits: PulseHits) -> EchoChanges:
-    """Return the echo of a fog for each of a block's pulses that meets nothing before the fog's peak."""
+    """Return the echo of a fog for each of a block's pulses that meets nothing before the fog's peak.
+
+    Its brightness is that of a surface at the peak's range that would send back the peak's power.
+    """
     distance, power = soft_peak(hits.setting, extinction)
     share = overlap_share(hits.setting, np.array([distance]))
-    seen = received_intensity(1.0, distance, 2.0 * extinction) * (1.0 if share is None else max(float(share[0]), 1e-9))
+    seen_share = 1.0 if share is None else max(float(share[0]), 1e-9)
+    white_power = received_intensity(1.0, distance, 2.0 * extinction) * seen_share
     pulse = np.flatnonzero(hits.distance.min(axis=0) > distance + hits.setting.range_resolution)
-    ray = np.zeros(len(pulse), dtype=np.intp)
-    return EchoChanges(pulse, ray, np.full(len(pulse), distance), np.full(len(pulse), power / float(seen)))
+    first_ray = np.zeros(len(pulse), dtype=np.intp)
+    brightness = np.full(len(pulse), power / float(white_power))
+    return EchoChanges(pulse, first_ray, np.full(len(pulse), distance), brightness)

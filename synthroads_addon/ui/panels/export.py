@@ -58,8 +58,8 @@ def export_cloud(source: Path, output: Path, classes: str | None, spacing: float
         report(share)
 
     if spacing > 0.0:
-        return subsample(source, output, spacing, classes, overwrite=True, progress=progress, block=BLOCK)
-    return convert(source, output, classes, overwrite=True, progress=progress, block=BLOCK)
+        return subsample(source, output, spacing, classes, overwrite=True, progress=progress, block_size=BLOCK)
+    return convert(source, output, classes, overwrite=True, progress=progress, block_size=BLOCK)
 
 
 def export_twin(

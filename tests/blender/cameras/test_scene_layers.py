@@ -56,9 +56,9 @@ def test_every_blender_gives_the_same() -> None:
     assert seen is not None
     assert plan.layers.request is not None
     seen = seen.select(np.linspace(0, len(seen) - 1, COUNT).astype(np.intp))
-    request = replace(plan.layers.request, wanted=frozenset(LAYERS))
+    request = replace(plan.layers.request, names=frozenset(LAYERS))
     with layer_source(request) as layers:
-        values = sample_points(layers, seen, request.wanted)
+        values = sample_points(layers, seen, request.names)
     found = {"position": seen.position} | {name: np.asarray(values.arrays[name], np.float64) for name in LAYERS}
     if WRITE in os.environ:
         RECORD.write_text(json.dumps({name: np.round(array, 6).tolist() for name, array in found.items()}) + "\n")

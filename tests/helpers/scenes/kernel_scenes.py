@@ -118,7 +118,7 @@ def assert_same(plan: ScanPlan, pulses: Pulses) -> Echoes:
     assert isinstance(plan.pulse_kernel, PulseKernel)
     end = float(pulses.time.max(initial=0.0))
     found, expected = (
-        BlockScan(one).traced_echoes(STRIP, pulses, one.target.motions(0.0, end, 0.01), 0)
+        BlockScan(one).tracer.traced_echoes(STRIP, pulses, one.target.motions(0.0, end, 0.01), 0)
         for one in (plan, by_numpy(plan))
     )
     whole = not (plan.atmosphere.effects or plan.reflection.multipath or plan.spares)
@@ -135,7 +135,7 @@ def assert_same(plan: ScanPlan, pulses: Pulses) -> Echoes:
 
 def known(traced: Traced, hit: np.ndarray) -> list[np.ndarray]:
     """Return all that is asked of hits."""
-    picked = [traced.pick(name, hit) for name in ("face", "material", "along")]
+    picked = [traced.pick(name, hit) for name in ("face", "material", "cosine")]
     return [*picked, *traced.ends(hit), traced.directions(hit), traced.times(hit)]
 
 

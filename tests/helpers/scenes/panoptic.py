@@ -86,8 +86,10 @@ class PanopticSet:
         scan, most = BlockScan(self.plan), self.plan.setting.maximum_range
         for strip, block in self.plan.blocks():
             first, count = self.plan.cut.pulse_span(strip, block)
-            poses = scan.poses_between(strip, *(self.plan.cut.time(strip, n) for n in (first, first + count - 1)))
-            pulses = scan.emit(strip, poses, None, first, count)
+            poses = scan.emitter.poses_between(
+                strip, *(self.plan.cut.time(strip, n) for n in (first, first + count - 1))
+            )
+            pulses = scan.emitter.emit(strip, poses, None, first, count)
             rays = [np.ascontiguousarray(one.T, dtype=np.float32) for one in (pulses.origin, pulses.direction)]
             face = caster.cast(*rays, most)
             hit = np.flatnonzero(face >= 0)

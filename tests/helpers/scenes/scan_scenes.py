@@ -131,13 +131,13 @@ def scan_pulses(scan: ScanPlan, strip: Strip, first: int, count: int, key: int =
 
 def emit_pulses(scan: ScanPlan, strip: Strip, begin: float, end: float, first: int, count: int) -> Pulses:
     """Return pulses of a strip without pointing errors; the poses are those between two times."""
-    stages = BlockScan(scan)
-    return stages.emit(strip, stages.poses_between(strip, begin, end), None, first, count)
+    emitter = BlockScan(scan).emitter
+    return emitter.emit(strip, emitter.poses_between(strip, begin, end), None, first, count)
 
 
 def beam_rays(scan: ScanPlan, pulses: Pulses) -> Rays:
     """Return the rays of pulses where nothing moves."""
-    return BlockScan(scan).rays(pulses, [])
+    return BlockScan(scan).tracer.rays(pulses, [])
 
 
 def middle_pulses(scan: ScanPlan, count: int = 100):
@@ -150,5 +150,5 @@ def echoes_and_pulses(scan: ScanPlan, first: int, count: int) -> tuple[Echoes, P
     strip = scan.path.strips[0]
     pulses = emit_pulses(scan, strip, 0.0, 80.0, first, count)
     traced = trace(scan.target, scan.reflection.surfaces, beam_rays(scan, pulses), [], 0.0, scan.setting.maximum_range)
-    signals = BlockScan(scan).signals(traced)
+    signals = BlockScan(scan).tracer.signals(traced)
     return group_returns(*signals, traced.pulse, scan.setting.range_resolution), pulses

@@ -195,10 +195,10 @@ def test_as_much_is_built_as_the_rays_reach(tmp_path: Path, kind: str, pitch: fl
     assert sorted((s.index, b) for part in parts for s, b in part.blocks) == [(s.index, b) for s, b in cut.all()]
     for part in parts:
         low, high = reached_stations(cut, geometry, list(part.blocks))
-        assert part.low <= max(low - 20.0, 0.0)
-        assert part.high >= min(high + 20.0, geometry.length)
-        assert part.start - part.low < 60.0 + beyond + 25.0
-    tilted = parts[4].start - parts[4].low
+        assert part.build_start <= max(low - 20.0, 0.0)
+        assert part.build_end >= min(high + 20.0, geometry.length)
+        assert part.start - part.build_start < 60.0 + beyond + 25.0
+    tilted = parts[4].start - parts[4].build_start
     if pitch:
         assert tilted > 60.0 * np.tan(np.deg2rad(pitch))
 

@@ -135,7 +135,7 @@ def errors_of_a_section(work: SectionScan, road: RoadGeometry, section: Any, mon
     monkeypatch.setattr(Site, "plan", keep)
     with build_section(work, section) as scan:
         MESH[id(scan)] = meshes[-1]
-        triangles = exact_triangles(road, section.low, section.high, scan, scan.reflection.frame_origin)
+        triangles = exact_triangles(road, section.build_start, section.build_end, scan, scan.reflection.frame_origin)
         strip, block = section.blocks[len(section.blocks) // 2]
         first, _ = work.cut.pulse_span(strip, block)
         result = scan_pulses(scan, strip, first, PULSES, block).points

@@ -63,7 +63,7 @@ class StandIns:
 
     @contextmanager
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> Iterator[LayerSource]:
-        self.asked.append(("layers", request.wanted, request.settings.image_spacing))
+        self.asked.append(("layers", request.names, request.settings.image_spacing))
         progress(1.0)
         yield MaterialLayers(surface_constants(self.materials(request.mesh.materials)))
 

@@ -122,9 +122,9 @@ def test_most_footprints_on_ground_and_pavement_alone_are_spared(name: str) -> N
     strip = plan.path.strips[1]  # not where the scene ends
     first, count = plan.cut.pulse_span(strip, 0)
     scan, times = BlockScan(plan), [plan.cut.time(strip, number) for number in (first, first + count - 1)]
-    poses = scan.poses_between(strip, times[0], times[1])
-    pulses = scan.emit(strip, poses, None, first, count)
-    faces = scan._trace(pulses, poses.motions).first.face
+    poses = scan.emitter.poses_between(strip, times[0], times[1])
+    pulses = scan.emitter.emit(strip, poses, None, first, count)
+    faces = scan.tracer.trace_rays(pulses, poses.motions).first.face
     labels = np.where(faces >= 0, np.take(plan.target.class_id, faces, mode="clip"), 255)
     bare = np.isin(labels, [class_id(name) for name in CLASSES]).all(axis=0)
     met = plan.target.cast(pulses.origin, pulses.direction, plan.setting.maximum_range, pulses.time, poses.motions)

@@ -56,8 +56,8 @@ def scanned(name: str, distance: float, reflectance: float, retroreflection: flo
     )
     strip = plan.path.strips[0]
     scan, counts = BlockScan(plan), shot_count(setting, strip.duration)
-    poses = scan.poses_between(strip, 0.0, strip.duration)
-    pulses = scan.emit(strip, poses, None, 0, counts)
+    poses = scan.emitter.poses_between(strip, 0.0, strip.duration)
+    pulses = scan.emitter.emit(strip, poses, None, 0, counts)
     width = np.tan(np.deg2rad(WIDE))
     x, y, z = pulses.direction
     fired = int(np.count_nonzero((x > 0.0) & (np.abs(y) < width * x) & (np.abs(z) < width * x)))

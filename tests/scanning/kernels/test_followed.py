@@ -188,8 +188,8 @@ def test_all_that_rays_meet_is_known_as_numpy_knows_it() -> None:
     plan, pulses = planned(soup(2500), 7, moving=driving(), divergence=WIDE, attenuation=0.01), downwards(2001)
     kernel, motions = plan.pulse_kernel, plan.target.motions(0.0, 0.1, 0.01)
     assert isinstance(kernel, PulseKernel)
-    numpys = BlockScan(plan)
-    expected = numpys._trace(pulses, motions)
+    numpys = BlockScan(plan).tracer
+    expected = numpys.trace_rays(pulses, motions)
     (found, signals), theirs = kernel.follow(pulses, motions), numpys.signals(expected)
     assert_bytes(found.ray, expected.ray)
     assert_bytes(found.rays.share, expected.rays.share)

@@ -79,9 +79,9 @@ def test_what_is_not_there_is_refused(loops: CompiledPoints, name: str, number: 
         *(none, none, five, none, five, five, vectors, None, five, five, vectors, vectors, vectors),
         *(np.zeros((5, 4)), np.zeros(5, np.uint8), np.zeros(5, np.uint32), np.zeros(5, np.uint16), np.zeros(3), 0.0),
     )
-    assert len(loops.placed(echoes, seen=True).xyz) == 5
+    assert len(loops.placed(echoes, with_seen=True).xyz) == 5
     with pytest.raises(IndexError, match="of 5 isn't there"):
-        loops.placed(echoes._replace(**{name: np.full(5, number)}), seen=True)
+        loops.placed(echoes._replace(**{name: np.full(5, number)}), with_seen=True)
     few = dict.fromkeys(("class_id", "instance_id", "material"), np.zeros(4, np.uint8))
     with pytest.raises(ValueError, match="class_id"):
-        loops.placed(echoes._replace(**few), seen=True)
+        loops.placed(echoes._replace(**few), with_seen=True)

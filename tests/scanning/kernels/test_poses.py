@@ -89,12 +89,12 @@ def test_vectors_and_poses_that_are_none(kernel: CompiledPoses) -> None:
 
 def test_arrays_that_do_not_match_are_refused(kernel: CompiledPoses) -> None:
     times = np.full(4, 3.001)
-    with pytest.raises(ValueError, match=r"vectors \[\(3, 5\)\]: 3 sets of \(3, 4\) at most"):
+    with pytest.raises(ValueError, match=r"3 arrays of shape \(3, 4\) at most, but have the shapes \[\(3, 5\)\]"):
         kernel.turned_vectors(track(4), times, [np.zeros((3, 5))])
     with pytest.raises(ValueError, match="at most"):
         kernel.turned_vectors(track(4), times, [np.zeros((3, 4))] * 4)
     for columns in (Columns(-1), Columns(0, np.arange(3)), Columns(0, np.array([0, 1, -1, 2]))):
-        with pytest.raises(ValueError, match="4 of them, none below 0"):
+        with pytest.raises(ValueError, match="have 4 rows, none below 0"):
             kernel.turned_vectors(track(4), times, [np.zeros((3, 4))], columns)
-    with pytest.raises(ValueError, match="columns from 0 of 0"):
+    with pytest.raises(ValueError, match="begin at 0 of 0"):
         kernel.turned_vectors(track(4), times, [np.zeros((3, 0))], Columns(0))

@@ -39,7 +39,7 @@ def test_they_are_those_of_the_raised_surface(direction: tuple[float, float, flo
     ends = BeamEnds(position, towards)
     raised = shift_by_relief(points, ends, *how)
     field = ReliefField(points, ends, *how)
-    turned = turn_normals(raised, field.rough, towards, field.heights)
+    turned = turn_normals(raised, field.rough_rows, towards, field.heights)
     height = ((raised.xyz - position) @ normal).reshape(SIDE, SIDE)
     slopes = np.gradient(height, SPACING)
     expected = normal - slopes[0][..., None] * first - slopes[1][..., None] * second

@@ -113,4 +113,4 @@ def test_a_way_is_that_of_its_point(way: tuple[float, float, float]) -> None:
     time = np.linspace(0.0, 2.0, 777)
     rotation, place, _ = track.at(time)
     expected = np.einsum("ijn,j->in", rotation.reshape(3, 3, -1), CENTRE) + place
-    np.testing.assert_allclose(track.along(track.way_of(CENTRE), time), expected, atol=1e-12)
+    np.testing.assert_allclose(track.interpolate(track.way_of(CENTRE), time), expected, atol=1e-12)

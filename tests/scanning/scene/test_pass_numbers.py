@@ -9,7 +9,7 @@ from synthroads_addon.scanning.scene.motion import LinearMotion, MovingMesh, Sca
 from synthroads_addon.scanning.scene.target import Target
 from tests.helpers.scenes.scan_scenes import BruteForce, mesh_of
 
-WAY = VehiclePasses(start=60.0, speed=20.0, whole=100.0, length=4.0, entry=5.0, period=10.0)
+WAY = VehiclePasses(start=60.0, speed=20.0, lane_length=100.0, length=4.0, entry=5.0, period=10.0)
 """It leaves after 2 s, and comes in at 5 s, 15 s, ..."""
 
 
