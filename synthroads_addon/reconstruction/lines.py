@@ -416,7 +416,7 @@ def _cover_by_stretch(share: Float) -> Float:
 
 
 class _DashPattern(NamedTuple):
-    """Dashes of a line: painted share of its length, dash and gap (m; 0 if solid), and station of its first dash (m)."""
+    """Dashes of a line: painted share of its length, dash and gap (m; 0 if solid), station of its first dash (m)."""
 
     painted_share: float
     dash: float
