@@ -40,8 +40,8 @@ class CloudTraits:
 
     def to_text(self) -> str:
         """Return the traits as text."""
-        told = ", ".join(sorted(self.attributes)) or "no attributes"
-        return f"{self.density:.3g} points/m2, {self.platform}, {told}"
+        attributes = ", ".join(sorted(self.attributes)) or "no attributes"
+        return f"{self.density:.3g} points/m2, {self.platform}, {attributes}"
 
 
 @dataclass(frozen=True)
@@ -76,12 +76,12 @@ class Choice:
 
     def why(self) -> str:
         """Return in one line which model was chosen and why."""
-        low, high = self.card.domain.density
-        trained = f"trained on {low:g} to {high:g} points/m2, {' and '.join(self.card.domain.platforms)}"
-        beside = (
+        least_density, largest_density = self.card.domain.density
+        training_domain = f"trained on {least_density:g} to {largest_density:g} points/m2, {' and '.join(self.card.domain.platforms)}"
+        reservation = (
             "" if not self.distance else "; the cloud is unlike that" if self.doubtful else "; the nearest there is"
         )
-        return f"{self.card.name} for {self.traits.to_text()}: {trained}{beside}"
+        return f"{self.card.name} for {self.traits.to_text()}: {training_domain}{reservation}"
 
 
 def choose_model(cloud: Path, task: str) -> Choice:
@@ -105,21 +105,21 @@ def nearest(cards: Sequence[ModelCard], traits: CloudTraits) -> Choice:
         InputError: the cloud lacks what each of them needs.
     """
     choices = [Choice(card, traits, domain_distance(card, traits)) for card in cards]
-    best = min(choices, key=lambda choice: choice.distance)
-    if best.distance == inf:
-        needed = " or ".join(sorted({name for card in cards for name in card.domain.needs} - traits.attributes))
-        raise InputError("cloud", traits.to_text(), f"the models that come with the package need {needed}")
-    return best
+    best_choice = min(choices, key=lambda choice: choice.distance)
+    if best_choice.distance == inf:
+        missing_attributes = " or ".join(sorted({name for card in cards for name in card.domain.needs} - traits.attributes))
+        raise InputError("cloud", traits.to_text(), f"the models that come with the package need {missing_attributes}")
+    return best_choice
 
 
 def domain_distance(card: ModelCard, traits: CloudTraits) -> float:
     """Return how far a cloud is from what a model was trained on; infinite if it lacks what the model needs."""
     if not set(card.domain.needs) <= traits.attributes:
         return inf
-    low, high = card.domain.density
+    least_density, largest_density = card.domain.density
     density = max(traits.density, 1e-6)
-    beside = max(0.0, log(low / density), log(density / high))
-    return beside + (0.0 if traits.platform in card.domain.platforms else _OTHER_PLATFORM)
+    density_distance = max(0.0, log(least_density / density), log(density / largest_density))
+    return density_distance + (0.0 if traits.platform in card.domain.platforms else _OTHER_PLATFORM)
 
 
 def cloud_traits(path: Path) -> CloudTraits:
@@ -146,14 +146,14 @@ def cloud_traits(path: Path) -> CloudTraits:
     if not cells:
         raise InputError(str(path), None, "has no points")
     places, counts = np.array(list(cells)), np.array(list(cells.values()), dtype=np.float64)
-    low, median, high = np.percentile(counts, [20, 50, 90])
-    unevenness = float(high / max(low, 1.0))
+    lower_count, median, upper_count = np.percentile(counts, [20, 50, 90])
+    unevenness = float(upper_count / max(lower_count, 1.0))
     names = (("intensity", brightest > darkest), ("color", colorful))
     return CloudTraits(
         density=float(median),
         unevenness=unevenness,
         platform=_platform(float(median), unevenness, places.astype(np.float64)),
-        attributes=frozenset(name for name, there in names if there),
+        attributes=frozenset(name for name, is_present in names if is_present),
     )
 
 

@@ -30,11 +30,11 @@ class Part(Model):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _read_old_names(cls, data: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
+    def _read_old_names(cls, data: Any, validate: ModelWrapValidatorHandler[Self]) -> Self:
         if isinstance(data, dict):
-            renamed = {old: new for old, new in cls.renamed.items() if new not in data}
-            data = {renamed.get(name, name): value for name, value in data.items()}
-        return read(data)
+            name_changes = {old_name: new_name for old_name, new_name in cls.renamed.items() if new_name not in data}
+            data = {name_changes.get(name, name): value for name, value in data.items()}
+        return validate(data)
 
 
 class Schedule(Part):
@@ -87,7 +87,7 @@ def names_in(folder: Path) -> list[str]:
     return sorted(path.stem for path in folder.glob("*.*"))
 
 
-def shipped_file(what: str, folder: Path, name_or_file: str, endings: Sequence[str] = (".yaml", ".json")) -> Path:
+def shipped_file(field: str, folder: Path, name_or_file: str, endings: Sequence[str] = (".yaml", ".json")) -> Path:
     """Return the path of the folder's file of that name, or the given path if it has an allowed ending (may not exist).
 
     Raises:
@@ -99,8 +99,8 @@ def shipped_file(what: str, folder: Path, name_or_file: str, endings: Sequence[s
     if path.suffix.lower().replace(".yml", ".yaml") in endings:
         return path
     hint = nearest_name(name_or_file, names)
-    allowed = f"must be a {' or '.join(endings)} file or one of {', '.join(names)}{hint}"
-    raise InputError(what, name_or_file, allowed)
+    requirement = f"must be a {' or '.join(endings)} file or one of {', '.join(names)}{hint}"
+    raise InputError(field, name_or_file, requirement)
 
 
 def load_configuration(name_or_file: str, changes: Sequence[str] = (), tasks: Sequence[str] = ()) -> Any:

@@ -53,8 +53,8 @@ class Experiment(Model):
     @field_validator("variants")
     @classmethod
     def _check_names(cls, variants: dict[str, Variant]) -> dict[str, Variant]:
-        if wrong := next((name for name in variants if not _FOLDER_NAME.fullmatch(name)), None):
-            raise ValueError(f"'{wrong}' must be the name of a folder: no / and no \\ in it, and no dot before it")
+        if invalid_name := next((name for name in variants if not _FOLDER_NAME.fullmatch(name)), None):
+            raise ValueError(f"'{invalid_name}' must be the name of a folder: no / and no \\ in it, and no dot before it")
         return variants
 
     def filled_data(self, folders: Mapping[str, str]) -> dict[str, Any]:
@@ -141,35 +141,35 @@ def kept_figures(file: Path, name: str, made_from: Any, is_sound: Callable[[Any]
     """
     if not file.is_file():
         return None
-    kept = read_json(file)
-    if made_from is not None and isinstance(kept, dict) and kept.get("made_from") != made_from:
+    content = read_json(file)
+    if made_from is not None and isinstance(content, dict) and content.get("made_from") != made_from:
         return None
-    if not isinstance(kept, dict) or not is_sound(kept.get(name)):
-        told = "aren't the figures of this experiment: without the file they are made anew"
-        raise InputError(f"{file}: {name}", None, told)
-    figures: dict[str, Any] = kept[name]
+    if not isinstance(content, dict) or not is_sound(content.get(name)):
+        fault = "aren't the figures of this experiment: without the file they are made anew"
+        raise InputError(f"{file}: {name}", None, fault)
+    figures: dict[str, Any] = content[name]
     return figures
 
 
 def cached_scores(
-    run: Run[Any], file: Path, score: Callable[[], dict[str, Any]], is_sound: Callable[[Any], bool], **more: Any
+    run: Run[Any], file: Path, score: Callable[[], dict[str, Any]], is_sound: Callable[[Any], bool], **dependencies: Any
 ) -> dict[str, Any]:
-    """Return a trained run's scores, from `file` where they were made of the same configuration, weights and `more`.
+    """Return a trained run's scores, from `file` where they were made of the same configuration, weights and `dependencies`.
 
     Args:
         run: with the configuration that it is tested with.
         file: for the scores, which are written.
         score: makes them.
         is_sound: see `kept_figures`.
-        more: what else they depend on, as JSON data.
+        dependencies: what else they depend on, as JSON data.
 
     Raises:
         InputError: the file is damaged.
     """
     configuration = lasting_data(run.configuration.to_dict())
-    made_from = {"configuration": configuration, "checkpoint_sha256": checksum(run.folder / CHECKPOINT), **more}
-    if (kept := kept_figures(file, "tests", made_from, is_sound)) is not None:
-        return kept
+    made_from = {"configuration": configuration, "checkpoint_sha256": checksum(run.folder / CHECKPOINT), **dependencies}
+    if (scores_in_file := kept_figures(file, "tests", made_from, is_sound)) is not None:
+        return scores_in_file
     scores = score()
     write_file(file, canonical_json({"made_from": made_from, "tests": scores}).encode(), overwrite=True)
     return scores

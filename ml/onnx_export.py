@@ -72,7 +72,7 @@ def onnx_bytes(network: Exportable) -> bytes:
     Raises:
         InputError: the package onnx or onnxscript isn't installed.
     """
-    axes = {name: torch.export.Dim(name) for of in network.dynamic.values() for name in of.values()}
+    axes = {name: torch.export.Dim(name) for lengths in network.dynamic.values() for name in lengths.values()}
     shapes = tuple(
         {axis: axes[length] for axis, length in network.dynamic.get(name, {}).items()} for name in network.inputs
     )
@@ -116,13 +116,13 @@ def largest_difference(network: Exportable, content: bytes) -> float | None:
     outputs = session.run(list(network.outputs), {name: value.numpy() for name, value in network.inputs.items()})
     with torch.no_grad():
         references = network.model(*network.inputs.values())
-    return max(float(np.abs(one - other.numpy()).max()) for one, other in zip(outputs, references, strict=True))
+    return max(float(np.abs(output - reference.numpy()).max()) for output, reference in zip(outputs, references, strict=True))
 
 
-def described(**told: Any) -> dict[str, str]:
+def described(**entries: Any) -> dict[str, str]:
     """Return metadata as texts: JSON, but for what is text already."""
     return {
-        name: value if isinstance(value, str) else json.dumps(value, sort_keys=True) for name, value in told.items()
+        name: value if isinstance(value, str) else json.dumps(value, sort_keys=True) for name, value in entries.items()
     }
 
 

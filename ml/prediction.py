@@ -64,11 +64,11 @@ def predict(
     if run is None:
         choice = choose_model(cloud, "segmentation")
         run = choice.card.name
-    trained = open_run(Path(run))
-    name = trained.configuration.task
-    written = output or usual_output(cloud, name)
-    asked = Prediction(cloud, written, path, overwrite, classification, "--output" if output else "")
-    return Predicted(name, written, task(name).predict(trained, asked, progress), choice)
+    trained_run = open_run(Path(run))
+    name = trained_run.configuration.task
+    target = output or usual_output(cloud, name)
+    prediction = Prediction(cloud, target, path, overwrite, classification, "--output" if output else "")
+    return Predicted(name, target, task(name).predict(trained_run, prediction, progress), choice)
 
 
 def usual_output(cloud: Path, task_name: str) -> Path:

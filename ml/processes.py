@@ -54,10 +54,10 @@ def average(tensors: Sequence[Tensor]) -> None:
     """Replace tensors of one device and type, in place, by their means over all processes."""
     if process_count() == 1 or not tensors:
         return
-    flat = torch.cat([tensor.reshape(-1) for tensor in tensors])
-    distributed.all_reduce(flat)
-    flat /= process_count()
-    for tensor, mean in zip(tensors, flat.split([tensor.numel() for tensor in tensors]), strict=True):
+    values = torch.cat([tensor.reshape(-1) for tensor in tensors])
+    distributed.all_reduce(values)
+    values /= process_count()
+    for tensor, mean in zip(tensors, values.split([tensor.numel() for tensor in tensors]), strict=True):
         tensor.copy_(mean.view_as(tensor))
 
 
@@ -82,49 +82,49 @@ def helper_processes(run: Run[Any], learn: Callable[[Run[Any]], object], device:
     context = multiprocessing.get_context("spawn")
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         meeting = Path(folder) / "meeting"
-        others = [
+        helpers = [
             context.Process(target=_help, args=(learn, run, meeting, number, device.type)) for number in range(1, count)
         ]
-        for other in others:
-            other.start()
-        done = Event()
-        Thread(target=_exit_if_lost, args=(others, done), daemon=True).start()
+        for helper in helpers:
+            helper.start()
+        finish_event = Event()
+        Thread(target=_exit_if_lost, args=(helpers, finish_event), daemon=True).start()
         try:
             _join(meeting, 0, count, device.type)
             yield
-            for other in others:
-                other.join()
+            for helper in helpers:
+                helper.join()
         except RuntimeError as error:
-            for other in others:
-                other.join(1.0)
-            if all(other.is_alive() for other in others):
+            for helper in helpers:
+                helper.join(1.0)
+            if all(helper.is_alive() for helper in helpers):
                 raise
             raise InputError("processes", count, _LOST) from error
         finally:
-            done.set()
-            for other in others:
-                other.kill()
+            finish_event.set()
+            for helper in helpers:
+                helper.kill()
             if distributed.is_initialized():
                 distributed.destroy_process_group()
 
 
-def _exit_if_lost(others: Sequence[Any], done: Event) -> None:
+def _exit_if_lost(helpers: Sequence[Any], finish_event: Event) -> None:
     """Watch the other processes (in a thread); 60 s after one has failed, exit this one with code 2 if it hangs.
 
     NCCL waits for a lost process up to `_PATIENCE`, and nothing that is raised meanwhile reaches it.
 
     Args:
-        others: processes that train with this one.
-        done: set when this one waits for none of them any more.
+        helpers: processes that train with this one.
+        finish_event: set when this one waits for none of them any more.
     """
-    while not done.wait(1.0):
-        if any(other.exitcode for other in others):
+    while not finish_event.wait(1.0):
+        if any(helper.exitcode for helper in helpers):
             break
-    if not done.wait(_GRACE):
-        sys.stderr.write(f"error: {InputError('processes', len(others) + 1, _LOST)}\n")
+    if not finish_event.wait(_GRACE):
+        sys.stderr.write(f"error: {InputError('processes', len(helpers) + 1, _LOST)}\n")
         sys.stderr.flush()
-        for other in others:
-            other.kill()
+        for helper in helpers:
+            helper.kill()
         remove_scratch_folders()
         os._exit(2)
 

@@ -66,10 +66,10 @@ def networks(task: str) -> dict[str, type[Part]]:
     return dict(sorted(_NETWORKS[task].items()))
 
 
-def network_union(task: str, usual: str) -> Any:
-    """Return the type annotation of a field ``network``: any options of a task, `usual` where no name is given."""
+def network_union(task: str, default: str) -> Any:
+    """Return the type annotation of a field ``network``: any options of a task, `default` where no name is given."""
     models = networks(task)
-    return discriminated_union({usual: models[usual], **models}, "name")
+    return discriminated_union({default: models[default], **models}, "name")
 
 
 def effect(*tasks: str, order: int = 100, **fields: Any) -> Callable[[F], F]:
@@ -96,8 +96,8 @@ def effect(*tasks: str, order: int = 100, **fields: Any) -> Callable[[F], F]:
 def effect_options(task: str, base: type[P]) -> type[P]:
     """Return a subclass of `base`'s options with the fields that registered effects of a task add."""
     _import_files(EFFECTS)
-    added = {name: field for one in _EFFECTS[task].values() for name, field in one.fields.items()}
-    fields: Any = {name: (type(field.default), field) for name, field in added.items()}
+    new_fields = {name: field for effect in _EFFECTS[task].values() for name, field in effect.fields.items()}
+    fields: Any = {name: (type(field.default), field) for name, field in new_fields.items()}
     return create_model(base.__name__, __base__=base, __module__=EFFECTS, __doc__=base.__doc__, **fields)
 
 
@@ -105,16 +105,16 @@ def apply_effects(
     task: str, sample: Any, options: Part, random: np.random.Generator, *, before_thinning: bool = False
 ) -> None:
     """Apply a task's effects to a sample in order, in place: of order below 0 if `before_thinning`, else the others."""
-    for one in sorted(_EFFECTS[task].values(), key=lambda one: one.order):
-        if (one.order < 0) == before_thinning:
-            one.change(sample, options, random)
+    for effect in sorted(_EFFECTS[task].values(), key=lambda one: one.order):
+        if (effect.order < 0) == before_thinning:
+            effect.change(sample, options, random)
 
 
-def _register(known: dict[str, Any], name: str, thing: Any, module: str) -> None:
-    if known.setdefault(name, thing) is not thing:
-        first = getattr(known[name], "change", known[name]).__module__
+def _register(registered: dict[str, Any], name: str, thing: Any, module: str) -> None:
+    if registered.setdefault(name, thing) is not thing:
+        first_module = getattr(registered[name], "change", registered[name]).__module__
         kind = "effect" if isinstance(thing, Effect) else "network"
-        raise ValueError(f"{first} and {module} both have the {kind} {name!r}")
+        raise ValueError(f"{first_module} and {module} both have the {kind} {name!r}")
 
 
 def _import_files(package: str) -> None:

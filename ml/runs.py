@@ -130,8 +130,8 @@ class Run(Generic[C]):
         if self.resume:
             self._resume(read_json(self.folder / CONFIGURATION))
         elif not self.overwrite:
-            told = "holds a run already; --resume goes on, --overwrite begins anew"
-            raise OutputError("--output", str(self.folder), told)
+            fault = "holds a run already; --resume goes on, --overwrite begins anew"
+            raise OutputError("--output", str(self.folder), fault)
         return self.resume
 
     def _kept_checkpoints(self) -> bool:
@@ -221,21 +221,21 @@ class Run(Generic[C]):
         if self.history:
             write_file(self.folder / CURVES, _curves(self.history), overwrite=True)
 
-    def _resume(self, before: Any) -> None:
-        if not isinstance(before, dict):
+    def _resume(self, previous_data: Any) -> None:
+        if not isinstance(previous_data, dict):
             raise InputError(str(self.folder / CONFIGURATION), None, "must be a JSON object")
-        now = self.configuration.to_dict()
+        current_data = self.configuration.to_dict()
         with suppress(InputError):  # fields may be called otherwise by now, or be new
-            before = self.configuration.from_dict(before).to_dict()
-        begun, configuration = lasting_data(before), lasting_data(now)
-        different = [name for name in {**begun, **configuration} if begun.get(name) != configuration.get(name)]
-        if different:
-            name = different[0]
-            raise InputError(f"--resume: {name}", now.get(name), f"the run was begun with {before.get(name)!r}")
+            previous_data = self.configuration.from_dict(previous_data).to_dict()
+        previous_lasting, current_lasting = lasting_data(previous_data), lasting_data(current_data)
+        changed_fields = [name for name in {**previous_lasting, **current_lasting} if previous_lasting.get(name) != current_lasting.get(name)]
+        if changed_fields:
+            name = changed_fields[0]
+            raise InputError(f"--resume: {name}", current_data.get(name), f"the run was begun with {previous_data.get(name)!r}")
         state = self.last_checkpoint()
-        self.kept = done = 0 if state is None else state["epoch"]
-        if done:
-            self.history = _read_history(self.folder / HISTORY)[:done]
+        self.kept = epoch_count = 0 if state is None else state["epoch"]
+        if epoch_count:
+            self.history = _read_history(self.folder / HISTORY)[:epoch_count]
 
 
 def load_state(module: nn.Module | torch.optim.Optimizer, state: Any, source: str) -> None:
@@ -256,10 +256,10 @@ def load_state(module: nn.Module | torch.optim.Optimizer, state: Any, source: st
     except (RuntimeError, ValueError, TypeError, LookupError, AttributeError):  # whatever doesn't fit
         raise InputError(source, None, "its checkpoint is of another network than its configuration") from None
     if isinstance(module, nn.Module):
-        wrong = [name for name, value in module.state_dict().items() if not torch.isfinite(value).all()]
-        if wrong:
-            told = f"not all of its checkpoint's numbers of {wrong[0]} are finite: it is damaged; train anew"
-            raise InputError(source, None, told)
+        damaged_names = [name for name, value in module.state_dict().items() if not torch.isfinite(value).all()]
+        if damaged_names:
+            fault = f"not all of its checkpoint's numbers of {damaged_names[0]} are finite: it is damaged; train anew"
+            raise InputError(source, None, fault)
 
 
 def _kind(value: object) -> str:
@@ -282,12 +282,12 @@ def stream_seed(seed: int, *purpose: str | int) -> int:
 
 def lasting_data(configuration: Mapping[str, Any]) -> dict[str, Any]:
     """Return a configuration's data without the fields that may change on resuming, those of `FREE_WHEN_RESUMING`."""
-    kept = {name: value for name, value in configuration.items() if name not in FREE_WHEN_RESUMING}
-    data = kept.get("data")
+    lasting_fields = {name: value for name, value in configuration.items() if name not in FREE_WHEN_RESUMING}
+    data = lasting_fields.get("data")
     if isinstance(data, Mapping) and isinstance(data.get("stream"), Mapping):
-        lasting = {name: value for name, value in data["stream"].items() if name not in _FREE_IN_STREAM}
-        kept["data"] = {**data, "stream": lasting}
-    return kept
+        stream_data = {name: value for name, value in data["stream"].items() if name not in _FREE_IN_STREAM}
+        lasting_fields["data"] = {**data, "stream": stream_data}
+    return lasting_fields
 
 
 def to_json_data(value: Any) -> Any:

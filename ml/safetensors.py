@@ -65,10 +65,10 @@ def read_metadata(path: Path) -> dict[str, str]:
     Raises:
         MissingFileError, InputError: there is no such file, or it is damaged.
     """
-    told = _header(path)[0].get(METADATA, {})
-    if not isinstance(told, dict) or not all(isinstance(text, str) for text in told.values()):
+    texts = _header(path)[0].get(METADATA, {})
+    if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
         raise InputError(f"{path}: {METADATA}", None, "must be texts by name")
-    return told
+    return texts
 
 
 def read_tensors(path: Path) -> dict[str, Tensor]:
@@ -79,7 +79,7 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
     """
     header, begin = _header(path)
     content = np.fromfile(path, dtype=np.uint8, offset=begin)
-    return {name: _tensor(path, name, told, content) for name, told in header.items() if name != METADATA}
+    return {name: _tensor(path, name, entry, content) for name, entry in header.items() if name != METADATA}
 
 
 def _header(path: Path) -> tuple[dict[str, Any], int]:
@@ -98,16 +98,16 @@ def _header(path: Path) -> tuple[dict[str, Any], int]:
     return header, _LENGTH + length
 
 
-def _tensor(path: Path, name: str, told: Any, content: np.ndarray[Any, np.dtype[np.uint8]]) -> Tensor:
-    damaged = InputError(f"{path}: {name}", None, "lies outside of the file, or isn't as long as its shape says")
+def _tensor(path: Path, name: str, entry: Any, content: np.ndarray[Any, np.dtype[np.uint8]]) -> Tensor:
+    damage_error = InputError(f"{path}: {name}", None, "lies outside of the file, or isn't as long as its shape says")
     try:
-        dtype, shape, (first, last) = _TYPES[told["dtype"]], list(told["shape"]), told["data_offsets"]
+        dtype, shape, (begin, end) = _TYPES[entry["dtype"]], list(entry["shape"]), entry["data_offsets"]
     except (KeyError, TypeError, ValueError):
-        raise damaged from None
-    if any(type(number) is not int for number in (*shape, first, last)):
+        raise damage_error from None
+    if any(type(number) is not int for number in (*shape, begin, end)):
         raise InputError(f"{path}: {name}", None, "its shape and data_offsets must be whole numbers")
     size = prod(shape) * dtype.itemsize
-    if not 0 <= first <= last <= len(content) or last - first != size or any(count < 0 for count in shape):
-        raise damaged
-    part = np.array(content[first:last])  # aligned and writable, as torch wants it
+    if not 0 <= begin <= end <= len(content) or end - begin != size or any(count < 0 for count in shape):
+        raise damage_error
+    part = np.array(content[begin:end])  # aligned and writable, as torch wants it
     return torch.from_numpy(part).view(dtype).reshape(shape) if size else torch.empty(shape, dtype=dtype)

@@ -37,9 +37,9 @@ class ShippedRun(Run[Any]):
 
     def calibration(self) -> dict[str, Any] | None:
         """Return the calibration of its deviations as JSON data, None if it has none."""
-        told = read_metadata(self._weights()).get("calibration")
+        text = read_metadata(self._weights()).get("calibration")
         try:
-            return json.loads(told) if told else None
+            return json.loads(text) if text else None
         except ValueError:
             raise InputError(str(self._weights()), None, "its calibration is no JSON") from None
 
@@ -55,9 +55,9 @@ def open_shipped(name: str) -> ShippedRun:
         InputError: there is none of this name, or its weights are damaged.
     """
     card = read_card(name)
-    told = read_metadata(card.weights).get("configuration", "")
+    text = read_metadata(card.weights).get("configuration", "")
     try:
-        data = json.loads(told)
+        data = json.loads(text)
     except ValueError:
         raise InputError(str(card.weights), None, "says nothing of the network that its weights are of") from None
     return ShippedRun(card.weights.with_suffix(""), from_data(data, str(card.weights)), card=card)

@@ -70,7 +70,7 @@ class Experiment(AnyExperiment):
 
 def run_experiment(
     experiment: Experiment,
-    configured: Mapping[str, CenterlineConfiguration],
+    configurations: Mapping[str, CenterlineConfiguration],
     output: Path,
     seeds: Sequence[int],
     progress: Progress = silent,
@@ -81,7 +81,7 @@ def run_experiment(
 
     Args:
         experiment: what is compared.
-        configured: see `experiments.configurations`.
+        configurations: see `experiments.configurations`.
         output: folder; ``VARIANT/without-ROADS/seed-N`` are the runs, or ``VARIANT/seed-N`` where no real road is
             learned from, `RESULTS` and `TABLE` the figures.
         seeds: one after another, each over all variants: a table is there as soon as the first is through.
@@ -90,38 +90,38 @@ def run_experiment(
     Raises:
         InputError: no variant learns from real roads, or what is to be left out isn't among them.
     """
-    roads = _real_roads(configured)
+    roads = _real_roads(configurations)
     turns = _turns(experiment.data.left_out, roads)
-    tested = [name for turn in turns for name in turn]
-    figures: dict[str, dict[str, Any]] = {name: {} for name in configured}
+    test_roads = [name for turn in turns for name in turn]
+    figures: dict[str, dict[str, Any]] = {name: {} for name in configurations}
     for seed in seeds:
         for name, variant in experiment.variants.items():
             results: dict[str, Any] = {}
             for turn in turns:
-                configuration, out = _without(with_seed(configured[name], seed), turn, roads), _without_name(turn)
-                learned = output / (variant.of or name)
-                folder = (learned / out if configuration.data.measured else learned) / f"seed-{seed}"
+                configuration, folder_name = _without(with_seed(configurations[name], seed), turn, roads), _without_name(turn)
+                variant_folder = output / (variant.of or name)
+                folder = (variant_folder / folder_name if configuration.data.measured else variant_folder) / f"seed-{seed}"
                 if variant.of is None:
                     _train(configuration, folder, progress)
-                file = output / name / f"{out}-seed-{seed}.json"
+                file = output / name / f"{folder_name}-seed-{seed}.json"
                 results |= _test(Run(folder, configuration), {road: roads[road] for road in turn}, file, progress)
-            figures[name][str(seed)] = {road: results[road] for road in tested}
-            write_results(output, figures, table(experiment.title, figures, list(configured)))
-        settings = configured[next(iter(configured))]
-        for rule, results in _rules(settings, seed, {road: roads[road] for road in tested}, output, progress).items():
+            figures[name][str(seed)] = {road: results[road] for road in test_roads}
+            write_results(output, figures, table(experiment.title, figures, list(configurations)))
+        settings = configurations[next(iter(configurations))]
+        for rule, results in _rules(settings, seed, {road: roads[road] for road in test_roads}, output, progress).items():
             figures.setdefault(rule, {})[str(seed)] = results
-        write_results(output, figures, table(experiment.title, figures, list(configured)))
+        write_results(output, figures, table(experiment.title, figures, list(configurations)))
     return figures
 
 
-def _real_roads(configured: Mapping[str, CenterlineConfiguration]) -> dict[str, tuple[Path, Path]]:
+def _real_roads(configurations: Mapping[str, CenterlineConfiguration]) -> dict[str, tuple[Path, Path]]:
     """Return cloud and axis of each real road that a variant learns from, by name.
 
     Raises:
         InputError: there are none, or two have one name.
     """
     roads: dict[str, tuple[Path, Path]] = {}
-    for configuration in configured.values():
+    for configuration in configurations.values():
         for cloud, axis in (files for road in configuration.data.measured for files in road.files()):
             if roads.setdefault(cloud.stem, (cloud, axis)) != (cloud, axis):
                 raise InputError("data.real", cloud.stem, "is the name of several roads, by which they are left out")
@@ -154,17 +154,17 @@ def _without(
     Raises:
         InputError: nothing else is left.
     """
-    measured = []
+    remaining_roads = []
     for road in configuration.data.measured:
         if Path(road.cloud).is_dir():
-            out = {*road.left_out, *(name for name in turn if roads[name][0].parent == Path(road.cloud))}
-            if any(cloud.stem not in out for cloud, _ in road.files()):
-                measured.append(road.model_copy(update={"left_out": tuple(sorted(out))}))
+            left_out = {*road.left_out, *(name for name in turn if roads[name][0].parent == Path(road.cloud))}
+            if any(cloud.stem not in left_out for cloud, _ in road.files()):
+                remaining_roads.append(road.model_copy(update={"left_out": tuple(sorted(left_out))}))
         elif Path(road.cloud).stem not in turn:
-            measured.append(road)
-    if configuration.data.measured and not measured:
+            remaining_roads.append(road)
+    if configuration.data.measured and not remaining_roads:
         raise InputError("left_out", list(turn), "leaves no real road to learn from")
-    data = configuration.data.model_copy(update={"measured": tuple(measured)})
+    data = configuration.data.model_copy(update={"measured": tuple(remaining_roads)})
     return configuration.model_copy(update={"data": data})
 
 
@@ -203,15 +203,15 @@ def _rules(
     """Return the figures by road of all predictors that learn nothing, cached in the experiment's folder."""
     file = output / "rules" / f"seed-{seed}.json"
     made_from = {"slices": configuration.slices.to_dict(), "roads": _checksums(roads)}
-    trivial = {name: one for name, (one,) in trivial_predictors(configuration.slices.half_width).items()}
-    predictors = {VIEWS: views_predictor(), "skeleton": skeleton_predictor(SkeletonSettings())} | trivial
+    trivial_rules = {name: predictor for name, (predictor,) in trivial_predictors(configuration.slices.half_width).items()}
+    predictors = {VIEWS: views_predictor(), "skeleton": skeleton_predictor(SkeletonSettings())} | trivial_rules
 
-    def are_sound(kept: Any) -> bool:
-        there = isinstance(kept, dict) and kept.keys() == predictors.keys()
-        return there and all(_are_figures(one, set(roads)) for one in kept.values())
+    def are_sound(data: Any) -> bool:
+        has_names = isinstance(data, dict) and data.keys() == predictors.keys()
+        return has_names and all(_are_figures(figures, set(roads)) for figures in data.values())
 
-    if (kept := kept_figures(file, "rules", made_from, are_sound)) is not None:
-        return kept
+    if (figures := kept_figures(file, "rules", made_from, are_sound)) is not None:
+        return figures
     rules = _measure(predictors, with_seed(configuration, seed), roads, progress)
     write_file(file, canonical_json({"made_from": made_from, "rules": rules}).encode(), overwrite=True)
     return rules
@@ -228,18 +228,18 @@ def _measure(
     settings = configuration.slices
     for number, (road, (cloud, axis)) in enumerate(roads.items()):
         progress(f"measuring on {road}", number / len(roads))
-        read: LearningRoad = read_measured(cloud, axis, settings.truth)
-        case = measured_case(read, configuration.seed, settings)
+        learning_road: LearningRoad = read_measured(cloud, axis, settings.truth)
+        case = measured_case(learning_road, configuration.seed, settings)
         for name, predictor in predictors.items():
             figures[name][road] = to_json_data(evaluate(predictor, case))
     return figures
 
 
-def _are_figures(kept: Any, names: Set[str]) -> bool:
+def _are_figures(data: Any, names: Set[str]) -> bool:
     """Return whether JSON data are figures of some roads by name, as `_measure` makes them of each predictor."""
-    if not isinstance(kept, dict) or kept.keys() != names:
+    if not isinstance(data, dict) or data.keys() != names:
         return False
-    for figures in kept.values():
+    for figures in data.values():
         if not isinstance(figures, dict) or not figures.keys() <= FIGURES.keys() or figures.get("slices") is None:
             return False
         if not all(value is None or is_number(value) for value in figures.values()):
@@ -259,10 +259,10 @@ def table(title: str, results: Results, variants: Sequence[str]) -> str:
         results: figures of variants and of rules, see `Results`; those without a seed are left out.
         variants: the variants' names; all others are rules, of which the best of each road is shown.
     """
-    done = {name: seeds for name, seeds in results.items() if seeds}
-    first = next(iter(done.values()), {})
-    roads = list(next(iter(first.values()), {}))
-    spreads = {name: _spreads(seeds, roads) for name, seeds in done.items()}
+    started = {name: seeds for name, seeds in results.items() if seeds}
+    first_variant = next(iter(started.values()), {})
+    roads = list(next(iter(first_variant.values()), {}))
+    spreads = {name: _spreads(seeds, roads) for name, seeds in started.items()}
     lines = [
         f"# {title}",
         "",
@@ -276,10 +276,10 @@ def table(title: str, results: Results, variants: Sequence[str]) -> str:
             for name in spreads
             if name in (*variants, VIEWS)
         ]
-        if not metric.title.startswith("in ") and len(done) > len(variants):
+        if not metric.title.startswith("in ") and len(started) > len(variants):
             rows.append(_best_rule(spreads, variants, metric, figure))
         lines += [f"**{metric.title}**", "", markdown(["", *roads, "all"], rows)]
-    counts = ", ".join(f"{name} {len(done[name])}" for name in variants if name in done)
+    counts = ", ".join(f"{name} {len(started[name])}" for name in variants if name in started)
     return "\n".join([*lines, f"Seeds: {counts}.", ""])
 
 
@@ -302,8 +302,8 @@ def _best_rule(
     rules = [name for name in spreads if name not in (*variants, VIEWS, PATH)]
     row = ["best of the rules"]
     for road in spreads[rules[0]]:
-        there = [spreads[name][road][figure] for name in rules if figure in spreads[name][road]]
+        rule_spreads = [spreads[name][road][figure] for name in rules if figure in spreads[name][road]]
         row.append(
-            cell(min((one for one in there if one.mean == one.mean), key=lambda one: one.mean, default=None), metric)
+            cell(min((spread for spread in rule_spreads if spread.mean == spread.mean), key=lambda one: one.mean, default=None), metric)
         )
     return row

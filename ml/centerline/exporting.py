@@ -40,20 +40,20 @@ def exportable_network(predictor: CenterlinePredictor, seed: int) -> Exportable:
         seed: of the example.
     """
     settings = predictor.settings
-    draw = torch.Generator().manual_seed(seed)
+    generator = torch.Generator().manual_seed(seed)
     shape = (2, settings.slices, min(settings.points_per_slice, 64))
     spread = torch.tensor([settings.thickness, 2.0 * settings.half_width, 0.5])
     frame = torch.zeros(*shape[:2], 4, dtype=torch.float64)
     frame[..., 0] = settings.spacing * torch.arange(settings.slices)
     inputs = {
-        "coord": spread * (torch.rand(*shape, 3, generator=draw) - 0.5),
-        "feat": torch.randn(*shape, len(FEATURES), generator=draw),
-        "mask": torch.rand(*shape, generator=draw) < 0.9,
+        "coord": spread * (torch.rand(*shape, 3, generator=generator) - 0.5),
+        "feat": torch.randn(*shape, len(FEATURES), generator=generator),
+        "mask": torch.rand(*shape, generator=generator) < 0.9,
         "frame": frame,
     }
     points = {0: "sequences", 2: "points"}
     dynamic = {"coord": points, "feat": points, "mask": points, "frame": {0: "sequences"}}
-    calibration: dict[str, Any] = {name: one.to_dict() for name, one in predictor.calibration.items()}
+    calibration: dict[str, Any] = {name: calibration_of_target.to_dict() for name, calibration_of_target in predictor.calibration.items()}
     metadata = described(
         task="centerline",
         slices=settings.to_dict(),

@@ -39,29 +39,29 @@ def find_road(
     line = line or path_through(ground)
     frames = frames_along(line, predictor.settings.frame_spacing)
     shape = (len(frames), len(TARGETS))
-    value, raw, std = (np.full(shape, np.nan) for _ in range(3))
+    value, raw_std, std = (np.full(shape, np.nan) for _ in range(3))
     widths = np.full((*shape, 2), np.nan)
-    for road, local, rows in strips(cloud, ground, line, frames, progress):
-        regression = predictor.regress(road, local)
+    for road, local_frames, rows in strips(cloud, ground, line, frames, progress):
+        regression = predictor.regress(road, local_frames)
         # Frames keep their stations, which rise strictly, from strip to strip.
-        number = np.searchsorted(frames.station, regression.frames.station[rows])
-        value[number] = regression.value[rows]
-        value[number, _HEIGHT] += road.origin[2]
-        raw[number], std[number], widths[number] = (
+        frame_numbers = np.searchsorted(frames.station, regression.frames.station[rows])
+        value[frame_numbers] = regression.value[rows]
+        value[frame_numbers, _HEIGHT] += road.origin[2]
+        raw_std[frame_numbers], std[frame_numbers], widths[frame_numbers] = (
             regression.raw_std[rows],
             regression.std[rows],
             regression.widths[rows],
         )
-        progress("finding the road", float(number[-1] + 1) / len(frames) if len(number) else 0.0)
-    kept = _found_span(value[:, 0])
+        progress("finding the road", float(frame_numbers[-1] + 1) / len(frames) if len(frame_numbers) else 0.0)
+    found_span = _found_span(value[:, 0])
     codes = (ground.header.epsg, ground.header.height_epsg)
-    return Regression(frames.select(kept), value[kept], raw[kept], std[kept], widths[kept], *codes)
+    return Regression(frames.select(found_span), value[found_span], raw_std[found_span], std[found_span], widths[found_span], *codes)
 
 
 def _found_span(center: Float) -> slice:
     """Return the slice from the first to the last frame whose `center` isn't NaN; of all frames if all are NaN."""
-    there = np.flatnonzero(np.isfinite(center))
-    return slice(int(there[0]), int(there[-1]) + 1) if len(there) else slice(None)
+    found_frames = np.flatnonzero(np.isfinite(center))
+    return slice(int(found_frames[0]), int(found_frames[-1]) + 1) if len(found_frames) else slice(None)
 
 
 DIGITS = 4
@@ -85,11 +85,11 @@ def centerline_geojson(regression: Regression, name: str, spacing: float) -> dic
     for line in ("center", "left_edge", "right_edge"):
         column = TARGETS.index(line)
         points = regression.points(line)
-        there = np.isfinite(points).all(axis=1)
-        far = np.concatenate([[True], np.diff(regression.frames.station) > 1.5 * spacing])
-        ends = np.flatnonzero(far | ~there | ~np.concatenate([[False], there[:-1]]))
-        for stretch in np.split(np.arange(len(there)), ends):
-            part = stretch[there[stretch]]
+        is_found = np.isfinite(points).all(axis=1)
+        after_gap = np.concatenate([[True], np.diff(regression.frames.station) > 1.5 * spacing])
+        ends = np.flatnonzero(after_gap | ~is_found | ~np.concatenate([[False], is_found[:-1]]))
+        for stretch in np.split(np.arange(len(is_found)), ends):
+            part = stretch[is_found[stretch]]
             if len(part) < 2:
                 continue
             properties = {

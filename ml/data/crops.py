@@ -84,13 +84,13 @@ class Seeds:
         """
         if self._counts is not None:
             group = int(np.searchsorted(self._ends, tile, side="right"))
-            first, end = int(self._ends[group - 1]) if group else 0, int(self._ends[group])
-            counts = self._counts[first:end]
+            first_tile, end_tile = int(self._ends[group - 1]) if group else 0, int(self._ends[group])
+            counts = self._counts[first_tile:end_tile]
             per_class = counts.sum(axis=0)
             if per_class.any():
                 label = random.choice(np.flatnonzero(per_class))
-                chosen = first + int(random.choice(end - first, p=counts[:, label] / per_class[label]))
-                return chosen, int(random.choice(np.flatnonzero(self._tiles[chosen].segment == label)))
+                chosen_tile = first_tile + int(random.choice(end_tile - first_tile, p=counts[:, label] / per_class[label]))
+                return chosen_tile, int(random.choice(np.flatnonzero(self._tiles[chosen_tile].segment == label)))
         return tile, int(random.integers(len(self._tiles[tile])))
 
 
@@ -160,8 +160,8 @@ def cut_crop(tile: CloudTile, middle: Float32, points: int, scaling: Scaling) ->
     Columns rather than balls: a gantry stays with its posts and a crown with its trunk.
     """
     if len(tile) > points:
-        away = ((tile.coord[:, :2] - middle[:2]) ** 2).sum(axis=1)
-        keep = np.sort(np.argpartition(away, points - 1)[:points])
+        squared_distance = ((tile.coord[:, :2] - middle[:2]) ** 2).sum(axis=1)
+        keep = np.sort(np.argpartition(squared_distance, points - 1)[:points])
         tile = tile.select(keep)
     return crop_of(tile, scaling)
 
@@ -193,14 +193,14 @@ def make_item(crop: Crop, settings: CropSettings, random: np.random.Generator) -
     color = _noise(random, (count, 3)) if crop.color is None else crop.color
     strength = _noise(random, (count, 1)) if crop.strength is None else crop.strength[:, None]
     columns = np.concatenate([coord / COORDINATE_SPAN, color, strength], axis=1)
-    chosen = [FEATURES.index(name) for name in settings.features]
+    feature_columns = [FEATURES.index(name) for name in settings.features]
     grid = np.floor(coord / settings.voxel).astype(np.int32)
     arrays: dict[str, AnyArray] = {
         "coord": coord,
         "grid_coord": grid - grid.min(axis=0),
         "color": color,
         "strength": strength,
-        "feat": columns[:, chosen],
+        "feat": columns[:, feature_columns],
         "segment": crop.segment.astype(np.int64),
         "offset": np.array([count], dtype=np.int64),
     }

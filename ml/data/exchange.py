@@ -38,31 +38,31 @@ class ExchangedCrops:
 
     def __getitem__(self, place: int) -> list[Item]:
         """Return the pair at a place as two items."""
-        given, random = self.synthetic.crop(place)
+        synthetic_crop, random = self.synthetic.crop(place)
         target_crop, _ = self.target.crop(place)
-        pair = exchanged(given, target_crop, stream(self.seed, "exchange", self.epoch, place))
+        pair = exchanged(synthetic_crop, target_crop, stream(self.seed, "exchange", self.epoch, place))
         return [make_item(crop, self.synthetic.settings, random) for crop in pair]
 
 
-def exchanged(one: Crop, other: Crop, random: np.random.Generator) -> tuple[Crop, Crop]:
+def exchanged(one: Crop, other_crop: Crop, random: np.random.Generator) -> tuple[Crop, Crop]:
     """Return two crops, centred, each with the other's points of a random half of the other's classes laid into it."""
-    centred_pair = [replace(crop, coord=centred(crop.coord)) for crop in (one, other)]
-    taken = [_some_classes(crop, random) for crop in centred_pair]
-    first, second = centred_pair
-    return _joined(first, second, taken[1]), _joined(second, first, taken[0])
+    centred_pair = [replace(crop, coord=centred(crop.coord)) for crop in (one, other_crop)]
+    class_masks = [_some_classes(crop, random) for crop in centred_pair]
+    first_crop, second_crop = centred_pair
+    return _joined(first_crop, second_crop, class_masks[1]), _joined(second_crop, first_crop, class_masks[0])
 
 
 def _some_classes(crop: Crop, random: np.random.Generator) -> Bool:
     """Return a mask (N,) of the points of a random half of a crop's classes, at least one where it has any."""
-    there = np.unique(crop.segment[crop.segment != IGNORED])
-    chosen = random.permutation(there)[: -(-len(there) // 2)]
-    return np.asarray(np.isin(crop.segment, chosen))
+    present_classes = np.unique(crop.segment[crop.segment != IGNORED])
+    chosen_classes = random.permutation(present_classes)[: -(-len(present_classes) // 2)]
+    return np.asarray(np.isin(crop.segment, chosen_classes))
 
 
-def _joined(crop: Crop, other: Crop, keep: Bool) -> Crop:
+def _joined(crop: Crop, other_crop: Crop, keep: Bool) -> Crop:
     """Return a crop with some of another's points behind its own; what either lacks is missing in all."""
     parts: dict[str, Any] = {}
     for name in crop.per_point:
-        values, more = getattr(crop, name), getattr(other, name)
-        parts[name] = None if values is None or more is None else np.concatenate([values, more[keep]])
+        values, other_values = getattr(crop, name), getattr(other_crop, name)
+        parts[name] = None if values is None or other_values is None else np.concatenate([values, other_values[keep]])
     return replace(crop, **parts)

@@ -59,8 +59,8 @@ def corridor_tiles(
     if not blocks:
         return
     points = concatenate(blocks)
-    _, nearest = tree.query(points.xyz[:, :2])
-    station = nearest * _SPACING // length
+    _, nearest_index = tree.query(points.xyz[:, :2])
+    station = nearest_index * _SPACING // length
     for number in np.unique(station):
         part = points.select(station == number)
         if len(part) >= _SMALLEST:
@@ -95,21 +95,21 @@ def choose_tiles(tiles: Iterable[Packed], limit: int, seed: int) -> list[Packed]
         limit: bytes of the file.
         seed: of the choice.
     """
-    given = list(tiles)
-    order = stream(seed, "packed tiles").permutation(len(given))
+    all_tiles = list(tiles)
+    order = stream(seed, "packed tiles").permutation(len(all_tiles))
     turns: dict[str, int] = {}
     ranked = []
     for place in order.tolist():
-        scene = str(given[place].notes["scene"])
+        scene = str(all_tiles[place].notes["scene"])
         ranked.append((turns.get(scene, 0), place))
         turns[scene] = turns.get(scene, 0) + 1
-    size, chosen = 1 << 16, []  # room for the notes' frame
+    size, chosen_places = 1 << 16, []  # room for the notes' frame
     for _, place in sorted(ranked):
-        more = len(given[place].content) + 700  # and for the tile's own notes and names
-        if size + more <= limit:
-            size += more
-            chosen.append(place)
-    return [given[place] for place in sorted(chosen)]
+        tile_size = len(all_tiles[place].content) + 700  # and for the tile's own notes and names
+        if size + tile_size <= limit:
+            size += tile_size
+            chosen_places.append(place)
+    return [all_tiles[place] for place in sorted(chosen_places)]
 
 
 def pack_summary(notes: Sequence[Mapping[str, Any]], size: int) -> dict[str, Any]:

@@ -60,20 +60,20 @@ def encode_words(tile: CloudTile) -> tuple[NDArray[np.uint64], NDArray[np.int32]
         raise InputError("classes", int(tile.segment.max()) + 1, f"must be at most {_NO_CLASS}")
     steps = np.rint(tile.coord.astype(np.float64) / STEP).astype(np.int64)
     cubes = steps // CUBE
-    inside = steps - cubes * CUBE
+    cube_steps = steps - cubes * CUBE
     keys = cell_keys(cubes.astype(np.float64))
-    order = np.lexsort((inside[:, 0], inside[:, 1], inside[:, 2], keys))
+    order = np.lexsort((cube_steps[:, 0], cube_steps[:, 1], cube_steps[:, 2], keys))
     starts = np.flatnonzero(np.r_[True, np.diff(keys[order]) != 0])
     counts = np.diff(np.r_[starts, len(order)])
     word = np.zeros(len(tile), dtype=np.uint64)
-    for values, shift in _fields(tile, inside):
+    for values, shift in _fields(tile, cube_steps):
         word |= values.astype(np.uint64) << np.uint64(shift)
     return word[order], cubes[order[starts]].astype(np.int32), counts
 
 
-def _fields(tile: CloudTile, inside: Int) -> Iterator[tuple[AnyArray, int]]:
+def _fields(tile: CloudTile, cube_steps: Int) -> Iterator[tuple[AnyArray, int]]:
     for axis in range(3):
-        yield inside[:, axis], 10 * axis
+        yield cube_steps[:, axis], 10 * axis
     if tile.color is not None:
         color = tile.color.astype(np.int64)
         yield color[:, 0] >> 3, 30
@@ -100,11 +100,11 @@ def pack_tile(tile: CloudTile) -> Packed:
     return Packed(notes, zlib.compress(content, 9))
 
 
-def unpack_tile(packed: Packed) -> CloudTile:
+def unpack_tile(packed_tile: Packed) -> CloudTile:
     """Return the decompressed tile: coordinates to half a step (5 mm), colours and intensities to their stored bits."""
-    notes = packed.notes
+    notes = packed_tile.notes
     points, cubes = int(notes["points"]), int(notes["cubes"])
-    content = zlib.decompress(packed.content)
+    content = zlib.decompress(packed_tile.content)
     if len(content) != 16 * cubes + 8 * points:
         raise ValueError("length")
     places = np.frombuffer(content, "<i4", 3 * cubes).reshape(-1, 3).astype(np.int64)

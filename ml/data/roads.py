@@ -83,8 +83,8 @@ class LearningRoad(Points):
     ) -> LearningRoad:
         """Return the points within ``reach`` (m) of a line, sorted by station along it, as a road."""
         station, offset = reference.project(points.xyz)
-        near = np.flatnonzero(np.abs(offset) <= reach)
-        order = near[np.argsort(station[near], kind="stable")]
+        rows_near = np.flatnonzero(np.abs(offset) <= reach)
+        order = rows_near[np.argsort(station[rows_near], kind="stable")]
         return cls(
             name=name,
             origin=points.origin,
@@ -105,8 +105,8 @@ class LearningRoad(Points):
         if self.truth is None or not np.isfinite(self.truth.room).any():
             return np.ones(len(self), dtype=bool)
         station, offset = self.truth.axis.project(self.xyz)
-        nearest = np.clip(np.searchsorted(self.truth.axis.station, station), 0, len(self.truth.room) - 1)
-        room = self.truth.room[nearest]
+        nearest_vertex = np.clip(np.searchsorted(self.truth.axis.station, station), 0, len(self.truth.room) - 1)
+        room = self.truth.room[nearest_vertex]
         return np.asarray((offset <= room[:, 0]) & (-offset <= room[:, 1]))
 
     def slices(self, frames: Frames, half_width: float, thickness: float = 1.0) -> Slices:
@@ -115,25 +115,25 @@ class LearningRoad(Points):
         A point is in a slice where it lies within half the thickness before or behind the frame's origin and within
         half_width (both m) beside it.
         """
-        half = 0.5 * thickness
-        ahead = np.column_stack([np.cos(frames.direction), np.sin(frames.direction)])
+        half_thickness = 0.5 * thickness
+        forward = np.column_stack([np.cos(frames.direction), np.sin(frames.direction)])
         corners = [
-            replace(frames, position=frames.position + x * ahead).at(np.full(len(frames), y))
-            for x in (-half, half)
+            replace(frames, position=frames.position + x * forward).at(np.full(len(frames), y))
+            for x in (-half_thickness, half_thickness)
             for y in (-half_width, half_width)
         ]
         stations = self.reference.project(np.concatenate(corners))[0].reshape(4, -1)
-        first = np.searchsorted(self.station, stations.min(axis=0) - _MARGIN)
-        last = np.searchsorted(self.station, stations.max(axis=0) + _MARGIN)
+        first_points = np.searchsorted(self.station, stations.min(axis=0) - _MARGIN)
+        end_points = np.searchsorted(self.station, stations.max(axis=0) + _MARGIN)
         index, place, counts = [], [], []
-        for at, direction, low, high in zip(frames.position, frames.direction, first, last, strict=True):
-            delta = self.xyz[low:high, :2] - at
+        for origin, direction, begin, end in zip(frames.position, frames.direction, first_points, end_points, strict=True):
+            delta = self.xyz[begin:end, :2] - origin
             cos, sin = np.cos(direction), np.sin(direction)
             x, y = cos * delta[:, 0] + sin * delta[:, 1], cos * delta[:, 1] - sin * delta[:, 0]
-            inside = np.flatnonzero((np.abs(x) <= half) & (np.abs(y) <= half_width))
-            index.append(low + inside)
-            place.append(np.column_stack([x[inside], y[inside]]))
-            counts.append(len(inside))
+            rows = np.flatnonzero((np.abs(x) <= half_thickness) & (np.abs(y) <= half_width))
+            index.append(begin + rows)
+            place.append(np.column_stack([x[rows], y[rows]]))
+            counts.append(len(rows))
         number = np.repeat(np.arange(len(frames)), counts)
         return Slices(np.concatenate(index), number, np.concatenate(place))
 
@@ -160,11 +160,11 @@ def scene_folders(data_set: Path, split: str | None) -> list[Path]:
         MissingFileError: there is no manifest.
         InputError: no scene of the split is done.
     """
-    done = [scene for scene in read_manifest(data_set).scenes if scene.status == "done"]
-    folders = [data_set / "scenes" / scene.name for scene in done if split in (None, scene.split)]
+    finished_scenes = [scene for scene in read_manifest(data_set).scenes if scene.status == "done"]
+    folders = [data_set / "scenes" / scene.name for scene in finished_scenes if split in (None, scene.split)]
     if not folders:
-        known = ", ".join(sorted({scene.split for scene in done}))
-        raise InputError(f"{data_set}: split", split, f"has no scene that is done; there is {known or 'none at all'}")
+        splits = ", ".join(sorted({scene.split for scene in finished_scenes}))
+        raise InputError(f"{data_set}: split", split, f"has no scene that is done; there is {splits or 'none at all'}")
     return folders
 
 
@@ -186,20 +186,20 @@ def read_scene(folder: Path, kind: Learned, cache: Path | None = None, keep: boo
         if not (folder / name).is_file():
             raise MissingFileError(str(folder / name), None, "no such file; a scene of a data set has one")
     parameters = read_parameters(folder / PARAMETERS)
-    whole = _read_cache(folder, cache) if cache else None
-    if whole is None:
+    scene_road = _read_cache(folder, cache) if cache else None
+    if scene_road is None:
         points = read_points(folder / CLOUD, GROUND_CLASSES)
         reference = truths(parameters, "road", points.origin)[0].axis
-        whole = LearningRoad.of_points(folder.name, points, reference)
+        scene_road = LearningRoad.of_points(folder.name, points, reference)
         if cache and keep:
-            _write_cache(whole, folder, cache)
-    road_truths = truths(parameters, kind, whole.origin)
+            _write_cache(scene_road, folder, cache)
+    road_truths = truths(parameters, kind, scene_road.origin)
     names = (
         [folder.name]
         if len(road_truths) == 1
         else [f"{folder.name}-{number + 1}" for number in range(len(road_truths))]
     )
-    return [replace(whole, name=name, truth=truth) for name, truth in zip(names, road_truths, strict=True)]
+    return [replace(scene_road, name=name, truth=truth) for name, truth in zip(names, road_truths, strict=True)]
 
 
 def axis_beside(cloud: Path) -> Path:
@@ -211,11 +211,11 @@ def axis_beside(cloud: Path) -> Path:
     if not cloud.exists():
         raise MissingFileError(str(cloud), None, "no such cloud, nor a data set's folder")
     candidates = [cloud.with_name(cloud.stem + ending) for ending in AXIS_ENDINGS]
-    there = next((path for path in candidates if path.is_file()), None)
-    if there is None:
+    axis_file = next((path for path in candidates if path.is_file()), None)
+    if axis_file is None:
         names = " or ".join(path.name for path in candidates)
         raise MissingFileError(str(cloud), None, f"has no axis beside it, {names}")
-    return there
+    return axis_file
 
 
 def clouds_with_axes(folder: Path) -> list[Path]:
@@ -229,8 +229,8 @@ def clouds_with_axes(folder: Path) -> list[Path]:
         path for path in clouds if any(path.with_name(path.stem + end).is_file() for end in AXIS_ENDINGS)
     ]
     if not clouds_with_axis:
-        allowed = f"holds no cloud with its axis beside it, NAME{' or NAME'.join(AXIS_ENDINGS)}"
-        raise MissingFileError(str(folder), None, allowed)
+        fault = f"holds no cloud with its axis beside it, NAME{' or NAME'.join(AXIS_ENDINGS)}"
+        raise MissingFileError(str(folder), None, fault)
     return clouds_with_axis
 
 
@@ -289,8 +289,8 @@ def cut_strip(road: LearningRoad, seed: int) -> LearningRoad:
     """
     if road.truth is None:
         return road
-    low, high = np.log(STRIP)
-    reach = float(np.exp(stream(seed, "strip", road.name).uniform(low, high)))
+    log_least, log_largest = np.log(STRIP)
+    reach = float(np.exp(stream(seed, "strip", road.name).uniform(log_least, log_largest)))
     _, offset = road.truth.axis.project(road.xyz)
     return road.select(np.abs(offset) <= reach)
 
@@ -305,8 +305,8 @@ def cut_beside_median(road: LearningRoad, error: float, rng: np.random.Generator
         error: how far from the middle of the median it may be at most, m.
         rng: draws it, uniformly.
     """
-    aside = rng.uniform(-error, error)
-    return road if road.truth is None else replace(road, truth=replace(road.truth, room=road.truth.room + aside))
+    shift = rng.uniform(-error, error)
+    return road if road.truth is None else replace(road, truth=replace(road.truth, room=road.truth.room + shift))
 
 
 def _cache_folder(folder: Path, cache: Path) -> Path:
@@ -326,15 +326,15 @@ def _write_cache(road: LearningRoad, folder: Path, cache: Path) -> None:
     try:
         cache.mkdir(parents=True, exist_ok=True)
         with scratch_folder(cache) as scratch:
-            made = scratch / place.name
-            made.mkdir()
+            new_folder = scratch / place.name
+            new_folder.mkdir()
             for array in _CACHED:
-                np.save(made / f"{array}.npy", getattr(road, array))
-            np.save(made / "reference.npy", road.reference.points)
-            (made / "notes.json").write_text(json.dumps(notes), encoding="utf-8")
+                np.save(new_folder / f"{array}.npy", getattr(road, array))
+            np.save(new_folder / "reference.npy", road.reference.points)
+            (new_folder / "notes.json").write_text(json.dumps(notes), encoding="utf-8")
             shutil.rmtree(place, ignore_errors=True)
             with suppress(OSError):  # another training has just kept the same
-                made.rename(place)
+                new_folder.rename(place)
     except OSError as error:
         raise OutputError("data.cache", str(cache), f"cannot be written ({error.strerror})") from None
 

@@ -91,6 +91,6 @@ class Stretch(Sample):
 
     def without_shoulders(self) -> bool:
         """Return whether it is a carriageway whose pavement ends within 1.2 m of its edge lines, in all slices."""
-        beyond = self.paved_sides() - self.lines
-        beyond = beyond[np.isfinite(beyond)]
-        return self.carriageway and bool(len(beyond)) and float(beyond.max()) <= NO_SHOULDER
+        excesses = self.paved_sides() - self.lines
+        excesses = excesses[np.isfinite(excesses)]
+        return self.carriageway and bool(len(excesses)) and float(excesses.max()) <= NO_SHOULDER

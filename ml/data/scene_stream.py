@@ -163,16 +163,16 @@ class SceneStream:
             for number in scene_numbers(self.folder):
                 if number < window.start:
                     remove_scene(self.folder, number)
-            last = min(epoch + 1, self.epochs - 1)
-            write_wanted(self.folder, range(window.start, self.options.window(last).stop))
-        while missing := [number for number in window if not is_made(self.folder, number)]:
-            self.progress("waiting for scenes", 1.0 - len(missing) / len(window))
-            self._check_producers(missing)
+            last_epoch = min(epoch + 1, self.epochs - 1)
+            write_wanted(self.folder, range(window.start, self.options.window(last_epoch).stop))
+        while missing_numbers := [number for number in window if not is_made(self.folder, number)]:
+            self.progress("waiting for scenes", 1.0 - len(missing_numbers) / len(window))
+            self._check_producers(missing_numbers)
             time.sleep(_TICK)
-        failed = [read_entry(self.folder, number) for number in window]
-        if all(entry.status == "failed" for entry in failed):
-            told = f"can't be made ({failed[0].error}), like all others of the epoch"
-            raise InputError("data.stream", failed[0].name, told)
+        entries = [read_entry(self.folder, number) for number in window]
+        if all(entry.status == "failed" for entry in entries):
+            fault = f"can't be made ({entries[0].error}), like all others of the epoch"
+            raise InputError("data.stream", entries[0].name, fault)
         return {number: scene_folder(self.folder, number) for number in window}
 
     def remove(self) -> None:
@@ -217,20 +217,20 @@ class SceneStream:
                 env=module_environment(),
             )
 
-    def _check_producers(self, missing: Sequence[int]) -> None:
+    def _check_producers(self, missing_numbers: Sequence[int]) -> None:
         """Raise `InputError` if a scene failed, or nobody is there any more to make those that are missing."""
         code = None if self._process is None else self._process.poll()
         if (failure := read_failure(self.folder)) is not None:
-            named = f"scene {failure.number}" + (f", {failure.name}" if failure.name else "")
-            told = f"couldn't be made: {failure.error}; --resume tries again"
+            scene_name = f"scene {failure.number}" + (f", {failure.name}" if failure.name else "")
+            fault = f"couldn't be made: {failure.error}; --resume tries again"
         elif code is not None:
             lines = (self.folder / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
-            named = f"scene {missing[0]}"
-            told = f"isn't made: the producer has ended with code {code} ({lines[-1] if lines else 'without a word'}); "
-            told += "--resume tries again"
+            scene_name = f"scene {missing_numbers[0]}"
+            fault = f"isn't made: the producer has ended with code {code} ({lines[-1] if lines else 'without a word'}); "
+            fault += "--resume tries again"
         else:
             return
-        raise InputError("data.stream", named, told)
+        raise InputError("data.stream", scene_name, fault)
 
 
 class EpochScenes:
@@ -241,8 +241,8 @@ class EpochScenes:
         read: reads a scene that was made, of a number and a folder.
     """
 
-    def __init__(self, stream: SceneStream, read: Callable[[int, Path], list[Any]]) -> None:
-        self._stream, self._read = stream, read
+    def __init__(self, stream: SceneStream, read_scene: Callable[[int, Path], list[Any]]) -> None:
+        self._stream, self._read = stream, read_scene
         self._kept: dict[int, list[Any]] = {}
 
     def __call__(self, epoch: int) -> list[Any]:
@@ -250,7 +250,7 @@ class EpochScenes:
         folders = self._stream.begin_epoch(epoch)
         for number, folder in folders.items():
             if number not in self._kept:
-                failed = read_entry(self._stream.folder, number).status == "failed"
-                self._kept[number] = [] if failed else self._read(number, folder)
+                has_failed = read_entry(self._stream.folder, number).status == "failed"
+                self._kept[number] = [] if has_failed else self._read(number, folder)
         self._kept = {number: self._kept[number] for number in folders}
-        return [one for crops in self._kept.values() for one in crops]
+        return [item for crops in self._kept.values() for item in crops]

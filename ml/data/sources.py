@@ -89,11 +89,11 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None, *, labe
         raise MissingFileError(str(path), None, f"no such file or folder of labelled points{hint}")
     for tile in tiles:
         try:
-            kept = slice(None) if voxel is None else voxel_sample(tile.coord, voxel)
+            sample = slice(None) if voxel is None else voxel_sample(tile.coord, voxel)
         except ValueError:
             raise InputError(str(path), None, f"a tile of {tile.scene} is too large for cells of {voxel:g} m") from None
-        thin = tile.select(kept)
-        yield thin if labels else replace(thin, segment=np.full(len(thin), IGNORED, dtype=np.int16))
+        thinned_tile = tile.select(sample)
+        yield thinned_tile if labels else replace(thinned_tile, segment=np.full(len(thinned_tile), IGNORED, dtype=np.int16))
 
 
 def _is_pack(path: Path) -> bool:
@@ -114,9 +114,9 @@ def _packed_tiles(path: Path, scheme: ClassScheme, voxel: float | None) -> Itera
         yield replace(tile, segment=_places(tile.segment, tile.segment != IGNORED, table))
 
 
-def _places(numbers: AnyArray, known: Bool, table: NDArray[np.int16]) -> NDArray[np.int16]:
-    """Return the scheme's class indices (N,) of a source's numbers by a table; `IGNORED` where `known` is False."""
-    return np.where(known, table[np.where(known, numbers, 0)], IGNORED).astype(np.int16)
+def _places(numbers: AnyArray, is_known: Bool, table: NDArray[np.int16]) -> NDArray[np.int16]:
+    """Return the scheme's class indices (N,) of a source's numbers by a table; `IGNORED` where `is_known` is False."""
+    return np.where(is_known, table[np.where(is_known, numbers, 0)], IGNORED).astype(np.int16)
 
 
 def _folder_tiles(path: Path, scheme: ClassScheme, source: Source, *, labels: bool) -> Iterator[CloudTile]:
@@ -156,9 +156,9 @@ def pointcept_tiles(root: Path, scheme: ClassScheme, split: str | None) -> Itera
         MissingFileError: there is no such split, or it is empty.
         InputError: an array is missing or of another length.
     """
-    told = read_json(root / "classes.json")
+    class_data = read_json(root / "classes.json")
     try:
-        names = dict(zip((int(number) for number in told["ids"]), map(str, told["classes"]), strict=True))
+        names = dict(zip((int(number) for number in class_data["ids"]), map(str, class_data["classes"]), strict=True))
     except (KeyError, TypeError, ValueError):
         raise InputError(str(root / "classes.json"), None, "must hold lists of classes and their ids") from None
     table = table_between(names, scheme, str(root))
@@ -193,14 +193,14 @@ def _pointcept_tile(folder: Path, table: NDArray[np.int16]) -> CloudTile:
         origin = np.array(notes.get("origin", [0.0, 0.0, 0.0]), dtype=np.float64).reshape(3)
     except (AttributeError, TypeError, ValueError):
         raise InputError(str(folder / "tile.json"), None, "must be an object whose origin is three numbers") from None
-    known = (segment >= 0) & (segment < UNLABELLED)
+    is_known = (segment >= 0) & (segment < UNLABELLED)
     return CloudTile(
         str(notes.get("scene", folder.name)),
         origin,
         coord,
         color if color is not None and color.any() else None,
         strength if strength is not None and strength.any() else None,
-        _places(segment, known, table),
+        _places(segment, is_known, table),
     )
 
 
@@ -238,8 +238,8 @@ def cloud_tiles(
         if not cloud.header.count:
             raise InputError(str(path), 0, "holds no points to learn from")
         scale = steps_per_unit(cloud)
-        low = np.min([block.xyz.min(axis=0) for block in cloud.blocks() if len(block)], axis=0)
-        origin = np.floor(low)
+        lowest = np.min([block.xyz.min(axis=0) for block in cloud.blocks() if len(block)], axis=0)
+        origin = np.floor(lowest)
         with TileSorter(source.tile, origin, Path(folder)) as sorter:
             sorter.add(labelled_blocks(cloud, scheme, source) if labels else unlabelled_blocks(cloud))
             for part in sorter.tiles():
@@ -270,8 +270,8 @@ def yardstick_tiles(folder: Path, scheme: ClassScheme, source: Source) -> Iterat
     edge = 1000.0 if yardstick.form == "sweeps" else source.tile
     for path in yardstick.files(folder, source.split):
         scene = path.relative_to(folder).with_suffix("").as_posix()
-        low = np.min([block.xyz.min(axis=0) for block, _ in numbered_blocks(path, yardstick) if len(block)], axis=0)
-        with tempfile.TemporaryDirectory() as scratch, TileSorter(edge, np.floor(low), Path(scratch)) as sorter:
+        lowest = np.min([block.xyz.min(axis=0) for block, _ in numbered_blocks(path, yardstick) if len(block)], axis=0)
+        with tempfile.TemporaryDirectory() as scratch, TileSorter(edge, np.floor(lowest), Path(scratch)) as sorter:
             for block, numbers in numbered_blocks(path, yardstick):
                 places = mapping.label(numbers, names)
                 if mapping.ignore_zero_intensity:
@@ -306,15 +306,15 @@ def labelled_blocks(cloud: CloudReader, scheme: ClassScheme, source: Source) -> 
     mapping, names = source.label_mapping(), class_names(scheme)
     if mapping is None:
         if not cloud.header.labelled:
-            allowed = "has no labels of ours: `mapping` must say which of its numbers is which class"
-            raise InputError(str(cloud.header.path), None, allowed)
+            fault = "has no labels of ours: `mapping` must say which of its numbers is which class"
+            raise InputError(str(cloud.header.path), None, fault)
         table = table_between({row.id: row.name for row in cloud.header.scheme.rows}, scheme, str(cloud.header.path))
         for block in cloud.usable_blocks():
             yield _with_places(block, table[block.class_id])
         return
-    for every, every_number in zip(cloud.blocks(), _numbers(cloud, mapping.field), strict=True):
-        kept = cloud.usable_points(every, noise=True)  # it is for the mapping to say what numbers mean
-        block, numbers = without_flags(every.select(kept)), every_number[kept]
+    for file_block, file_numbers in zip(cloud.blocks(), _numbers(cloud, mapping.field), strict=True):
+        is_usable = cloud.usable_points(file_block, noise=True)  # it is for the mapping to say what numbers mean
+        block, numbers = without_flags(file_block.select(is_usable)), file_numbers[is_usable]
         places = mapping.label(numbers, names)
         if mapping.ignore_zero_intensity:
             places = np.where(block.intensity > 0, places, IGNORED).astype(np.int16)

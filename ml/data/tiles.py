@@ -79,8 +79,8 @@ def robust_scaling(strengths: Sequence[Float32]) -> Scaling:
     values = np.concatenate(strengths) if strengths else np.zeros(0, dtype=np.float32)
     if len(values) == 0:
         return Scaling()
-    low, middle, high = np.percentile(values, [10.0, 50.0, 90.0])
-    return Scaling(float(middle), float(high - low) if high > low else 1.0)
+    lower_decile, median, upper_decile = np.percentile(values, [10.0, 50.0, 90.0])
+    return Scaling(float(median), float(upper_decile - lower_decile) if upper_decile > lower_decile else 1.0)
 
 
 def scalings(tiles: Sequence[CloudTile], kind: str, voxel: float | None = None) -> dict[str, Scaling]:

@@ -79,17 +79,17 @@ def shorten_sockets() -> None:
     place = tempfile.gettempdir()
     if sys.platform == "win32" or _fits(place) or _socket_folders:
         return
-    for other in _SHORT_PLACES:
+    for short_place in _SHORT_PLACES:
         with suppress(OSError):
             stack = ExitStack()
-            folder = str(stack.enter_context(scratch_folder(Path(other))))
+            folder = str(stack.enter_context(scratch_folder(Path(short_place))))
             _socket_folders.append(stack)
             Finalize(None, stack.close, exitpriority=_AFTER_SOCKETS)
-            before, tempfile.tempdir = tempfile.tempdir, folder
+            previous_folder, tempfile.tempdir = tempfile.tempdir, folder
             try:
                 get_temp_dir()  # once for this process and its workers
             finally:
-                tempfile.tempdir = before
+                tempfile.tempdir = previous_folder
             return
     raise OutputError("temporary folder", place, "has too long a name for data workers; TMPDIR names another")
 
@@ -124,20 +124,20 @@ def report_lost_workers(workers: int) -> Iterator[None]:
     except RuntimeError as error:
         if not str(error).startswith("DataLoader worker (pid"):
             raise
-        said = " ".join(str(error).partition(". ")[0].split())
-        allowed = f"one of these processes was lost ({said}): is memory short? --resume goes on, with fewer too"
-        raise InputError("workers", workers, allowed) from None
+        message = " ".join(str(error).partition(". ")[0].split())
+        fault = f"one of these processes was lost ({message}): is memory short? --resume goes on, with fewer too"
+        raise InputError("workers", workers, fault) from None
 
 
 def silence_lost_pipes(_worker: int) -> None:
     """Initialise a data worker so that it prints no broken-pipe traceback after its trainer ended."""
-    said = sys.excepthook
+    previous_hook = sys.excepthook
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # its end by PyTorch, put off by `defer_interrupt`
 
     def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         if not issubclass(kind, (EOFError, ConnectionError)):
-            said(kind, error, trace)
+            previous_hook(kind, error, trace)
 
     sys.excepthook = hook
 
@@ -152,8 +152,8 @@ def defer_interrupt() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
+    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)

@@ -21,13 +21,13 @@ def full_precision(function: Callable[P, R]) -> Callable[P, R]:
     """Wrap a function of tensors to run in float32 even under bfloat16 autocast, in which 60 m would be 0.25 m off."""
 
     @wraps(function)
-    def exact(*given: P.args, **named: P.kwargs) -> R:
-        device = next(one.device.type for one in given if isinstance(one, Tensor))
+    def exact(*arguments: P.args, **keywords: P.kwargs) -> R:
+        device = next(argument.device.type for argument in arguments if isinstance(argument, Tensor))
         if not torch.is_autocast_enabled(device):
-            return function(*given, **named)
-        wide: Any = [one.float() if isinstance(one, Tensor) and one.dtype == torch.bfloat16 else one for one in given]
+            return function(*arguments, **keywords)
+        widened_arguments: Any = [argument.float() if isinstance(argument, Tensor) and argument.dtype == torch.bfloat16 else argument for argument in arguments]
         with torch.autocast(device, enabled=False):
-            return function(*wide, **named)
+            return function(*widened_arguments, **keywords)
 
     return exact
 

@@ -42,7 +42,7 @@ class IntervalCalibration:
     @property
     def holds(self) -> bool:
         """Whether the one factor brings both shares within their tolerances."""
-        return all(abs(share - level) <= by for share, level, by in zip(self.after, LEVELS, TOLERANCES, strict=True))
+        return all(abs(share - level) <= tolerance for share, level, tolerance in zip(self.after, LEVELS, TOLERANCES, strict=True))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the calibration as JSON data, with `holds`."""
@@ -51,8 +51,8 @@ class IntervalCalibration:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
         """Return the calibration from `to_dict`'s data; None in pairs becomes NaN."""
-        widths, before, after = (_pair(data[name]) for name in ("widths", "before", "after"))
-        return cls(float(data["factor"]), widths, before, after, int(data["count"]))
+        widths, share_before, share_after = (_pair(data[name]) for name in ("widths", "before", "after"))
+        return cls(float(data["factor"]), widths, share_before, share_after, int(data["count"]))
 
 
 def calibrate_target(error: Float, std: Float) -> IntervalCalibration:
@@ -62,23 +62,23 @@ def calibrate_target(error: Float, std: Float) -> IntervalCalibration:
         error: (N,) errors; those that aren't finite don't count.
         std: (N,) the model's standard deviations in the same unit, > 0.
     """
-    known = np.isfinite(error) & np.isfinite(std)
-    ratio = np.sort(np.abs(error[known]) / std[known])
+    is_known = np.isfinite(error) & np.isfinite(std)
+    ratio = np.sort(np.abs(error[is_known]) / std[is_known])
     if not len(ratio):
         return IntervalCalibration()
     widths = tuple(_conformal(ratio, level) for level in LEVELS)
     # The share that is covered changes only where the interval's end passes an error.
-    tried = np.unique(np.concatenate([ratio / deviation for deviation in DEVIATIONS]))
-    tried = tried[tried > 0.0]
-    factor = float(tried[np.argmin(_share_error(ratio, tried))]) if len(tried) else 1.0
+    candidate_factors = np.unique(np.concatenate([ratio / deviation for deviation in DEVIATIONS]))
+    candidate_factors = candidate_factors[candidate_factors > 0.0]
+    factor = float(candidate_factors[np.argmin(_share_error(ratio, candidate_factors))]) if len(candidate_factors) else 1.0
     return IntervalCalibration(
         factor, (widths[0], widths[1]), _covered_share(ratio, 1.0), _covered_share(ratio, factor), len(ratio)
     )
 
 
 def _pair(values: Sequence[float | None]) -> tuple[float, float]:
-    first, second = (float("nan") if value is None else float(value) for value in values)
-    return first, second
+    first_value, second_value = (float("nan") if value is None else float(value) for value in values)
+    return first_value, second_value
 
 
 def _conformal(ratio: Float, level: float) -> float:
@@ -94,8 +94,8 @@ def _covered_share(ratio: Float, factor: float) -> tuple[float, float]:
 
 def _share_error(ratio: Float, factors: Float) -> Float:
     """Return for each factor (F,) the larger of the two levels' coverage errors, in units of `TOLERANCES`."""
-    missed = [
+    errors = [
         np.abs(np.searchsorted(ratio, factors * deviation, side="right") / len(ratio) - level) / tolerance
         for deviation, level, tolerance in zip(DEVIATIONS, LEVELS, TOLERANCES, strict=True)
     ]
-    return np.maximum(*missed)
+    return np.maximum(*errors)

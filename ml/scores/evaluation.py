@@ -87,23 +87,23 @@ def make_case(
         InputError: the road has no truth.
     """
     settings = settings or SliceSettings()
-    seen = road if cropping is None else crop_road(road, cropping.share, seed, cropping.length)
-    seen = cut_beside_median(seen, settings.median_error, stream(seed, "median", road.name))
-    path = estimated_path(seen.xyz.astype(np.float64)) if estimated else road.known_truth.axis
+    visible_road = road if cropping is None else crop_road(road, cropping.share, seed, cropping.length)
+    visible_road = cut_beside_median(visible_road, settings.median_error, stream(seed, "median", road.name))
+    path = estimated_path(visible_road.xyz.astype(np.float64)) if estimated else road.known_truth.axis
     rng = stream(seed, "frames", road.name)
-    strayed = displace_frames(frames_along(path), rng, settings.window, settings.direction_deg, settings.wander_length)
-    return Case(seen, strayed)
+    displaced_frames = displace_frames(frames_along(path), rng, settings.window, settings.direction_deg, settings.wander_length)
+    return Case(visible_road, displaced_frames)
 
 
-def evaluate(predictor: Predictor, shown: Case) -> dict[str, float]:
+def evaluate(predictor: Predictor, case: Case) -> dict[str, float]:
     """Return one predictor's metrics (`distances.METRICS`) on one road, by name; undefined ones are NaN or missing."""
-    frames = shown.frames
-    predicted = predictor(shown.road, frames)
-    true, _ = shown.road.known_truth.axis.crossing(frames.position, frames.direction)
-    std = predicted[:, 1] if predicted.shape[1] > 1 else None
-    intervals = predicted[:, -2:] if predicted.shape[1] == len(CORRIDOR_COLUMNS) else None
-    compared = Comparison(frames.at(predicted[:, 0]), frames.at(true), frames.station, std, intervals)
-    return figures(METRICS, compared)
+    frames = case.frames
+    prediction = predictor(case.road, frames)
+    true_y, _ = case.road.known_truth.axis.crossing(frames.position, frames.direction)
+    std = prediction[:, 1] if prediction.shape[1] > 1 else None
+    intervals = prediction[:, -2:] if prediction.shape[1] == len(CORRIDOR_COLUMNS) else None
+    comparison = Comparison(frames.at(prediction[:, 0]), frames.at(true_y), frames.station, std, intervals)
+    return figures(METRICS, comparison)
 
 
 def measure(
@@ -124,27 +124,27 @@ def measure(
         if len(versions) not in (1, len(seeds)):
             raise ValueError(f"{name}: {len(versions)} predictors for {len(seeds)} seeds")
     for index, seed in enumerate(seeds):
-        shown = cases(seed)
-        names = [one.road.name for one in shown]
-        if twice := {name for name in names if names.count(name) > 1}:
-            raise InputError("road", sorted(twice)[0], "is the name of several roads; give data sets of other names")
+        seed_cases = cases(seed)
+        names = [case.road.name for case in seed_cases]
+        if repeated_names := {name for name in names if names.count(name) > 1}:
+            raise InputError("road", sorted(repeated_names)[0], "is the name of several roads; give data sets of other names")
         metrics_by_road: dict[str, dict[str, dict[str, float]]] = {name: {} for name in predictors}
-        for one in shown:  # road by road: predictors share what they cut out of it
+        for case in seed_cases:  # road by road: predictors share what they cut out of it
             for name, versions in predictors.items():
-                metrics_by_road[name][one.road.name] = evaluate(versions[0 if len(versions) == 1 else index], one)
+                metrics_by_road[name][case.road.name] = evaluate(versions[0 if len(versions) == 1 else index], case)
         for name, by_name in metrics_by_road.items():
             for road, row in (*by_name.items(), ("all", over_roads(by_name.values()))):
                 rows[name].setdefault(road, []).append(row)
     return {name: {road: over_seeds(values) for road, values in by_road.items()} for name, by_road in rows.items()}
 
 
-def trivial_predictor(name: str, cut: SliceCache | None = None) -> Predictor:
-    """Return the untrained predictor of a rule's name in `baselines.RULES`; `cut` shares slices between predictors."""
+def trivial_predictor(name: str, slice_cache: SliceCache | None = None) -> Predictor:
+    """Return the untrained predictor of a rule's name in `baselines.RULES`; `slice_cache` shares slices between predictors."""
     rule, length = baselines.RULES[name]
-    cut = cut or SliceCache()
+    slice_cache = slice_cache or SliceCache()
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
-        slices = cut(road, frames, length)
+        slices = slice_cache(road, frames, length)
         belonging = road.belonging[slices.index]
         y, intensity = slices.xy[belonging, 1], road.intensity[slices.index[belonging]].astype(np.float64)
         return baselines.slice_centers(rule, slices.number[belonging], y, intensity, len(frames))[:, None]
@@ -198,10 +198,10 @@ def predict_path(road: LearningRoad, frames: Frames) -> Float:
 def trivial_predictors(half_width: float = HALF_WIDTH) -> dict[str, list[Predictor]]:
     """Return all untrained baseline predictors by name, one each, for `measure`; they share the slices cut out."""
     predictors: dict[str, list[Predictor]] = {"the displaced path": [predict_path]}
-    cut = SliceCache(half_width)
-    predictors |= {name: [trivial_predictor(name, cut)] for name in baselines.RULES}
+    slice_cache = SliceCache(half_width)
+    predictors |= {name: [trivial_predictor(name, slice_cache)] for name in baselines.RULES}
     for name in baselines.SPANNED:
-        rule = trivial_predictor(name, cut)
+        rule = trivial_predictor(name, slice_cache)
         predictors[f"{name}, parabola of {baselines.SPAN:.0f} m"] = [along_parabolas(rule, baselines.SPAN)]
     return predictors
 
@@ -213,13 +213,13 @@ def along_parabolas(predictor: Predictor, length: float) -> Predictor:
         y = predictor(road, frames)[:, 0]
         place, result = frames.at(y), np.full(len(y), np.nan)
         for part in stretches(frames):
-            known = part[np.isfinite(y[part])]
+            found_rows = part[np.isfinite(y[part])]
             for index in part:
-                near = known[np.abs(frames.station[known] - frames.station[index]) <= 0.5 * length]
-                if len(near) >= baselines.FEWEST:
+                neighbours = found_rows[np.abs(frames.station[found_rows] - frames.station[index]) <= 0.5 * length]
+                if len(neighbours) >= baselines.FEWEST:
                     cos, sin = np.cos(frames.direction[index]), np.sin(frames.direction[index])
-                    x, aside = ((place[near] - frames.position[index]) @ np.array([[cos, -sin], [sin, cos]])).T
-                    result[index] = np.polyfit(x, aside, 2)[2]
+                    x, lateral_offset = ((place[neighbours] - frames.position[index]) @ np.array([[cos, -sin], [sin, cos]])).T
+                    result[index] = np.polyfit(x, lateral_offset, 2)[2]
         return result[:, None]
 
     return predict

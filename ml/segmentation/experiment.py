@@ -46,7 +46,7 @@ class Experiment(AnyExperiment):
 
 def run_experiment(
     experiment: Experiment,
-    configured: Mapping[str, SegmentationConfiguration],
+    configurations: Mapping[str, SegmentationConfiguration],
     output: Path,
     seeds: Sequence[int],
     progress: Progress = silent,
@@ -55,15 +55,15 @@ def run_experiment(
 
     Args:
         experiment: what is compared.
-        configured: see `configurations`.
+        configurations: see `configurations`.
         output: folder; ``VARIANT/seed-N`` are the runs, `RESULTS` and `TABLE` the scores.
         seeds: one after another, each over all variants: a table is there as soon as the first is through.
         progress: of each training.
     """
-    results: dict[str, dict[str, Any]] = {name: {} for name in configured}
+    results: dict[str, dict[str, Any]] = {name: {} for name in configurations}
     for seed in seeds:
         for name, variant in experiment.variants.items():
-            configuration = with_seed(configured[name], seed)
+            configuration = with_seed(configurations[name], seed)
             folder = output / (variant.of or name) / f"seed-{seed}"
             if variant.of is None:
                 tests = _train_variant(configuration, folder, output, progress)
@@ -85,16 +85,16 @@ def _train_variant(
                 run.begin()
                 _reuse_pretraining(configuration, run.part(PRETRAINING), output)
             train(run, progress)
-    kept = kept_figures(folder / METRICS, "tests", None, partial(_are_tests, configuration))
-    assert kept is not None, "the training has written it"
-    return kept
+    tests = kept_figures(folder / METRICS, "tests", None, partial(_are_tests, configuration))
+    assert tests is not None, "the training has written it"
+    return tests
 
 
-def _are_tests(configuration: SegmentationConfiguration, kept: Any) -> bool:
+def _are_tests(configuration: SegmentationConfiguration, data: Any) -> bool:
     """Return whether JSON data are scores of a configuration's tests, as `score_all` makes them."""
     tests, scheme = configuration.data.tests, configuration.scheme()
-    there = isinstance(kept, dict) and kept.keys() == tests.keys()
-    return there and all(are_scores(kept[name], told_apart(sources, scheme)) for name, sources in tests.items())
+    has_tests = isinstance(data, dict) and data.keys() == tests.keys()
+    return has_tests and all(are_scores(data[name], told_apart(sources, scheme)) for name, sources in tests.items())
 
 
 def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, output: Path) -> None:
@@ -103,8 +103,8 @@ def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, o
     if (target / CONFIGURATION).is_file():
         return
     for file in sorted(output.glob(f"*/*/{CONFIGURATION}")):
-        told = read_json(file)
-        if isinstance(told, dict) and lasting_data(told) == data and (file.parent / METRICS).is_file():
+        stored = read_json(file)
+        if isinstance(stored, dict) and lasting_data(stored) == data and (file.parent / METRICS).is_file():
             for name in (CONFIGURATION, CHECKPOINT, HISTORY):
                 write_file(target / name, (file.parent / name).read_bytes(), overwrite=True)
             return
@@ -127,5 +127,5 @@ def table(title: str, results: Mapping[str, Mapping[str, Any]], variants: Sequen
         results: variant -> seed -> test -> scores as of `Confusion.to_dict`.
         variants: those that are shown; all if none.
     """
-    shown = {name: results[name] for name in variants or results}
-    return f"# {title}\n\n{tables_by_test(shown)}\n"
+    chosen_results = {name: results[name] for name in variants or results}
+    return f"# {title}\n\n{tables_by_test(chosen_results)}\n"

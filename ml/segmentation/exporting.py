@@ -42,12 +42,12 @@ def exportable_network(model: nn.Module, configuration: SegmentationConfiguratio
     Raises:
         InputError: the network can't be written as ONNX.
     """
-    draw = torch.Generator().manual_seed(configuration.seed)
+    generator = torch.Generator().manual_seed(configuration.seed)
     points = _CLOUDS * _POINTS
-    coord = torch.rand(points, 3, generator=draw) * torch.tensor([_CUBE, _CUBE, 1.0])
+    coord = torch.rand(points, 3, generator=generator) * torch.tensor([_CUBE, _CUBE, 1.0])
     offset = torch.arange(_POINTS, points + 1, _POINTS)
     geometry = configuration.network.onnx_inputs({"coord": coord, "offset": offset})
-    feat = torch.randn(points, len(configuration.features), generator=draw)
+    feat = torch.randn(points, len(configuration.features), generator=generator)
     names = tuple(geometry.inputs)
     dynamic = {"feat": {0: "points0"}, **geometry.lengths}
     metadata = described(
@@ -58,5 +58,5 @@ def exportable_network(model: nn.Module, configuration: SegmentationConfiguratio
         intensity=configuration.intensity,
         network=configuration.network.to_dict(),
     )
-    wrapped = _FromTensors(model, names).eval()
-    return Exportable(wrapped, {"feat": feat, **geometry.inputs}, dynamic, ("scores",), metadata)
+    tensor_model = _FromTensors(model, names).eval()
+    return Exportable(tensor_model, {"feat": feat, **geometry.inputs}, dynamic, ("scores",), metadata)

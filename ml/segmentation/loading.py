@@ -56,8 +56,8 @@ def prepare_domains(
 
 def large_enough(tiles: Sequence[CloudTile], configuration: SegmentationConfiguration) -> list[CloudTile]:
     """Return the tiles with at least `SMALLEST_SHARE` of a crop's points; all with any point if there are none."""
-    least = SMALLEST_SHARE * configuration.crop_points
-    return [tile for tile in tiles if len(tile) >= least] or [tile for tile in tiles if len(tile)]
+    smallest_size = SMALLEST_SHARE * configuration.crop_points
+    return [tile for tile in tiles if len(tile) >= smallest_size] or [tile for tile in tiles if len(tile)]
 
 
 def thin_tiles(
@@ -100,29 +100,29 @@ class CropBatches:
         self.seeds = self._seeds()
 
     def __len__(self) -> int:
-        given = self.configuration
-        return math.ceil((given.crops_per_epoch or given.crops_per_tile * len(self.tiles)) / given.batch)
+        configuration = self.configuration
+        return math.ceil((configuration.crops_per_epoch or configuration.crops_per_tile * len(self.tiles)) / configuration.batch)
 
     def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Item]:
         """Yield the batches of an epoch whose numbers, from 0, `share` selects."""
-        given, sizes = self.configuration, [len(tiles) for tiles in self.domains]
-        draws = plan(sizes, given.crops_per_tile, given.synthetic_share, given.seed, epoch, given.crops_per_epoch)
+        configuration, sizes = self.configuration, [len(tiles) for tiles in self.domains]
+        draws = plan(sizes, configuration.crops_per_tile, configuration.synthetic_share, configuration.seed, epoch, configuration.crops_per_epoch)
         crops = self._crops(self.tiles, draws, self.seeds[0], epoch)
-        yield from _load_crops(crops, given, epoch, given.adaptation.mix3d, share, self.device)
+        yield from _load_crops(crops, configuration, epoch, configuration.adaptation.mix3d, share, self.device)
 
     def _seeds(self) -> list[Seeds]:
         """Return where crops are cut out, in all tiles.
 
         Where a share is stated, a crop stays in the domain that it was planned in, whatever class is looked for.
         """
-        given = self.configuration
-        groups = [len(tiles) for tiles in self.domains] if given.synthetic_share is not None else ()
-        return [Seeds(self.tiles, len(class_names(given.scheme())), given.balanced, groups)]
+        configuration = self.configuration
+        groups = [len(tiles) for tiles in self.domains] if configuration.synthetic_share is not None else ()
+        return [Seeds(self.tiles, len(class_names(configuration.scheme())), configuration.balanced, groups)]
 
     def _crops(self, tiles: Sequence[CloudTile], draws: Sequence[Draw], seeds: Seeds, epoch: int) -> CropDataset:
-        given = self.configuration
-        settings, scaling = given.crop_settings(), self.scaling
-        return CropDataset(tiles, scaling, settings, draws, seeds, effects=given.effects, seed=given.seed, epoch=epoch)
+        configuration = self.configuration
+        settings, scaling = configuration.crop_settings(), self.scaling
+        return CropDataset(tiles, scaling, settings, draws, seeds, effects=configuration.effects, seed=configuration.seed, epoch=epoch)
 
 
 class ExchangedBatches(CropBatches):
@@ -141,18 +141,18 @@ class ExchangedBatches(CropBatches):
 
     def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Item]:
         """Yield the batches of an epoch whose numbers, from 0, `share` selects."""
-        given = self.configuration
+        configuration = self.configuration
         synthetic, target = (
             self._crops(tiles, self._draws(len(tiles), place, epoch), seeds, epoch)
             for place, (tiles, seeds) in enumerate(zip(self.domains, self.seeds, strict=True))
         )
-        pairs = ExchangedCrops(synthetic, target, given.seed, epoch)
-        yield from _load_crops(pairs, given, epoch, 0.0, share, self.device, self._pairs_per_batch())
+        pairs = ExchangedCrops(synthetic, target, configuration.seed, epoch)
+        yield from _load_crops(pairs, configuration, epoch, 0.0, share, self.device, self._pairs_per_batch())
 
     def _pairs(self) -> int:
         """Return the pairs of an epoch: as many as there are crops of synthetic tiles."""
-        given = self.configuration
-        return given.crops_per_epoch or given.crops_per_tile * len(self.domains[0])
+        configuration = self.configuration
+        return configuration.crops_per_epoch or configuration.crops_per_tile * len(self.domains[0])
 
     def _pairs_per_batch(self) -> int:
         return max(self.configuration.batch // 2, 1)
@@ -191,9 +191,9 @@ class StreamedCropBatches:
         self.epoch: int | None = None
 
     def __len__(self) -> int:
-        given = self.configuration
-        assert given.crops_per_epoch is not None, "the configuration has seen to it"
-        return math.ceil(given.crops_per_epoch / given.batch)
+        configuration = self.configuration
+        assert configuration.crops_per_epoch is not None, "the configuration has seen to it"
+        return math.ceil(configuration.crops_per_epoch / configuration.batch)
 
     def domains(self, epoch: int) -> dict[str, list[CloudTile]]:
         """Return an epoch's tiles by domain, when all its scenes are there.
@@ -233,7 +233,7 @@ def _load_crops(
     numbers, size = range(len(dataset)), size or configuration.batch
     return load_batches(
         dataset,
-        [numbers[first : first + size] for first in numbers[::size][share]],
+        [numbers[start : start + size] for start in numbers[::size][share]],
         Collate(configuration, epoch, mix3d, gpu_prepares(configuration, device)),
         configuration.workers,
         pin_memory=device.type == "cuda",
@@ -255,17 +255,17 @@ class Collate:
     mix3d: float
     left_to_gpu: bool
 
-    def __call__(self, drawn: Sequence[Item] | Sequence[list[Item]]) -> Item:
+    def __call__(self, samples: Sequence[Item] | Sequence[list[Item]]) -> Item:
         """Return the batch of items or of pairs, perhaps overlaid, prepared unless the GPU does that."""
-        items = [item for each in drawn for item in (each if isinstance(each, list) else [each])]
+        items = [item for sample in samples for item in (sample if isinstance(sample, list) else [sample])]
         batch = collate(items)
         if self.mix3d and self._chance(items[0]) < self.mix3d:
             batch = overlay_clouds(batch)
         return batch if self.left_to_gpu else self.configuration.network.prepare(batch)
 
-    def _chance(self, first: Item) -> float:
+    def _chance(self, item: Item) -> float:
         """Return a random number from 0 to 1 seeded by the first item's points: workers don't know batch numbers."""
-        content = zlib.crc32(first["coord"].numpy().tobytes())
+        content = zlib.crc32(item["coord"].numpy().tobytes())
         return float(stream(self.configuration.seed, "mix3d", self.epoch, content).random())
 
 
@@ -278,12 +278,12 @@ def adaptation_batches(
     # By their points: a sliver says as much of the scene as it holds of it.
     shares = np.array([len(tile) for tile in tiles]) / sum(map(len, tiles))
     random = stream(configuration.seed, "adaptation")
-    chosen = random.choice(len(tiles), configuration.adaptation.adabn_crops, p=shares)
+    tile_indices = random.choice(len(tiles), configuration.adaptation.adabn_crops, p=shares)
     dataset = CropDataset(
         tiles,
         scalings(tiles, configuration.intensity),
         configuration.crop_settings(),
-        [Draw(int(tile), number) for number, tile in enumerate(chosen)],
+        [Draw(int(tile), number) for number, tile in enumerate(tile_indices)],
         Seeds(tiles, 0, balanced=False),
         seed=configuration.seed,
     )

@@ -156,8 +156,8 @@ class SegmentationConfiguration(Configuration):
         Raises:
             InputError: the set-up needs data of a kind and none are named.
         """
-        alone = {"real": ("real",), "synthetic": ("synthetic",), "self_trained": ("synthetic",)}
-        domains = alone.get(self.set_up, ("synthetic", "real"))
+        single_domains = {"real": ("real",), "synthetic": ("synthetic",), "self_trained": ("synthetic",)}
+        domains = single_domains.get(self.set_up, ("synthetic", "real"))
         sources = {"real": self.data.real, "synthetic": self.data.synthetic}
         for domain in domains:
             if not sources[domain] and not (domain == "synthetic" and self.data.stream is not None):
@@ -193,8 +193,8 @@ def mapped_intensities(synthetic: Sequence[CloudTile], real: Sequence[CloudTile]
     Raises:
         InputError: one of them has no intensities.
     """
-    have, want = _histogram(synthetic, "data.synthetic"), _histogram(real, "data.real")
-    mapping = QuantileMap(have, want)
+    synthetic_histogram, real_histogram = _histogram(synthetic, "data.synthetic"), _histogram(real, "data.real")
+    mapping = QuantileMap(synthetic_histogram, real_histogram)
     return [
         replace(tile, strength=(mapping.map(_levels(tile)) / FULL).astype(np.float32))
         if tile.strength is not None
@@ -235,14 +235,14 @@ def plan(
         seed, epoch: of the order, and of which tiles have one crop more where the share leaves a rest.
         total: the epoch's crops, in the place of ``per_tile``.
     """
-    whole = sum(domains)
-    total = per_tile * whole if total is None else total
+    tile_count = sum(domains)
+    total = per_tile * tile_count if total is None else total
     random = stream(seed, "plan", epoch)
     if synthetic_share is None or len(domains) < 2:
-        counts = np.diff(np.rint(total * np.cumsum([0, *domains]) / whole).astype(int)).tolist()
+        counts = np.diff(np.rint(total * np.cumsum([0, *domains]) / tile_count).astype(int)).tolist()
     else:
-        first = min(max(round(total * synthetic_share), 1), total - 1)
-        counts = [first, total - first]
+        synthetic_crops = min(max(round(total * synthetic_share), 1), total - 1)
+        counts = [synthetic_crops, total - synthetic_crops]
     draws: list[Draw] = []
     begin = 0
     for tiles, count in zip(domains, counts, strict=True):

@@ -28,8 +28,8 @@ def target_tiles(configuration: SegmentationConfiguration) -> list[CloudTile]:
     Raises:
         MissingFileError, InputError: there are none, they are damaged, or hold no points.
     """
-    thinned = thin_tiles(configuration.data.target, configuration, "target", labels=False)
-    tiles = large_enough(list(thinned), configuration)
+    thin_tiles_of_target = thin_tiles(configuration.data.target, configuration, "target", labels=False)
+    tiles = large_enough(list(thin_tiles_of_target), configuration)
     if not tiles:
         raise InputError("data.target", 0, "holds no points to learn from")
     return tiles
@@ -48,22 +48,22 @@ def believed_labels(
     scaling = scalings(tiles, configuration.intensity)
     labels, sureness = [], []
     for tile in tiles:
-        label, sure = np.zeros(len(tile), dtype=np.int16), np.zeros(len(tile), dtype=np.float32)
-        for inside, scores in piece_scores(tile, scaling[tile.scene], classifier, configuration.crop_settings()):
-            largest = scores.float().softmax(dim=1).max(dim=1)
-            label[inside], sure[inside] = largest.indices.cpu().numpy(), largest.values.cpu().numpy()
+        label, probability = np.zeros(len(tile), dtype=np.int16), np.zeros(len(tile), dtype=np.float32)
+        for indices, scores in piece_scores(tile, scaling[tile.scene], classifier, configuration.crop_settings()):
+            best_class = scores.float().softmax(dim=1).max(dim=1)
+            label[indices], probability[indices] = best_class.indices.cpu().numpy(), best_class.values.cpu().numpy()
         labels.append(label)
-        sureness.append(sure)
-    least = _thresholds(np.concatenate(labels), np.concatenate(sureness), configuration)
+        sureness.append(probability)
+    thresholds = _thresholds(np.concatenate(labels), np.concatenate(sureness), configuration)
     return [
-        replace(tile, segment=np.where(sure >= least[label], label, IGNORED).astype(np.int16))
-        for tile, label, sure in zip(tiles, labels, sureness, strict=True)
+        replace(tile, segment=np.where(probability >= thresholds[label], label, IGNORED).astype(np.int16))
+        for tile, label, probability in zip(tiles, labels, sureness, strict=True)
     ]
 
 
 def _thresholds(labels: AnyArray, sureness: Float32, configuration: SegmentationConfiguration) -> Float32:
     """Return for each class (C,) the probability from which its label is believed; 2, which none has, without any."""
-    least = np.full(len(class_names(configuration.scheme())), 2.0, dtype=np.float32)
+    thresholds = np.full(len(class_names(configuration.scheme())), 2.0, dtype=np.float32)
     for place in np.unique(labels):
-        least[place] = np.quantile(sureness[labels == place], 1.0 - configuration.self_training.believed)
-    return least
+        thresholds[place] = np.quantile(sureness[labels == place], 1.0 - configuration.self_training.believed)
+    return thresholds

@@ -101,13 +101,13 @@ def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = 
     files: list[str] = []
     for path, name in zip(evaluation.data, _names(evaluation), strict=True):
         source = _test_source(path, evaluation)
-        confusion, shown = score(model, configuration, [source], progress)
+        confusion, largest_result = score(model, configuration, [source], progress)
         results[name] = confusion.to_dict()
         tables[name] = score_table(results[name]) + "\n"
         files.append(f"{name}.txt")
         write_file(evaluation.output / files[-1], tables[name].encode(), overwrite=True)
-        if shown is not None:
-            tile, labels = shown
+        if largest_result is not None:
+            tile, labels = largest_result
             scheme = configuration.scheme()
             files.append(f"{name}.png")
             picture = comparison(tile, labels, source.targets(scheme), scheme)
@@ -134,21 +134,21 @@ def _names(evaluation: Evaluation) -> list[str]:
     """
     places = [
         path.parent / f"{path.name}-{evaluation.split}" if path.is_dir() else path.with_suffix("")
-        for path in (given.absolute() for given in evaluation.data)
+        for path in (path_places.absolute() for path_places in evaluation.data)
     ]
-    given = zip(evaluation.data, places, strict=True)
-    if twice := sorted(str(path) for path, place in given if places.count(place) > 1):
-        raise InputError("data", twice[0], "is given twice, or with two endings")
+    path_places = zip(evaluation.data, places, strict=True)
+    if repeated_paths := sorted(str(path) for path, place in path_places if places.count(place) > 1):
+        raise InputError("data", repeated_paths[0], "is given twice, or with two endings")
     longest = max(len(place.parts) for place in places)
-    tried = (["-".join(place.parts[-parts:]) for place in places] for parts in range(1, longest + 1))
-    return next(names for names in tried if len(set(names)) == len(names))
+    name_candidates = (["-".join(place.parts[-parts:]) for place in places] for parts in range(1, longest + 1))
+    return next(names for names in name_candidates if len(set(names)) == len(names))
 
 
 def _test_source(path: Path, evaluation: Evaluation) -> Source:
     """Return a test's source; a cloud of up to 5 million points is one tile, as tiles' edges see less around them."""
     if path.is_dir():
-        told = {"mapping": evaluation.mapping, "yardstick": evaluation.yardstick}
-        return Source(path=str(path), split=evaluation.split, **told)
+        class_options = {"mapping": evaluation.mapping, "yardstick": evaluation.yardstick}
+        return Source(path=str(path), split=evaluation.split, **class_options)
     tile = 60.0
     if path.suffix.lower() in ENDINGS and path.is_file():
         with suppress(InputError), open_cloud(path) as cloud:  # a packed file is no cloud
@@ -194,7 +194,7 @@ def train_network(run: Run[SegmentationConfiguration], progress: Progress = sile
     model = build(configuration).to(device)
     if configuration.start:
         _begin_with(model, configuration)
-    begun = deepcopy(model.state_dict())
+    start_weights = deepcopy(model.state_dict())
     target = target_tiles(configuration) if configuration.set_up == "self_trained" else []
     run.begin()
     with _scene_stream(run, progress) as stream:
@@ -202,12 +202,12 @@ def train_network(run: Run[SegmentationConfiguration], progress: Progress = sile
             _self_train(model, run, domains, target, validation, progress)
         elif configuration.set_up == "fine_tuned":
             _fit(model, _pretraining(run), {"synthetic": domains["synthetic"]}, validation, progress, stream)
-            second = configuration.model_copy(update={"schedule": configuration.fine_tuning})
-            _fit(model, replace(run, configuration=second), {"real": domains["real"]}, validation, progress)
+            fine_tuning = configuration.model_copy(update={"schedule": configuration.fine_tuning})
+            _fit(model, replace(run, configuration=fine_tuning), {"real": domains["real"]}, validation, progress)
         else:
             _fit(model, run, domains, validation, progress, stream)
         if configuration.start_share:
-            _mix_with_start(model, run, begun)
+            _mix_with_start(model, run, start_weights)
         if configuration.fitted_offsets:
             _shift_scores(model, run, domains, stream)
     if stream is not None:
@@ -227,7 +227,7 @@ def _scene_stream(
     return SceneStream(options, configuration.seed, run.folder, epochs, ("pointcept",), progress)
 
 
-def _mix_with_start(model: nn.Module, run: Run[SegmentationConfiguration], begun: Mapping[str, Tensor]) -> None:
+def _mix_with_start(model: nn.Module, run: Run[SegmentationConfiguration], start_weights: Mapping[str, Tensor]) -> None:
     """Set the weights to a mean of those that the training began and ended with, in place, and save them; once.
 
     Wortsman et al., "Robust fine-tuning of zero-shot models" (2022): what few labels say nothing of isn't forgotten.
@@ -237,7 +237,7 @@ def _mix_with_start(model: nn.Module, run: Run[SegmentationConfiguration], begun
         return
     for name, value in model.state_dict().items():
         if value.is_floating_point():
-            value.lerp_(begun[name], share)
+            value.lerp_(start_weights[name], share)
     run.save({**state, "model": model.state_dict(), MIXED: share})
 
 
@@ -254,7 +254,7 @@ def _shift_scores(
         device = next(model.parameters()).device
         batches = StreamedCropBatches(configuration, domains, stream, device)
         domains = batches.domains(configuration.schedule.epochs - 1)
-    tiles = [tile for several in domains.values() for tile in several]
+    tiles = [tile for domain_tiles in domains.values() for tile in domain_tiles]
     offsets = torch.from_numpy(fit_offsets(tiles, classifier(model, configuration), configuration))
     configuration.network.shift_scores(model, offsets)
     run.save({**state, "model": model.state_dict(), OFFSETS: offsets})
@@ -267,12 +267,12 @@ def _begin_with(model: nn.Module, configuration: SegmentationConfiguration) -> N
         MissingFileError: there is no such run or model.
         InputError: it is of another network, of other classes, or sees other features.
     """
-    before = open_run(Path(configuration.start))
+    start_run = open_run(Path(configuration.start))
     for name in ("task", "classes", "features", "intensity", "network"):
-        told, value = getattr(before.configuration, name, None), getattr(configuration, name)
-        if told != value:
-            raise InputError("start", configuration.start, f"must have the same {name}: it has {told}, not {value}")
-    load_weights(model, before)
+        start_value, value = getattr(start_run.configuration, name, None), getattr(configuration, name)
+        if start_value != value:
+            raise InputError("start", configuration.start, f"must have the same {name}: it has {start_value}, not {value}")
+    load_weights(model, start_run)
 
 
 def _self_train(
@@ -287,13 +287,13 @@ def _self_train(
     configuration, rounds = run.configuration, run.configuration.self_training.rounds
     if not configuration.start:
         _fit(model, _pretraining(run), domains, validation, progress)
-    part = configuration.model_copy(update={"schedule": configuration.fine_tuning})
+    round_configuration = configuration.model_copy(update={"schedule": configuration.fine_tuning})
     for number in range(1, rounds + 1):
         folder = run.part(PRETRAINING, f"round-{number}")
-        last = number == rounds
-        round_run = replace(run, configuration=part) if last else Run.start(folder, part, resume=True)
-        labelled = believed_labels(target, classifier(model, configuration), configuration)
-        _fit(model, round_run, {**domains, "target": labelled}, validation, progress)
+        is_last_round = number == rounds
+        round_run = replace(run, configuration=round_configuration) if is_last_round else Run.start(folder, round_configuration, resume=True)
+        labelled_tiles = believed_labels(target, classifier(model, configuration), configuration)
+        _fit(model, round_run, {**domains, "target": labelled_tiles}, validation, progress)
 
 
 def _pretraining(run: Run[SegmentationConfiguration]) -> Run[SegmentationConfiguration]:
@@ -337,9 +337,9 @@ def smoothed_loss(scores: Tensor, truth: Tensor, weights: Tensor, smoothing: flo
         weights: (C,).
         smoothing: from 0 to below 1.
     """
-    known = truth != IGNORED
-    losses = functional.cross_entropy(scores[known], truth[known], reduction="none", label_smoothing=smoothing)
-    weight = weights[truth[known]]
+    has_label = truth != IGNORED
+    losses = functional.cross_entropy(scores[has_label], truth[has_label], reduction="none", label_smoothing=smoothing)
+    weight = weights[truth[has_label]]
     return (losses * weight).sum() / weight.sum().clamp_min(1e-12)
 
 
@@ -357,9 +357,9 @@ def objective(
     def loss(model: nn.Module, batch: Item) -> tuple[Tensor, Figures]:
         scores, truth = scores_of(model, prepare_on_gpu(configuration, batch)), batch["segment"]
         value = smoothed_loss(scores, truth, weights, configuration.label_smoothing)
-        known = truth != IGNORED
-        right = (scores.detach().argmax(dim=1) == truth) & known
-        return value, {"accuracy": float(right.sum() / known.sum().clamp_min(1))}
+        has_label = truth != IGNORED
+        is_correct = (scores.detach().argmax(dim=1) == truth) & has_label
+        return value, {"accuracy": float(is_correct.sum() / has_label.sum().clamp_min(1))}
 
     return loss
 

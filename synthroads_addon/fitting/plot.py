@@ -93,7 +93,7 @@ def deviation_picture(
 
 @dataclass(frozen=True)
 class _Row:
-    """One diagram: values over stations and their statistics; least extent of its axis and limit, m; the limit's text."""
+    """One diagram: values over stations, their statistics, least extent of the axis, limit (m) and its text."""
 
     station: Float
     values: Float

@@ -31,14 +31,14 @@ def change_intensities(stretch: Stretch, effects: SequenceEffects, rng: Generato
     if rng.random() < effects.plain or not stretch.strength.any():
         return
     share = rng.random(7)
-    value, marked = _repaint_lines(np.maximum(stretch.strength, 0.0), stretch, effects.repaint, rng)
-    value = _wear_markings(value, stretch.paved, marked, effects.paint * share[0])
-    value, like_pavement = _verges(value, stretch, marked, effects.verge, rng)
+    value, is_marking = _repaint_lines(np.maximum(stretch.strength, 0.0), stretch, effects.repaint, rng)
+    value = _wear_markings(value, stretch.paved, is_marking, effects.paint * share[0])
+    value, like_pavement = _verges(value, stretch, is_marking, effects.verge, rng)
     value = np.where(like_pavement, value, value * np.exp(effects.contrast * rng.uniform(-1.0, 1.0)))
     value = _blur_footprint(value, stretch, effects.footprint * share[5])
     value *= _falloff(stretch.coord[:, 1], effects.falloff * share[1], rng)
-    low, high = np.log(effects.gamma)
-    log = np.exp(low + share[4] * (high - low)) * np.log(np.maximum(value / np.max(value), _DARKEST))
+    log_least, log_largest = np.log(effects.gamma)
+    log = np.exp(log_least + share[4] * (log_largest - log_least)) * np.log(np.maximum(value / np.max(value), _DARKEST))
     # Noise by the spread, so that a scanner that compresses its intensities isn't drowned in it.
     spread = float(np.subtract(*np.percentile(log, (90.0, 10.0))))
     noise = effects.speckle * share[2] * rng.standard_normal(len(value))
@@ -62,50 +62,50 @@ def _repaint_lines(value: Float, stretch: Stretch, probability: float, rng: Gene
     line between the lanes is known.
     """
     lane, edge, side, width = rng.random(4)
-    marked, bare = stretch.marked, stretch.paved & ~stretch.marked
-    if not stretch.without_shoulders() or not marked.any() or not bare.any():
-        return value, marked
-    paint, pavement = float(np.median(value[marked])), float(np.median(value[bare]))
+    is_marking, is_bare = stretch.marked, stretch.paved & ~stretch.marked
+    if not stretch.without_shoulders() or not is_marking.any() or not is_bare.any():
+        return value, is_marking
+    paint, pavement = float(np.median(value[is_marking])), float(np.median(value[is_bare]))
     y = stretch.coord[:, 1] - stretch.center[stretch.number]
     edges = stretch.lines[stretch.number] * [1.0, -1.0]
-    gone = np.zeros(len(value), dtype=bool)
-    both, one = edge < probability, probability <= edge < 2.0 * probability
-    worn = (both or (one and side < 0.5), both or (one and side >= 0.5), lane >= 1.0 - probability)
-    for happens, offset in zip(worn, (edges[:, 0], edges[:, 1], 0.0), strict=True):
+    is_worn = np.zeros(len(value), dtype=bool)
+    both_worn, one_worn = edge < probability, probability <= edge < 2.0 * probability
+    line_is_worn = (both_worn or (one_worn and side < 0.5), both_worn or (one_worn and side >= 0.5), lane >= 1.0 - probability)
+    for happens, offset in zip(line_is_worn, (edges[:, 0], edges[:, 1], 0.0), strict=True):
         if happens:
-            gone |= marked & (np.abs(y - offset) < _LINE_REACH)
+            is_worn |= is_marking & (np.abs(y - offset) < _LINE_REACH)
     if lane < probability:
-        low, high = _LINE_WIDTHS
-        painted = stretch.paved & (np.abs(y) < 0.5 * (low + (high - low) * width))
-        value, marked = np.where(painted, paint, value), marked | painted
-    return np.where(gone, pavement, value), marked & ~gone
+        narrowest, widest = _LINE_WIDTHS
+        in_line = stretch.paved & (np.abs(y) < 0.5 * (narrowest + (widest - narrowest) * width))
+        value, is_marking = np.where(in_line, paint, value), is_marking | in_line
+    return np.where(is_worn, pavement, value), is_marking & ~is_worn
 
 
-def _verges(value: Float, stretch: Stretch, marked: Bool, widest: float, rng: Generator) -> tuple[Float, Bool]:
+def _verges(value: Float, stretch: Stretch, is_marking: Bool, widest: float, rng: Generator) -> tuple[Float, Bool]:
     """Return intensities (K,) with crushed-stone verges added to a rural road, and the mask of what looks paved (K,).
 
     These are hardly brighter or darker than asphalt: the pavement seems wider than it is.
     """
     widths, tone = rng.uniform(0.0, widest, 2), np.exp(_VERGE_TONE * rng.uniform(-1.0, 1.0))
-    bare = stretch.paved & ~marked
-    if not stretch.without_shoulders() or not bare.any():
+    is_bare = stretch.paved & ~is_marking
+    if not stretch.without_shoulders() or not is_bare.any():
         return value, stretch.paved
     y = stretch.coord[:, 1] - stretch.center[stretch.number]
-    beyond = np.column_stack([y, -y]) - stretch.paved_sides()[stretch.number]
-    verge = ~stretch.paved & ((beyond > 0.0) & (beyond < widths)).any(axis=1)
-    usual = float(np.median(value[verge])) if verge.any() else 0.0
-    if usual <= 0.0:
+    excess = np.column_stack([y, -y]) - stretch.paved_sides()[stretch.number]
+    verge = ~stretch.paved & ((excess > 0.0) & (excess < widths)).any(axis=1)
+    verge_level = float(np.median(value[verge])) if verge.any() else 0.0
+    if verge_level <= 0.0:
         return value, stretch.paved
-    return np.where(verge, value * (tone * float(np.median(value[bare])) / usual), value), stretch.paved | verge
+    return np.where(verge, value * (tone * float(np.median(value[is_bare])) / verge_level), value), stretch.paved | verge
 
 
-def _wear_markings(value: Float, paved: Bool, marked: Bool, share: float) -> Float:
+def _wear_markings(value: Float, is_paved: Bool, is_marking: Bool, share: float) -> Float:
     """Return intensities (K,) with the markings' excess over the pavement's median reduced by a share."""
-    bare = paved & ~marked
-    if not marked.any() or not bare.any():
+    is_bare = is_paved & ~is_marking
+    if not is_marking.any() or not is_bare.any():
         return value
-    pavement = float(np.median(value[bare]))
-    return np.where(marked, value + share * np.minimum(pavement - value, 0.0), value)
+    pavement = float(np.median(value[is_bare]))
+    return np.where(is_marking, value + share * np.minimum(pavement - value, 0.0), value)
 
 
 def _blur_footprint(value: Float, stretch: Stretch, width: float) -> Float:
@@ -121,10 +121,10 @@ def _blur_footprint(value: Float, stretch: Stretch, width: float) -> Float:
     order = np.argsort(place)
     place = place[order]
     total = np.concatenate([[0.0], np.cumsum(value[order])])
-    first = np.searchsorted(place, place - 0.5 * width, side="left")
-    last = np.searchsorted(place, place + 0.5 * width, side="right")
+    begin = np.searchsorted(place, place - 0.5 * width, side="left")
+    end = np.searchsorted(place, place + 0.5 * width, side="right")
     result = np.empty_like(value)
-    result[order] = (total[last] - total[first]) / (last - first)
+    result[order] = (total[end] - total[begin]) / (end - begin)
     return result
 
 
@@ -138,8 +138,8 @@ def _falloff(y: Float, power: float, rng: Generator) -> Float:
     height = np.exp(rng.uniform(*np.log(_SCANNER_HEIGHTS)))
     square = height**2 + (y[:, None] - rng.uniform(-_SCANNER_ASIDE, _SCANNER_ASIDE, passes)) ** 2
     nearness = np.cumsum(1.0 / square, axis=1)
-    chosen = (rng.random(len(y))[:, None] * nearness[:, -1:] > nearness).sum(axis=1)
-    result: Float = (square[np.arange(len(y)), chosen] / height**2) ** (-power / 2.0)
+    scanner = (rng.random(len(y))[:, None] * nearness[:, -1:] > nearness).sum(axis=1)
+    result: Float = (square[np.arange(len(y)), scanner] / height**2) ** (-power / 2.0)
     return result
 
 

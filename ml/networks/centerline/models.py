@@ -125,8 +125,8 @@ class CenterlineModel(nn.Module):
         self.kernel_points = FixedKernelPoints(count, half_width, options.cells, options.point_width, width)
         self.pool = AttentionPool(width, options.heads, options.context)
         self.heads = Heads(width, options.context, self.kernel_points.spacing)
-        fine = (options.fine_reach, options.fine_cells)
-        self.again = Refinement(options.point_width, options.fine_width, options.context, slices, *fine, options.heads)
+        refinement_size = (options.fine_reach, options.fine_cells)
+        self.again = Refinement(options.point_width, options.fine_width, options.context, slices, *refinement_size, options.heads)
 
     def forward(self, batch: Batch) -> Output:
         """Return centreline, corridor, deviations and logits of a batch's slices, see the module."""
@@ -195,14 +195,14 @@ def both_ways(model: nn.Module, batch: Batch) -> Output:
     Mirroring the batch mirrors the result exactly. Variances are averaged; what the two disagree on is left out, as the
     calibration sees it.
     """
-    one, other = model(batch), model(mirror_batch(batch))
-    back = mirrored_corridor(other["corridor"])
-    variance = with_sides_swapped(other["corridor_std"]) ** 2
+    output, mirrored_output = model(batch), model(mirror_batch(batch))
+    corridor_back = mirrored_corridor(mirrored_output["corridor"])
+    variance = with_sides_swapped(mirrored_output["corridor_std"]) ** 2
     return {
-        "center": 0.5 * (one["center"] - other["center"]),
-        "center_std": (0.5 * (one["center_std"] ** 2 + other["center_std"] ** 2)).sqrt(),
-        "corridor": 0.5 * (one["corridor"] + back),
-        "corridor_std": (0.5 * (one["corridor_std"] ** 2 + variance)).sqrt(),
+        "center": 0.5 * (output["center"] - mirrored_output["center"]),
+        "center_std": (0.5 * (output["center_std"] ** 2 + mirrored_output["center_std"] ** 2)).sqrt(),
+        "corridor": 0.5 * (output["corridor"] + corridor_back),
+        "corridor_std": (0.5 * (output["corridor_std"] ** 2 + variance)).sqrt(),
     }
 
 

@@ -44,8 +44,8 @@ class Refinement(nn.Module):
         self.reach, self.cells, self.spacing = reach, cells, 2.0 * reach / cells
         self.register_buffer("places", self.spacing * (torch.arange(cells) + 0.5) - reach, persistent=False)
         self.first = nn.Linear(inputs + 2, width)
-        along = 5 if slices > 1 else 1
-        self.grid = nn.ModuleList(GridConvolution(width, along, 5, dilation) for dilation in _APART)
+        slice_span = 5 if slices > 1 else 1
+        self.grid = nn.ModuleList(GridConvolution(width, slice_span, 5, dilation) for dilation in _APART)
         self.local = nn.Linear(width, width)
         self.context = nn.Linear(context, width)
         self.where = nn.Sequential(nn.GELU(), nn.Linear(width, 2))
@@ -70,19 +70,19 @@ class Refinement(nn.Module):
             (B, S) how much farther to the left the centre lies, m, the logarithm of that's deviation, and (B, S, cells)
             what the soft-argmax is taken of.
         """
-        aside = guess[..., None] + coord[..., 0] * torch.tan(heading)[..., None]
-        straight = coord - torch.stack([torch.zeros_like(aside), aside, torch.zeros_like(aside)], dim=-1)
-        sums = cell_sums(straight.flatten(0, 1), mask.flatten(0, 1), features.flatten(0, 1), self.reach, self.cells)
+        line_y = guess[..., None] + coord[..., 0] * torch.tan(heading)[..., None]
+        straightened = coord - torch.stack([torch.zeros_like(line_y), line_y, torch.zeros_like(line_y)], dim=-1)
+        sums = cell_sums(straightened.flatten(0, 1), mask.flatten(0, 1), features.flatten(0, 1), self.reach, self.cells)
         grid = self.first(cell_features(sums)).unflatten(0, guess.shape)
         for layer in self.grid:
             grid = layer(grid)
         logits, residual = self.where(self.local(grid) + self.context(context)[..., None, :]).unbind(-1)
         share = logits.softmax(-1)
         step = (share * (self.places + self.spacing * residual)).sum(-1)
-        seen = self.seen((share[..., None] * grid).sum(-2)) + context
+        summary = self.seen((share[..., None] * grid).sum(-2)) + context
         if self.along is not None:
-            seen = self.along(nn.functional.gelu(seen))
-        return step, self.spread(nn.functional.gelu(seen))[..., 0] + _FIRST_LOG_STD, logits
+            summary = self.along(nn.functional.gelu(summary))
+        return step, self.spread(nn.functional.gelu(summary))[..., 0] + _FIRST_LOG_STD, logits
 
 
 @full_precision
@@ -99,38 +99,38 @@ def parabola(frame: Tensor, center: Tensor, weight: Tensor, stiffness: Tensor) -
         y (B, S) at which the parabola crosses the slices' orthogonals, m, and its direction (B, S) in them, rad.
     """
     place, turn = _in_the_middle(frame, center.dtype)
-    left = torch.stack([-torch.sin(turn), torch.cos(turn)], dim=-1)
-    points = place + center[..., None] * left
+    left_normals = torch.stack([-torch.sin(turn), torch.cos(turn)], dim=-1)
+    points = place + center[..., None] * left_normals
     # The middle's own offset costs nothing: a road far from the path is as good as one near it.
     middle = points.mean(1, keepdim=True)[..., 1]
-    along = points[..., 0] / _PARABOLA_UNIT
-    powers = torch.stack([torch.ones_like(along), along, along * along], dim=-1)
-    weighted = powers * weight[..., None]
+    distance = points[..., 0] / _PARABOLA_UNIT
+    powers = torch.stack([torch.ones_like(distance), distance, distance * distance], dim=-1)
+    weighted_powers = powers * weight[..., None]
     # Ridge regression: (X'WX + diag(stiffness)) beta = X'Wy.
-    normal = weighted.transpose(1, 2) @ powers + torch.diag(stiffness)
-    factors = _solve(normal, (weighted * (points[..., 1] - middle)[..., None]).sum(1))
+    normal = weighted_powers.transpose(1, 2) @ powers + torch.diag(stiffness)
+    factors = _solve(normal, (weighted_powers * (points[..., 1] - middle)[..., None]).sum(1))
     value = (powers @ factors[..., None])[..., 0] + middle
-    slope = (factors[:, 1:2] + 2.0 * factors[:, 2:] * along) / _PARABOLA_UNIT
+    slope = (factors[:, 1:2] + 2.0 * factors[:, 2:] * distance) / _PARABOLA_UNIT
     # One step of Newton's method along the orthogonal: the parabola is nearly straight from here to there.
-    away = (points[..., 1] - value) / (left[..., 1] - slope * left[..., 0])
-    return center - away, torch.atan(slope) - turn
+    step = (points[..., 1] - value) / (left_normals[..., 1] - slope * left_normals[..., 0])
+    return center - step, torch.atan(slope) - turn
 
 
-def _solve(matrix: Tensor, right: Tensor) -> Tensor:
+def _solve(matrix: Tensor, rhs: Tensor) -> Tensor:
     """Return x (B, 3) of symmetric positive definite systems matrix (B, 3, 3) x = right (B, 3), by elimination.
 
     Written out, as neither ONNX nor batches of small systems on a GPU have a fast solver.
     """
     (first, b, c), (second, e), third = matrix[:, 0].unbind(-1), matrix[:, 1, 1:].unbind(-1), matrix[:, 2, 2]
-    y0, y1, y2 = right.unbind(-1)
+    y0, y1, y2 = rhs.unbind(-1)
     to_second, to_third = b / first, c / first
     second, e = second - to_second * b, e - to_second * c
-    further = e / second
-    third = third - to_third * c - further * e
+    factor = e / second
+    third = third - to_third * c - factor * e
     y1 = y1 - to_second * y0
-    y2 = y2 - to_third * y0 - further * y1
+    y2 = y2 - to_third * y0 - factor * y1
     z2 = y2 / third
-    z1 = y1 / second - further * z2
+    z1 = y1 / second - factor * z2
     return torch.stack([y0 / first - to_second * z1 - to_third * z2, z1, z2], dim=-1)
 
 

@@ -34,16 +34,16 @@ class CellConvolution(nn.Module):
 
     def __init__(self, offsets: int, in_channels: int, out_channels: int) -> None:
         super().__init__()
-        bound = (offsets * in_channels) ** -0.5  # 1 / sqrt(fan in), as PyTorch's convolutions begin with
-        self.weight = nn.Parameter(torch.empty(offsets, in_channels, out_channels).uniform_(-bound, bound))
+        limit = (offsets * in_channels) ** -0.5  # 1 / sqrt(fan in), as PyTorch's convolutions begin with
+        self.weight = nn.Parameter(torch.empty(offsets, in_channels, out_channels).uniform_(-limit, limit))
 
     def forward(self, values: Tensor, around: "Around") -> Tensor:
         """Return features (M, out_channels) of cells with features (M, in_channels)."""
         device = values.device.type
         weight: Tensor = self.weight
         if torch.is_autocast_enabled(device):
-            half = torch.get_autocast_dtype(device)
-            values, weight = values.to(half), weight.to(half)
+            autocast_type = torch.get_autocast_dtype(device)
+            values, weight = values.to(autocast_type), weight.to(autocast_type)
         return convolve(values, weight, around)
 
 
@@ -56,8 +56,8 @@ class Around:
             opposite.
     """
 
-    def __init__(self, near: Tensor) -> None:
-        self.near = near
+    def __init__(self, neighbour_table: Tensor) -> None:
+        self.near = neighbour_table
         self._pairs: list[tuple[Tensor, Tensor]] | None = None
 
     def pairs(self) -> list[tuple[Tensor, Tensor]]:
@@ -113,16 +113,16 @@ class _Gathered(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
-        values, weight, near = ctx.saved_tensors
+        values, weight, neighbour_table = ctx.saved_tensors
         gradient = gradients[0].contiguous()
         of_values = of_weight = None
         if ctx.needs_input_grad[0]:  # n(i, k) = j means n(j, K - 1 - k) = i: a convolution with reversed offsets
-            of_values = _product(gradient, weight.flip(0).transpose(1, 2), near)
+            of_values = _product(gradient, weight.flip(0).transpose(1, 2), neighbour_table)
         if ctx.needs_input_grad[1]:
             total = _sums(weight.shape[0] * weight.shape[1], weight.shape[2], weight)
-            padded = _with_nothing(values)
-            for rows in _chunks(near, values.shape[1]):
-                total += _gathered(padded, near[rows]).T @ gradient[rows]
+            values_and_zeros = _with_nothing(values)
+            for rows in _chunks(neighbour_table, values.shape[1]):
+                total += _gathered(values_and_zeros, neighbour_table[rows]).T @ gradient[rows]
             of_weight = total.to(weight.dtype).view_as(weight)
         return of_values, of_weight, None
 
@@ -132,10 +132,10 @@ def _sums(rows: int, columns: int, like: Tensor) -> Tensor:
     return like.new_zeros(rows, columns, dtype=torch.float32 if like.dtype == torch.bfloat16 else like.dtype)
 
 
-def _product(values: Tensor, weight: Tensor, near: Tensor) -> Tensor:
+def _product(values: Tensor, weight: Tensor, neighbour_table: Tensor) -> Tensor:
     """Return the convolution (M, D) of values (M, C), gathered chunk by chunk."""
-    padded, matrix = _with_nothing(values), weight.reshape(-1, weight.shape[2])
-    parts = [_gathered(padded, near[rows]) @ matrix for rows in _chunks(near, values.shape[1])]
+    values_and_zeros, matrix = _with_nothing(values), weight.reshape(-1, weight.shape[2])
+    parts = [_gathered(values_and_zeros, neighbour_table[rows]) @ matrix for rows in _chunks(neighbour_table, values.shape[1])]
     return torch.cat(parts) if parts else values.new_empty(0, weight.shape[2])
 
 
@@ -144,13 +144,13 @@ def _with_nothing(values: Tensor) -> Tensor:
     return torch.cat([values, values.new_zeros(1, values.shape[1])])
 
 
-def _gathered(padded: Tensor, near: Tensor) -> Tensor:
+def _gathered(values_and_zeros: Tensor, neighbour_table: Tensor) -> Tensor:
     """Return the values (M, K C) around each cell, offset by offset."""
-    return padded.index_select(0, near.reshape(-1)).unflatten(0, near.shape).flatten(1)
+    return values_and_zeros.index_select(0, neighbour_table.reshape(-1)).unflatten(0, neighbour_table.shape).flatten(1)
 
 
-def _chunks(near: Tensor, channels: int) -> Iterator[slice]:
+def _chunks(neighbour_table: Tensor, channels: int) -> Iterator[slice]:
     """Yield slices of the cells so short that what is gathered for them is no more than `_CHUNK`."""
-    rows = max(_CHUNK // (near.shape[1] * channels), 1)
-    for begin in range(0, len(near), rows):
+    rows = max(_CHUNK // (neighbour_table.shape[1] * channels), 1)
+    for begin in range(0, len(neighbour_table), rows):
         yield slice(begin, begin + rows)

@@ -87,28 +87,28 @@ def build_cells(coord: Tensor, offset: Tensor, grid: Grid, *, always_masked: boo
     counts = _points_of_clouds(coord, offset)
     clouds = len(counts)
     cloud = torch.repeat_interleave(torch.arange(clouds, device=coord.device), counts, output_size=len(coord))
-    places, inside = _places(coord, cloud, clouds, grid.cell)
+    places, place_in_cell = _places(coord, cloud, clouds, grid.cell)
     keys, cell = torch.unique(_keys(cloud, places), return_inverse=True)
     points = torch.bincount(cell, minlength=len(keys)).to(coord.dtype)
-    cells: Cells = {"cell0": cell, "share0": points.reciprocal()[cell], "inside0": inside}
+    cells: Cells = {"cell0": cell, "share0": points.reciprocal()[cell], "inside0": place_in_cell}
     for stage in range(grid.stages):
         if stage:
             cloud, places = _apart(keys)
-            coarse, parent = torch.unique(_keys(cloud, places >> 1), return_inverse=True)
-            cells |= {f"parent{stage}": parent, f"children{stage}": _children(places, parent, len(coarse))}
-            keys = coarse
+            coarse_keys, parent = torch.unique(_keys(cloud, places >> 1), return_inverse=True)
+            cells |= {f"parent{stage}": parent, f"children{stage}": _children(places, parent, len(coarse_keys))}
+            keys = coarse_keys
         cloud, places = _apart(keys)
         counts = torch.bincount(cloud, minlength=clouds)
         cells[f"ends{stage}"] = counts.cumsum(0)
         if stage < grid.attention_from:
-            near = _cells_around(keys)
-            cells[f"near{stage}"] = near[:, _CROSS].contiguous() if grid.cross else near
+            neighbour_table = _cells_around(keys)
+            cells[f"near{stage}"] = neighbour_table[:, _CROSS].contiguous() if grid.cross else neighbour_table
             continue
-        patch, place, filled = _patches(places, cloud, counts, grid)
+        patch, place, slot_mask = _patches(places, cloud, counts, grid)
         cells |= {f"grid{stage}": places.to(coord.dtype), f"patch{stage}": patch, f"place{stage}": place}
-        if filled is not None or always_masked:
-            full = torch.ones(patch.shape[1:], dtype=torch.bool, device=coord.device)
-            cells[f"filled{stage}"] = full if filled is None else filled
+        if slot_mask is not None or always_masked:
+            all_slots = torch.ones(patch.shape[1:], dtype=torch.bool, device=coord.device)
+            cells[f"filled{stage}"] = all_slots if slot_mask is None else slot_mask
     return cells
 
 
@@ -122,8 +122,8 @@ def _points_of_clouds(coord: Tensor, offset: Tensor) -> Tensor:
 
 def _places(coord: Tensor, cloud: Tensor, clouds: int, edge: float) -> tuple[Tensor, Tensor]:
     """Return the points' cells (N, 3), counted from each cloud's lowest, and their places in them (N, 3)."""
-    scaled = coord / edge
-    floor = scaled.floor()
+    cell_coordinates = coord / edge
+    floor = cell_coordinates.floor()
     lowest = floor.new_zeros(clouds, _AXES)
     lowest.scatter_reduce_(0, cloud[:, None].expand(-1, _AXES), floor, "amin", include_self=False)
     cells = floor - lowest[cloud]
@@ -133,7 +133,7 @@ def _places(coord: Tensor, cloud: Tensor, clouds: int, edge: float) -> tuple[Ten
             edge,
             f"must be so large that no cloud is wider than {LARGEST} cells: one is {widest + 1:.0f} wide",
         )
-    return cells.long(), scaled - floor - 0.5
+    return cells.long(), cell_coordinates - floor - 0.5
 
 
 def _keys(cloud: Tensor, places: Tensor) -> Tensor:
@@ -144,15 +144,15 @@ def _keys(cloud: Tensor, places: Tensor) -> Tensor:
 
 def _apart(keys: Tensor) -> tuple[Tensor, Tensor]:
     """Return clouds (M,) and places (M, 3) of cells' numbers."""
-    last = (1 << BITS) - 1
-    places = torch.stack([(keys >> 2 * BITS) & last, (keys >> BITS) & last, keys & last], dim=1) - 1
+    mask = (1 << BITS) - 1
+    places = torch.stack([(keys >> 2 * BITS) & mask, (keys >> BITS) & mask, keys & mask], dim=1) - 1
     return keys >> 3 * BITS, places
 
 
 def _children(places: Tensor, parent: Tensor, count: int) -> Tensor:
     """Return for each of `count` cells the cells (8,) of the stage before in it; for empty octants another of them."""
-    odd = places & 1
-    octant = odd[:, 0] << 2 | odd[:, 1] << 1 | odd[:, 2]
+    parity = places & 1
+    octant = parity[:, 0] << 2 | parity[:, 1] << 1 | parity[:, 2]
     table = torch.full((count * 8,), -1, dtype=torch.int64, device=places.device)
     table[parent * 8 + octant] = torch.arange(len(places), device=places.device)
     table = table.view(count, 8)
@@ -168,14 +168,14 @@ def _cells_around(keys: Tensor) -> Tensor:
     sides = torch.arange(-1, 2, device=keys.device)
     columns = ((sides[:, None] << BITS) + sides).flatten() << BITS
     targets = keys[:, None] + columns - 1
-    first = torch.searchsorted(keys, targets)
-    ended = torch.cat([keys, keys.new_full((1,), -1)])
-    near = torch.empty(count, 9, 3, dtype=torch.int32, device=keys.device)
-    for up in range(3):
-        there = ended[first] == targets + up
-        near[:, :, up] = torch.where(there, first, count)
-        first += there
-    return near.flatten(1)
+    position = torch.searchsorted(keys, targets)
+    ended_keys = torch.cat([keys, keys.new_full((1,), -1)])
+    neighbour_table = torch.empty(count, 9, 3, dtype=torch.int32, device=keys.device)
+    for step in range(3):
+        exists = ended_keys[position] == targets + step
+        neighbour_table[:, :, step] = torch.where(exists, position, count)
+        position += exists
+    return neighbour_table.flatten(1)
 
 
 def _patches(places: Tensor, cloud: Tensor, counts: Tensor, grid: Grid) -> tuple[Tensor, Tensor, Tensor | None]:
@@ -189,22 +189,22 @@ def _patches(places: Tensor, cloud: Tensor, counts: Tensor, grid: Grid) -> tuple
     width = min(grid.patch, -(-max(sizes, default=0) // _MULTIPLE) * _MULTIPLE)
     numbers = [-(-size // width) if size else 0 for size in sizes]
     number = torch.tensor(numbers, dtype=torch.int64, device=device)
-    begin, first = counts.cumsum(0) - counts, number.cumsum(0) - number
+    begin, first_patch = counts.cumsum(0) - counts, number.cumsum(0) - number
 
     owner = torch.repeat_interleave(torch.arange(len(sizes), device=device), number, output_size=sum(numbers))
     size, parts = counts[owner], number[owner]
-    nth = torch.arange(sum(numbers), device=device) - first[owner]
-    low, high = ((one * size + parts - 1).div(parts, rounding_mode="floor") for one in (nth, nth + 1))
-    start = (low - (width - (high - low)).div(2, rounding_mode="floor")).clamp(min=0)
+    patch_number = torch.arange(sum(numbers), device=device) - first_patch[owner]
+    stretch_begin, stretch_end = ((number_in_cloud * size + parts - 1).div(parts, rounding_mode="floor") for number_in_cloud in (patch_number, patch_number + 1))
+    start = (stretch_begin - (width - (stretch_end - stretch_begin)).div(2, rounding_mode="floor")).clamp(min=0)
     start = torch.minimum(start, (size - width).clamp(min=0))
     slots = start[:, None] + torch.arange(width, device=device)
-    filled = slots < size[:, None]
+    slot_mask = slots < size[:, None]
     slots = begin[owner][:, None] + torch.minimum(slots, size[:, None] - 1)
 
     rank = torch.arange(len(places), device=device) - begin[cloud]
-    patch = first[cloud] + (rank * number[cloud]).div(counts[cloud], rounding_mode="floor")
-    asked = patch * width + rank - start[patch]
+    patch = first_patch[cloud] + (rank * number[cloud]).div(counts[cloud], rounding_mode="floor")
+    slot = patch * width + rank - start[patch]
     orders = [torch.argsort(cloud << 3 * BITS | curve_codes(places, curve)) for curve in grid.curves]
     order = torch.stack(orders)
-    place = torch.empty_like(order).scatter_(1, order, asked.expand_as(order))
-    return order[:, slots], place, None if all(size >= width for size in sizes if size) else filled
+    place = torch.empty_like(order).scatter_(1, order, slot.expand_as(order))
+    return order[:, slots], place, None if all(size >= width for size in sizes if size) else slot_mask

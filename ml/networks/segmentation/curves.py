@@ -38,10 +38,10 @@ def curve_codes(cells: Tensor, curve: Curve) -> Tensor:
 
 def z_order_codes(cells: Tensor) -> Tensor:
     """Return the places (M,) along the z-order curve of cells (M, 3): the axes' bits in turn, x first."""
-    parted = cells.long()
-    for shift, kept in _SPREAD:
-        parted = (parted | (parted << shift)) & kept
-    return (parted[:, 0] << 2) | (parted[:, 1] << 1) | parted[:, 2]
+    bits = cells.long()
+    for shift, bit_mask in _SPREAD:
+        bits = (bits | (bits << shift)) & bit_mask
+    return (bits[:, 0] << 2) | (bits[:, 1] << 1) | bits[:, 2]
 
 
 def hilbert_codes(cells: Tensor) -> Tensor:
@@ -51,9 +51,9 @@ def hilbert_codes(cells: Tensor) -> Tensor:
     code = torch.zeros_like(octants)
     state = torch.zeros_like(octants)
     for bit in range(BITS - 1, -1, -1):
-        at = state + ((octants >> (_AXES * bit)) & (_OCTANTS - 1))
-        code = (code << _AXES) | digits[at]
-        state = states[at]
+        table_index = state + ((octants >> (_AXES * bit)) & (_OCTANTS - 1))
+        code = (code << _AXES) | digits[table_index]
+        state = states[table_index]
     return code
 
 
@@ -77,10 +77,10 @@ def _hilbert_tables() -> tuple[list[int], list[int]]:
     return digits, states
 
 
-def _turned(bits: int, by: int) -> int:
+def _turned(bits: int, steps: int) -> int:
     """Return three bits turned to the left, the last one coming in on the right again."""
-    by %= _AXES
-    return ((bits << by) | (bits >> (_AXES - by))) & (_OCTANTS - 1)
+    steps %= _AXES
+    return ((bits << steps) | (bits >> (_AXES - steps))) & (_OCTANTS - 1)
 
 
 def _from_gray(gray: int) -> int:
@@ -92,8 +92,8 @@ def _entry(digit: int) -> int:
     """Return the corner at which the curve enters the octant that is visited as number `digit`."""
     if digit == 0:
         return 0
-    even = 2 * ((digit - 1) // 2)
-    return even ^ (even >> 1)
+    even_number = 2 * ((digit - 1) // 2)
+    return even_number ^ (even_number >> 1)
 
 
 def _direction(digit: int) -> int:

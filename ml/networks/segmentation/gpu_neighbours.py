@@ -47,21 +47,21 @@ def build_neighbours(coord: Tensor, offset: Tensor, neighbourhood: Neighbourhood
     # What the network sees is rounded to the coordinates' dtype, so neighbours are those of the rounded positions.
     points = _Points(local[order].double(), cloud, count)  # sorting by cloud leaves which point is of which
     neighbours: Neighbours = {"positions0": local, "offset0": ends}
-    for stage, inner in enumerate(neighbourhood.inner, start=1):
+    for stage, has_inner in enumerate(neighbourhood.inner, start=1):
         radius = neighbourhood.stage_radius(stage)
         sample = _grid_sample(points, radius * 2.0 / 3.0)
-        kept = points.select(sample)
-        neighbours[f"positions{stage}"] = kept.xyz.to(local.dtype)
+        sampled = points.select(sample)
+        neighbours[f"positions{stage}"] = sampled.xyz.to(local.dtype)
         neighbours[f"offset{stage}"] = torch.searchsorted(
-            kept.cloud, torch.arange(count, device=coord.device), right=True
+            sampled.cloud, torch.arange(count, device=coord.device), right=True
         )
         neighbours[f"sample{stage}"] = sample
-        neighbours[f"group{stage}"] = _first_in_ball(kept, points, radius, neighbourhood.neighbours)
-        if inner:
-            neighbours[f"inner{stage}"] = _first_in_ball(kept, kept, 2 * radius, neighbourhood.neighbours)
-        nearest, weight = _nearest_three(points, kept, radius)
-        neighbours[f"nearest{stage}"], neighbours[f"weight{stage}"] = nearest, weight.to(local.dtype)
-        points = kept
+        neighbours[f"group{stage}"] = _first_in_ball(sampled, points, radius, neighbourhood.neighbours)
+        if has_inner:
+            neighbours[f"inner{stage}"] = _first_in_ball(sampled, sampled, 2 * radius, neighbourhood.neighbours)
+        nearest_index, weight = _nearest_three(points, sampled, radius)
+        neighbours[f"nearest{stage}"], neighbours[f"weight{stage}"] = nearest_index, weight.to(local.dtype)
+        points = sampled
     return _in_given_order(neighbours, order)
 
 
@@ -105,10 +105,10 @@ class _Cells:
     def around(cls, points: _Points, edge: float) -> _Cells:
         """Return cells of an edge for some points, of which there is at least one."""
         cells = torch.floor(points.xyz / edge)
-        low = cells.amin(dim=0)
-        wide, deep, tall = (int(span) for span in (cells.amax(dim=0) - low + 3).tolist())
-        _check_cells((wide, deep, tall), points.count)
-        return cls(edge, low, (wide, deep, tall))
+        lowest_cell = cells.amin(dim=0)
+        cells_x, cells_y, cells_z = (int(span) for span in (cells.amax(dim=0) - lowest_cell + 3).tolist())
+        _check_cells((cells_x, cells_y, cells_z), points.count)
+        return cls(edge, lowest_cell, (cells_x, cells_y, cells_z))
 
     def places(self, points: _Points) -> Tensor:
         """Return each point's cell (N, 3), counted from 1."""
@@ -116,8 +116,8 @@ class _Cells:
 
     def keys(self, places: Tensor, cloud: Tensor) -> Tensor:
         """Return the number of cells (...), given their places (..., 3) and clouds (...)."""
-        wide, deep, tall = self.spans
-        return ((cloud * wide + places[..., 0]) * deep + places[..., 1]) * tall + places[..., 2]
+        cells_x, cells_y, cells_z = self.spans
+        return ((cloud * cells_x + places[..., 0]) * cells_y + places[..., 1]) * cells_z + places[..., 2]
 
 
 def _check_cells(spans: tuple[int, int, int], clouds: int) -> None:
@@ -132,15 +132,15 @@ def _clouds_of(ends: Tensor, points: int) -> Tensor:
 
 def _lowest(xyz: Tensor, cloud: Tensor, count: int) -> Tensor:
     """Return the least coordinates of each cloud (B, 3); infinity for an empty one."""
-    least = xyz.new_full((count, 3), torch.inf)
-    return least.scatter_reduce_(0, cloud[:, None].expand(-1, 3), xyz, "amin")
+    lowest = xyz.new_full((count, 3), torch.inf)
+    return lowest.scatter_reduce_(0, cloud[:, None].expand(-1, 3), xyz, "amin")
 
 
 def _about_middle(coord: Tensor, cloud: Tensor, count: int) -> Tensor:
     """Return coordinates (N, 3) centred on the middle of their cloud's bounding box."""
-    exact = coord.double()
-    middle = 0.5 * (_lowest(exact, cloud, count) - _lowest(-exact, cloud, count))
-    return (exact - middle[cloud]).to(coord.dtype)
+    coordinates = coord.double()
+    middle = 0.5 * (_lowest(coordinates, cloud, count) - _lowest(-coordinates, cloud, count))
+    return (coordinates - middle[cloud]).to(coord.dtype)
 
 
 def _geometric_order(points: Tensor, cloud: Tensor) -> Tensor:
@@ -177,10 +177,10 @@ def _grid_sample(points: _Points, edge: float) -> Tensor:
         return points.cloud
     steps = (points.xyz - _lowest(points.xyz, points.cloud, points.count)[points.cloud]) / edge
     cells = torch.floor(steps)
-    wide, deep, tall = (int(span) for span in (cells.amax(dim=0) + 1).tolist())
-    _check_cells((wide, deep, tall), points.count)
+    cells_x, cells_y, cells_z = (int(span) for span in (cells.amax(dim=0) + 1).tolist())
+    _check_cells((cells_x, cells_y, cells_z), points.count)
     number = cells.long()
-    key = ((points.cloud * wide + number[:, 0]) * deep + number[:, 1]) * tall + number[:, 2]
+    key = ((points.cloud * cells_x + number[:, 0]) * cells_y + number[:, 1]) * cells_z + number[:, 2]
     order = torch.argsort(_squared(steps - cells - 0.5), stable=True)
     order = order[torch.argsort(key[order], stable=True)]
     return order[_first_of_each(key[order])].sort().values
@@ -194,9 +194,9 @@ def _squared(vectors: Tensor) -> Tensor:
 
 def _first_of_each(sorted_values: Tensor) -> Tensor:
     """Return a mask (N,) of the first of each run of equal values."""
-    first = torch.ones_like(sorted_values, dtype=torch.bool)
-    first[1:] = sorted_values[1:] != sorted_values[:-1]
-    return first
+    is_first = torch.ones_like(sorted_values, dtype=torch.bool)
+    is_first[1:] = sorted_values[1:] != sorted_values[:-1]
+    return is_first
 
 
 def _pairs(queries: _Points, support: _Points, edge: float) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
@@ -210,35 +210,35 @@ def _pairs(queries: _Points, support: _Points, edge: float) -> Iterator[tuple[Te
     limits = torch.tensor(cells.spans, device=key.device) - 1
     # Of far queries too, whose cells don't hold anything: the nearest ones that are numbered.
     place = cells.places(queries).clamp(min=torch.zeros_like(limits), max=limits)
-    around = torch.cartesian_prod(torch.arange(-1, 2), torch.arange(-1, 2)).to(place)
-    columns = place[:, None].expand(-1, len(around), 3).clone()
-    columns[..., :2] += around
-    inside = ((columns[..., :2] >= 0) & (columns[..., :2] <= limits[:2])).all(dim=-1)
+    column_steps = torch.cartesian_prod(torch.arange(-1, 2), torch.arange(-1, 2)).to(place)
+    columns = place[:, None].expand(-1, len(column_steps), 3).clone()
+    columns[..., :2] += column_steps
+    in_grid = ((columns[..., :2] >= 0) & (columns[..., :2] <= limits[:2])).all(dim=-1)
     columns[..., :2].clamp_(min=0)
-    low, high = (columns.clone() for _ in range(2))
-    low[..., 2].sub_(1).clamp_(min=0)
-    high[..., 2] = torch.minimum(high[..., 2] + 1, limits[2])
-    cloud = queries.cloud[:, None].expand(-1, len(around))
-    begin = torch.searchsorted(key, cells.keys(low, cloud))
-    length = (torch.searchsorted(key, cells.keys(high, cloud), right=True) - begin) * inside
+    lower_cell, upper_cell = (columns.clone() for _ in range(2))
+    lower_cell[..., 2].sub_(1).clamp_(min=0)
+    upper_cell[..., 2] = torch.minimum(upper_cell[..., 2] + 1, limits[2])
+    cloud = queries.cloud[:, None].expand(-1, len(column_steps))
+    begin = torch.searchsorted(key, cells.keys(lower_cell, cloud))
+    length = (torch.searchsorted(key, cells.keys(upper_cell, cloud), right=True) - begin) * in_grid
     total = length.sum(dim=1).cumsum(dim=0)
     for rows in _blocks(total, _PAIRS.get(key.device.type, _PAIRS_ELSEWHERE)):
-        flat = length[rows].reshape(-1)
-        column = torch.repeat_interleave(torch.arange(len(flat), device=key.device), flat)
-        within = torch.arange(len(column), device=key.device) - (flat.cumsum(dim=0) - flat)[column]
-        other = order[begin[rows].reshape(-1)[column] + within]
-        query = rows.start + torch.div(column, len(around), rounding_mode="floor")
-        yield query, other, _squared(queries.xyz[query] - support.xyz[other]).sqrt()
+        lengths = length[rows].reshape(-1)
+        column = torch.repeat_interleave(torch.arange(len(lengths), device=key.device), lengths)
+        place_in_run = torch.arange(len(column), device=key.device) - (lengths.cumsum(dim=0) - lengths)[column]
+        support_index = order[begin[rows].reshape(-1)[column] + place_in_run]
+        query = rows.start + torch.div(column, len(column_steps), rounding_mode="floor")
+        yield query, support_index, _squared(queries.xyz[query] - support.xyz[support_index]).sqrt()
 
 
 def _blocks(total: Tensor, pairs: int) -> Iterator[slice]:
     """Yield slices of queries with at most so many pairs, or one query; `total` (M,) is their running sum."""
     sums = total.cpu()
-    first, before = 0, 0
-    while first < len(sums):
-        last = max(int(torch.searchsorted(sums, before + pairs, right=True)), first + 1)
-        yield slice(first, last)
-        first, before = last, int(sums[last - 1])
+    begin, pairs_before = 0, 0
+    while begin < len(sums):
+        end = max(int(torch.searchsorted(sums, pairs_before + pairs, right=True)), begin + 1)
+        yield slice(begin, end)
+        begin, pairs_before = end, int(sums[end - 1])
 
 
 def _first_in_ball(queries: _Points, support: _Points, radius: float, limit: int) -> Tensor:
@@ -249,13 +249,13 @@ def _first_in_ball(queries: _Points, support: _Points, radius: float, limit: int
     indices = torch.full((len(queries), limit), -1, dtype=torch.int32, device=queries.xyz.device)
     if not len(queries):
         return indices
-    for query, other, distance in _pairs(queries, support, radius):
-        near = distance < radius
-        key = (query[near] * len(support) + other[near]).sort().values
+    for query, support_index, distance in _pairs(queries, support, radius):
+        in_ball = distance < radius
+        key = (query[in_ball] * len(support) + support_index[in_ball]).sort().values
         row = torch.div(key, len(support), rounding_mode="floor")
         rank = _ranks(row)
-        taken = rank < limit
-        indices[row[taken], rank[taken]] = (key % len(support))[taken].int()
+        has_room = rank < limit
+        indices[row[has_room], rank[has_room]] = (key % len(support))[has_room].int()
     return torch.where(indices < 0, indices[:, :1], indices)
 
 
@@ -265,7 +265,7 @@ def _ranks(sorted_values: Tensor) -> Tensor:
     return places - torch.cummax(places * _first_of_each(sorted_values), dim=0).values
 
 
-def _nearest_three(points: _Points, kept: _Points, radius: float) -> tuple[Tensor, Tensor]:
+def _nearest_three(points: _Points, support: _Points, radius: float) -> tuple[Tensor, Tensor]:
     """Return indices (N, 3) int32 and inverse-distance weights (N, 3) of each point's three nearest kept ones.
 
     Where a cloud has fewer, the index of the others is its first, and their weight 0.
@@ -274,31 +274,31 @@ def _nearest_three(points: _Points, kept: _Points, radius: float) -> tuple[Tenso
     weight = points.xyz.new_zeros(len(points), 3)
     if not len(points):
         return weight.int(), weight
-    begins = torch.searchsorted(kept.cloud, torch.arange(points.count, device=device))
-    nearest = begins[points.cloud][:, None].repeat(1, 3)
-    count = torch.bincount(kept.cloud, minlength=points.count).clamp(max=3)[points.cloud]
-    extent = float((kept.xyz.amax(dim=0) - kept.xyz.amin(dim=0)).amax())
-    left, edge = torch.arange(len(points), device=device), 4.0 / 3.0 * radius
-    while len(left):
-        asked = points.select(left)
-        place, distance = nearest[left], points.xyz.new_full((len(left), 3), torch.inf)
-        for query, other, step in _pairs(asked, kept, edge):
+    begins = torch.searchsorted(support.cloud, torch.arange(points.count, device=device))
+    nearest_index = begins[points.cloud][:, None].repeat(1, 3)
+    count = torch.bincount(support.cloud, minlength=points.count).clamp(max=3)[points.cloud]
+    extent = float((support.xyz.amax(dim=0) - support.xyz.amin(dim=0)).amax())
+    open_points, edge = torch.arange(len(points), device=device), 4.0 / 3.0 * radius
+    while len(open_points):
+        queries = points.select(open_points)
+        place, distance = nearest_index[open_points], points.xyz.new_full((len(open_points), 3), torch.inf)
+        for query, support_index, step in _pairs(queries, support, edge):
             order = torch.argsort(step, stable=True)
             order = order[torch.argsort(query[order], stable=True)]
             rank = _ranks(query[order])
             order, rank = order[rank < 3], rank[rank < 3]
-            place[query[order], rank], distance[query[order], rank] = other[order], step[order]
-        last = distance.gather(1, (count[left] - 1)[:, None])[:, 0]
-        done = (last <= edge) | torch.full_like(last, edge > 2.0 * (extent + radius), dtype=torch.bool)
-        nearest[left[done]] = place[done]
-        weight[left[done]] = 1.0 / (distance[done] + TINY)
-        left, edge = left[~done], 2.0 * edge
-    return nearest.int(), weight / weight.sum(dim=1, keepdim=True)
+            place[query[order], rank], distance[query[order], rank] = support_index[order], step[order]
+        farthest_distance = distance.gather(1, (count[open_points] - 1)[:, None])[:, 0]
+        is_done = (farthest_distance <= edge) | torch.full_like(farthest_distance, edge > 2.0 * (extent + radius), dtype=torch.bool)
+        nearest_index[open_points[is_done]] = place[is_done]
+        weight[open_points[is_done]] = 1.0 / (distance[is_done] + TINY)
+        open_points, edge = open_points[~is_done], 2.0 * edge
+    return nearest_index.int(), weight / weight.sum(dim=1, keepdim=True)
 
 
 def _in_given_order(neighbours: Neighbours, order: Tensor) -> Neighbours:
     """Return tensors whose indices into the clouds, found for points in `order`, are mapped back to the given order."""
     place = torch.empty_like(order)
     place[order] = torch.arange(len(order), device=order.device)
-    turned = {name: order[neighbours[name].long()].to(neighbours[name].dtype) for name in ("sample1", "group1")}
-    return neighbours | turned | {name: neighbours[name][place] for name in ("nearest1", "weight1")}
+    mapped = {name: order[neighbours[name].long()].to(neighbours[name].dtype) for name in ("sample1", "group1")}
+    return neighbours | mapped | {name: neighbours[name][place] for name in ("nearest1", "weight1")}

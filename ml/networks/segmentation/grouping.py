@@ -80,12 +80,12 @@ class Grouping:
         number of pairs (N, 3); that mean (3,); the relative positions' covariance (3, 3).
         """
         if self._statistics is None:
-            flat = self.index.reshape(-1).long()  # adding at 32-bit indices is slow
+            flat_index = self.index.reshape(-1).long()  # adding at 32-bit indices is slow
             relative = self.relative().reshape(-1, 3)
             mean = relative.mean(dim=0)
             centred = relative - mean
-            share = torch.bincount(flat, minlength=len(self.support)).to(relative.dtype) / self.pairs
-            sums = torch.zeros_like(self.support).index_add_(0, flat, centred) / self.pairs
+            share = torch.bincount(flat_index, minlength=len(self.support)).to(relative.dtype) / self.pairs
+            sums = torch.zeros_like(self.support).index_add_(0, flat_index, centred) / self.pairs
             self._statistics = share, sums, mean, centred.T @ centred / self.pairs
         return self._statistics
 
@@ -159,8 +159,8 @@ def _first_column(values: Tensor, largest: Tensor) -> Tensor:
     limit = values.shape[1]
     # The first of equal ones gets the largest number. Not integers: comparing into floats is far quicker.
     countdown = torch.arange(limit, 0, -1, dtype=values.dtype, device=values.device)[:, None]
-    first = values.eq_(largest[:, None]).mul_(countdown).amax(dim=1)
-    return (limit - first.long()).clamp_(max=limit - 1)  # NaN equals nothing: any will do then
+    countdown_of_largest = values.eq_(largest[:, None]).mul_(countdown).amax(dim=1)
+    return (limit - countdown_of_largest.long()).clamp_(max=limit - 1)  # NaN equals nothing: any will do then
 
 
 @full_precision
@@ -174,8 +174,8 @@ def normalised_max(features: Tensor, weight: Tensor, norm: Norm, grouping: Group
         grouping: who looks at whom.
     """
     sign = norm.scale_sign()
-    turned = weight * sign[:, None]
-    directions, weights = turned[:, :3], turned[:, 3:]
+    signed_weight = weight * sign[:, None]
+    directions, weights = signed_weight[:, :3], signed_weight[:, 3:]
     values = features @ weights.T
     mean, variance = _statistics(norm, sign, grouping, values, directions)
     scale = norm.weight * sign * torch.rsqrt(variance + norm.eps)
@@ -196,25 +196,25 @@ def normalised_max_of_two(
         norms: of both; between them is a ReLU.
         grouping: who looks at whom.
     """
-    first, second = norms
+    inner_norm, outer_norm = norms
     directions, linear = weights[0][:, :3], weights[0][:, 3:]
     values = features @ linear.T
-    mean, variance = _statistics(first, torch.ones_like(first.weight), grouping, values, directions)
-    scale = first.weight * torch.rsqrt(variance + first.eps)
+    mean, variance = _statistics(inner_norm, torch.ones_like(inner_norm.weight), grouping, values, directions)
+    scale = inner_norm.weight * torch.rsqrt(variance + inner_norm.eps)
     support = torch.addmm(values, grouping.support, directions.T) * scale
-    offset = torch.addmm(first.bias - mean * scale, grouping.queries, -(directions * scale[:, None]).T)
-    sign = second.scale_sign()
-    turned = weights[1] * sign[:, None]
-    top, total, product = pairs_max(support, offset, grouping.index, turned, moments=second.training)
-    mean, variance = _running_moments(second, sign)
-    if second.training and grouping.pairs:
-        between = total / grouping.pairs
-        mean = turned @ between
-        covariance = product / grouping.pairs - torch.outer(between, between)
-        variance = ((turned @ covariance) * turned).sum(dim=1).clamp(min=0.0)
-        second.observe(mean * sign, variance, grouping.pairs)
-    scale = second.weight * sign * torch.rsqrt(variance + second.eps)
-    return torch.addcmul(second.bias - mean * scale, top, scale)
+    offset = torch.addmm(inner_norm.bias - mean * scale, grouping.queries, -(directions * scale[:, None]).T)
+    sign = outer_norm.scale_sign()
+    signed_weight = weights[1] * sign[:, None]
+    top, total, product = pairs_max(support, offset, grouping.index, signed_weight, moments=outer_norm.training)
+    mean, variance = _running_moments(outer_norm, sign)
+    if outer_norm.training and grouping.pairs:
+        mean_inner = total / grouping.pairs
+        mean = signed_weight @ mean_inner
+        covariance = product / grouping.pairs - torch.outer(mean_inner, mean_inner)
+        variance = ((signed_weight @ covariance) * signed_weight).sum(dim=1).clamp(min=0.0)
+        outer_norm.observe(mean * sign, variance, grouping.pairs)
+    scale = outer_norm.weight * sign * torch.rsqrt(variance + outer_norm.eps)
+    return torch.addcmul(outer_norm.bias - mean * scale, top, scale)
 
 
 def _statistics(
@@ -247,9 +247,9 @@ class _PairsMax(torch.autograd.Function):
         total, product = offset.new_zeros(in_channels), offset.new_zeros(in_channels, in_channels)
         for rows in _chunks(queries, limit * out_channels, offset.device):
             pairs = _pairs(support, offset[rows], index[rows])
-            after = (pairs @ weight.T).view(-1, limit, out_channels)
-            top[rows] = after.amax(dim=1)
-            column[rows] = _first_column(after, top[rows]).to(torch.uint8)
+            outputs = (pairs @ weight.T).view(-1, limit, out_channels)
+            top[rows] = outputs.amax(dim=1)
+            column[rows] = _first_column(outputs, top[rows]).to(torch.uint8)
             if moments:
                 total += pairs.sum(dim=0)
                 product.addmm_(pairs.T, pairs)
@@ -262,8 +262,8 @@ class _PairsMax(torch.autograd.Function):
         support, offset, index, weight, column = ctx.saved_tensors
         of_top, of_total, of_product = gradients
         limit, out_channels = index.shape[1], weight.shape[0]
-        of_support, of_offset, of_weight = (torch.zeros_like(each) for each in (support, offset, weight))
-        both = of_product + of_product.T
+        of_support, of_offset, of_weight = (torch.zeros_like(tensor) for tensor in (support, offset, weight))
+        symmetric_product = of_product + of_product.T
         for rows in _chunks(len(index), limit * out_channels, offset.device):
             pairs = _pairs(support, offset[rows], index[rows])
             of_after = pairs.new_zeros(len(of_top[rows]), limit, out_channels)
@@ -271,7 +271,7 @@ class _PairsMax(torch.autograd.Function):
             of_weight.addmm_(of_after.view(-1, out_channels).T, pairs)
             of_pairs = of_after.view(-1, out_channels) @ weight
             if ctx.moments:
-                of_pairs.addmm_(pairs, both).add_(of_total)
+                of_pairs.addmm_(pairs, symmetric_product).add_(of_total)
             of_pairs.mul_(pairs.sign())  # through the ReLU
             of_support.index_add_(0, index[rows].reshape(-1).long(), of_pairs)
             of_offset[rows] = of_pairs.view(-1, limit, pairs.shape[1]).sum(dim=1)
@@ -298,8 +298,8 @@ def pairs_max(
     if torch.compiler.is_exporting():
         pairs = support.index_select(0, index.reshape(-1)).unflatten(0, index.shape)
         in_channels = weight.shape[1]
-        after = torch.relu(pairs + offset[:, None]) @ weight.T
-        return after.amax(dim=1), offset.new_zeros(in_channels), offset.new_zeros(in_channels, in_channels)
+        outputs = torch.relu(pairs + offset[:, None]) @ weight.T
+        return outputs.amax(dim=1), offset.new_zeros(in_channels), offset.new_zeros(in_channels, in_channels)
     result: tuple[Tensor, Tensor, Tensor] = _PairsMax.apply(support, offset, index, weight, moments)
     return result
 
@@ -310,9 +310,9 @@ def _pairs(support: Tensor, offset: Tensor, index: Tensor) -> Tensor:
 
 
 @full_precision
-def interpolate(values: Tensor, nearest: Tensor, weight: Tensor) -> Tensor:
-    """Return weighted sums (N, C) of the rows of `values` (M, C) that `nearest` (N, 3) names."""
+def interpolate(values: Tensor, index: Tensor, weight: Tensor) -> Tensor:
+    """Return weighted sums (N, C) of the rows of `values` (M, C) that `index` (N, 3) names."""
     if torch.compiler.is_exporting():
-        chosen = values.index_select(0, nearest.reshape(-1)).unflatten(0, nearest.shape)
-        return (chosen * weight.to(values.dtype)[..., None]).sum(dim=1)
-    return F.embedding_bag(nearest, values, mode="sum", per_sample_weights=weight.to(values.dtype))
+        rows = values.index_select(0, index.reshape(-1)).unflatten(0, index.shape)
+        return (rows * weight.to(values.dtype)[..., None]).sum(dim=1)
+    return F.embedding_bag(index, values, mode="sum", per_sample_weights=weight.to(values.dtype))

@@ -178,11 +178,11 @@ class PointTransformer(nn.Module):
         if tuple(feat.shape) != shape:
             raise InputError("feat", tuple(feat.shape), f"must have the shape {shape}")
         views = [self._views(cells, stage) for stage in range(len(self.stages))]
-        first = cells["near0"] if "near0" in cells else cells["grid0"]
+        stage_table = cells["near0"] if "near0" in cells else cells["grid0"]
         points = self.stem(torch.cat([feat, cells["inside0"].to(feat.dtype)], dim=1))
         # In single precision at least: cells of many points sum many small shares.
         share = cells["share0"].to(torch.promote_types(feat.dtype, torch.float32))
-        values = points.new_zeros(first.shape[0], points.shape[1], dtype=share.dtype)
+        values = points.new_zeros(stage_table.shape[0], points.shape[1], dtype=share.dtype)
         values = values.index_add(0, cells["cell0"], points * share[:, None])
         levels = [points]
         for stage, blocks in enumerate(self.stages):
@@ -247,8 +247,8 @@ def rotations(places: Tensor, width: int) -> tuple[Tensor, Tensor]:
 @full_precision
 def turned(values: Tensor, cosine: Tensor, sine: Tensor) -> Tensor:
     """Return values (M, heads, width) with their pairs of channels, half the width apart, turned by angles."""
-    first, second = values.chunk(2, dim=-1)
-    return torch.cat([first * cosine - second * sine, first * sine + second * cosine], dim=-1)
+    first_half, second_half = values.chunk(2, dim=-1)
+    return torch.cat([first_half * cosine - second_half * sine, first_half * sine + second_half * cosine], dim=-1)
 
 
 def skipped(change: Tensor, ends: Tensor | None, share: float, training: bool) -> Tensor:
@@ -264,9 +264,9 @@ def skipped(change: Tensor, ends: Tensor | None, share: float, training: bool) -
     """
     if not training or not share or ends is None:
         return change
-    kept = (torch.rand(len(ends), device=change.device) >= share).to(change.dtype) / (1.0 - share)
+    cloud_factor = (torch.rand(len(ends), device=change.device) >= share).to(change.dtype) / (1.0 - share)
     counts = torch.diff(ends, prepend=ends.new_zeros(1))
-    return change * torch.repeat_interleave(kept, counts, output_size=len(change))[:, None]
+    return change * torch.repeat_interleave(cloud_factor, counts, output_size=len(change))[:, None]
 
 
 def _block(options: PointTransformerOptions, stage: int, drop: float) -> nn.Module:
@@ -291,8 +291,8 @@ class ConvolutionBlock(nn.Module):
     def forward(self, values: Tensor, view: View) -> Tensor:
         """Return the cells' features (M, width) after the block; the shape stays."""
         assert view.around is not None
-        seen = F.relu_(self.look_norm(self.look(self.norm(values), view.around)))
-        return values + skipped(self.mix(seen), view.ends, self.drop, self.training)
+        convolved = F.relu_(self.look_norm(self.look(self.norm(values), view.around)))
+        return values + skipped(self.mix(convolved), view.ends, self.drop, self.training)
 
 
 class AttentionBlock(nn.Module):
@@ -312,8 +312,8 @@ class AttentionBlock(nn.Module):
     def forward(self, values: Tensor, view: View) -> Tensor:
         """Return the cells' features (M, width) after the block; the shape stays."""
         values = values + skipped(self._attention(self.norm(values), view), view.ends, self.drop, self.training)
-        wide = F.gelu(self.widen(self.wide_norm(values)))
-        return values + skipped(self.narrow(wide), view.ends, self.drop, self.training)
+        expanded = F.gelu(self.widen(self.wide_norm(values)))
+        return values + skipped(self.narrow(expanded), view.ends, self.drop, self.training)
 
     def _attention(self, values: Tensor, view: View) -> Tensor:
         """Return what each cell (M, width) takes from the cells of its patch."""
@@ -323,7 +323,7 @@ class AttentionBlock(nn.Module):
         # Vaswani et al. 2017: softmax(Q K^T / sqrt(d)) V. Queries and keys are turned before cells are gathered, once
         # for each cell and not once for each of the patches that it is in.
         q, k, v = self.look(values).unflatten(1, (3, -1, self.head_width)).unbind(1)
-        q, k = (turned(each, *view.turns).to(v.dtype) for each in (q, k))
+        q, k = (turned(tensor, *view.turns).to(v.dtype) for tensor in (q, k))
         qkv = torch.stack([q, k, v], dim=1)
         patches = qkv.index_select(0, view.patch.reshape(-1)).unflatten(0, view.patch.shape)
         q, k, v = patches.transpose(1, 3).unbind(2)  # (P, heads, K, width of a head)
@@ -331,8 +331,8 @@ class AttentionBlock(nn.Module):
         attention = F.scaled_dot_product_attention(q, k, v, attn_mask=mask)
         # Of the patches that a cell is in only one is asked for it: that in whose middle it lies.
         by_cell = attention.transpose(1, 2).flatten(2).flatten(0, 1).index_select(0, view.place)
-        joined: Tensor = self.join(by_cell)
-        return joined
+        result: Tensor = self.join(by_cell)
+        return result
 
 
 class Pool(nn.Module):
@@ -356,13 +356,13 @@ class Unpool(nn.Module):
         self.own = Pointwise(skip_channels, skip_channels)
         self.wide = Pointwise(in_channels, skip_channels)
 
-    def forward(self, skip: Tensor, wide: Tensor, parent: Tensor) -> Tensor:
+    def forward(self, skip: Tensor, coarse: Tensor, parent: Tensor) -> Tensor:
         """Return features (N, skip channels) of cells from theirs before and those of the wider cells around them.
 
         Args:
             skip: of the stage before (N, skip channels).
-            wide: of the wider cells (M, in channels).
+            coarse: of the wider cells (M, in channels).
             parent: (N,) the wider cell of each.
         """
-        joined: Tensor = self.own(skip) + self.wide(wide).index_select(0, parent)
-        return joined
+        result: Tensor = self.own(skip) + self.wide(coarse).index_select(0, parent)
+        return result
