@@ -78,6 +78,8 @@ def read_card(name: str) -> ModelCard:
     path = WEIGHTS / f"{name}.json"
     if not path.is_file():
         names = sorted(card_file.stem for card_file in WEIGHTS.glob("*.json"))
-        requirement = f"must be one of {', '.join(names)}{nearest_name(name, names)}" if names else "no model is shipped"
+        requirement = (
+            f"must be one of {', '.join(names)}{nearest_name(name, names)}" if names else "no model is shipped"
+        )
         raise InputError("model", name, requirement)
     return ModelCard.from_dict(read_json(path), source=path.name)

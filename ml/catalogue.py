@@ -70,7 +70,9 @@ def _yardstick(name: str) -> Entry:
         "splits": list(yardstick.splits),
         "classes": list(dict.fromkeys(yardstick.mapping.classes.values())),
     }
-    return Entry(name, yardstick.title, shipped_file("yardstick", YARDSTICKS, name, [".json"]), key_figures, yardstick.source)
+    return Entry(
+        name, yardstick.title, shipped_file("yardstick", YARDSTICKS, name, [".json"]), key_figures, yardstick.source
+    )
 
 
 def _object(file: Path) -> Mapping[str, Any]:

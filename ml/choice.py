@@ -77,7 +77,9 @@ class Choice:
     def why(self) -> str:
         """Return in one line which model was chosen and why."""
         least_density, largest_density = self.card.domain.density
-        training_domain = f"trained on {least_density:g} to {largest_density:g} points/m2, {' and '.join(self.card.domain.platforms)}"
+        training_domain = (
+            f"trained on {least_density:g} to {largest_density:g} points/m2, {' and '.join(self.card.domain.platforms)}"
+        )
         reservation = (
             "" if not self.distance else "; the cloud is unlike that" if self.doubtful else "; the nearest there is"
         )
@@ -95,10 +97,10 @@ def choose_model(cloud: Path, task: str) -> Choice:
     if not cards:
         raise InputError("RUN", None, f"no model for {task} comes with the package; `synthroads train` makes one")
     traits = cloud_traits(cloud)
-    return nearest(cards, traits)
+    return nearest_model(cards, traits)
 
 
-def nearest(cards: Sequence[ModelCard], traits: CloudTraits) -> Choice:
+def nearest_model(cards: Sequence[ModelCard], traits: CloudTraits) -> Choice:
     """Return which of some models (at least one) was trained on what is most like a cloud; of equal ones the first.
 
     Raises:
@@ -107,7 +109,9 @@ def nearest(cards: Sequence[ModelCard], traits: CloudTraits) -> Choice:
     choices = [Choice(card, traits, domain_distance(card, traits)) for card in cards]
     best_choice = min(choices, key=lambda choice: choice.distance)
     if best_choice.distance == inf:
-        missing_attributes = " or ".join(sorted({name for card in cards for name in card.domain.needs} - traits.attributes))
+        missing_attributes = " or ".join(
+            sorted({name for card in cards for name in card.domain.needs} - traits.attributes)
+        )
         raise InputError("cloud", traits.to_text(), f"the models that come with the package need {missing_attributes}")
     return best_choice
 

@@ -54,7 +54,9 @@ class Experiment(Model):
     @classmethod
     def _check_names(cls, variants: dict[str, Variant]) -> dict[str, Variant]:
         if invalid_name := next((name for name in variants if not _FOLDER_NAME.fullmatch(name)), None):
-            raise ValueError(f"'{invalid_name}' must be the name of a folder: no / and no \\ in it, and no dot before it")
+            raise ValueError(
+                f"'{invalid_name}' must be the name of a folder: no / and no \\ in it, and no dot before it"
+            )
         return variants
 
     def filled_data(self, folders: Mapping[str, str]) -> dict[str, Any]:
@@ -127,7 +129,7 @@ def fill_path(path: str, folders: Mapping[str, str]) -> str:
         raise InputError("--data", name, f"must be given: {name}=FOLDER") from None
 
 
-def kept_figures(file: Path, name: str, made_from: Any, is_sound: Callable[[Any], bool]) -> dict[str, Any] | None:
+def read_figures(file: Path, name: str, made_from: Any, is_sound: Callable[[Any], bool]) -> dict[str, Any] | None:
     """Return the figures that an experiment keeps in a file, or None if there are none, or those of something else.
 
     Args:
@@ -160,7 +162,7 @@ def cached_scores(
         run: with the configuration that it is tested with.
         file: for the scores, which are written.
         score: makes them.
-        is_sound: see `kept_figures`.
+        is_sound: see `read_figures`.
         dependencies: what else they depend on, as JSON data.
 
     Raises:
@@ -168,7 +170,7 @@ def cached_scores(
     """
     configuration = lasting_data(run.configuration.to_dict())
     made_from = {"configuration": configuration, "checkpoint_sha256": checksum(run.folder / CHECKPOINT), **dependencies}
-    if (scores_in_file := kept_figures(file, "tests", made_from, is_sound)) is not None:
+    if (scores_in_file := read_figures(file, "tests", made_from, is_sound)) is not None:
         return scores_in_file
     scores = score()
     write_file(file, canonical_json({"made_from": made_from, "tests": scores}).encode(), overwrite=True)

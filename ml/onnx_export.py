@@ -116,10 +116,12 @@ def largest_difference(network: Exportable, content: bytes) -> float | None:
     outputs = session.run(list(network.outputs), {name: value.numpy() for name, value in network.inputs.items()})
     with torch.no_grad():
         references = network.model(*network.inputs.values())
-    return max(float(np.abs(output - reference.numpy()).max()) for output, reference in zip(outputs, references, strict=True))
+    return max(
+        float(np.abs(output - reference.numpy()).max()) for output, reference in zip(outputs, references, strict=True)
+    )
 
 
-def described(**entries: Any) -> dict[str, str]:
+def metadata_texts(**entries: Any) -> dict[str, str]:
     """Return metadata as texts: JSON, but for what is text already."""
     return {
         name: value if isinstance(value, str) else json.dumps(value, sort_keys=True) for name, value in entries.items()

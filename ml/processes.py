@@ -83,14 +83,15 @@ def helper_processes(run: Run[Any], learn: Callable[[Run[Any]], object], device:
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         meeting = Path(folder) / "meeting"
         helpers = [
-            context.Process(target=_help, args=(learn, run, meeting, number, device.type)) for number in range(1, count)
+            context.Process(target=_run_helper, args=(learn, run, meeting, number, device.type))
+            for number in range(1, count)
         ]
         for helper in helpers:
             helper.start()
         finish_event = Event()
         Thread(target=_exit_if_lost, args=(helpers, finish_event), daemon=True).start()
         try:
-            _join(meeting, 0, count, device.type)
+            _join_group(meeting, 0, count, device.type)
             yield
             for helper in helpers:
                 helper.join()
@@ -137,16 +138,16 @@ def _check_devices(count: int, device: str) -> None:
         raise InputError("device", device, "must be cuda or auto for several processes: one GPU each")
 
 
-def _join(meeting: Path, number: int, count: int, device: str) -> None:
+def _join_group(meeting: Path, number: int, count: int, device: str) -> None:
     store = FileStore(str(meeting), count)
     store.set_timeout(_MEETING)
     backend = "nccl" if device == "cuda" else "gloo"
     distributed.init_process_group(backend, store=store, rank=number, world_size=count, timeout=_PATIENCE)
 
 
-def _help(learn: Callable[[Run[Any]], object], run: Run[Any], meeting: Path, number: int, device: str) -> None:
+def _run_helper(learn: Callable[[Run[Any]], object], run: Run[Any], meeting: Path, number: int, device: str) -> None:
     """Join the training and call ``learn(run)`` in a helper process; the first process reports the project's errors."""
     with suppress(SynthRoadsError, KeyboardInterrupt):
-        _join(meeting, number, run.configuration.processes, device)
+        _join_group(meeting, number, run.configuration.processes, device)
         learn(run)
         distributed.destroy_process_group()

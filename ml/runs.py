@@ -80,7 +80,7 @@ class Run(Generic[C]):
         """
         run = cls(folder, configuration, resume=resume, overwrite=overwrite)
         if not process_number():  # the first process's, which alone writes
-            run._goes_on()
+            run._take_over()
         return run
 
     @contextmanager
@@ -100,7 +100,7 @@ class Run(Generic[C]):
             try:
                 yield
             except InputError:
-                self._remove_unless_kept()
+                self._remove_unless_saved()
                 raise
             finally:
                 self.held = False
@@ -116,16 +116,16 @@ class Run(Generic[C]):
         if self.begun:
             return
         if not process_number():
-            if not self._goes_on():
+            if not self._take_over():
                 self._clear()
             content = canonical_json(self.configuration.to_dict()).encode()
             write_file(self.folder / CONFIGURATION, content, overwrite=True)
         self.begun = True
         wait_for_all()  # nobody goes on with a checkpoint that is removed until here
 
-    def _goes_on(self) -> bool:
+    def _take_over(self) -> bool:
         """Take over what an interrupted run has kept, and return whether there is one; for errors see `start`."""
-        if not (self.folder / CONFIGURATION).exists() or not self._kept_checkpoints():
+        if not (self.folder / CONFIGURATION).exists() or not self._has_checkpoints():
             return False
         if self.resume:
             self._resume(read_json(self.folder / CONFIGURATION))
@@ -134,13 +134,13 @@ class Run(Generic[C]):
             raise OutputError("--output", str(self.folder), fault)
         return self.resume
 
-    def _kept_checkpoints(self) -> bool:
+    def _has_checkpoints(self) -> bool:
         """Return whether an epoch of the run, or of what it began with, is kept in its folder."""
         return (self.folder / CHECKPOINT).exists() or any((self.folder / PRETRAINING).rglob(CHECKPOINT))
 
-    def _remove_unless_kept(self) -> None:
+    def _remove_unless_saved(self) -> None:
         """Remove what `begin` has written, and the folder if it is empty then, unless an epoch is kept."""
-        if self.begun and not self._kept_checkpoints():
+        if self.begun and not self._has_checkpoints():
             with suppress(OSError):  # what ended the training is told
                 self._clear()
                 (self.folder / CONFIGURATION).unlink(missing_ok=True)
@@ -200,9 +200,9 @@ class Run(Generic[C]):
             raise InputError(str(path), None, "is no checkpoint of a training of ours")
         epoch, model = state["epoch"], state["model"]
         if isinstance(epoch, bool) or not isinstance(epoch, int) or epoch < 0:
-            raise InputError(f"{path}: epoch", _kind(epoch), "a whole number from 0 is needed")
+            raise InputError(f"{path}: epoch", _value_text(epoch), "a whole number from 0 is needed")
         if not isinstance(model, Mapping) or not all(isinstance(value, torch.Tensor) for value in model.values()):
-            raise InputError(f"{path}: model", _kind(model), "a dictionary of tensors is needed")
+            raise InputError(f"{path}: model", _value_text(model), "a dictionary of tensors is needed")
         return state
 
     def calibration(self) -> dict[str, Any] | None:
@@ -228,10 +228,16 @@ class Run(Generic[C]):
         with suppress(InputError):  # fields may be called otherwise by now, or be new
             previous_data = self.configuration.from_dict(previous_data).to_dict()
         previous_lasting, current_lasting = lasting_data(previous_data), lasting_data(current_data)
-        changed_fields = [name for name in {**previous_lasting, **current_lasting} if previous_lasting.get(name) != current_lasting.get(name)]
+        changed_fields = [
+            name
+            for name in {**previous_lasting, **current_lasting}
+            if previous_lasting.get(name) != current_lasting.get(name)
+        ]
         if changed_fields:
             name = changed_fields[0]
-            raise InputError(f"--resume: {name}", current_data.get(name), f"the run was begun with {previous_data.get(name)!r}")
+            raise InputError(
+                f"--resume: {name}", current_data.get(name), f"the run was begun with {previous_data.get(name)!r}"
+            )
         state = self.last_checkpoint()
         self.kept = epoch_count = 0 if state is None else state["epoch"]
         if epoch_count:
@@ -262,7 +268,7 @@ def load_state(module: nn.Module | torch.optim.Optimizer, state: Any, source: st
             raise InputError(source, None, fault)
 
 
-def _kind(value: object) -> str:
+def _value_text(value: object) -> str:
     """Return a number or text as it is written, of anything else its type's name: tensors have long texts."""
     return repr(value) if isinstance(value, (str, int, float)) else type(value).__name__
 

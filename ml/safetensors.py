@@ -65,7 +65,7 @@ def read_metadata(path: Path) -> dict[str, str]:
     Raises:
         MissingFileError, InputError: there is no such file, or it is damaged.
     """
-    texts = _header(path)[0].get(METADATA, {})
+    texts = _read_header(path)[0].get(METADATA, {})
     if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
         raise InputError(f"{path}: {METADATA}", None, "must be texts by name")
     return texts
@@ -77,12 +77,12 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
     Raises:
         MissingFileError, InputError: there is no such file, or it is damaged.
     """
-    header, begin = _header(path)
+    header, begin = _read_header(path)
     content = np.fromfile(path, dtype=np.uint8, offset=begin)
-    return {name: _tensor(path, name, entry, content) for name, entry in header.items() if name != METADATA}
+    return {name: _read_tensor(path, name, entry, content) for name, entry in header.items() if name != METADATA}
 
 
-def _header(path: Path) -> tuple[dict[str, Any], int]:
+def _read_header(path: Path) -> tuple[dict[str, Any], int]:
     """Return a file's header and the offset of its data."""
     if not path.is_file():
         raise MissingFileError(str(path), None, "no such file of weights")
@@ -98,7 +98,7 @@ def _header(path: Path) -> tuple[dict[str, Any], int]:
     return header, _LENGTH + length
 
 
-def _tensor(path: Path, name: str, entry: Any, content: np.ndarray[Any, np.dtype[np.uint8]]) -> Tensor:
+def _read_tensor(path: Path, name: str, entry: Any, content: np.ndarray[Any, np.dtype[np.uint8]]) -> Tensor:
     damage_error = InputError(f"{path}: {name}", None, "lies outside of the file, or isn't as long as its shape says")
     try:
         dtype, shape, (begin, end) = _TYPES[entry["dtype"]], list(entry["shape"]), entry["data_offsets"]

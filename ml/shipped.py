@@ -88,23 +88,23 @@ def ship(run: Run[Any], weights: Path, *, overwrite: bool = False) -> int:
     state = run.last_checkpoint()
     if state is None or state["epoch"] < run.configuration.schedule.epochs:
         raise InputError(str(run.folder), None, "its training isn't finished; `synthroads train --resume` goes on")
-    tensors = {name: _halved(value) for name, value in state["model"].items()}
+    tensors = {name: _to_half_precision(value) for name, value in state["model"].items()}
     size = sum(value.numel() * value.element_size() for value in tensors.values())
     if size > LARGEST_MB * 1e6:
         raise InputError(str(run.folder), round(size / 1e6, 1), f"its weights must take less than {LARGEST_MB:g} MB")
-    metadata: Mapping[str, str] = {"format": "pt", "configuration": _as_text(run.configuration.to_dict())}
+    metadata: Mapping[str, str] = {"format": "pt", "configuration": _json_text(run.configuration.to_dict())}
     if (calibration := run.calibration()) is not None:
-        metadata = {**metadata, "calibration": _as_text(calibration)}
+        metadata = {**metadata, "calibration": _json_text(calibration)}
     write_tensors(weights, tensors, metadata, overwrite=overwrite)
     return weights.stat().st_size
 
 
-def _halved(value: torch.Tensor) -> torch.Tensor:
+def _to_half_precision(value: torch.Tensor) -> torch.Tensor:
     """Return a tensor in half precision; integers, and values beyond its range, as they are."""
     if not value.is_floating_point() or float(value.abs().max() if value.numel() else 0.0) > 6e4:
         return value
     return value.half()
 
 
-def _as_text(data: Any) -> str:
+def _json_text(data: Any) -> str:
     return json.dumps(data, sort_keys=True, separators=(",", ":"))

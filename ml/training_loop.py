@@ -76,7 +76,9 @@ def fit(
     """
     configuration, number, count = run.configuration, process_number(), process_count()
     batches_per_step = configuration.accumulation
-    steps_per_epoch = batches_per_epoch // (count * batches_per_step) if count > 1 else -(-batches_per_epoch // batches_per_step)
+    steps_per_epoch = (
+        batches_per_epoch // (count * batches_per_step) if count > 1 else -(-batches_per_epoch // batches_per_step)
+    )
     if steps_per_epoch == 0 and count > 1:
         raise InputError("processes", count, f"must not exceed the batches of an epoch, {batches_per_epoch}")
     share = slice(number, min(steps_per_epoch * count * batches_per_step, batches_per_epoch), count)
@@ -95,7 +97,9 @@ def fit(
         model.train()
         figures: list[Figures] = []
         loss_sum = 0.0
-        for step, step_batches in enumerate(_groups(batches(epoch, share), batches_per_step), start=epoch * steps_per_epoch):
+        for step, step_batches in enumerate(
+            _groups(batches(epoch, share), batches_per_step), start=epoch * steps_per_epoch
+        ):
             rate = learning_rate(schedule, step, schedule.epochs * steps_per_epoch)
             figures.append(train_step(model, optimizer, rate, configuration, loss, *step_batches))
             loss_sum += figures[-1]["loss"]

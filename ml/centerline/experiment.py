@@ -20,7 +20,7 @@ from ..configuration import Part
 from ..data.batches import MeasuredRoad
 from ..data.roads import LearningRoad, read_measured
 from ..experiments import Experiment as AnyExperiment
-from ..experiments import cached_scores, fill_path, kept_figures, with_seed, write_results
+from ..experiments import cached_scores, fill_path, read_figures, with_seed, write_results
 from ..runs import METRICS, Run, to_json_data
 from ..scores.baselines import SkeletonSettings
 from ..scores.distances import METRICS as FIGURES
@@ -98,17 +98,24 @@ def run_experiment(
         for name, variant in experiment.variants.items():
             results: dict[str, Any] = {}
             for turn in turns:
-                configuration, folder_name = _without(with_seed(configurations[name], seed), turn, roads), _without_name(turn)
+                configuration, folder_name = (
+                    _leave_out_roads(with_seed(configurations[name], seed), turn, roads),
+                    _folder_without(turn),
+                )
                 variant_folder = output / (variant.of or name)
-                folder = (variant_folder / folder_name if configuration.data.measured else variant_folder) / f"seed-{seed}"
+                folder = (
+                    variant_folder / folder_name if configuration.data.measured else variant_folder
+                ) / f"seed-{seed}"
                 if variant.of is None:
-                    _train(configuration, folder, progress)
+                    _train_run(configuration, folder, progress)
                 file = output / name / f"{folder_name}-seed-{seed}.json"
-                results |= _test(Run(folder, configuration), {road: roads[road] for road in turn}, file, progress)
+                results |= _test_run(Run(folder, configuration), {road: roads[road] for road in turn}, file, progress)
             figures[name][str(seed)] = {road: results[road] for road in test_roads}
             write_results(output, figures, table(experiment.title, figures, list(configurations)))
         settings = configurations[next(iter(configurations))]
-        for rule, results in _rules(settings, seed, {road: roads[road] for road in test_roads}, output, progress).items():
+        for rule, results in _rule_figures(
+            settings, seed, {road: roads[road] for road in test_roads}, output, progress
+        ).items():
             figures.setdefault(rule, {})[str(seed)] = results
         write_results(output, figures, table(experiment.title, figures, list(configurations)))
     return figures
@@ -146,7 +153,7 @@ def _turns(left_out: Sequence[Sequence[str]], roads: Mapping[str, object]) -> li
     return turns
 
 
-def _without(
+def _leave_out_roads(
     configuration: CenterlineConfiguration, turn: Sequence[str], roads: Mapping[str, tuple[Path, Path]]
 ) -> CenterlineConfiguration:
     """Return a variant's configuration with the roads of a turn left out of what it learns from.
@@ -168,7 +175,7 @@ def _without(
     return configuration.model_copy(update={"data": data})
 
 
-def _without_name(turn: Sequence[str]) -> str:
+def _folder_without(turn: Sequence[str]) -> str:
     """Return the name of the folder of the runs that a turn's roads were left out of."""
     names = "+".join(turn)
     if len(names) > _LONGEST_NAME:
@@ -176,24 +183,24 @@ def _without_name(turn: Sequence[str]) -> str:
     return f"without-{names}"
 
 
-def _train(configuration: CenterlineConfiguration, folder: Path, progress: Progress) -> None:
+def _train_run(configuration: CenterlineConfiguration, folder: Path, progress: Progress) -> None:
     run = Run.start(folder, configuration, resume=True)
     if not (folder / METRICS).is_file():
         train(run, progress)
 
 
-def _test(
+def _test_run(
     run: Run[CenterlineConfiguration], roads: Mapping[str, tuple[Path, Path]], file: Path, progress: Progress
 ) -> dict[str, Any]:
     """Return a trained run's figures by road, cached in a file as long as run, clouds and axes stay as they are."""
 
     def score() -> dict[str, Any]:
-        return _measure({"": load_predictor(run)}, run.configuration, roads, progress)[""]
+        return _measure_predictors({"": load_predictor(run)}, run.configuration, roads, progress)[""]
 
     return cached_scores(run, file, score, partial(_are_figures, names=set(roads)), roads=_checksums(roads))
 
 
-def _rules(
+def _rule_figures(
     configuration: CenterlineConfiguration,
     seed: int,
     roads: Mapping[str, tuple[Path, Path]],
@@ -203,21 +210,23 @@ def _rules(
     """Return the figures by road of all predictors that learn nothing, cached in the experiment's folder."""
     file = output / "rules" / f"seed-{seed}.json"
     made_from = {"slices": configuration.slices.to_dict(), "roads": _checksums(roads)}
-    trivial_rules = {name: predictor for name, (predictor,) in trivial_predictors(configuration.slices.half_width).items()}
+    trivial_rules = {
+        name: predictor for name, (predictor,) in trivial_predictors(configuration.slices.half_width).items()
+    }
     predictors = {VIEWS: views_predictor(), "skeleton": skeleton_predictor(SkeletonSettings())} | trivial_rules
 
     def are_sound(data: Any) -> bool:
         has_names = isinstance(data, dict) and data.keys() == predictors.keys()
         return has_names and all(_are_figures(figures, set(roads)) for figures in data.values())
 
-    if (figures := kept_figures(file, "rules", made_from, are_sound)) is not None:
+    if (figures := read_figures(file, "rules", made_from, are_sound)) is not None:
         return figures
-    rules = _measure(predictors, with_seed(configuration, seed), roads, progress)
+    rules = _measure_predictors(predictors, with_seed(configuration, seed), roads, progress)
     write_file(file, canonical_json({"made_from": made_from, "rules": rules}).encode(), overwrite=True)
     return rules
 
 
-def _measure(
+def _measure_predictors(
     predictors: Mapping[str, Predictor],
     configuration: CenterlineConfiguration,
     roads: Mapping[str, tuple[Path, Path]],
@@ -236,7 +245,7 @@ def _measure(
 
 
 def _are_figures(data: Any, names: Set[str]) -> bool:
-    """Return whether JSON data are figures of some roads by name, as `_measure` makes them of each predictor."""
+    """Return whether JSON data are figures of some roads by name, as `_measure_predictors` makes them of each predictor."""
     if not isinstance(data, dict) or data.keys() != names:
         return False
     for figures in data.values():
@@ -262,7 +271,7 @@ def table(title: str, results: Results, variants: Sequence[str]) -> str:
     started = {name: seeds for name, seeds in results.items() if seeds}
     first_variant = next(iter(started.values()), {})
     roads = list(next(iter(first_variant.values()), {}))
-    spreads = {name: _spreads(seeds, roads) for name, seeds in started.items()}
+    spreads = {name: _spread_figures(seeds, roads) for name, seeds in started.items()}
     lines = [
         f"# {title}",
         "",
@@ -283,15 +292,15 @@ def table(title: str, results: Results, variants: Sequence[str]) -> str:
     return "\n".join([*lines, f"Seeds: {counts}.", ""])
 
 
-def _spreads(seeds: Mapping[str, Mapping[str, Any]], roads: Sequence[str]) -> dict[str, dict[str, Any]]:
+def _spread_figures(seeds: Mapping[str, Mapping[str, Any]], roads: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Return the spread over seeds of each figure by road, and of all roads together, weighted by their slices."""
-    by_seed = [{road: _numbers(by_road[road]) for road in roads} for by_road in seeds.values()]
+    by_seed = [{road: _nan_for_none(by_road[road]) for road in roads} for by_road in seeds.values()]
     for rows in by_seed:
         rows["all"] = over_roads([rows[road] for road in roads])
     return {road: over_seeds([rows[road] for rows in by_seed]) for road in (*roads, "all")}
 
 
-def _numbers(figures: Mapping[str, float | None]) -> dict[str, float]:
+def _nan_for_none(figures: Mapping[str, float | None]) -> dict[str, float]:
     return {name: float("nan") if value is None else value for name, value in figures.items()}
 
 
@@ -304,6 +313,13 @@ def _best_rule(
     for road in spreads[rules[0]]:
         rule_spreads = [spreads[name][road][figure] for name in rules if figure in spreads[name][road]]
         row.append(
-            cell(min((spread for spread in rule_spreads if spread.mean == spread.mean), key=lambda one: one.mean, default=None), metric)
+            cell(
+                min(
+                    (spread for spread in rule_spreads if spread.mean == spread.mean),
+                    key=lambda one: one.mean,
+                    default=None,
+                ),
+                metric,
+            )
         )
     return row

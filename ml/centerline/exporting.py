@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from ..data.corridor import CORRIDOR
 from ..data.slices import FEATURES
 from ..networks.centerline.models import CenterlineModel
-from ..onnx_export import Exportable, described
+from ..onnx_export import Exportable, metadata_texts
 from .predictor import CenterlinePredictor
 
 INPUTS = ("coord", "feat", "mask", "frame")
@@ -53,8 +53,10 @@ def exportable_network(predictor: CenterlinePredictor, seed: int) -> Exportable:
     }
     points = {0: "sequences", 2: "points"}
     dynamic = {"coord": points, "feat": points, "mask": points, "frame": {0: "sequences"}}
-    calibration: dict[str, Any] = {name: calibration_of_target.to_dict() for name, calibration_of_target in predictor.calibration.items()}
-    metadata = described(
+    calibration: dict[str, Any] = {
+        name: calibration_of_target.to_dict() for name, calibration_of_target in predictor.calibration.items()
+    }
+    metadata = metadata_texts(
         task="centerline",
         slices=settings.to_dict(),
         features=list(FEATURES),

@@ -55,7 +55,9 @@ def find_road(
         progress("finding the road", float(frame_numbers[-1] + 1) / len(frames) if len(frame_numbers) else 0.0)
     found_span = _found_span(value[:, 0])
     codes = (ground.header.epsg, ground.header.height_epsg)
-    return Regression(frames.select(found_span), value[found_span], raw_std[found_span], std[found_span], widths[found_span], *codes)
+    return Regression(
+        frames.select(found_span), value[found_span], raw_std[found_span], std[found_span], widths[found_span], *codes
+    )
 
 
 def _found_span(center: Float) -> slice:

@@ -69,7 +69,11 @@ def axis_beside(document: object, origin: Float, path: CloudPath) -> tuple[Float
         target = path.stations
         next_vertex = np.clip(np.searchsorted(station[order], target), 1, len(points) - 1)
         previous_station, next_station = station[order][next_vertex - 1], station[order][next_vertex]
-        between_vertices = (target >= previous_station - 1e-9) & (target <= next_station + 1e-9) & (next_station - previous_station <= _GAP)
+        between_vertices = (
+            (target >= previous_station - 1e-9)
+            & (target <= next_station + 1e-9)
+            & (next_station - previous_station <= _GAP)
+        )
         offset = np.where(between_vertices, np.interp(target, station[order], offsets[order]), offset)
         std = np.where(between_vertices, np.interp(target, station[order], deviation[order]), std)
     return offset, std

@@ -77,7 +77,7 @@ def measure_run(
     write_file(evaluation.output / files[-1], canonical_json(corridor).encode(), overwrite=True)
     for number, case in enumerate(cases[:PICTURES]):
         progress("drawing", number / min(len(cases), PICTURES))
-        files += _draw(evaluation.output, case, predictor, name)
+        files += _draw_road(evaluation.output, case, predictor, name)
     results = {"corridor": corridor, "tables": as_data(spreads), "files": files}
     means = {figure: nan_to_none(spread.mean) for figure, spread in spreads[name]["all"].items()}
     return {"roads": len(cases), **means, **results}, report(spreads, corridor)
@@ -135,7 +135,7 @@ def corridor_figures(predictor: CenterlinePredictor, cases: Sequence[Case]) -> d
     return rows
 
 
-def _draw(folder: Path, case: Case, predictor: CenterlinePredictor, name: str) -> list[str]:
+def _draw_road(folder: Path, case: Case, predictor: CenterlinePredictor, name: str) -> list[str]:
     """Write two PNG pictures of a road, its centrelines and its corridor, to a folder; return their file names."""
     length = case.road.known_truth.axis.length
     view = PictureView(max(0.0, 0.5 * (length - _VIEW)), min(length, 0.5 * (length + _VIEW)))

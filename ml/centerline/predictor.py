@@ -19,7 +19,7 @@ from ..data.corridor import CORRIDOR, Truth
 from ..data.frames import Frames, interleave_count, stretches
 from ..data.roads import LearningRoad
 from ..data.slices import FrameSlices, SliceSettings, collate
-from ..networks.centerline.models import LINES, TARGETS, CenterlineModel, all_targets, both_ways
+from ..networks.centerline.models import LINES, TARGETS, CenterlineModel, all_targets, predict_both_ways
 from ..runs import NOT_FINITE
 from ..scores.calibration import IntervalCalibration, calibrate_target
 from ..training_loop import move_to_device
@@ -109,16 +109,16 @@ class CenterlinePredictor:
         their mean as well, since errors of the same points don't average out. Where sequences are interleaved, lines
         are `smooth_line`.
         """
-        mean, raw_std = self._regress(road, frames)
+        mean, raw_std = self._combine_sequences(road, frames)
         calibration = [self.calibration[name] for name in TARGETS]
         factors, widths = np.array([one.factor for one in calibration]), np.array([one.widths for one in calibration])
         return Regression(frames, mean, raw_std, raw_std * factors, raw_std[:, :, None] * widths)
 
-    def _regress(self, road: LearningRoad, frames: Frames) -> tuple[Float, Float]:
+    def _combine_sequences(self, road: LearningRoad, frames: Frames) -> tuple[Float, Float]:
         shape = (len(frames), len(TARGETS))
         weight, value, spread = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         has_points = np.zeros(len(frames), dtype=bool)
-        for number, height, slice_has_points, estimate, std in self._sequences(road, frames):
+        for number, height, slice_has_points, estimate, std in self._predict_sequences(road, frames):
             estimate[:, _HEIGHT] += height
             inverse = 1.0 / std**2
             np.add.at(weight, number, inverse)
@@ -128,7 +128,9 @@ class CenterlinePredictor:
         # The mean of the variances, each weighted by its inverse, is the harmonic one.
         with np.errstate(invalid="ignore", divide="ignore"):
             mean, raw_std = value / weight, np.sqrt(spread / weight)
-        nearby_points = np.convolve(has_points, np.ones(2 * _NEAR + 1))[_NEAR:-_NEAR] if len(has_points) else np.zeros(0)
+        nearby_points = (
+            np.convolve(has_points, np.ones(2 * _NEAR + 1))[_NEAR:-_NEAR] if len(has_points) else np.zeros(0)
+        )
         mean[nearby_points == 0], raw_std[nearby_points == 0] = np.nan, np.nan
         reach = interleave_count(frames, self.settings.spacing)
         for line in LINES:
@@ -159,7 +161,9 @@ class CenterlinePredictor:
         calibrated.calibration = {name: calibrate_target(size, std) for name, size, std in targets}
         return calibrated, all_errors
 
-    def _sequences(self, road: LearningRoad, frames: Frames) -> Iterator[tuple[Index, Float, Bool, Float, Float]]:
+    def _predict_sequences(
+        self, road: LearningRoad, frames: Frames
+    ) -> Iterator[tuple[Index, Float, Bool, Float, Float]]:
         """Yield per batch, for its N slices: frame index, z origin (m), has points, values and deviations (N, T)."""
         data = FrameSlices(road, frames, self.settings, self.use.step)
         self.model.eval()
@@ -168,14 +172,20 @@ class CenterlinePredictor:
             samples = [data[number] for number in range(start, start + len(frame_indices))]
             batch = move_to_device(self.model, collate(samples))
             with torch.no_grad():
-                output = both_ways(self.model, batch) if self.use.mirror else self.model(batch)
+                output = predict_both_ways(self.model, batch) if self.use.mirror else self.model(batch)
             values, deviations = (
                 all_targets(output, kind).flatten(0, 1).cpu().numpy().astype(np.float64) for kind in ("", "_std")
             )
             has_points = batch["mask"].any(-1).flatten().cpu().numpy()
             if not np.isfinite(values[has_points]).all() or np.isnan(deviations[has_points]).any():
                 raise InputError("network", None, NOT_FINITE)
-            yield frame_indices.flatten(), batch["frame"][..., 3].flatten().cpu().numpy(), has_points, values, deviations
+            yield (
+                frame_indices.flatten(),
+                batch["frame"][..., 3].flatten().cpu().numpy(),
+                has_points,
+                values,
+                deviations,
+            )
 
 
 def smooth_line(frames: Frames, y: Float, std: Float, reach: int) -> Float:
@@ -201,16 +211,24 @@ def smooth_line(frames: Frames, y: Float, std: Float, reach: int) -> Float:
             forward_distance, lateral_distance = cos[rows] * dx + sin[rows] * dy, cos[rows] * dy - sin[rows] * dx
             weight = np.nan_to_num((reach - abs(shift)) / std[neighbour_rows] ** 2) * np.isfinite(lateral_distance)
             forward_distance, lateral_distance = np.nan_to_num(forward_distance), np.nan_to_num(lateral_distance)
-            terms = (np.ones_like(forward_distance), forward_distance, lateral_distance, forward_distance * forward_distance, forward_distance * lateral_distance)
+            terms = (
+                np.ones_like(forward_distance),
+                forward_distance,
+                lateral_distance,
+                forward_distance * forward_distance,
+                forward_distance * lateral_distance,
+            )
             total[:, rows - part[0]] += weight * np.stack(terms)
-        result[part] = np.where(np.isfinite(y[part]), _crossing_of(*total), np.nan)
+        result[part] = np.where(np.isfinite(y[part]), _line_at_zero(*total), np.nan)
     return result
 
 
-def _crossing_of(sum_w: Float, sum_x: Float, sum_y: Float, sum_xx: Float, sum_xy: Float) -> Float:
+def _line_at_zero(sum_w: Float, sum_x: Float, sum_y: Float, sum_xx: Float, sum_xy: Float) -> Float:
     """Return y at x = 0 of weighted least-squares lines, from weighted sums of 1, x, y, x^2, xy; NaN without weight."""
     spread = sum_w * sum_xx - sum_x * sum_x
-    slope = np.divide(sum_w * sum_xy - sum_x * sum_y, spread, out=np.zeros_like(sum_w), where=spread > 1e-6 * sum_w * sum_w)
+    slope = np.divide(
+        sum_w * sum_xy - sum_x * sum_y, spread, out=np.zeros_like(sum_w), where=spread > 1e-6 * sum_w * sum_w
+    )
     return np.divide(sum_y - slope * sum_x, sum_w, out=np.full_like(sum_w, np.nan), where=sum_w > 0.0)
 
 

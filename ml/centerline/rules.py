@@ -37,10 +37,14 @@ def road_cloud(road: LearningRoad) -> RoadCloud:
     kind: UInt8 = table[road.class_id[rows]]
     is_pavement = np.isin(kind, (PointKind.PAVEMENT, PointKind.MARKING))
     has_pavement_class = bool(is_pavement.sum() > _LABELLED_SHARE * len(kind))
-    has_marking_class = has_pavement_class and bool((kind == PointKind.MARKING).sum() > _MARKED_SHARE * is_pavement.sum())
+    has_marking_class = has_pavement_class and bool(
+        (kind == PointKind.MARKING).sum() > _MARKED_SHARE * is_pavement.sum()
+    )
     intensity = np.asarray(road.intensity[rows], dtype=np.float32)
     xyz = np.asarray(road.xyz[rows], dtype=np.float64)
-    return RoadCloud(xyz, intensity, kind, np.zeros(3), Placement(), has_pavement_class, has_marking_class, len(kind), {})
+    return RoadCloud(
+        xyz, intensity, kind, np.zeros(3), Placement(), has_pavement_class, has_marking_class, len(kind), {}
+    )
 
 
 def views_predictor(network: Predictor | None = None) -> Predictor:

@@ -170,7 +170,7 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
     corridor = lines.with_suffix(".corridor.json")
     check_file_target(corridor, prediction.output_option, prediction.overwrite)
     predictor = load_predictor(run)
-    line = None if prediction.path is None else read_path(prediction.path, place=_place_of(prediction.cloud))
+    line = None if prediction.path is None else read_path(prediction.path, place=_read_placement(prediction.cloud))
     regression = find_road(predictor, prediction.cloud, line, progress)
     name = prediction.cloud.stem
     text = canonical_json(centerline_geojson(regression, name, predictor.settings.frame_spacing))
@@ -187,7 +187,7 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
     }
 
 
-def _place_of(cloud: Path) -> Placement:
+def _read_placement(cloud: Path) -> Placement:
     with open_cloud(cloud) as reader:
         return reader.header.place
 
@@ -308,7 +308,7 @@ def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: 
         "validation_95": center.after[1],
         "calibration_factor": center.factor,
         "parameters": sum(weights.numel() for weights in model.parameters()),
-        "corridor_mae": {name: _mean_size(error[:, index]) for index, name in enumerate(TARGETS)},
+        "corridor_mae": {name: _mean_absolute(error[:, index]) for index, name in enumerate(TARGETS)},
         "calibration": data,
     }
 
@@ -326,6 +326,6 @@ def _residuals(model: nn.Module, batches: Sequence[Batch]) -> tuple[Any, Any]:
     return np.concatenate(error).astype(np.float64), np.concatenate(std).astype(np.float64)
 
 
-def _mean_size(values: Any) -> float | None:
+def _mean_absolute(values: Any) -> float | None:
     sizes = np.abs(values[np.isfinite(values)])
     return float(sizes.mean()) if len(sizes) else None

@@ -66,7 +66,9 @@ class MeasuredRoad(Part):
         for field_name, names in (("roads", self.roads), ("left_out", self.left_out)):
             if unknown := sorted(set(names) - set(clouds_by_name)):
                 raise InputError(field_name, unknown[0], f"must be of the roads of {path}: {', '.join(clouds_by_name)}")
-        names_kept = [name for name in clouds_by_name if name in (self.roads or clouds_by_name) and name not in self.left_out]
+        names_kept = [
+            name for name in clouds_by_name if name in (self.roads or clouds_by_name) and name not in self.left_out
+        ]
         if not names_kept:
             raise InputError("left_out", list(self.left_out), f"leaves no road of {path}")
         return [(clouds_by_name[name], axis_beside(clouds_by_name[name])) for name in names_kept]
@@ -155,7 +157,9 @@ def read_roads(data: DataOptions, truth: Learned, progress: Progress = silent) -
     share = 0.0 if data.measured_validation else data.measured_validation_share
     measured_roads: list[LearningRoad] = []
     measured_validation: list[LearningRoad] = []
-    for training_part, validation_part in (_learned_and_kept(road, share) for road in _read_measured(data.measured, truth, progress)):
+    for training_part, validation_part in (
+        _split_road(road, share) for road in _read_measured(data.measured, truth, progress)
+    ):
         measured_roads.append(training_part)
         measured_validation += validation_part
     measured_validation += _read_measured(data.measured_validation, truth, progress)
@@ -199,9 +203,13 @@ class Batches:
         nonempty_groups = [(group, share) for group, share in kinds if group]
         total = sum(share for _, share in nonempty_groups)
         self.shares = (
-            np.array([share / total for _, share in nonempty_groups]) if total else np.full(len(nonempty_groups), 1.0 / len(nonempty_groups))
+            np.array([share / total for _, share in nonempty_groups])
+            if total
+            else np.full(len(nonempty_groups), 1.0 / len(nonempty_groups))
         )
-        self.datasets = [SliceDataset(group, settings, self.drawn_per_epoch, seed, effects) for group, _ in nonempty_groups]
+        self.datasets = [
+            SliceDataset(group, settings, self.drawn_per_epoch, seed, effects) for group, _ in nonempty_groups
+        ]
 
     def kinds(self, epoch: int) -> Index:
         """Return the index in `datasets` of each sample that an epoch draws, (drawn_per_epoch,), random by shares."""
@@ -211,7 +219,7 @@ class Batches:
     def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Batch]:
         """Yield the batches of an epoch whose numbers, from 0, `share` selects; every second pass is mirrored."""
         kind = self.kinds(epoch)
-        plan = [self._planned(epoch, number) for number in range(self.options.steps)[share]]
+        plan = [self._batch_plan(epoch, number) for number in range(self.options.steps)[share]]
         new_numbers = _first_occurrences([numbers for _, numbers in plan])
         samples: dict[int, Sample] = {}
         draws = load_batches(_Draws(self.datasets, kind, epoch), new_numbers, _as_arrays, self.workers)
@@ -222,7 +230,7 @@ class Batches:
                 samples.clear()
             yield mirror_batch(batch) if turn % 2 else batch
 
-    def _planned(self, epoch: int, number: int) -> tuple[int, list[int]]:
+    def _batch_plan(self, epoch: int, number: int) -> tuple[int, list[int]]:
         """Return which pass over an epoch's samples a batch belongs to, and the numbers of its samples."""
         size, steps_per_pass = self.options.size, self.options.steps // self.options.passes
         turn, place = divmod(number, steps_per_pass)
@@ -349,7 +357,7 @@ def _clip(road: LearningRoad, first_station: float, last_station: float, field: 
     return replace(road, truth=Truth.of_axis(part, road.known_truth.kind))
 
 
-def _learned_and_kept(road: LearningRoad, share: float) -> tuple[LearningRoad, list[LearningRoad]]:
+def _split_road(road: LearningRoad, share: float) -> tuple[LearningRoad, list[LearningRoad]]:
     """Return a road without a share of its length at the end, and that end, `APART` behind it; no end if that is 0."""
     if not share:
         return road, []

@@ -52,7 +52,9 @@ class LabelMapping(Model):
                 raise InputError("classes", number, 'must be whole numbers as text, e.g. "40"')
             if name not in target_names:
                 raise InputError(
-                    f"classes.{number}", name, f"must be one of {', '.join(target_names)}{nearest_name(name, target_names)}"
+                    f"classes.{number}",
+                    name,
+                    f"must be one of {', '.join(target_names)}{nearest_name(name, target_names)}",
                 )
         return target_names
 

@@ -108,7 +108,9 @@ class Truth:
         lanes = [self._along(values, station) for values in (self.lanes, self.lane_width)]
         corridor = np.column_stack([as_seen(edges[0], edges[1]), *lanes, heading, height])
         corridor[np.isnan(center)] = np.nan
-        lines, room = (as_seen(*(self._along(side, station) for side in side_values.T)) for side_values in (self.lines, self.room))
+        lines, room = (
+            as_seen(*(self._along(side, station) for side in side_values.T)) for side_values in (self.lines, self.room)
+        )
         return Crossings(center, station, corridor, lines, room)
 
     @property
@@ -119,7 +121,10 @@ class Truth:
         station = self.axis.station
         frames = Frames(self.axis.position(station), self.axis.direction(station), station)
         crossings = self.at(frames)
-        sides = np.column_stack([crossings.corridor[:, 0] - crossings.center, crossings.center - crossings.corridor[:, 1]]) - crossings.lines
+        sides = (
+            np.column_stack([crossings.corridor[:, 0] - crossings.center, crossings.center - crossings.corridor[:, 1]])
+            - crossings.lines
+        )
         excesses = sides[np.isfinite(sides)]
         return bool(len(excesses)) and float(excesses.max()) <= NO_SHOULDER
 
@@ -128,7 +133,9 @@ class Truth:
         known_station = np.nan_to_num(station)
         vertex_after = np.clip(np.searchsorted(self.axis.station, known_station), 1, len(values) - 1)
         vertex_before = vertex_after - 1
-        share = (known_station - self.axis.station[vertex_before]) / (self.axis.station[vertex_after] - self.axis.station[vertex_before])
+        share = (known_station - self.axis.station[vertex_before]) / (
+            self.axis.station[vertex_after] - self.axis.station[vertex_before]
+        )
         infinite = np.isinf(values[vertex_before]) | np.isinf(values[vertex_after])
         with np.errstate(invalid="ignore"):
             interpolated = values[vertex_before] * (1.0 - share) + values[vertex_after] * share
@@ -168,7 +175,9 @@ def truths(parameters: RoadParameters, kind: Learned, origin: ArrayLike = (0.0, 
     if kind not in LEARNED_KINDS:
         raise InputError("truth", kind, f"must be one of {', '.join(LEARNED_KINDS)}")
     if kind == "either":
-        without_shoulder_truths = [truth for truth in truths(parameters, "carriageway", origin) if truth.without_shoulders]
+        without_shoulder_truths = [
+            truth for truth in truths(parameters, "carriageway", origin) if truth.without_shoulders
+        ]
         return [*truths(parameters, "road", origin), *without_shoulder_truths]
     geometry = RoadGeometry(parameters)
     shift: Float = np.array(parameters.transform.translate) - np.asarray(origin, dtype=np.float64)

@@ -89,7 +89,9 @@ class Seeds:
             per_class = counts.sum(axis=0)
             if per_class.any():
                 label = random.choice(np.flatnonzero(per_class))
-                chosen_tile = first_tile + int(random.choice(end_tile - first_tile, p=counts[:, label] / per_class[label]))
+                chosen_tile = first_tile + int(
+                    random.choice(end_tile - first_tile, p=counts[:, label] / per_class[label])
+                )
                 return chosen_tile, int(random.choice(np.flatnonzero(self._tiles[chosen_tile].segment == label)))
         return tile, int(random.integers(len(self._tiles[tile])))
 
@@ -172,7 +174,7 @@ def crop_of(tile: CloudTile, scaling: Scaling) -> Crop:
     return Crop(tile.coord, None if tile.strength is None else scaling.apply(tile.strength), color, tile.segment)
 
 
-def centred(coord: AnyArray) -> Float32:
+def centre_coordinates(coord: AnyArray) -> Float32:
     """Return coordinates (N, 3) less the mean of x and y and the median of z."""
     middle = [*coord[:, :2].mean(axis=0, dtype=np.float64), np.median(coord[:, 2])]
     return np.asarray((coord - np.array(middle)).astype(np.float32))
@@ -189,7 +191,7 @@ def make_item(crop: Crop, settings: CropSettings, random: np.random.Generator) -
     count = len(crop)
     if count == 0:
         raise InputError("crop", 0, "has no points")
-    coord = centred(crop.coord)
+    coord = centre_coordinates(crop.coord)
     color = _noise(random, (count, 3)) if crop.color is None else crop.color
     strength = _noise(random, (count, 1)) if crop.strength is None else crop.strength[:, None]
     columns = np.concatenate([coord / COORDINATE_SPAN, color, strength], axis=1)

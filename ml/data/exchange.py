@@ -15,7 +15,7 @@ from synthroads_addon.base.arrays import Bool
 from synthroads_addon.base.random_streams import stream
 
 from .classes import IGNORED
-from .crops import CropDataset, Item, centred, make_item
+from .crops import CropDataset, Item, centre_coordinates, make_item
 from .samples import Crop
 
 
@@ -40,26 +40,28 @@ class ExchangedCrops:
         """Return the pair at a place as two items."""
         synthetic_crop, random = self.synthetic.crop(place)
         target_crop, _ = self.target.crop(place)
-        pair = exchanged(synthetic_crop, target_crop, stream(self.seed, "exchange", self.epoch, place))
+        pair = exchange_classes(synthetic_crop, target_crop, stream(self.seed, "exchange", self.epoch, place))
         return [make_item(crop, self.synthetic.settings, random) for crop in pair]
 
 
-def exchanged(one: Crop, other_crop: Crop, random: np.random.Generator) -> tuple[Crop, Crop]:
+def exchange_classes(one: Crop, other_crop: Crop, random: np.random.Generator) -> tuple[Crop, Crop]:
     """Return two crops, centred, each with the other's points of a random half of the other's classes laid into it."""
-    centred_pair = [replace(crop, coord=centred(crop.coord)) for crop in (one, other_crop)]
-    class_masks = [_some_classes(crop, random) for crop in centred_pair]
+    centred_pair = [replace(crop, coord=centre_coordinates(crop.coord)) for crop in (one, other_crop)]
+    class_masks = [_random_classes(crop, random) for crop in centred_pair]
     first_crop, second_crop = centred_pair
-    return _joined(first_crop, second_crop, class_masks[1]), _joined(second_crop, first_crop, class_masks[0])
+    return _append_points(first_crop, second_crop, class_masks[1]), _append_points(
+        second_crop, first_crop, class_masks[0]
+    )
 
 
-def _some_classes(crop: Crop, random: np.random.Generator) -> Bool:
+def _random_classes(crop: Crop, random: np.random.Generator) -> Bool:
     """Return a mask (N,) of the points of a random half of a crop's classes, at least one where it has any."""
     present_classes = np.unique(crop.segment[crop.segment != IGNORED])
     chosen_classes = random.permutation(present_classes)[: -(-len(present_classes) // 2)]
     return np.asarray(np.isin(crop.segment, chosen_classes))
 
 
-def _joined(crop: Crop, other_crop: Crop, keep: Bool) -> Crop:
+def _append_points(crop: Crop, other_crop: Crop, keep: Bool) -> Crop:
     """Return a crop with some of another's points behind its own; what either lacks is missing in all."""
     parts: dict[str, Any] = {}
     for name in crop.per_point:

@@ -140,16 +140,16 @@ def sequences(frames: Frames, length: int, step: int | None = None, spacing: flo
 
 def interleave_count(frames: Frames, spacing: float) -> int:
     """Return the ratio, rounded and at least 1, of a sequence's spacing (m) to the frames' own: every n-th is taken."""
-    return max(1, round(spacing / _own_spacing(frames, spacing)))
+    return max(1, round(spacing / _frame_spacing(frames, spacing)))
 
 
 def stretches(frames: Frames, spacing: float = SPACING) -> list[Index]:
     """Return the frames' indices per gapless stretch; a gap is more than 1.5 times their spacing, `spacing` at most."""
-    gaps = np.abs(np.diff(frames.station)) > 1.5 * _own_spacing(frames, spacing)
+    gaps = np.abs(np.diff(frames.station)) > 1.5 * _frame_spacing(frames, spacing)
     return [part for part in np.split(np.arange(len(frames)), np.flatnonzero(gaps) + 1) if len(part)]
 
 
-def _own_spacing(frames: Frames, largest: float) -> float:
+def _frame_spacing(frames: Frames, largest: float) -> float:
     return min(float(np.median(np.abs(np.diff(frames.station)))), largest) if len(frames) > 1 else largest
 
 
@@ -196,8 +196,12 @@ def estimated_path(xyz: Float, cell: float = 4.0, window: float = 60.0, half_wid
     """
     plan = np.asarray(xyz, dtype=np.float64)[:, :2]
     cells = _cells(plan, cell)
-    rough_path = MeasuredAxis(cells[_way_through(cells, cell)])
-    path = _smooth_line(rough_path.position(rough_path.stations(SPACING)), window) if rough_path.length > 4 * SPACING else rough_path
+    rough_path = MeasuredAxis(cells[_shortest_way(cells, cell)])
+    path = (
+        _smooth_line(rough_path.position(rough_path.stations(SPACING)), window)
+        if rough_path.length > 4 * SPACING
+        else rough_path
+    )
     for _ in range(3):
         path = _centre_path(path, plan, window, half_width)
     return path
@@ -212,7 +216,7 @@ def _cells(plan: Float, cell: float) -> Float:
     return np.column_stack([np.bincount(owner, plan[:, column]) for column in (0, 1)]) / counts[:, None]
 
 
-def _way_through(cells: Float, cell: float) -> Index:
+def _shortest_way(cells: Float, cell: float) -> Index:
     """Return the indices of the cells on the shortest path between the two farthest apart along the strip."""
     pairs = cKDTree(cells).query_pairs(2.1 * cell, output_type="ndarray")
     pairs = _bridge_cells(cells, pairs)
@@ -258,9 +262,15 @@ def _centre_path(path: MeasuredAxis, plan: Float, window: float, half_width: flo
     left_extent = sorted_offset[end - 1 - (_STRAY * (end - start)).astype(int)]
     # Where a strip is cut off askew, or one side is hidden, the middle of what is left isn't the strip's.
     is_wide_enough = left_extent - right_extent >= _WHOLE * np.median(left_extent - right_extent)
-    middle, right_extent, left_extent = station.min() + _BIN * (occupied_bins[is_wide_enough] + 0.5), right_extent[is_wide_enough], left_extent[is_wide_enough]
+    middle, right_extent, left_extent = (
+        station.min() + _BIN * (occupied_bins[is_wide_enough] + 0.5),
+        right_extent[is_wide_enough],
+        left_extent[is_wide_enough],
+    )
     stations = np.arange(station.min(), station.max() + 0.5 * SPACING, SPACING)
-    return _smooth_line(_on_path(path, stations).at(np.interp(stations, middle, 0.5 * (right_extent + left_extent))), window)
+    return _smooth_line(
+        _on_path(path, stations).at(np.interp(stations, middle, 0.5 * (right_extent + left_extent))), window
+    )
 
 
 def _on_path(path: MeasuredAxis, station: Float) -> Frames:

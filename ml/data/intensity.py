@@ -67,4 +67,6 @@ def contrast(logs: Float, y: Float) -> Float:
     local_level = np.interp(y, _BIN * (first_bin + np.flatnonzero(has_points) + 0.5), smooth_medians)
     excess = logs - local_level
     lower_quintile, upper_quintile = np.percentile(excess, (20.0, 80.0))
-    return excess / max(float(upper_quintile - lower_quintile) / _SPREAD_20_80, QUIETEST * max(_decile_spread(logs), _SMALLEST))
+    return excess / max(
+        float(upper_quintile - lower_quintile) / _SPREAD_20_80, QUIETEST * max(_decile_spread(logs), _SMALLEST)
+    )

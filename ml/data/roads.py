@@ -126,7 +126,9 @@ class LearningRoad(Points):
         first_points = np.searchsorted(self.station, stations.min(axis=0) - _MARGIN)
         end_points = np.searchsorted(self.station, stations.max(axis=0) + _MARGIN)
         index, place, counts = [], [], []
-        for origin, direction, begin, end in zip(frames.position, frames.direction, first_points, end_points, strict=True):
+        for origin, direction, begin, end in zip(
+            frames.position, frames.direction, first_points, end_points, strict=True
+        ):
             delta = self.xyz[begin:end, :2] - origin
             cos, sin = np.cos(direction), np.sin(direction)
             x, y = cos * delta[:, 0] + sin * delta[:, 1], cos * delta[:, 1] - sin * delta[:, 0]

@@ -226,7 +226,9 @@ class SceneStream:
         elif code is not None:
             lines = (self.folder / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
             scene_name = f"scene {missing_numbers[0]}"
-            fault = f"isn't made: the producer has ended with code {code} ({lines[-1] if lines else 'without a word'}); "
+            fault = (
+                f"isn't made: the producer has ended with code {code} ({lines[-1] if lines else 'without a word'}); "
+            )
             fault += "--resume tries again"
         else:
             return

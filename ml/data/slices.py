@@ -220,7 +220,9 @@ def cut_stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> 
     return stretch
 
 
-def make_sample(stretch: Stretch, settings: SliceSettings, rng: np.random.Generator, road: int, number: Index) -> Sample:
+def make_sample(
+    stretch: Stretch, settings: SliceSettings, rng: np.random.Generator, road: int, number: Index
+) -> Sample:
     """Return a sequence as a dictionary of tensors (see the module); thins `stretch` to `points_per_slice`, in place."""
     thin_slices(stretch, settings.points_per_slice, rng)
     ends = np.searchsorted(stretch.number, np.arange(len(stretch.center)), side="right")
@@ -272,7 +274,11 @@ def _starts(road: LearningRoad, number: int, settings: SliceSettings) -> list[tu
         return []
     length = settings.spacing * (settings.slices - 1)
     parts = road.truth.axis.parts
-    return [(number, first_station, last_station - length) for first_station, last_station in parts.tolist() if last_station - first_station >= length]
+    return [
+        (number, first_station, last_station - length)
+        for first_station, last_station in parts.tolist()
+        if last_station - first_station >= length
+    ]
 
 
 def thin_slices(stretch: Stretch, largest_count: int, rng: np.random.Generator) -> None:

@@ -93,7 +93,11 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None, *, labe
         except ValueError:
             raise InputError(str(path), None, f"a tile of {tile.scene} is too large for cells of {voxel:g} m") from None
         thinned_tile = tile.select(sample)
-        yield thinned_tile if labels else replace(thinned_tile, segment=np.full(len(thinned_tile), IGNORED, dtype=np.int16))
+        yield (
+            thinned_tile
+            if labels
+            else replace(thinned_tile, segment=np.full(len(thinned_tile), IGNORED, dtype=np.int16))
+        )
 
 
 def _is_pack(path: Path) -> bool:
@@ -111,10 +115,10 @@ def _packed_tiles(path: Path, scheme: ClassScheme, voxel: float | None) -> Itera
     table = table_between(dict(enumerate(class_names(pack.scheme))), scheme, str(path))
     for place in range(len(pack)):
         tile = pack.tile(place)
-        yield replace(tile, segment=_places(tile.segment, tile.segment != IGNORED, table))
+        yield replace(tile, segment=_class_indices(tile.segment, tile.segment != IGNORED, table))
 
 
-def _places(numbers: AnyArray, is_known: Bool, table: NDArray[np.int16]) -> NDArray[np.int16]:
+def _class_indices(numbers: AnyArray, is_known: Bool, table: NDArray[np.int16]) -> NDArray[np.int16]:
     """Return the scheme's class indices (N,) of a source's numbers by a table; `IGNORED` where `is_known` is False."""
     return np.where(is_known, table[np.where(is_known, numbers, 0)], IGNORED).astype(np.int16)
 
@@ -200,7 +204,7 @@ def _pointcept_tile(folder: Path, table: NDArray[np.int16]) -> CloudTile:
         coord,
         color if color is not None and color.any() else None,
         strength if strength is not None and strength.any() else None,
-        _places(segment, is_known, table),
+        _class_indices(segment, is_known, table),
     )
 
 
@@ -249,7 +253,7 @@ def cloud_tiles(
 def unlabelled_blocks(cloud: CloudReader) -> Iterator[PointBlock]:
     """Yield a cloud's blocks without labels, whatever they are."""
     for block in cloud.usable_blocks():
-        yield _with_places(block, np.full(len(block), IGNORED, dtype=np.int16))
+        yield _with_class_indices(block, np.full(len(block), IGNORED, dtype=np.int16))
 
 
 def yardstick_tiles(folder: Path, scheme: ClassScheme, source: Source) -> Iterator[CloudTile]:
@@ -276,7 +280,7 @@ def yardstick_tiles(folder: Path, scheme: ClassScheme, source: Source) -> Iterat
                 places = mapping.label(numbers, names)
                 if mapping.ignore_zero_intensity:
                     places = np.where(block.intensity > 0, places, IGNORED).astype(np.int16)
-                sorter.add([_with_places(block, places)])
+                sorter.add([_with_class_indices(block, places)])
             for part in sorter.tiles():
                 yield tile_of(part.points, scene, part.corner, FULL)
 
@@ -310,7 +314,7 @@ def labelled_blocks(cloud: CloudReader, scheme: ClassScheme, source: Source) -> 
             raise InputError(str(cloud.header.path), None, fault)
         table = table_between({row.id: row.name for row in cloud.header.scheme.rows}, scheme, str(cloud.header.path))
         for block in cloud.usable_blocks():
-            yield _with_places(block, table[block.class_id])
+            yield _with_class_indices(block, table[block.class_id])
         return
     for file_block, file_numbers in zip(cloud.blocks(), _numbers(cloud, mapping.field), strict=True):
         is_usable = cloud.usable_points(file_block, noise=True)  # it is for the mapping to say what numbers mean
@@ -318,10 +322,10 @@ def labelled_blocks(cloud: CloudReader, scheme: ClassScheme, source: Source) -> 
         places = mapping.label(numbers, names)
         if mapping.ignore_zero_intensity:
             places = np.where(block.intensity > 0, places, IGNORED).astype(np.int16)
-        yield _with_places(block, places)
+        yield _with_class_indices(block, places)
 
 
-def _with_places(block: PointBlock, places: NDArray[np.int16]) -> PointBlock:
+def _with_class_indices(block: PointBlock, places: NDArray[np.int16]) -> PointBlock:
     return replace(block, class_id=np.where(places == IGNORED, UNLABELLED, places).astype(np.uint8))
 
 

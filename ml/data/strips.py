@@ -110,8 +110,10 @@ def strips(
             in_strip = (frames.station >= first_station) & (frames.station < last_station)
             if number in strip_numbers:
                 points = points_of(ground.header, [block], ground.colored)
-                line = _part(path, first_station - REACH, last_station + REACH).translate(-points.origin)
-                local_frames = Frames(frames.position - points.origin[:2], frames.direction, frames.station).select(in_strip)
+                line = _cut_path(path, first_station - REACH, last_station + REACH).translate(-points.origin)
+                local_frames = Frames(frames.position - points.origin[:2], frames.direction, frames.station).select(
+                    in_strip
+                )
                 yield LearningRoad.of_points(cloud.stem, points, line), local_frames, strip_numbers[in_strip] == number
 
 
@@ -132,9 +134,11 @@ def _sort_points(files: TileFiles, cloud: Path, ground: GroundReading, path: Mea
             progress("sorting points", points_done / max(ground.header.count, 1))
 
 
-def _part(path: MeasuredAxis, first_station: float, last_station: float) -> MeasuredAxis:
+def _cut_path(path: MeasuredAxis, first_station: float, last_station: float) -> MeasuredAxis:
     """Return the part of a path from station `first_station` to `last_station` (m), with one vertex beyond on either side."""
     first_vertex = max(0, int(np.searchsorted(path.station, first_station, "right")) - 1)
     end_vertex = min(len(path.points), int(np.searchsorted(path.station, last_station, "left")) + 1)
     first_vertex = min(first_vertex, end_vertex - 2) if end_vertex >= 2 else 0
-    return MeasuredAxis(path.points[first_vertex : max(end_vertex, 2)], path.joined[first_vertex : max(end_vertex, 2) - 1])
+    return MeasuredAxis(
+        path.points[first_vertex : max(end_vertex, 2)], path.joined[first_vertex : max(end_vertex, 2) - 1]
+    )

@@ -49,7 +49,10 @@ class Yardstick(Part):
 
     @model_validator(mode="after")
     def _check_paths(self) -> Self:
-        for name in (*([self.names] if self.names else []), *(pattern for patterns in self.splits.values() for pattern in patterns)):
+        for name in (
+            *([self.names] if self.names else []),
+            *(pattern for patterns in self.splits.values() for pattern in patterns),
+        ):
             if not stays_below(name):
                 raise ValueError(f"'{name}' must lie in the data set's folder: a relative path with / and without ..")
         return self
@@ -63,7 +66,12 @@ class Yardstick(Part):
         """
         if split is not None and split not in self.splits:
             raise InputError("split", split, f"must be one of {', '.join(self.splits)}")
-        patterns = [pattern for name, split_patterns in self.splits.items() if split in (None, name) for pattern in split_patterns]
+        patterns = [
+            pattern
+            for name, split_patterns in self.splits.items()
+            if split in (None, name)
+            for pattern in split_patterns
+        ]
         readable = (".bin", ".ply", ".las", ".laz", ".npy")
         paths = {path for pattern in patterns for path in folder.glob(pattern) if path.suffix.lower() in readable}
         if not paths:
@@ -185,9 +193,14 @@ def _ply(path: Path, yardstick: Yardstick) -> Iterator[tuple[PointBlock, NDArray
                 raise InputError(str(path), None, f"is truncated: {count} points are in its header")
             record = np.frombuffer(data, dtype=kind)
             xyz = _finite(path, np.stack([record[axis].astype(np.float64) for axis in "xyz"], axis=1))
-            intensity = record[yardstick.intensity].astype(np.float64) if yardstick.intensity in names else np.zeros(rows)
+            intensity = (
+                record[yardstick.intensity].astype(np.float64) if yardstick.intensity in names else np.zeros(rows)
+            )
             rgb = np.stack([record[name] for name in ("red", "green", "blue")], axis=1) if "red" in names else None
-            yield _block(xyz, intensity / full_intensity, rgb), np.rint(record[yardstick.mapping.field]).astype(np.int64)
+            yield (
+                _block(xyz, intensity / full_intensity, rgb),
+                np.rint(record[yardstick.mapping.field]).astype(np.int64),
+            )
 
 
 def _largest(kind: np.dtype[Any], name: str) -> float:

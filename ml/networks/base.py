@@ -25,7 +25,10 @@ def full_precision(function: Callable[P, R]) -> Callable[P, R]:
         device = next(argument.device.type for argument in arguments if isinstance(argument, Tensor))
         if not torch.is_autocast_enabled(device):
             return function(*arguments, **keywords)
-        widened_arguments: Any = [argument.float() if isinstance(argument, Tensor) and argument.dtype == torch.bfloat16 else argument for argument in arguments]
+        widened_arguments: Any = [
+            argument.float() if isinstance(argument, Tensor) and argument.dtype == torch.bfloat16 else argument
+            for argument in arguments
+        ]
         with torch.autocast(device, enabled=False):
             return function(*widened_arguments, **keywords)
 

@@ -42,7 +42,10 @@ class IntervalCalibration:
     @property
     def holds(self) -> bool:
         """Whether the one factor brings both shares within their tolerances."""
-        return all(abs(share - level) <= tolerance for share, level, tolerance in zip(self.after, LEVELS, TOLERANCES, strict=True))
+        return all(
+            abs(share - level) <= tolerance
+            for share, level, tolerance in zip(self.after, LEVELS, TOLERANCES, strict=True)
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the calibration as JSON data, with `holds`."""
@@ -70,7 +73,9 @@ def calibrate_target(error: Float, std: Float) -> IntervalCalibration:
     # The share that is covered changes only where the interval's end passes an error.
     candidate_factors = np.unique(np.concatenate([ratio / deviation for deviation in DEVIATIONS]))
     candidate_factors = candidate_factors[candidate_factors > 0.0]
-    factor = float(candidate_factors[np.argmin(_share_error(ratio, candidate_factors))]) if len(candidate_factors) else 1.0
+    factor = (
+        float(candidate_factors[np.argmin(_share_error(ratio, candidate_factors))]) if len(candidate_factors) else 1.0
+    )
     return IntervalCalibration(
         factor, (widths[0], widths[1]), _covered_share(ratio, 1.0), _covered_share(ratio, factor), len(ratio)
     )

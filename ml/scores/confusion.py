@@ -54,12 +54,12 @@ class Confusion:
         self.counts += np.bincount(rows * count + columns, minlength=count * count).reshape(count, count)
 
     @property
-    def right(self) -> Int:
+    def true_positives(self) -> Int:
         """Return the true positives of each class (C,)."""
         return self.counts.diagonal()
 
     @property
-    def found(self) -> Int:
+    def predicted_counts(self) -> Int:
         """Return the number of points predicted as each class (C,)."""
         return self.counts.sum(axis=0)
 
@@ -104,9 +104,11 @@ def _ratio(numerator: Any, denominator: Any) -> Any:
 
 
 METRICS = {
-    "precision": Metric(lambda of: _ratio(of.right, of.found), "precision", 100.0, 1),
-    "recall": Metric(lambda of: _ratio(of.right, of.support), "recall", 100.0, 1),
-    "iou": Metric(lambda of: _ratio(of.right, of.support + of.found - of.right), "IoU", 100.0, 1),
+    "precision": Metric(lambda of: _ratio(of.true_positives, of.predicted_counts), "precision", 100.0, 1),
+    "recall": Metric(lambda of: _ratio(of.true_positives, of.support), "recall", 100.0, 1),
+    "iou": Metric(
+        lambda of: _ratio(of.true_positives, of.support + of.predicted_counts - of.true_positives), "IoU", 100.0, 1
+    ),
 }
 """Metrics of each class (C,) of a `Confusion`; what is here is in its data and in all tables."""
 Scores = Mapping[str, Any]

@@ -267,7 +267,7 @@ def _window_chamfer(predicted_points: Float, true_points: Float) -> tuple[float,
     common_samples = [_sample_polynomial(fit, scale, common_extent) for fit in fits]
     if not all(len(points) for points in (*full_samples, *common_samples)):
         return None
-    return _both_ways(*full_samples), _both_ways(*common_samples)
+    return _mutual_distance(*full_samples), _mutual_distance(*common_samples)
 
 
 def _sample_polynomial(fit: np.polynomial.Polynomial, scale: float, extent: tuple[float, float]) -> Float:
@@ -276,7 +276,7 @@ def _sample_polynomial(fit: np.polynomial.Polynomial, scale: float, extent: tupl
     return np.column_stack([metres, scale * fit(metres / scale)])
 
 
-def _both_ways(points: Float, other_points: Float) -> float:
+def _mutual_distance(points: Float, other_points: Float) -> float:
     """Return the Chamfer distance of two point sets: both directed mean nearest distances added, m."""
     return float(cKDTree(other_points).query(points)[0].mean() + cKDTree(points).query(other_points)[0].mean())
 

@@ -91,7 +91,9 @@ def make_case(
     visible_road = cut_beside_median(visible_road, settings.median_error, stream(seed, "median", road.name))
     path = estimated_path(visible_road.xyz.astype(np.float64)) if estimated else road.known_truth.axis
     rng = stream(seed, "frames", road.name)
-    displaced_frames = displace_frames(frames_along(path), rng, settings.window, settings.direction_deg, settings.wander_length)
+    displaced_frames = displace_frames(
+        frames_along(path), rng, settings.window, settings.direction_deg, settings.wander_length
+    )
     return Case(visible_road, displaced_frames)
 
 
@@ -127,7 +129,9 @@ def measure(
         seed_cases = cases(seed)
         names = [case.road.name for case in seed_cases]
         if repeated_names := {name for name in names if names.count(name) > 1}:
-            raise InputError("road", sorted(repeated_names)[0], "is the name of several roads; give data sets of other names")
+            raise InputError(
+                "road", sorted(repeated_names)[0], "is the name of several roads; give data sets of other names"
+            )
         metrics_by_road: dict[str, dict[str, dict[str, float]]] = {name: {} for name in predictors}
         for case in seed_cases:  # road by road: predictors share what they cut out of it
             for name, versions in predictors.items():
@@ -218,7 +222,9 @@ def along_parabolas(predictor: Predictor, length: float) -> Predictor:
                 neighbours = found_rows[np.abs(frames.station[found_rows] - frames.station[index]) <= 0.5 * length]
                 if len(neighbours) >= baselines.FEWEST:
                     cos, sin = np.cos(frames.direction[index]), np.sin(frames.direction[index])
-                    x, lateral_offset = ((place[neighbours] - frames.position[index]) @ np.array([[cos, -sin], [sin, cos]])).T
+                    x, lateral_offset = (
+                        (place[neighbours] - frames.position[index]) @ np.array([[cos, -sin], [sin, cos]])
+                    ).T
                     result[index] = np.polyfit(x, lateral_offset, 2)[2]
         return result[:, None]
 

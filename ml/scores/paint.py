@@ -56,7 +56,9 @@ def with_painted_line(road: LearningRoad) -> LearningRoad:
     direction = axis.direction(places[has_line])
     left_normals = np.column_stack([-np.sin(direction), np.cos(direction)])
     points = axis.position(places[has_line]) + line_offsets[has_line, None] * left_normals
-    line = MeasuredAxis(np.column_stack([points, axis.elevation(places[has_line])]), np.diff(places[has_line]) < 1.5 * STEP)
+    line = MeasuredAxis(
+        np.column_stack([points, axis.elevation(places[has_line])]), np.diff(places[has_line]) < 1.5 * STEP
+    )
     return replace(road, truth=Truth.of_axis(line, truth.kind))
 
 

@@ -62,9 +62,7 @@ class PictureView:
 
 
 @literal_texts()
-def lines_picture(
-    case: Case, lines: Mapping[str, Float], view: PictureView, title: str, height: float = 12.0
-) -> bytes:
+def lines_picture(case: Case, lines: Mapping[str, Float], view: PictureView, title: str, height: float = 12.0) -> bytes:
     """Return a PNG of a road straightened: predicted centrelines over the cloud, and their offsets from the true axis.
 
     Args:
@@ -74,13 +72,13 @@ def lines_picture(
         title: of the picture.
         height: of the upper panel to either side of the axis, m.
     """
-    figure, panels = _panels(title, (2.2, 1.0), view, height)
-    _cloud(panels[0], case, view, height)
-    _true(panels[0], case, view)
+    figure, panels = _new_panels(title, (2.2, 1.0), view, height)
+    _draw_cloud(panels[0], case, view, height)
+    _draw_truth(panels[0], case, view)
     panels[1].axhline(0.0, color="black", lw=1.0, label="true axis")
     largest = 0.0
     for (name, y), color in zip(lines.items(), COLORS, strict=False):
-        station, offset = _beside(case, case.frames.at(y), view)
+        station, offset = _project_points(case, case.frames.at(y), view)
         panels[0].plot(station, offset, color=color, lw=1.2, label=shown_text(name))
         panels[1].plot(station, offset, color=color, lw=1.2)
         largest = max(largest, float(np.nanquantile(np.abs(offset), 0.98)) if np.isfinite(offset).any() else 0.0)
@@ -106,20 +104,20 @@ def corridor_picture(case: Case, prediction: Float, view: PictureView, title: st
     """
     column = {name: prediction[:, i] for i, name in enumerate(CORRIDOR_COLUMNS[: prediction.shape[1]])}
     with_lanes = "lanes" in column and bool(np.isfinite(column["lanes"]).any())
-    figure, panels = _panels(title, (2.4, 1.0, 0.8) if with_lanes else (2.4, 1.0), view, height)
-    _cloud(panels[0], case, view, height)
-    _true(panels[0], case, view, edges=True)
+    figure, panels = _new_panels(title, (2.4, 1.0, 0.8) if with_lanes else (2.4, 1.0), view, height)
+    _draw_cloud(panels[0], case, view, height)
+    _draw_truth(panels[0], case, view, edges=True)
     for name, color, label in (("center", CENTER, "centre"), ("left_edge", EDGE, "edges"), ("right_edge", EDGE, None)):
         if name in column:
-            _band(panels[0], case, view, column[name], _half_width(column, name, 95), color, label)
+            _draw_band(panels[0], case, view, column[name], _interval_half_width(column, name, 95), color, label)
     panels[0].legend(loc="upper right", ncols=4, fontsize=8, framealpha=0.9)
-    _center_error(panels[1], case, view, column)
+    _draw_center_error(panels[1], case, view, column)
     if with_lanes:
-        _lanes(panels[2], case, view, column)
+        _draw_lanes(panels[2], case, view, column)
     return small_png(figure, dpi=110)
 
 
-def _panels(title: str, heights: Sequence[float], view: PictureView, height: float) -> tuple[Any, Sequence[Any]]:
+def _new_panels(title: str, heights: Sequence[float], view: PictureView, height: float) -> tuple[Any, Sequence[Any]]:
     figure = new_figure(13.0, 1.6 + 2.0 * sum(heights))
     panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
     figure.suptitle(shown_text(title), fontsize=11)
@@ -130,7 +128,7 @@ def _panels(title: str, heights: Sequence[float], view: PictureView, height: flo
     return figure, panels
 
 
-def _cloud(axes: Axes, case: Case, view: PictureView, height: float) -> None:
+def _draw_cloud(axes: Axes, case: Case, view: PictureView, height: float) -> None:
     """Draw a road's points by intensity rank, straightened along the true axis, into the axes.
 
     Where only an axis is known, as of real scans that may not be passed on, means of cells are drawn and no points.
@@ -148,14 +146,18 @@ def _cloud(axes: Axes, case: Case, view: PictureView, height: float) -> None:
         places = np.column_stack([station[visible_points], offset[visible_points]])
         count, _ = np.histogramdd(places, bins=[station_edges, offset_edges])
         total, _ = np.histogramdd(places, bins=[station_edges, offset_edges], weights=intensity)
-        axes.pcolormesh(station_edges, offset_edges, np.where(count > 0, total / np.maximum(count, 1), np.nan).T, **style)
+        axes.pcolormesh(
+            station_edges, offset_edges, np.where(count > 0, total / np.maximum(count, 1), np.nan).T, **style
+        )
         return
     sample = slice(None, None, max(1, len(visible_points) // _MOST_POINTS))
     size = float(np.clip(60_000 / max(len(visible_points), 1), 0.4, 6.0))
-    axes.scatter(station[visible_points][sample], offset[visible_points][sample], c=intensity[sample], s=size, lw=0, **style)
+    axes.scatter(
+        station[visible_points][sample], offset[visible_points][sample], c=intensity[sample], s=size, lw=0, **style
+    )
 
 
-def _true(axes: Axes, case: Case, view: PictureView, edges: bool = False) -> None:
+def _draw_truth(axes: Axes, case: Case, view: PictureView, edges: bool = False) -> None:
     truth = case.road.known_truth
     station = np.arange(view.first, view.last, 0.5)
     axes.plot(station, np.where(truth.axis.inside(station), 0.0, np.nan), color=TRUE, lw=2.5, label="true axis")
@@ -167,7 +169,7 @@ def _true(axes: Axes, case: Case, view: PictureView, edges: bool = False) -> Non
             axes.plot(line_station[order], line_offset[order], color=TRUE, lw=2.0, ls="--", label=label)
 
 
-def _beside(case: Case, points: Float, view: PictureView) -> tuple[Float, Float]:
+def _project_points(case: Case, points: Float, view: PictureView) -> tuple[Float, Float]:
     """Return ascending stations and offsets (m) of the points (M, 2) in the view; NaN rows separate stretches."""
     truth = case.road.known_truth
     is_finite = np.isfinite(points).all(axis=1)
@@ -184,7 +186,7 @@ def _by_station(station: Float, offset: Float) -> tuple[Float, Float]:
     return np.insert(station, breaks, np.nan), np.insert(offset, breaks, np.nan)
 
 
-def _half_width(column: Mapping[str, Float], name: str, level: int) -> Float:
+def _interval_half_width(column: Mapping[str, Float], name: str, level: int) -> Float:
     """Return half-widths (M,) of a column's `level` % interval: predicted, else by its standard deviation, else 0."""
     if f"{name}_{level}" in column:
         width = column[f"{name}_{level}"]
@@ -193,16 +195,26 @@ def _half_width(column: Mapping[str, Float], name: str, level: int) -> Float:
     return np.nan_to_num(width)
 
 
-def _band(axes: Axes, case: Case, view: PictureView, y: Float, width: Float, color: str, label: str | None) -> None:
+def _draw_band(
+    axes: Axes, case: Case, view: PictureView, y: Float, width: Float, color: str, label: str | None
+) -> None:
     """Draw a predicted line and the band of its 95 % interval into the axes."""
-    station, offset = _beside(case, case.frames.at(y), view)
-    _, lower_offset = _across(case, y - width, view)
-    band_station, upper_offset = _across(case, y + width, view)
-    axes.fill_between(band_station, lower_offset, upper_offset, color=color, alpha=0.35, lw=0, label=None if label is None else f"{label}, 95 %")
+    station, offset = _project_points(case, case.frames.at(y), view)
+    _, lower_offset = _offsets_at_frames(case, y - width, view)
+    band_station, upper_offset = _offsets_at_frames(case, y + width, view)
+    axes.fill_between(
+        band_station,
+        lower_offset,
+        upper_offset,
+        color=color,
+        alpha=0.35,
+        lw=0,
+        label=None if label is None else f"{label}, 95 %",
+    )
     axes.plot(station, offset, color=color, lw=1.3, label=label)
 
 
-def _across(case: Case, y: Float, view: PictureView) -> tuple[Float, Float]:
+def _offsets_at_frames(case: Case, y: Float, view: PictureView) -> tuple[Float, Float]:
     """Return ascending stations where frames cross the true axis and the offsets of their points y (m), NaN at gaps."""
     axis, frames = case.road.known_truth.axis, case.frames
     _, station = axis.crossing(frames.position, frames.direction)
@@ -210,29 +222,31 @@ def _across(case: Case, y: Float, view: PictureView) -> tuple[Float, Float]:
     return _by_station(station[in_view], axis.project(frames.at(y)[in_view])[1])
 
 
-def _center_error(axes: Axes, case: Case, view: PictureView, column: Mapping[str, Float]) -> None:
+def _draw_center_error(axes: Axes, case: Case, view: PictureView, column: Mapping[str, Float]) -> None:
     y = column["center"]
-    station, offset = _across(case, y, view)
+    station, offset = _offsets_at_frames(case, y, view)
     for level, alpha in ((95, 0.2), (68, 0.35)):
-        width = _half_width(column, "center", level)
+        width = _interval_half_width(column, "center", level)
         if width.any():
-            band_station, lower_offset = _across(case, y - width, view)
-            _, upper_offset = _across(case, y + width, view)
-            axes.fill_between(band_station, lower_offset, upper_offset, color=CENTER, alpha=alpha, lw=0, label=f"{level} %")
+            band_station, lower_offset = _offsets_at_frames(case, y - width, view)
+            _, upper_offset = _offsets_at_frames(case, y + width, view)
+            axes.fill_between(
+                band_station, lower_offset, upper_offset, color=CENTER, alpha=alpha, lw=0, label=f"{level} %"
+            )
     axes.plot(station, offset, color=CENTER, lw=1.2, label="predicted centre")
     axes.axhline(0.0, color="black", lw=1.0)
     axes.set(ylabel="centre, m")
     axes.legend(loc="upper right", ncols=3, fontsize=8)
 
 
-def _lanes(axes: Axes, case: Case, view: PictureView, column: Mapping[str, Float]) -> None:
+def _draw_lanes(axes: Axes, case: Case, view: PictureView, column: Mapping[str, Float]) -> None:
     truth = case.road.known_truth.at(case.frames)
     in_view = np.flatnonzero((truth.station >= view.first) & (truth.station <= view.last))
     in_view = in_view[np.argsort(truth.station[in_view])]
     station = truth.station[in_view]
     for name, color in (("lanes", CENTER), ("lane_width", EDGE)):
         value, label = column[name][in_view], name.replace("_", " ") + (", m" if name == "lane_width" else "")
-        spread = _half_width(column, name, 95)[in_view]
+        spread = _interval_half_width(column, name, 95)[in_view]
         axes.fill_between(station, value - spread, value + spread, color=color, alpha=0.25, lw=0)
         axes.plot(station, value, color=color, lw=1.2, label=label)
         true_value = truth.corridor[in_view, CORRIDOR.index(name)]

@@ -60,7 +60,10 @@ def shown_figures(target: str, figures: Mapping[str, float | None]) -> dict[str,
 def _cells(rows: Mapping[str, Mapping[str, Spread]], columns: Columns) -> tuple[list[str], list[list[str]]]:
     """Return head and body of a table with a row of figures per name; columns that no row has are left out."""
     used_columns = {figure: metric for figure, metric in columns.items() if any(figure in row for row in rows.values())}
-    body = [[name, *(cell(row.get(figure), metric) for figure, metric in used_columns.items())] for name, row in rows.items()]
+    body = [
+        [name, *(cell(row.get(figure), metric) for figure, metric in used_columns.items())]
+        for name, row in rows.items()
+    ]
     return ["", *(metric.title for metric in used_columns.values())], body
 
 

@@ -13,11 +13,11 @@ from synthroads_addon.base.schema import read_json
 
 from ..data.sources import Source
 from ..experiments import Experiment as AnyExperiment
-from ..experiments import cached_scores, fill_path, kept_figures, with_seed, write_results
+from ..experiments import cached_scores, fill_path, read_figures, with_seed, write_results
 from ..runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting_data
 from ..scores.confusion import are_scores, tables_by_test
 from .recipes import Data, SegmentationConfiguration
-from .scoring import score_all, told_apart, trained_model
+from .scoring import score_all, target_names, trained_model
 from .task import train
 
 
@@ -85,7 +85,7 @@ def _train_variant(
                 run.begin()
                 _reuse_pretraining(configuration, run.part(PRETRAINING), output)
             train(run, progress)
-    tests = kept_figures(folder / METRICS, "tests", None, partial(_are_tests, configuration))
+    tests = read_figures(folder / METRICS, "tests", None, partial(_are_tests, configuration))
     assert tests is not None, "the training has written it"
     return tests
 
@@ -94,7 +94,7 @@ def _are_tests(configuration: SegmentationConfiguration, data: Any) -> bool:
     """Return whether JSON data are scores of a configuration's tests, as `score_all` makes them."""
     tests, scheme = configuration.data.tests, configuration.scheme()
     has_tests = isinstance(data, dict) and data.keys() == tests.keys()
-    return has_tests and all(are_scores(data[name], told_apart(sources, scheme)) for name, sources in tests.items())
+    return has_tests and all(are_scores(data[name], target_names(sources, scheme)) for name, sources in tests.items())
 
 
 def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, output: Path) -> None:

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from ..data.classes import class_names
-from ..onnx_export import Exportable, described
+from ..onnx_export import Exportable, metadata_texts
 from .recipes import SegmentationConfiguration
 
 _CLOUDS = 3
@@ -50,7 +50,7 @@ def exportable_network(model: nn.Module, configuration: SegmentationConfiguratio
     feat = torch.randn(points, len(configuration.features), generator=generator)
     names = tuple(geometry.inputs)
     dynamic = {"feat": {0: "points0"}, **geometry.lengths}
-    metadata = described(
+    metadata = metadata_texts(
         task="segmentation",
         classes=list(class_names(configuration.scheme())),
         features=list(configuration.features),

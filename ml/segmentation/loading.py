@@ -21,7 +21,7 @@ from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, scalings
 from ..data.workers import load_batches
 from .network import gpu_prepares, overlay_clouds
-from .recipes import SegmentationConfiguration, mapped_intensities, plan
+from .recipes import SegmentationConfiguration, map_intensities, plan
 
 SMALLEST_SHARE = 0.25
 """Of a crop's points: tiles with fewer are left out of training, unless all have. Chosen: a smaller tile shows too
@@ -48,13 +48,13 @@ def prepare_domains(
     domains: Mapping[str, Sequence[CloudTile]], configuration: SegmentationConfiguration
 ) -> dict[str, list[CloudTile]]:
     """Return domains without slivers, synthetic intensities mapped for `mixed_mapped`; see `read_domains`."""
-    prepared = {domain: large_enough(tiles, configuration) for domain, tiles in domains.items()}
+    prepared = {domain: drop_slivers(tiles, configuration) for domain, tiles in domains.items()}
     if configuration.set_up == "mixed_mapped" and "real" in prepared and "synthetic" in prepared:
-        prepared["synthetic"] = mapped_intensities(prepared["synthetic"], prepared["real"])
+        prepared["synthetic"] = map_intensities(prepared["synthetic"], prepared["real"])
     return prepared
 
 
-def large_enough(tiles: Sequence[CloudTile], configuration: SegmentationConfiguration) -> list[CloudTile]:
+def drop_slivers(tiles: Sequence[CloudTile], configuration: SegmentationConfiguration) -> list[CloudTile]:
     """Return the tiles with at least `SMALLEST_SHARE` of a crop's points; all with any point if there are none."""
     smallest_size = SMALLEST_SHARE * configuration.crop_points
     return [tile for tile in tiles if len(tile) >= smallest_size] or [tile for tile in tiles if len(tile)]
@@ -101,12 +101,21 @@ class CropBatches:
 
     def __len__(self) -> int:
         configuration = self.configuration
-        return math.ceil((configuration.crops_per_epoch or configuration.crops_per_tile * len(self.tiles)) / configuration.batch)
+        return math.ceil(
+            (configuration.crops_per_epoch or configuration.crops_per_tile * len(self.tiles)) / configuration.batch
+        )
 
     def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Item]:
         """Yield the batches of an epoch whose numbers, from 0, `share` selects."""
         configuration, sizes = self.configuration, [len(tiles) for tiles in self.domains]
-        draws = plan(sizes, configuration.crops_per_tile, configuration.synthetic_share, configuration.seed, epoch, configuration.crops_per_epoch)
+        draws = plan(
+            sizes,
+            configuration.crops_per_tile,
+            configuration.synthetic_share,
+            configuration.seed,
+            epoch,
+            configuration.crops_per_epoch,
+        )
         crops = self._crops(self.tiles, draws, self.seeds[0], epoch)
         yield from _load_crops(crops, configuration, epoch, configuration.adaptation.mix3d, share, self.device)
 
@@ -122,7 +131,9 @@ class CropBatches:
     def _crops(self, tiles: Sequence[CloudTile], draws: Sequence[Draw], seeds: Seeds, epoch: int) -> CropDataset:
         configuration = self.configuration
         settings, scaling = configuration.crop_settings(), self.scaling
-        return CropDataset(tiles, scaling, settings, draws, seeds, effects=configuration.effects, seed=configuration.seed, epoch=epoch)
+        return CropDataset(
+            tiles, scaling, settings, draws, seeds, effects=configuration.effects, seed=configuration.seed, epoch=epoch
+        )
 
 
 class ExchangedBatches(CropBatches):

@@ -49,7 +49,9 @@ def adapt_network(model: nn.Module, batches: Iterable[Item], configuration: Segm
     """
     adapted = deepcopy(model)
     adapt_norms(
-        adapted, batches, lambda batch: scores_of(adapted, prepare_on_gpu(configuration, move_to_device(adapted, batch)))
+        adapted,
+        batches,
+        lambda batch: scores_of(adapted, prepare_on_gpu(configuration, move_to_device(adapted, batch))),
     )
     return adapted
 

@@ -185,7 +185,7 @@ def class_weights(shares: Float, power: float = 1.0) -> Float:
     return np.asarray(weights / weights.mean(), dtype=np.float64)
 
 
-def mapped_intensities(synthetic: Sequence[CloudTile], real: Sequence[CloudTile]) -> list[CloudTile]:
+def map_intensities(synthetic: Sequence[CloudTile], real: Sequence[CloudTile]) -> list[CloudTile]:
     """Return the synthetic tiles with intensities quantile-mapped to the real tiles' distribution.
 
     Both are training data: nothing of a test is looked at.

@@ -72,8 +72,18 @@ def overlapping_pieces(
         """Yield the pieces of squares counted from ``low``, recursively smaller; ``candidates`` are candidates around."""
         cells = np.floor((position[members] - low) / edge).astype(np.int64)
         for cell in np.unique(cells, axis=0):
-            core, square_corner, candidate_positions = members[np.all(cells == cell, axis=1)], low + cell * edge, position[candidates]
-            visible_points = candidates[np.all((candidate_positions >= square_corner - margin) & (candidate_positions < square_corner + edge + margin), axis=1)]
+            core, square_corner, candidate_positions = (
+                members[np.all(cells == cell, axis=1)],
+                low + cell * edge,
+                position[candidates],
+            )
+            visible_points = candidates[
+                np.all(
+                    (candidate_positions >= square_corner - margin)
+                    & (candidate_positions < square_corner + edge + margin),
+                    axis=1,
+                )
+            ]
             if len(visible_points) > largest and edge / 2 >= _SMALLEST_EDGE:
                 yield from cut(core, visible_points, square_corner, edge / 2, min(margin, edge / 2))
             else:
@@ -134,7 +144,7 @@ def piece_scores(
         return
     total: Tensor | None = None
     for view in range(settings.votes):
-        for indices, scores in _view_scores(_turned(tile, view), scaling, classifier, settings, core_mask, seed):
+        for indices, scores in _view_scores(_rotate_tile(tile, view), scaling, classifier, settings, core_mask, seed):
             if total is None:
                 total = scores.new_zeros(len(tile), scores.shape[1], dtype=torch.float32)
             total[torch.from_numpy(indices)] += scores.float().softmax(dim=1)
@@ -148,14 +158,16 @@ def _view_scores(
 ) -> Iterator[tuple[Index, Tensor]]:
     """Yield the scores of a tile's points in one view, piece by piece, with the points' indices; see `piece_scores`."""
     for number, (indices, visible_points) in enumerate(overlapping_pieces(tile.coord[:, :2], core_mask)):
-        batch = make_item(crop_of(tile.select(visible_points), scaling), settings, stream(seed, "missing features", number))
+        batch = make_item(
+            crop_of(tile.select(visible_points), scaling), settings, stream(seed, "missing features", number)
+        )
         scores = classifier(batch)
         if not torch.isfinite(scores).all():
             raise InputError("network", None, NOT_FINITE)
         yield indices, scores[torch.from_numpy(np.searchsorted(visible_points, indices))]
 
 
-def _turned(tile: CloudTile, view: int) -> CloudTile:
+def _rotate_tile(tile: CloudTile, view: int) -> CloudTile:
     """Return a tile as a view sees it: the first as it is, each further one turned on, every second one mirrored.
 
     Pieces are cut where it is turned to, so that each view has other borders.
@@ -176,7 +188,10 @@ def _needed_points(thinned_points: Float32, all_points: Float32, core: Bool | No
     """Return a mask of the thinned points within two voxels of the core's bounding box in plan; all without a core."""
     if core is None:
         return np.ones(len(thinned_points), dtype=bool)
-    lower_corner, upper_corner = all_points[core][:, :2].min(axis=0) - 2 * voxel, all_points[core][:, :2].max(axis=0) + 2 * voxel
+    lower_corner, upper_corner = (
+        all_points[core][:, :2].min(axis=0) - 2 * voxel,
+        all_points[core][:, :2].max(axis=0) + 2 * voxel,
+    )
     return np.asarray(np.all((thinned_points[:, :2] >= lower_corner) & (thinned_points[:, :2] <= upper_corner), axis=1))
 
 
@@ -239,7 +254,7 @@ def check_tests(configuration: SegmentationConfiguration) -> None:
     """
     scheme = configuration.scheme()
     for sources in configuration.data.tests.values():
-        told_apart(sources, scheme)
+        target_names(sources, scheme)
         for source in sources:
             _groups(source, scheme)
             if next(read_tiles(source, scheme, None), None) is None:
@@ -268,7 +283,7 @@ def score(
         InputError: the sources tell different classes apart, or a mapping's groups leave out a class.
     """
     scheme = configuration.scheme()
-    confusion = Confusion(told_apart(sources, scheme))
+    confusion = Confusion(target_names(sources, scheme))
     if configuration.adaptation.adabn:
         tiles = list(thin_tiles(sources, configuration, "test"))
         with report_lost_workers(configuration.workers):
@@ -290,7 +305,7 @@ def score(
     return confusion, largest_result
 
 
-def told_apart(sources: Sequence[Source], scheme: ClassScheme) -> tuple[str, ...]:
+def target_names(sources: Sequence[Source], scheme: ClassScheme) -> tuple[str, ...]:
     """Return the names of the classes, or groups, that the sources of one test tell apart.
 
     Raises:

@@ -17,7 +17,7 @@ from synthroads_addon.base.errors import InputError
 
 from ..data.classes import IGNORED, class_names
 from ..data.tiles import CloudTile, scalings
-from .loading import large_enough, thin_tiles
+from .loading import drop_slivers, thin_tiles
 from .recipes import SegmentationConfiguration
 from .scoring import Classifier, piece_scores
 
@@ -29,13 +29,13 @@ def target_tiles(configuration: SegmentationConfiguration) -> list[CloudTile]:
         MissingFileError, InputError: there are none, they are damaged, or hold no points.
     """
     thin_tiles_of_target = thin_tiles(configuration.data.target, configuration, "target", labels=False)
-    tiles = large_enough(list(thin_tiles_of_target), configuration)
+    tiles = drop_slivers(list(thin_tiles_of_target), configuration)
     if not tiles:
         raise InputError("data.target", 0, "holds no points to learn from")
     return tiles
 
 
-def believed_labels(
+def label_confident_points(
     tiles: Sequence[CloudTile], classifier: Classifier, configuration: SegmentationConfiguration
 ) -> list[CloudTile]:
     """Return tiles labelled by a network where it is surest: of the points that it calls a class, that class's share.

@@ -39,7 +39,7 @@ from .offsets import fit_offsets
 from .prediction import Labelling, predict_file
 from .recipes import SegmentationConfiguration, class_shares, class_weights
 from .scoring import check_tests, classifier, label_tile, load_weights, score, score_all, trained_model
-from .self_training import believed_labels, target_tiles
+from .self_training import label_confident_points, target_tiles
 
 OFFSETS = "offsets"
 """Key of the checkpoint's offsets that were added to the network's scores, (C,)."""
@@ -271,7 +271,9 @@ def _begin_with(model: nn.Module, configuration: SegmentationConfiguration) -> N
     for name in ("task", "classes", "features", "intensity", "network"):
         start_value, value = getattr(start_run.configuration, name, None), getattr(configuration, name)
         if start_value != value:
-            raise InputError("start", configuration.start, f"must have the same {name}: it has {start_value}, not {value}")
+            raise InputError(
+                "start", configuration.start, f"must have the same {name}: it has {start_value}, not {value}"
+            )
     load_weights(model, start_run)
 
 
@@ -291,8 +293,12 @@ def _self_train(
     for number in range(1, rounds + 1):
         folder = run.part(PRETRAINING, f"round-{number}")
         is_last_round = number == rounds
-        round_run = replace(run, configuration=round_configuration) if is_last_round else Run.start(folder, round_configuration, resume=True)
-        labelled_tiles = believed_labels(target, classifier(model, configuration), configuration)
+        round_run = (
+            replace(run, configuration=round_configuration)
+            if is_last_round
+            else Run.start(folder, round_configuration, resume=True)
+        )
+        labelled_tiles = label_confident_points(target, classifier(model, configuration), configuration)
         _fit(model, round_run, {**domains, "target": labelled_tiles}, validation, progress)
 
 

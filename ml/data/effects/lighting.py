@@ -70,7 +70,11 @@ def _repaint_lines(value: Float, stretch: Stretch, probability: float, rng: Gene
     edges = stretch.lines[stretch.number] * [1.0, -1.0]
     is_worn = np.zeros(len(value), dtype=bool)
     both_worn, one_worn = edge < probability, probability <= edge < 2.0 * probability
-    line_is_worn = (both_worn or (one_worn and side < 0.5), both_worn or (one_worn and side >= 0.5), lane >= 1.0 - probability)
+    line_is_worn = (
+        both_worn or (one_worn and side < 0.5),
+        both_worn or (one_worn and side >= 0.5),
+        lane >= 1.0 - probability,
+    )
     for happens, offset in zip(line_is_worn, (edges[:, 0], edges[:, 1], 0.0), strict=True):
         if happens:
             is_worn |= is_marking & (np.abs(y - offset) < _LINE_REACH)
@@ -96,7 +100,9 @@ def _verges(value: Float, stretch: Stretch, is_marking: Bool, widest: float, rng
     verge_level = float(np.median(value[verge])) if verge.any() else 0.0
     if verge_level <= 0.0:
         return value, stretch.paved
-    return np.where(verge, value * (tone * float(np.median(value[is_bare])) / verge_level), value), stretch.paved | verge
+    return np.where(
+        verge, value * (tone * float(np.median(value[is_bare])) / verge_level), value
+    ), stretch.paved | verge
 
 
 def _wear_markings(value: Float, is_paved: Bool, is_marking: Bool, share: float) -> Float:

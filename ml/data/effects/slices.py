@@ -41,7 +41,9 @@ class SequenceCrop(Part):
         for name, lower_limit in (("reach", 0.5), ("beyond", 0.0)):
             smallest, largest = getattr(self, name)
             if not lower_limit <= smallest <= largest <= 1000.0:
-                raise ValueError(f"{name} is {smallest:g}, {largest:g}: must be two ascending numbers from {lower_limit:g} to 1000")
+                raise ValueError(
+                    f"{name} is {smallest:g}, {largest:g}: must be two ascending numbers from {lower_limit:g} to 1000"
+                )
         return self
 
 
@@ -111,7 +113,10 @@ def mirror_side(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> N
     sign = 1.0 if outwards == 0 else -1.0
     # How far beyond the pavement's outer and inner edge each point lies.
     outward_distance = sign * (stretch.coord[:, 1] - stretch.center[stretch.number])
-    beyond_outer, beyond_inner = outward_distance - edges[stretch.number, outwards], -outward_distance - edges[stretch.number, inwards]
+    beyond_outer, beyond_inner = (
+        outward_distance - edges[stretch.number, outwards],
+        -outward_distance - edges[stretch.number, inwards],
+    )
     rise = stretch.coord[:, 2] - stretch.corridor[stretch.number, HEIGHT]
     rims = [rise[(excess <= 0.0) & (excess >= -_RIM)] for excess in (beyond_inner, beyond_outer)]
     if not len(rims[0]) or not len(rims[1]):

@@ -78,7 +78,9 @@ def cell_sums(coord: Tensor, mask: Tensor, features: Tensor, reach: float, numbe
     sums = values.new_zeros(slices * number, channels + 2)
     for cell, weight in ((lower_cell, 1.0 - (cell_place - lower_cell)), (lower_cell + 1.0, cell_place - lower_cell)):
         in_grid = mask & (cell >= 0) & (cell < number)
-        index = first_cell + torch.where(in_grid, cell, 0.0).long()  # NaN, of weights beyond reason, is no number of a cell
+        index = (
+            first_cell + torch.where(in_grid, cell, 0.0).long()
+        )  # NaN, of weights beyond reason, is no number of a cell
         sums = sums.index_add(0, index.flatten(), values * (weight * in_grid).flatten()[:, None])
     return sums.view(slices, number, channels + 2)
 
@@ -173,7 +175,7 @@ class GridConvolution(nn.Module):
         width: features.
         along: slices that it spans, odd.
         across: kernel points that it looks at, odd.
-        apart: how far these lie apart; 1: next to each other.
+        dilation: distance of these from one to the next, kernel points; 1 for neighbours.
     """
 
     def __init__(self, width: int, slices: int, kernel_points: int, dilation: int = 1) -> None:
@@ -200,14 +202,14 @@ class RelativeAttention(nn.Module):
         dropout: share of what is added that is left out in training.
     """
 
-    apart: Tensor
+    relative_index: Tensor
 
     def __init__(self, count: int, width: int, heads: int, dropout: float) -> None:
         super().__init__()
         self.heads = heads
         self.bias = nn.Parameter(torch.zeros(heads, 2 * count - 1))
         steps = torch.arange(count)
-        self.register_buffer("apart", steps[:, None] - steps[None, :] + count - 1, persistent=False)
+        self.register_buffer("relative_index", steps[:, None] - steps[None, :] + count - 1, persistent=False)
         self.before = nn.LayerNorm(width)
         self.project = nn.Linear(width, 3 * width)
         self.out = nn.Linear(width, width)
@@ -222,7 +224,7 @@ class RelativeAttention(nn.Module):
         head_width = width // self.heads
         parts = self.project(self.before(sequence)).view(number, length, 3, self.heads, head_width)
         query, key, value = parts.permute(2, 0, 3, 1, 4)
-        score = query @ key.transpose(-1, -2) / head_width**0.5 + self.bias[:, self.apart[:length, :length]]
+        score = query @ key.transpose(-1, -2) / head_width**0.5 + self.bias[:, self.relative_index[:length, :length]]
         attended = (score.softmax(-1) @ value).transpose(1, 2).reshape(number, length, width)
         sequence = sequence + self.dropout(self.out(attended))
         return sequence + self.dropout(self.network(sequence))

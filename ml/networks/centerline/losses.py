@@ -96,7 +96,9 @@ def centerline_loss(options: LossOptions, half_width: float) -> Callable[[nn.Mod
         weight = estimate.new_tensor([1.0] + [options.corridor] * (len(TARGETS) - 1))
         value = (weight * likelihood(error, output["log_std"], known_mask, options.beta)).sum()
         first_look_error = output["rough"] - torch.where(known_mask[..., 0], truth[..., 0], output["rough"].detach())
-        first_look_cost = functional.huber_loss(first_look_error, torch.zeros_like(first_look_error), reduction="none", delta=_ROUGH)
+        first_look_cost = functional.huber_loss(
+            first_look_error, torch.zeros_like(first_look_error), reduction="none", delta=_ROUGH
+        )
         value = value + options.rough * first_look_cost.sum() / known_mask[..., 0].sum().clamp_min(1)
         if options.places:
             number = output["logits"].shape[2]

@@ -126,7 +126,9 @@ class CenterlineModel(nn.Module):
         self.pool = AttentionPool(width, options.heads, options.context)
         self.heads = Heads(width, options.context, self.kernel_points.spacing)
         refinement_size = (options.fine_reach, options.fine_cells)
-        self.again = Refinement(options.point_width, options.fine_width, options.context, slices, *refinement_size, options.heads)
+        self.again = Refinement(
+            options.point_width, options.fine_width, options.context, slices, *refinement_size, options.heads
+        )
 
     def forward(self, batch: Batch) -> Output:
         """Return centreline, corridor, deviations and logits of a batch's slices, see the module."""
@@ -189,7 +191,7 @@ def all_targets(values: Mapping[str, Tensor], kind: str = "") -> Tensor:
     return torch.cat([values[f"center{kind}"][..., None], values[f"corridor{kind}"]], dim=-1)
 
 
-def both_ways(model: nn.Module, batch: Batch) -> Output:
+def predict_both_ways(model: nn.Module, batch: Batch) -> Output:
     """Return centre, corridor and deviations averaged over a batch and its mirror image, mirrored back.
 
     Mirroring the batch mirrors the result exactly. Variances are averaged; what the two disagree on is left out, as the

@@ -74,7 +74,7 @@ class Around:
 def convolve(values: Tensor, weight: Tensor, around: Around) -> Tensor:
     """Return the sums (M, D) over the offsets around each cell of the values there (M, C) times `weight` (K, C, D)."""
     if torch.compiler.is_exporting():  # a graph without chunks and gradients
-        return _gathered(_with_nothing(values), around.near) @ weight.flatten(0, 1)
+        return _gather_neighbours(_append_zeros(values), around.near) @ weight.flatten(0, 1)
     algorithm = _Pairwise if values.device.type == "cpu" else _Gathered
     result: Tensor = algorithm.apply(values, weight, around)
     return result
@@ -85,7 +85,7 @@ class _Pairwise(torch.autograd.Function):
     def forward(ctx: Any, values: Tensor, weight: Tensor, around: Around) -> Tensor:
         ctx.save_for_backward(values, weight)
         ctx.around = around
-        total = _sums(len(values), weight.shape[2], values)
+        total = _zero_sums(len(values), weight.shape[2], values)
         # Within one offset no cell occurs twice on either side: no two summands meet, so that the order is fixed.
         for (centres, neighbours), matrix in zip(around.pairs(), weight, strict=True):
             total.index_add_(0, centres, (values.index_select(0, neighbours) @ matrix).to(total.dtype))
@@ -94,7 +94,7 @@ class _Pairwise(torch.autograd.Function):
     @staticmethod
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
         values, weight = ctx.saved_tensors
-        of_values = _sums(len(values), values.shape[1], values) if ctx.needs_input_grad[0] else None
+        of_values = _zero_sums(len(values), values.shape[1], values) if ctx.needs_input_grad[0] else None
         of_weight = torch.empty_like(weight) if ctx.needs_input_grad[1] else None
         for k, (centres, neighbours) in enumerate(ctx.around.pairs()):
             gradient = gradients[0].index_select(0, centres)
@@ -119,32 +119,35 @@ class _Gathered(torch.autograd.Function):
         if ctx.needs_input_grad[0]:  # n(i, k) = j means n(j, K - 1 - k) = i: a convolution with reversed offsets
             of_values = _product(gradient, weight.flip(0).transpose(1, 2), neighbour_table)
         if ctx.needs_input_grad[1]:
-            total = _sums(weight.shape[0] * weight.shape[1], weight.shape[2], weight)
-            values_and_zeros = _with_nothing(values)
+            total = _zero_sums(weight.shape[0] * weight.shape[1], weight.shape[2], weight)
+            values_and_zeros = _append_zeros(values)
             for rows in _chunks(neighbour_table, values.shape[1]):
-                total += _gathered(values_and_zeros, neighbour_table[rows]).T @ gradient[rows]
+                total += _gather_neighbours(values_and_zeros, neighbour_table[rows]).T @ gradient[rows]
             of_weight = total.to(weight.dtype).view_as(weight)
         return of_values, of_weight, None
 
 
-def _sums(rows: int, columns: int, like: Tensor) -> Tensor:
+def _zero_sums(rows: int, columns: int, like: Tensor) -> Tensor:
     """Return zeros to add to: in single precision in the place of bfloat16, whose 8 bits soon drop summands."""
     return like.new_zeros(rows, columns, dtype=torch.float32 if like.dtype == torch.bfloat16 else like.dtype)
 
 
 def _product(values: Tensor, weight: Tensor, neighbour_table: Tensor) -> Tensor:
     """Return the convolution (M, D) of values (M, C), gathered chunk by chunk."""
-    values_and_zeros, matrix = _with_nothing(values), weight.reshape(-1, weight.shape[2])
-    parts = [_gathered(values_and_zeros, neighbour_table[rows]) @ matrix for rows in _chunks(neighbour_table, values.shape[1])]
+    values_and_zeros, matrix = _append_zeros(values), weight.reshape(-1, weight.shape[2])
+    parts = [
+        _gather_neighbours(values_and_zeros, neighbour_table[rows]) @ matrix
+        for rows in _chunks(neighbour_table, values.shape[1])
+    ]
     return torch.cat(parts) if parts else values.new_empty(0, weight.shape[2])
 
 
-def _with_nothing(values: Tensor) -> Tensor:
+def _append_zeros(values: Tensor) -> Tensor:
     """Return the values (M, C) with a row of zeros after them, for offsets at which there is no cell."""
     return torch.cat([values, values.new_zeros(1, values.shape[1])])
 
 
-def _gathered(values_and_zeros: Tensor, neighbour_table: Tensor) -> Tensor:
+def _gather_neighbours(values_and_zeros: Tensor, neighbour_table: Tensor) -> Tensor:
     """Return the values (M, K C) around each cell, offset by offset."""
     return values_and_zeros.index_select(0, neighbour_table.reshape(-1)).unflatten(0, neighbour_table.shape).flatten(1)
 

@@ -87,17 +87,17 @@ def build_cells(coord: Tensor, offset: Tensor, grid: Grid, *, always_masked: boo
     counts = _points_of_clouds(coord, offset)
     clouds = len(counts)
     cloud = torch.repeat_interleave(torch.arange(clouds, device=coord.device), counts, output_size=len(coord))
-    places, place_in_cell = _places(coord, cloud, clouds, grid.cell)
+    places, place_in_cell = _cell_places(coord, cloud, clouds, grid.cell)
     keys, cell = torch.unique(_keys(cloud, places), return_inverse=True)
     points = torch.bincount(cell, minlength=len(keys)).to(coord.dtype)
     cells: Cells = {"cell0": cell, "share0": points.reciprocal()[cell], "inside0": place_in_cell}
     for stage in range(grid.stages):
         if stage:
-            cloud, places = _apart(keys)
+            cloud, places = _split_keys(keys)
             coarse_keys, parent = torch.unique(_keys(cloud, places >> 1), return_inverse=True)
             cells |= {f"parent{stage}": parent, f"children{stage}": _children(places, parent, len(coarse_keys))}
             keys = coarse_keys
-        cloud, places = _apart(keys)
+        cloud, places = _split_keys(keys)
         counts = torch.bincount(cloud, minlength=clouds)
         cells[f"ends{stage}"] = counts.cumsum(0)
         if stage < grid.attention_from:
@@ -120,7 +120,7 @@ def _points_of_clouds(coord: Tensor, offset: Tensor) -> Tensor:
     return torch.from_numpy(np.diff(ends, prepend=0)).to(coord.device)
 
 
-def _places(coord: Tensor, cloud: Tensor, clouds: int, edge: float) -> tuple[Tensor, Tensor]:
+def _cell_places(coord: Tensor, cloud: Tensor, clouds: int, edge: float) -> tuple[Tensor, Tensor]:
     """Return the points' cells (N, 3), counted from each cloud's lowest, and their places in them (N, 3)."""
     cell_coordinates = coord / edge
     floor = cell_coordinates.floor()
@@ -142,7 +142,7 @@ def _keys(cloud: Tensor, places: Tensor) -> Tensor:
     return (((cloud << BITS | x) << BITS | y) << BITS) | z
 
 
-def _apart(keys: Tensor) -> tuple[Tensor, Tensor]:
+def _split_keys(keys: Tensor) -> tuple[Tensor, Tensor]:
     """Return clouds (M,) and places (M, 3) of cells' numbers."""
     mask = (1 << BITS) - 1
     places = torch.stack([(keys >> 2 * BITS) & mask, (keys >> BITS) & mask, keys & mask], dim=1) - 1
@@ -194,7 +194,10 @@ def _patches(places: Tensor, cloud: Tensor, counts: Tensor, grid: Grid) -> tuple
     owner = torch.repeat_interleave(torch.arange(len(sizes), device=device), number, output_size=sum(numbers))
     size, parts = counts[owner], number[owner]
     patch_number = torch.arange(sum(numbers), device=device) - first_patch[owner]
-    stretch_begin, stretch_end = ((number_in_cloud * size + parts - 1).div(parts, rounding_mode="floor") for number_in_cloud in (patch_number, patch_number + 1))
+    stretch_begin, stretch_end = (
+        (number_in_cloud * size + parts - 1).div(parts, rounding_mode="floor")
+        for number_in_cloud in (patch_number, patch_number + 1)
+    )
     start = (stretch_begin - (width - (stretch_end - stretch_begin)).div(2, rounding_mode="floor")).clamp(min=0)
     start = torch.minimum(start, (size - width).clamp(min=0))
     slots = start[:, None] + torch.arange(width, device=device)

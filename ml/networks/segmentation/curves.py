@@ -70,14 +70,14 @@ def _hilbert_tables() -> tuple[list[int], list[int]]:
             for octant in range(_OCTANTS):
                 # Hamilton and Rau-Chaplin 2008: an octant b of a cube that the curve enters at e, along axis d, is the
                 # inverse Gray code of (b xor e) rotated right by d + 1.
-                digit = _from_gray(_turned(octant ^ corner, -(axis + 1)))
-                entry = corner ^ _turned(_entry(digit), axis + 1)
+                digit = _from_gray(_rotate_bits(octant ^ corner, -(axis + 1)))
+                entry = corner ^ _rotate_bits(_entry(digit), axis + 1)
                 digits.append(digit)
                 states.append(_OCTANTS * (_AXES * entry + (axis + _direction(digit) + 1) % _AXES))
     return digits, states
 
 
-def _turned(bits: int, steps: int) -> int:
+def _rotate_bits(bits: int, steps: int) -> int:
     """Return three bits turned to the left, the last one coming in on the right again."""
     steps %= _AXES
     return ((bits << steps) | (bits >> (_AXES - steps))) & (_OCTANTS - 1)

@@ -42,7 +42,7 @@ def build_neighbours(coord: Tensor, offset: Tensor, neighbourhood: Neighbourhood
     ends = torch.from_numpy(check_ends(coord, offset)).to(coord.device)
     count = len(ends)
     cloud = _clouds_of(ends, len(coord))
-    local = _about_middle(coord, cloud, count)
+    local = _centre_clouds(coord, cloud, count)
     order = _geometric_order(local, cloud)
     # What the network sees is rounded to the coordinates' dtype, so neighbours are those of the rounded positions.
     points = _Points(local[order].double(), cloud, count)  # sorting by cloud leaves which point is of which
@@ -130,16 +130,16 @@ def _clouds_of(ends: Tensor, points: int) -> Tensor:
     return torch.searchsorted(ends, torch.arange(points, device=ends.device), right=True)
 
 
-def _lowest(xyz: Tensor, cloud: Tensor, count: int) -> Tensor:
+def _lowest_coordinates(xyz: Tensor, cloud: Tensor, count: int) -> Tensor:
     """Return the least coordinates of each cloud (B, 3); infinity for an empty one."""
     lowest = xyz.new_full((count, 3), torch.inf)
     return lowest.scatter_reduce_(0, cloud[:, None].expand(-1, 3), xyz, "amin")
 
 
-def _about_middle(coord: Tensor, cloud: Tensor, count: int) -> Tensor:
+def _centre_clouds(coord: Tensor, cloud: Tensor, count: int) -> Tensor:
     """Return coordinates (N, 3) centred on the middle of their cloud's bounding box."""
     coordinates = coord.double()
-    middle = 0.5 * (_lowest(coordinates, cloud, count) - _lowest(-coordinates, cloud, count))
+    middle = 0.5 * (_lowest_coordinates(coordinates, cloud, count) - _lowest_coordinates(-coordinates, cloud, count))
     return (coordinates - middle[cloud]).to(coord.dtype)
 
 
@@ -149,24 +149,24 @@ def _geometric_order(points: Tensor, cloud: Tensor) -> Tensor:
     key = torch.zeros_like(cloud)
     for axis in range(3):
         key = _mix_bits(key ^ bits[:, axis])
-    order = torch.argsort(key ^ _signed(1 << 63), stable=True)  # as if it had no sign
+    order = torch.argsort(key ^ _as_signed(1 << 63), stable=True)  # as if it had no sign
     return order[torch.argsort(cloud[order], stable=True)]
 
 
 def _mix_bits(key: Tensor) -> Tensor:
     """Return hashes of 64-bit keys, as `neighbours` does: SplitMix64's finaliser on numbers with a sign."""
-    key = key + _signed(0x9E3779B97F4A7C15)
-    key = (key ^ _shifted(key, 30)) * _signed(0xBF58476D1CE4E5B9)
-    key = (key ^ _shifted(key, 27)) * _signed(0x94D049BB133111EB)
-    return key ^ _shifted(key, 31)
+    key = key + _as_signed(0x9E3779B97F4A7C15)
+    key = (key ^ _shift_right(key, 30)) * _as_signed(0xBF58476D1CE4E5B9)
+    key = (key ^ _shift_right(key, 27)) * _as_signed(0x94D049BB133111EB)
+    return key ^ _shift_right(key, 31)
 
 
-def _signed(number: int) -> int:
+def _as_signed(number: int) -> int:
     """Return the number with a sign whose 64 bits are those of a number without."""
     return number - (1 << 64) if number >= 1 << 63 else number
 
 
-def _shifted(key: Tensor, bits: int) -> Tensor:
+def _shift_right(key: Tensor, bits: int) -> Tensor:
     """Return 64-bit keys shifted to the right, zeros from the left."""
     return (key >> bits) & ((1 << (64 - bits)) - 1)
 
@@ -175,18 +175,18 @@ def _grid_sample(points: _Points, edge: float) -> Tensor:
     """Return the ascending indices of the point nearest to the centre of each occupied cell, as `voxel_sample` does."""
     if not len(points):
         return points.cloud
-    steps = (points.xyz - _lowest(points.xyz, points.cloud, points.count)[points.cloud]) / edge
+    steps = (points.xyz - _lowest_coordinates(points.xyz, points.cloud, points.count)[points.cloud]) / edge
     cells = torch.floor(steps)
     cells_x, cells_y, cells_z = (int(span) for span in (cells.amax(dim=0) + 1).tolist())
     _check_cells((cells_x, cells_y, cells_z), points.count)
     number = cells.long()
     key = ((points.cloud * cells_x + number[:, 0]) * cells_y + number[:, 1]) * cells_z + number[:, 2]
-    order = torch.argsort(_squared(steps - cells - 0.5), stable=True)
+    order = torch.argsort(_squared_lengths(steps - cells - 0.5), stable=True)
     order = order[torch.argsort(key[order], stable=True)]
     return order[_first_of_each(key[order])].sort().values
 
 
-def _squared(vectors: Tensor) -> Tensor:
+def _squared_lengths(vectors: Tensor) -> Tensor:
     """Return the squared lengths (N,) of vectors (N, 3), summed in the order in which NumPy sums them."""
     squares = vectors * vectors
     return squares[:, 0] + squares[:, 1] + squares[:, 2]
@@ -228,7 +228,7 @@ def _pairs(queries: _Points, support: _Points, edge: float) -> Iterator[tuple[Te
         place_in_run = torch.arange(len(column), device=key.device) - (lengths.cumsum(dim=0) - lengths)[column]
         support_index = order[begin[rows].reshape(-1)[column] + place_in_run]
         query = rows.start + torch.div(column, len(column_steps), rounding_mode="floor")
-        yield query, support_index, _squared(queries.xyz[query] - support.xyz[support_index]).sqrt()
+        yield query, support_index, _squared_lengths(queries.xyz[query] - support.xyz[support_index]).sqrt()
 
 
 def _blocks(total: Tensor, pairs: int) -> Iterator[slice]:
@@ -289,7 +289,9 @@ def _nearest_three(points: _Points, support: _Points, radius: float) -> tuple[Te
             order, rank = order[rank < 3], rank[rank < 3]
             place[query[order], rank], distance[query[order], rank] = support_index[order], step[order]
         farthest_distance = distance.gather(1, (count[open_points] - 1)[:, None])[:, 0]
-        is_done = (farthest_distance <= edge) | torch.full_like(farthest_distance, edge > 2.0 * (extent + radius), dtype=torch.bool)
+        is_done = (farthest_distance <= edge) | torch.full_like(
+            farthest_distance, edge > 2.0 * (extent + radius), dtype=torch.bool
+        )
         nearest_index[open_points[is_done]] = place[is_done]
         weight[open_points[is_done]] = 1.0 / (distance[is_done] + TINY)
         open_points, edge = open_points[~is_done], 2.0 * edge

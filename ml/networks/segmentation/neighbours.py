@@ -93,7 +93,7 @@ def build_neighbours(coord: torch.Tensor, offset: torch.Tensor, neighbourhood: N
     """
     ends = check_ends(coord, offset)
     bounds = list(itertools.pairwise([0, *ends.tolist()])) or [(0, 0)]
-    clouds = [_stages_of(coord[begin:end].numpy(), neighbourhood) for begin, end in bounds]
+    clouds = [_cloud_stages(coord[begin:end].numpy(), neighbourhood) for begin, end in bounds]
     stages = range(len(neighbourhood.inner) + 1)
     sizes = np.array([[len(cloud[f"positions{stage}"]) for stage in stages] for cloud in clouds], dtype=np.int64)
     begins = np.cumsum(sizes, axis=0) - sizes
@@ -120,9 +120,9 @@ def check_ends(coord: torch.Tensor, offset: torch.Tensor) -> Int:
     return ends
 
 
-def _stages_of(coord: NDArray[np.floating], neighbourhood: Neighbourhood) -> dict[str, NDArray[np.generic]]:
+def _cloud_stages(coord: NDArray[np.floating], neighbourhood: Neighbourhood) -> dict[str, NDArray[np.generic]]:
     """Return positions, samples and neighbours of one cloud's stages, indices counted from its own first point."""
-    local = _about_middle(coord)
+    local = _centre_cloud(coord)
     order = geometric_order(local)
     # What the network sees is rounded to the coordinates' dtype, so neighbours are those of the rounded positions.
     points = local[order].astype(np.float64)
@@ -143,7 +143,7 @@ def _stages_of(coord: NDArray[np.floating], neighbourhood: Neighbourhood) -> dic
     return _in_given_order(arrays, order)
 
 
-def _about_middle(coord: NDArray[np.floating]) -> NDArray[np.floating]:
+def _centre_cloud(coord: NDArray[np.floating]) -> NDArray[np.floating]:
     """Return coordinates (N, 3) centred on the middle of their bounding box, which doesn't depend on their order."""
     if not len(coord):
         return coord

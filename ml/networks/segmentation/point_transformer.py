@@ -245,13 +245,13 @@ def rotations(places: Tensor, width: int) -> tuple[Tensor, Tensor]:
 
 
 @full_precision
-def turned(values: Tensor, cosine: Tensor, sine: Tensor) -> Tensor:
+def rotate_pairs(values: Tensor, cosine: Tensor, sine: Tensor) -> Tensor:
     """Return values (M, heads, width) with their pairs of channels, half the width apart, turned by angles."""
     first_half, second_half = values.chunk(2, dim=-1)
     return torch.cat([first_half * cosine - second_half * sine, first_half * sine + second_half * cosine], dim=-1)
 
 
-def skipped(change: Tensor, ends: Tensor | None, share: float, training: bool) -> Tensor:
+def drop_clouds(change: Tensor, ends: Tensor | None, share: float, training: bool) -> Tensor:
     """Return the change (M, C) that a block makes, in training without that of a random share of the clouds.
 
     What stays is scaled up, so that the mean is as it is without.
@@ -292,7 +292,7 @@ class ConvolutionBlock(nn.Module):
         """Return the cells' features (M, width) after the block; the shape stays."""
         assert view.around is not None
         convolved = F.relu_(self.look_norm(self.look(self.norm(values), view.around)))
-        return values + skipped(self.mix(convolved), view.ends, self.drop, self.training)
+        return values + drop_clouds(self.mix(convolved), view.ends, self.drop, self.training)
 
 
 class AttentionBlock(nn.Module):
@@ -311,9 +311,9 @@ class AttentionBlock(nn.Module):
 
     def forward(self, values: Tensor, view: View) -> Tensor:
         """Return the cells' features (M, width) after the block; the shape stays."""
-        values = values + skipped(self._attention(self.norm(values), view), view.ends, self.drop, self.training)
+        values = values + drop_clouds(self._attention(self.norm(values), view), view.ends, self.drop, self.training)
         expanded = F.gelu(self.widen(self.wide_norm(values)))
-        return values + skipped(self.narrow(expanded), view.ends, self.drop, self.training)
+        return values + drop_clouds(self.narrow(expanded), view.ends, self.drop, self.training)
 
     def _attention(self, values: Tensor, view: View) -> Tensor:
         """Return what each cell (M, width) takes from the cells of its patch."""
@@ -323,7 +323,7 @@ class AttentionBlock(nn.Module):
         # Vaswani et al. 2017: softmax(Q K^T / sqrt(d)) V. Queries and keys are turned before cells are gathered, once
         # for each cell and not once for each of the patches that it is in.
         q, k, v = self.look(values).unflatten(1, (3, -1, self.head_width)).unbind(1)
-        q, k = (turned(tensor, *view.turns).to(v.dtype) for tensor in (q, k))
+        q, k = (rotate_pairs(tensor, *view.turns).to(v.dtype) for tensor in (q, k))
         qkv = torch.stack([q, k, v], dim=1)
         patches = qkv.index_select(0, view.patch.reshape(-1)).unflatten(0, view.patch.shape)
         q, k, v = patches.transpose(1, 3).unbind(2)  # (P, heads, K, width of a head)
