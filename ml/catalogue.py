@@ -32,6 +32,7 @@ def _training(name: str) -> Entry:
 
 
 def _experiment(name: str) -> Entry:
+    """Return the entry of a shipped experiment: its configuration and the names of its variants."""
     file = shipped_file("experiment", EXPERIMENTS, name)
     data = _object(file)
     variants = data.get("variants")
@@ -43,6 +44,7 @@ def _experiment(name: str) -> Entry:
 
 
 def _model(name: str) -> Entry:
+    """Return the entry of a shipped model: its task, domain, size, figures and limits."""
     card = read_card(name)
     least_density, largest_density = card.domain.density
     megabytes = round(card.weights.stat().st_size / 1e6, 2) if card.weights.is_file() else None
@@ -58,12 +60,14 @@ def _model(name: str) -> Entry:
 
 
 def _mapping(name: str) -> Entry:
+    """Return the entry of a shipped mapping of classes: the attribute that it reads, and its classes."""
     mapping = load_mapping(name)
     key_figures = {"field": mapping.field, "classes": list(dict.fromkeys(mapping.classes.values()))}
     return Entry(name, mapping.title, shipped_file("mapping", MAPPINGS, name, [".json"]), key_figures)
 
 
 def _yardstick(name: str) -> Entry:
+    """Return the entry of a public data set: the form of its files, its splits and classes."""
     yardstick = load_yardstick(name)
     key_figures = {
         "form": yardstick.form,
@@ -76,6 +80,7 @@ def _yardstick(name: str) -> Entry:
 
 
 def _object(file: Path) -> Mapping[str, Any]:
+    """Return the content of a YAML file; InputError unless it is an object."""
     data = read_yaml(file)
     if not isinstance(data, dict):
         raise InputError(str(file), None, "must be an object")

@@ -15,7 +15,7 @@ from .cards import ModelCard, Platform, model_names, read_card
 
 FAR = log(3.0)
 """Distance from a model's domain beyond which its results are doubtful: density three times off, another platform."""
-_OTHER_PLATFORM = log(3.0) + 1e-9
+_OTHER_PLATFORM = log(3.0) + 1e-9  # added for another platform: always beyond `FAR`
 _UNEVEN = 12.0  # of the 90th to the 20th percentile of cells' points: scanners that stand or drive on the road
 _LONG = 3.0  # of a ground-based cloud's extent along to that across: the scanner drove
 _DENSE = 60.0  # points/m2 from which an even cloud is a UAV's
@@ -27,10 +27,10 @@ class CloudTraits:
     """Traits of a cloud by which a model is chosen.
 
     Attributes:
-        density: median of the points in occupied square metres.
-        unevenness: ratio of the 90th to the 20th percentile of the same.
-        platform: that the scanner was on, judged by the two and the extent.
-        attributes: of the points that tell something: ``intensity``, ``color``.
+        density: median number of points in occupied square metres, 1/m2.
+        unevenness: ratio of the 90th to the 20th percentile of these numbers.
+        platform: likely platform of the scanner, judged by density, unevenness and extent.
+        attributes: names of the points' attributes that vary: ``intensity``, ``color``.
     """
 
     density: float
@@ -46,13 +46,13 @@ class CloudTraits:
 
 @dataclass(frozen=True)
 class Choice:
-    """A chosen model, and why.
+    """A model chosen for a cloud, with the cloud's traits and distance from the model's domain.
 
     Attributes:
-        card: of the model.
-        traits: of the cloud.
-        distance: from what the model was trained on: 0 inside, the logarithm of how many times the density is off
-            outside, and more on another platform.
+        card: card of the model.
+        traits: traits of the cloud.
+        distance: distance from the model's domain: 0 inside, else the logarithm of the ratio by which the density is
+            outside, plus `_OTHER_PLATFORM` on another platform.
     """
 
     card: ModelCard
@@ -61,7 +61,7 @@ class Choice:
 
     @property
     def doubtful(self) -> bool:
-        """Return whether the cloud is too far from what the model was trained on."""
+        """Return whether the cloud lies farther than `FAR` from the model's domain."""
         return self.distance > FAR
 
     def to_dict(self) -> dict[str, Any]:
@@ -75,7 +75,7 @@ class Choice:
         return {"model": self.card.name, "cloud": traits, "distance": round(self.distance, 3), "why": self.why()}
 
     def why(self) -> str:
-        """Return in one line which model was chosen and why."""
+        """Return one line of text with the chosen model and the reason."""
         least_density, largest_density = self.card.domain.density
         training_domain = (
             f"trained on {least_density:g} to {largest_density:g} points/m2, {' and '.join(self.card.domain.platforms)}"
@@ -87,7 +87,7 @@ class Choice:
 
 
 def choose_model(cloud: Path, task: str) -> Choice:
-    """Return the shipped model of a task that was trained on what is most like a cloud.
+    """Return the shipped model of a task whose domain is nearest to a cloud.
 
     Raises:
         MissingFileError: there is no such file.
@@ -101,10 +101,10 @@ def choose_model(cloud: Path, task: str) -> Choice:
 
 
 def nearest_model(cards: Sequence[ModelCard], traits: CloudTraits) -> Choice:
-    """Return which of some models (at least one) was trained on what is most like a cloud; of equal ones the first.
+    """Return the choice of the model (of at least one) whose domain is nearest to a cloud; of equal ones the first.
 
     Raises:
-        InputError: the cloud lacks what each of them needs.
+        InputError: the cloud lacks attributes that each model needs.
     """
     choices = [Choice(card, traits, domain_distance(card, traits)) for card in cards]
     best_choice = min(choices, key=lambda choice: choice.distance)
@@ -117,7 +117,7 @@ def nearest_model(cards: Sequence[ModelCard], traits: CloudTraits) -> Choice:
 
 
 def domain_distance(card: ModelCard, traits: CloudTraits) -> float:
-    """Return how far a cloud is from what a model was trained on; infinite if it lacks what the model needs."""
+    """Return a cloud's distance from a model's domain (`Choice.distance`); infinite if it lacks needed attributes."""
     if not set(card.domain.needs) <= traits.attributes:
         return inf
     least_density, largest_density = card.domain.density
@@ -131,7 +131,7 @@ def cloud_traits(path: Path) -> CloudTraits:
 
     Raises:
         MissingFileError: there is no such file.
-        InputError: it is no cloud, or empty.
+        InputError: the file is no cloud, or empty.
     """
     cells: dict[tuple[int, int], int] = {}
     brightest, colorful = 0.0, False

@@ -53,6 +53,7 @@ class Experiment(Model):
     @field_validator("variants")
     @classmethod
     def _check_names(cls, variants: dict[str, Variant]) -> dict[str, Variant]:
+        """Refuse names of variants that can't be names of folders."""
         if invalid_name := next((name for name in variants if not _FOLDER_NAME.fullmatch(name)), None):
             raise ValueError(
                 f"'{invalid_name}' must be the name of a folder: no / and no \\ in it, and no dot before it"
@@ -95,9 +96,9 @@ def configurations(experiment: Experiment, folders: Mapping[str, str], changes: 
     """Return each variant's training configuration by name, with the first seed and paths filled in.
 
     Args:
-        experiment: what is compared.
-        folders: what {NAME} in its paths stands for.
-        changes: of all variants, ``path=value``.
+        experiment: the experiment with its variants.
+        folders: folder by NAME, for {NAME} in the experiment's paths.
+        changes: changes of all variants, ``path=value``.
 
     Raises:
         InputError: a name isn't given, or a change is wrong.
@@ -130,13 +131,13 @@ def fill_path(path: str, folders: Mapping[str, str]) -> str:
 
 
 def read_figures(file: Path, name: str, made_from: Any, is_sound: Callable[[Any], bool]) -> dict[str, Any] | None:
-    """Return the figures that an experiment keeps in a file, or None if there are none, or those of something else.
+    """Return the figures that an experiment keeps in a file; None if there are none, or those of other data.
 
     Args:
-        file: of an object with figures and, unless ``made_from`` is None, with what they were made from.
-        name: of the figures in it.
-        made_from: what they should be made from, as JSON data.
-        is_sound: returns whether they are such figures as a table needs.
+        file: JSON file of an object with the figures and, unless ``made_from`` is None, with that as ``made_from``.
+        name: key of the figures in the object.
+        made_from: data that the figures must be made from, as JSON data; None if that doesn't matter.
+        is_sound: function that tells whether figures have the form that a table needs.
 
     Raises:
         InputError: the file is damaged.
@@ -156,14 +157,14 @@ def read_figures(file: Path, name: str, made_from: Any, is_sound: Callable[[Any]
 def cached_scores(
     run: Run[Any], file: Path, score: Callable[[], dict[str, Any]], is_sound: Callable[[Any], bool], **dependencies: Any
 ) -> dict[str, Any]:
-    """Return a trained run's scores, from `file` where they were made of the same configuration, weights and `dependencies`.
+    """Return a trained run's scores, from a file if they were made of the same configuration, weights and dependencies.
 
     Args:
-        run: with the configuration that it is tested with.
-        file: for the scores, which are written.
-        score: makes them.
+        run: run with the configuration that it is tested with.
+        file: file in which the scores are kept.
+        score: function that computes the scores.
         is_sound: see `read_figures`.
-        dependencies: what else they depend on, as JSON data.
+        dependencies: further values that the scores depend on, as JSON data.
 
     Raises:
         InputError: the file is damaged.
@@ -178,7 +179,7 @@ def cached_scores(
 
 
 def write_results(output: Path, results: Mapping[str, Any], table: str) -> None:
-    """Write the scores that there are by now, as `RESULTS` and `TABLE`, into an experiment's folder."""
+    """Write the scores computed so far into an experiment's folder, as `RESULTS` and `TABLE`."""
     write_file(output / RESULTS, canonical_json(results).encode(), overwrite=True)
     write_file(output / TABLE, table.encode(), overwrite=True)
 

@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from .runs import Run
 
 _MEETING = timedelta(minutes=10)
-"""How long one waits for the others to begin."""
+"""Time that a process waits for the others to begin."""
 _GRACE = 60.0
-"""Seconds in which this process has to notice by itself that another one was lost; over NCCL it waits on instead."""
+"""Seconds in which this process should notice by itself that another one was lost, which over NCCL it doesn't."""
 _LOST = "one was lost: is memory short? --resume goes on"
 _PATIENCE = timedelta(days=2)
-"""How long for each later step: the first scores the validation data alone."""
+"""Time that a process waits for another one in later steps: the first process scores the validation data alone."""
 
 
 def process_number() -> int:
@@ -45,7 +45,7 @@ def process_count() -> int:
 
 
 def wait_for_all() -> None:
-    """Wait until all processes that train together have come here."""
+    """Wait until all processes that train together have reached this call."""
     if distributed.is_initialized():
         distributed.barrier()
 
@@ -66,9 +66,9 @@ def helper_processes(run: Run[Any], learn: Callable[[Run[Any]], object], device:
     """Context in which the configuration's further processes run ``learn(run)``, joined by torch.distributed.
 
     Args:
-        run: its ``processes`` says how many take part, this one included.
-        learn: a function of a module.
-        device: that this process trains on.
+        run: run whose configuration's ``processes`` is the number of processes, this one included.
+        learn: function of a module that trains a run.
+        device: device that this process trains on.
 
     Raises:
         InputError: one of them was lost, there are fewer CUDA devices than processes, or one device is named.
@@ -116,7 +116,7 @@ def _exit_if_lost(helpers: Sequence[Any], finish_event: Event) -> None:
 
     Args:
         helpers: processes that train with this one.
-        finish_event: set when this one waits for none of them any more.
+        finish_event: event that is set once this process waits for none of them any more.
     """
     while not finish_event.wait(1.0):
         if any(helper.exitcode for helper in helpers):
@@ -139,6 +139,7 @@ def _check_devices(count: int, device: str) -> None:
 
 
 def _join_group(meeting: Path, number: int, count: int, device: str) -> None:
+    """Join the process group of the training: NCCL on GPUs, Gloo on CPUs, met through a file."""
     store = FileStore(str(meeting), count)
     store.set_timeout(_MEETING)
     backend = "nccl" if device == "cuda" else "gloo"

@@ -24,7 +24,7 @@ EFFECTS = "ml.data.effects"
 _NETWORKS: dict[str, dict[str, type[Part]]] = {task: {} for task in FOLDERS}
 _EFFECTS: dict[str, dict[str, Effect]] = {task: {} for task in FOLDERS}
 Change = Callable[[Any, Any, np.random.Generator], None]
-"""Changes a `Sample` in place: called with it, with the task's options of effects and with the sample's own stream."""
+"""Function that changes a `Sample` in place: called with the sample, the options of effects and a random stream."""
 F = TypeVar("F", bound=Change)
 
 
@@ -33,9 +33,9 @@ class Effect:
     """A registered augmentation of training samples.
 
     Attributes:
-        change: what it does.
-        order: effects of lower ones go first, those below 0 before a sample is thinned out.
-        fields: what it adds to the options.
+        change: function that changes a sample.
+        order: effects with a lower order come first, those below 0 before a sample is thinned out.
+        fields: fields that the effect adds to the options.
     """
 
     change: Change
@@ -47,13 +47,14 @@ def network(task: str) -> Callable[[type[P]], type[P]]:
     """Return a class decorator that registers a network's options for a task, by the default of their ``name``.
 
     Args:
-        task: that it learns, out of `FOLDERS`.
+        task: task of the network, out of `FOLDERS`.
 
     Raises:
         ValueError: another network of the task has this name.
     """
 
     def register(options: type[P]) -> type[P]:
+        """Register a class of options under the default of its ``name``."""
         _register(_NETWORKS[task], options.model_fields["name"].default, options, options.__module__)
         return options
 
@@ -67,7 +68,7 @@ def networks(task: str) -> dict[str, type[Part]]:
 
 
 def network_union(task: str, default: str) -> Any:
-    """Return the type annotation of a field ``network``: any options of a task, `default` where no name is given."""
+    """Return the type annotation of a field ``network``: options of any network of a task, `default` without a name."""
     models = networks(task)
     return discriminated_union({default: models[default], **models}, "name")
 
@@ -76,16 +77,17 @@ def effect(*tasks: str, order: int = 100, **fields: Any) -> Callable[[F], F]:
     """Return a decorator that registers a function as an augmentation of some tasks, under the function's name.
 
     Args:
-        tasks: on whose samples it acts, out of `FOLDERS`.
-        order: see `Effect`; those that come with the package are below 100.
-        fields: declared by `quantity`, with a default at which it neither does nor draws anything. A configuration's
-            ``effects`` have them.
+        tasks: tasks on whose samples the effect acts, out of `FOLDERS`.
+        order: order of the effect (`Effect`); those that come with the package are below 100.
+        fields: fields declared by `quantity`, with a default at which the effect does and draws nothing. A
+            configuration's ``effects`` get them.
 
     Raises:
         ValueError: another effect of a task has this name.
     """
 
     def register(change: F) -> F:
+        """Register a function for each of the tasks."""
         for task in tasks:
             _register(_EFFECTS[task], change.__name__, Effect(change, order, fields), change.__module__)
         return change
@@ -111,6 +113,7 @@ def apply_effects(
 
 
 def _register(registered: dict[str, Any], name: str, thing: Any, module: str) -> None:
+    """Add a named network or effect to a table; ValueError if another one has the name."""
     if registered.setdefault(name, thing) is not thing:
         first_module = getattr(registered[name], "change", registered[name]).__module__
         kind = "effect" if isinstance(thing, Effect) else "network"
@@ -118,5 +121,6 @@ def _register(registered: dict[str, Any], name: str, thing: Any, module: str) ->
 
 
 def _import_files(package: str) -> None:
+    """Import all modules of a package, which register what they define."""
     for file in iter_modules(import_module(package).__path__):
         import_module(f"{package}.{file.name}")

@@ -32,7 +32,7 @@ METRICS = "metrics.json"
 CURVES = "curves.png"
 CALIBRATION = "calibration.json"
 PRETRAINING = "pretraining"
-"""Folder, within that of a fine-tuned or self-trained run, of what it began with, and of its rounds but the last."""
+"""Folder within a fine-tuned or self-trained run's that holds its pretraining, and its rounds but the last."""
 LOCK = ".lock"
 """File that the training at work in the folder holds locked; it is gone at the end."""
 NOT_FINITE = "not all that it says of the cloud is finite: its weights are beyond reason; train it anew"
@@ -40,7 +40,7 @@ NOT_FINITE = "not all that it says of the cloud is finite: its weights are beyon
 FREE_WHEN_RESUMING = ("threads", "device", "workers", "prepare_on")
 """Fields that may change between the parts of one training: they say where it runs, not what it learns."""
 _FREE_IN_STREAM = ("producers", "folder")
-"""Those of `data.stream`."""
+"""Fields of `data.stream` that may change between the parts of one training."""
 
 C = TypeVar("C", bound=Configuration)
 
@@ -50,12 +50,12 @@ class Run(Generic[C]):
     """One training: its folder, configuration and history.
 
     Attributes:
-        folder: of its files.
-        configuration: all that it depends on.
-        history: one dictionary of numbers per epoch that is done.
-        kept: epochs that the checkpoint holds, from which the training can go on.
-        resume, overwrite: whether what is in the folder is gone on with, or replaced.
-        begun: whether its configuration stands in the folder.
+        folder: folder of its files.
+        configuration: configuration that determines it.
+        history: figures by name of each finished epoch.
+        kept: number of finished epochs that the checkpoint holds.
+        resume, overwrite: whether a run in the folder is resumed, or replaced.
+        begun: whether the configuration was written to the folder.
         held: whether this process holds the folder's lock.
     """
 
@@ -85,12 +85,12 @@ class Run(Generic[C]):
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Context in which no other training is at work in the run's folder; within it, it does nothing more.
+        """Context in which this process holds the lock of the run's folder; nested contexts do nothing more.
 
-        Where the input is at fault before an epoch is kept, nothing of the run is left.
+        After an InputError before the first checkpoint nothing of the run is left.
 
         Raises:
-            OutputError: another one is, or the folder can't be written.
+            OutputError: another training holds the lock, or the folder can't be written.
         """
         if self.held or process_number():
             yield
@@ -106,9 +106,9 @@ class Run(Generic[C]):
                 self.held = False
 
     def begin(self) -> None:
-        """Write the run's configuration, and remove what stands of a run that it replaces; once, when data are read.
+        """Write the run's configuration and remove the files of a run that it replaces; once, after data are read.
 
-        Of several processes that train together all come here, and the first one writes.
+        All processes that train together call it, and the first one writes.
 
         Raises:
             OutputError, InputError: see `start`; or the folder can't be written.
@@ -124,7 +124,7 @@ class Run(Generic[C]):
         wait_for_all()  # nobody goes on with a checkpoint that is removed until here
 
     def _take_over(self) -> bool:
-        """Take over what an interrupted run has kept, and return whether there is one; for errors see `start`."""
+        """Return whether the folder's run is resumed, after taking over its history; for errors see `start`."""
         if not (self.folder / CONFIGURATION).exists() or not self._has_checkpoints():
             return False
         if self.resume:
@@ -135,11 +135,11 @@ class Run(Generic[C]):
         return self.resume
 
     def _has_checkpoints(self) -> bool:
-        """Return whether an epoch of the run, or of what it began with, is kept in its folder."""
+        """Return whether the folder holds a checkpoint of the run, or of its pretraining."""
         return (self.folder / CHECKPOINT).exists() or any((self.folder / PRETRAINING).rglob(CHECKPOINT))
 
     def _remove_unless_saved(self) -> None:
-        """Remove what `begin` has written, and the folder if it is empty then, unless an epoch is kept."""
+        """Remove the files that `begin` has written, unless there is a checkpoint."""
         if self.begun and not self._has_checkpoints():
             with suppress(OSError):  # what ended the training is told
                 self._clear()
@@ -206,7 +206,7 @@ class Run(Generic[C]):
         return state
 
     def calibration(self) -> dict[str, Any] | None:
-        """Return the calibration of a model's deviations as JSON data, None if it has none or not yet."""
+        """Return the calibration of the model's deviations as JSON data; None if there is none (yet)."""
         path = self.folder / CALIBRATION
         return read_json(path) if path.is_file() else None
 
@@ -222,6 +222,7 @@ class Run(Generic[C]):
             write_file(self.folder / CURVES, _curves(self.history), overwrite=True)
 
     def _resume(self, previous_data: Any) -> None:
+        """Take over the history of an interrupted run; InputError if its configuration differs."""
         if not isinstance(previous_data, dict):
             raise InputError(str(self.folder / CONFIGURATION), None, "must be a JSON object")
         current_data = self.configuration.to_dict()
@@ -248,12 +249,12 @@ def load_state(module: nn.Module | torch.optim.Optimizer, state: Any, source: st
     """Load the weights of a checkpoint into a network, or an optimiser's state, in place.
 
     Args:
-        module: of the run's configuration.
-        state: what the checkpoint holds for it.
-        source: run or file that it is of, for the message.
+        module: network or optimiser of the run's configuration.
+        state: its state in the checkpoint.
+        source: run or file of the checkpoint, for the message.
 
     Raises:
-        InputError: it is of another network, or a weight isn't finite, so that the network would say nothing of worth.
+        InputError: the state is another network's, or a weight isn't finite.
     """
     if isinstance(module, nn.Module) and any(value.is_complex() for value in state.values()):
         raise InputError(source, None, "its checkpoint holds complex numbers, which no network of ours has")
@@ -269,7 +270,7 @@ def load_state(module: nn.Module | torch.optim.Optimizer, state: Any, source: st
 
 
 def _value_text(value: object) -> str:
-    """Return a number or text as it is written, of anything else its type's name: tensors have long texts."""
+    """Return a number or text as in Python code, for anything else the name of its type (tensors have long texts)."""
     return repr(value) if isinstance(value, (str, int, float)) else type(value).__name__
 
 

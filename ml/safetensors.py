@@ -60,7 +60,7 @@ def write_tensors(
 
 
 def read_metadata(path: Path) -> dict[str, str]:
-    """Return the texts that a safetensors file says of its tensors, without reading these.
+    """Return the metadata texts of a safetensors file, without reading its tensors.
 
     Raises:
         MissingFileError, InputError: there is no such file, or it is damaged.
@@ -83,7 +83,7 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
 
 
 def _read_header(path: Path) -> tuple[dict[str, Any], int]:
-    """Return a file's header and the offset of its data."""
+    """Return a file's header as a dictionary, and the offset of its data in bytes."""
     if not path.is_file():
         raise MissingFileError(str(path), None, "no such file of weights")
     with path.open("rb") as file:
@@ -99,6 +99,7 @@ def _read_header(path: Path) -> tuple[dict[str, Any], int]:
 
 
 def _read_tensor(path: Path, name: str, entry: Any, content: np.ndarray[Any, np.dtype[np.uint8]]) -> Tensor:
+    """Return one tensor by its entry in the header (dtype, shape, data_offsets), from the file's data bytes."""
     damage_error = InputError(f"{path}: {name}", None, "lies outside of the file, or isn't as long as its shape says")
     try:
         dtype, shape, (begin, end) = _TYPES[entry["dtype"]], list(entry["shape"]), entry["data_offsets"]

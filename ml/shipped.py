@@ -23,7 +23,7 @@ class ShippedRun(Run[Any]):
     """A shipped model in the place of a run: configuration, weights and calibration come from one file.
 
     Attributes:
-        card: of the model.
+        card: card of the model.
     """
 
     card: ModelCard | None = None
@@ -36,7 +36,7 @@ class ShippedRun(Run[Any]):
         return {"model": on_device, "epoch": self.configuration.schedule.epochs}
 
     def calibration(self) -> dict[str, Any] | None:
-        """Return the calibration of its deviations as JSON data, None if it has none."""
+        """Return the calibration of the model's deviations as JSON data; None if it has none."""
         text = read_metadata(self._weights()).get("calibration")
         try:
             return json.loads(text) if text else None
@@ -44,6 +44,7 @@ class ShippedRun(Run[Any]):
             raise InputError(str(self._weights()), None, "its calibration is no JSON") from None
 
     def _weights(self) -> Path:
+        """Return the file of the model's weights."""
         assert self.card is not None
         return self.card.weights
 
@@ -52,7 +53,7 @@ def open_shipped(name: str) -> ShippedRun:
     """Open a shipped model by its name.
 
     Raises:
-        InputError: there is none of this name, or its weights are damaged.
+        InputError: there is no model of this name, or its weights are damaged.
     """
     card = read_card(name)
     text = read_metadata(card.weights).get("configuration", "")
@@ -67,7 +68,7 @@ def open_run(run: Path) -> Run[Any]:
     """Open a trained run by its folder, or a shipped model by its name; a folder of that name comes first.
 
     Raises:
-        MissingFileError, InputError: there is neither.
+        MissingFileError, InputError: there is neither such a folder nor such a model.
     """
     if run.is_dir() or len(run.parts) > 1 or str(run) not in model_names():
         if not run.exists() and (hint := nearest_name(str(run), model_names())):
@@ -79,7 +80,7 @@ def open_run(run: Path) -> Run[Any]:
 def ship(run: Run[Any], weights: Path, *, overwrite: bool = False) -> int:
     """Write a trained run's weights in half precision, with its configuration and calibration; return the bytes.
 
-    The optimiser stays behind, and paths of data and caches are those of the configuration.
+    The optimiser's state is left out; paths of data and caches stay those of the configuration.
 
     Raises:
         InputError: the run isn't finished, or the weights take more than `LARGEST_MB`.
@@ -107,4 +108,5 @@ def _to_half_precision(value: torch.Tensor) -> torch.Tensor:
 
 
 def _json_text(data: Any) -> str:
+    """Return data as compact JSON with sorted keys."""
     return json.dumps(data, sort_keys=True, separators=(",", ":"))

@@ -19,9 +19,9 @@ from .runs import Run, load_state, stream_seed
 M = TypeVar("M", bound=nn.Module)
 Figures = dict[str, float]
 Batches = Callable[[int, slice], Iterable[Any]]
-"""Gives those batches of an epoch whose numbers a slice names; the same for the same epoch and number."""
+"""Function that returns the batches of an epoch whose numbers a slice selects; equal calls give equal batches."""
 Loss = Callable[[M, Any], tuple[Tensor, Figures]]
-"""Returns what is minimised and further figures, which are averaged over the epoch."""
+"""Function that returns a batch's loss, which is minimised, and further figures, which are averaged over the epoch."""
 
 
 def chosen_device(configuration: Configuration) -> torch.device:
@@ -63,13 +63,13 @@ def fit(
     accumulation of one process, whose last step may have fewer. The first process alone validates and saves.
 
     Args:
-        model: on the device it is trained on.
-        run: keeps checkpoint and history.
-        batches: the batches of one epoch.
-        batches_per_epoch: how many those are.
-        loss: of one batch; NaN or infinity ends the training.
-        validate: further figures of an epoch, computed after it.
-        progress: told the share of all steps that is done.
+        model: model, on the device it is trained on.
+        run: run that keeps checkpoint and history.
+        batches: function that returns the batches of one epoch.
+        batches_per_epoch: number of an epoch's batches.
+        loss: loss of one batch; NaN or infinity ends the training.
+        validate: function that computes further figures after an epoch.
+        progress: called with the share of all steps that is done.
 
     Raises:
         InputError: the loss is no longer finite, or an epoch has fewer batches than there are processes.
@@ -145,7 +145,7 @@ def optimizer_of(model: nn.Module, schedule: Schedule) -> torch.optim.AdamW:
 def train_step(
     model: M, optimizer: torch.optim.Optimizer, rate: float, configuration: Configuration, loss: Loss[M], *batches: Any
 ) -> Figures:
-    """Do one optimiser step, gradients averaged over batches and processes; return mean loss and mean other figures.
+    """Do one optimiser step with gradients averaged over batches and processes; return mean loss and other figures.
 
     The loss is the mean over all processes, the other figures are this process's.
 
@@ -190,6 +190,7 @@ def _groups(batches: Iterable[Any], size: int) -> Iterator[list[Any]]:
 
 
 def _means(figures: list[Figures]) -> Figures:
+    """Return the mean of each figure over steps; InputError without any."""
     if not figures:
         raise InputError("training data", 0, "an epoch has no batch: more data or a smaller batch are needed")
     return {name: math.fsum(step[name] for step in figures) / len(figures) for name in figures[0]}

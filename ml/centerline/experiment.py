@@ -77,7 +77,8 @@ def run_experiment(
 ) -> dict[str, Any]:
     """Train (unless done) and test all variants with the given seeds; return the figures, written after each.
 
-    A variant that learns from real roads is trained anew for each turn of roads that are left out, and tested on these.
+    A variant that learns from real roads is trained once for each group of roads left out (a turn), and tested on
+    these.
 
     Args:
         experiment: what is compared.
@@ -85,10 +86,10 @@ def run_experiment(
         output: folder; ``VARIANT/without-ROADS/seed-N`` are the runs, or ``VARIANT/seed-N`` where no real road is
             learned from, `RESULTS` and `TABLE` the figures.
         seeds: one after another, each over all variants: a table is there as soon as the first is through.
-        progress: of each training.
+        progress: called with each training's stage and share.
 
     Raises:
-        InputError: no variant learns from real roads, or what is to be left out isn't among them.
+        InputError: no variant learns from real roads, or a road to leave out isn't among them.
     """
     roads = _real_roads(configurations)
     turns = _turns(experiment.data.left_out, roads)
@@ -125,7 +126,7 @@ def _real_roads(configurations: Mapping[str, CenterlineConfiguration]) -> dict[s
     """Return cloud and axis of each real road that a variant learns from, by name.
 
     Raises:
-        InputError: there are none, or two have one name.
+        InputError: there are no real roads, or two have the same name.
     """
     roads: dict[str, tuple[Path, Path]] = {}
     for configuration in configurations.values():
@@ -159,7 +160,7 @@ def _leave_out_roads(
     """Return a variant's configuration with the roads of a turn left out of what it learns from.
 
     Raises:
-        InputError: nothing else is left.
+        InputError: no other real road is left.
     """
     remaining_roads = []
     for road in configuration.data.measured:
@@ -176,7 +177,7 @@ def _leave_out_roads(
 
 
 def _folder_without(turn: Sequence[str]) -> str:
-    """Return the name of the folder of the runs that a turn's roads were left out of."""
+    """Return the name of the folder for runs trained without a turn's roads."""
     names = "+".join(turn)
     if len(names) > _LONGEST_NAME:
         names = f"{names[:_LONGEST_NAME]}-{hashlib.sha256(names.encode()).hexdigest()[:8]}"
@@ -184,6 +185,7 @@ def _folder_without(turn: Sequence[str]) -> str:
 
 
 def _train_run(configuration: CenterlineConfiguration, folder: Path, progress: Progress) -> None:
+    """Train the run of a folder, or go on with it, unless it is finished."""
     run = Run.start(folder, configuration, resume=True)
     if not (folder / METRICS).is_file():
         train(run, progress)
@@ -195,6 +197,7 @@ def _test_run(
     """Return a trained run's figures by road, cached in a file as long as run, clouds and axes stay as they are."""
 
     def score() -> dict[str, Any]:
+        """Return the trained model's figures by road."""
         return _measure_predictors({"": load_predictor(run)}, run.configuration, roads, progress)[""]
 
     return cached_scores(run, file, score, partial(_are_figures, names=set(roads)), roads=_checksums(roads))
@@ -207,7 +210,7 @@ def _rule_figures(
     output: Path,
     progress: Progress,
 ) -> dict[str, dict[str, Any]]:
-    """Return the figures by road of all predictors that learn nothing, cached in the experiment's folder."""
+    """Return the figures by road of all rule-based predictors, cached in the experiment's folder."""
     file = output / "rules" / f"seed-{seed}.json"
     made_from = {"slices": configuration.slices.to_dict(), "roads": _checksums(roads)}
     trivial_rules = {
@@ -216,6 +219,7 @@ def _rule_figures(
     predictors = {VIEWS: views_predictor(), "skeleton": skeleton_predictor(SkeletonSettings())} | trivial_rules
 
     def are_sound(data: Any) -> bool:
+        """Return whether JSON data are figures of all rules on all roads."""
         has_names = isinstance(data, dict) and data.keys() == predictors.keys()
         return has_names and all(_are_figures(figures, set(roads)) for figures in data.values())
 
@@ -245,7 +249,7 @@ def _measure_predictors(
 
 
 def _are_figures(data: Any, names: Set[str]) -> bool:
-    """Return whether JSON data are figures of some roads by name, as `_measure_predictors` makes them of each predictor."""
+    """Return whether JSON data are one predictor's figures by road, as `_measure_predictors` makes them."""
     if not isinstance(data, dict) or data.keys() != names:
         return False
     for figures in data.values():
@@ -257,6 +261,7 @@ def _are_figures(data: Any, names: Set[str]) -> bool:
 
 
 def _checksums(roads: Mapping[str, tuple[Path, Path]]) -> dict[str, list[str]]:
+    """Return the checksums of cloud and axis of each road, by name."""
     return {name: [checksum(path) for path in files] for name, files in roads.items()}
 
 
@@ -301,13 +306,14 @@ def _spread_figures(seeds: Mapping[str, Mapping[str, Any]], roads: Sequence[str]
 
 
 def _nan_for_none(figures: Mapping[str, float | None]) -> dict[str, float]:
+    """Return a road's figures with NaN in the place of None."""
     return {name: float("nan") if value is None else value for name, value in figures.items()}
 
 
 def _best_rule(
     spreads: Mapping[str, Mapping[str, Any]], variants: Sequence[str], metric: Metric, figure: str
 ) -> list[str]:
-    """Return a table's row with the smallest mean of a figure that a rule has on each road."""
+    """Return a table's row with the smallest mean of a figure over the rules, road by road."""
     rules = [name for name in spreads if name not in (*variants, VIEWS, PATH)]
     row = ["best of the rules"]
     for road in spreads[rules[0]]:

@@ -37,7 +37,7 @@ def exportable_network(predictor: CenterlinePredictor, seed: int) -> Exportable:
 
     Args:
         predictor: the trained model.
-        seed: of the example.
+        seed: seed of the random example.
     """
     settings = predictor.settings
     generator = torch.Generator().manual_seed(seed)

@@ -29,8 +29,8 @@ def find_road(
     Args:
         predictor: a trained model.
         cloud: file with the road's points.
-        line: along the road, map coordinates; None: it is found in the cloud, as the middle of its ground.
-        progress: told the share that is done.
+        line: line along the road, map coordinates; None if it is found in the cloud, as the middle of its ground.
+        progress: called with the share that is done.
 
     Raises:
         MissingFileError, InputError: the file is missing or damaged, or the cloud holds no ground.
@@ -67,9 +67,9 @@ def _found_span(center: Float) -> slice:
 
 
 DIGITS = 4
-"""Decimals: 0.1 mm."""
+"""Decimals of lengths in files: 0.1 mm."""
 UNITS = {"lanes": "1", "heading": "rad"}
-"""All other numbers are in metres."""
+"""Units of the corridor's columns that aren't in metres."""
 
 
 def centerline_geojson(regression: Regression, name: str, spacing: float) -> dict[str, Any]:
@@ -80,8 +80,8 @@ def centerline_geojson(regression: Regression, name: str, spacing: float) -> dic
 
     Args:
         regression: by the model.
-        name: of the collection.
-        spacing: of the frames, m.
+        name: name of the collection.
+        spacing: distance between frames, m.
     """
     features = []
     for line in ("center", "left_edge", "right_edge"):
@@ -111,11 +111,11 @@ def centerline_geojson(regression: Regression, name: str, spacing: float) -> dic
 
 
 def corridor_json(regression: Regression, calibration: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the corridor as JSON data: per column a list of one number per frame, None where nothing was found.
+    """Return the corridor as JSON data: per column a list of one number per frame, None where the model found nothing.
 
     Args:
         regression: by the model.
-        calibration: what is said about how far its deviations can be trusted.
+        calibration: calibration of the deviations, as JSON data.
     """
     frames = regression.frames
     columns: dict[str, Any] = {
@@ -142,4 +142,5 @@ def corridor_json(regression: Regression, calibration: Mapping[str, Any]) -> dic
 
 
 def _as_list(values: Float, digits: int = DIGITS) -> list[float | None]:
+    """Return numbers rounded for JSON, None where they aren't finite; adding 0.0 turns -0.0 into 0.0."""
     return [round(value, digits) + 0.0 if np.isfinite(value) else None for value in values.tolist()]

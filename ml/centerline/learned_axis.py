@@ -25,8 +25,8 @@ def learned_axis(folder: FilePath, cloud_file: FilePath) -> Predictor:
     """Return a function (cloud, path) -> (offset, std) of the axis along the path, m, by a trained centreline model.
 
     Args:
-        folder: of the run, or the name of a shipped model.
-        cloud_file: the cloud that the axis is wanted of.
+        folder: folder of a trained run, or the name of a shipped model.
+        cloud_file: file of the cloud on which the model is used.
 
     Raises:
         MissingFileError, InputError: it is no run of a centreline model, or its training isn't finished.
@@ -37,6 +37,7 @@ def learned_axis(folder: FilePath, cloud_file: FilePath) -> Predictor:
         raise InputError("--run", str(folder), f"is a model for {name}, a centreline model is needed")
 
     def predict(cloud: RoadCloud, path: CloudPath) -> tuple[Float, Float]:
+        """Return offset and standard deviation (M,), m, of the predicted axis along a path."""
         with scratch_folder() as place:
             course, lines = place / "path.csv", place / "axis.geojson"
             points = path.points[::5] + cloud.origin[:2]
@@ -48,12 +49,12 @@ def learned_axis(folder: FilePath, cloud_file: FilePath) -> Predictor:
 
 
 def axis_beside(document: object, origin: Float, path: CloudPath) -> tuple[Float, Float]:
-    """Return offset and standard deviation (M,), m, of GeoJSON centrelines at each point of a path; NaN beside none.
+    """Return offset and standard deviation (M,), m, of GeoJSON centrelines at each point of a path; NaN where none is.
 
     Args:
         document: GeoJSON with features whose ``feature`` is ``centerline``, and ``std`` per vertex.
         origin: (3,) map coordinates of the path's local origin.
-        path: beside which.
+        path: path whose M points are looked at.
     """
     features = document.get("features", []) if isinstance(document, dict) else []
     offset, std = np.full(len(path.points), np.nan), np.full(len(path.points), np.nan)

@@ -113,12 +113,12 @@ def read_cases(
 
 
 def measured_case(road: LearningRoad, seed: int, settings: SliceSettings) -> Case:
-    """Return a real road as it is measured on: both sides cropped, anew every 50 m, the path found in what is left."""
+    """Return a real road as a case: both sides cropped, anew every 50 m, the path found in the points left."""
     return make_case(road, seed, cropping=STRETCHES, estimated=True, settings=settings)
 
 
 def corridor_figures(predictor: CenterlinePredictor, cases: Sequence[Case]) -> dict[str, dict[str, float | None]]:
-    """Return mean absolute error, coverage, ... of each target over all roads' frames; None without known truth."""
+    """Return the figures `TARGET_METRICS` of each target over all roads' frames; None without known truth."""
     error, std, interval_widths = [], [], []
     for case in cases:
         regression = predictor.regress(case.road, case.frames)

@@ -44,7 +44,7 @@ class Regression:
     """Centreline and corridor that a model regressed in M frames, with deviations; T are the `TARGETS`, centre first.
 
     Attributes:
-        frames: where.
+        frames: the M frames along a path.
         value: (M, T) float64; y in the frame (m) of the centre and the edges; the height is the elevation in the road's
             local coordinates. NaN: nothing found.
         raw_std: (M, T) the model's own standard deviations.
@@ -78,10 +78,10 @@ class CenterlinePredictor:
     """A trained centreline model with its deviations' calibration; callable as a predictor of `scores.evaluation`.
 
     Args:
-        model: trained.
-        settings: how its slices are cut.
-        use: how it is used.
-        calibration: of each target by name; deviations of those that it lacks are the model's own.
+        model: the trained model.
+        settings: options by which slices are cut.
+        use: options of prediction: mirroring, step, batch.
+        calibration: calibration by target's name; targets that it lacks keep the model's own deviations.
     """
 
     model: CenterlineModel
@@ -105,9 +105,9 @@ class CenterlinePredictor:
     def regress(self, road: LearningRoad, frames: Frames) -> Regression:
         """Return centreline and corridor in M frames with calibrated deviations; NaN where no points are near.
 
-        A frame in several sequences has the mean of what they say, weighted by the inverse variances. Its variance is
-        their mean as well, since errors of the same points don't average out. Where sequences are interleaved, lines
-        are `smooth_line`.
+        A frame in several sequences has the mean of their estimates, weighted by inverse variances. Its variance is
+        the mean of their variances, since errors of the same points don't average out. Where sequences are interleaved,
+        lines are smoothed by `smooth_line`.
         """
         mean, raw_std = self._combine_sequences(road, frames)
         calibration = [self.calibration[name] for name in TARGETS]
@@ -115,6 +115,7 @@ class CenterlinePredictor:
         return Regression(frames, mean, raw_std, raw_std * factors, raw_std[:, :, None] * widths)
 
     def _combine_sequences(self, road: LearningRoad, frames: Frames) -> tuple[Float, Float]:
+        """Return means and standard deviations (M, T) of the targets over all sequences that a frame is in."""
         shape = (len(frames), len(TARGETS))
         weight, value, spread = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         has_points = np.zeros(len(frames), dtype=bool)
@@ -141,8 +142,8 @@ class CenterlinePredictor:
     def calibrate(self, roads: Iterable[tuple[LearningRoad, Frames]]) -> tuple[CenterlinePredictor, Float]:
         """Return a copy calibrated so that its deviations fit its errors on some roads, and these errors (N, T).
 
-        Found on a few roads of another scanner, one factor per target makes its deviations right there (see
-        `calibration`); what the model says stays the same.
+        A calibration found on a few roads of another scanner corrects the deviations for that scanner (see
+        `calibration`); the predicted values stay the same.
 
         Args:
             roads: roads with a known truth, and frames along each.
@@ -189,16 +190,16 @@ class CenterlinePredictor:
 
 
 def smooth_line(frames: Frames, y: Float, std: Float, reach: int) -> Float:
-    """Return y (M,) of a line, m, smoothed by weighted local lines where neighbouring frames come from other sequences.
+    """Return a line's y (M,), m, smoothed by weighted local lines where neighbouring frames come from other sequences.
 
-    Each is that of the straight line through the places in fewer than ``reach`` frames to either side, weighted by the
-    inverse variances and the nearer the more: 5 mm off a circle of 280 m with a reach of 4 m.
+    Each y is that of the straight line fitted to the places in fewer than ``reach`` frames to either side, weighted by
+    the inverse variances and the nearer the more: 5 mm off a circle of 280 m with a reach of 4 m.
 
     Args:
         frames: in order, with equal spacing but for gaps, which aren't crossed.
         y: (M,) of the line, m; NaN: not found, and it stays so.
         std: (M,) its standard deviation, m.
-        reach: frames that belong to different sequences; 1: nothing changes.
+        reach: number of interleaved sequences; with 1 nothing changes.
     """
     place, result = frames.at(y), y.copy()
     cos, sin = np.cos(frames.direction), np.sin(frames.direction)

@@ -48,12 +48,12 @@ def road_cloud(road: LearningRoad) -> RoadCloud:
 
 
 def views_predictor(network: Predictor | None = None) -> Predictor:
-    """Return a predictor of centres with deviations and intervals, m, by all views that learn nothing, and a network's.
+    """Return a predictor of centres with deviations and intervals, m, by all rule-based views, and perhaps a network's.
 
     Where no road can be made out nothing is predicted.
 
     Args:
-        network: the predictor whose centres are one more view; None without.
+        network: predictor whose centres are one more view; None for rule-based views alone.
     """
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
@@ -74,9 +74,11 @@ def views_predictor(network: Predictor | None = None) -> Predictor:
 
 
 def _network_view(network: Predictor, road: LearningRoad, frames: Frames) -> AxisPredictor:
+    """Return a network's centres on a road as a view for the reconstruction: a function of cloud and path."""
     centres = network(road, frames)
 
     def predict(cloud: RoadCloud, path: CloudPath) -> tuple[Float, Float]:
+        """Return offset and standard deviation (M,), m, of the network's centreline along a path; NaN beyond it."""
         is_predicted = np.isfinite(centres[:, 0])
         offset, std = np.full(len(path.points), np.nan), np.full(len(path.points), np.nan)
         if is_predicted.sum() < 2:
@@ -92,9 +94,9 @@ def _network_view(network: Predictor, road: LearningRoad, frames: Frames) -> Axi
 
 
 def _in_frames(road: FoundRoad, frames: Frames) -> Float:
-    """Return y (m) at which a found axis crosses each of M frames, its deviation and intervals there, and no corridor.
+    """Return y (m) at which a found axis crosses each of M frames, with its deviation and intervals.
 
-    In the columns `CORRIDOR_COLUMNS`; what isn't known is NaN.
+    The columns are `CORRIDOR_COLUMNS`; unknown ones are NaN.
     """
     axis = road.axis
     stations = road.path.stations

@@ -112,6 +112,7 @@ def train_network(run: Run[CenterlineConfiguration], progress: Progress = silent
     run.begin()
 
     def batches_of(roads: Roads) -> Batches:
+        """Return the configuration's training batches of some roads."""
         return Batches(
             roads,
             configuration.slices,
@@ -188,6 +189,7 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
 
 
 def _read_placement(cloud: Path) -> Placement:
+    """Return the coordinate system of a cloud's file."""
     with open_cloud(cloud) as reader:
         return reader.header.place
 
@@ -232,11 +234,12 @@ def _calibration_of(data: Any, folder: Path) -> dict[str, IntervalCalibration]:
 
 
 def _empty_model(configuration: CenterlineConfiguration) -> CenterlineModel:
+    """Return the configuration's model with random weights."""
     return configuration.network.build(configuration.slices.half_width, configuration.slices.slices)
 
 
 def _first_model(configuration: CenterlineConfiguration) -> CenterlineModel:
-    """Return the model before its first step: weights seeded at random, or those of the run `begin_with`.
+    """Return the model that training begins with: random weights by the seed, or those of the run `begin_with`.
 
     Raises:
         MissingFileError, InputError: there is no such run, or its model is another.
@@ -264,6 +267,7 @@ def _validation(configuration: CenterlineConfiguration, roads: Roads) -> Any:
     batches = fixed_batches(validation_roads, configuration.slices, crop, count, configuration.seed)
 
     def validate(model: nn.Module, epoch: int) -> dict[str, float]:
+        """Return the centre's mean absolute error (m), and the shares within its 68 % and 95 % intervals."""
         error, std = _residuals(model, batches)
         is_known = np.isfinite(error[:, 0])
         ratio = np.abs(error[is_known, 0]) / std[is_known, 0]
@@ -277,9 +281,9 @@ def _validation(configuration: CenterlineConfiguration, roads: Roads) -> Any:
 
 
 def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: Roads) -> dict[str, Any]:
-    """Calibrate the model's deviations, write them to the run; return the metrics on the roads that they are of.
+    """Calibrate the model's deviations and write the calibration to the run; return the metrics on these roads.
 
-    Roads are gone along from end to end, as in use: joined lines are better than those of single sequences. They are
+    Roads are predicted from end to end, as in use: joined lines are better than those of single sequences. They are
     the validation's, or those held out, which are shown whole and once more as strips cut unevenly around them, as
     scans of road networks are.
     """
@@ -327,5 +331,6 @@ def _residuals(model: nn.Module, batches: Sequence[Batch]) -> tuple[Any, Any]:
 
 
 def _mean_absolute(values: Any) -> float | None:
+    """Return the mean absolute value of those values that are finite; None without any."""
     sizes = np.abs(values[np.isfinite(values)])
     return float(sizes.mean()) if len(sizes) else None

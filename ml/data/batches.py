@@ -30,7 +30,7 @@ APART = 20.0
 
 
 class MeasuredRoad(Part):
-    """A real cloud and its axis, or all those of a folder: whole roads, or of each what lies between two stations."""
+    """A real cloud and its axis, or all those of a folder: whole roads, or the parts between two stations."""
 
     cloud: str = Field(
         min_length=1,
@@ -46,6 +46,7 @@ class MeasuredRoad(Part):
 
     @model_validator(mode="after")
     def _check_stations(self) -> Self:
+        """Refuse an end before the begin."""
         if self.last <= self.first:
             raise ValueError(f"last must be larger than first, {self.first:g}")
         return self
@@ -107,6 +108,7 @@ class DataOptions(Part):
 
     @model_validator(mode="after")
     def _check_roads(self) -> Self:
+        """Refuse data without roads to learn from or to validate with."""
         validated = self.measured_validation or self.measured_validation_share
         if not self.data_sets and not (self.measured and validated):
             raise ValueError(
@@ -129,6 +131,7 @@ class BatchOptions(Part):
 
     @model_validator(mode="after")
     def _check_passes(self) -> Self:
+        """Refuse a number of batches that passes don't divide."""
         if self.steps % self.passes:
             raise ValueError(f"steps is {self.steps}: must be a multiple of passes, {self.passes}")
         return self
@@ -176,13 +179,13 @@ class Batches:
     """Random training batches: called with an epoch's number it yields them, determined by seed and epoch alone.
 
     Args:
-        roads: to learn from.
+        roads: roads to learn from.
         settings: how slices are cut.
-        effects: drawn for each sample.
-        options: how many.
-        seed: of everything random.
-        measured_share: of the samples from real roads, where there are both kinds.
-        workers: processes that draw samples; 0: this one. All give the same.
+        effects: augmentation, drawn for each sample.
+        options: sizes of batches and epochs.
+        seed: seed of all random choices.
+        measured_share: share of the samples from real roads, where there are both kinds.
+        workers: processes that draw samples; 0 for this one. The samples don't depend on it.
     """
 
     def __init__(
@@ -231,7 +234,10 @@ class Batches:
             yield mirror_batch(batch) if turn % 2 else batch
 
     def _batch_plan(self, epoch: int, number: int) -> tuple[int, list[int]]:
-        """Return which pass over an epoch's samples a batch belongs to, and the numbers of its samples."""
+        """Return the pass over an epoch's samples that a batch belongs to, and the numbers of its samples.
+
+        The first pass takes the samples in the order in which they are drawn, further ones in random order.
+        """
         size, steps_per_pass = self.options.size, self.options.steps // self.options.passes
         turn, place = divmod(number, steps_per_pass)
         order = stream(self.seed, "order", epoch, turn).permutation(self.drawn_per_epoch)
@@ -243,10 +249,10 @@ class StreamedBatches:
     """Training batches like those of `Batches`, whose synthetic roads are also those of a stream's scenes.
 
     Args:
-        roads: to learn from; the stream's come behind the synthetic ones.
-        batches: makes an epoch's `Batches` of the roads that it draws from.
-        stream: of the scenes.
-        truth: what is learned.
+        roads: roads to learn from; the stream's come behind the synthetic ones.
+        batches: function that makes an epoch's `Batches` of the roads that it draws from.
+        stream: stream of scenes.
+        truth: kind of truth that is learned.
     """
 
     def __init__(self, roads: Roads, batches: Callable[[Roads], Batches], stream: SceneStream, truth: Learned) -> None:
@@ -273,7 +279,7 @@ class StreamedBatches:
 
 
 def _first_occurrences(batches: Sequence[Sequence[int]]) -> list[list[int]]:
-    """Return of each batch the numbers that no batch before it has."""
+    """Return the numbers of each batch that occur in no batch before it."""
     numbers_before: set[int] = set()
     new_numbers = []
     for batch in batches:
@@ -300,6 +306,7 @@ def _as_arrays(samples: list[Sample]) -> list[dict[str, Any]]:
 
 
 def _as_tensors(sample: Mapping[str, Any]) -> Sample:
+    """Return a sample's arrays as tensors."""
     return {name: torch.as_tensor(value) for name, value in sample.items()}
 
 
@@ -309,11 +316,11 @@ def fixed_batches(
     """Return `count` validation sequences in batches of up to 32, drawn from the seed: always the same.
 
     Args:
-        roads: with a truth.
+        roads: roads with a known truth.
         settings: how slices are cut.
-        effects: what is done to the points; None: nothing.
-        count: of sequences.
-        seed: of what is drawn.
+        effects: augmentation of the points; None for none.
+        count: number of sequences.
+        seed: seed of the drawn sequences.
     """
     dataset = SliceDataset(roads, settings, count, seed, effects, "validation slices")
     samples = [dataset.draw_sample(number) for number in range(count)]
@@ -329,6 +336,7 @@ def crop_only_effects(crop: SequenceCrop) -> SequenceEffects:
 def _read_scenes(
     data_sets: Sequence[str], split: str, truth: Learned, cache: Path | None, progress: Progress
 ) -> list[LearningRoad]:
+    """Read the roads of all finished scenes of a split of some data sets."""
     folders = [folder for data_set in data_sets for folder in scene_folders(Path(data_set), split)]
     roads: list[LearningRoad] = []
     for number, folder in enumerate(folders):
@@ -348,7 +356,7 @@ def _read_measured(roads: Sequence[MeasuredRoad], truth: Learned, progress: Prog
 
 
 def _clip(road: LearningRoad, first_station: float, last_station: float, field: str) -> LearningRoad:
-    """Return a road whose true axis is clipped to the stations `first_station` to `last_station`, m; the field is for the error."""
+    """Return a road with its true axis clipped between two stations, m; ``field`` names the input in the error."""
     axis = road.known_truth.axis
     in_part = (axis.station >= first_station) & (axis.station <= last_station)
     if np.count_nonzero(in_part) < 2:
@@ -358,7 +366,10 @@ def _clip(road: LearningRoad, first_station: float, last_station: float, field: 
 
 
 def _split_road(road: LearningRoad, share: float) -> tuple[LearningRoad, list[LearningRoad]]:
-    """Return a road without a share of its length at the end, and that end, `APART` behind it; no end if that is 0."""
+    """Return a road's part to learn from, and in a list the end to validate with, a share of its length.
+
+    Both lie `APART` from each other; with a share of 0 the whole road is learned from.
+    """
     if not share:
         return road, []
     length = road.known_truth.axis.length

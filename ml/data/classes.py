@@ -36,7 +36,7 @@ class LabelMapping(Model):
         """Return the names that the mapped truth distinguishes, in order: its groups if it has any, else `names`.
 
         Args:
-            names: of the scheme's classes.
+            names: names of the scheme's classes.
 
         Raises:
             InputError: a number stands for something that is neither a class nor a group, or a group names no class.
@@ -82,7 +82,7 @@ def load_mapping(name_or_file: str) -> LabelMapping:
 
     Raises:
         MissingFileError: there is no such file.
-        InputError: it is no mapping.
+        InputError: the file holds no mapping.
     """
     path = shipped_file("mapping", MAPPINGS, name_or_file, [".json"])
     return LabelMapping.from_dict(read_json(path), str(name_or_file))
@@ -100,9 +100,9 @@ def table_between(source: Mapping[int, str], scheme: ClassScheme, where: str) ->
     become 5, and the 5 never 17.
 
     Args:
-        source: names by id.
-        scheme: what is learned.
-        where: the source, for messages.
+        source: the source's class names by id.
+        scheme: scheme of the classes that are learned.
+        where: name of the source, for messages.
 
     Raises:
         InputError: a class of the source has no place in the scheme.

@@ -45,11 +45,11 @@ class Truth:
         kind: ``road``, the middle of the whole road; ``carriageway``, the line between a carriageway's two lanes.
         axis: the centreline, in the coordinates of the cloud's points.
         left, right: outer edges of the pavement; None where they aren't known anywhere.
-        lanes: (N,) number of lanes; NaN where one begins or ends, or it isn't known.
+        lanes: (N,) number of lanes; NaN where one begins or ends, or where unknown.
         lane_width: (N,) mean width of the lanes, m, or NaN.
         lines: (N, 2) distances from the centre to the left and to the right edge line, m; NaN where they aren't known.
-        room: (N, 2) how far the scene belongs to this road alone, to the left and to the right, m; infinite for a
-            whole road, for a carriageway up to the middle of the median.
+        room: (N, 2) distances to the left and to the right in which the scene belongs to this road alone, m; infinite
+            for a whole road, for a carriageway up to the middle of the median.
         has_height: whether the axis' elevations are known.
     """
 
@@ -89,7 +89,7 @@ class Truth:
         )
 
     def at(self, frames: Frames) -> Crossings:
-        """Return the truth where M frames' y axes cross it, signed as the frames see it; heights are elevations, m."""
+        """Return the truth where the y axes of M frames cross it, signed as in the frames; heights are elevations, m."""
         center, station = self.axis.crossing(frames.position, frames.direction)
         turn = self.axis.direction(station) - frames.direction
         against = np.cos(turn) < 0.0
@@ -115,7 +115,7 @@ class Truth:
 
     @property
     def without_shoulders(self) -> bool:
-        """Return whether it is a carriageway whose pavement nowhere reaches `NO_SHOULDER` beyond its edge lines."""
+        """Return whether this is a carriageway whose pavement nowhere reaches `NO_SHOULDER` beyond its edge lines."""
         if self.kind != "carriageway" or self.left is None or self.right is None:
             return False
         station = self.axis.station
@@ -165,8 +165,8 @@ def truths(parameters: RoadParameters, kind: Learned, origin: ArrayLike = (0.0, 
 
     Args:
         parameters: the road.
-        kind: which centreline; ``either``: the road's, then that of each carriageway without shoulders, which by itself
-            is like a road of two lanes.
+        kind: kind of centreline; ``either``: the road's, then that of each carriageway without shoulders, which by
+            itself is like a road of two lanes.
         origin: (3,) map coordinates that were subtracted from the cloud's points.
 
     Raises:
@@ -188,6 +188,7 @@ def truths(parameters: RoadParameters, kind: Learned, origin: ArrayLike = (0.0, 
 
 
 def _whole_road(geometry: RoadGeometry) -> Truth:
+    """Return the truth of a whole road: its axis, outer edges, and the lanes of both directions together."""
     axis = MeasuredAxis.of_road(geometry, STEP)
     station = _vertices(geometry)
     count, total = np.zeros(len(station)), np.zeros(len(station))
@@ -211,7 +212,7 @@ def _whole_road(geometry: RoadGeometry) -> Truth:
 
 
 def _carriageway(geometry: RoadGeometry, section: CarriagewaySection) -> Truth | None:
-    """Return the truth of one carriageway where it has exactly two full lanes; None if it nowhere has."""
+    """Return the truth of one carriageway where it has exactly two full lanes; None if it has them nowhere."""
     station = _vertices(geometry)
     number, width = _lanes(section, station)
     boundaries = section.lane_boundaries(station)
@@ -243,6 +244,7 @@ def _carriageway(geometry: RoadGeometry, section: CarriagewaySection) -> Truth |
 
 
 def _vertices(geometry: RoadGeometry) -> Float:
+    """Return the stations (N,), m, at most `STEP` apart, at which lines are made from parameters."""
     return np.linspace(0.0, geometry.length, max(2, int(np.ceil(geometry.length / STEP)) + 1))
 
 
@@ -275,6 +277,7 @@ def _points(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
 
 
 def _offset_line(geometry: RoadGeometry, station: Float, offset: Float) -> MeasuredAxis | None:
+    """Return the line at offsets (N,), m, from the axis, with gaps where they are NaN; None without two vertices."""
     known_rows = np.flatnonzero(~np.isnan(offset))
     if len(known_rows) < 2:
         return None

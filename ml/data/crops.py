@@ -30,7 +30,7 @@ Item = dict[str, Tensor]
 NO_EFFECTS = CropEffects(
     rotation=False, smallest_scale=1.0, largest_scale=1.0, jitter=0.0, jitter_limit=0.0, color_drop=0.0
 )
-"""For validation and prediction."""
+"""Options that change nothing, for validation and prediction."""
 MISSING_SIGMA = 0.02
 """Standard deviation of the noise that stands for a missing feature: nothing, but never exactly the same."""
 COORDINATE_SPAN = 10.0
@@ -69,7 +69,7 @@ class Seeds:
         tiles: of all scenes.
         classes: number of classes.
         balanced: draw the class first, then the tile by its number of points of that class, then one of these.
-        groups: numbers of tiles, one after another, of the groups that a balanced draw doesn't leave; one if empty.
+        groups: number of tiles of each consecutive group within which a balanced draw stays; one group if empty.
     """
 
     def __init__(self, tiles: Sequence[CloudTile], classes: int, balanced: bool, groups: Sequence[int] = ()) -> None:
@@ -103,13 +103,13 @@ class CropDataset(Dataset[Item]):
     The same seed, epoch and place give the same item, in whichever worker and order.
 
     Args:
-        tiles: thinned to the training voxel.
-        scalings: of intensities by scene.
-        settings: how items are made.
-        plan: the crops.
-        seeds: where they are cut out.
-        effects: what happens to them.
-        seed, epoch: of all that is random.
+        tiles: tiles, thinned to the training voxel.
+        scalings: scaling of intensities by scene.
+        settings: size, voxel and features of the items.
+        plan: planned crops of the epoch.
+        seeds: sampler of the crops' centres.
+        effects: augmentation of the crops.
+        seed, epoch: key of the random streams.
     """
 
     tiles: Sequence[CloudTile]
@@ -129,7 +129,7 @@ class CropDataset(Dataset[Item]):
         return make_item(crop, self.settings, random)
 
     def crop(self, place: int) -> tuple[Crop, np.random.Generator]:
-        """Return a planned crop with its effects, and the random stream that goes on after them."""
+        """Return a planned crop after its effects, and the random stream to go on with."""
         draw = self.plan[place]
         random = stream(self.seed, "crop", self.epoch, draw.tile, draw.number)
         return _draw_crop(self, draw.tile, random), random
@@ -183,7 +183,7 @@ def centre_coordinates(coord: AnyArray) -> Float32:
 def make_item(crop: Crop, settings: CropSettings, random: np.random.Generator) -> Item:
     """Return a crop as a dictionary of tensors (see the module), centred; noise stands for missing features.
 
-    It is centred on the mean of x and y and the median of z. What is missing is small noise from ``random``.
+    The crop is centred on the mean of x and y and the median of z. Missing colours and intensities are small noise.
 
     Raises:
         InputError: the crop has no points.
@@ -225,4 +225,5 @@ def collate(items: Sequence[Item]) -> Item:
 
 
 def _noise(random: np.random.Generator, shape: tuple[int, int]) -> Float32:
+    """Return small normal noise that stands for a missing feature."""
     return random.normal(0.0, MISSING_SIGMA, shape).astype(np.float32)

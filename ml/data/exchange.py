@@ -25,7 +25,7 @@ class ExchangedCrops:
 
     Attributes:
         synthetic, target: the crops of an epoch, as many of each.
-        seed, epoch: of the choice of classes.
+        seed, epoch: key of the random choice of classes.
     """
 
     synthetic: CropDataset
@@ -45,7 +45,7 @@ class ExchangedCrops:
 
 
 def exchange_classes(one: Crop, other_crop: Crop, random: np.random.Generator) -> tuple[Crop, Crop]:
-    """Return two crops, centred, each with the other's points of a random half of the other's classes laid into it."""
+    """Return two crops, centred, each with the points of a random half of the other's classes added."""
     centred_pair = [replace(crop, coord=centre_coordinates(crop.coord)) for crop in (one, other_crop)]
     class_masks = [_random_classes(crop, random) for crop in centred_pair]
     first_crop, second_crop = centred_pair
@@ -62,7 +62,7 @@ def _random_classes(crop: Crop, random: np.random.Generator) -> Bool:
 
 
 def _append_points(crop: Crop, other_crop: Crop, keep: Bool) -> Crop:
-    """Return a crop with some of another's points behind its own; what either lacks is missing in all."""
+    """Return a crop with some of another's points appended; attributes that either lacks are None."""
     parts: dict[str, Any] = {}
     for name in crop.per_point:
         values, other_values = getattr(crop, name), getattr(other_crop, name)

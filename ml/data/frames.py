@@ -28,11 +28,11 @@ SPACING = 1.0
 _BIN = 4.0
 """Length along a path over which the points' extent across it is taken, m."""
 _STRAY = 0.02
-"""Share of the points on either side that don't count for the extent."""
+"""Share of the outermost points on either side that don't count for the extent, as they may be stray."""
 _WHOLE = 0.75
-"""Share of the usual extent that a place must have to count."""
+"""Share of the median extent that a place must have to count."""
 _WAVES = 12
-"""Cosines that make up a random deviation."""
+"""Number of cosines that make up a random deviation."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def frames_along(path: MeasuredAxis, spacing: float = SPACING, reach: float = 5.
     Args:
         path: the path.
         spacing: between two frames, m.
-        reach: a frame has the direction of the path from this far before to this far behind it, m.
+        reach: distance before and behind a frame between which the path's chord gives its direction, m.
     """
     station = path.stations(spacing)
     return Frames(path.position(station), path.direction(station, reach), station)
@@ -84,8 +84,8 @@ def displace_frames(
     """Return frames moved sideways and turned by smooth random amounts.
 
     Args:
-        frames: where they would be without.
-        rng: of the deviation.
+        frames: frames without displacement.
+        rng: random stream of the deviation.
         window: the deviation is uniform in -window / 2 to window / 2, m.
         direction_deg: standard deviation of the error of direction beside what the deviation's own slope makes, deg.
         length: correlation length of the deviation, m; that of the error of direction is a third of it.
@@ -150,6 +150,7 @@ def stretches(frames: Frames, spacing: float = SPACING) -> list[Index]:
 
 
 def _frame_spacing(frames: Frames, largest: float) -> float:
+    """Return the median distance of neighbouring frames, m, at most ``largest``."""
     return min(float(np.median(np.abs(np.diff(frames.station)))), largest) if len(frames) > 1 else largest
 
 
@@ -163,7 +164,7 @@ def read_path(
         origin: (3,) map coordinates that were subtracted from the cloud's points.
         tolerance: points are dropped until one lies at least this far from the next, m: a platform that stands still
             has no direction.
-        place: the cloud's coordinate system, see `read_axis`.
+        place: coordinate system of the cloud, see `read_axis`.
 
     Raises:
         MissingFileError, InputError: see `read_axis`.
@@ -183,7 +184,7 @@ def estimated_path(xyz: Float, cell: float = 4.0, window: float = 60.0, half_wid
     """Return the line along the middle of a strip of points, found from the points alone, however the strip bends.
 
     The two ends of the strip are the cells of a grid that lie farthest apart along it. The shortest way between them is
-    smoothed, then three times over drawn to the middle of the points' extent across it and smoothed.
+    smoothed, then three times moved to the middle of the points' extent across it and smoothed.
 
     Args:
         xyz: (N, 2 or 3) points of the road, or of a strip around it, m.
@@ -245,6 +246,7 @@ def _bridge_cells(cells: Float, pairs: Index) -> Index:
 
 
 def _graph(count: int, pairs: Index, weights: Float) -> Any:
+    """Return the sparse graph of cells whose linked pairs (P, 2) have weights (P,)."""
     return coo_array((weights, (pairs[:, 0], pairs[:, 1])), shape=(count, count)).tocsr()
 
 
@@ -274,7 +276,7 @@ def _centre_path(path: MeasuredAxis, plan: Float, window: float, half_width: flo
 
 
 def _on_path(path: MeasuredAxis, station: Float) -> Frames:
-    """Return frames at stations of a path without gaps, which goes on straight beyond its ends."""
+    """Return frames at stations (M,), m, of a path without gaps, extended straight beyond its ends."""
     clipped_station = np.clip(station, 0.0, path.length)
     direction = path.direction(clipped_station, reach=8.0)
     overshoot = (station - clipped_station)[:, None] * np.column_stack([np.cos(direction), np.sin(direction)])

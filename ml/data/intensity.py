@@ -11,17 +11,17 @@ import numpy as np
 from synthroads_addon.base.arrays import Float
 
 DARKEST = 0.01
-"""Intensities below this share of the median count as it."""
+"""Share of the median intensity to which smaller intensities are raised."""
 _BIN = 0.5
 """Width across the road over which a median is taken, m."""
 _AROUND = 3
-"""Bins to either side whose medians' median is what is around: wider than any line, narrower than a lane's."""
+"""Bins to either side over whose medians the local level is a median: wider than any line, narrower than a lane."""
 QUIETEST = 0.15
-"""Noise by the distance of the logarithms' 10th and 90th percentiles: less is taken for this."""
+"""Least noise, as a share of the distance of the logarithms' 10th and 90th percentiles."""
 _SPREAD_20_80 = 1.683
 """Distance of a Gaussian's 20th and 80th percentiles, in deviations."""
 _SMALLEST = 1e-3
-"""Logarithms that differ by less are the same."""
+"""Least spread of logarithms by which they are divided."""
 
 
 def logarithms(intensity: Float) -> Float:
@@ -38,6 +38,7 @@ def level(logs: Float) -> Float:
 
 
 def _decile_spread(logs: Float) -> float:
+    """Return the distance of the 10th and the 90th percentile of logarithms."""
     lower_decile, upper_decile = np.percentile(logs, (10.0, 90.0))
     return float(upper_decile - lower_decile)
 
@@ -49,7 +50,7 @@ def contrast(logs: Float, y: Float) -> Float:
     `QUIETEST` where there is less.
 
     Args:
-        logs: of the intensities of a sequence's points.
+        logs: (K,) logarithms of the intensities of a sequence's points.
         y: (K,) their places across the road, m.
     """
     cell = np.floor(y / _BIN).astype(np.intp)

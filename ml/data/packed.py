@@ -34,7 +34,7 @@ CUBE = 1024
 """Steps across a cube."""
 _NO_CLASS = 31
 _TIME = (1980, 1, 1, 0, 0, 0)
-"""No wall clock in files."""
+"""Fixed time of the archive's members, so that equal content gives equal files."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class Packed:
     """One tile of training data as it is stored: compressed points and notes.
 
     Attributes:
-        notes: scene, origin, number of points, what is missing.
-        content: compressed.
+        notes: scene, origin, number of points, and whether there are colours and intensities.
+        content: compressed cubes and points.
     """
 
     notes: dict[str, Any]
@@ -72,6 +72,7 @@ def encode_words(tile: CloudTile) -> tuple[NDArray[np.uint64], NDArray[np.int32]
 
 
 def _fields(tile: CloudTile, cube_steps: Int) -> Iterator[tuple[AnyArray, int]]:
+    """Yield (values (N,), lowest bit) of each part of the points' 64-bit words, see the module."""
     for axis in range(3):
         yield cube_steps[:, axis], 10 * axis
     if tile.color is not None:
@@ -113,6 +114,7 @@ def unpack_tile(packed_tile: Packed) -> CloudTile:
     word = np.ascontiguousarray(planes.T).view("<u8").reshape(-1)
 
     def bits(shift: int, count: int) -> Int:
+        """Return the numbers (N,) in some bits of all words, from the lowest bit ``shift`` on."""
         return ((word >> np.uint64(shift)) & np.uint64((1 << count) - 1)).astype(np.int64)
 
     steps = np.stack([bits(10 * axis, 10) for axis in range(3)], axis=1) + np.repeat(places * CUBE, counts, axis=0)
@@ -156,11 +158,11 @@ class PackReader:
     Attributes:
         scheme: classes that the tiles' ``segment`` counts.
         voxel: edge of the cells of which one point each was kept, m.
-        notes: of each tile.
+        notes: notes of each tile.
 
     Raises:
         MissingFileError: there is no such file.
-        InputError: it isn't such a file, or damaged.
+        InputError: the file holds no packed tiles, or is damaged.
     """
 
     def __init__(self, path: Path) -> None:

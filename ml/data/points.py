@@ -36,7 +36,7 @@ class Points:
         class_names: name of each class by its id.
         has_color: whether the points have colours; a file whose colours are all 0 has none.
         epsg: code of the map coordinate system, None if the file doesn't say.
-        place: the coordinate system, and that of the file that they are from.
+        place: coordinate system of the points, and that of their file.
     """
 
     origin: Float
@@ -75,7 +75,7 @@ def read_points(path: Path, classes: Collection[str] | None = None) -> Points:
 
     Raises:
         MissingFileError: there is no such file.
-        InputError: it is no cloud, is damaged, or holds no point of these classes.
+        InputError: the file is no cloud, is damaged, or holds no point of these classes.
     """
     with open_cloud(path) as cloud:
         header = cloud.header
@@ -94,7 +94,7 @@ def read_ground(path: Path) -> Points:
 
     Raises:
         MissingFileError: there is no such file.
-        InputError: it is no cloud, is damaged, or is classified but has no ground.
+        InputError: the file is no cloud, is damaged, or is classified but has no ground.
     """
     points = read_points(path)
     ground = points.of_class(GROUND_CLASSES)
@@ -109,9 +109,9 @@ def points_of(header: CloudHeader, blocks: Sequence[PointBlock], colored: bool |
     """Return blocks of a cloud concatenated as `Points`: shifted to a local origin, intensities and colours as shares.
 
     Args:
-        header: of the cloud.
-        blocks: at least one.
-        colored: whether the cloud has any colour that isn't black; looked up in the blocks if not given.
+        header: header of the cloud's file.
+        blocks: blocks of the cloud, at least one.
+        colored: whether the cloud has any colour that isn't black; None to look it up in the blocks.
     """
     xyz, intensity, rgb, class_id = (
         np.concatenate([getattr(block, name) for block in blocks]) for name in ("xyz", "intensity", "rgb", "class_id")

@@ -28,7 +28,7 @@ from .frames import Frames
 from .points import GROUND_CLASSES, Points, read_ground, read_points
 
 REACH = 45.0
-"""Points farther from the line that they are sorted along aren't kept, m."""
+"""Distance from the reference line beyond which points are dropped, m."""
 CLOUD, PARAMETERS = "cloud.laz", "parameters.json"
 STRIP = (6.0, 20.0)
 """Least and largest half width of strips that scans of road networks are cut into, m."""
@@ -54,10 +54,10 @@ class LearningRoad(Points):
     Arrays may be mapped from files. Coordinates are float32 here (0.25 mm at 4 km), colours 8 bits of sRGB.
 
     Attributes:
-        name: of the road.
+        name: name of the road.
         station: (N,) float32 along ``reference``, m, ascending.
-        reference: the line that the points are sorted along.
-        truth: the centreline, None if it isn't known.
+        reference: line along which the points are sorted.
+        truth: centreline and corridor; None if unknown.
     """
 
     name: str
@@ -71,7 +71,7 @@ class LearningRoad(Points):
         """Return the road's truth, never None.
 
         Raises:
-            InputError: it isn't known.
+            InputError: the road has no known truth.
         """
         if self.truth is None:
             raise InputError("road", self.name, "must have a known centreline to be measured on")
@@ -101,7 +101,7 @@ class LearningRoad(Points):
 
     @cached_property
     def belonging(self) -> Bool:
-        """Mask (N,) of the points within the truth's `room`: of a carriageway up to the median's middle; cached."""
+        """Return the mask (N,) of the points within the truth's `room`, of a carriageway up to the median; cached."""
         if self.truth is None or not np.isfinite(self.truth.room).any():
             return np.ones(len(self), dtype=bool)
         station, offset = self.truth.axis.project(self.xyz)
@@ -110,7 +110,7 @@ class LearningRoad(Points):
         return np.asarray((offset <= room[:, 0]) & (-offset <= room[:, 1]))
 
     def slices(self, frames: Frames, half_width: float, thickness: float = 1.0) -> Slices:
-        """Return which points lie in the slice across the road at each of M frames, and where in it.
+        """Return the points in the slice across the road at each of M frames, with their places in it.
 
         A point is in a slice where it lies within half the thickness before or behind the frame's origin and within
         half_width (both m) beside it.
@@ -160,7 +160,7 @@ def scene_folders(data_set: Path, split: str | None) -> list[Path]:
 
     Raises:
         MissingFileError: there is no manifest.
-        InputError: no scene of the split is done.
+        InputError: no scene of the split is finished.
     """
     finished_scenes = [scene for scene in read_manifest(data_set).scenes if scene.status == "done"]
     folders = [data_set / "scenes" / scene.name for scene in finished_scenes if split in (None, scene.split)]
@@ -174,12 +174,12 @@ def read_scene(folder: Path, kind: Learned, cache: Path | None = None, keep: boo
     """Read a data set's scene as roads: its ground points, with the truth of each road or carriageway of `kind`.
 
     Args:
-        folder: with ``cloud.laz`` and ``parameters.json``.
-        kind: of the truth. A road with carriageways of two lanes gives a `LearningRoad` for each of them with the kind
+        folder: folder of the scene, with ``cloud.laz`` and ``parameters.json``.
+        kind: kind of truth. A road with carriageways of two lanes gives a `LearningRoad` for each of them with the kind
             ``carriageway``, perhaps none; with ``either`` the whole road, and each of them that has no shoulders. Names
             of several end with their number.
-        cache: folder in which the sorted points are kept, to be mapped into memory the next time; None: nowhere.
-        keep: whether they are written there; else what is there is read, and no more.
+        cache: folder in which sorted points are kept, to be mapped into memory the next time; None for no cache.
+        keep: whether points are written to the cache; if not, it is only read.
 
     Raises:
         MissingFileError, InputError: a file is missing or damaged.
@@ -224,7 +224,7 @@ def clouds_with_axes(folder: Path) -> list[Path]:
     """Return a folder's clouds that have an axis beside them, by name; other files in it don't matter.
 
     Raises:
-        MissingFileError: there is none.
+        MissingFileError: the folder holds no such cloud.
     """
     clouds = sorted(path for path in folder.iterdir() if path.suffix.lower() in ENDINGS and path.is_file())
     clouds_with_axis = [
@@ -242,7 +242,7 @@ def read_measured(cloud: Path, axis: Path, kind: Learned, gap: float | None = No
     Args:
         cloud: the cloud.
         axis: CSV with columns x, y, z (``s`` and others aren't used) or GeoJSON.
-        kind: what the axis is the middle of; ``either`` is a whole road's.
+        kind: road or carriageway whose middle the axis is; ``either`` counts as a whole road.
         gap: see `MeasuredAxis.read`.
 
     Raises:
@@ -263,10 +263,10 @@ def crop_road(road: LearningRoad, share: float, seed: int, length: float = 1.0) 
     left, but may lie anywhere from (1 - share) / (2 - share) of its width on, where both sides reached as far.
 
     Args:
-        road: its truth is where the sides are measured from; it says nothing else.
+        road: road with a known truth, from whose axis the sides are measured.
         share: largest part of R that is cut off, below 1.
-        seed: the same cuts for the same seed.
-        length: metres of the station that share their cuts; cuts of single slices average out over many.
+        seed: seed of the cuts.
+        length: length along the axis that shares its cuts, m; cuts of single slices average out over many.
 
     Raises:
         InputError: the road has no truth, or the share is out of its limits.
@@ -300,12 +300,12 @@ def cut_strip(road: LearningRoad, seed: int) -> LearningRoad:
 def cut_beside_median(road: LearningRoad, error: float, rng: np.random.Generator) -> LearningRoad:
     """Return the road with its truth's `room` shifted by a random distance up to `error` (m); points stay.
 
-    So where the other carriageway is cut off later, beside the median's middle, doesn't tell where this one lies.
+    Thus the place where the other carriageway is cut off doesn't reveal the place of this one.
 
     Args:
-        road: with a truth; a road that is no carriageway stays as it is.
-        error: how far from the middle of the median it may be at most, m.
-        rng: draws it, uniformly.
+        road: road with a truth; only a carriageway's room is finite and changes.
+        error: largest distance of the cut from the middle of the median, m.
+        rng: random stream of the uniform shift.
     """
     shift = rng.uniform(-error, error)
     return road if road.truth is None else replace(road, truth=replace(road.truth, room=road.truth.room + shift))

@@ -45,14 +45,14 @@ from ..configuration import Part
 from ..processes import process_number, wait_for_all
 
 SCENES = "scenes"
-"""Folder of the scenes in that of a run, where no other is named."""
+"""Name of the scenes' folder within a run's, unless the options name another one."""
 LOG = "producer.log"
 PRODUCER: Sequence[str] = module_command("jobs.dataset.scene_producer")
-"""Command that makes scenes, a program of its own: learning doesn't import what makes them."""
+"""Command that makes scenes, run as a program of its own, so that learning doesn't import the generator."""
 _TICK = 0.05
 """Seconds between two looks for a scene."""
 _END = 30.0
-"""Seconds that the producers have to end."""
+"""Seconds after which producers that don't end are killed."""
 
 
 class StreamOptions(Part):
@@ -73,6 +73,7 @@ class StreamOptions(Part):
 
     @model_validator(mode="after")
     def _check_keep(self) -> Self:
+        """Refuse a folder too small for the scenes of an epoch and the next one."""
         if self.keep < 2 * self.scenes_per_epoch:
             raise ValueError(
                 f"keep is {self.keep}: must be at least twice scenes_per_epoch, {2 * self.scenes_per_epoch}: for this "
@@ -89,15 +90,15 @@ class StreamOptions(Part):
 class SceneStream:
     """The scenes of a training, as a context in which producers make them.
 
-    Of several processes that train together the first one has them made; all wait and read.
+    Of several processes that train together the first one runs the producers; all wait and read.
 
     Args:
-        options: of the stream.
-        seed: of the training, which the scenes depend on too.
-        run_folder: of the run.
-        epochs: how many the training has; no scenes are made for more.
-        layouts: of the scenes, in the place of the recipe's.
-        progress: told while the training waits.
+        options: options of the stream.
+        seed: seed of the training, on which the scenes depend too.
+        run_folder: folder of the run.
+        epochs: number of the training's epochs; no scenes are made for more.
+        layouts: layouts of the scenes, instead of the recipe's.
+        progress: called while the training waits.
 
     Raises:
         InputError: there is no such recipe, or something in it is wrong.
@@ -152,7 +153,7 @@ class SceneStream:
     def begin_epoch(self, epoch: int) -> dict[int, Path]:
         """Return the folders of the scenes that an epoch draws from by number, when all are there.
 
-        What no later epoch draws from is removed, and those of the next epoch are begun.
+        Scenes that no later epoch draws from are removed, and those of the next epoch are requested.
 
         Raises:
             InputError: a scene can't be made.
@@ -176,7 +177,7 @@ class SceneStream:
         return {number: scene_folder(self.folder, number) for number in window}
 
     def remove(self) -> None:
-        """Remove the folder, when the training has ended and the producers too; what is not the stream's stays."""
+        """Remove the stream's files, and the folder if it is empty then, after training and producers have ended."""
         if process_number():
             return
         for number in scene_numbers(self.folder):
@@ -206,7 +207,7 @@ class SceneStream:
         write_atomically(plan, text)
 
     def _begin(self) -> None:
-        """Start the producers, in a session of their own: Ctrl-C is the training's, which then ends them."""
+        """Start the producers in a session of their own: Ctrl-C reaches the training alone, which then ends them."""
         with path_inside(self.folder, LOG, self.folder, follow=True).open("wb") as log:
             self._process = subprocess.Popen(
                 [*PRODUCER, str(self.folder), str(self.options.producers)],
@@ -218,7 +219,7 @@ class SceneStream:
             )
 
     def _check_producers(self, missing_numbers: Sequence[int]) -> None:
-        """Raise `InputError` if a scene failed, or nobody is there any more to make those that are missing."""
+        """Raise `InputError` if a scene failed, or if the producers ended before the missing scenes were made."""
         code = None if self._process is None else self._process.poll()
         if (failure := read_failure(self.folder)) is not None:
             scene_name = f"scene {failure.number}" + (f", {failure.name}" if failure.name else "")
@@ -236,10 +237,10 @@ class SceneStream:
 
 
 class EpochScenes:
-    """Reader of the scenes of an epoch, which keeps what it has read as long as later ones draw from it.
+    """Reader of an epoch's scenes with a cache of those from which the epoch draws.
 
     Args:
-        stream: of the scenes.
+        stream: stream of scenes.
         read: reads a scene that was made, of a number and a folder.
     """
 
@@ -248,7 +249,7 @@ class EpochScenes:
         self._kept: dict[int, list[Any]] = {}
 
     def __call__(self, epoch: int) -> list[Any]:
-        """Return all that is read of the scenes that an epoch draws from, in their order."""
+        """Return the items read from all scenes that an epoch draws from, in their order."""
         folders = self._stream.begin_epoch(epoch)
         for number, folder in folders.items():
             if number not in self._kept:

@@ -78,12 +78,12 @@ class SliceDataset(Dataset[Sample]):
     The n-th sample of an epoch depends on the seed, the epoch and n alone.
 
     Args:
-        roads: with a known truth.
+        roads: roads with a known truth.
         settings: how slices are cut.
         samples: sequences per epoch.
-        seed: of everything random.
-        effects: None: none. The path still strays.
-        purpose: of the samples: those of another purpose are others.
+        seed: seed of all random choices.
+        effects: augmentation; None for none, though the path still strays.
+        purpose: name of the random stream, so that samples for other purposes differ.
 
     Raises:
         InputError: no road is long enough for a sequence.
@@ -156,14 +156,14 @@ class IterableSlices(IterableDataset[Sample]):
 class FrameSlices(Dataset[Sample]):
     """Map-style data set of the sequences that cover all frames along one road, in order, without effects.
 
-    Which points are left out where a slice has too many depends on the place alone, so that cutting a road into parts
+    The points left out where a slice has too many depend on the place alone, so that cutting a road into parts
     changes nothing.
 
     Args:
-        road: with or without a truth.
+        road: road with or without a truth.
         frames: M frames; ``number`` of a sample says which.
         settings: how slices are cut.
-        step: slices from one sequence's start to the next one's; so many as a sequence has if not given.
+        step: slices from one sequence's start to the next one's; None for a sequence's length.
     """
 
     road: LearningRoad
@@ -223,7 +223,7 @@ def cut_stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> 
 def make_sample(
     stretch: Stretch, settings: SliceSettings, rng: np.random.Generator, road: int, number: Index
 ) -> Sample:
-    """Return a sequence as a dictionary of tensors (see the module); thins `stretch` to `points_per_slice`, in place."""
+    """Return a sequence as a dictionary of tensors (see the module); it is thinned to `points_per_slice` in place."""
     thin_slices(stretch, settings.points_per_slice, rng)
     ends = np.searchsorted(stretch.number, np.arange(len(stretch.center)), side="right")
     height = _medians(stretch.coord[:, 2], ends)
@@ -269,7 +269,7 @@ def collate(samples: Sequence[Mapping[str, Tensor]]) -> Batch:
 
 
 def _starts(road: LearningRoad, number: int, settings: SliceSettings) -> list[tuple[int, float, float]]:
-    """Return (road's number, first, last station, m) per part of the true axis: where a sequence can begin."""
+    """Return (road's number, first, last station, m) at which a sequence can begin, for each part of the true axis."""
     if road.truth is None:
         return []
     length = settings.spacing * (settings.slices - 1)

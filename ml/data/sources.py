@@ -62,13 +62,13 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None, *, labe
     """Yield the tiles of a source of labelled points, thinned to one point per voxel, ordered by name.
 
     Args:
-        source: where they are.
+        source: source of the tiles.
         scheme: classes that are learned.
         voxel: edge of the cells of which one point each is kept, m; None for all points.
-        labels: whether labels are read; else all are `IGNORED`, and clouds need none.
+        labels: whether labels are read; if not, all are `IGNORED`, and clouds need none.
 
     Raises:
-        MissingFileError: there is nothing.
+        MissingFileError: there is no such file or folder.
         InputError: a file is damaged or has no labels, or its classes don't fit the scheme.
     """
     path = Path(source.path)
@@ -101,6 +101,7 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None, *, labe
 
 
 def _is_pack(path: Path) -> bool:
+    """Return whether an NPZ file holds packed tiles."""
     try:
         with zipfile.ZipFile(path) as archive:
             return "notes.json" in archive.namelist()
@@ -109,6 +110,7 @@ def _is_pack(path: Path) -> bool:
 
 
 def _packed_tiles(path: Path, scheme: ClassScheme, voxel: float | None) -> Iterator[CloudTile]:
+    """Yield the tiles of a file of packed tiles with the scheme's class indices."""
     pack = PackReader(path)
     if voxel is not None and pack.voxel > voxel * (1.0 + 1e-9):
         raise InputError("voxel", voxel, f"must be at least {pack.voxel:g} m, as the points of {path} were thinned")
@@ -124,6 +126,7 @@ def _class_indices(numbers: AnyArray, is_known: Bool, table: NDArray[np.int16]) 
 
 
 def _folder_tiles(path: Path, scheme: ClassScheme, source: Source, *, labels: bool) -> Iterator[CloudTile]:
+    """Yield the tiles of a folder: in Pointcept's layout, or of the clouds in it and below it."""
     root = pointcept_root(path)
     if root is not None:
         yield from pointcept_tiles(root, scheme, source.split)
@@ -143,7 +146,7 @@ def clouds_below(folder: Path) -> list[Path]:
 
 
 def pointcept_root(path: Path) -> Path | None:
-    """Return the folder with ``classes.json``, this one or the data set's only one; None if there is none."""
+    """Return the folder with ``classes.json``: the given one or the only one of a data set; None if there is none."""
     if (path / "classes.json").is_file():
         return path
     roots = sorted(file.parent for file in path.glob("pointcept/*/classes.json"))
@@ -184,6 +187,7 @@ def pointcept_folders(root: Path, split: str | None) -> list[Path]:
 
 
 def _pointcept_tile(folder: Path, table: NDArray[np.int16]) -> CloudTile:
+    """Return the tile of a folder of arrays, its classes by a table of the scheme's indices."""
     coord, segment = _array(folder, "coord", (3,), "f4"), _array(folder, "segment", (), "i8")
     color = _array(folder, "color", (3,), "u1") if (folder / "color.npy").exists() else None
     strength = _array(folder, "strength", (), "f4") if (folder / "strength.npy").exists() else None
@@ -251,7 +255,7 @@ def cloud_tiles(
 
 
 def unlabelled_blocks(cloud: CloudReader) -> Iterator[PointBlock]:
-    """Yield a cloud's blocks without labels, whatever they are."""
+    """Yield a cloud's blocks with all labels replaced by `IGNORED`."""
     for block in cloud.usable_blocks():
         yield _with_class_indices(block, np.full(len(block), IGNORED, dtype=np.int16))
 
@@ -260,7 +264,7 @@ def yardstick_tiles(folder: Path, scheme: ClassScheme, source: Source) -> Iterat
     """Yield the labelled points of a public data set in a folder, file by file, as square tiles, in bounded memory.
 
     Args:
-        folder: of the data set.
+        folder: folder of the data set.
         scheme: classes that are learned.
         source: yardstick, split, and edge of the tiles; a sweep is one tile.
 
@@ -289,9 +293,9 @@ def tile_of(points: PointBlock, scene: str, origin: Float, scale: float) -> Clou
     """Return a block as a tile: local float32 coordinates, 8-bit colours, intensities as shares of 16 bits.
 
     Args:
-        points: N of them; ``class_id`` is the class's index in the scheme, 255: ignored.
+        points: N points; ``class_id`` is the class's index in the scheme, 255: ignored.
         scene: name of the scene.
-        origin: (3,) map coordinates that the tile's count from, m.
+        origin: (3,) map coordinates of the tile's local origin, m.
         scale: 16-bit steps per unit of intensity.
     """
     strength = (levels(points.intensity, scale) / FULL).astype(np.float32)
@@ -326,6 +330,7 @@ def labelled_blocks(cloud: CloudReader, scheme: ClassScheme, source: Source) -> 
 
 
 def _with_class_indices(block: PointBlock, places: NDArray[np.int16]) -> PointBlock:
+    """Return a block with class indices (N,) as its class ids, 255 where they are `IGNORED`."""
     return replace(block, class_id=np.where(places == IGNORED, UNLABELLED, places).astype(np.uint8))
 
 

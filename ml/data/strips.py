@@ -20,7 +20,7 @@ from .points import GROUND_CLASSES, UNSORTED_CLASSES, points_of
 from .roads import REACH, LearningRoad
 
 LENGTH = 500.0
-"""Of a strip along the path, m."""
+"""Length of a strip along the path, m."""
 MARGIN = 40.0
 """How far a strip's points and frames reach beyond its ends, m: more than a sequence of slices is long."""
 _CELL = 1.0
@@ -32,7 +32,7 @@ class GroundReading:
     """Ground classes, colours and occupied cells of a cloud, from a first pass through it.
 
     Attributes:
-        header: of the cloud.
+        header: header of the cloud's file.
         classes: ids of the classes that its ground has.
         colored: whether any of its points has a colour that isn't black.
         cells: (C, 2) places in plan of some ground points, one in each square metre, map coordinates.
@@ -87,20 +87,20 @@ def path_through(ground: GroundReading) -> MeasuredAxis:
 def strips(
     cloud: Path, ground: GroundReading, path: MeasuredAxis, frames: Frames, progress: Progress = silent
 ) -> Iterator[tuple[LearningRoad, Frames, Bool]]:
-    """Yield a long road in overlapping strips along its path: ground points, local frames, mask of its own frames.
+    """Yield a long road in overlapping strips along its path: ground points, local frames, mask of the strip's frames.
 
     The points lie in a temporary folder meanwhile, and in memory only those of one strip.
 
     Args:
         cloud: the cloud.
-        ground: what `find_ground` found in it.
-        path: along the road, map coordinates.
-        frames: along the path, map coordinates.
-        progress: told about the sorting.
+        ground: ground of the cloud, by `find_ground`.
+        path: path along the road, map coordinates.
+        frames: frames along the path, map coordinates.
+        progress: called with the share of points that are sorted.
 
     Yields:
-        the strip's points, its frames in the points' local coordinates, and which of them are its own: the others
-        belong to its neighbours and are only there so that sequences of slices reach across.
+        the strip's points, its frames in the points' local coordinates, and a mask of the frames within the strip: the
+        others belong to the neighbouring strips and are given so that sequences of slices reach across.
     """
     with tempfile.TemporaryDirectory(prefix="synthroads-strips-") as folder, TileFiles(Path(folder)) as files:
         _sort_points(files, cloud, ground, path, progress)
@@ -135,7 +135,7 @@ def _sort_points(files: TileFiles, cloud: Path, ground: GroundReading, path: Mea
 
 
 def _cut_path(path: MeasuredAxis, first_station: float, last_station: float) -> MeasuredAxis:
-    """Return the part of a path from station `first_station` to `last_station` (m), with one vertex beyond on either side."""
+    """Return the part of a path between two stations (m), with one more vertex on either side."""
     first_vertex = max(0, int(np.searchsorted(path.station, first_station, "right")) - 1)
     end_vertex = min(len(path.points), int(np.searchsorted(path.station, last_station, "left")) + 1)
     first_vertex = min(first_vertex, end_vertex - 2) if end_vertex >= 2 else 0

@@ -20,7 +20,7 @@ class CloudTile:
 
     Attributes:
         scene: name of the scene; intensities are scaled scene by scene.
-        origin: (3,) float64 map coordinates that ``coord`` counts from, m.
+        origin: (3,) float64 map coordinates of the origin of ``coord``, m.
         coord: (N, 3) float32, m.
         color: (N, 3) uint8 sRGB, or None where the scene has none.
         strength: (N,) float32 intensity as a share of 16 bits, or None where the scene has none.
@@ -87,9 +87,9 @@ def scalings(tiles: Sequence[CloudTile], kind: str, voxel: float | None = None) 
     """Return the intensity scaling of each scene, by the scene's name.
 
     Args:
-        tiles: of all scenes.
+        tiles: tiles of all scenes.
         kind: ``robust``, or ``share``: the share of 16 bits as it stands.
-        voxel: edge of the cells of which one point counts, m; None: all points do, as where tiles are thinned out.
+        voxel: edge of the cells of which one point counts, m; None if all points count, as of thinned tiles.
     """
     if kind == "share":
         return dict.fromkeys((tile.scene for tile in tiles), Scaling())

@@ -49,6 +49,7 @@ class Yardstick(Part):
 
     @model_validator(mode="after")
     def _check_paths(self) -> Self:
+        """Refuse paths and patterns that lead out of the data set's folder."""
         for name in (
             *([self.names] if self.names else []),
             *(pattern for patterns in self.splits.values() for pattern in patterns),
@@ -178,7 +179,7 @@ def _array(path: Path) -> Iterator[tuple[PointBlock, NDArray[np.int64]]]:
 
 
 def _ply(path: Path, yardstick: Yardstick) -> Iterator[tuple[PointBlock, NDArray[np.int64]]]:
-    """Yield the points of a PLY file, whatever its attributes are called."""
+    """Yield the points of a PLY file with their label numbers, by the yardstick's names of attributes."""
     with path.open("rb") as file:
         count, kind, _ = read_ply_header(path, file)
         names = kind.names or ()
@@ -204,7 +205,7 @@ def _ply(path: Path, yardstick: Yardstick) -> Iterator[tuple[PointBlock, NDArray
 
 
 def _largest(kind: np.dtype[Any], name: str) -> float:
-    """Return what a full intensity is in an attribute: of 8 bits what they can hold, of all wider ones 16 bits."""
+    """Return the full intensity of an attribute: the largest number of 8 bits, or of 16 bits for all wider types."""
     part = kind[name]
     return float(np.iinfo(part).max) if part.itemsize == 1 else _FULL
 
@@ -226,6 +227,7 @@ def _las(path: Path, field: str) -> Iterator[tuple[PointBlock, NDArray[np.int64]
 
 
 def _finite(path: Path, xyz: Float) -> Float:
+    """Return coordinates; InputError unless all are finite."""
     if not np.isfinite(xyz).all():
         raise InputError(str(path), None, "must hold finite coordinates")
     return xyz

@@ -89,10 +89,10 @@ def slice_centers(rule: Rule, number: Index, y: Float, intensity: Float, count: 
 
     Args:
         rule: one of `RULES`.
-        number: (N,) the slice that each point lies in.
-        y: (N,) across, in its slice's frame, m.
+        number: (N,) index of the slice that each point lies in.
+        y: (N,) place across, in the slice's frame, m.
         intensity: (N,) of any scale.
-        count: M, of slices.
+        count: number M of slices.
     """
     result = np.full(count, np.nan)
     order = np.argsort(number, kind="stable")
@@ -138,8 +138,8 @@ def skeleton_centers(
     Args:
         xy: (N, 2) the road's points, m.
         intensity: (N,) of any scale; needed for the mask ``dark`` only.
-        origin: (M, 2) of the slices' frames, about a metre apart, in their order along the path.
-        direction: (M,) of the frames, rad.
+        origin: (M, 2) origins of the slices' frames, m, about a metre apart, in their order along the path.
+        direction: (M,) directions of the frames, rad.
         settings: raster, branches, mask, bins.
     """
     return centers_on(skeletons(xy, intensity, origin, settings), origin, direction, settings.bin)
@@ -246,9 +246,9 @@ def average_along(points: Float, width: float, direction: Float) -> Float:
     """Return the means (J, 2), m, of points (K, 2) in bins along their principal axis, ordered along the path.
 
     Args:
-        points: of a window's skeleton.
-        width: of a bin, m.
-        direction: (M,) of the window's frames, rad: which way the path runs.
+        points: (K, 2) points of a window's skeleton, m.
+        width: width of a bin, m.
+        direction: (M,) directions of the window's frames, rad, which tell the way of the path.
     """
     if len(points) < 2:
         return np.empty((0, 2))

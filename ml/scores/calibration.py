@@ -27,10 +27,10 @@ class IntervalCalibration:
     """Correction of one target's standard deviations: a factor, and interval widths for 68 % and 95 %.
 
     Attributes:
-        factor: on the model's standard deviation.
+        factor: factor on the model's standard deviation.
         widths: half-widths of the 68 % and the 95 % interval in units of the model's (uncorrected) standard deviation.
         before, after: shares that the Gaussian intervals cover on the validation roads, without and with the factor.
-        count: of the errors that it was found on.
+        count: number of errors that the calibration was found on.
     """
 
     factor: float = 1.0
@@ -41,7 +41,7 @@ class IntervalCalibration:
 
     @property
     def holds(self) -> bool:
-        """Whether the one factor brings both shares within their tolerances."""
+        """Return whether the one factor brings both shares within their tolerances."""
         return all(
             abs(share - level) <= tolerance
             for share, level, tolerance in zip(self.after, LEVELS, TOLERANCES, strict=True)
@@ -82,17 +82,19 @@ def calibrate_target(error: Float, std: Float) -> IntervalCalibration:
 
 
 def _pair(values: Sequence[float | None]) -> tuple[float, float]:
+    """Return two numbers as floats, NaN for None."""
     first_value, second_value = (float("nan") if value is None else float(value) for value in values)
     return first_value, second_value
 
 
 def _conformal(ratio: Float, level: float) -> float:
-    """Return the split conformal quantile of ascending ratios: a new one is at most it with probability >= `level`."""
+    """Return the split conformal quantile of ascending ratios: a new one is below it with probability >= `level`."""
     rank = int(np.ceil(level * (len(ratio) + 1)))
     return float(ratio[min(rank, len(ratio)) - 1])
 
 
 def _covered_share(ratio: Float, factor: float) -> tuple[float, float]:
+    """Return the shares of errors within the 68 % and 95 % intervals of deviations times a factor."""
     shares = [float(np.searchsorted(ratio, factor * d, side="right") / len(ratio)) for d in DEVIATIONS]
     return shares[0], shares[1]
 

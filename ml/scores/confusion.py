@@ -99,6 +99,7 @@ class Confusion:
 
 
 def _ratio(numerator: Any, denominator: Any) -> Any:
+    """Return a quotient element by element; NaN where the denominator is 0."""
     denominator = np.asarray(denominator, dtype=np.float64)
     return np.divide(numerator, denominator, out=np.full_like(denominator, np.nan), where=denominator > 0)
 
@@ -185,6 +186,7 @@ def _class_rows(columns: Sequence[tuple[Sequence[Scores], str]]) -> list[_ClassR
 
 
 def _class_table(titles: Sequence[str], rows: Sequence[_ClassRow]) -> list[str]:
+    """Return the lines of a Markdown table with a row for each class."""
     body = [[label, f"{points:,}", *cells] for label, points, cells in rows]
     return markdown(["class", "points", *titles], body, ["---", "--:", *["--:"] * len(titles)]).splitlines()
 

@@ -40,7 +40,7 @@ DEGREE = 3
 _FEWEST = 2 * (DEGREE + 1)
 """Predicted centres that a window's polynomial needs."""
 _PAST_END = 1.0
-"""Points farther than this, m, past a line's end are beside none of it."""
+"""Distance past a line's end, m, from which on points have no offset from the line."""
 
 
 @dataclass(frozen=True)
@@ -114,10 +114,12 @@ class Comparison:
 
 
 def _mean(values: Float) -> float:
+    """Return the mean of values; NaN without any."""
     return float(values.mean()) if len(values) else np.nan
 
 
 def _deviation(road: Comparison) -> float | None:
+    """Return a road's mean predicted standard deviation, m; None if none was predicted."""
     return None if road.std is None else _mean(road.std[road.both][np.isfinite(road.std[road.both])])
 
 
@@ -236,7 +238,7 @@ def windows(station: Float, truth_mask: Bool, window: float = WINDOW) -> list[In
 
     Args:
         station: (M,) m, growing.
-        truth_mask: (M,) whether the truth is.
+        truth_mask: (M,) mask of the slices with a known truth.
         window: length, m.
     """
     known_rows = np.flatnonzero(truth_mask)

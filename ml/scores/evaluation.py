@@ -77,11 +77,11 @@ def make_case(
     """Return a road, cropped if asked, with frames along its axis or an estimated path, displaced by the seed.
 
     Args:
-        road: with a known truth.
-        seed: of cuts and of how the path strays.
-        cropping: None: all points stay.
+        road: road with a known truth.
+        seed: seed of the cuts and of the path's displacement.
+        cropping: options of cutting off the sides; None to keep all points.
         estimated: whether the path is found in the points; else it is the axis. Both stray.
-        settings: how far the path strays; those of `SliceSettings` if not given.
+        settings: options of the path's displacement; None for the defaults.
 
     Raises:
         InputError: the road has no truth.
@@ -114,9 +114,9 @@ def measure(
     """Return each metric's mean and deviation over seeds, by predictor, road (`all`: combined) and metric.
 
     Args:
-        predictors: by name; one per seed, as models that were trained with it, or one for all seeds.
-        cases: the roads as a seed shows them.
-        seeds: of cuts and frames. The n-th predictor is measured with the n-th seed.
+        predictors: predictors by name; one per seed, as models trained with it, or one for all seeds.
+        cases: function that returns the cases of a seed.
+        seeds: seeds of cuts and frames. The n-th predictor is measured with the n-th seed.
 
     Raises:
         InputError: two roads have the same name, by which figures are told apart.
@@ -143,11 +143,12 @@ def measure(
 
 
 def trivial_predictor(name: str, slice_cache: SliceCache | None = None) -> Predictor:
-    """Return the untrained predictor of a rule's name in `baselines.RULES`; `slice_cache` shares slices between predictors."""
+    """Return the untrained predictor of a rule of `baselines.RULES`; predictors may share a cache of slices."""
     rule, length = baselines.RULES[name]
     slice_cache = slice_cache or SliceCache()
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
+        """Return each slice's centre (M, 1), m, by the rule."""
         slices = slice_cache(road, frames, length)
         belonging = road.belonging[slices.index]
         y, intensity = slices.xy[belonging, 1], road.intensity[slices.index[belonging]].astype(np.float64)
@@ -160,7 +161,7 @@ class SliceCache:
     """Cache of the slices of the last road and frames, per thickness.
 
     Args:
-        half_width: points up to this are seen beside a frame, m.
+        half_width: reach of a slice to either side of its frame, m.
     """
 
     def __init__(self, half_width: float = HALF_WIDTH) -> None:
@@ -181,6 +182,7 @@ def skeleton_predictor(settings: baselines.SkeletonSettings) -> Predictor:
     """Return the untrained predictor of centres (M, 1), m, by the road's morphological skeleton."""
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
+        """Return the skeleton's centres (M, 1), m, in the frames."""
         xy, intensity = mask_points(road, settings.mask)
         return baselines.skeleton_centers(xy, intensity, frames.position, frames.direction, settings)[:, None]
 
@@ -195,7 +197,7 @@ def mask_points(road: LearningRoad, mask: str) -> tuple[Float, Float]:
 
 
 def predict_path(road: LearningRoad, frames: Frames) -> Float:
-    """Predict the centre at each frame's origin: zeros (M, 1); what the displaced path alone is worth."""
+    """Return zeros (M, 1): the centre predicted at each frame's origin, which measures the displaced path itself."""
     return np.zeros((len(frames), 1))
 
 
@@ -214,6 +216,7 @@ def along_parabolas(predictor: Predictor, length: float) -> Predictor:
     """Return a predictor that smooths another's centres by a parabola fitted over `length` (m) around each frame."""
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
+        """Return the centres (M, 1), m, of parabolas through the other predictor's centres."""
         y = predictor(road, frames)[:, 0]
         place, result = frames.at(y), np.full(len(y), np.nan)
         for part in stretches(frames):

@@ -13,12 +13,12 @@ class Metric:
     """A named figure of predictions: how it is computed, and how tables show it.
 
     Attributes:
-        value: makes it of what was compared; None: there is none.
-        title: of its column in tables, which have none without.
-        factor: on it in tables.
-        decimals: there.
-        place: of the column, behind those of lower ones.
-        summed: whether that of several roads is their sum, and not a mean.
+        value: function that computes the figure of a comparison; None as its result: there is none.
+        title: title of the figure's column in tables; empty for none.
+        factor: factor on the figure in tables.
+        decimals: decimals in tables.
+        place: order of the column: ascending.
+        summed: whether the figure of several roads is their sum instead of a mean.
     """
 
     value: Callable[[Any], Any]
@@ -99,4 +99,5 @@ def markdown(head: Sequence[str], body: Iterable[Sequence[str]], rule: Sequence[
 
 
 def _row(cells: Sequence[str]) -> str:
+    """Return a row of a Markdown table."""
     return f"| {' | '.join(cells)} |"

@@ -20,9 +20,9 @@ from ..data.roads import LearningRoad
 REACH = 1.2
 """A line is looked for up to so far from the axis, m."""
 LENGTH = 10.0
-"""Of road of which one place of the line is taken, m."""
+"""Length of road from which one place of the line is taken, m."""
 STEP = 2.0
-"""Distance of the places, m."""
+"""Distance from one place to the next, m."""
 CELL = 0.05
 """Width of a cell across the road, m."""
 LINE = 0.3
@@ -30,7 +30,7 @@ LINE = 0.3
 BRIGHTER = 0.7
 """A line is brighter than the median beside the axis by at least so much of the logarithms' 20th to 80th percentile."""
 FEWEST = 100
-"""Points of which a place is taken."""
+"""Points that a place needs at least."""
 
 
 def with_painted_line(road: LearningRoad) -> LearningRoad:

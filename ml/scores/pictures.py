@@ -43,7 +43,7 @@ def small_png(figure: Any, dpi: float | None = None) -> bytes:
     """Draw a Matplotlib figure; return it as a PNG of at most 256 colours, a fourth as large as with all.
 
     Args:
-        figure: is drawn.
+        figure: figure to draw.
         dpi: pixels per inch; the figure's own if not given.
     """
     full_png, content = io.BytesIO(), io.BytesIO()
@@ -55,7 +55,7 @@ def small_png(figure: Any, dpi: float | None = None) -> bytes:
 
 @dataclass(frozen=True)
 class PictureView:
-    """Stations along a road's true axis from which to which it is drawn, m."""
+    """Stations along a road's true axis, m, between which the road is drawn."""
 
     first: float
     last: float
@@ -67,7 +67,7 @@ def lines_picture(case: Case, lines: Mapping[str, Float], view: PictureView, tit
 
     Args:
         case: road and frames.
-        lines: y of the centres in the frames (M,), m, by the predictor's name.
+        lines: y (M,) of the centres in the frames, m, by the predictor's name.
         view: what of the road.
         title: of the picture.
         height: of the upper panel to either side of the axis, m.
@@ -118,6 +118,7 @@ def corridor_picture(case: Case, prediction: Float, view: PictureView, title: st
 
 
 def _new_panels(title: str, heights: Sequence[float], view: PictureView, height: float) -> tuple[Any, Sequence[Any]]:
+    """Return a figure and its panels below each other, the upper one with the view's limits."""
     figure = new_figure(13.0, 1.6 + 2.0 * sum(heights))
     panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
     figure.suptitle(shown_text(title), fontsize=11)
@@ -158,6 +159,7 @@ def _draw_cloud(axes: Axes, case: Case, view: PictureView, height: float) -> Non
 
 
 def _draw_truth(axes: Axes, case: Case, view: PictureView, edges: bool = False) -> None:
+    """Draw the true axis, and if asked the true edges, into the axes."""
     truth = case.road.known_truth
     station = np.arange(view.first, view.last, 0.5)
     axes.plot(station, np.where(truth.axis.inside(station), 0.0, np.nan), color=TRUE, lw=2.5, label="true axis")
@@ -223,6 +225,7 @@ def _offsets_at_frames(case: Case, y: Float, view: PictureView) -> tuple[Float, 
 
 
 def _draw_center_error(axes: Axes, case: Case, view: PictureView, column: Mapping[str, Float]) -> None:
+    """Draw the predicted centre's offset from the true axis with its 68 % and 95 % bands."""
     y = column["center"]
     station, offset = _offsets_at_frames(case, y, view)
     for level, alpha in ((95, 0.2), (68, 0.35)):
@@ -240,6 +243,7 @@ def _draw_center_error(axes: Axes, case: Case, view: PictureView, column: Mappin
 
 
 def _draw_lanes(axes: Axes, case: Case, view: PictureView, column: Mapping[str, Float]) -> None:
+    """Draw the predicted and true number and width of lanes over the station."""
     truth = case.road.known_truth.at(case.frames)
     in_view = np.flatnonzero((truth.station >= view.first) & (truth.station <= view.last))
     in_view = in_view[np.argsort(truth.station[in_view])]
@@ -271,10 +275,10 @@ def comparison(
     """Return a PNG with three top views of a tile: true classes, predicted classes, and where they differ.
 
     Args:
-        tile: with its truth.
+        tile: tile with its true classes.
         prediction: (N,) classes.
-        names: of the classes.
-        scheme: that they are of, for their colours; a built-in one if None.
+        names: names of the classes.
+        scheme: scheme of the classes, for their colours; None for a built-in one.
     """
     from matplotlib.patches import Patch  # takes half a second, which only pictures need
 

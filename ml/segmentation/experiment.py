@@ -32,6 +32,7 @@ class Experiment(AnyExperiment):
         """Return training data and tests with {NAME} in all paths replaced by its folder; see the base class."""
 
         def fill(source: Source) -> Source:
+            """Return a source with {NAME} in its path replaced by its folder."""
             return source.model_copy(update={"path": fill_path(source.path, folders)})
 
         return Data(
@@ -54,11 +55,11 @@ def run_experiment(
     """Train (unless done) and test all variants with the given seeds; return the scores, written after each.
 
     Args:
-        experiment: what is compared.
+        experiment: the experiment with its variants.
         configurations: see `configurations`.
         output: folder; ``VARIANT/seed-N`` are the runs, `RESULTS` and `TABLE` the scores.
         seeds: one after another, each over all variants: a table is there as soon as the first is through.
-        progress: of each training.
+        progress: called with each training's stage and share.
     """
     results: dict[str, dict[str, Any]] = {name: {} for name in configurations}
     for seed in seeds:
@@ -77,7 +78,7 @@ def run_experiment(
 def _train_variant(
     configuration: SegmentationConfiguration, folder: Path, output: Path, progress: Progress
 ) -> dict[str, Any]:
-    """Return a run's test scores by test, training it first unless it is already."""
+    """Return a run's scores by test, after training it unless that is done."""
     run = Run.start(folder, configuration, resume=True)
     with run.alone():
         if not (folder / METRICS).is_file():
@@ -123,9 +124,9 @@ def table(title: str, results: Mapping[str, Mapping[str, Any]], variants: Sequen
     """Return a Markdown page with a table per test: IoU of each class and variant, %, mean (standard deviation).
 
     Args:
-        title: above the tables.
+        title: title above the tables.
         results: variant -> seed -> test -> scores as of `Confusion.to_dict`.
-        variants: those that are shown; all if none.
+        variants: names of the variants to show; empty for all.
     """
     chosen_results = {name: results[name] for name in variants or results}
     return f"# {title}\n\n{tables_by_test(chosen_results)}\n"

@@ -25,7 +25,7 @@ class _FromTensors(nn.Module):
         self.model, self.names = model, names
 
     def forward(self, *tensors: Tensor) -> tuple[Tensor]:
-        """Return the class scores (N, C) of N points, of their features (N, F) and what was prepared, in order."""
+        """Return the class scores (N, C) of N points from their features (N, F) and the prepared geometry, in order."""
         feat, *prepared = tensors
         return (self.model(feat, dict(zip(self.names, prepared, strict=True))),)
 
@@ -33,11 +33,11 @@ class _FromTensors(nn.Module):
 def exportable_network(model: nn.Module, configuration: SegmentationConfiguration) -> Exportable:
     """Return a trained network with an example, random points, to be written as ONNX.
 
-    What it needs of the clouds' geometry (the stages' points, who looks at whom) are inputs beside the features.
+    The geometry that the network needs (the stages' points, their neighbours) are inputs beside the features.
 
     Args:
         model: the trained network.
-        configuration: that it was trained by.
+        configuration: configuration of its training.
 
     Raises:
         InputError: the network can't be written as ONNX.

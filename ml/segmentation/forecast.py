@@ -31,8 +31,8 @@ _TILES = 8
 def forecast(configuration: SegmentationConfiguration, steps: int) -> dict[str, Any]:
     """Time some training steps; return seconds per step, the steps and hours of the whole training, ..., as JSON data.
 
-    A step is all that a training does for a batch: crops cut out, neighbours found, loss, gradients, weights changed.
-    One more step goes first and isn't counted.
+    A step is all that a training does for a batch: cutting crops, finding neighbours, loss, gradients, changing
+    weights. One more step is run first and not counted.
 
     Raises:
         InputError: the data are missing, or their tiles have fewer points than a crop; or the set-up has several

@@ -65,11 +65,11 @@ def thin_tiles(
 ) -> Iterator[CloudTile]:
     """Yield the sources' tiles thinned to one point per training voxel, scenes renamed to ``TITLE/PLACE/SCENE``.
 
-    Scenes of two sources may have one name: here they have others, so that their intensities are scaled apart.
+    Scenes of two sources may share a name: the new names keep the scaling of their intensities separate.
 
     Args:
-        sources, configuration: of the training.
-        title: of the domain.
+        sources, configuration: sources of the tiles, and configuration of the training.
+        title: title of the domain.
         labels: whether labels are read; else all are `IGNORED`.
     """
     for place, source in enumerate(sources):
@@ -82,8 +82,8 @@ class CropBatches:
 
     Args:
         configuration: of the training.
-        domains: the tiles of each; the synthetic ones first where there are two.
-        device: that they are for; on a GPU the network may prepare them itself.
+        domains: tiles by domain; the synthetic ones first where there are two.
+        device: device of the training; on a GPU the network may prepare batches itself.
     """
 
     def __init__(
@@ -120,7 +120,7 @@ class CropBatches:
         yield from _load_crops(crops, configuration, epoch, configuration.adaptation.mix3d, share, self.device)
 
     def _seeds(self) -> list[Seeds]:
-        """Return where crops are cut out, in all tiles.
+        """Return the sampler of crop centres in all tiles.
 
         Where a share is stated, a crop stays in the domain that it was planned in, whatever class is looked for.
         """
@@ -129,6 +129,7 @@ class CropBatches:
         return [Seeds(self.tiles, len(class_names(configuration.scheme())), configuration.balanced, groups)]
 
     def _crops(self, tiles: Sequence[CloudTile], draws: Sequence[Draw], seeds: Seeds, epoch: int) -> CropDataset:
+        """Return the data set of an epoch's planned crops of some tiles."""
         configuration = self.configuration
         settings, scaling = configuration.crop_settings(), self.scaling
         return CropDataset(
@@ -143,7 +144,7 @@ class ExchangedBatches(CropBatches):
     """
 
     def _seeds(self) -> list[Seeds]:
-        """Return where crops of each domain are cut out; believed labels are too few to balance classes by them."""
+        """Return a sampler of crop centres per domain; guessed labels are too few to balance classes by."""
         classes, (synthetic, target) = len(class_names(self.configuration.scheme())), self.domains
         return [Seeds(synthetic, classes, self.configuration.balanced), Seeds(target, classes, balanced=False)]
 
@@ -166,6 +167,7 @@ class ExchangedBatches(CropBatches):
         return configuration.crops_per_epoch or configuration.crops_per_tile * len(self.domains[0])
 
     def _pairs_per_batch(self) -> int:
+        """Return the pairs of a batch: half of its crops, at least one."""
         return max(self.configuration.batch // 2, 1)
 
     def _draws(self, tiles: int, place: int, epoch: int) -> list[Draw]:
@@ -185,8 +187,8 @@ class StreamedCropBatches:
         device: see `CropBatches`.
 
     Attributes:
-        epoch: the one that was begun last, None before the first.
-        tiles: those of that epoch.
+        epoch: epoch that was begun last; None before the first.
+        tiles: tiles of that epoch.
     """
 
     def __init__(
@@ -225,7 +227,7 @@ class StreamedCropBatches:
 
 
 def streamed_tiles(configuration: SegmentationConfiguration, number: int, folder: Path) -> list[CloudTile]:
-    """Return the thinned tiles of a stream's scene; none of one without tiles."""
+    """Return the thinned tiles of a stream's scene; an empty list if it has none."""
     if not any(folder.glob("pointcept/*/*/*/coord.npy")):
         return []
     return list(thin_tiles([Source(path=str(folder))], configuration, f"stream/{number}"))
@@ -240,7 +242,17 @@ def _load_crops(
     device: torch.device,
     size: int | None = None,
 ) -> Iterator[Item]:
-    """Yield batches of so many elements of a data set; as the configuration says if not given."""
+    """Yield the batches of an epoch that a share selects, prepared by the configuration's workers.
+
+    Args:
+        dataset: crops or pairs of crops of the epoch.
+        configuration: of the training.
+        epoch: number of the epoch.
+        mix3d: share of batches that are overlaid (Mix3D).
+        share: slice of the batches' numbers.
+        device: device of the training.
+        size: elements of a batch; None for the configuration's.
+    """
     numbers, size = range(len(dataset)), size or configuration.batch
     return load_batches(
         dataset,

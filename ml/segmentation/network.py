@@ -36,7 +36,7 @@ def gpu_prepares(configuration: SegmentationConfiguration, device: torch.device)
 
 
 def prepare_on_gpu(configuration: SegmentationConfiguration, batch: Item) -> Item:
-    """Return a batch prepared where it lies on a GPU and the network can do it there; else as it is."""
+    """Return a batch prepared by the network if it lies on a GPU where the network can do that; else unchanged."""
     prepares_here = gpu_prepares(configuration, batch["coord"].device)
     return configuration.network.prepare(batch) if prepares_here else batch
 
@@ -67,9 +67,9 @@ def adapt_norms(model: nn.Module, batches: Iterable[B], scores: Callable[[B], Te
     own statistics, as in training, and those of all batches are pooled, by their numbers of points. Weights stay.
 
     Args:
-        model: comes back with the modes that it had; if an error comes up, also with its old statistics.
-        batches: of the other domain, without effects; crops as large as in training.
-        scores: runs the model on a batch; returns one row per point.
+        model: network; its modes are restored, and after an error its statistics too.
+        batches: batches of the other domain, without effects; crops as large as in training.
+        scores: function that runs the model on a batch and returns one row per point.
 
     Returns:
         The number of points looked at.
@@ -104,6 +104,7 @@ def adapt_norms(model: nn.Module, batches: Iterable[B], scores: Callable[[B], Te
 
 
 def _pool_statistics(pools: list[_Pool], scores: Callable[[B], Tensor], batch: B) -> int:
+    """Run the model on a batch, add its norms' statistics to their pools, and return its points."""
     with torch.no_grad():
         points = len(scores(batch))
         for pool in pools:
@@ -123,6 +124,7 @@ class _Pool:
         self.square = torch.zeros_like(self.mean)
 
     def _batches(self) -> int:
+        """Return the number of batches that the norm has seen."""
         return 0 if self.norm.num_batches_tracked is None else int(self.norm.num_batches_tracked)
 
     def add(self, points: int) -> None:

@@ -30,9 +30,9 @@ def fit_offsets(tiles: Sequence[CloudTile], classifier: Classifier, configuratio
     """Return the offsets (C,) of the classes' scores by which the mean IoU over thinned, labelled tiles is largest.
 
     Args:
-        tiles: of the training.
-        classifier: scores of the trained network.
-        configuration: of the training.
+        tiles: thinned training tiles.
+        classifier: function that returns the trained network's scores.
+        configuration: configuration of the training.
     """
     stride = -(-sum(map(len, tiles)) // MOST_POINTS)
     sampled_tiles = tiles[::stride]
@@ -52,7 +52,7 @@ def fit_offsets(tiles: Sequence[CloudTile], classifier: Classifier, configuratio
 def best_offsets(scores: Float32, truth: Int) -> Float:
     """Return the offsets (C,) at which the mean IoU of the largest scores (N, C) against true classes (N,) is largest.
 
-    It goes up one class at a time, by ever smaller steps. Classes without a point get none.
+    Coordinate ascent: one class's offset changes at a time, by ever smaller steps. Classes without a point keep 0.
     """
     present_classes = np.unique(truth)
     offsets = np.zeros(scores.shape[1])
@@ -72,6 +72,7 @@ def best_offsets(scores: Float32, truth: Int) -> Float:
 
 
 def _mean_iou(scores: Float32, truth: Int) -> float:
+    """Return the mean IoU of the classes of largest scores (N, C) against true classes (N,)."""
     confusion = Confusion([str(place) for place in range(scores.shape[1])])
     confusion.add(truth, scores.argmax(axis=1))
     return confusion.mean("iou")

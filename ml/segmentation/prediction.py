@@ -45,7 +45,7 @@ TILE = 48.0
 MARGIN = 6.0
 """Width that a tile sees of the tiles around it, m: at least that of the pieces within."""
 _RECORD = np.dtype([("place", "<f4", 3), ("rgb", "<u2", 3), ("intensity", "<u2"), ("index", "<i8")])
-"""Fields that are kept of a point in a tile's file."""
+"""Fields of a point in a tile's file."""
 
 _COPC = "copc"
 """User id of the records of cloud-optimised files."""
@@ -56,10 +56,10 @@ class Labelling:
     """A trained classifier with the settings by which it labels points.
 
     Attributes:
-        classifier: scores of a batch.
-        settings: voxel and features.
-        scheme: classes.
-        intensity: ``share`` or ``robust``, as in training.
+        classifier: function that returns the scores of a batch.
+        settings: voxel, features and votes.
+        scheme: scheme of the classes.
+        intensity: scaling of intensities, ``share`` or ``robust``, as in training.
     """
 
     classifier: Classifier
@@ -85,10 +85,10 @@ def predict_file(
 
     Args:
         source, target: ending in .las or .laz; the target appears when it is whole.
-        labelling: what labels the points.
+        labelling: classifier that labels the points, with its settings.
         classification: write the classes' LAS codes to the standard field ``classification`` too.
         overwrite: whether the target may be replaced.
-        progress: told stage and share.
+        progress: called with the stage and its share.
 
     Raises:
         MissingFileError: there is no such file.
@@ -141,8 +141,8 @@ class TileStore:
     """A cloud sorted into square tiles on disk.
 
     Args:
-        folder: for the tiles' files.
-        edge: of a tile, m.
+        folder: folder for the tiles' files.
+        edge: edge of a tile, m.
 
     Attributes:
         count: number of points in the tiles.
@@ -157,7 +157,7 @@ class TileStore:
         self._colored = False
 
     def fill(self, source: Path, progress: Progress) -> int:
-        """Sort a cloud's points that may be worked with into the tiles' files; return how many points it has in all."""
+        """Sort a cloud's usable points into the tiles' files; return the number of all its points."""
         read_count = 0
         with open_cloud(source) as cloud:
             self._origin = np.floor(np.asarray(cloud.header.offset, dtype=np.float64))
@@ -197,7 +197,7 @@ class TileStore:
         return Scaling(median, upper_decile - lower_decile if upper_decile > lower_decile else 1.0)
 
     def tiles(self) -> Iterator[tuple[CloudTile, Bool, Int]]:
-        """Yield each tile with its margin, the mask of its own points, and their indices in the file."""
+        """Yield each tile with its margin, the mask of the points within the tile, and their indices in the file."""
         for row, column in sorted(self._known):
             parts, cores = [], []
             for north in (-1, 0, 1):
@@ -218,7 +218,12 @@ class TileStore:
             yield tile, core, record["index"][core]
 
     def _near(self, row: int, column: int, north: int, east: int) -> AnyArray:
-        """Return a tile's points within `MARGIN` of the tile that it is ``north`` and ``east`` of, relative to that."""
+        """Return a tile's points within `MARGIN` of a neighbouring tile, in that one's coordinates.
+
+        Args:
+            row, column: place of the tile.
+            north, east: rows and columns by which it lies north and east of the neighbour, -1 to 1.
+        """
         if (row, column) not in self._known:
             return np.empty(0, dtype=_RECORD)
         record = np.fromfile(self._folder / f"{row}_{column}", dtype=_RECORD)
@@ -236,6 +241,7 @@ class TileStore:
         return np.concatenate([plan, np.full((len(tile), 1), self._origin[2])], axis=1)
 
     def _append(self, tile: Int, record: AnyArray) -> None:
+        """Append records (N,) to the files of their tiles (N, 2: column, row)."""
         order = np.lexsort(tile.T)
         tile, record = tile[order], record[order]
         starts = np.flatnonzero(np.r_[True, np.any(tile[1:] != tile[:-1], axis=1)])
@@ -301,7 +307,7 @@ def copy_header_texts(source: Path, target: Path) -> None:
 def extended_header(source_header: laspy.LasHeader, scheme: ClassScheme, needs_codes: bool) -> laspy.LasHeader:
     """Return a copy of a LAS header with the predicted-class attribute, without COPC records and identifier texts.
 
-    A record of ours names the scheme's classes, in place of one from an earlier run.
+    One of its variable-length records names the scheme's classes, in place of one from an earlier run.
 
     Raises:
         InputError: LAS codes are wanted, and the file's point format holds those up to 31 only.

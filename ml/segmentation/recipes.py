@@ -126,12 +126,14 @@ class SegmentationConfiguration(Configuration):
     @field_validator("features")
     @classmethod
     def _refuse_repetitions(cls, features: tuple[Feature, ...]) -> tuple[Feature, ...]:
+        """Refuse a feature that is named twice."""
         if len(set(features)) < len(features):
             raise ValueError("features must differ")
         return features
 
     @model_validator(mode="after")
     def _check_data(self) -> SegmentationConfiguration:
+        """Refuse options that don't fit the set-up or the stream of scenes."""
         if self.synthetic_share is not None and not self.set_up.startswith("mixed"):
             raise ValueError(f"synthetic_share is for mixed set-ups, not for {self.set_up}")
         if self.start_share and not self.start:
@@ -204,11 +206,13 @@ def map_intensities(synthetic: Sequence[CloudTile], real: Sequence[CloudTile]) -
 
 
 def _levels(tile: CloudTile) -> Index:
+    """Return a tile's intensities (N,) as 16-bit levels."""
     assert tile.strength is not None
     return np.rint(np.clip(tile.strength, 0.0, 1.0) * FULL).astype(np.intp)
 
 
 def _histogram(tiles: Sequence[CloudTile], where: str) -> Int:
+    """Return the number of points by 16-bit intensity level over all tiles; InputError without any."""
     counts = np.zeros(LEVELS, dtype=np.int64)
     for tile in tiles:
         if tile.strength is not None:
@@ -230,10 +234,10 @@ def plan(
 
     Args:
         domains: number of tiles of each domain, the synthetic one first where there are two.
-        per_tile: crops of a tile; all tiles' together are the epoch's.
+        per_tile: number of crops of a tile; the epoch has those of all tiles.
         synthetic_share: share of the first domain's crops; None for ``per_tile`` crops of every tile.
-        seed, epoch: of the order, and of which tiles have one crop more where the share leaves a rest.
-        total: the epoch's crops, in the place of ``per_tile``.
+        seed, epoch: key of the random order, which also decides the tiles with one crop more where a rest is left.
+        total: number of the epoch's crops, in the place of ``per_tile``; None for that.
     """
     tile_count = sum(domains)
     total = per_tile * tile_count if total is None else total

@@ -52,16 +52,16 @@ def overlapping_pieces(
     margin: float = MARGIN,
     largest: int = LARGEST,
 ) -> Iterator[tuple[Index, Index]]:
-    """Yield square pieces of a tile as (indices of their own points, indices of these and the points around).
+    """Yield square pieces of a tile as (indices of the points within, indices of these and of the points around).
 
-    Every point that is to be in a piece is in exactly one.
+    Every point of the core lies within exactly one piece.
 
     Args:
         plan: (N, 2) m.
-        core_mask: (N,) which points are to be in a piece, the others being seen only; all if not given.
-        edge: of the squares, m.
-        margin: seen around them, m.
-        largest: points seen; squares with more are cut in four.
+        core_mask: (N,) mask of the points to lie within pieces, the others being context; None for all.
+        edge: edge of the squares, m.
+        margin: width of the context around a square, m.
+        largest: largest number of points of a piece with its context; squares with more are cut in four.
     """
     members = np.arange(len(plan)) if core_mask is None else np.flatnonzero(core_mask)
     if len(members) == 0:
@@ -69,7 +69,7 @@ def overlapping_pieces(
     position = np.asarray(plan, dtype=np.float64)
 
     def cut(members: Index, candidates: Index, low: Float, edge: float, margin: float) -> Iterator[tuple[Index, Index]]:
-        """Yield the pieces of squares counted from ``low``, recursively smaller; ``candidates`` are candidates around."""
+        """Yield the pieces in squares of a grid from a corner on, recursively smaller where points are many."""
         cells = np.floor((position[members] - low) / edge).astype(np.int64)
         for cell in np.unique(cells, axis=0):
             core, square_corner, candidate_positions = (
@@ -104,11 +104,11 @@ def label_tile(
 
     Args:
         tile: N points of any density; its labels aren't looked at.
-        scaling: of its intensities.
+        scaling: scaling of the tile's intensities.
         classifier: scores (n, C) of a batch.
         settings: voxel and features.
-        core: (N,) the points whose class is wanted, in their order; all if not given.
-        seed: of the noise that stands for missing features.
+        core: (N,) mask of the points to label; None for all.
+        seed: seed of the noise that stands for missing features.
     """
     voxel_points = voxel_sample(tile.coord, settings.voxel)
     thinned_tile = tile.select(voxel_points)
@@ -131,12 +131,12 @@ def piece_scores(
 ) -> Iterator[tuple[Index, Tensor]]:
     """Yield the class scores (n, C) of a thinned tile's points, piece by piece, with the points' indices (n,).
 
-    With several votes they are logarithms of the views' mean probabilities, of all points at once.
+    With several votes the scores are logarithms of the views' mean probabilities, of all points at once.
 
     Args:
         tile: N points, one per voxel; its labels aren't looked at.
         scaling, classifier, settings, seed: see `label_tile`.
-        core_mask: (N,) which points' scores are wanted; all if not given.
+        core_mask: (N,) mask of the points to score; None for all.
     """
     tile = replace(tile, segment=np.full(len(tile), IGNORED, dtype=np.int16))
     if settings.votes == 1:
@@ -168,9 +168,9 @@ def _view_scores(
 
 
 def _rotate_tile(tile: CloudTile, view: int) -> CloudTile:
-    """Return a tile as a view sees it: the first as it is, each further one turned on, every second one mirrored.
+    """Return a tile turned for a view: by the golden angle times its number, and mirrored for odd numbers.
 
-    Pieces are cut where it is turned to, so that each view has other borders.
+    Pieces are cut after turning, so that each view has other borders.
     """
     if view == 0:
         return tile
@@ -236,6 +236,7 @@ def classifier(model: nn.Module, configuration: SegmentationConfiguration) -> Cl
     """Return a function from an item to class scores (N, C) by the model in evaluation mode, without gradients."""
 
     def scores(batch: Item) -> Tensor:
+        """Return the class scores (N, C) of an item's points."""
         model.eval()
         with torch.inference_mode():
             if not gpu_prepares(configuration, next(model.parameters()).device):
@@ -306,10 +307,10 @@ def score(
 
 
 def target_names(sources: Sequence[Source], scheme: ClassScheme) -> tuple[str, ...]:
-    """Return the names of the classes, or groups, that the sources of one test tell apart.
+    """Return the names of the classes, or groups, that the truth of one test's sources distinguishes.
 
     Raises:
-        InputError: they differ in this.
+        InputError: the sources distinguish different classes.
     """
     names = {source.targets(scheme) for source in sources}
     if len(names) != 1:

@@ -38,12 +38,12 @@ def target_tiles(configuration: SegmentationConfiguration) -> list[CloudTile]:
 def label_confident_points(
     tiles: Sequence[CloudTile], classifier: Classifier, configuration: SegmentationConfiguration
 ) -> list[CloudTile]:
-    """Return tiles labelled by a network where it is surest: of the points that it calls a class, that class's share.
+    """Return tiles labelled where a network is surest: of each class the same share of the points predicted as it.
 
     Args:
-        tiles: thinned ones, whose labels aren't looked at.
-        classifier: scores of the network.
-        configuration: of the training; ``self_training.believed`` is the share.
+        tiles: thinned tiles; their labels aren't used.
+        classifier: function that returns the network's scores.
+        configuration: configuration of the training; ``self_training.believed`` is the share.
     """
     scaling = scalings(tiles, configuration.intensity)
     labels, sureness = [], []
@@ -62,7 +62,7 @@ def label_confident_points(
 
 
 def _thresholds(labels: AnyArray, sureness: Float32, configuration: SegmentationConfiguration) -> Float32:
-    """Return for each class (C,) the probability from which its label is believed; 2, which none has, without any."""
+    """Return each class's least probability (C,) for its label to be kept; 2, which none reaches, without points."""
     thresholds = np.full(len(class_names(configuration.scheme())), 2.0, dtype=np.float32)
     for place in np.unique(labels):
         thresholds[place] = np.quantile(sureness[labels == place], 1.0 - configuration.self_training.believed)

@@ -66,6 +66,7 @@ def train(run: SegmentationRun, progress: Progress = silent) -> dict[str, Any]:
 
 
 def _train_alone(run: SegmentationRun, progress: Progress) -> dict[str, Any]:
+    """Train a run's network as `train` does, with the run's folder locked."""
     configuration = run.configuration
     check_tests(configuration)
     device = chosen_device(configuration)
@@ -127,10 +128,10 @@ def exportable(run: SegmentationRun) -> Exportable:
 
 
 def _names(evaluation: Evaluation) -> list[str]:
-    """Return a unique name for each of the data: its path's last parts, as many as tell all apart.
+    """Return a unique name for each of the data: the last parts of its path, as few as make all names differ.
 
     Raises:
-        InputError: data are given twice.
+        InputError: a path is given twice.
     """
     places = [
         path.parent / f"{path.name}-{evaluation.split}" if path.is_dir() else path.with_suffix("")
@@ -145,7 +146,7 @@ def _names(evaluation: Evaluation) -> list[str]:
 
 
 def _test_source(path: Path, evaluation: Evaluation) -> Source:
-    """Return a test's source; a cloud of up to 5 million points is one tile, as tiles' edges see less around them."""
+    """Return a test's source; a cloud of up to 5 million points is one tile, as points at tiles' edges lack context."""
     if path.is_dir():
         class_options = {"mapping": evaluation.mapping, "yardstick": evaluation.yardstick}
         return Source(path=str(path), split=evaluation.split, **class_options)
@@ -228,9 +229,9 @@ def _scene_stream(
 
 
 def _mix_with_start(model: nn.Module, run: Run[SegmentationConfiguration], start_weights: Mapping[str, Tensor]) -> None:
-    """Set the weights to a mean of those that the training began and ended with, in place, and save them; once.
+    """Set the weights to a weighted mean of those at the training's start and end, in place, and save them; once.
 
-    Wortsman et al., "Robust fine-tuning of zero-shot models" (2022): what few labels say nothing of isn't forgotten.
+    Wortsman et al., "Robust fine-tuning of zero-shot models" (2022): classes that the new labels lack aren't forgotten.
     """
     state, share = run.last_checkpoint(next(model.parameters()).device), run.configuration.start_share
     if process_number() or state is None or MIXED in state:
@@ -261,11 +262,11 @@ def _shift_scores(
 
 
 def _begin_with(model: nn.Module, configuration: SegmentationConfiguration) -> None:
-    """Load the weights that a training begins with, in place.
+    """Load the weights of the run or model `start` into a network, in place.
 
     Raises:
         MissingFileError: there is no such run or model.
-        InputError: it is of another network, of other classes, or sees other features.
+        InputError: it has another network, other classes or other features.
     """
     start_run = open_run(Path(configuration.start))
     for name in ("task", "classes", "features", "intensity", "network"):
@@ -361,6 +362,7 @@ def objective(
     weights = torch.from_numpy(class_weights(shares, configuration.class_weights).astype(np.float32)).to(device)
 
     def loss(model: nn.Module, batch: Item) -> tuple[Tensor, Figures]:
+        """Return the loss of a batch, and the share of labelled points with the right class."""
         scores, truth = scores_of(model, prepare_on_gpu(configuration, batch)), batch["segment"]
         value = smoothed_loss(scores, truth, weights, configuration.label_smoothing)
         has_label = truth != IGNORED
@@ -377,9 +379,11 @@ def _objective_of_epochs(
 
     @lru_cache(maxsize=1)
     def of_epoch(epoch: int | None) -> Callable[[nn.Module, Item], tuple[Tensor, Figures]]:
+        """Return the objective of the epoch under way; the number only tells epochs apart in the cache."""
         return objective(batches.configuration, batches.tiles, device)
 
     def loss(model: nn.Module, batch: Item) -> tuple[Tensor, Figures]:
+        """Return the loss of a batch by the objective of the epoch under way."""
         return of_epoch(batches.epoch)(model, batch)
 
     return loss
@@ -388,9 +392,11 @@ def _objective_of_epochs(
 def _validation(
     configuration: SegmentationConfiguration, tiles: list[CloudTile]
 ) -> Callable[[nn.Module, int], Figures]:
+    """Return a function (model, epoch) -> mean IoU on the validation tiles."""
     scaling = scalings(tiles, configuration.intensity)
 
     def validate(model: nn.Module, epoch: int) -> Figures:
+        """Return the mean IoU over all validation tiles."""
         confusion = Confusion(class_names(configuration.scheme()))
         scores = classifier(model, configuration)
         for tile in tiles:

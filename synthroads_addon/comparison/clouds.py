@@ -48,12 +48,14 @@ class ListedCloud(ClosedModel):
 
     @model_validator(mode="after")
     def _offsets_need_an_axis(self) -> ListedCloud:
+        """Refuse an axis without offsets of pavement, and offsets without an axis."""
         if (self.axis is None) != (not self.paved):
             raise ValueError("axis and paved locate the pavement together: one of the two is missing")
         return self
 
     @model_validator(mode="after")
     def _azimuths_need_a_scanner(self) -> ListedCloud:
+        """Refuse azimuths without the scanner's place that they are counted around."""
         if self.azimuth_deg is not None and self.scanner is None:
             raise ValueError("azimuth_deg needs scanner, about which it is counted")
         return self

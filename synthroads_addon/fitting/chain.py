@@ -290,21 +290,26 @@ class Heights:
     spacings: ClassVar[Spacings] = Spacings(20.0, 40.0, 40.0)
 
     def measure(self, chain: Chain, stations: Float) -> tuple[Float, Float]:
+        """Return the given stations (N,) and the weighted heights above a chain of grades (N,), m."""
         return stations, self.weights * (self.heights - elevations(chain, stations))
 
     def jacobian(self, chain: Chain, stations: Float) -> Float:
+        """Return the derivatives (N, F) of the weighted residuals by all F parameters (see `Chain.basis`)."""
         grid = quadrature_grid(chain, stations)
         rise, fall = ramp_integrals(chain, stations, grid, np.ones(len(grid) - 1))
         return -self.weights[:, None] * assemble_jacobian(np.ones((len(stations), 1)), rise, fall, chain.slopes)
 
     def move_pose(self, pose: Float, step: Float) -> Float:
+        """Return the elevation (1,) after a step (1,), m."""
         return pose + step
 
     def fit_window(self, indices: Int, spacing: float, start: Start | None, origin: float) -> ChainFit:
+        """Return the fit of a chain of grades to the heights of one window; arguments as `Plan.fit_window`."""
         part = Heights(self.heights[indices], self.weights[indices], self.stations[indices] - origin, 0.8 * spacing)
         return refine(part, _first_heights(part.stations, part.heights, spacing, start), part.stations, False, 8)
 
     def state_at(self, chain: Chain, station: float) -> Start:
+        """Return elevation (1,), m, and grade of the chain at a station (m)."""
         return elevations(chain, np.array([station])), float(np.interp(station, chain.knots, chain.values))
 
 
@@ -343,6 +348,7 @@ class ChainFit:
 
     @property
     def rms(self) -> float:
+        """Return the root mean square of the weighted residuals, m."""
         return float(np.sqrt(self.sum_of_squares / len(self.residuals)))
 
     @property
@@ -353,6 +359,7 @@ class ChainFit:
 
     @property
     def p95(self) -> float:
+        """Return the 95th percentile of the absolute weighted residuals, m."""
         return float(np.percentile(np.abs(self.residuals), 95))
 
     @cached_property

@@ -374,6 +374,7 @@ def _follow_heights(station: Float, heights: Float, weights: Float, length: floa
     point_stations, point_heights = station[is_point], heights[is_point]
 
     def largest_error(profile: Profile) -> float:
+        """Return a profile's largest distance from the heights, m."""
         return float(np.abs(profile.elevation(point_stations) - point_heights).max())
 
     design: Profile | None = None

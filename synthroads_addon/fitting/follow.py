@@ -378,6 +378,7 @@ def _fit_part(
     """
 
     def measure(model: Model, pose: Float, approximate_stations: Float) -> tuple[Float, Float]:
+        """Return the points' stations and offsets (N,), m, on a model's elements, near approximate stations."""
         feet, off = _alignment(model, pose).project_near(points, approximate_stations - model.knots[0], NEAR)
         return feet + model.knots[0], off
 

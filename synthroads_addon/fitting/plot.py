@@ -108,6 +108,7 @@ def _picture(title: str, rows: Sequence[_Row], first_station: float, last_statio
     names = ("across, m (left of the line is up)", "height, m")
 
     def paint(draw: ImageDraw.ImageDraw) -> None:
+        """Draw the title and the diagrams."""
         draw_text(draw, (_MARGIN, _MARGIN), title, 19)
         for number, row in enumerate(rows):
             _draw_row(draw, 2 * _MARGIN + 50 + number * _ROW, names[number], row, first_station, last_station)

@@ -131,6 +131,7 @@ def _design_class(measurements: RoadMeasurements) -> str:
 
 
 def _carriageway(measurements: RoadMeasurements, side: SideSection) -> Carriageway:
+    """Return one side's measured cross-section as the carriageway of a parameter set, lengths in m."""
     return Carriageway(
         instance=1,
         side=side.side,
@@ -197,6 +198,10 @@ def _bays(measurements: RoadMeasurements) -> Iterator[tuple[str, Turnout]]:
 
 
 def _markings(measurements: RoadMeasurements) -> Iterator[tuple[str, LineMarking]]:
+    """Yield (id, marking) of each line of the carriageways, and of a single carriageway's middle line.
+
+    Lines that weren't seen are left out at a side's borders, as are those of assumed cross-sections.
+    """
     section = measurements.section
     length = round_value(measurements.fit.alignment.length)
     for side in SIDES:
@@ -281,6 +286,7 @@ def barrier_object(barrier: FoundBarrier, start: float, end: float, length: floa
 
 
 def _terrain(ground: GroundShape) -> Terrain:
+    """Return the terrain of a parameter set by the measured shape of the ground; its wavelength is chosen."""
     return Terrain(
         instance=1,
         half_width=_length(ground.half_width, 5.0, 1000.0),

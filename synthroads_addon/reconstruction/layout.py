@@ -254,6 +254,7 @@ class _Part:
         return [line for line in lines if self._along(line) >= seen_share * self.seen * self.length]
 
     def _along(self, line: Line) -> float:
+        """Return the length of a line within the part, m: at most the line's own."""
         usual_part = self.usual & (line.stations > line.start) & (line.stations < line.end)
         return min(line.length, STRETCH * SPACING * float(usual_part.sum()))
 

@@ -183,6 +183,7 @@ def make_profiles(cloud: RoadCloud, path: CloudPath, half_width: float, keep_poi
     kind = cloud.kind[surface][in_grid]
 
     def total(values: NDArray[np.generic] | None) -> Grid:
+        """Return the sums by bin (S, U) of points' values; of None the number of points."""
         return np.bincount(cell, values, rows * columns).reshape(rows, columns).astype(np.float32)
 
     count = total(None)

@@ -220,6 +220,7 @@ def _fit_trapezoid(
     """
 
     def residual(shape: Float) -> Float:
+        """Return the trapezoid's width less the measured excess (N,), m."""
         return _trapezoid(stations, shape) - excess_width
 
     # Above the median: the tapers are part of the run.

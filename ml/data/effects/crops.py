@@ -36,6 +36,7 @@ class CropEffects(PointEffects):
 
     @model_validator(mode="after")
     def _check_limit(self) -> Self:
+        """Refuse a limit of the jitter below its standard deviation."""
         if self.jitter_limit < self.jitter:
             raise ValueError(f"jitter_limit must not be less than jitter, {self.jitter:g}")
         return self

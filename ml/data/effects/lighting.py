@@ -11,18 +11,18 @@ from .slices import SequenceEffects
 Generator = np.random.Generator
 
 _DARKEST = 1e-5
-"""Intensities below this share of the brightest count as it."""
+"""Share of the brightest intensity to which smaller ones are raised."""
 _NARROWEST = 0.02
-"""A footprint narrower than this is a point, m."""
+"""Width of a footprint below which it has no effect, m."""
 _LINE_REACH = 0.5
-"""Paint within so far of a line's place is the line's, m."""
+"""Distance from a line's place within which paint belongs to the line, m."""
 _LINE_WIDTHS = (0.12, 0.6)
-"""Of a solid lane line: one narrow line to a double one with what lies between, m."""
+"""Least and largest width of a solid lane line, m: one narrow line, and a double one with the gap."""
 _VERGE_TONE = 0.3
 """Logarithm of the largest factor by which a verge of crushed stone is brighter or darker than asphalt."""
 _SCANNER_HEIGHTS = (1.5, 60.0)
 _SCANNER_ASIDE = 15.0
-"""Of the scanners from whose range intensities fall off: lowest and highest, and farthest from the path, m."""
+"""Largest distance of a scanner from the path, m; the heights are the lowest and the highest of scanners."""
 
 
 @effect("centerline", order=40)
@@ -57,8 +57,8 @@ def tint_colors(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> N
 def _repaint_lines(value: Float, stretch: Stretch, probability: float, rng: Generator) -> tuple[Float, Bool]:
     """Return intensities and marking mask (K,) with lane and edge lines of a rural carriageway repainted or worn off.
 
-    Two lanes are parted by dashes on motorways; on rural roads as well by a solid or a double line, or by none; and
-    many of them have no edge lines. On a motorway that would lead astray: beside a ramp it is by its dashes that the
+    Two lanes are separated by dashes on motorways; on rural roads also by a solid or a double line, or by none; and
+    many of them have no edge lines. Motorways stay as they are: beside a ramp it is by its dashes that the
     line between the lanes is known.
     """
     lane, edge, side, width = rng.random(4)
@@ -86,9 +86,9 @@ def _repaint_lines(value: Float, stretch: Stretch, probability: float, rng: Gene
 
 
 def _verges(value: Float, stretch: Stretch, is_marking: Bool, widest: float, rng: Generator) -> tuple[Float, Bool]:
-    """Return intensities (K,) with crushed-stone verges added to a rural road, and the mask of what looks paved (K,).
+    """Return intensities (K,) with crushed-stone verges added to a rural road, and a mask (K,) of what looks paved.
 
-    These are hardly brighter or darker than asphalt: the pavement seems wider than it is.
+    The verges are hardly brighter or darker than asphalt, so that the pavement seems wider than it is.
     """
     widths, tone = rng.uniform(0.0, widest, 2), np.exp(_VERGE_TONE * rng.uniform(-1.0, 1.0))
     is_bare = stretch.paved & ~is_marking

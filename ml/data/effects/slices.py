@@ -17,7 +17,7 @@ from .base import PointEffects, point_effect_field
 Generator = np.random.Generator
 
 _RIM = 0.7
-"""Width of the pavement's edge whose height is taken, m."""
+"""Width of the pavement's rim over which its edge's height is taken, m."""
 
 
 class SequenceCrop(Part):
@@ -38,6 +38,7 @@ class SequenceCrop(Part):
 
     @model_validator(mode="after")
     def _check_sides(self) -> Self:
+        """Refuse limits of the crop that don't ascend or are out of bounds."""
         for name, lower_limit in (("reach", 0.5), ("beyond", 0.0)):
             smallest, largest = getattr(self, name)
             if not lower_limit <= smallest <= largest <= 1000.0:
@@ -94,6 +95,7 @@ class SequenceEffects(PointEffects):
 
     @model_validator(mode="after")
     def _check_gamma(self) -> Self:
+        """Refuse powers of the intensities that don't ascend or are out of bounds."""
         if not 0.01 <= self.gamma[0] <= self.gamma[1] <= 10.0:
             smallest, largest = self.gamma
             raise ValueError(f"gamma is {smallest:g}, {largest:g}: must be two ascending numbers from 0.01 to 10")
@@ -104,7 +106,7 @@ class SequenceEffects(PointEffects):
 def mirror_side(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Replace the median's side of a carriageway by its mirrored outer side, in place, with probability `alone`.
 
-    So a motorway's carriageway becomes a rural road. Heights go on from the pavement's own edge.
+    So a motorway's carriageway becomes a rural road. Mirrored heights continue the height of the inner edge.
     """
     if rng.random() >= effects.alone or not stretch.without_shoulders():
         return

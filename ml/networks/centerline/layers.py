@@ -42,8 +42,8 @@ class PointFeatures(nn.Module):
     """A small per-point MLP of x, height and attributes; not of y, so that it is the same across the road.
 
     Args:
-        columns: the columns of a batch's ``feat`` that are used.
-        width: features made from them.
+        columns: indices of the columns of a batch's ``feat`` that are used.
+        width: number of features per point.
     """
 
     def __init__(self, columns: tuple[int, ...], width: int) -> None:
@@ -68,7 +68,7 @@ def cell_sums(coord: Tensor, mask: Tensor, features: Tensor, reach: float, numbe
         mask: (N, P) which of them exist.
         features: (N, P, C).
         reach: the cells divide -reach to reach, m.
-        number: of cells.
+        number: number of cells.
     """
     slices, _, channels = features.shape
     values = torch.cat([features, coord[..., 2:], torch.ones_like(coord[..., :1])], dim=-1).flatten(0, 1)
@@ -97,7 +97,7 @@ class FixedKernelPoints(nn.Module):
     Args:
         count: kernel points of a slice.
         half_width: the outermost ones' distance from the frame's origin, m.
-        cells: per spacing.
+        cells: cells per spacing of the kernel points.
         inputs: features of a point.
         width: features of a token.
     """
@@ -125,7 +125,7 @@ class FixedKernelPoints(nn.Module):
 class DeformableKernelPoints(nn.Module):
     """Layer that gathers points' features at kernel points which first move across the road by learned shifts.
 
-    What fixed kernel points see there says how far each moves, as in a deformable KPConv; here at most one spacing.
+    The shift of each is computed from the fixed kernel point's token, as in a deformable KPConv; at most one spacing.
 
     Args:
         count: kernel points of a slice.
@@ -149,9 +149,9 @@ class DeformableKernelPoints(nn.Module):
         """Return the tokens of N slices gathered at the moved kernel points, from points and features.
 
         Args:
-            coord: the points.
+            coord: (N, P, 3) points, m.
             mask: (N, P) which of them exist.
-            features: theirs.
+            features: (N, P, inputs) features of the points.
             fixed_tokens: (N, K, width) tokens of the fixed kernel points at the same places.
         """
         places = self.places + self.spacing * torch.tanh(self.shift(fixed_tokens)[..., 0])

@@ -47,10 +47,10 @@ def likelihood(error: Tensor, log_std: Tensor, mask: Tensor, beta: float) -> Ten
     It is a Gaussian's up to `OUTLIER` deviations, and beyond goes on as a straight line (Huber).
 
     Args:
-        error: (B, S, T) in units of the target; anything where it isn't known.
-        log_std: (B, S, T) of the predicted deviation in the same unit.
-        mask: (B, S, T) which of them count; a target that is known nowhere has the loss 0.
-        beta: each term is multiplied by its variance to this power, which counts as a constant.
+        error: (B, S, T) errors in units of the target; any number where unknown.
+        log_std: (B, S, T) logarithm of the predicted deviation in the same unit.
+        mask: (B, S, T) targets that are known; one that is known nowhere has the loss 0.
+        beta: power of the variance by which each term is multiplied, as a constant without gradient.
     """
     error = torch.where(mask, error, torch.zeros_like(error))
     # -ln N(error; 0, sigma) = (error / sigma)^2 / 2 + ln sigma + constant, times sigma^(2 beta) (Seitzer et al. 2022).
@@ -68,9 +68,9 @@ def cross_entropy(logits: Tensor, places: Tensor, lines: Tensor, mask: Tensor) -
 
     Args:
         logits: (B, S, K, L).
-        places: (B, S, K) where the kernel points are (or began), at equal spacing, m.
+        places: (B, S, K) places of the kernel points (before they move), at equal spacing, m.
         lines: (B, S, L) y of the lines, m.
-        mask: (B, S, L) which count.
+        mask: (B, S, L) lines that are known.
     """
     first_place, last_place = places[..., :1], places[..., -1:]
     spacing = (last_place - first_place) / (places.shape[-1] - 1)
@@ -84,11 +84,12 @@ def centerline_loss(options: LossOptions, half_width: float) -> Callable[[nn.Mod
     """Return a function (model, batch) -> (loss, {"center_mae": m}) that adds up the terms by their weights.
 
     Args:
-        options: what counts how much.
-        half_width: where the outermost kernel points are, m.
+        options: weights of the terms.
+        half_width: distance of the outermost kernel points from the frame's origin, m.
     """
 
     def loss(model: nn.Module, batch: Batch) -> tuple[Tensor, Figures]:
+        """Return the loss of a batch's predictions, and the centre's mean absolute error, m."""
         output: Output = model(batch)
         truth, estimate = all_targets(batch), all_targets(output)
         known_mask = ~torch.isnan(truth)

@@ -71,13 +71,14 @@ class ModelOptions(Part):
         """Return the centreline model with random weights from PyTorch's global generator.
 
         Args:
-            half_width: what a slice sees to either side, m.
-            slices: of a sequence.
+            half_width: reach of a slice to either side, m.
+            slices: number of slices of a sequence.
         """
         raise NotImplementedError
 
     @model_validator(mode="after")
     def _check_widths(self) -> ModelOptions:
+        """Refuse widths that the attention's heads don't divide evenly, or odd ones."""
         for name in ("width", "context"):
             if getattr(self, name) % self.heads or getattr(self, name) % 2:
                 raise ValueError(f"{name} must be even and a multiple of heads, {self.heads}")
@@ -138,7 +139,7 @@ class CenterlineModel(nn.Module):
         tokens, context = self.encode(self.kernel_points(coord, mask, features), coord, mask, features, shape[1])
         outputs = {name: values.unflatten(0, shape) for name, values in self.heads(tokens, context).items()}
         context = context.unflatten(0, shape)
-        # Where to look again is no way for the second look's errors to reach the first.
+        # Detached: gradients of the second look must not reach the first one through the place of the second look.
         guess, heading = self.line(outputs["center"].detach(), outputs, context, batch["frame"])
         guess, heading = guess.detach(), heading.detach()
         step, log_std, outputs["fine_logits"] = self.again(
@@ -163,10 +164,10 @@ class CenterlineModel(nn.Module):
         """Return y (m) and direction (rad), both (B, S) in the slices' frames, of a line through regressed centres.
 
         Args:
-            center: y of the centres, m; a constant.
+            center: (B, S) y of the centres, m, without gradient.
             outputs: the heads' other outputs.
-            context: (B, S, D).
-            frame: (B, S, 4).
+            context: (B, S, D) context of the slices.
+            frame: (B, S, 4) x, y, direction and z origin of the slices' frames.
         """
         raise NotImplementedError
 
@@ -194,8 +195,8 @@ def all_targets(values: Mapping[str, Tensor], kind: str = "") -> Tensor:
 def predict_both_ways(model: nn.Module, batch: Batch) -> Output:
     """Return centre, corridor and deviations averaged over a batch and its mirror image, mirrored back.
 
-    Mirroring the batch mirrors the result exactly. Variances are averaged; what the two disagree on is left out, as the
-    calibration sees it.
+    Mirroring the batch mirrors the result exactly. Variances are averaged; the difference of the two results isn't
+    added, as the calibration accounts for it.
     """
     output, mirrored_output = model(batch), model(mirror_batch(batch))
     corridor_back = mirrored_corridor(mirrored_output["corridor"])
@@ -209,4 +210,5 @@ def predict_both_ways(model: nn.Module, batch: Batch) -> Output:
 
 
 def _bound_values(logarithm: Tensor) -> Tensor:
+    """Return logarithms softly limited to `_LARGEST_LOG`, nearly unchanged when small."""
     return _LARGEST_LOG * torch.tanh(logarithm / _LARGEST_LOG)

@@ -29,10 +29,10 @@ class Refinement(nn.Module):
         inputs: features of a point.
         width: features of a cell.
         context: features of a slice.
-        slices: of a sequence, which see each other; 1: each by itself.
-        reach: the cells divide -reach to reach beside the first guess, m.
-        cells: their number.
-        heads: of the attention.
+        slices: number of slices of a sequence, which see each other; with 1 each is alone.
+        reach: distance to either side of the first estimate that the cells divide, m.
+        cells: number of cells.
+        heads: number of heads of the attention.
     """
 
     places: Tensor
@@ -60,15 +60,15 @@ class Refinement(nn.Module):
 
         Args:
             coord: (B, S, P, 3) points, m.
-            mask: (B, S, P) which of them exist.
+            mask: (B, S, P) mask of the points that exist.
             features: (B, S, P, C).
-            guess: (B, S) y at which the road was found first, m.
-            heading: (B, S) its direction in the slices' frames, rad.
+            guess: (B, S) first estimate of the centre's y, m.
+            heading: (B, S) first estimate of the direction in the slices' frames, rad.
             context: (B, S, D) of the slices.
 
         Returns:
-            (B, S) how much farther to the left the centre lies, m, the logarithm of that's deviation, and (B, S, cells)
-            what the soft-argmax is taken of.
+            (B, S) offset of the centre to the left of the estimate, m, the logarithm of its deviation, and (B, S,
+            cells) logits of the soft-argmax.
         """
         line_y = guess[..., None] + coord[..., 0] * torch.tan(heading)[..., None]
         straightened = coord - torch.stack([torch.zeros_like(line_y), line_y, torch.zeros_like(line_y)], dim=-1)
@@ -117,21 +117,24 @@ def parabola(frame: Tensor, center: Tensor, weight: Tensor, stiffness: Tensor) -
 
 
 def _solve(matrix: Tensor, rhs: Tensor) -> Tensor:
-    """Return x (B, 3) of symmetric positive definite systems matrix (B, 3, 3) x = right (B, 3), by elimination.
+    """Return x (B, 3) of symmetric positive definite systems matrix (B, 3, 3) x = rhs (B, 3), by Gaussian elimination.
 
     Written out, as neither ONNX nor batches of small systems on a GPU have a fast solver.
     """
-    (first, b, c), (second, e), third = matrix[:, 0].unbind(-1), matrix[:, 1, 1:].unbind(-1), matrix[:, 2, 2]
+    # The upper triangle of the matrix: rows (a, b, c), (d, e) and (f,).
+    (a, b, c), (d, e), f = matrix[:, 0].unbind(-1), matrix[:, 1, 1:].unbind(-1), matrix[:, 2, 2]
     y0, y1, y2 = rhs.unbind(-1)
-    to_second, to_third = b / first, c / first
-    second, e = second - to_second * b, e - to_second * c
-    factor = e / second
-    third = third - to_third * c - factor * e
-    y1 = y1 - to_second * y0
-    y2 = y2 - to_third * y0 - factor * y1
-    z2 = y2 / third
-    z1 = y1 / second - factor * z2
-    return torch.stack([y0 / first - to_second * z1 - to_third * z2, z1, z2], dim=-1)
+    # Forward elimination of the first column, then of the second.
+    factor_1, factor_2 = b / a, c / a
+    d, e = d - factor_1 * b, e - factor_1 * c
+    factor_21 = e / d
+    f = f - factor_2 * c - factor_21 * e
+    y1 = y1 - factor_1 * y0
+    y2 = y2 - factor_2 * y0 - factor_21 * y1
+    # Back substitution.
+    x2 = y2 / f
+    x1 = y1 / d - factor_21 * x2
+    return torch.stack([y0 / a - factor_1 * x1 - factor_2 * x2, x1, x2], dim=-1)
 
 
 def _in_the_middle(frame: Tensor, dtype: torch.dtype) -> tuple[Tensor, Tensor]:

@@ -28,8 +28,8 @@ class CellConvolution(nn.Module):
     """A layer without bias over the cells around each cell.
 
     Args:
-        offsets: around a cell, its own among them.
-        in_channels, out_channels: as of PyTorch's convolutions.
+        offsets: number of offsets around a cell, its own included.
+        in_channels, out_channels: channels of the input and the output.
     """
 
     def __init__(self, offsets: int, in_channels: int, out_channels: int) -> None:
@@ -48,7 +48,7 @@ class CellConvolution(nn.Module):
 
 
 class Around:
-    """Which cells lie around which.
+    """Table of the cells around each cell.
 
     Args:
         near: (M, K) integers: the cells n(i, k) around each of M; M where there is none. Offsets must be in an order
@@ -61,7 +61,7 @@ class Around:
         self._pairs: list[tuple[Tensor, Tensor]] | None = None
 
     def pairs(self) -> list[tuple[Tensor, Tensor]]:
-        """Return for each offset k the cells i that have a cell there, and those cells n(i, k); made once."""
+        """Return for each offset k the cells i that have a neighbour there, and these neighbours n(i, k); cached."""
         if self._pairs is None:
             near_by_offset = self.near.T.contiguous()
             mask = near_by_offset < near_by_offset.shape[1]
@@ -83,6 +83,7 @@ def convolve(values: Tensor, weight: Tensor, around: Around) -> Tensor:
 class _Pairwise(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, values: Tensor, weight: Tensor, around: Around) -> Tensor:
+        """Return the convolution (M, D), offset by offset over the pairs of filled cells."""
         ctx.save_for_backward(values, weight)
         ctx.around = around
         total = _zero_sums(len(values), weight.shape[2], values)
@@ -93,6 +94,7 @@ class _Pairwise(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
+        """Return the gradients of values (M, C) and weight (K, C, D), by the equations of the module."""
         values, weight = ctx.saved_tensors
         of_values = _zero_sums(len(values), values.shape[1], values) if ctx.needs_input_grad[0] else None
         of_weight = torch.empty_like(weight) if ctx.needs_input_grad[1] else None
@@ -108,11 +110,13 @@ class _Pairwise(torch.autograd.Function):
 class _Gathered(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, values: Tensor, weight: Tensor, around: Around) -> Tensor:
+        """Return the convolution (M, D) by one product of matrices per chunk of cells."""
         ctx.save_for_backward(values, weight, around.near)
         return _product(values, weight, around.near)
 
     @staticmethod
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
+        """Return the gradients of values (M, C) and weight (K, C, D), by the equations of the module."""
         values, weight, neighbour_table = ctx.saved_tensors
         gradient = gradients[0].contiguous()
         of_values = of_weight = None
@@ -128,7 +132,7 @@ class _Gathered(torch.autograd.Function):
 
 
 def _zero_sums(rows: int, columns: int, like: Tensor) -> Tensor:
-    """Return zeros to add to: in single precision in the place of bfloat16, whose 8 bits soon drop summands."""
+    """Return zeros (rows, columns) for sums: in float32 instead of bfloat16, whose 8 bits soon drop summands."""
     return like.new_zeros(rows, columns, dtype=torch.float32 if like.dtype == torch.bfloat16 else like.dtype)
 
 
@@ -148,12 +152,12 @@ def _append_zeros(values: Tensor) -> Tensor:
 
 
 def _gather_neighbours(values_and_zeros: Tensor, neighbour_table: Tensor) -> Tensor:
-    """Return the values (M, K C) around each cell, offset by offset."""
+    """Return the values (M, K C) around each cell, offset by offset, from values with a row of zeros at the end."""
     return values_and_zeros.index_select(0, neighbour_table.reshape(-1)).unflatten(0, neighbour_table.shape).flatten(1)
 
 
 def _chunks(neighbour_table: Tensor, channels: int) -> Iterator[slice]:
-    """Yield slices of the cells so short that what is gathered for them is no more than `_CHUNK`."""
+    """Yield slices of the cells so short that the values gathered for them are no more than `_CHUNK` numbers."""
     rows = max(_CHUNK // (neighbour_table.shape[1] * channels), 1)
     for begin in range(0, len(neighbour_table), rows):
         yield slice(begin, begin + rows)

@@ -56,11 +56,11 @@ class Grid:
 
     Attributes:
         cell: edge of the cells of stage 0, m; it doubles with each stage.
-        stages: number of them.
-        attention_from: the first stage whose cells look along curves, and not around themselves.
-        cross: look at the 6 cells that share a face, not at all 26.
-        curves: that late stages are sorted along.
-        patch: cells that look at each other along a curve; a multiple of 8.
+        stages: number of stages.
+        attention_from: first stage whose cells attend along curves; earlier ones convolve over cells around.
+        cross: whether only the 6 cells that share a face count as neighbours, not all 26.
+        curves: curves along which late stages are sorted.
+        patch: number of cells that attend to each other along a curve; a multiple of 8.
     """
 
     cell: float
@@ -77,8 +77,8 @@ def build_cells(coord: Tensor, offset: Tensor, grid: Grid, *, always_masked: boo
     Args:
         coord: (N, 3) floating-point numbers, m.
         offset: (B,) integers: where each cloud ends. Clouds may be empty or of one point.
-        grid: what to make.
-        always_masked: give ``filled{s}`` also where all places count.
+        grid: options of the cells.
+        always_masked: whether ``filled{s}`` is returned even where all places count.
 
     Raises:
         InputError: the offsets don't fit the points, a coordinate is not finite, there are more than 16,384 clouds, or
@@ -121,7 +121,7 @@ def _points_of_clouds(coord: Tensor, offset: Tensor) -> Tensor:
 
 
 def _cell_places(coord: Tensor, cloud: Tensor, clouds: int, edge: float) -> tuple[Tensor, Tensor]:
-    """Return the points' cells (N, 3), counted from each cloud's lowest, and their places in them (N, 3)."""
+    """Return the points' cells (N, 3), counted from each cloud's lowest, and places in these (N, 3), -0.5 to 0.5."""
     cell_coordinates = coord / edge
     floor = cell_coordinates.floor()
     lowest = floor.new_zeros(clouds, _AXES)
@@ -137,20 +137,23 @@ def _cell_places(coord: Tensor, cloud: Tensor, clouds: int, edge: float) -> tupl
 
 
 def _keys(cloud: Tensor, places: Tensor) -> Tensor:
-    """Return a number (M,) for each cell: by cloud, x, y, z, each counted from 1, so that cells around have one too."""
+    """Return the key (M,) of each cell: cloud, x, y, z in the bits from high to low, places counted from 1.
+
+    Counted from 1, cells around have keys too.
+    """
     x, y, z = (places + 1).unbind(1)
     return (((cloud << BITS | x) << BITS | y) << BITS) | z
 
 
 def _split_keys(keys: Tensor) -> tuple[Tensor, Tensor]:
-    """Return clouds (M,) and places (M, 3) of cells' numbers."""
+    """Return the clouds (M,) and places (M, 3) of cells' keys (M,), the inverse of `_keys`."""
     mask = (1 << BITS) - 1
     places = torch.stack([(keys >> 2 * BITS) & mask, (keys >> BITS) & mask, keys & mask], dim=1) - 1
     return keys >> 3 * BITS, places
 
 
 def _children(places: Tensor, parent: Tensor, count: int) -> Tensor:
-    """Return for each of `count` cells the cells (8,) of the stage before in it; for empty octants another of them."""
+    """Return the cells (count, 8) of the stage before in each cell's octants; empty ones repeat another's cell."""
     parity = places & 1
     octant = parity[:, 0] << 2 | parity[:, 1] << 1 | parity[:, 2]
     table = torch.full((count * 8,), -1, dtype=torch.int64, device=places.device)
@@ -179,7 +182,7 @@ def _cells_around(keys: Tensor) -> Tensor:
 
 
 def _patches(places: Tensor, cloud: Tensor, counts: Tensor, grid: Grid) -> tuple[Tensor, Tensor, Tensor | None]:
-    """Return cells of the patches (C, P, K), each cell's place in them (C, M), and which places count (P, K) or None.
+    """Return the patches' cells (C, P, K), each cell's slot in them (C, M), and the mask of used slots (P, K) or None.
 
     Each cloud's curve is cut into stretches as equal as can be, as few as have room in patches. A patch has its stretch
     in the middle and the cells before and after it; where a cloud is too small to fill one, places stay empty.

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 BITS = 16
-"""Of a cell's number along an axis; the code of a cell takes three times as many."""
+"""Bits of a cell's number along an axis; the code of a cell takes three times as many."""
 Curve = Literal["hilbert", "z-order", "hilbert-transposed", "z-order-transposed"]
 CURVES: tuple[Curve, ...] = get_args(Curve)
 """All of them."""
@@ -22,7 +22,7 @@ _AXES = 3
 _OCTANTS = 1 << _AXES
 """Of a cell: two halves along each axis."""
 _SPREAD = ((16, 0x00FF0000FF), (8, 0x00F00F00F00F), (4, 0x0C30C30C30C3), (2, 0x249249249249))
-"""Steps that part the bits of a number so that two free ones lie between: shift, and what is kept."""
+"""Steps (shift, mask) that spread the bits of a number so that two zeros lie between each two."""
 
 
 def curve_codes(cells: Tensor, curve: Curve) -> Tensor:
@@ -59,9 +59,9 @@ def hilbert_codes(cells: Tensor) -> Tensor:
 
 @cache
 def _hilbert_tables() -> tuple[list[int], list[int]]:
-    """Return for each state and octant, at 8 state + octant, the octant's place in its cube, and 8 its own state.
+    """Return two tables at index 8 state + octant: the octant's place along the curve, and 8 times the state within it.
 
-    A state is where the curve enters a cube (a corner, 0 to 7) and the axis along which it leaves it from there:
+    A state combines the corner (0 to 7) at which the curve enters a cube and the axis along which it leaves:
     3 corner + axis.
     """
     digits, states = [], []
@@ -78,13 +78,13 @@ def _hilbert_tables() -> tuple[list[int], list[int]]:
 
 
 def _rotate_bits(bits: int, steps: int) -> int:
-    """Return three bits turned to the left, the last one coming in on the right again."""
+    """Return three bits rotated to the left by some steps."""
     steps %= _AXES
     return ((bits << steps) | (bits >> (_AXES - steps))) & (_OCTANTS - 1)
 
 
 def _from_gray(gray: int) -> int:
-    """Return the number of three bits whose reflected Gray code is given."""
+    """Return the three-bit number whose reflected Gray code is given (inverse Gray code)."""
     return gray ^ (gray >> 1) ^ (gray >> 2)
 
 

@@ -22,7 +22,7 @@ _PAIRS = {"cpu": 1 << 20}
 _PAIRS_ELSEWHERE = 1 << 23
 """The same on a GPU. Chosen: 32 MiB for each number of a pair in single precision."""
 _LARGEST_KEY = 2**62
-"""Cells that have numbers. Chosen: 63 bits, one of them to spare."""
+"""Largest number of cells. Chosen: keys have 63 bits, one of them to spare."""
 
 
 def build_neighbours(coord: Tensor, offset: Tensor, neighbourhood: Neighbourhood) -> Neighbours:
@@ -31,7 +31,7 @@ def build_neighbours(coord: Tensor, offset: Tensor, neighbourhood: Neighbourhood
     Args:
         coord: (N, 3) float32 or float64, m.
         offset: (B,) integers: where each cloud ends. Clouds may be empty or of one point.
-        neighbourhood: what to look for; its sampling must be ``grid``.
+        neighbourhood: options of the search; its sampling must be ``grid``.
 
     Raises:
         InputError: the offsets don't fit the points, a coordinate is not finite, a cloud spans more cells of its
@@ -71,7 +71,7 @@ class _Points:
 
     Attributes:
         xyz: (N, 3) float64, m, those of each cloud one after the other.
-        cloud: (N,) which cloud each is of.
+        cloud: (N,) index of each point's cloud.
         count: number of clouds.
     """
 
@@ -92,9 +92,9 @@ class _Cells:
     """Cells that points are sorted into, numbered so that those along z follow each other and no two clouds touch.
 
     Attributes:
-        edge: of a cell, m.
-        low: (3,) least cell of all points.
-        spans: cells along each axis, with one more on either side.
+        edge: edge of a cell, m.
+        low: (3,) lowest cell of all points along each axis.
+        spans: number of cells along each axis, with one more on either side.
     """
 
     edge: float
@@ -103,7 +103,7 @@ class _Cells:
 
     @classmethod
     def around(cls, points: _Points, edge: float) -> _Cells:
-        """Return cells of an edge for some points, of which there is at least one."""
+        """Return the cells of an edge (m) around some points, at least one."""
         cells = torch.floor(points.xyz / edge)
         lowest_cell = cells.amin(dim=0)
         cells_x, cells_y, cells_z = (int(span) for span in (cells.amax(dim=0) - lowest_cell + 3).tolist())
@@ -115,18 +115,19 @@ class _Cells:
         return (torch.floor(points.xyz / self.edge) - self.low).long() + 1
 
     def keys(self, places: Tensor, cloud: Tensor) -> Tensor:
-        """Return the number of cells (...), given their places (..., 3) and clouds (...)."""
+        """Return the keys of cells (...), given their places (..., 3) and clouds (...)."""
         cells_x, cells_y, cells_z = self.spans
         return ((cloud * cells_x + places[..., 0]) * cells_y + places[..., 1]) * cells_z + places[..., 2]
 
 
 def _check_cells(spans: tuple[int, int, int], clouds: int) -> None:
+    """Refuse a grid with more cells than 62-bit keys can number."""
     if spans[0] * spans[1] * spans[2] * max(clouds, 1) >= _LARGEST_KEY:
         raise InputError("coord", " x ".join(map(str, spans)), "must span fewer than 2^62 cells in all")
 
 
 def _clouds_of(ends: Tensor, points: int) -> Tensor:
-    """Return for each of so many packed points (N,) the number of its cloud."""
+    """Return the cloud's index of each of N packed points, given where the clouds end (B,)."""
     return torch.searchsorted(ends, torch.arange(points, device=ends.device), right=True)
 
 
@@ -162,7 +163,7 @@ def _mix_bits(key: Tensor) -> Tensor:
 
 
 def _as_signed(number: int) -> int:
-    """Return the number with a sign whose 64 bits are those of a number without."""
+    """Return the signed number with the same 64 bits as an unsigned one (two's complement)."""
     return number - (1 << 64) if number >= 1 << 63 else number
 
 
@@ -232,7 +233,7 @@ def _pairs(queries: _Points, support: _Points, edge: float) -> Iterator[tuple[Te
 
 
 def _blocks(total: Tensor, pairs: int) -> Iterator[slice]:
-    """Yield slices of queries with at most so many pairs, or one query; `total` (M,) is their running sum."""
+    """Yield slices of queries with at most ``pairs`` pairs, or of one query; ``total`` (M,) is their running sum."""
     sums = total.cpu()
     begin, pairs_before = 0, 0
     while begin < len(sums):
@@ -260,15 +261,16 @@ def _first_in_ball(queries: _Points, support: _Points, radius: float, limit: int
 
 
 def _ranks(sorted_values: Tensor) -> Tensor:
-    """Return the place (N,) of each value in its run of equal ones, from 0."""
+    """Return the rank (N,), from 0, of each value in its run of equal values."""
     places = torch.arange(len(sorted_values), device=sorted_values.device)
     return places - torch.cummax(places * _first_of_each(sorted_values), dim=0).values
 
 
 def _nearest_three(points: _Points, support: _Points, radius: float) -> tuple[Tensor, Tensor]:
-    """Return indices (N, 3) int32 and inverse-distance weights (N, 3) of each point's three nearest kept ones.
+    """Return indices (N, 3) int32 and inverse-distance weights (N, 3) of each point's three nearest support points.
 
-    Where a cloud has fewer, the index of the others is its first, and their weight 0.
+    Where a cloud has fewer, the missing ones have the index of its first and the weight 0. The search goes on with
+    doubled cells for points that have too few within reach.
     """
     device = points.xyz.device
     weight = points.xyz.new_zeros(len(points), 3)

@@ -46,7 +46,7 @@ class Norm(nn.BatchNorm1d):
             self.running_var.lerp_(variance.detach() * (count / (count - 1)), share)
 
     def scale_sign(self) -> Tensor:
-        """Return the sign of the norm's scale per channel (C,), +1 or -1, detached: does output rise with input."""
+        """Return the sign of the norm's scale per channel (C,), +1 or -1, without gradient."""
         return torch.where(self.weight.detach() < 0, -1.0, 1.0).to(self.weight.dtype)
 
 
@@ -65,7 +65,7 @@ class Grouping:
 
     @property
     def pairs(self) -> int:
-        """Number of pairs, M x K."""
+        """Return the number of pairs, M x K."""
         return self.index.numel()
 
     def relative(self) -> Tensor:
@@ -76,8 +76,9 @@ class Grouping:
     def pair_statistics(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Return pair shares (N,), centred sums (N, 3), mean (3,) and covariance (3, 3) of relative positions; cached.
 
-        The share of all pairs that each is in (N,); the sum of its relative positions less their overall mean, over the
-        number of pairs (N, 3); that mean (3,); the relative positions' covariance (3, 3).
+        Per support point the share of all pairs that it is in (N,), and the sum of its relative positions less their
+        overall mean, over the number of pairs (N, 3); then that mean (3,), and the relative positions' covariance (3,
+        3).
         """
         if self._statistics is None:
             flat_index = self.index.reshape(-1).long()  # adding at 32-bit indices is slow
@@ -93,8 +94,8 @@ class Grouping:
         """Return mean and population variance (C,) over all pairs of ``features_j + directions (p_j - p_i) / r``.
 
         Args:
-            features: of the support points (N, C).
-            directions: (C, 3).
+            features: (N, C) features of the support points.
+            directions: (C, 3) weights of the relative positions.
         """
         share, sums, mean, covariance = self.pair_statistics()
         feature_mean = share @ features
@@ -112,6 +113,7 @@ class Grouping:
 class _GatherMax(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, values: Tensor, index: Tensor) -> Tensor:
+        """Return the maxima (M, C) over the rows of values (N, C) that index (M, K) names."""
         largest, place = _largest(values, index, with_place=ctx.needs_input_grad[0])
         ctx.save_for_backward(place)
         ctx.shape = values.shape
@@ -119,6 +121,7 @@ class _GatherMax(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, None]:
+        """Return the gradient of the values (N, C): each maximum's goes to its row."""
         (place,) = ctx.saved_tensors
         return gradients[0].new_zeros(ctx.shape).scatter_add_(0, place.long(), gradients[0]), None
 
@@ -169,8 +172,8 @@ def normalised_max(features: Tensor, weight: Tensor, norm: Norm, grouping: Group
 
     Args:
         features: of the support points (N, C0).
-        weight: of the convolution (C, 3 + C0), relative positions first.
-        norm: over the C channels; in training its statistics are those of all pairs.
+        weight: (C, 3 + C0) weights of the convolution, relative positions first.
+        norm: batch norm over the C channels; in training its statistics are those of all pairs.
         grouping: who looks at whom.
     """
     sign = norm.scale_sign()
@@ -192,8 +195,8 @@ def normalised_max_of_two(
 
     Args:
         features: of the support points (N, C0).
-        weights: of the convolution (C1, 3 + C0), and of the layer that follows it on each pair (C2, C1).
-        norms: of both; between them is a ReLU.
+        weights: those of the convolution (C1, 3 + C0), and of the layer that follows it on each pair (C2, C1).
+        norms: batch norms of both layers; between them is a ReLU.
         grouping: who looks at whom.
     """
     inner_norm, outer_norm = norms
@@ -220,7 +223,7 @@ def normalised_max_of_two(
 def _statistics(
     norm: Norm, sign: Tensor, grouping: Grouping, values: Tensor, directions: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Return mean and variance (C,) for a norm: of all pairs in training (updates it), else its running ones."""
+    """Return mean and variance (C,) for a norm: of all pairs in training, which updates it, else its running ones."""
     if not norm.training or not grouping.pairs:
         return _running_moments(norm, sign)
     mean, variance = grouping.moments(values, directions)
@@ -229,6 +232,7 @@ def _statistics(
 
 
 def _running_moments(norm: Norm, sign: Tensor) -> tuple[Tensor, Tensor]:
+    """Return a norm's running mean and variance (C,), the mean times a sign per channel."""
     assert norm.running_mean is not None
     assert norm.running_var is not None
     return norm.running_mean * sign, norm.running_var
@@ -239,6 +243,7 @@ class _PairsMax(torch.autograd.Function):
     def forward(
         ctx: Any, support: Tensor, offset: Tensor, index: Tensor, weight: Tensor, moments: bool
     ) -> tuple[Tensor, Tensor, Tensor]:
+        """Return maxima, sums and sums of products as `pairs_max` does, chunk by chunk."""
         (queries, limit), (out_channels, in_channels) = index.shape, weight.shape
         top, column = (
             offset.new_empty(queries, out_channels),
@@ -259,6 +264,7 @@ class _PairsMax(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, Tensor, None, Tensor, None]:
+        """Return the gradients of support, offset and weight; the pairs are made again chunk by chunk."""
         support, offset, index, weight, column = ctx.saved_tensors
         of_top, of_total, of_product = gradients
         limit, out_channels = index.shape[1], weight.shape[0]
@@ -289,8 +295,8 @@ def pairs_max(
         support: (N, C1).
         offset: (M, C1).
         index: (M, K) rows of `support`, K up to 255.
-        weight: of the layer (C2, C1).
-        moments: whether those are wanted; they are 0 otherwise.
+        weight: (C2, C1) weights of the layer.
+        moments: whether the sums are computed; they are 0 otherwise.
 
     Returns:
         Maxima (M, C2), the sum of ``y`` over all pairs (C1,), and the sum of its products ``y y^T`` (C1, C1).
@@ -305,6 +311,7 @@ def pairs_max(
 
 
 def _pairs(support: Tensor, offset: Tensor, index: Tensor) -> Tensor:
+    """Return the values y_ij = relu(support_j + offset_i) of all pairs, (M K, C)."""
     gathered = support.index_select(0, index.reshape(-1)).view(*index.shape, support.shape[1])
     return F.relu_(gathered.add_(offset[:, None])).view(-1, support.shape[1])
 

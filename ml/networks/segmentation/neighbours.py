@@ -46,10 +46,10 @@ _POINTS_INTO = {
     "inner": (0, torch.int32),
     "nearest": (0, torch.int32),
 }
-"""Arrays of indices: into which stage, counted from their own, and their dtype."""
+"""Arrays of indices: stage that they point into, relative to their own, and their dtype."""
 Sampling = Literal["grid", "farthest"]
 _STRIDE = 4
-"""One in so many points stays. As PointNet++ and PointNeXt do."""
+"""One in four points stays in each stage, as in PointNet++ and PointNeXt."""
 _CHUNK = 1 << 15
 """Queries whose pairs are held at once. Chosen: bounds memory."""
 TINY = 1e-8
@@ -61,9 +61,9 @@ class Neighbourhood:
     """Options for thinning a cloud stage by stage, and for its points' neighbourhoods.
 
     Attributes:
-        radius: of the balls around the first stage's points, m; it doubles with each stage.
-        neighbours: points of a ball; fewer are filled up with the first one again.
-        inner: of each stage: whether its points also look at each other, within twice the stage's radius.
+        radius: radius of the balls around the first stage's points, m; it doubles with each stage.
+        neighbours: number of points of a ball; missing ones repeat the first.
+        inner: for each stage whether neighbours within the stage are looked for, within twice its radius.
         sampling: ``grid`` keeps of each cell the point nearest to its middle; cells of the first stage are two thirds
             of the radius wide, and double with each stage (a fourth of a surface's points then stays), and
             ``farthest`` keeps exactly one in four, each the farthest from those already kept.
@@ -85,7 +85,7 @@ def build_neighbours(coord: torch.Tensor, offset: torch.Tensor, neighbourhood: N
     Args:
         coord: (N, 3) float32 or float64, m; on the CPU.
         offset: (B,) integers: where each cloud ends. Clouds may be empty or of one point.
-        neighbourhood: what to look for.
+        neighbourhood: options of the search.
 
     Raises:
         InputError: the offsets don't fit the points, a coordinate is not finite, or a cloud spans more cells of
@@ -177,6 +177,7 @@ def _mix_bits(key: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 
 def _sample(points: Float, radius: float, sampling: Sampling) -> Int:
+    """Return the indices of the points that a stage keeps, by grid or by farthest points."""
     if not len(points):
         return np.zeros(0, dtype=np.int64)
     if sampling == "grid":

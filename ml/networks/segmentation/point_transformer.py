@@ -68,6 +68,7 @@ class PointTransformerOptions(SegmentationNetwork):
     @field_validator("curves")
     @classmethod
     def _refuse_repetitions(cls, curves: tuple[Curve, ...]) -> tuple[Curve, ...]:
+        """Refuse a curve that is named twice."""
         if len(set(curves)) < len(curves):
             raise ValueError("curves must differ")
         return curves
@@ -75,6 +76,7 @@ class PointTransformerOptions(SegmentationNetwork):
     @field_validator("patch", "head_width")
     @classmethod
     def _require_multiples(cls, number: int, field: ValidationInfo) -> int:
+        """Refuse patches that aren't multiples of 8, and heads that aren't multiples of 6 channels."""
         step = 8 if field.field_name == "patch" else 6
         if number % step:
             raise ValueError(f"must be a multiple of {step}, not {number}")
@@ -82,6 +84,7 @@ class PointTransformerOptions(SegmentationNetwork):
 
     @model_validator(mode="after")
     def _check_stages(self) -> PointTransformerOptions:
+        """Refuse stages whose numbers of channels and blocks don't fit each other or the heads."""
         if len(self.channels) != len(self.blocks):
             raise ValueError(f"blocks must be as many as channels, {len(self.channels)}")
         if min(self.blocks) < 0 or max(self.blocks) > 64:
@@ -106,14 +109,14 @@ class PointTransformerOptions(SegmentationNetwork):
         return PointTransformer(self, features, classes)
 
     def onnx_inputs(self, batch: Batch) -> OnnxInputs:
-        """Return what is found of a batch's cells, and their lengths' names."""
+        """Return the tensors of a batch's cells, and the names of their lengths."""
         cells = build_cells(batch["coord"], batch["offset"], self.grid, always_masked=True)
         inputs = {name: value for name, value in cells.items() if not name.startswith("ends")}
         return OnnxInputs(inputs, {name: _lengths(name) for name in inputs})
 
 
 def _lengths(name: str) -> dict[int, str]:
-    """Return which axes of one of `Cells` may have any length, and what the lengths are called."""
+    """Return the axes of any length of one of the tensors `Cells`, with the lengths' names."""
     kind, stage = name[:-1], int(name[-1])
     if kind in ("cell", "share", "inside"):
         return {0: "points0"}
@@ -138,9 +141,9 @@ class PointTransformer(nn.Module):
     """Convolutions and attention on the cells of packed clouds, and a class for every point.
 
     Args:
-        options: its stages.
-        features: of a point.
-        classes: of the output.
+        options: options of the network.
+        features: number of features of a point.
+        classes: number of classes.
     """
 
     def __init__(self, options: PointTransformerOptions, features: int, classes: int) -> None:
@@ -168,7 +171,7 @@ class PointTransformer(nn.Module):
 
         Args:
             feat: (N, features).
-            batch: with ``coord`` (N, 3) and ``offset`` (B,), or with what `build_cells` finds of them.
+            batch: batch with ``coord`` (N, 3) and ``offset`` (B,), or with the tensors of `build_cells`.
 
         Raises:
             InputError: features and coordinates don't fit each other or the network, or there is no grid for them.
@@ -199,7 +202,7 @@ class PointTransformer(nn.Module):
         return scores
 
     def _views(self, cells: Cells, stage: int) -> Iterator[View]:
-        """Yield for each further block of a stage what its cells look at, without end."""
+        """Yield the view of each further block of a stage, without end: its neighbours or the patches of a curve."""
         ends = cells.get(f"ends{stage}")
         if stage < self.options.attention_from:
             yield from repeat(View(ends, around=Around(cells[f"near{stage}"])))
@@ -219,8 +222,8 @@ class View:
     Attributes:
         ends: where each cloud's cells end (B,); None where nothing is dropped.
         around: the cells around each, for convolutions.
-        patch, place, filled: of one curve, see `Cells`; for attention.
-        turns: of `rotations`, for attention.
+        patch, place, filled: tensors of one curve (`Cells`), for attention.
+        turns: cosines and sines of `rotations`, for attention.
     """
 
     ends: Tensor | None
@@ -246,21 +249,21 @@ def rotations(places: Tensor, width: int) -> tuple[Tensor, Tensor]:
 
 @full_precision
 def rotate_pairs(values: Tensor, cosine: Tensor, sine: Tensor) -> Tensor:
-    """Return values (M, heads, width) with their pairs of channels, half the width apart, turned by angles."""
+    """Return values (M, heads, width) with pairs of channels, half the width apart, rotated by angles (RoPE)."""
     first_half, second_half = values.chunk(2, dim=-1)
     return torch.cat([first_half * cosine - second_half * sine, first_half * sine + second_half * cosine], dim=-1)
 
 
 def drop_clouds(change: Tensor, ends: Tensor | None, share: float, training: bool) -> Tensor:
-    """Return the change (M, C) that a block makes, in training without that of a random share of the clouds.
+    """Return a block's change of features (M, C), in training 0 for a random share of the clouds (stochastic depth).
 
-    What stays is scaled up, so that the mean is as it is without.
+    The other clouds' change is scaled up, so that the expected value stays.
 
     Args:
-        change: of the cells.
+        change: (M, C) change of the cells' features.
         ends: where each cloud's cells end (B,).
-        share: of the clouds.
-        training: whether any are left out.
+        share: probability of dropping a cloud's change.
+        training: whether the network is in training; nothing is dropped otherwise.
     """
     if not training or not share or ends is None:
         return change
@@ -316,7 +319,7 @@ class AttentionBlock(nn.Module):
         return values + drop_clouds(self.narrow(expanded), view.ends, self.drop, self.training)
 
     def _attention(self, values: Tensor, view: View) -> Tensor:
-        """Return what each cell (M, width) takes from the cells of its patch."""
+        """Return the attention's output (M, width) for each cell from the cells of its patch."""
         assert view.patch is not None
         assert view.place is not None
         assert view.turns is not None
@@ -360,9 +363,9 @@ class Unpool(nn.Module):
         """Return features (N, skip channels) of cells from theirs before and those of the wider cells around them.
 
         Args:
-            skip: of the stage before (N, skip channels).
-            coarse: of the wider cells (M, in channels).
-            parent: (N,) the wider cell of each.
+            skip: (N, skip channels) features of the stage before.
+            coarse: (M, in channels) features of the wider cells.
+            parent: (N,) index of the wider cell that each cell lies in.
         """
         result: Tensor = self.own(skip) + self.wide(coarse).index_select(0, parent)
         return result

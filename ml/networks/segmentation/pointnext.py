@@ -80,14 +80,14 @@ class PointNeXtOptions(SegmentationNetwork):
         return self.sampling == "grid"
 
     def onnx_inputs(self, batch: Batch) -> OnnxInputs:
-        """Return the stages' points and who looks at whom, and their lengths' names."""
+        """Return the tensors of the stages' points and neighbours, and the names of their lengths."""
         neighbours = build_neighbours(batch["coord"], batch["offset"], self.neighbourhood)
         inputs = {name: value for name, value in neighbours.items() if not name.startswith("offset")}
         return OnnxInputs(inputs, {name: {0: f"points{_rows_of(name)}"} for name in inputs})
 
 
 def _rows_of(name: str) -> int:
-    """Return the stage whose points an array of `Neighbours` has rows for."""
+    """Return the stage whose points are the rows of an array of `Neighbours`, by the array's name."""
     stage = int(name[-1])
     return stage - 1 if name[:-1] in ("nearest", "weight") else stage
 
@@ -96,9 +96,9 @@ class PointNeXt(nn.Module):
     """PointNeXt (Qian et al. 2022) for semantic segmentation of packed clouds.
 
     Args:
-        options: its size and neighbourhoods.
-        features: of a point.
-        classes: of the output.
+        options: size and neighbourhoods.
+        features: number of features of a point.
+        classes: number of classes.
     """
 
     def __init__(self, options: PointNeXtOptions, features: int, classes: int) -> None:
@@ -199,9 +199,9 @@ class SetAbstraction(nn.Module):
         """Return features (M, out_channels) of the remaining points.
 
         Args:
-            values: of all points (N, in_channels).
-            sample: the remaining ones among them (M,).
-            grouping: whom the remaining look at.
+            values: (N, in_channels) features of all points.
+            sample: (M,) indices of the remaining points.
+            grouping: neighbours of the remaining points.
         """
         if self.second is None or self.second_norm is None:
             pooled = normalised_max(values, self.first.weight, self.first_norm, grouping)
@@ -243,9 +243,9 @@ class FeaturePropagation(nn.Module):
 
         Args:
             skip: features of the stage before (N, skip_channels).
-            coarse: of the thin stage (M, in_channels).
-            nearest_index: (N, 3) three points of the thin stage.
-            weight: (N, 3) their weights.
+            coarse: (M, in_channels) features of the coarser stage.
+            nearest_index: (N, 3) indices of the three nearest points of the coarser stage.
+            weight: (N, 3) weights of these points.
         """
         skip_weight, coarse_weight = self.join.weight.split([skip.shape[1], coarse.shape[1]], dim=1)
         fused = torch.addmm(interpolate(coarse @ coarse_weight.T, nearest_index, weight), skip, skip_weight.T)
