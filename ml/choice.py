@@ -141,29 +141,29 @@ def cloud_traits(path: Path) -> CloudTraits:
             if not len(block):
                 continue
             plan = np.floor(block.xyz[:, :2]).astype(np.int64)
-            places, counts = np.unique(plan, axis=0, return_counts=True)
-            for place, count in zip(map(tuple, places.tolist()), counts.tolist(), strict=True):
-                cells[place] = cells.get(place, 0) + count
+            cell_corners, counts = np.unique(plan, axis=0, return_counts=True)
+            for cell_corner, count in zip(map(tuple, cell_corners.tolist()), counts.tolist(), strict=True):
+                cells[cell_corner] = cells.get(cell_corner, 0) + count
             brightest = max(brightest, float(block.intensity.max()))
             darkest = min(darkest, float(block.intensity.min()))
             colorful = colorful or bool(cloud.header.has_color and block.rgb.any())
     if not cells:
         raise InputError(str(path), None, "has no points")
-    places, counts = np.array(list(cells)), np.array(list(cells.values()), dtype=np.float64)
+    cell_corners, counts = np.array(list(cells)), np.array(list(cells.values()), dtype=np.float64)
     lower_count, median, upper_count = np.percentile(counts, [20, 50, 90])
     unevenness = float(upper_count / max(lower_count, 1.0))
     names = (("intensity", brightest > darkest), ("color", colorful))
     return CloudTraits(
         density=float(median),
         unevenness=unevenness,
-        platform=_platform(float(median), unevenness, places.astype(np.float64)),
+        platform=_platform(float(median), unevenness, cell_corners.astype(np.float64)),
         attributes=frozenset(name for name, is_present in names if is_present),
     )
 
 
-def _platform(density: float, unevenness: float, places: np.ndarray[Any, np.dtype[np.float64]]) -> Platform:
+def _platform(density: float, unevenness: float, cell_corners: np.ndarray[Any, np.dtype[np.float64]]) -> Platform:
     """Return the likely platform: even clouds are seen from above, uneven ones from the road."""
     if unevenness < _UNEVEN:
         return "uav" if density >= _DENSE else "airborne"
-    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(places.T)), 1.0)) if len(places) > 2 else np.ones(2)
+    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(cell_corners.T)), 1.0)) if len(cell_corners) > 2 else np.ones(2)
     return "mobile" if spread[1] > _LONG * spread[0] else "tripod"

@@ -107,7 +107,7 @@ def apply_effects(
     task: str, sample: Any, options: Part, random: np.random.Generator, *, before_thinning: bool = False
 ) -> None:
     """Apply a task's effects to a sample in order, in place: of order below 0 if `before_thinning`, else the others."""
-    for effect in sorted(_EFFECTS[task].values(), key=lambda one: one.order):
+    for effect in sorted(_EFFECTS[task].values(), key=lambda item: item.order):
         if (effect.order < 0) == before_thinning:
             effect.change(sample, options, random)
 

@@ -311,8 +311,8 @@ def _curves(history: list[dict[str, float]]) -> bytes:
     """Return a PNG with one small plot per figure of the history, over the epochs."""
     names = [name for name in history[-1] if name not in ("epoch", "seconds")]
     figure = new_figure(4 * min(len(names), 3), 3 * -(-len(names) // 3))
-    for place, name in enumerate(names):
-        axes = figure.add_subplot(-(-len(names) // 3), min(len(names), 3), place + 1)
+    for plot_number, name in enumerate(names):
+        axes = figure.add_subplot(-(-len(names) // 3), min(len(names), 3), plot_number + 1)
         axes.plot([epoch["epoch"] for epoch in history], [epoch.get(name, float("nan")) for epoch in history])
         axes.set(title=shown_text(name.replace("_", " ")), xlabel="epoch")
         axes.grid(alpha=0.3)

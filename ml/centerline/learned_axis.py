@@ -38,8 +38,8 @@ def learned_axis(folder: FilePath, cloud_file: FilePath) -> Predictor:
 
     def predict(cloud: RoadCloud, path: CloudPath) -> tuple[Float, Float]:
         """Return offset and standard deviation (M,), m, of the predicted axis along a path."""
-        with scratch_folder() as place:
-            course, lines = place / "path.csv", place / "axis.geojson"
+        with scratch_folder() as folder_for_files:
+            course, lines = folder_for_files / "path.csv", folder_for_files / "axis.geojson"
             points = path.points[::5] + cloud.origin[:2]
             np.savetxt(course, points, delimiter=",", header="x,y", comments="", fmt="%.4f")
             task(name).predict(trained_run, Prediction(cloud_file, lines, course))

@@ -111,7 +111,7 @@ class CenterlinePredictor:
         """
         mean, raw_std = self._combine_sequences(road, frames)
         calibration = [self.calibration[name] for name in TARGETS]
-        factors, widths = np.array([one.factor for one in calibration]), np.array([one.widths for one in calibration])
+        factors, widths = np.array([target_calibration.factor for target_calibration in calibration]), np.array([target_calibration.widths for target_calibration in calibration])
         return Regression(frames, mean, raw_std, raw_std * factors, raw_std[:, :, None] * widths)
 
     def _combine_sequences(self, road: LearningRoad, frames: Frames) -> tuple[Float, Float]:
@@ -201,14 +201,14 @@ def smooth_line(frames: Frames, y: Float, std: Float, reach: int) -> Float:
         std: (M,) its standard deviation, m.
         reach: number of interleaved sequences; with 1 nothing changes.
     """
-    place, result = frames.at(y), y.copy()
+    line_points, result = frames.at(y), y.copy()
     cos, sin = np.cos(frames.direction), np.sin(frames.direction)
     for part in stretches(frames):
         total = np.zeros((5, len(part)))
         for shift in range(1 - reach, reach):
             rows = part[max(0, -shift) : max(0, len(part) - max(0, shift))]
             neighbour_rows = rows + shift
-            dx, dy = (place[neighbour_rows] - frames.position[rows]).T
+            dx, dy = (line_points[neighbour_rows] - frames.position[rows]).T
             forward_distance, lateral_distance = cos[rows] * dx + sin[rows] * dy, cos[rows] * dy - sin[rows] * dx
             weight = np.nan_to_num((reach - abs(shift)) / std[neighbour_rows] ** 2) * np.isfinite(lateral_distance)
             forward_distance, lateral_distance = np.nan_to_num(forward_distance), np.nan_to_num(lateral_distance)

@@ -239,10 +239,10 @@ class Batches:
         The first pass takes the samples in the order in which they are drawn, further ones in random order.
         """
         size, steps_per_pass = self.options.size, self.options.steps // self.options.passes
-        turn, place = divmod(number, steps_per_pass)
+        turn, batch_in_pass = divmod(number, steps_per_pass)
         order = stream(self.seed, "order", epoch, turn).permutation(self.drawn_per_epoch)
         numbers = order if turn else np.arange(len(order))
-        return turn, numbers[place * size : (place + 1) * size].tolist()
+        return turn, numbers[batch_in_pass * size : (batch_in_pass + 1) * size].tolist()
 
 
 class StreamedBatches:

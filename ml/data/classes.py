@@ -60,8 +60,8 @@ class LabelMapping(Model):
 
     def label(self, numbers: NDArray[np.integer], names: tuple[str, ...]) -> NDArray[np.int16]:
         """Return the index in `targets(names)` of each number (N,) of a file; `IGNORED` (-1) where it isn't mapped."""
-        places = {name: place for place, name in enumerate(self.targets(names))}
-        table = {int(number): places[name] for number, name in self.classes.items()}
+        index_by_name = {name: class_index for class_index, name in enumerate(self.targets(names))}
+        table = {int(number): index_by_name[name] for number, name in self.classes.items()}
         distinct_numbers, inverse = np.unique(numbers, return_inverse=True)
         indices = np.array([table.get(int(number), IGNORED) for number in distinct_numbers], dtype=np.int16)
         return indices[inverse.reshape(-1)] if len(distinct_numbers) else np.zeros(0, dtype=np.int16)
@@ -72,8 +72,8 @@ class LabelMapping(Model):
         if not self.groups:
             return np.arange(len(names), dtype=np.int16)
         table = np.full(len(names), IGNORED, dtype=np.int16)
-        for place, group in enumerate(targets):
-            table[[names.index(member) for member in self.groups[group]]] = place
+        for group_index, group in enumerate(targets):
+            table[[names.index(member) for member in self.groups[group]]] = group_index
         return table
 
 
@@ -110,10 +110,10 @@ def table_between(source: Mapping[int, str], scheme: ClassScheme, where: str) ->
     names = class_names(scheme)
     full_names = {row.id: row.name for row in class_scheme("17").rows}
     members: dict[str, int] = {}
-    for place, row in enumerate(scheme.rows):
+    for class_index, row in enumerate(scheme.rows):
         for member in row.of:
             if not isinstance(member, ClassSelector):
-                members[full_names.get(member, "") if isinstance(member, int) else member] = place
+                members[full_names.get(member, "") if isinstance(member, int) else member] = class_index
     table = np.full(256, IGNORED, dtype=np.int16)
     for number, name in source.items():
         if number == UNLABELLED or name == "unlabelled":

@@ -124,13 +124,13 @@ class CropDataset(Dataset[Item]):
     def __len__(self) -> int:
         return len(self.plan)
 
-    def __getitem__(self, place: int) -> Item:
-        crop, random = self.crop(place)
+    def __getitem__(self, crop_index: int) -> Item:
+        crop, random = self.crop(crop_index)
         return make_item(crop, self.settings, random)
 
-    def crop(self, place: int) -> tuple[Crop, np.random.Generator]:
+    def crop(self, crop_index: int) -> tuple[Crop, np.random.Generator]:
         """Return a planned crop after its effects, and the random stream to go on with."""
-        draw = self.plan[place]
+        draw = self.plan[crop_index]
         random = stream(self.seed, "crop", self.epoch, draw.tile, draw.number)
         return _draw_crop(self, draw.tile, random), random
 
@@ -209,9 +209,9 @@ def make_item(crop: Crop, settings: CropSettings, random: np.random.Generator) -
     return {name: torch.from_numpy(np.ascontiguousarray(array)) for name, array in arrays.items()}
 
 
-def _draw_crop(crops: CropDataset | CropStream, place: int, random: np.random.Generator) -> Crop:
+def _draw_crop(crops: CropDataset | CropStream, tile_index: int, random: np.random.Generator) -> Crop:
     """Return an augmented crop around a random point of the tile, or of the tile that the seeds choose."""
-    number, point = crops.seeds.draw(place, random)
+    number, point = crops.seeds.draw(tile_index, random)
     tile = crops.tiles[number]
     crop = cut_crop(tile, tile.coord[point], crops.settings.points, crops.scalings[tile.scene])
     apply_effects("segmentation", crop, crops.effects, random)

@@ -36,11 +36,11 @@ class ExchangedCrops:
     def __len__(self) -> int:
         return len(self.synthetic)
 
-    def __getitem__(self, place: int) -> list[Item]:
+    def __getitem__(self, pair_index: int) -> list[Item]:
         """Return the pair at a place as two items."""
-        synthetic_crop, random = self.synthetic.crop(place)
-        target_crop, _ = self.target.crop(place)
-        pair = exchange_classes(synthetic_crop, target_crop, stream(self.seed, "exchange", self.epoch, place))
+        synthetic_crop, random = self.synthetic.crop(pair_index)
+        target_crop, _ = self.target.crop(pair_index)
+        pair = exchange_classes(synthetic_crop, target_crop, stream(self.seed, "exchange", self.epoch, pair_index))
         return [make_item(crop, self.synthetic.settings, random) for crop in pair]
 
 

@@ -210,8 +210,8 @@ def estimated_path(xyz: Float, cell: float = 4.0, window: float = 60.0, half_wid
 
 def _cells(plan: Float, cell: float) -> Float:
     """Return the mean (C, 2) of the points in every occupied cell of a grid of edge `cell`, m."""
-    at = np.floor((plan - plan.min(axis=0)) / cell).astype(np.int64)
-    _, owner, counts = np.unique(at @ np.array([1 << 32, 1]), return_inverse=True, return_counts=True)
+    cell_index = np.floor((plan - plan.min(axis=0)) / cell).astype(np.int64)
+    _, owner, counts = np.unique(cell_index @ np.array([1 << 32, 1]), return_inverse=True, return_counts=True)
     if len(counts) < 2:
         raise InputError("cloud", len(plan), f"must reach farther than {cell:g} m for its road to be found")
     return np.column_stack([np.bincount(owner, plan[:, column]) for column in (0, 1)]) / counts[:, None]

@@ -99,17 +99,17 @@ def choose_tiles(tiles: Iterable[Packed], limit: int, seed: int) -> list[Packed]
     order = stream(seed, "packed tiles").permutation(len(all_tiles))
     turns: dict[str, int] = {}
     ranked = []
-    for place in order.tolist():
-        scene = str(all_tiles[place].notes["scene"])
-        ranked.append((turns.get(scene, 0), place))
+    for tile_index in order.tolist():
+        scene = str(all_tiles[tile_index].notes["scene"])
+        ranked.append((turns.get(scene, 0), tile_index))
         turns[scene] = turns.get(scene, 0) + 1
     size, chosen_places = 1 << 16, []  # room for the notes' frame
-    for _, place in sorted(ranked):
-        tile_size = len(all_tiles[place].content) + 700  # and for the tile's own notes and names
+    for _, tile_index in sorted(ranked):
+        tile_size = len(all_tiles[tile_index].content) + 700  # and for the tile's own notes and names
         if size + tile_size <= limit:
             size += tile_size
-            chosen_places.append(place)
-    return [all_tiles[place] for place in sorted(chosen_places)]
+            chosen_places.append(tile_index)
+    return [all_tiles[tile_index] for tile_index in sorted(chosen_places)]
 
 
 def pack_summary(notes: Sequence[Mapping[str, Any]], size: int) -> dict[str, Any]:

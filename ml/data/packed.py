@@ -108,7 +108,7 @@ def unpack_tile(packed_tile: Packed) -> CloudTile:
     content = zlib.decompress(packed_tile.content)
     if len(content) != 16 * cubes + 8 * points:
         raise ValueError("length")
-    places = np.frombuffer(content, "<i4", 3 * cubes).reshape(-1, 3).astype(np.int64)
+    cube_indices = np.frombuffer(content, "<i4", 3 * cubes).reshape(-1, 3).astype(np.int64)
     counts = np.frombuffer(content, "<i4", cubes, 12 * cubes)
     planes = np.frombuffer(content, np.uint8, 8 * points, 16 * cubes).reshape(8, points)
     word = np.ascontiguousarray(planes.T).view("<u8").reshape(-1)
@@ -117,7 +117,7 @@ def unpack_tile(packed_tile: Packed) -> CloudTile:
         """Return the numbers (N,) in some bits of all words, from the lowest bit ``shift`` on."""
         return ((word >> np.uint64(shift)) & np.uint64((1 << count) - 1)).astype(np.int64)
 
-    steps = np.stack([bits(10 * axis, 10) for axis in range(3)], axis=1) + np.repeat(places * CUBE, counts, axis=0)
+    steps = np.stack([bits(10 * axis, 10) for axis in range(3)], axis=1) + np.repeat(cube_indices * CUBE, counts, axis=0)
     color = np.stack([bits(30, 5) * 255 / 31, bits(35, 6) * 255 / 63, bits(41, 5) * 255 / 31], axis=1)
     segment = bits(59, 5)
     return CloudTile(
@@ -146,8 +146,8 @@ def write_pack(path: Path, tiles: list[Packed], scheme: ClassScheme, voxel: floa
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(zipfile.ZipInfo("notes.json", _TIME), json.dumps(notes))
-        for place, tile in enumerate(tiles):
-            archive.writestr(zipfile.ZipInfo(f"{place:06d}", _TIME), tile.content)
+        for tile_index, tile in enumerate(tiles):
+            archive.writestr(zipfile.ZipInfo(f"{tile_index:06d}", _TIME), tile.content)
     write_file(path, content.getvalue(), overwrite=overwrite)
     return len(content.getvalue())
 
@@ -181,9 +181,9 @@ class PackReader:
     def __len__(self) -> int:
         return len(self.notes)
 
-    def tile(self, place: int) -> CloudTile:
+    def tile(self, tile_index: int) -> CloudTile:
         """Return the tile of an index, decompressed; raise `InputError` if the file is damaged there."""
         try:
-            return unpack_tile(Packed(self.notes[place], self._archive.read(f"{place:06d}")))
+            return unpack_tile(Packed(self.notes[tile_index], self._archive.read(f"{tile_index:06d}")))
         except (*ARCHIVE_FAULTS, TypeError):
-            raise InputError(str(self.path), None, f"is damaged at tile {place}") from None
+            raise InputError(str(self.path), None, f"is damaged at tile {tile_index}") from None

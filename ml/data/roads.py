@@ -125,7 +125,7 @@ class LearningRoad(Points):
         stations = self.reference.project(np.concatenate(corners))[0].reshape(4, -1)
         first_points = np.searchsorted(self.station, stations.min(axis=0) - _MARGIN)
         end_points = np.searchsorted(self.station, stations.max(axis=0) + _MARGIN)
-        index, place, counts = [], [], []
+        index, local_points, counts = [], [], []
         for origin, direction, begin, end in zip(
             frames.position, frames.direction, first_points, end_points, strict=True
         ):
@@ -134,10 +134,10 @@ class LearningRoad(Points):
             x, y = cos * delta[:, 0] + sin * delta[:, 1], cos * delta[:, 1] - sin * delta[:, 0]
             rows = np.flatnonzero((np.abs(x) <= half_thickness) & (np.abs(y) <= half_width))
             index.append(begin + rows)
-            place.append(np.column_stack([x[rows], y[rows]]))
+            local_points.append(np.column_stack([x[rows], y[rows]]))
             counts.append(len(rows))
         number = np.repeat(np.arange(len(frames)), counts)
-        return Slices(np.concatenate(index), number, np.concatenate(place))
+        return Slices(np.concatenate(index), number, np.concatenate(local_points))
 
 
 @dataclass(frozen=True)
@@ -323,39 +323,39 @@ def _write_cache(road: LearningRoad, folder: Path, cache: Path) -> None:
     Raises:
         OutputError: the cache can't be written.
     """
-    place = _cache_folder(folder, cache)
+    cache_folder = _cache_folder(folder, cache)
     notes = {"origin": road.origin.tolist(), "classes": road.class_names, "has_color": road.has_color}
     try:
         cache.mkdir(parents=True, exist_ok=True)
         with scratch_folder(cache) as scratch:
-            new_folder = scratch / place.name
+            new_folder = scratch / cache_folder.name
             new_folder.mkdir()
             for array in _CACHED:
                 np.save(new_folder / f"{array}.npy", getattr(road, array))
             np.save(new_folder / "reference.npy", road.reference.points)
             (new_folder / "notes.json").write_text(json.dumps(notes), encoding="utf-8")
-            shutil.rmtree(place, ignore_errors=True)
+            shutil.rmtree(cache_folder, ignore_errors=True)
             with suppress(OSError):  # another training has just kept the same
-                new_folder.rename(place)
+                new_folder.rename(cache_folder)
     except OSError as error:
         raise OutputError("data.cache", str(cache), f"cannot be written ({error.strerror})") from None
 
 
 def _read_cache(folder: Path, cache: Path) -> LearningRoad | None:
     """Return a scene's road from the cache, arrays memory-mapped; None if it isn't there or damaged."""
-    place = _cache_folder(folder, cache)
+    cache_folder = _cache_folder(folder, cache)
     try:
-        notes = json.loads((place / "notes.json").read_text(encoding="utf-8"))
-        arrays = {name: np.load(place / f"{name}.npy", mmap_mode="r") for name in _CACHED}
+        notes = json.loads((cache_folder / "notes.json").read_text(encoding="utf-8"))
+        arrays = {name: np.load(cache_folder / f"{name}.npy", mmap_mode="r") for name in _CACHED}
         count = len(arrays["xyz"])
-        if any(arrays[name].dtype != of[0] or arrays[name].shape != (count, *of[1]) for name, of in _CACHED.items()):
+        if any(arrays[name].dtype != type_and_shape[0] or arrays[name].shape != (count, *type_and_shape[1]) for name, type_and_shape in _CACHED.items()):
             return None
         return LearningRoad(
             name=folder.name,
             origin=np.array(notes["origin"], dtype=np.float64).reshape(3),
             class_names={int(number): str(name) for number, name in notes["classes"].items()},
             has_color=bool(notes["has_color"]),
-            reference=MeasuredAxis(np.load(place / "reference.npy")),
+            reference=MeasuredAxis(np.load(cache_folder / "reference.npy")),
             **arrays,
         )
     except (*ARCHIVE_FAULTS, TypeError, AttributeError, InputError):

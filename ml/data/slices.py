@@ -99,8 +99,8 @@ class SliceDataset(Dataset[Sample]):
     def __post_init__(self) -> None:
         """Find the stations at which sequences can begin."""
         self.epoch = 0
-        places = (_starts(road, number, self.settings) for number, road in enumerate(self.roads))
-        self._starts = [starts for starts in places if starts]
+        starts_by_road = (_starts(road, number, self.settings) for number, road in enumerate(self.roads))
+        self._starts = [starts for starts in starts_by_road if starts]
         if not self._starts:
             length = self.settings.spacing * (self.settings.slices - 1)
             raise InputError("roads", len(self.roads), f"none has a known {self.settings.truth} over {length:g} m")
@@ -182,9 +182,9 @@ class FrameSlices(Dataset[Sample]):
     def __getitem__(self, number: int) -> Sample:
         run = self.runs[number]
         run_frames = self.frames.select(run)
-        place = int(np.floor(1000.0 * run_frames.station[0])) & 0xFFFFFFFF
+        station_key = int(np.floor(1000.0 * run_frames.station[0])) & 0xFFFFFFFF
         stretch = cut_stretch(self.road, run_frames, self.settings)
-        return make_sample(stretch, self.settings, stream(0, "frames", place), 0, run)
+        return make_sample(stretch, self.settings, stream(0, "frames", station_key), 0, run)
 
 
 def cut_stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> Stretch:

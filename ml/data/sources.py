@@ -115,8 +115,8 @@ def _packed_tiles(path: Path, scheme: ClassScheme, voxel: float | None) -> Itera
     if voxel is not None and pack.voxel > voxel * (1.0 + 1e-9):
         raise InputError("voxel", voxel, f"must be at least {pack.voxel:g} m, as the points of {path} were thinned")
     table = table_between(dict(enumerate(class_names(pack.scheme))), scheme, str(path))
-    for place in range(len(pack)):
-        tile = pack.tile(place)
+    for tile_index in range(len(pack)):
+        tile = pack.tile(tile_index)
         yield replace(tile, segment=_class_indices(tile.segment, tile.segment != IGNORED, table))
 
 
@@ -281,10 +281,10 @@ def yardstick_tiles(folder: Path, scheme: ClassScheme, source: Source) -> Iterat
         lowest = np.min([block.xyz.min(axis=0) for block, _ in numbered_blocks(path, yardstick) if len(block)], axis=0)
         with tempfile.TemporaryDirectory() as scratch, TileSorter(edge, np.floor(lowest), Path(scratch)) as sorter:
             for block, numbers in numbered_blocks(path, yardstick):
-                places = mapping.label(numbers, names)
+                class_indices = mapping.label(numbers, names)
                 if mapping.ignore_zero_intensity:
-                    places = np.where(block.intensity > 0, places, IGNORED).astype(np.int16)
-                sorter.add([_with_class_indices(block, places)])
+                    class_indices = np.where(block.intensity > 0, class_indices, IGNORED).astype(np.int16)
+                sorter.add([_with_class_indices(block, class_indices)])
             for part in sorter.tiles():
                 yield tile_of(part.points, scene, part.corner, FULL)
 
@@ -323,15 +323,15 @@ def labelled_blocks(cloud: CloudReader, scheme: ClassScheme, source: Source) -> 
     for file_block, file_numbers in zip(cloud.blocks(), _numbers(cloud, mapping.field), strict=True):
         is_usable = cloud.usable_points(file_block, noise=True)  # it is for the mapping to say what numbers mean
         block, numbers = without_flags(file_block.select(is_usable)), file_numbers[is_usable]
-        places = mapping.label(numbers, names)
+        class_indices = mapping.label(numbers, names)
         if mapping.ignore_zero_intensity:
-            places = np.where(block.intensity > 0, places, IGNORED).astype(np.int16)
-        yield _with_class_indices(block, places)
+            class_indices = np.where(block.intensity > 0, class_indices, IGNORED).astype(np.int16)
+        yield _with_class_indices(block, class_indices)
 
 
-def _with_class_indices(block: PointBlock, places: NDArray[np.int16]) -> PointBlock:
+def _with_class_indices(block: PointBlock, class_indices: NDArray[np.int16]) -> PointBlock:
     """Return a block with class indices (N,) as its class ids, 255 where they are `IGNORED`."""
-    return replace(block, class_id=np.where(places == IGNORED, UNLABELLED, places).astype(np.uint8))
+    return replace(block, class_id=np.where(class_indices == IGNORED, UNLABELLED, class_indices).astype(np.uint8))
 
 
 def _numbers(cloud: CloudReader, field: str) -> Iterator[AnyArray]:

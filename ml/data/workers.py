@@ -76,8 +76,8 @@ def shorten_sockets() -> None:
     Raises:
         OutputError: there is no folder with a short enough name.
     """
-    place = tempfile.gettempdir()
-    if sys.platform == "win32" or _fits(place) or _socket_folders:
+    default_folder = tempfile.gettempdir()
+    if sys.platform == "win32" or _fits(default_folder) or _socket_folders:
         return
     for short_place in _SHORT_PLACES:
         with suppress(OSError):
@@ -91,7 +91,7 @@ def shorten_sockets() -> None:
             finally:
                 tempfile.tempdir = previous_folder
             return
-    raise OutputError("temporary folder", place, "has too long a name for data workers; TMPDIR names another")
+    raise OutputError("temporary folder", default_folder, "has too long a name for data workers; TMPDIR names another")
 
 
 def _fits(folder: str) -> bool:

@@ -147,8 +147,8 @@ def skeleton_centers(
 
 def skeletons(xy: Float, intensity: Float | None, origin: Float, settings: SkeletonSettings) -> list[Float]:
     """Return per window of 100 slices the points (K, 2), m, of the pruned skeleton of the road's raster."""
-    place = cKDTree(origin)
-    slice_of = place.query(xy)[1]
+    frame_tree = cKDTree(origin)
+    slice_of = frame_tree.query(xy)[1]
     order = np.argsort(slice_of, kind="stable")
     sorted_slices = slice_of[order]
     result = []
@@ -159,7 +159,7 @@ def skeletons(xy: Float, intensity: Float | None, origin: Float, settings: Skele
         line = np.empty((0, 2))
         if len(indices):
             line = skeleton_points(xy[indices], None if intensity is None else intensity[indices], settings)
-        nearest_slice = place.query(line)[1] if len(line) else np.empty(0, dtype=np.intp)
+        nearest_slice = frame_tree.query(line)[1] if len(line) else np.empty(0, dtype=np.intp)
         result.append(line[(nearest_slice >= first_slice) & (nearest_slice < end_slice)])
     return result
 

@@ -85,8 +85,8 @@ class Confusion:
         """Return per-class scores, means, accuracy, counts and the matrix as JSON data; NaN becomes None."""
         columns = {metric: self.values(metric) for metric in METRICS}
         rows = {
-            name: {metric: nan_to_none(values[place]) for metric, values in columns.items()} | {"support": int(support)}
-            for place, (name, support) in enumerate(zip(self.names, self.support, strict=True))
+            name: {metric: nan_to_none(values[class_index]) for metric, values in columns.items()} | {"support": int(support)}
+            for class_index, (name, support) in enumerate(zip(self.names, self.support, strict=True))
         }
         return {
             "classes": rows,
@@ -149,9 +149,9 @@ def tables_by_test(results: Mapping[str, Mapping[str, Mapping[str, Scores]]], ro
     """
     variant_runs = {name: list(seeds.values()) for name, seeds in results.items() if seeds}
     lines = [f"IoU in %, {NOTE}.", ""]
-    for place, test in enumerate(next(iter(variant_runs.values()))[0] if variant_runs else ()):
+    for test_number, test in enumerate(next(iter(variant_runs.values()))[0] if variant_runs else ()):
         body = _class_rows([([run[test] for run in runs], "iou") for runs in variant_runs.values()])
-        lines += [f"**{test}**", "", *_class_table(list(variant_runs), body), *(rows if place == 0 else ()), ""]
+        lines += [f"**{test}**", "", *_class_table(list(variant_runs), body), *(rows if test_number == 0 else ()), ""]
     counts = ", ".join(f"{name} {len(runs)}" for name, runs in variant_runs.items())
     return "\n".join([*lines, f"Seeds: {counts}."])
 

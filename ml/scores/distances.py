@@ -104,13 +104,13 @@ class Comparison:
         """Chamfer distances between polynomials of the predicted and the true line, m; cached."""
         return chamfer(self.predicted, self.true, self.station)
 
-    def coverage(self, place: int) -> float | None:
+    def coverage(self, level_index: int) -> float | None:
         """Return the share of distances within the predicted interval of `LEVELS[place]`; None without deviations."""
         if self.std is None:
             return None
         if self.intervals is None:
-            return coverage(self.distance, self.std[self.both], LEVELS[place])
-        return _mean((self.distance <= self.intervals[self.both, place]).astype(np.float64))
+            return coverage(self.distance, self.std[self.both], LEVELS[level_index])
+        return _mean((self.distance <= self.intervals[self.both, level_index]).astype(np.float64))
 
 
 def _mean(values: Float) -> float:
@@ -163,9 +163,9 @@ class TargetErrors:
     widths: Float
     whole: bool
 
-    def inside(self, place: int) -> float:
+    def inside(self, level_index: int) -> float:
         """Return the share of errors within the predicted interval of `LEVELS[place]`; NaN without slices."""
-        return _mean((self.size <= self.widths[:, place]).astype(np.float64))
+        return _mean((self.size <= self.widths[:, level_index]).astype(np.float64))
 
 
 TARGET_METRICS = {

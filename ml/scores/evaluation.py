@@ -218,7 +218,7 @@ def along_parabolas(predictor: Predictor, length: float) -> Predictor:
     def predict(road: LearningRoad, frames: Frames) -> Float:
         """Return the centres (M, 1), m, of parabolas through the other predictor's centres."""
         y = predictor(road, frames)[:, 0]
-        place, result = frames.at(y), np.full(len(y), np.nan)
+        center_points, result = frames.at(y), np.full(len(y), np.nan)
         for part in stretches(frames):
             found_rows = part[np.isfinite(y[part])]
             for index in part:
@@ -226,7 +226,7 @@ def along_parabolas(predictor: Predictor, length: float) -> Predictor:
                 if len(neighbours) >= baselines.FEWEST:
                     cos, sin = np.cos(frames.direction[index]), np.sin(frames.direction[index])
                     x, lateral_offset = (
-                        (place[neighbours] - frames.position[index]) @ np.array([[cos, -sin], [sin, cos]])
+                        (center_points[neighbours] - frames.position[index]) @ np.array([[cos, -sin], [sin, cos]])
                     ).T
                     result[index] = np.polyfit(x, lateral_offset, 2)[2]
         return result[:, None]

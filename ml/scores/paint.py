@@ -47,17 +47,17 @@ def with_painted_line(road: LearningRoad) -> LearningRoad:
     logs = logarithms(road.intensity[is_near].astype(np.float64))
     order = np.argsort(station, kind="stable")
     station, offset, logs = station[order], offset[order], logs[order]
-    places = axis.stations(STEP)
-    begins, ends = (np.searchsorted(station, places + side * 0.5 * LENGTH) for side in (-1.0, 1.0))
+    place_stations = axis.stations(STEP)
+    begins, ends = (np.searchsorted(station, place_stations + side * 0.5 * LENGTH) for side in (-1.0, 1.0))
     line_offsets = np.array([_ridge(offset[a:b], logs[a:b]) for a, b in zip(begins, ends, strict=True)])
     has_line = np.isfinite(line_offsets)
     if has_line.sum() < 2:
         raise InputError("road", road.name, "has no painted line beside its axis")
-    direction = axis.direction(places[has_line])
+    direction = axis.direction(place_stations[has_line])
     left_normals = np.column_stack([-np.sin(direction), np.cos(direction)])
-    points = axis.position(places[has_line]) + line_offsets[has_line, None] * left_normals
+    points = axis.position(place_stations[has_line]) + line_offsets[has_line, None] * left_normals
     line = MeasuredAxis(
-        np.column_stack([points, axis.elevation(places[has_line])]), np.diff(places[has_line]) < 1.5 * STEP
+        np.column_stack([points, axis.elevation(place_stations[has_line])]), np.diff(place_stations[has_line]) < 1.5 * STEP
     )
     return replace(road, truth=Truth.of_axis(line, truth.kind))
 

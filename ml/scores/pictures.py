@@ -144,9 +144,9 @@ def _draw_cloud(axes: Axes, case: Case, view: PictureView, height: float) -> Non
     axes.set_facecolor("#101418")
     if case.road.known_truth.left is None:
         station_edges, offset_edges = np.arange(view.first, view.last + 0.5), np.arange(-height, height + 0.125, 0.25)
-        places = np.column_stack([station[visible_points], offset[visible_points]])
-        count, _ = np.histogramdd(places, bins=[station_edges, offset_edges])
-        total, _ = np.histogramdd(places, bins=[station_edges, offset_edges], weights=intensity)
+        plan_points = np.column_stack([station[visible_points], offset[visible_points]])
+        count, _ = np.histogramdd(plan_points, bins=[station_edges, offset_edges])
+        total, _ = np.histogramdd(plan_points, bins=[station_edges, offset_edges], weights=intensity)
         axes.pcolormesh(
             station_edges, offset_edges, np.where(count > 0, total / np.maximum(count, 1), np.nan).T, **style
         )

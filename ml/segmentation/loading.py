@@ -72,9 +72,9 @@ def thin_tiles(
         title: title of the domain.
         labels: whether labels are read; else all are `IGNORED`.
     """
-    for place, source in enumerate(sources):
+    for source_number, source in enumerate(sources):
         for tile in read_tiles(source, configuration.scheme(), configuration.voxel, labels=labels):
-            yield replace(tile, scene=f"{title}/{place}/{tile.scene}")
+            yield replace(tile, scene=f"{title}/{source_number}/{tile.scene}")
 
 
 class CropBatches:
@@ -155,8 +155,8 @@ class ExchangedBatches(CropBatches):
         """Yield the batches of an epoch whose numbers, from 0, `share` selects."""
         configuration = self.configuration
         synthetic, target = (
-            self._crops(tiles, self._draws(len(tiles), place, epoch), seeds, epoch)
-            for place, (tiles, seeds) in enumerate(zip(self.domains, self.seeds, strict=True))
+            self._crops(tiles, self._draws(len(tiles), domain_number, epoch), seeds, epoch)
+            for domain_number, (tiles, seeds) in enumerate(zip(self.domains, self.seeds, strict=True))
         )
         pairs = ExchangedCrops(synthetic, target, configuration.seed, epoch)
         yield from _load_crops(pairs, configuration, epoch, 0.0, share, self.device, self._pairs_per_batch())
@@ -170,11 +170,11 @@ class ExchangedBatches(CropBatches):
         """Return the pairs of a batch: half of its crops, at least one."""
         return max(self.configuration.batch // 2, 1)
 
-    def _draws(self, tiles: int, place: int, epoch: int) -> list[Draw]:
+    def _draws(self, tiles: int, domain_number: int, epoch: int) -> list[Draw]:
         """Return one draw of a domain's tiles for each pair, all tiles as often, in random order."""
-        order = stream(self.configuration.seed, "pairs", place, epoch).permutation(self._pairs())
+        order = stream(self.configuration.seed, "pairs", domain_number, epoch).permutation(self._pairs())
         # Crops of the two domains have numbers, and with them random streams, of their own.
-        return [Draw(int(number % tiles), int(number // tiles) * 2 + place) for number in order]
+        return [Draw(int(number % tiles), int(number // tiles) * 2 + domain_number) for number in order]
 
 
 class StreamedCropBatches:

@@ -61,10 +61,10 @@ def best_offsets(scores: Float32, truth: Int) -> Float:
         improved = True
         while improved:
             improved = False
-            for place in present_classes:
+            for class_index in present_classes:
                 for change in (step, -step):
                     trial_offsets = offsets.copy()
-                    trial_offsets[place] += change
+                    trial_offsets[class_index] += change
                     trial_iou = _mean_iou(scores + trial_offsets.astype(np.float32), truth)
                     if trial_iou > best_iou + _LEAST_GAIN:
                         offsets, best_iou, improved = trial_offsets, trial_iou, True
@@ -73,6 +73,6 @@ def best_offsets(scores: Float32, truth: Int) -> Float:
 
 def _mean_iou(scores: Float32, truth: Int) -> float:
     """Return the mean IoU of the classes of largest scores (N, C) against true classes (N,)."""
-    confusion = Confusion([str(place) for place in range(scores.shape[1])])
+    confusion = Confusion([str(class_index) for class_index in range(scores.shape[1])])
     confusion.add(truth, scores.argmax(axis=1))
     return confusion.mean("iou")

@@ -193,7 +193,7 @@ class TileStore:
             record = np.fromfile(self._folder / f"{row}_{column}", dtype=_RECORD)
             histogram += np.bincount(record["intensity"][voxel_sample(record["place"], voxel)], minlength=LEVELS)
         share = np.cumsum(histogram) / histogram.sum()
-        lower_decile, median, upper_decile = (int(np.searchsorted(share, at)) / FULL for at in (0.1, 0.5, 0.9))
+        lower_decile, median, upper_decile = (int(np.searchsorted(share, cumulative_share)) / FULL for cumulative_share in (0.1, 0.5, 0.9))
         return Scaling(median, upper_decile - lower_decile if upper_decile > lower_decile else 1.0)
 
     def tiles(self) -> Iterator[tuple[CloudTile, Bool, Int]]:
@@ -277,9 +277,9 @@ def write_copy(
             with laspy.open(temporary, "w", header=header, do_compress=compress) as writer:
                 written_count = 0
                 for source_points in reader.chunk_iterator(BLOCK):
-                    places = np.asarray(labels[written_count : written_count + len(source_points)])
-                    writer.write_points(extended_record(source_points, header, ids[places], codes))
-                    counts += np.bincount(places, minlength=256)
+                    class_indices = np.asarray(labels[written_count : written_count + len(source_points)])
+                    writer.write_points(extended_record(source_points, header, ids[class_indices], codes))
+                    counts += np.bincount(class_indices, minlength=256)
                     written_count += len(source_points)
                     progress("writing", written_count / reader.header.point_count)
                 if written_count != len(labels):

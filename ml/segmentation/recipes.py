@@ -253,4 +253,4 @@ def plan(
         order = random.permutation(tiles)
         draws += [Draw(begin + int(order[k % tiles]), k // tiles) for k in range(count)]
         begin += tiles
-    return [draws[place] for place in random.permutation(len(draws))]
+    return [draws[draw_index] for draw_index in random.permutation(len(draws))]

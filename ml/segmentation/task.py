@@ -133,15 +133,15 @@ def _names(evaluation: Evaluation) -> list[str]:
     Raises:
         InputError: a path is given twice.
     """
-    places = [
+    unique_paths = [
         path.parent / f"{path.name}-{evaluation.split}" if path.is_dir() else path.with_suffix("")
         for path in (path_places.absolute() for path_places in evaluation.data)
     ]
-    path_places = zip(evaluation.data, places, strict=True)
-    if repeated_paths := sorted(str(path) for path, place in path_places if places.count(place) > 1):
+    path_places = zip(evaluation.data, unique_paths, strict=True)
+    if repeated_paths := sorted(str(path) for path, unique_path in path_places if unique_paths.count(unique_path) > 1):
         raise InputError("data", repeated_paths[0], "is given twice, or with two endings")
-    longest = max(len(place.parts) for place in places)
-    name_candidates = (["-".join(place.parts[-parts:]) for place in places] for parts in range(1, longest + 1))
+    longest = max(len(unique_path.parts) for unique_path in unique_paths)
+    name_candidates = (["-".join(unique_path.parts[-parts:]) for unique_path in unique_paths] for parts in range(1, longest + 1))
     return next(names for names in name_candidates if len(set(names)) == len(names))
 
 

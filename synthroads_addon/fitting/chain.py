@@ -521,10 +521,10 @@ def _smooth_values(run: Float, values: Float, spacing: float, sample_places: Flo
     return _cubic(sample_places / width, count) @ np.linalg.solve(normal, matrix.T @ (values - centre)) + centre
 
 
-def _cubic(place: Float, count: int) -> Float:
+def _cubic(knot_position: Float, count: int) -> Float:
     """Return the values (N, count + 3) of the cubic B-splines over ``count`` unit intervals at places (N,)."""
-    interval = np.clip(place.astype(np.int64), 0, count - 1)
-    fraction = place - interval
+    interval = np.clip(knot_position.astype(np.int64), 0, count - 1)
+    fraction = knot_position - interval
     # Uniform cubic B-splines: (1 - f)^3, 3 f^3 - 6 f^2 + 4, -3 f^3 + 3 f^2 + 3 f + 1 and f^3, each over 6.
     weights = (
         np.stack(
@@ -538,8 +538,8 @@ def _cubic(place: Float, count: int) -> Float:
         )
         / 6
     )
-    matrix = np.zeros((len(place), count + 3))
-    matrix[np.arange(len(place))[:, None], interval[:, None] + np.arange(4)] = weights
+    matrix = np.zeros((len(knot_position), count + 3))
+    matrix[np.arange(len(knot_position))[:, None], interval[:, None] + np.arange(4)] = weights
     return matrix
 
 

@@ -358,13 +358,13 @@ class _Part:
         )
 
 
-def _richer_models(model: Model, element: int, place: float) -> Iterator[Model]:
+def _richer_models(model: Model, element: int, station: float) -> Iterator[Model]:
     """Yield models with more freedom around an element: a border opened, a kind freed, or an element inserted.
 
     Args:
         model: model of a stretch.
         element: index of the element.
-        place: station (m) of the largest residual, at which the element may be split.
+        station: station (m) of the largest residual, at which the element may be split.
     """
     for knot in (element - 1, element):
         if 0 <= knot < model.size - 1 and model.smooth[knot]:
@@ -377,8 +377,8 @@ def _richer_models(model: Model, element: int, place: float) -> Iterator[Model]:
         if 0 < knot < model.size:
             kinds = (ZERO, EQUAL, FREE) if model.order == 2 else (EQUAL, FREE)
             yield from (_insert_element(model, knot, kind) for kind in kinds)
-    if model.knots[element] + _SHORT < place < model.knots[element + 1] - _SHORT:
-        yield from (_split_element(model, element, place, joins_smoothly) for joins_smoothly in (False, True))
+    if model.knots[element] + _SHORT < station < model.knots[element + 1] - _SHORT:
+        yield from (_split_element(model, element, station, joins_smoothly) for joins_smoothly in (False, True))
 
 
 def _insert_element(model: Model, knot: int, kind: int) -> Model:
@@ -395,16 +395,16 @@ def _insert_element(model: Model, knot: int, kind: int) -> Model:
     return replace(model, knots=knots, kinds=kinds, values=values, smooth=is_smooth)
 
 
-def _split_element(model: Model, element: int, place: float, joins_smoothly: bool) -> Model:
+def _split_element(model: Model, element: int, station: float, joins_smoothly: bool) -> Model:
     """Return the model with an element split at a station, m: smoothly into free ones, else by a jump into arcs."""
-    knots = np.insert(model.knots, element + 1, place)
+    knots = np.insert(model.knots, element + 1, station)
     kinds = np.insert(model.kinds, element, model.kinds[element])
     if joins_smoothly:
         kinds[element : element + 2] = FREE
     elif model.order == 2:
         kinds[element : element + 2] = np.minimum(kinds[element : element + 2], EQUAL)
     start_value, end_value = model.values[element]
-    share = (place - model.knots[element]) / (model.knots[element + 1] - model.knots[element])
+    share = (station - model.knots[element]) / (model.knots[element + 1] - model.knots[element])
     middle = start_value + share * (end_value - start_value)
     values = np.insert(model.values, element, [start_value, middle], axis=0)
     values[element + 1] = [middle, end_value]

@@ -230,10 +230,10 @@ def axis_of_points(
 def _tell_misfit(name: str, fit: AxisFit) -> None:
     """Warn where the road fitted to an axis is farther off its points than the fit aimed at (root mean square)."""
     rows = (("across", fit.horizontal, fit.tolerance), ("in height", fit.height, _HEIGHT_SHARE * fit.tolerance))
-    for way, deviations, aim in rows:
+    for direction, deviations, aim in rows:
         if deviations.rms > aim:
             text = "%s: the fitted road is off its points by %.1f cm %s (rms), which is to be %g cm at most: worst"
-            sizes = (100.0 * deviations.rms, way, 100.0 * aim, 100.0 * deviations.worst, deviations.worst_station)
+            sizes = (100.0 * deviations.rms, direction, 100.0 * aim, 100.0 * deviations.worst, deviations.worst_station)
             warn(f"{text} %.1f cm at station %.0f m", name, *sizes)
 
 
@@ -537,7 +537,7 @@ def _end_on_design(fit: ChainFit, ends: Iterable[str], tolerance: float) -> Chai
             for end_fit in trials
             if end_fit.sum_of_squares / len(end_fit.residuals) + floor**2 <= largest_square
         ]
-        fit = min(allowed_fits, key=lambda one: (one.chain.freedom(), one.sum_of_squares), default=fit)
+        fit = min(allowed_fits, key=lambda trial: (trial.chain.freedom(), trial.sum_of_squares), default=fit)
     return fit
 
 

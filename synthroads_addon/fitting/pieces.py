@@ -98,8 +98,8 @@ def noise_std(station: Float, values: Float, degree: int) -> float:
     if len(values) < 2 * order:
         return 0.0
     window = np.lib.stride_tricks.sliding_window_view
-    places = window(station, order + 1)
-    gaps = places[:, :, None] - places[:, None, :]
+    window_stations = window(station, order + 1)
+    gaps = window_stations[:, :, None] - window_stations[:, None, :]
     gaps[:, np.arange(order + 1), np.arange(order + 1)] = 1.0
     # Divided difference of order n: sum of y_i / prod_{j != i} (s_i - s_j), here with weights of unit norm.
     weights = 1.0 / gaps.prod(axis=2)

@@ -341,7 +341,7 @@ def split_chains(fit: ChainFit) -> list[Chain]:
                 candidates.append(
                     (_square_gain([hat, *ends], q, residuals), _split_element(chain, freed_kinds, e, knot))
                 )
-    return [split_chain for _, split_chain in sorted(candidates, key=lambda way: -way[0])]
+    return [split_chain for _, split_chain in sorted(candidates, key=lambda candidate: -candidate[0])]
 
 
 def _split_element(chain: Chain, freed: Int, e: int, knot: float) -> Chain:

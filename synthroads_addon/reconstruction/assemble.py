@@ -156,7 +156,7 @@ def crossfall_points(stations: Float, fall: Float) -> tuple[CrossfallPoint, ...]
     if len(corners) == 2 and abs(percent[corners[0]] - percent[corners[1]]) <= _CROSSFALL_TOLERANCE:
         return (CrossfallPoint(station=0.0, crossfall_percent=round(float(np.median(percent)), 3)),)
     rows = [(_length(station[i]), round(float(percent[i]), 3)) for i in corners]
-    return tuple(CrossfallPoint(station=at, crossfall_percent=value) for at, value in rows)
+    return tuple(CrossfallPoint(station=corner_station, crossfall_percent=value) for corner_station, value in rows)
 
 
 def _corners(station: Float, value: Float, tolerance: float) -> list[int]:
@@ -274,15 +274,15 @@ def _furniture(measurements: RoadMeasurements) -> Iterator[tuple[str, RoadObject
 
 def barrier_object(barrier: FoundBarrier, start: float, end: float, length: float) -> RoadObject:
     """Return a found barrier between two stations as an object of the road; ramped down where it ends on the road."""
-    place = {"instance": 1, "start_station": start, "end_station": end, "offset": _length(barrier.offset)}
+    common_fields = {"instance": 1, "start_station": start, "end_station": end, "offset": _length(barrier.offset)}
     ends_on_road = start > 0.0 or end < length
     terminal = round(min(_TERMINAL, (end - start) / 4.0), 2) if ends_on_road else 0.0
     if barrier.kind == "noise":
-        return NoiseBarrier(**place, height=_length(barrier.height, 1.0, 12.0))
+        return NoiseBarrier(**common_fields, height=_length(barrier.height, 1.0, 12.0))
     if barrier.kind == "concrete":
-        return ConcreteBarrier(**place, height=_length(barrier.height, 0.4, 2.0), terminal_length=terminal)
+        return ConcreteBarrier(**common_fields, height=_length(barrier.height, 0.4, 2.0), terminal_length=terminal)
     height = _length(barrier.height, 0.3, 1.5)
-    return Guardrail(**place, height=height, faces=barrier.faces, terminal_length=terminal)
+    return Guardrail(**common_fields, height=height, faces=barrier.faces, terminal_length=terminal)
 
 
 def _terrain(ground: GroundShape) -> Terrain:

@@ -50,11 +50,11 @@ def find_branch(profiles: Profiles, line: Line) -> Float:
 
     NaN where a branch ended beside the line, so that no paint shows how both come together.
     """
-    place = np.interp(profiles.stations, line.stations, line.offsets)
-    line_rows = (profiles.stations >= line.start) & (profiles.stations <= line.end) & np.isfinite(place)
-    branch_offset = np.zeros(len(place))
+    line_offset = np.interp(profiles.stations, line.stations, line.offsets)
+    line_rows = (profiles.stations >= line.start) & (profiles.stations <= line.end) & np.isfinite(line_offset)
+    branch_offset = np.zeros(len(line_offset))
     if line_rows.sum() >= _LONG:
-        branches = [_branch_beside(_gains(profiles, place, sign)[line_rows]) for sign in (-1, 1)]
+        branches = [_branch_beside(_gains(profiles, line_offset, sign)[line_rows]) for sign in (-1, 1)]
         branch_offset[line_rows] = np.where(branches[0] > branches[1], -branches[0], branches[1])
     full_rows = np.zeros(profiles.stretches * STRETCH)
     full_rows[: len(branch_offset)] = branch_offset
@@ -89,18 +89,18 @@ def _with_ends(branch_offset: Float) -> Float:
     return result
 
 
-def _gains(profiles: Profiles, place: Float, sign: int) -> Float:
+def _gains(profiles: Profiles, line_offset: Float, sign: int) -> Float:
     """Return the gain (S, B) of a branch that runs through each bin beside a line, in units of the line's own paint.
 
     It is the bin's paint over that of the line, less the share `_PAINTED` below which paint speaks against a branch.
 
     Args:
         profiles: S rows.
-        place: (S,) of the line, m.
+        line_offset: (S,) of the line, m.
         sign: 1 for bins to its left, -1 to its right.
     """
     reach, side = round(_FARTHEST / ACROSS), round(_SIDE / ACROSS)
-    begin = np.rint((np.nan_to_num(place) - profiles.offsets[0]) / ACROSS).astype(np.int64)
+    begin = np.rint((np.nan_to_num(line_offset) - profiles.offsets[0]) / ACROSS).astype(np.int64)
     columns = begin[:, None] + sign * np.arange(reach + 1 + side)
     in_grid = (columns >= 0) & (columns < len(profiles.offsets))
     paint = np.take_along_axis(profiles.paint, np.clip(columns, 0, len(profiles.offsets) - 1), axis=1)

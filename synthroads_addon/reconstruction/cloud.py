@@ -174,7 +174,7 @@ def _kind_table(scheme: ClassScheme) -> NDArray[np.uint8]:
     return table
 
 
-def _sort_by_height(path: FilePath, points: _Points, place: Placement, classes: dict[str, int]) -> RoadCloud:
+def _sort_by_height(path: FilePath, points: _Points, placement: Placement, classes: dict[str, int]) -> RoadCloud:
     """Return the cloud with unclassified points left out, or told apart by height if most points are unclassified.
 
     Below 0.12 m above the ground they are ground, from 0.2 m to 8 m they are furniture (chosen: kerbs lie between,
@@ -198,7 +198,7 @@ def _sort_by_height(path: FilePath, points: _Points, place: Placement, classes: 
     has_pavement_class = bool(is_pavement.sum() > _LABELLED_SHARE * surface.sum())
     has_marking_class = has_pavement_class and bool((kind == PointKind.MARKING).sum() > 0.001 * is_pavement.sum())
     return RoadCloud(
-        xyz, intensity, kind, origin, place, has_pavement_class, has_marking_class, sum(classes.values()), classes
+        xyz, intensity, kind, origin, placement, has_pavement_class, has_marking_class, sum(classes.values()), classes
     )
 
 
@@ -244,6 +244,6 @@ def _above_grid(xyz: Float) -> Float:
     opened = ndimage.grey_opening(filled_heights, size=(WINDOW, WINDOW))
     # Where little was opened away the lowest points themselves are the ground: an opening cuts off every crest.
     ground = ndimage.uniform_filter(np.where(filled_heights - opened > _STEP, opened, filled_heights), 3)
-    place = xyz[:, :2] / CELL - lowest_cell - 0.5
-    ground_below = ndimage.map_coordinates(ground, place.T, order=1, mode="nearest")
+    grid_position = xyz[:, :2] / CELL - lowest_cell - 0.5
+    ground_below = ndimage.map_coordinates(ground, grid_position.T, order=1, mode="nearest")
     return xyz[:, 2] - np.asarray(ground_below)

@@ -202,8 +202,8 @@ def _posts(true_road: RoadGeometry, found_road: RoadGeometry, shift: Float) -> d
     points = []
     for road in (true_road, found_road):
         items = [item for item in road.parameters.of_type(Delineator).values() if item.station <= road.length]
-        places = np.array([(item.station, item.offset) for item in items]).reshape(-1, 2)
-        points.append(road.alignment.place(*places.T))
+        station_offsets = np.array([(item.station, item.offset) for item in items]).reshape(-1, 2)
+        points.append(road.alignment.place(*station_offsets.T))
     true_points, found_points = points[0] + shift, points[1]
     if not len(true_points) or not len(found_points):
         return {

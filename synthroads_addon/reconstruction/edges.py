@@ -99,9 +99,9 @@ def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int)
     first_split, last_split = int(best_splits[0]), int(best_splits[-1])
     if first_split == 0 or last_split == len(offset):
         return edge, 0.0
-    gaps = [abs(float(offset[at] - offset[at - 1])) for at in (first_split, last_split)]
-    places = [0.5 * float(offset[at - 1] + offset[at]) for at in (first_split, last_split)]
-    return 0.5 * (places[0] + places[1]), max(*gaps, abs(places[1] - places[0]))
+    gaps = [abs(float(offset[split] - offset[split - 1])) for split in (first_split, last_split)]
+    border_offsets = [0.5 * float(offset[split - 1] + offset[split]) for split in (first_split, last_split)]
+    return 0.5 * (border_offsets[0] + border_offsets[1]), max(*gaps, abs(border_offsets[1] - border_offsets[0]))
 
 
 def _find_edge(share: Float, begin: float, sign: int) -> float:

@@ -389,15 +389,15 @@ def _place_in(line: Line, usual_mask: Bool | None) -> float:
 def _band(pavement: Pavement, part: _Part, lines: list[Line]) -> Band:
     """Return a strip of pavement as a band with its lines; of two nearer than a lane the more painted one stays."""
     right_edge, left_edge = part.span
-    place = {id(line): _place_in(line, part.usual) for line in lines}
-    band_lines = [line for line in lines if right_edge - _BAND_MARGIN < place[id(line)] < left_edge + _BAND_MARGIN]
+    line_offset = {id(line): _place_in(line, part.usual) for line in lines}
+    band_lines = [line for line in lines if right_edge - _BAND_MARGIN < line_offset[id(line)] < left_edge + _BAND_MARGIN]
     chosen_lines: list[Line] = []
     for line in sorted(band_lines, key=lambda item: -item.length * (0.2 + item.width)):
-        if all(abs(place[id(line)] - place[id(chosen_line)]) >= _NARROWEST_LANE for chosen_line in chosen_lines):
+        if all(abs(line_offset[id(line)] - line_offset[id(chosen_line)]) >= _NARROWEST_LANE for chosen_line in chosen_lines):
             chosen_lines.append(line)
-    chosen_lines.sort(key=lambda line: place[id(line)])
+    chosen_lines.sort(key=lambda line: line_offset[id(line)])
     missing_offsets = []
-    for right_line, left_line in pairwise(place[id(line)] for line in chosen_lines):
+    for right_line, left_line in pairwise(line_offset[id(line)] for line in chosen_lines):
         if left_line - right_line > _WIDEST_LANE:
             count = round((left_line - right_line) / _USUAL_LANE)
             missing_offsets += [right_line + (left_line - right_line) * (i + 1) / count for i in range(count - 1)]

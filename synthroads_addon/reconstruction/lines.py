@@ -140,14 +140,14 @@ def _joined(profiles: Profiles, tracks: list[_Track]) -> list[_Track]:
     """
     result: list[_Track] = []
     for track in sorted(tracks, key=lambda item: item[0][0]):
-        station, place = track[0]
+        station, offset = track[0]
         candidates = [
             earlier_track
             for earlier_track in result
-            if earlier_track[-1][0] < station and abs(earlier_track[-1][1] - place) <= _SAME
+            if earlier_track[-1][0] < station and abs(earlier_track[-1][1] - offset) <= _SAME
         ]
-        predecessor = min(candidates, key=lambda other: abs(other[-1][1] - place), default=None)
-        if predecessor is not None and _in_rows(profiles, predecessor[-1][0], station, place):
+        predecessor = min(candidates, key=lambda other: abs(other[-1][1] - offset), default=None)
+        if predecessor is not None and _in_rows(profiles, predecessor[-1][0], station, offset):
             predecessor.extend(track)
         else:
             result.append(list(track))
@@ -169,15 +169,15 @@ def _peaks(profiles: Profiles, paint: Grid) -> list[float]:
     total = ndimage.gaussian_filter1d(np.where(has_points, paint, 0.0).sum(axis=0).astype(np.float64), 1.0)
     mean = np.where(count > 0.05 * len(paint), total / np.maximum(count, 1e-9), 0.0)
     peaks = find_peaks(mean, height=_HEIGHT, prominence=_PROMINENCE, width=(None, _WIDEST / ACROSS))[0]
-    return [_vertex(mean, at, profiles.offsets) for at in peaks]
+    return [_vertex(mean, peak, profiles.offsets) for peak in peaks]
 
 
-def _vertex(values: Float, at: int, places: Float) -> float:
+def _vertex(values: Float, peak: int, bin_offsets: Float) -> float:
     """Return the offset, m, of the vertex of the parabola through a peak and its two neighbours."""
-    left_value, peak_value, right_value = values[at - 1 : at + 2]
+    left_value, peak_value, right_value = values[peak - 1 : peak + 2]
     second_difference = left_value - 2.0 * peak_value + right_value
     return float(
-        places[at] + (0.5 * ACROSS * (left_value - right_value) / second_difference if second_difference < 0.0 else 0.0)
+        bin_offsets[peak] + (0.5 * ACROSS * (left_value - right_value) / second_difference if second_difference < 0.0 else 0.0)
     )
 
 
@@ -290,17 +290,17 @@ def _paint_by_row(profiles: Profiles, stations: Float, offsets: Float) -> tuple[
 
     The mean is found twice, the second time around the smoothed first one, so that a track's own error doesn't pull.
     """
-    place = np.interp(profiles.stations, stations, offsets)
+    track_offset = np.interp(profiles.stations, stations, offsets)
     # Twice: the first mean is pulled by how far the track is off, the second lies about the line itself.
-    middle, _ = _paint_near(profiles, place)
-    local = ndimage.median_filter(np.where(np.isfinite(middle), middle, place), size=21, mode="nearest")
+    middle, _ = _paint_near(profiles, track_offset)
+    local = ndimage.median_filter(np.where(np.isfinite(middle), middle, track_offset), size=21, mode="nearest")
     return _paint_near(profiles, local)
 
 
-def _paint_near(profiles: Profiles, place: Float) -> tuple[Float, Float]:
+def _paint_near(profiles: Profiles, line_offset: Float) -> tuple[Float, Float]:
     """Return mean offset and width (S,), m, of each row's paint within `_NEAR` of a place (S,), m; NaN if unknown."""
     reach = round(_NEAR / ACROSS)
-    middle_column = np.rint((place - profiles.offsets[0]) / ACROSS).astype(np.int64)
+    middle_column = np.rint((line_offset - profiles.offsets[0]) / ACROSS).astype(np.int64)
     columns = middle_column[:, None] + np.arange(-reach, reach + 1)
     in_grid = (columns >= 0) & (columns < len(profiles.offsets))
     columns = np.clip(columns, 0, len(profiles.offsets) - 1)

@@ -72,11 +72,11 @@ class CloudPath:
     def frame(self, station: ArrayLike) -> tuple[Float, Float]:
         """Return positions (N, 2) and headings (N,) at stations (N,), straight on beyond the ends."""
         station = np.asarray(station, dtype=np.float64)
-        place = (station - self.start) / SPACING
-        index = np.clip(place.astype(np.int64), 0, len(self.points) - 2)
-        share = (place - index)[:, None]
+        vertex_position = (station - self.start) / SPACING
+        index = np.clip(vertex_position.astype(np.int64), 0, len(self.points) - 2)
+        share = (vertex_position - index)[:, None]
         position = self.points[index] + share * (self.points[index + 1] - self.points[index])
-        return position, np.interp(place, np.arange(len(self.heading)), self.heading)
+        return position, np.interp(vertex_position, np.arange(len(self.heading)), self.heading)
 
     def place(self, station: ArrayLike, offset: ArrayLike) -> Float:
         """Return points (N, 2) at stations and offsets (N,), the offset positive to the left."""
@@ -135,13 +135,13 @@ def _project(frames: Float, points: Float, station: Float) -> tuple[Float, Float
     last_index = len(frames) - 2
     offset = np.empty(0)
     for round_ in range(_ROUNDS):
-        place = station / SPACING
-        index = np.clip(place.astype(np.int64), 0, last_index)
-        share = np.clip(place - index, 0.0, 1.0)
+        vertex_position = station / SPACING
+        index = np.clip(vertex_position.astype(np.int64), 0, last_index)
+        share = np.clip(vertex_position - index, 0.0, 1.0)
         frame = frames[index]
         change = frames[index + 1] - frame
         heading = frame[:, 2] + share * change[:, 2]
-        step_share = (place - index)[:, None]
+        step_share = (vertex_position - index)[:, None]
         vector = points - frame[:, :2] - step_share * change[:, :2]
         cos, sin = np.cos(heading), np.sin(heading)
         offset = vector[:, 1] * cos - vector[:, 0] * sin

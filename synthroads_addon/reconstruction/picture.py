@@ -146,5 +146,5 @@ def _objects(axes: Any, geometry: RoadGeometry) -> None:
             label = None
     posts = list(geometry.parameters.of_type(Delineator).values())
     if posts:
-        place = [post.station for post in posts], [post.offset for post in posts]
-        axes.plot(*place, "^", ms=5, color=POST, mec="white", mew=0.5, label="delineators")
+        stations_and_offsets = [post.station for post in posts], [post.offset for post in posts]
+        axes.plot(*stations_and_offsets, "^", ms=5, color=POST, mec="white", mew=0.5, label="delineators")

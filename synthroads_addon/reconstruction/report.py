@@ -287,10 +287,10 @@ def measure_lines(report: dict[str, Any]) -> Iterator[str]:
 
 def doubt_lines(judgement: dict[str, Any]) -> Iterator[tuple[float, str]]:
     """Yield (station where it begins, m; text) of each stretch that isn't to be trusted, with the reasons."""
-    for kind, what in (("doubtful", "doubtful"), ("other_sections", "another section")):
+    for kind, kind_text in (("doubtful", "doubtful"), ("other_sections", "another section")):
         for doubt in judgement.get(kind, ()):
-            place = f"{what} from {doubt['start']:.0f} to {doubt['end']:.0f} m"
-            yield doubt["start"], f"{place}: {'; '.join(doubt['why'])}"
+            stretch_text = f"{kind_text} from {doubt['start']:.0f} to {doubt['end']:.0f} m"
+            yield doubt["start"], f"{stretch_text}: {'; '.join(doubt['why'])}"
 
 
 def reservation_lines(report: dict[str, Any]) -> Iterator[str]:

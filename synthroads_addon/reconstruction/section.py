@@ -351,12 +351,12 @@ def _half_section(part: _SidePart) -> SideSection:
         columns[-1] = columns[-1].shift(-half_line, std)
     elif is_mirrored:
         opposite_distance = min(abs(line.offset) for line in side_lines[-part.sign])
-        place = part.everywhere(opposite_distance - 0.5 * line_width(None, "outer_edge", "single", part.marked))
-        columns.append(_Boundary(place, place, zeros, False))
+        lane_edge = part.everywhere(opposite_distance - 0.5 * line_width(None, "outer_edge", "single", part.marked))
+        columns.append(_Boundary(lane_edge, lane_edge, zeros, False))
     else:  # no edge line at all: the lane reaches to the pavement's edge
         edge_visible = bool(np.isfinite(outer_edge.offsets).any())
-        place = outer_edge.offsets if edge_visible else part.everywhere(0.5 * part.band.width)
-        columns.append(_Boundary(place, place, outer_edge.spacing, edge_visible))
+        lane_edge = outer_edge.offsets if edge_visible else part.everywhere(0.5 * part.band.width)
+        columns.append(_Boundary(lane_edge, lane_edge, outer_edge.spacing, edge_visible))
     lines += [None] * (len(columns) - len(lines))
     inner_edge = Edge(zeros, zeros)
     half_section = _summarise_side(part, lines, columns, inner_edge, outer_edge)
@@ -388,8 +388,8 @@ def _assumed_section(part: _SidePart) -> SideSection:
     name = min(STANDARD_CROSS_SECTIONS, key=lambda key: abs(STANDARD_CROSS_SECTIONS[key].paved_width - width))
     row = STANDARD_CROSS_SECTIONS[name]
     innermost_line = inner_edge.offsets + row.inner_edge_strip
-    places = [innermost_line + sum(row.lanes[::-1][:i]) for i in range(len(row.lanes) + 1)]
-    columns = [_Boundary(place, place, inner_edge.spacing, False) for place in places]
+    lane_edges = [innermost_line + sum(row.lanes[::-1][:i]) for i in range(len(row.lanes) + 1)]
+    columns = [_Boundary(lane_edge, lane_edge, inner_edge.spacing, False) for lane_edge in lane_edges]
     lines: list[Line | None] = [None] * len(columns)
     measured_side = _summarise_side(part, lines, columns, inner_edge, outer_edge)
     lanes = [Estimate(lane, np.inf) for lane in reversed(row.lanes)]

@@ -123,12 +123,12 @@ def _blur_footprint(value: Float, stretch: Stretch, width: float) -> Float:
         return value
     y = stretch.coord[:, 1] - stretch.coord[:, 1].min()
     # Slices far apart from each other on one axis, so that one search finds all windows.
-    place = stretch.number * (2.0 * (float(y.max()) + width)) + y
-    order = np.argsort(place)
-    place = place[order]
+    position = stretch.number * (2.0 * (float(y.max()) + width)) + y
+    order = np.argsort(position)
+    position = position[order]
     total = np.concatenate([[0.0], np.cumsum(value[order])])
-    begin = np.searchsorted(place, place - 0.5 * width, side="left")
-    end = np.searchsorted(place, place + 0.5 * width, side="right")
+    begin = np.searchsorted(position, position - 0.5 * width, side="left")
+    end = np.searchsorted(position, position + 0.5 * width, side="right")
     result = np.empty_like(value)
     result[order] = (total[end] - total[begin]) / (end - begin)
     return result
@@ -163,8 +163,8 @@ def _waves(stretch: Stretch, rng: Generator) -> Float:
     """Return random values (K,) of about unit deviation, smooth over the ground: waves of 2 to 20 m any way."""
     count = 6
     rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(2.0), np.log(20.0), count))
-    way, phase = rng.uniform(0.0, 2.0 * np.pi, (2, count))
+    wave_direction, phase = rng.uniform(0.0, 2.0 * np.pi, (2, count))
     x, y = stretch.points_along(), stretch.coord[:, 1]
-    angle = x[:, None] * (rate * np.cos(way)) + y[:, None] * (rate * np.sin(way)) + phase
+    angle = x[:, None] * (rate * np.cos(wave_direction)) + y[:, None] * (rate * np.sin(wave_direction)) + phase
     result: Float = np.cos(angle).sum(axis=1) * np.sqrt(2.0 / count)
     return result

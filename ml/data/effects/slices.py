@@ -126,9 +126,9 @@ def mirror_side(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> N
     outer_points = np.flatnonzero((beyond_outer > 0.0) & np.isfinite(edges[stretch.number, inwards]))
     points_kept = np.flatnonzero(~(beyond_inner > 0.0))
     number = stretch.number[outer_points]
-    place = stretch.center[number] - sign * (edges[number, inwards] + beyond_outer[outer_points])
+    mirrored_y = stretch.center[number] - sign * (edges[number, inwards] + beyond_outer[outer_points])
     mirrored_points = stretch.coord[outer_points].copy()
-    mirrored_points[:, 1] = place
+    mirrored_points[:, 1] = mirrored_y
     mirrored_points[:, 2] += float(np.median(rims[0]) - np.median(rims[1]))
     source_rows = np.concatenate([points_kept, outer_points])
     xyz = np.concatenate([stretch.coord[points_kept], mirrored_points])

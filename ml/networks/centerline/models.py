@@ -149,9 +149,9 @@ class CenterlineModel(nn.Module):
         outputs["fine_places"] = guess[..., None] + self.again.places
         outputs["log_std"] = _bound_values(torch.cat([log_std[..., None], outputs["log_std"]], dim=-1))
         _, heading = self.line(outputs["center"].detach(), outputs, context, batch["frame"])
-        place = CORRIDOR.index("heading")
+        heading_column = CORRIDOR.index("heading")
         outputs["corridor"] = torch.cat(
-            [outputs["corridor"][..., :place], heading[..., None], outputs["corridor"][..., place + 1 :]], dim=-1
+            [outputs["corridor"][..., :heading_column], heading[..., None], outputs["corridor"][..., heading_column + 1 :]], dim=-1
         )
         std = torch.exp(outputs["log_std"]) * outputs["log_std"].new_tensor(SCALE)
         return outputs | {"center_std": std[..., 0], "corridor_std": std[..., 1:]}

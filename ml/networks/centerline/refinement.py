@@ -98,9 +98,9 @@ def parabola(frame: Tensor, center: Tensor, weight: Tensor, stiffness: Tensor) -
     Returns:
         y (B, S) at which the parabola crosses the slices' orthogonals, m, and its direction (B, S) in them, rad.
     """
-    place, turn = _in_the_middle(frame, center.dtype)
+    origins, turn = _in_the_middle(frame, center.dtype)
     left_normals = torch.stack([-torch.sin(turn), torch.cos(turn)], dim=-1)
-    points = place + center[..., None] * left_normals
+    points = origins + center[..., None] * left_normals
     # The middle's own offset costs nothing: a road far from the path is as good as one near it.
     middle = points.mean(1, keepdim=True)[..., 1]
     distance = points[..., 0] / _PARABOLA_UNIT
@@ -143,7 +143,7 @@ def _in_the_middle(frame: Tensor, dtype: torch.dtype) -> tuple[Tensor, Tensor]:
     delta = frame[..., :2] - middle[:, None, :2]
     cos, sin = torch.cos(middle[:, 2:3]), torch.sin(middle[:, 2:3])
     x, y = delta.unbind(-1)
-    place = torch.stack([cos * x + sin * y, cos * y - sin * x], dim=-1)
+    origins = torch.stack([cos * x + sin * y, cos * y - sin * x], dim=-1)
     # Directions of a path towards the west jump by a whole turn.
     turn = torch.remainder(frame[..., 2] - middle[:, 2:3] + torch.pi, 2.0 * torch.pi) - torch.pi
-    return place.to(dtype), turn.to(dtype)
+    return origins.to(dtype), turn.to(dtype)

@@ -104,8 +104,8 @@ def build_cells(coord: Tensor, offset: Tensor, grid: Grid, *, always_masked: boo
             neighbour_table = _cells_around(keys)
             cells[f"near{stage}"] = neighbour_table[:, _CROSS].contiguous() if grid.cross else neighbour_table
             continue
-        patch, place, slot_mask = _patches(places, cloud, counts, grid)
-        cells |= {f"grid{stage}": places.to(coord.dtype), f"patch{stage}": patch, f"place{stage}": place}
+        patch, slot_of_cell, slot_mask = _patches(places, cloud, counts, grid)
+        cells |= {f"grid{stage}": places.to(coord.dtype), f"patch{stage}": patch, f"place{stage}": slot_of_cell}
         if slot_mask is not None or always_masked:
             all_slots = torch.ones(patch.shape[1:], dtype=torch.bool, device=coord.device)
             cells[f"filled{stage}"] = all_slots if slot_mask is None else slot_mask
@@ -212,5 +212,5 @@ def _patches(places: Tensor, cloud: Tensor, counts: Tensor, grid: Grid) -> tuple
     slot = patch * width + rank - start[patch]
     orders = [torch.argsort(cloud << 3 * BITS | curve_codes(places, curve)) for curve in grid.curves]
     order = torch.stack(orders)
-    place = torch.empty_like(order).scatter_(1, order, slot.expand_as(order))
-    return order[:, slots], place, None if all(size >= width for size in sizes if size) else slot_mask
+    slot_of_cell = torch.empty_like(order).scatter_(1, order, slot.expand_as(order))
+    return order[:, slots], slot_of_cell, None if all(size >= width for size in sizes if size) else slot_mask

@@ -210,9 +210,9 @@ def _pairs(queries: _Points, support: _Points, edge: float) -> Iterator[tuple[Te
     key, order = cells.keys(cells.places(support), support.cloud).sort(stable=True)
     limits = torch.tensor(cells.spans, device=key.device) - 1
     # Of far queries too, whose cells don't hold anything: the nearest ones that are numbered.
-    place = cells.places(queries).clamp(min=torch.zeros_like(limits), max=limits)
-    column_steps = torch.cartesian_prod(torch.arange(-1, 2), torch.arange(-1, 2)).to(place)
-    columns = place[:, None].expand(-1, len(column_steps), 3).clone()
+    query_cell = cells.places(queries).clamp(min=torch.zeros_like(limits), max=limits)
+    column_steps = torch.cartesian_prod(torch.arange(-1, 2), torch.arange(-1, 2)).to(query_cell)
+    columns = query_cell[:, None].expand(-1, len(column_steps), 3).clone()
     columns[..., :2] += column_steps
     in_grid = ((columns[..., :2] >= 0) & (columns[..., :2] <= limits[:2])).all(dim=-1)
     columns[..., :2].clamp_(min=0)
@@ -262,8 +262,8 @@ def _first_in_ball(queries: _Points, support: _Points, radius: float, limit: int
 
 def _ranks(sorted_values: Tensor) -> Tensor:
     """Return the rank (N,), from 0, of each value in its run of equal values."""
-    places = torch.arange(len(sorted_values), device=sorted_values.device)
-    return places - torch.cummax(places * _first_of_each(sorted_values), dim=0).values
+    indices = torch.arange(len(sorted_values), device=sorted_values.device)
+    return indices - torch.cummax(indices * _first_of_each(sorted_values), dim=0).values
 
 
 def _nearest_three(points: _Points, support: _Points, radius: float) -> tuple[Tensor, Tensor]:
@@ -283,18 +283,18 @@ def _nearest_three(points: _Points, support: _Points, radius: float) -> tuple[Te
     open_points, edge = torch.arange(len(points), device=device), 4.0 / 3.0 * radius
     while len(open_points):
         queries = points.select(open_points)
-        place, distance = nearest_index[open_points], points.xyz.new_full((len(open_points), 3), torch.inf)
+        nearest_found, distance = nearest_index[open_points], points.xyz.new_full((len(open_points), 3), torch.inf)
         for query, support_index, step in _pairs(queries, support, edge):
             order = torch.argsort(step, stable=True)
             order = order[torch.argsort(query[order], stable=True)]
             rank = _ranks(query[order])
             order, rank = order[rank < 3], rank[rank < 3]
-            place[query[order], rank], distance[query[order], rank] = support_index[order], step[order]
+            nearest_found[query[order], rank], distance[query[order], rank] = support_index[order], step[order]
         farthest_distance = distance.gather(1, (count[open_points] - 1)[:, None])[:, 0]
         is_done = (farthest_distance <= edge) | torch.full_like(
             farthest_distance, edge > 2.0 * (extent + radius), dtype=torch.bool
         )
-        nearest_index[open_points[is_done]] = place[is_done]
+        nearest_index[open_points[is_done]] = nearest_found[is_done]
         weight[open_points[is_done]] = 1.0 / (distance[is_done] + TINY)
         open_points, edge = open_points[~is_done], 2.0 * edge
     return nearest_index.int(), weight / weight.sum(dim=1, keepdim=True)
@@ -302,7 +302,7 @@ def _nearest_three(points: _Points, support: _Points, radius: float) -> tuple[Te
 
 def _in_given_order(neighbours: Neighbours, order: Tensor) -> Neighbours:
     """Return tensors whose indices into the clouds, found for points in `order`, are mapped back to the given order."""
-    place = torch.empty_like(order)
-    place[order] = torch.arange(len(order), device=order.device)
+    inverse_order = torch.empty_like(order)
+    inverse_order[order] = torch.arange(len(order), device=order.device)
     mapped = {name: order[neighbours[name].long()].to(neighbours[name].dtype) for name in ("sample1", "group1")}
-    return neighbours | mapped | {name: neighbours[name][place] for name in ("nearest1", "weight1")}
+    return neighbours | mapped | {name: neighbours[name][inverse_order] for name in ("nearest1", "weight1")}

@@ -114,16 +114,16 @@ class _GatherMax(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, values: Tensor, index: Tensor) -> Tensor:
         """Return the maxima (M, C) over the rows of values (N, C) that index (M, K) names."""
-        largest, place = _largest(values, index, with_place=ctx.needs_input_grad[0])
-        ctx.save_for_backward(place)
+        largest, largest_row = _largest(values, index, with_place=ctx.needs_input_grad[0])
+        ctx.save_for_backward(largest_row)
         ctx.shape = values.shape
         return largest
 
     @staticmethod
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, None]:
         """Return the gradient of the values (N, C): each maximum's goes to its row."""
-        (place,) = ctx.saved_tensors
-        return gradients[0].new_zeros(ctx.shape).scatter_add_(0, place.long(), gradients[0]), None
+        (largest_row,) = ctx.saved_tensors
+        return gradients[0].new_zeros(ctx.shape).scatter_add_(0, largest_row.long(), gradients[0]), None
 
 
 def gather_max(values: Tensor, index: Tensor) -> Tensor:
@@ -141,13 +141,13 @@ def _largest(values: Tensor, index: Tensor, *, with_place: bool) -> tuple[Tensor
     """Return maxima (M, C) over the rows of each neighbourhood, and their rows (M, C), or (0,) unless `with_place`."""
     (queries, limit), channels = index.shape, values.shape[1]
     largest = values.new_empty(queries, channels)
-    place = index.new_empty((queries, channels) if with_place else 0)
+    largest_row = index.new_empty((queries, channels) if with_place else 0)
     for rows in _chunks(queries, limit * channels, values.device):
         gathered = values.index_select(0, index[rows].reshape(-1)).view(-1, limit, channels)
         largest[rows] = gathered.amax(dim=1)
         if with_place:
-            place[rows] = index[rows].gather(1, _first_column(gathered, largest[rows]))
-    return largest, place
+            largest_row[rows] = index[rows].gather(1, _first_column(gathered, largest[rows]))
+    return largest, largest_row
 
 
 def _chunks(queries: int, size: int, device: torch.device) -> Iterator[slice]:

@@ -153,10 +153,10 @@ def _centre_cloud(coord: NDArray[np.floating]) -> NDArray[np.floating]:
 
 def _in_given_order(arrays: dict[str, NDArray[np.generic]], order: Int) -> dict[str, NDArray[np.generic]]:
     """Return arrays whose indices into the cloud, found for points in `order`, are mapped back to the given order."""
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
+    inverse_order = np.empty_like(order)
+    inverse_order[order] = np.arange(len(order))
     mapped = {name: order[arrays[name]] if len(order) else arrays[name] for name in ("sample1", "group1")}
-    return arrays | mapped | {name: arrays[name][place] for name in ("nearest1", "weight1")}
+    return arrays | mapped | {name: arrays[name][inverse_order] for name in ("nearest1", "weight1")}
 
 
 def geometric_order(points: NDArray[np.floating]) -> Int:

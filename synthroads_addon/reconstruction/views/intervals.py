@@ -60,31 +60,31 @@ def _quantile(density: Float, share: float) -> Float:
 
 def _density(axis: FusedAxis) -> Float:
     """Return the density (K, P) of the axis' place beside the fused axis, up to a factor by stretch."""
-    place = np.arange(-round(_REACH / _STEP), round(_REACH / _STEP) + 1) * _STEP
-    result = np.zeros((len(axis.offsets), len(place)))
+    distance = np.arange(-round(_REACH / _STEP), round(_REACH / _STEP) + 1) * _STEP
+    result = np.zeros((len(axis.offsets), len(distance)))
     kinds = [_EVIDENCE.get(view.name, view.name) for view in axis.views]
     for kind in dict.fromkeys(kinds):
         kind_views = [view for view, view_kind in zip(axis.views, kinds, strict=True) if view_kind == kind]
         # Views of one kind of evidence slip together: the mean of their logarithms counts as one view.
         view_count = np.sum([np.isfinite(view.offsets) for view in kind_views], axis=0)
         result += (
-            np.sum([_likelihood(view, axis.offsets, place) for view in kind_views], axis=0)
+            np.sum([_likelihood(view, axis.offsets, distance) for view in kind_views], axis=0)
             / np.maximum(view_count, 1)[:, None]
         )
     return np.exp(result - result.max(axis=1, keepdims=True))
 
 
-def _likelihood(view: View, axis_offsets: Float, place: Float) -> Float:
+def _likelihood(view: View, axis_offsets: Float, distance: Float) -> Float:
     """Return the logarithm of a view's likelihood (K, P) of the axis at each place; 0 where the view sees nothing.
 
     Args:
         view: offsets with standard deviations.
         axis_offsets: (K,) of the fused axis, m.
-        place: (P,) distances from the fused axis, m.
+        distance: (P,) distances from the fused axis, m.
     """
     seen_mask = np.isfinite(view.offsets)
     std = np.where(seen_mask, view.std, 1.0)[:, None]
-    z = (place - np.where(seen_mask, view.offsets - axis_offsets, 0.0)[:, None]) / std
+    z = (distance - np.where(seen_mask, view.offsets - axis_offsets, 0.0)[:, None]) / std
     # p = (1 - slips) N(place; offset, std) + slips / (2 reach): the tail keeps a single view from ruling a place out.
     normal_density = np.exp(-0.5 * z**2) / (np.sqrt(2.0 * np.pi) * std)
     return np.where(seen_mask[:, None], np.log((1.0 - SLIPS) * normal_density + SLIPS / (2.0 * _REACH)), 0.0)

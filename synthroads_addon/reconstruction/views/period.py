@@ -100,7 +100,7 @@ def _axis_of(power: Float, offsets: Float, dual: bool, middle: float) -> float:
     """
     blurred = ndimage.gaussian_filter1d(power, 1.0)
     peaks = find_peaks(blurred, height=_CLEAR, distance=round(_LANE / ACROSS))[0]
-    places = [_centre_of_peak(blurred, place, offsets) for place in peaks]
+    line_offsets = [_centre_of_peak(blurred, line_offset, offsets) for line_offset in peaks]
     if not dual:
         if not len(peaks):
             return np.nan
@@ -108,10 +108,10 @@ def _axis_of(power: Float, offsets: Float, dual: bool, middle: float) -> float:
         order = np.argsort(-blurred[peaks])
         if len(order) > 1 and blurred[peaks[order[1]]] > _RIVAL * blurred[peaks[order[0]]]:
             return np.nan
-        return places[int(order[0])]
+        return line_offsets[int(order[0])]
     right_lines, left_lines = (
-        [place for place in places if place < middle],
-        [place for place in places if place > middle],
+        [line_offset for line_offset in line_offsets if line_offset < middle],
+        [line_offset for line_offset in line_offsets if line_offset > middle],
     )
     if not right_lines or len(right_lines) != len(left_lines):
         return np.nan

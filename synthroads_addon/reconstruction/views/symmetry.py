@@ -89,17 +89,17 @@ def _axis_of(signals: Float, offsets: Float) -> tuple[float, float]:
     score, pairs = _symmetry(signals)
     if not np.isfinite(score).any():
         return np.nan, np.inf
-    place = offsets[0] + 0.5 * ACROSS * np.arange(len(score))
-    candidate_mask = (np.abs(place) <= _REACH) & (pairs * ACROSS >= _FEWEST)
+    axis_offsets = offsets[0] + 0.5 * ACROSS * np.arange(len(score))
+    candidate_mask = (np.abs(axis_offsets) <= _REACH) & (pairs * ACROSS >= _FEWEST)
     candidate_score = np.where(candidate_mask, score, -np.inf)
     best_place = int(candidate_score.argmax())
     if not candidate_score[best_place] >= _CLEAR:
         return np.nan, np.inf
-    around_best = np.abs(place - place[best_place]) < _OTHER
+    around_best = np.abs(axis_offsets - axis_offsets[best_place]) < _OTHER
     if float(np.where(around_best, -np.inf, candidate_score).max()) > _RIVAL * candidate_score[best_place]:
         return np.nan, np.inf
     peak = around_best & (candidate_score >= _NEAR_BEST * candidate_score[best_place])
-    return float(np.average(place[peak], weights=candidate_score[peak])), 0.5 * float(np.ptp(place[peak]))
+    return float(np.average(axis_offsets[peak], weights=candidate_score[peak])), 0.5 * float(np.ptp(axis_offsets[peak]))
 
 
 def _symmetry(values: Float) -> tuple[Float, Float]:
