@@ -165,5 +165,7 @@ def _platform(density: float, unevenness: float, cell_corners: np.ndarray[Any, n
     """Return the likely platform: even clouds are seen from above, uneven ones from the road."""
     if unevenness < _UNEVEN:
         return "uav" if density >= _DENSE else "airborne"
-    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(cell_corners.T)), 1.0)) if len(cell_corners) > 2 else np.ones(2)
+    spread = (
+        np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(cell_corners.T)), 1.0)) if len(cell_corners) > 2 else np.ones(2)
+    )
     return "mobile" if spread[1] > _LONG * spread[0] else "tripod"

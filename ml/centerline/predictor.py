@@ -111,7 +111,10 @@ class CenterlinePredictor:
         """
         mean, raw_std = self._combine_sequences(road, frames)
         calibration = [self.calibration[name] for name in TARGETS]
-        factors, widths = np.array([target_calibration.factor for target_calibration in calibration]), np.array([target_calibration.widths for target_calibration in calibration])
+        factors, widths = (
+            np.array([target_calibration.factor for target_calibration in calibration]),
+            np.array([target_calibration.widths for target_calibration in calibration]),
+        )
         return Regression(frames, mean, raw_std, raw_std * factors, raw_std[:, :, None] * widths)
 
     def _combine_sequences(self, road: LearningRoad, frames: Frames) -> tuple[Float, Float]:

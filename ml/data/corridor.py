@@ -89,7 +89,7 @@ class Truth:
         )
 
     def at(self, frames: Frames) -> Crossings:
-        """Return the truth where the y axes of M frames cross it, signed as in the frames; heights are elevations, m."""
+        """Return the truth where M frames' y axes cross it, signed as in the frames; heights are elevations, m."""
         center, station = self.axis.crossing(frames.position, frames.direction)
         turn = self.axis.direction(station) - frames.direction
         against = np.cos(turn) < 0.0

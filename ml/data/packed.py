@@ -117,7 +117,9 @@ def unpack_tile(packed_tile: Packed) -> CloudTile:
         """Return the numbers (N,) in some bits of all words, from the lowest bit ``shift`` on."""
         return ((word >> np.uint64(shift)) & np.uint64((1 << count) - 1)).astype(np.int64)
 
-    steps = np.stack([bits(10 * axis, 10) for axis in range(3)], axis=1) + np.repeat(cube_indices * CUBE, counts, axis=0)
+    steps = np.stack([bits(10 * axis, 10) for axis in range(3)], axis=1) + np.repeat(
+        cube_indices * CUBE, counts, axis=0
+    )
     color = np.stack([bits(30, 5) * 255 / 31, bits(35, 6) * 255 / 63, bits(41, 5) * 255 / 31], axis=1)
     segment = bits(59, 5)
     return CloudTile(

@@ -348,7 +348,10 @@ def _read_cache(folder: Path, cache: Path) -> LearningRoad | None:
         notes = json.loads((cache_folder / "notes.json").read_text(encoding="utf-8"))
         arrays = {name: np.load(cache_folder / f"{name}.npy", mmap_mode="r") for name in _CACHED}
         count = len(arrays["xyz"])
-        if any(arrays[name].dtype != type_and_shape[0] or arrays[name].shape != (count, *type_and_shape[1]) for name, type_and_shape in _CACHED.items()):
+        if any(
+            arrays[name].dtype != type_and_shape[0] or arrays[name].shape != (count, *type_and_shape[1])
+            for name, type_and_shape in _CACHED.items()
+        ):
             return None
         return LearningRoad(
             name=folder.name,

@@ -90,7 +90,7 @@ class Stretch(Sample):
         return np.column_stack([self.corridor[:, LEFT] - self.center, self.center - self.corridor[:, RIGHT]])
 
     def without_shoulders(self) -> bool:
-        """Return whether this is a carriageway whose pavement ends within `NO_SHOULDER` of its edge lines everywhere."""
+        """Return whether a carriageway's pavement ends within `NO_SHOULDER` of its edge lines everywhere."""
         excesses = self.paved_sides() - self.lines
         excesses = excesses[np.isfinite(excesses)]
         return self.carriageway and bool(len(excesses)) and float(excesses.max()) <= NO_SHOULDER

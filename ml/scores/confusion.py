@@ -85,7 +85,8 @@ class Confusion:
         """Return per-class scores, means, accuracy, counts and the matrix as JSON data; NaN becomes None."""
         columns = {metric: self.values(metric) for metric in METRICS}
         rows = {
-            name: {metric: nan_to_none(values[class_index]) for metric, values in columns.items()} | {"support": int(support)}
+            name: {metric: nan_to_none(values[class_index]) for metric, values in columns.items()}
+            | {"support": int(support)}
             for class_index, (name, support) in enumerate(zip(self.names, self.support, strict=True))
         }
         return {

@@ -57,7 +57,8 @@ def with_painted_line(road: LearningRoad) -> LearningRoad:
     left_normals = np.column_stack([-np.sin(direction), np.cos(direction)])
     points = axis.position(place_stations[has_line]) + line_offsets[has_line, None] * left_normals
     line = MeasuredAxis(
-        np.column_stack([points, axis.elevation(place_stations[has_line])]), np.diff(place_stations[has_line]) < 1.5 * STEP
+        np.column_stack([points, axis.elevation(place_stations[has_line])]),
+        np.diff(place_stations[has_line]) < 1.5 * STEP,
     )
     return replace(road, truth=Truth.of_axis(line, truth.kind))
 

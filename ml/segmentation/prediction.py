@@ -193,7 +193,9 @@ class TileStore:
             record = np.fromfile(self._folder / f"{row}_{column}", dtype=_RECORD)
             histogram += np.bincount(record["intensity"][voxel_sample(record["place"], voxel)], minlength=LEVELS)
         share = np.cumsum(histogram) / histogram.sum()
-        lower_decile, median, upper_decile = (int(np.searchsorted(share, cumulative_share)) / FULL for cumulative_share in (0.1, 0.5, 0.9))
+        lower_decile, median, upper_decile = (
+            int(np.searchsorted(share, cumulative_share)) / FULL for cumulative_share in (0.1, 0.5, 0.9)
+        )
         return Scaling(median, upper_decile - lower_decile if upper_decile > lower_decile else 1.0)
 
     def tiles(self) -> Iterator[tuple[CloudTile, Bool, Int]]:

@@ -65,5 +65,7 @@ def _thresholds(labels: AnyArray, sureness: Float32, configuration: Segmentation
     """Return each class's least probability (C,) for its label to be kept; 2, which none reaches, without points."""
     thresholds = np.full(len(class_names(configuration.scheme())), 2.0, dtype=np.float32)
     for class_index in np.unique(labels):
-        thresholds[class_index] = np.quantile(sureness[labels == class_index], 1.0 - configuration.self_training.believed)
+        thresholds[class_index] = np.quantile(
+            sureness[labels == class_index], 1.0 - configuration.self_training.believed
+        )
     return thresholds

@@ -141,7 +141,9 @@ def _names(evaluation: Evaluation) -> list[str]:
     if repeated_paths := sorted(str(path) for path, unique_path in path_places if unique_paths.count(unique_path) > 1):
         raise InputError("data", repeated_paths[0], "is given twice, or with two endings")
     longest = max(len(unique_path.parts) for unique_path in unique_paths)
-    name_candidates = (["-".join(unique_path.parts[-parts:]) for unique_path in unique_paths] for parts in range(1, longest + 1))
+    name_candidates = (
+        ["-".join(unique_path.parts[-parts:]) for unique_path in unique_paths] for parts in range(1, longest + 1)
+    )
     return next(names for names in name_candidates if len(set(names)) == len(names))
 
 

@@ -29,9 +29,8 @@ def calm_swings(model: Model, station: Float, heights: Float, largest_swing: flo
     if not is_swing.any():
         return model
     padded_flags = np.pad(is_swing, 1)
-    widened_flags = (
-        padded_flags[:-2] | padded_flags[1:-1] | padded_flags[2:]
-    )  # beside a swing the elements are askew as well
+    # Beside a swing the elements are askew as well.
+    widened_flags = padded_flags[:-2] | padded_flags[1:-1] | padded_flags[2:]
     grade = np.gradient(heights, station)
     for first_chord, last_chord in reversed(_runs(widened_flags)):
         points = slice(first_chord, last_chord + 2)

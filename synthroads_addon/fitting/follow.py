@@ -238,7 +238,9 @@ def follow_points(points: Float, tolerance: float) -> DesignFit | None:
         if not best_fit.rank(points, tolerance)[0]:
             break
         best_fit = min(
-            best_fit, _search_elements(points, values_error, tolerance), key=lambda candidate: candidate.rank(points, tolerance)
+            best_fit,
+            _search_elements(points, values_error, tolerance),
+            key=lambda candidate: candidate.rank(points, tolerance),
         )
     return replace(best_fit, model=_move_end(best_fit.model, float(best_fit.stations[-1])))
 
@@ -379,7 +381,9 @@ def _fit_part(
 
     def measure(model: Model, pose: Float, approximate_stations: Float) -> tuple[Float, Float]:
         """Return the points' stations and offsets (N,), m, on a model's elements, near approximate stations."""
-        feet, lateral_offsets = _alignment(model, pose).project_near(points, approximate_stations - model.knots[0], NEAR)
+        feet, lateral_offsets = _alignment(model, pose).project_near(
+            points, approximate_stations - model.knots[0], NEAR
+        )
         return feet + model.knots[0], lateral_offsets
 
     feet, offsets = measure(model, pose, station)

@@ -111,9 +111,8 @@ def _gains(profiles: Profiles, line_offset: Float, sign: int) -> Float:
     mean = np.where(share > _KNOWN, total / np.maximum(share, 1e-9), np.nan)
     excess = mean[:, :-side] - mean[:, side:]  # an island may be as bright as its line, a lane isn't
     contrast = excess[np.isfinite(excess[:, 0]), 0]
-    painted_contrast = (
-        contrast[contrast > 0.5 * np.percentile(contrast, 80)] if len(contrast) else contrast
-    )  # a line may be dashed
+    # A line may be dashed.
+    painted_contrast = contrast[contrast > 0.5 * np.percentile(contrast, 80)] if len(contrast) else contrast
     line_paint = float(np.median(painted_contrast)) if len(painted_contrast) else 0.0
     if line_paint <= 0.0:
         return np.full(excess.shape, -1.0)

@@ -93,9 +93,8 @@ def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int)
         return edge, 0.0
     # The split after n points, outwards, leaves the fewest on the wrong side where paved less unpaved ones are most.
     gain = np.append(0, np.cumsum(np.where(paved, 1, -1)))
-    best_splits = np.flatnonzero(
-        gain == gain.max()
-    )  # where points of both lie mingled there are several: the first is no edge
+    # Where points of both lie mingled there are several: the first is no edge.
+    best_splits = np.flatnonzero(gain == gain.max())
     first_split, last_split = int(best_splits[0]), int(best_splits[-1])
     if first_split == 0 or last_split == len(offset):
         return edge, 0.0

@@ -201,9 +201,8 @@ def raised_lines(layout: RoadLayout) -> Float:
             line_height, *side_heights = (
                 _mean_height(profiles, rows, float(line.measured[number]), *reach) for reach in _ON_AND_BESIDE
             )
-            result[row, number] = line_height - np.maximum(
-                side_heights[0], side_heights[1]
-            )  # unseen where either side is
+            # Unseen where either side is.
+            result[row, number] = line_height - np.maximum(side_heights[0], side_heights[1])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # stretches without lines
         return np.asarray(np.nanmedian(result, axis=0))

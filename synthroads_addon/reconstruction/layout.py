@@ -390,10 +390,14 @@ def _band(pavement: Pavement, part: _Part, lines: list[Line]) -> Band:
     """Return a strip of pavement as a band with its lines; of two nearer than a lane the more painted one stays."""
     right_edge, left_edge = part.span
     line_offset = {id(line): _place_in(line, part.usual) for line in lines}
-    band_lines = [line for line in lines if right_edge - _BAND_MARGIN < line_offset[id(line)] < left_edge + _BAND_MARGIN]
+    band_lines = [
+        line for line in lines if right_edge - _BAND_MARGIN < line_offset[id(line)] < left_edge + _BAND_MARGIN
+    ]
     chosen_lines: list[Line] = []
     for line in sorted(band_lines, key=lambda item: -item.length * (0.2 + item.width)):
-        if all(abs(line_offset[id(line)] - line_offset[id(chosen_line)]) >= _NARROWEST_LANE for chosen_line in chosen_lines):
+        if all(
+            abs(line_offset[id(line)] - line_offset[id(chosen_line)]) >= _NARROWEST_LANE for chosen_line in chosen_lines
+        ):
             chosen_lines.append(line)
     chosen_lines.sort(key=lambda line: line_offset[id(line)])
     missing_offsets = []
@@ -502,9 +506,8 @@ def axis_from_lines(layout: RoadLayout) -> FoundAxis:
         np.hypot(level_std if np.isfinite(level_std) else 0.0, _shared_error(guides, smooth_axis.scatter))
     )
     has_votes = np.isfinite(voted_offsets)
-    axis_offsets = np.interp(
-        stations, stations[has_votes], smooth_axis.values[has_votes]
-    )  # no curve is guessed where nothing was seen
+    # No curve is guessed where nothing was seen.
+    axis_offsets = np.interp(stations, stations[has_votes], smooth_axis.values[has_votes])
     return FoundAxis(stations, axis_offsets, np.hypot(smooth_axis.std, level_std), voted_offsets)
 
 

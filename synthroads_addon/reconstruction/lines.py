@@ -177,7 +177,8 @@ def _vertex(values: Float, peak: int, bin_offsets: Float) -> float:
     left_value, peak_value, right_value = values[peak - 1 : peak + 2]
     second_difference = left_value - 2.0 * peak_value + right_value
     return float(
-        bin_offsets[peak] + (0.5 * ACROSS * (left_value - right_value) / second_difference if second_difference < 0.0 else 0.0)
+        bin_offsets[peak]
+        + (0.5 * ACROSS * (left_value - right_value) / second_difference if second_difference < 0.0 else 0.0)
     )
 
 

@@ -78,9 +78,8 @@ def cell_sums(coord: Tensor, mask: Tensor, features: Tensor, reach: float, numbe
     sums = values.new_zeros(slices * number, channels + 2)
     for cell, weight in ((lower_cell, 1.0 - (cell_place - lower_cell)), (lower_cell + 1.0, cell_place - lower_cell)):
         in_grid = mask & (cell >= 0) & (cell < number)
-        index = (
-            first_cell + torch.where(in_grid, cell, 0.0).long()
-        )  # NaN, of weights beyond reason, is no number of a cell
+        # NaN, of weights beyond reason, is no number of a cell.
+        index = first_cell + torch.where(in_grid, cell, 0.0).long()
         sums = sums.index_add(0, index.flatten(), values * (weight * in_grid).flatten()[:, None])
     return sums.view(slices, number, channels + 2)
 

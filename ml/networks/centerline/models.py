@@ -151,7 +151,12 @@ class CenterlineModel(nn.Module):
         _, heading = self.line(outputs["center"].detach(), outputs, context, batch["frame"])
         heading_column = CORRIDOR.index("heading")
         outputs["corridor"] = torch.cat(
-            [outputs["corridor"][..., :heading_column], heading[..., None], outputs["corridor"][..., heading_column + 1 :]], dim=-1
+            [
+                outputs["corridor"][..., :heading_column],
+                heading[..., None],
+                outputs["corridor"][..., heading_column + 1 :],
+            ],
+            dim=-1,
         )
         std = torch.exp(outputs["log_std"]) * outputs["log_std"].new_tensor(SCALE)
         return outputs | {"center_std": std[..., 0], "corridor_std": std[..., 1:]}

@@ -145,9 +145,8 @@ def _along(stations: Float, offsets: Float, deviation: Float) -> tuple[Float, Fl
         return np.zeros(len(offsets)), np.full(len(offsets), np.inf)
     weights = np.where(seen_mask, 1.0 / np.square(np.where(seen_mask, deviation, 1.0)), 0.0)
     smooth_axis = smooth(offsets, weights, STRETCH * SPACING, _WAVELENGTH, usual_std=0.03)
-    values = np.interp(
-        stations, stations[seen_mask], smooth_axis.values[seen_mask]
-    )  # no curve is guessed where nothing was seen
+    # No curve is guessed where nothing was seen.
+    values = np.interp(stations, stations[seen_mask], smooth_axis.values[seen_mask])
     # Nothing is known of the course within a gap but its ends: the deviation grows with the distance from these.
     gap = STRETCH * SPACING * ndimage.distance_transform_edt(~seen_mask)
     std = np.interp(stations, stations[seen_mask], deviation[seen_mask])
