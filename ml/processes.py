@@ -79,6 +79,7 @@ def helper_processes(run: Run[Any], learn: Callable[[Run[Any]], object], device:
         return
     if device.type == "cuda":
         _check_devices(count, run.configuration.device)
+    # The processes find each other by a file in a temporary folder.
     context = multiprocessing.get_context("spawn")
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         meeting = Path(folder) / "meeting"

@@ -102,6 +102,7 @@ def ship(run: Run[Any], weights: Path, *, overwrite: bool = False) -> int:
 
 def _to_half_precision(value: torch.Tensor) -> torch.Tensor:
     """Return a tensor in half precision; integers, and values beyond its range, as they are."""
+    # Half precision ends at 65,504.
     if not value.is_floating_point() or float(value.abs().max() if value.numel() else 0.0) > 6e4:
         return value
     return value.half()

@@ -81,6 +81,7 @@ def fit(
     )
     if steps_per_epoch == 0 and count > 1:
         raise InputError("processes", count, f"must not exceed the batches of an epoch, {batches_per_epoch}")
+    # The batches of this process.
     share = slice(number, min(steps_per_epoch * count * batches_per_step, batches_per_epoch), count)
     schedule: Schedule = configuration.schedule
     optimizer = optimizer_of(model, schedule)
@@ -107,6 +108,7 @@ def fit(
             progress(Stage("training", detail), (step + 1) / (schedule.epochs * steps_per_epoch))
         summary = {"epoch": epoch + 1, **_means(figures), "learning_rate": optimizer.param_groups[0]["lr"]}
         average([buffer for buffer in model.buffers() if buffer.is_floating_point()])  # statistics of norms
+        # Helper processes neither validate nor save.
         if number:
             continue
         if validate is not None:

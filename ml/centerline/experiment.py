@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Mapping, Sequence, Set
 from functools import partial
 from pathlib import Path
@@ -99,10 +100,8 @@ def run_experiment(
         for name, variant in experiment.variants.items():
             results: dict[str, Any] = {}
             for turn in turns:
-                configuration, folder_name = (
-                    _leave_out_roads(with_seed(configurations[name], seed), turn, roads),
-                    _folder_without(turn),
-                )
+                configuration = _leave_out_roads(with_seed(configurations[name], seed), turn, roads)
+                folder_name = _folder_without(turn)
                 variant_folder = output / (variant.of or name)
                 folder = (
                     variant_folder / folder_name if configuration.data.measured else variant_folder
@@ -318,14 +317,6 @@ def _best_rule(
     row = ["best of the rules"]
     for road in spreads[rules[0]]:
         rule_spreads = [spreads[name][road][figure] for name in rules if figure in spreads[name][road]]
-        row.append(
-            cell(
-                min(
-                    (spread for spread in rule_spreads if spread.mean == spread.mean),
-                    key=lambda one: one.mean,
-                    default=None,
-                ),
-                metric,
-            )
-        )
+        measured_spreads = [spread for spread in rule_spreads if not math.isnan(spread.mean)]
+        row.append(cell(min(measured_spreads, key=lambda spread: spread.mean, default=None), metric))
     return row

@@ -96,10 +96,8 @@ class CenterlinePredictor:
     def __call__(self, road: LearningRoad, frames: Frames) -> Float:
         """Return (M, 4 + 2 K) numbers, columns `evaluation.CORRIDOR_COLUMNS`, NaN where nothing is found."""
         regression = self.regress(road, frames)
-        center, corridor = (
-            (regression.value[:, :1], regression.std[:, :1]),
-            (regression.value[:, 1:], regression.std[:, 1:]),
-        )
+        center = (regression.value[:, :1], regression.std[:, :1])
+        corridor = (regression.value[:, 1:], regression.std[:, 1:])
         return np.column_stack([*center, *corridor, regression.widths[:, 0]])
 
     def regress(self, road: LearningRoad, frames: Frames) -> Regression:
@@ -111,10 +109,8 @@ class CenterlinePredictor:
         """
         mean, raw_std = self._combine_sequences(road, frames)
         calibration = [self.calibration[name] for name in TARGETS]
-        factors, widths = (
-            np.array([target_calibration.factor for target_calibration in calibration]),
-            np.array([target_calibration.widths for target_calibration in calibration]),
-        )
+        factors = np.array([target_calibration.factor for target_calibration in calibration])
+        widths = np.array([target_calibration.widths for target_calibration in calibration])
         return Regression(frames, mean, raw_std, raw_std * factors, raw_std[:, :, None] * widths)
 
     def _combine_sequences(self, road: LearningRoad, frames: Frames) -> tuple[Float, Float]:

@@ -219,6 +219,7 @@ def _cells(plan: Float, cell: float) -> Float:
 
 def _shortest_way(cells: Float, cell: float) -> Index:
     """Return the indices of the cells on the shortest path between the two farthest apart along the strip."""
+    # Chosen: cells two apart are still neighbours, a tenth more as the means lie off their cells' middles.
     pairs = cKDTree(cells).query_pairs(2.1 * cell, output_type="ndarray")
     pairs = _bridge_cells(cells, pairs)
     graph = _graph(len(cells), pairs, np.hypot(*(cells[pairs[:, 0]] - cells[pairs[:, 1]]).T))
@@ -264,11 +265,9 @@ def _centre_path(path: MeasuredAxis, plan: Float, window: float, half_width: flo
     left_extent = sorted_offset[end - 1 - (_STRAY * (end - start)).astype(int)]
     # Where a strip is cut off askew, or one side is hidden, the middle of what is left isn't the strip's.
     is_wide_enough = left_extent - right_extent >= _WHOLE * np.median(left_extent - right_extent)
-    middle, right_extent, left_extent = (
-        station.min() + _BIN * (occupied_bins[is_wide_enough] + 0.5),
-        right_extent[is_wide_enough],
-        left_extent[is_wide_enough],
-    )
+    middle = station.min() + _BIN * (occupied_bins[is_wide_enough] + 0.5)
+    right_extent = right_extent[is_wide_enough]
+    left_extent = left_extent[is_wide_enough]
     stations = np.arange(station.min(), station.max() + 0.5 * SPACING, SPACING)
     return _smooth_line(
         _on_path(path, stations).at(np.interp(stations, middle, 0.5 * (right_extent + left_extent))), window

@@ -106,6 +106,7 @@ def unpack_tile(packed_tile: Packed) -> CloudTile:
     notes = packed_tile.notes
     points, cubes = int(notes["points"]), int(notes["cubes"])
     content = zlib.decompress(packed_tile.content)
+    # Per cube three int32 of place and one of its points' number; per point one word, stored byte by byte.
     if len(content) != 16 * cubes + 8 * points:
         raise ValueError("length")
     cube_indices = np.frombuffer(content, "<i4", 3 * cubes).reshape(-1, 3).astype(np.int64)

@@ -219,25 +219,27 @@ def _branches(skeleton: Bool) -> tuple[NDArray[np.int32], list[int]]:
     step in a line have three neighbours as well, but only two lines: they join them.
     """
     neighbours = ndimage.convolve(skeleton.astype(np.int8), _AROUND.astype(np.int8), mode="constant") - 1
-    crowded = skeleton & (neighbours > 2)
-    number, _ = ndimage.label(skeleton & ~crowded, structure=_AROUND)
-    knots, _ = ndimage.label(crowded, structure=_AROUND)
+    knot_pixels = skeleton & (neighbours > 2)
+    line_labels, _ = ndimage.label(skeleton & ~knot_pixels, structure=_AROUND)
+    knot_labels, _ = ndimage.label(knot_pixels, structure=_AROUND)
+    # A knot is a junction if more than two lines touch it.
     junction = np.zeros_like(skeleton)
-    for knot, part in enumerate(ndimage.find_objects(knots), 1):
-        box = tuple(slice(max(0, side.start - 1), side.stop + 1) for side in part)
-        knot_mask = knots[box] == knot
-        touching_labels = np.unique(number[box][ndimage.binary_dilation(knot_mask, _AROUND)])
+    for knot, knot_box in enumerate(ndimage.find_objects(knot_labels), 1):
+        box = tuple(slice(max(0, side.start - 1), side.stop + 1) for side in knot_box)
+        knot_mask = knot_labels[box] == knot
+        touching_labels = np.unique(line_labels[box][ndimage.binary_dilation(knot_mask, _AROUND)])
         junction[box] |= knot_mask & (np.count_nonzero(touching_labels) > 2)
-    number, _ = ndimage.label(skeleton & ~junction, structure=_AROUND)
+    # Label again: the other knots join the lines they lie on.
+    line_labels, _ = ndimage.label(skeleton & ~junction, structure=_AROUND)
     ends = skeleton & ~junction & (neighbours <= 1)
-    return number, [int(label) for label in np.unique(number[ends])]
+    return line_labels, [int(label) for label in np.unique(line_labels[ends])]
 
 
-def _lengths(number: NDArray[np.int32], labels: list[int]) -> Iterator[tuple[int, float]]:
+def _lengths(line_labels: NDArray[np.int32], labels: list[int]) -> Iterator[tuple[int, float]]:
     """Yield label and length in pixels of each of the chosen lines, a diagonal step counting the root of two."""
-    boxes = ndimage.find_objects(number)
+    boxes = ndimage.find_objects(line_labels)
     for label in labels:
-        mask = number[boxes[label - 1]] == label
+        mask = line_labels[boxes[label - 1]] == label
         diagonal = np.count_nonzero(mask[1:, 1:] & mask[:-1, :-1]) + np.count_nonzero(mask[1:, :-1] & mask[:-1, 1:])
         yield label, np.count_nonzero(mask) + (2.0**0.5 - 1.0) * diagonal
 

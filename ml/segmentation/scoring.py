@@ -72,11 +72,9 @@ def overlapping_pieces(
         """Yield the pieces in squares of a grid from a corner on, recursively smaller where points are many."""
         cells = np.floor((position[members] - low) / edge).astype(np.int64)
         for cell in np.unique(cells, axis=0):
-            core, square_corner, candidate_positions = (
-                members[np.all(cells == cell, axis=1)],
-                low + cell * edge,
-                position[candidates],
-            )
+            core = members[np.all(cells == cell, axis=1)]
+            square_corner = low + cell * edge
+            candidate_positions = position[candidates]
             visible_points = candidates[
                 np.all(
                     (candidate_positions >= square_corner - margin)
@@ -188,10 +186,8 @@ def _needed_points(thinned_points: Float32, all_points: Float32, core: Bool | No
     """Return a mask of the thinned points within two voxels of the core's bounding box in plan; all without a core."""
     if core is None:
         return np.ones(len(thinned_points), dtype=bool)
-    lower_corner, upper_corner = (
-        all_points[core][:, :2].min(axis=0) - 2 * voxel,
-        all_points[core][:, :2].max(axis=0) + 2 * voxel,
-    )
+    lower_corner = all_points[core][:, :2].min(axis=0) - 2 * voxel
+    upper_corner = all_points[core][:, :2].max(axis=0) + 2 * voxel
     return np.asarray(np.all((thinned_points[:, :2] >= lower_corner) & (thinned_points[:, :2] <= upper_corner), axis=1))
 
 
@@ -302,6 +298,7 @@ def score(
                 confusion.add(tile.segment, groups[labels])
                 if largest_result is None or len(tile) > len(largest_result[0]):
                     largest_result = (tile, groups[labels])
+            # Half way: the number of tiles isn't known before they are read.
             progress("scoring", 0.5)
     return confusion, largest_result
 

@@ -152,6 +152,7 @@ def _test_source(path: Path, evaluation: Evaluation) -> Source:
     if path.is_dir():
         class_options = {"mapping": evaluation.mapping, "yardstick": evaluation.yardstick}
         return Source(path=str(path), split=evaluation.split, **class_options)
+    # Chosen: tiles of 60 m bound memory; 1 km takes in a small cloud as a whole.
     tile = 60.0
     if path.suffix.lower() in ENDINGS and path.is_file():
         with suppress(InputError), open_cloud(path) as cloud:  # a packed file is no cloud

@@ -75,10 +75,8 @@ def _insert_parabolas(model: Model, station: Float, heights: Float, grade: Float
     values = np.empty((2 * len(chord), 2))
     values[::2] = np.column_stack([grade[:-1], middle])
     values[1::2] = np.column_stack([middle, grade[1:]])
-    model_before, model_after = (
-        _cut_elements(model, -np.inf, float(station[0])),
-        _cut_elements(model, float(station[-1]), np.inf),
-    )
+    model_before = _cut_elements(model, -np.inf, float(station[0]))
+    model_after = _cut_elements(model, float(station[-1]), np.inf)
     sections = [row for row in (model_before, (knots, values), model_after) if len(row[1])]
     all_knots = np.concatenate([sections[0][0][:1], *(row[0][1:] for row in sections)])
     count = sum(len(row[1]) for row in sections)

@@ -417,6 +417,7 @@ def refine(data: AxisData, chain: Chain, stations: Float, free_knots: bool, step
     """
     fit = ChainFit(data, chain, *data.measure(chain, stations))
     basis = chain.basis(free_knots)
+    # Less damping after a step that helps, more after one that doesn't; the factors are chosen.
     damping, system = 1.0, _system(fit, basis, free_knots)
     for _ in range(steps if basis.shape[1] else 0):
         upper_factor, target, knot_rows, scale = system

@@ -223,6 +223,7 @@ def model_of_pieces(pieces: Sequence[Piece], station: Float, order: int) -> Mode
     for piece_before, piece_after in itertools.pairwise(pieces):
         last_station, next_station = float(station[piece_before.last]), float(station[piece_after.first])
         gap = next_station - last_station
+        # The border lies within a gap's length beside the gap, and not beyond the middles of both pieces.
         earliest = (
             0.5 * (float(station[piece_before.first]) + last_station)
             if piece_before.first < piece_before.last
@@ -239,6 +240,7 @@ def model_of_pieces(pieces: Sequence[Piece], station: Float, order: int) -> Mode
         border = max(border, knots[-1] + _SHORT)
         kind = _kind(piece_after, order)
         turn = piece_before.at(border, order - 1) - piece_after.at(border, order - 1)
+        # An angle between the pieces: a short arc around the border turns by it.
         if order == 2 and abs(turn) > _KINK:
             half_length = 0.25 * gap
             start = max(border - half_length, 0.5 * (knots[-1] + border))

@@ -326,6 +326,7 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05, design_ends: bool = Fal
     alignment, approximate_stations = design or _fit_plan(local[:, :2], weights, _MARGIN * tolerance, design_ends)
     reach = max(NEAR, 5.0 * float(np.median(np.diff(approximate_stations))))
     station, offset = alignment.project_near(local[:, :2], approximate_stations, reach)
+    # Each point's station and distance on the fitted alignment.
     axis_distance = np.hypot(*(local[:, :2] - alignment.position(station)).T)
     # The road ends at its last point's foot: points before its begin or behind its end, out of their order, are off it.
     axis_distance = np.hypot(axis_distance, np.maximum(np.maximum(-station, station - alignment.length), 0.0))
@@ -446,12 +447,14 @@ def _fit_windows(data: AxisData, run: Float, tolerance: float, design_ends: bool
         design_ends: see `fit_axis`.
     """
     step = float(np.median(np.diff(run)))
+    # Chosen: at least 60 points in a window, and 15 that the next window fits again.
     window, tail = max(_WINDOW, 60.0 * step), max(_TAIL, 15.0 * step)
     pieces: list[Chain] = []
     start: Start | None = None
     first_point, origin, is_refused = 0, 0.0, False
     station = np.empty(len(run))
     while True:
+        # The window's points, thinned where they are too many.
         is_last_window = run[-1] - run[first_point] <= window + tail
         end = len(run) if is_last_window else int(np.searchsorted(run, run[first_point] + window))
         end = max(end, min(first_point + 8, len(run)))
@@ -469,6 +472,7 @@ def _fit_windows(data: AxisData, run: Float, tolerance: float, design_ends: bool
         station[first_point:end] = origin + np.interp(np.arange(first_point, end), indices, fit.stations)
         if end == len(run):
             return _join_pieces([*pieces, fit.chain]), station
+        # The last part of the window is fitted again in the next one, with points to both sides.
         end_station = _window_end(fit.chain, tail)
         start = data.state_at(fit.chain, end_station)
         pieces.append(_cut_chain(fit.chain, end_station))
@@ -490,6 +494,7 @@ def _fit_window(
     """
     scale = _KNOTS * length / len(indices)
     count = independent_count(length, len(indices))
+    # Chosen: at most one element per 15 m for exact points, per 30 m for measured ones, five more or at least five.
     exact_goal = Goal(tolerance, 2.0 * tolerance, _EXACT, count, int(length / 15.0) + 5)
     dense_fit = data.fit_window(indices, max(data.spacings.exact, scale), start, origin)
     if dense_fit.rms < 3.0 * _ROUNDED:

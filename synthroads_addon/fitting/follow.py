@@ -309,6 +309,7 @@ def refine_design(points: Float, initial_fit: DesignFit, free_knots: bool = True
     fitted_parts: list[Model] = []
     stations, offsets = station.copy(), np.zeros(len(station))
     while True:
+        # Fit the next part to the points along it; it starts at the pose at which the part before ends.
         end_element = min(first_element + _ELEMENTS, model.size)
         part = _slice(model, first_element, end_element)
         value_is_fixed = bool(first_element and model.smooth[first_element - 1])
@@ -325,6 +326,7 @@ def refine_design(points: Float, initial_fit: DesignFit, free_knots: bool = True
         if end_element == model.size:
             fitted_parts.append(part)
             break
+        # Keep the first elements; the others, which the points that follow change, are fitted again in the next part.
         kept_elements = _first_elements(part, _KEPT)
         fitted_parts.append(kept_elements)
         end_point, heading, _ = _alignment(kept_elements, part_pose).frame(
@@ -332,11 +334,12 @@ def refine_design(points: Float, initial_fit: DesignFit, free_knots: bool = True
         )
         part_pose = np.array([*end_point, heading])
         first_element += _KEPT
-        knots = model.knots.copy()  # the rest begins where this part ends
+        knots = model.knots.copy()
         knots[first_element : end_element + 1] = part.knots[_KEPT:]
         values = model.values.copy()
         values[first_element:end_element] = part.values[_KEPT:]
         model = replace(model, knots=knots, values=values)
+        # Points that lay before the part's moved end belong to the elements after it.
         stations[stations > knots[end_element]] = np.maximum(
             stations[stations > knots[end_element]], knots[end_element]
         )
@@ -387,20 +390,19 @@ def _fit_part(
         return feet + model.knots[0], lateral_offsets
 
     feet, offsets = measure(model, pose, station)
-    damping = 1e-6
     matrix = _jacobian(model, pose, feet)
+    # Parameters in order: the pose's two, the free values from the start's on, the knots between elements.
+    first_free = 0 if free_pose else 3 if value_is_fixed else 2
+    end_free = matrix.shape[1] if free_knots else matrix.shape[1] - model.size + 1
+    # Levenberg-Marquardt; the factors of the damping are chosen.
+    damping = 1e-6
     for _ in range(_STEPS):
-        free_columns = matrix if free_pose else matrix[:, 2:]
-        if value_is_fixed:
-            free_columns = free_columns[:, 1:] if not free_pose else free_columns
-        if not free_knots:
-            free_columns = free_columns[:, : free_columns.shape[1] - model.size + 1]
+        free_columns = matrix[:, first_free:end_free]
         scale = np.maximum(np.sqrt((free_columns**2).sum(axis=0)), 1e-12)
         rows = np.vstack((free_columns / scale, np.sqrt(damping) * np.eye(len(scale))))
         step = np.linalg.lstsq(rows, np.append(offsets, np.zeros(len(scale))), rcond=None)[0] / scale
         full_step = np.zeros(matrix.shape[1])
-        end = matrix.shape[1] if free_knots else matrix.shape[1] - model.size + 1
-        full_step[end - len(step) : end] = step
+        full_step[first_free:end_free] = step
         lateral_step, turn = full_step[0], full_step[1]
         trial_model = model.apply_step(full_step)
         trial_pose = pose + np.array([-np.sin(pose[2]) * lateral_step, np.cos(pose[2]) * lateral_step, turn])
@@ -422,7 +424,7 @@ def _fit_part(
 def _jacobian(model: Model, pose: Float, station: Float) -> Float:
     """Return the derivatives (N, P) of the alignment's lateral position at stations (N,) by the model's parameters.
 
-    A change of curvature at s' turns the rest about the place there, which moves it by t(s) . (z(s) - z(s')) across
+    A change of curvature at s' turns the rest about the place there, which moves it by t(s) . (z(s) - z(s')) across.
     """
     alignment = _alignment(model, pose)
     shift = model.knots[0]
@@ -494,6 +496,7 @@ def _move_end(model: Model, end: float) -> Model:
     """Return a model whose last element is cut or prolonged to a station (m)."""
     knots, values = model.knots.copy(), model.values.copy()
     last_length = knots[-1] - knots[-2]
+    # Chosen: a tenth of the last element stays.
     end = max(end, knots[-2] + 0.1 * last_length)
     values[-1, 1] = values[-1, 0] + (values[-1, 1] - values[-1, 0]) * (end - knots[-2]) / last_length
     knots[-1] = end

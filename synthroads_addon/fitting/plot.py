@@ -62,10 +62,8 @@ def axis_picture(fit: AxisFit, name: str) -> Image.Image:
         name: name of the file with the points.
     """
     title = f"{name}: distance of {fit.points:,} points from the fitted road"
-    first_station, last_station = (
-        float(min(fit.stations.min(), 0.0)),
-        float(max(fit.stations.max(), fit.alignment.length)),
-    )
+    first_station = float(min(fit.stations.min(), 0.0))
+    last_station = float(max(fit.stations.max(), fit.alignment.length))
     bounds = f"; refused beyond {REFUSED_BEYOND:g} times the tolerance of {fit.tolerance:g} m: {fit.limit:g} m"
     rows = [
         _Row(fit.stations, fit.across, fit.horizontal, 2.0 * fit.tolerance, fit.limit, bounds),

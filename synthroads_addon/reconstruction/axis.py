@@ -116,6 +116,7 @@ def straighten_path(cloud: RoadCloud, options: Options, progress: Progress = sil
     """
     xy = cloud.xyz[cloud.of(PointKind.PAVEMENT, PointKind.MARKING) if cloud.labelled else cloud.surface, :2]
     path = path_through(options.path) if options.path is not None else first_path(xy)
+    # Chosen: 200,000 points tell the road's width.
     _, offset = path.project(xy[:: max(1, len(xy) // 200_000)])
     distances = np.abs(offset)[np.abs(offset) < _HALF_WIDTHS[1]]
     if not len(distances):
@@ -193,5 +194,6 @@ def _learned_view(cloud: RoadCloud, profiles: Profiles, options: Options) -> lis
         raise InputError("--run", None, "the model predicts no axis anywhere in this cloud")
     has_axis = np.interp(profiles.middles, path_stations, is_predicted.astype(np.float64)) > 0.5
     value = np.interp(profiles.middles, path_stations[is_predicted], offset[is_predicted])
+    # Chosen: no prediction counts as better than 1 cm, so that one view can't outweigh all the others.
     deviation = np.interp(profiles.middles, path_stations[is_predicted], np.maximum(std[is_predicted], 0.01))
     return [View("network", np.where(has_axis, value, np.nan), np.where(has_axis, deviation, np.inf))]

@@ -91,6 +91,7 @@ def _seen_part(path: CloudPath, axis: FusedAxis) -> CloudPath:
     seen_stations = axis.stations[np.isfinite(axis.raw)]
     if not len(seen_stations):
         return path
+    # 2.5 m: half of a stretch, to its ends.
     in_part = (path.stations >= seen_stations[0] - 2.5) & (path.stations <= seen_stations[-1] + 2.5)
     first_point = int(np.flatnonzero(in_part)[0])
     return CloudPath(path.points[in_part], path.heading[in_part], path.start + first_point)

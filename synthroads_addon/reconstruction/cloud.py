@@ -196,6 +196,7 @@ def _sort_by_height(path: FilePath, points: _Points, placement: Placement, class
         raise InputError(str(path), int(surface.sum()), requirement)
     is_pavement = np.isin(kind, (PointKind.PAVEMENT, PointKind.MARKING))
     has_pavement_class = bool(is_pavement.sum() > _LABELLED_SHARE * surface.sum())
+    # Chosen: a scan with markings shows them on more than 0.1 % of its pavement; fewer points are stray.
     has_marking_class = has_pavement_class and bool((kind == PointKind.MARKING).sum() > 0.001 * is_pavement.sum())
     return RoadCloud(
         xyz, intensity, kind, origin, placement, has_pavement_class, has_marking_class, sum(classes.values()), classes

@@ -121,10 +121,8 @@ def judge(
     middle_name, edges_reason = "the pavement's middle", "the pavement's edges aren't seen on both sides"
     unseen = np.isnan(middles)
     if layout.kind == "dual":
-        middle_name, edges_reason = (
-            "the median's middle",
-            "neither the median's edges nor lines on both sides of it are seen",
-        )
+        middle_name = "the median's middle"
+        edges_reason = "neither the median's edges nor lines on both sides of it are seen"
         both_painted = np.all(
             [_is_painted(band, guide) for band, guide in zip(layout.bands, guides, strict=True)], axis=0
         )
@@ -231,10 +229,8 @@ def _doubts(profiles: Profiles, doubtful: Bool, masks: dict[str, Bool]) -> Itera
     label, _ = ndimage.label(doubtful)
     half_stretch, length = 0.5 * STRETCH, float(profiles.stations[-1])
     for (run,) in ndimage.find_objects(label):
-        start, end = (
-            profiles.middles[run.start] - half_stretch,
-            min(profiles.middles[run.stop - 1] + half_stretch, length),
-        )
+        start = profiles.middles[run.start] - half_stretch
+        end = min(profiles.middles[run.stop - 1] + half_stretch, length)
         reasons = tuple(reason for reason, mask in masks.items() if mask[run].any())
         yield Doubt(round(float(start), 1), round(float(end), 1), reasons)
 

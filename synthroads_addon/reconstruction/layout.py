@@ -268,6 +268,7 @@ def usual_place(distance: Float) -> float | None:
     distances = distance[np.isfinite(distance)]
     if not len(distances):
         return None
+    # Bins of 0.1 m that reach beyond both ends; the chosen 0.4 m to both sides of a peak hold an edge's own spread.
     edges = np.arange(distances.min() - 0.25, distances.max() + 0.36, 0.1)
     count = ndimage.uniform_filter1d(np.histogram(distances, edges)[0].astype(np.float64), 3)
     peak = int(find_peaks(np.pad(count, 1), height=_COMMON * count.max())[0][0]) - 1
@@ -377,6 +378,7 @@ def _blur(values: Grid) -> Grid:
     weight = ndimage.gaussian_filter(has_points.astype(np.float32), _BLUR)
     mean = ndimage.gaussian_filter(np.where(has_points, values, 0.0).astype(np.float32), _BLUR)
     with np.errstate(invalid="ignore", divide="ignore"):
+        # Chosen: points in 5 % of the blur's reach tell its value.
         return np.where(weight > 0.05, mean / weight, np.nan)
 
 
@@ -394,6 +396,7 @@ def _band(pavement: Pavement, part: _Part, lines: list[Line]) -> Band:
         line for line in lines if right_edge - _BAND_MARGIN < line_offset[id(line)] < left_edge + _BAND_MARGIN
     ]
     chosen_lines: list[Line] = []
+    # Painted area, with 0.2 m on the width (chosen): of lines as long the wider one, of others mostly the longer one.
     for line in sorted(band_lines, key=lambda item: -item.length * (0.2 + item.width)):
         if all(
             abs(line_offset[id(line)] - line_offset[id(chosen_line)]) >= _NARROWEST_LANE for chosen_line in chosen_lines
@@ -485,9 +488,11 @@ def axis_from_lines(layout: RoadLayout) -> FoundAxis:
     if not any(np.isfinite(line.measured).any() for line in lines):
         raise InputError("road", None, "neither lines nor edges of a carriageway can be made out in the cloud")
     if not np.isfinite(centre).any():
+        # Without guides begin with the mean of all lines.
         line_offsets = np.array([line.measured for line in lines])
         has_votes = np.isfinite(line_offsets).sum(axis=0)
         start = np.where(has_votes > 0, np.nansum(line_offsets, axis=0) / np.maximum(has_votes, 1), np.nan)
+    # Repeated, as a line's mean distance is from the axis of the round before.
     axis = fill_gaps(start)
     for _ in range(_ROUNDS):
         voted_offsets = _vote_axis(lines, axis)
@@ -501,6 +506,7 @@ def axis_from_lines(layout: RoadLayout) -> FoundAxis:
         _AXIS_WAVELENGTH,
         usual_std=USUAL,
     )
+    # The deviation of the constant, which smoothing along the road doesn't lessen.
     level_std = mean_with_std(centre - voted_offsets)[1]
     level_std = float(
         np.hypot(level_std if np.isfinite(level_std) else 0.0, _shared_error(guides, smooth_axis.scatter))

@@ -224,12 +224,11 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
         offsets: (T,) of the track, m.
     """
     half_window = _WINDOW / 2.0
-    start = max(profiles.stations[0], stations[0] - half_window)
-    end = min(profiles.stations[-1], stations[-1] + half_window)
     middle, cover = _paint_by_row(profiles, stations, offsets)
     track_rows = _shown(profiles.stations, stations, half_window)
     # The width where it is painted: a high percentile, as dashes leave most rows bare.
     usual_width = float(np.nanpercentile(cover[track_rows], 90)) if np.isfinite(cover[track_rows]).any() else 0.0
+    # Chosen: no marking is narrower than 3 cm.
     if usual_width < 0.03:
         return None
     share = _painted_share(cover, usual_width)
@@ -237,6 +236,7 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
     stretch_offsets, weights = _offsets_by_stretch(profiles, middle, np.where(track_rows, share, 0.0))
     if (weights > 0.0).sum() < 4:
         return None
+    # Width and offsets by bins; by the points themselves where these are known.
     width, width_std = mean_with_std(cover[track_rows][np.nan_to_num(share[track_rows]) > 0.5])
     spacing = profiles.row_gaps(stretch_offsets)
     if profiles.points is not None:
@@ -244,9 +244,11 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
         stretch_offsets, widths, spacing = _between_points(profiles, profiles.points, stretch_offsets, painted_rows)
         weights = np.where(np.isfinite(stretch_offsets), weights, 0.0)
         width, width_std = mean_with_std(widths)
-        width_std = float(np.hypot(width_std, hidden_std(2.0 * spacing, width_std)))  # both edges lie between rows
+        # Both edges lie somewhere between two rows of points.
+        width_std = float(np.hypot(width_std, hidden_std(2.0 * spacing, width_std)))
     if (weights > 0.0).sum() < 4:
         return None
+    # The line reaches from the first to the last stretch that shows paint.
     smooth_offsets = smooth(stretch_offsets, weights, STRETCH * SPACING, WAVELENGTH, usual_std=USUAL)
     seen_stations = grid[weights > 0.0]
     start, end = float(seen_stations[0] - STRETCH / 2.0), float(seen_stations[-1] + STRETCH / 2.0)
@@ -294,6 +296,7 @@ def _paint_by_row(profiles: Profiles, stations: Float, offsets: Float) -> tuple[
     track_offset = np.interp(profiles.stations, stations, offsets)
     # Twice: the first mean is pulled by how far the track is off, the second lies about the line itself.
     middle, _ = _paint_near(profiles, track_offset)
+    # Chosen: the median over 21 rows removes single rows' errors and follows every bend.
     local = ndimage.median_filter(np.where(np.isfinite(middle), middle, track_offset), size=21, mode="nearest")
     return _paint_near(profiles, local)
 
@@ -312,6 +315,7 @@ def _paint_near(profiles: Profiles, line_offset: Float) -> tuple[Float, Float]:
     total = paint_amount.sum(axis=1)
     # Bins that no point fell into are taken to be like the rest of their row.
     share = has_points.mean(axis=1)
+    # Chosen: points in 30 % of the bins tell a row's paint, and 0.15 of a bin's paint its middle.
     cover = np.where(share > 0.3, total / np.maximum(share, 1e-9) * ACROSS, np.nan)
     with np.errstate(invalid="ignore", divide="ignore"):
         # Centre of gravity of the paint.
@@ -332,7 +336,13 @@ def _painted_share(cover: Float, usual_width: float) -> Float:
 
 
 def _offsets_by_stretch(profiles: Profiles, middle: Float, share: Float) -> tuple[Float, Float]:
-    """Return the paint's weighted mean offset, m, and its weight, 0 to 1, by stretch, (K,) each; NaN without paint."""
+    """Return the paint's weighted mean offset, m, and its weight, 0 to 1, by stretch, (K,) each; NaN without paint.
+
+    Args:
+        profiles: S rows in K stretches.
+        middle: (S,) offset of the line's middle by row, m; NaN without paint.
+        share: (S,) share of paint by row, 0 to 1.
+    """
     count = profiles.stretches
     index = np.arange(len(middle)) // STRETCH
     weight = np.where(np.isfinite(middle) & np.isfinite(share), np.nan_to_num(share), 0.0)
@@ -340,6 +350,7 @@ def _offsets_by_stretch(profiles: Profiles, middle: Float, share: Float) -> tupl
     total = np.bincount(index, weight, count)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.bincount(index, weight * np.nan_to_num(middle), count) / total
+    # Chosen: paint in 15 % of a stretch's rows tells its offset.
     weights = np.where(total > 0.15 * STRETCH, np.minimum(total / STRETCH, 1.0), 0.0)
     return np.where(weights > 0.0, mean, np.nan), weights
 
@@ -367,10 +378,8 @@ def _between_points(
             ((points.station[point_slice] - first_border) / SPACING).astype(np.int64), 0, len(painted_rows) - 1
         )
         on_painted_row = painted_rows[row]
-        offset, is_paint = (
-            points.offset[point_slice][on_painted_row].astype(np.float64),
-            points.marked[point_slice][on_painted_row],
-        )
+        offset = points.offset[point_slice][on_painted_row].astype(np.float64)
+        is_paint = points.marked[point_slice][on_painted_row]
         if is_paint.sum() < _FEWEST_POINTS or len(offset) < 2 * _FEWEST_POINTS:
             continue
         begin, end = _best_span(is_paint)
@@ -428,15 +437,15 @@ class _DashPattern(NamedTuple):
 def _dash_pattern(stations: Float, cover: Float) -> _DashPattern:
     """Return the pattern of a line's dashes.
 
+    Rows unpainted for longer than any gap don't count: there the line lies hidden between rows of points. The period
+    is that of the strongest wave in the paint; a standard pattern within `_DASH_TOLERANCE` takes its place.
+
     Args:
         stations: (R,) of the rows, m.
         cover: (R,) painted share of each row, NaN if unknown.
-
-
-    Rows unpainted for longer than any gap don't count: there the line lies hidden between rows of points.
-    The period is that of the strongest wave in the paint; a standard pattern within `_DASH_TOLERANCE` takes its place.
     """
     row_mask = np.isfinite(cover)
+    # Chosen: fewer than 30 rows show no pattern.
     if row_mask.sum() < 30:
         return _DashPattern(1.0, 0.0, 0.0, float(stations[0]))
     filled_cover = np.interp(stations, stations[row_mask], cover[row_mask])

@@ -194,6 +194,7 @@ def first_path(xy: Float) -> CloudPath:
     forward_points = _march(cells, tree, start, direction, half_width)
     backward_points = _march(cells, tree, start, direction + np.pi, half_width)
     line = np.array([*backward_points[::-1], *forward_points[1:]])
+    # Eastwards; the angle of 0.01 rad decides the way of a line that runs due north.
     if (line[-1] - line[0]) @ (np.cos(0.01), np.sin(0.01)) < 0.0:
         line = line[::-1]
     return smooth_path(path_through(line), _WAVELENGTH)
@@ -218,6 +219,7 @@ def _march_start(cells: Float, tree: cKDTree) -> tuple[Float, float, float]:
             np.linalg.eigh(np.cov((cells_around - centre).T)) if len(cells_around) > 2 else (np.ones(2), np.eye(2))
         )
         if np.sqrt(spread[1]) > _LONGISH * np.sqrt(max(spread[0], 1e-9)):
+            # Chosen: 2 % of the cells may lie off the road, in drives and junctions.
             half_width = float(np.percentile(np.abs((cells_around - centre) @ axes[:, 0]), 98))
             return centre, float(np.arctan2(axes[1, 1], axes[0, 1])), min(half_width + _MARGIN, _REACH)
     raise InputError("road", None, "its surface in the cloud is nowhere longer than wide: --path says how it runs")

@@ -242,6 +242,7 @@ def _fill_bins(values: Grid, known_mask: Bool) -> Grid:
     """Return values (S, U) whose unknown bins hold the Gaussian-weighted mean of known ones around."""
     result = np.where(known_mask, values, 0.0).astype(np.float32)
     filled_mask = known_mask.copy()
+    # Chosen: ever wider blurs (in bins) fill what narrower ones leave, where float32 still tells their weight.
     for sigma in (_BLUR, 2.0, 6.0, 20.0):
         weight = ndimage.gaussian_filter(known_mask.astype(np.float32), sigma)
         mean = ndimage.gaussian_filter(np.where(known_mask, values, 0.0).astype(np.float32), sigma)
@@ -310,6 +311,7 @@ def _reference_stretch(blocks: list[Float]) -> int:
 def registration_signal(profiles: Profiles) -> Grid:
     """Return the signal (S, U) by which profiles are registered: paint and the pavement's edges; 0 without points."""
     paint = np.clip(np.nan_to_num(profiles.paint), 0.0, 1.0)
+    # Chosen: blurs of one to two bins, so that lines a bin beside each other still match.
     signal = ndimage.gaussian_filter1d(paint, 1.5, axis=1)
     if profiles.paved is not None:
         paved = ndimage.gaussian_filter(np.nan_to_num(profiles.paved), (1.0, 2.0))

@@ -415,17 +415,20 @@ def _summarise_side(
     part: _SidePart, lines: list[Line | None], boundaries: list[_Boundary], inner_edge: Edge, outer_edge: Edge
 ) -> SideSection:
     """Return a side's widths, with standard deviations, from lines and edges measured in each stretch."""
+    # Widths count in the usual stretches only, in all where these are few.
     edge_seen = _is_visible(outer_edge)
     outer_width = outer_edge.offsets - _fill_with_median(boundaries[-1].smoothed)
     if part.band.usual is not None:
         outer_width = np.where(part.band.usual, outer_width, np.nan)
     usual_mask = _usual_stretches(outer_width, lines[-1])
     mask = usual_mask if usual_mask.sum() >= _FEWEST_STRETCHES else np.ones(len(usual_mask), dtype=bool)
+    # The lanes' boundaries, in the order of their distance from the axis.
     paint_std = 0.0 if part.marked else _PAINT_STD
     offsets = [boundary.place(mask, part.axis_std).widened(paint_std) for boundary in boundaries]
     edge_std = 0.0 if part.layout.profiles.paved is not None else _EDGE_STD
     if part.layout.kind == "single":  # its lanes begin at the axis
         offsets[0] = replace(offsets[0], std=part.axis_std)
+    # The pavement outside of the lanes: edge strip and shoulder.
     outer_estimate = Estimate(_USUAL_STRIP, np.inf)
     if edge_seen:
         # Over the same stretches as the lines, so that errors that edge and lines share cancel in the difference.
@@ -489,6 +492,7 @@ def _usual_stretches(width: Float, line: Line | None) -> Bool:
         usual_mask &= solid_mask if (solid_mask & usual_mask).sum() >= _FEWEST_STRETCHES else usual_mask
     if not usual_mask.any():
         return usual_mask
+    # Chosen: bins of 0.1 m up to 10 m; from -1 m on, as a measured edge may lie within the lane's line.
     count, edges = np.histogram(width[usual_mask], np.arange(-1.0, 10.0, 0.1))
     density = ndimage.uniform_filter1d(count.astype(np.float64), 3)
     # Turnouts make the pavement wider, and on a short road may be longer than what lies between them: of the common
@@ -513,10 +517,8 @@ def _order_lines(band: Band, sign: int) -> tuple[list[Line | None], list[_Bounda
             boundaries.append(seen_boundaries[number])
             continue
         # Missing lines lie between measured ones only (`layout`), so that there is one on either side.
-        inner_number, outer_number = (
-            max(i for i in seen_boundaries if i < number),
-            min(i for i in seen_boundaries if i > number),
-        )
+        inner_number = max(i for i in seen_boundaries if i < number)
+        outer_number = min(i for i in seen_boundaries if i > number)
         share = (number - inner_number) / (outer_number - inner_number)
         offset = (1.0 - share) * seen_boundaries[inner_number].smoothed + share * seen_boundaries[outer_number].smoothed
         boundaries.append(_Boundary(offset, offset, seen_boundaries[inner_number].spacing, False))

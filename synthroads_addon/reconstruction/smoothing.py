@@ -143,10 +143,8 @@ def interval_mean(values: Float, spacing: Float, axis_std: float = 0.0) -> tuple
         return float("nan"), float("inf")
     centre = mean_with_std(middles)[0]
     sigma = _end_scatter(middles, half_length, centre, axis_std)
-    lower_ends, upper_ends = (
-        middles - np.maximum(half_length, 0.5 * _LEAST_SCATTER),
-        middles + np.maximum(half_length, 0.5 * _LEAST_SCATTER),
-    )
+    lower_ends = middles - np.maximum(half_length, 0.5 * _LEAST_SCATTER)
+    upper_ends = middles + np.maximum(half_length, 0.5 * _LEAST_SCATTER)
     mu = np.arange(np.percentile(lower_ends, 1) - sigma, np.percentile(upper_ends, 99) + sigma + _GRID, _GRID)
     # A uniform distribution from low to high, convolved with a normal one of sigma:
     # L_i(mu) = Phi((mu - low_i) / sigma) - Phi((mu - high_i) / sigma), over its largest, but no less than an outlier's.

@@ -225,10 +225,12 @@ def _fit_trapezoid(
 
     # Above the median: the tapers are part of the run.
     width = float(np.percentile(excess_width[(stations >= run_start) & (stations <= run_end)], 70))
+    # Start with a bay's usual tapers, or with 30 % of a short run, half of each within the run (chosen).
     taper = min(EMERGENCY_BAY_TAPER, 0.3 * (run_end - run_start) + _LEAST_TAPER)
     initial_shape = np.array(
         [run_start - 0.3 * taper, taper, max(run_end - run_start - 1.4 * taper, 5.0), taper, width]
     )
+    # Chosen: bays are 0.1 to 10 m wide with tapers of 80 m at most; residuals beyond 0.2 m count less.
     lower_bounds = np.array([run_start - _AROUND, _LEAST_TAPER, 1.0, _LEAST_TAPER, 0.1])
     upper_bounds = np.array([run_end, 80.0, run_end - run_start + _AROUND, 80.0, 10.0])
     solution = least_squares(

@@ -61,6 +61,7 @@ def compare_widths(reconstruction: Reconstruction, truth: RoadParameters) -> lis
     shift = np.array(reconstruction.parameters.transform.translate[:2]) - np.array(truth.transform.translate[:2])
     position, heading, _ = found_road.alignment.frame(found_stations)
     true_stations, _ = true_road.alignment.project(position + shift)
+    # Stations at which a foot lies on the end of either road have none across it.
     on_both_roads = (
         (found_stations > 0.0)
         & (found_stations < found_road.length)

@@ -151,6 +151,7 @@ def _falloff(y: Float, power: float, rng: Generator) -> Float:
 
 def _tracks(stretch: Stretch, rng: Generator) -> Float:
     """Return random values (K,) of about unit deviation that vary across the road only: waves of 1.5 to 6 m."""
+    # Chosen: five waves look irregular.
     count = 5
     rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(1.5), np.log(6.0), count))
     y = stretch.coord[:, 1] - np.nan_to_num(stretch.center)[stretch.number]
@@ -161,6 +162,7 @@ def _tracks(stretch: Stretch, rng: Generator) -> Float:
 
 def _waves(stretch: Stretch, rng: Generator) -> Float:
     """Return random values (K,) of about unit deviation, smooth over the ground: waves of 2 to 20 m any way."""
+    # Chosen: six waves look irregular.
     count = 6
     rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(2.0), np.log(20.0), count))
     wave_direction, phase = rng.uniform(0.0, 2.0 * np.pi, (2, count))

@@ -115,10 +115,8 @@ def mirror_side(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> N
     sign = 1.0 if outwards == 0 else -1.0
     # How far beyond the pavement's outer and inner edge each point lies.
     outward_distance = sign * (stretch.coord[:, 1] - stretch.center[stretch.number])
-    beyond_outer, beyond_inner = (
-        outward_distance - edges[stretch.number, outwards],
-        -outward_distance - edges[stretch.number, inwards],
-    )
+    beyond_outer = outward_distance - edges[stretch.number, outwards]
+    beyond_inner = -outward_distance - edges[stretch.number, inwards]
     rise = stretch.coord[:, 2] - stretch.corridor[stretch.number, HEIGHT]
     rims = [rise[(excess <= 0.0) & (excess >= -_RIM)] for excess in (beyond_inner, beyond_outer)]
     if not len(rims[0]) or not len(rims[1]):
@@ -165,6 +163,7 @@ def drop_parts(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> No
     keep = effects.kept_points(points, rng)
     keep &= (rng.random(slices) >= effects.empty)[stretch.number]
     if rng.random() < effects.hidden and points:
+        # Chosen: a hole as large as a vehicle, from a car to a lorry.
         hole_point, length, width = rng.integers(points), rng.uniform(2.0, 12.0), rng.uniform(1.5, 3.0)
         x, y = stretch.points_along(), stretch.coord[:, 1]
         keep &= ~((np.abs(x - x[hole_point]) <= length / 2.0) & (np.abs(y - y[hole_point]) <= width / 2.0))

@@ -76,9 +76,10 @@ def cell_sums(coord: Tensor, mask: Tensor, features: Tensor, reach: float, numbe
     lower_cell = cell_place.floor()
     first_cell = number * torch.arange(slices, device=coord.device)[:, None]
     sums = values.new_zeros(slices * number, channels + 2)
+    # Each point adds to the cell below its position and to the one above.
     for cell, weight in ((lower_cell, 1.0 - (cell_place - lower_cell)), (lower_cell + 1.0, cell_place - lower_cell)):
         in_grid = mask & (cell >= 0) & (cell < number)
-        # NaN, of weights beyond reason, is no number of a cell.
+        # A NaN of diverged weights can't be an index: cell 0 stands in, with a weight of 0.
         index = first_cell + torch.where(in_grid, cell, 0.0).long()
         sums = sums.index_add(0, index.flatten(), values * (weight * in_grid).flatten()[:, None])
     return sums.view(slices, number, channels + 2)

@@ -96,11 +96,13 @@ def centerline_loss(options: LossOptions, half_width: float) -> Callable[[nn.Mod
         error = (estimate - torch.where(known_mask, truth, estimate.detach())) / estimate.new_tensor(SCALE)
         weight = estimate.new_tensor([1.0] + [options.corridor] * (len(TARGETS) - 1))
         value = (weight * likelihood(error, output["log_std"], known_mask, options.beta)).sum()
+        # The centre's first look: Huber's loss of the offsets before refinement.
         first_look_error = output["rough"] - torch.where(known_mask[..., 0], truth[..., 0], output["rough"].detach())
         first_look_cost = functional.huber_loss(
             first_look_error, torch.zeros_like(first_look_error), reduction="none", delta=_ROUGH
         )
         value = value + options.rough * first_look_cost.sum() / known_mask[..., 0].sum().clamp_min(1)
+        # Lines as classes over places across the road.
         if options.places:
             number = output["logits"].shape[2]
             places = torch.linspace(-half_width, half_width, number, device=estimate.device).expand(
@@ -110,6 +112,7 @@ def centerline_loss(options: LossOptions, half_width: float) -> Callable[[nn.Mod
             entropy = cross_entropy(output["logits"], places, truth[..., lines], known_mask[..., lines])
             share = estimate.new_tensor([1.0] + [options.edges] * (len(LINES) - 1))
             value = value + options.places * (share * entropy).sum()
+        # The centre as a class over fine places around the first look.
         if options.fine:
             logits, places = output["fine_logits"][..., None], output["fine_places"]
             value = value + options.fine * cross_entropy(logits, places, truth[..., :1], known_mask[..., :1]).sum()

@@ -194,6 +194,7 @@ def _patches(places: Tensor, cloud: Tensor, counts: Tensor, grid: Grid) -> tuple
     number = torch.tensor(numbers, dtype=torch.int64, device=device)
     begin, first_patch = counts.cumsum(0) - counts, number.cumsum(0) - number
 
+    # By patch: its cloud, its stretch of the cloud's curve, and the slots around that stretch.
     owner = torch.repeat_interleave(torch.arange(len(sizes), device=device), number, output_size=sum(numbers))
     size, parts = counts[owner], number[owner]
     patch_number = torch.arange(sum(numbers), device=device) - first_patch[owner]
@@ -207,6 +208,7 @@ def _patches(places: Tensor, cloud: Tensor, counts: Tensor, grid: Grid) -> tuple
     slot_mask = slots < size[:, None]
     slots = begin[owner][:, None] + torch.minimum(slots, size[:, None] - 1)
 
+    # By cell: its patch and slot, in the order of each curve.
     rank = torch.arange(len(places), device=device) - begin[cloud]
     patch = first_patch[cloud] + (rank * number[cloud]).div(counts[cloud], rounding_mode="floor")
     slot = patch * width + rank - start[patch]

@@ -284,12 +284,14 @@ def _nearest_three(points: _Points, support: _Points, radius: float) -> tuple[Te
     while len(open_points):
         queries = points.select(open_points)
         nearest_found, distance = nearest_index[open_points], points.xyz.new_full((len(open_points), 3), torch.inf)
+        # Of each query's pairs, sorted by distance, keep the nearest three.
         for query, support_index, step in _pairs(queries, support, edge):
             order = torch.argsort(step, stable=True)
             order = order[torch.argsort(query[order], stable=True)]
             rank = _ranks(query[order])
             order, rank = order[rank < 3], rank[rank < 3]
             nearest_found[query[order], rank], distance[query[order], rank] = support_index[order], step[order]
+        # Done if no nearer point can lie beyond the cells searched, or if these hold everything.
         farthest_distance = distance.gather(1, (count[open_points] - 1)[:, None])[:, 0]
         is_done = (farthest_distance <= edge) | torch.full_like(
             farthest_distance, edge > 2.0 * (extent + radius), dtype=torch.bool

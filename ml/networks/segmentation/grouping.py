@@ -245,10 +245,8 @@ class _PairsMax(torch.autograd.Function):
     ) -> tuple[Tensor, Tensor, Tensor]:
         """Return maxima, sums and sums of products as `pairs_max` does, chunk by chunk."""
         (queries, limit), (out_channels, in_channels) = index.shape, weight.shape
-        top, column = (
-            offset.new_empty(queries, out_channels),
-            torch.empty(queries, out_channels, dtype=torch.uint8, device=offset.device),
-        )
+        top = offset.new_empty(queries, out_channels)
+        column = torch.empty(queries, out_channels, dtype=torch.uint8, device=offset.device)
         total, product = offset.new_zeros(in_channels), offset.new_zeros(in_channels, in_channels)
         for rows in _chunks(queries, limit * out_channels, offset.device):
             pairs = _pairs(support, offset[rows], index[rows])

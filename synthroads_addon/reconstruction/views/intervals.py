@@ -49,7 +49,7 @@ def _quantile(density: Float, share: float) -> Float:
     # The interval is the same to both sides: shares are added up from the middle outwards.
     pairs = density[:, middle + 1 :] + density[:, middle - 1 :: -1]
     cumulative_share = np.cumsum(np.column_stack([np.zeros(len(density)), density[:, middle], pairs]), axis=1)
-    # The first place by which it is reached.
+    # Index of the first cumulative share that reaches the wanted one; 1 at least.
     end_index = np.maximum((cumulative_share < share).argmin(axis=1), 1)[:, None]
     share_before, share_after = (
         np.take_along_axis(cumulative_share, end_index - step, axis=1)[:, 0] for step in (1, 0)

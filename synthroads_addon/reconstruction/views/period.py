@@ -109,10 +109,8 @@ def _axis_of(power: Float, offsets: Float, dual: bool, middle: float) -> float:
         if len(order) > 1 and blurred[peaks[order[1]]] > _RIVAL * blurred[peaks[order[0]]]:
             return np.nan
         return line_offsets[int(order[0])]
-    right_lines, left_lines = (
-        [line_offset for line_offset in line_offsets if line_offset < middle],
-        [line_offset for line_offset in line_offsets if line_offset > middle],
-    )
+    right_lines = [line_offset for line_offset in line_offsets if line_offset < middle]
+    left_lines = [line_offset for line_offset in line_offsets if line_offset > middle]
     if not right_lines or len(right_lines) != len(left_lines):
         return np.nan
     return 0.5 * (max(right_lines) + min(left_lines))
