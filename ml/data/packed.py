@@ -108,7 +108,7 @@ def unpack_tile(packed_tile: Packed) -> CloudTile:
     content = zlib.decompress(packed_tile.content)
     # Per cube three int32 of place and one of its points' number; per point one word, stored byte by byte.
     if len(content) != 16 * cubes + 8 * points:
-        raise ValueError("length")
+        raise ValueError("must be as long as its numbers of cubes and points say")
     cube_indices = np.frombuffer(content, "<i4", 3 * cubes).reshape(-1, 3).astype(np.int64)
     counts = np.frombuffer(content, "<i4", cubes, 12 * cubes)
     planes = np.frombuffer(content, np.uint8, 8 * points, 16 * cubes).reshape(8, points)

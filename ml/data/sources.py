@@ -73,7 +73,7 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None, *, labe
     """
     path = Path(source.path)
     if source.yardstick and source.mapping:
-        raise InputError("mapping", source.mapping, "a yardstick has its own mapping")
+        raise InputError("mapping", source.mapping, "must be left out: a yardstick has its own mapping")
     if source.split and path.is_file():
         raise InputError("split", source.split, f"{path.name} is a file, which has no splits")
     if source.yardstick:

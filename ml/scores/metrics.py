@@ -93,9 +93,9 @@ def markdown(head: Sequence[str], body: Iterable[Sequence[str]], rule: Sequence[
         body: rows of cells.
         rule: what stands below the titles; three dashes each if not given.
     """
-    dashes = " | ".join(["---"] * len(head)) if rule is None else None
-    second = f"| {dashes} |" if dashes else f"|{'|'.join(rule or ())}|"
-    return "".join(f"{line}\n" for line in (_row(head), second, *map(_row, body)))
+    dash_cells = " | ".join(["---"] * len(head))
+    separator = f"| {dash_cells} |" if rule is None else f"|{'|'.join(rule)}|"
+    return "".join(f"{line}\n" for line in (_row(head), separator, *map(_row, body)))
 
 
 def _row(cells: Sequence[str]) -> str:

@@ -152,7 +152,7 @@ class TileStore:
         self._folder, self._edge = folder / "tiles", edge
         self._folder.mkdir()
         self.count = 0
-        self._known: set[tuple[int, int]] = set()
+        self._written_tiles: set[tuple[int, int]] = set()
         self._has_intensity = False
         self._colored = False
 
@@ -189,7 +189,7 @@ class TileStore:
         if kind == "share" or not self._has_intensity:
             return Scaling()
         histogram = np.zeros(LEVELS, dtype=np.int64)
-        for row, column in self._known:
+        for row, column in self._written_tiles:
             record = np.fromfile(self._folder / f"{row}_{column}", dtype=_RECORD)
             histogram += np.bincount(record["intensity"][voxel_sample(record["place"], voxel)], minlength=LEVELS)
         share = np.cumsum(histogram) / histogram.sum()
@@ -200,7 +200,7 @@ class TileStore:
 
     def tiles(self) -> Iterator[tuple[CloudTile, Bool, Int]]:
         """Yield each tile with its margin, the mask of the points within the tile, and their indices in the file."""
-        for row, column in sorted(self._known):
+        for row, column in sorted(self._written_tiles):
             parts, cores = [], []
             for north in (-1, 0, 1):
                 for east in (-1, 0, 1):
@@ -226,7 +226,7 @@ class TileStore:
             row, column: place of the tile.
             north, east: rows and columns by which it lies north and east of the neighbour, -1 to 1.
         """
-        if (row, column) not in self._known:
+        if (row, column) not in self._written_tiles:
             return np.empty(0, dtype=_RECORD)
         record = np.fromfile(self._folder / f"{row}_{column}", dtype=_RECORD)
         record["place"][:, 0] += np.float32(east * self._edge)
@@ -249,7 +249,7 @@ class TileStore:
         starts = np.flatnonzero(np.r_[True, np.any(tile[1:] != tile[:-1], axis=1)])
         for begin, end in zip(starts, np.r_[starts[1:], len(tile)], strict=True):
             column, row = int(tile[begin, 0]), int(tile[begin, 1])
-            self._known.add((row, column))
+            self._written_tiles.add((row, column))
             with (self._folder / f"{row}_{column}").open("ab") as file:
                 file.write(record[begin:end].tobytes())
 

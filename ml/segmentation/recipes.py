@@ -128,7 +128,7 @@ class SegmentationConfiguration(Configuration):
     def _refuse_repetitions(cls, features: tuple[Feature, ...]) -> tuple[Feature, ...]:
         """Refuse a feature that is named twice."""
         if len(set(features)) < len(features):
-            raise ValueError("features must differ")
+            raise ValueError("features must not name a feature twice")
         return features
 
     @model_validator(mode="after")

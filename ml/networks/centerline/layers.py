@@ -154,9 +154,9 @@ class DeformableKernelPoints(nn.Module):
             features: (N, P, inputs) features of the points.
             fixed_tokens: (N, K, width) tokens of the fixed kernel points at the same places.
         """
-        places = self.places + self.spacing * torch.tanh(self.shift(fixed_tokens)[..., 0])
+        kernel_offsets = self.places + self.spacing * torch.tanh(self.shift(fixed_tokens)[..., 0])
         # Linear weights h = max(0, 1 - |y - place| / spacing), as the influence of a KPConv's kernel points.
-        relative_distance = (coord[:, None, :, 1] - places[..., None]) / self.spacing
+        relative_distance = (coord[:, None, :, 1] - kernel_offsets[..., None]) / self.spacing
         weight = (1.0 - relative_distance.abs()).clamp_min(0.0) * mask[:, None, :]
         mass = weight.sum(-1, keepdim=True)
         values = torch.cat([features, coord[..., 2:]], dim=-1)
@@ -165,7 +165,7 @@ class DeformableKernelPoints(nn.Module):
         # Where in the kernel point's reach a feature has its centre: the line's place if the feature is brightness.
         centre = first_moment[..., :-1] / (zeroth[..., :-1] + 0.2 * _FEW)
         tokens = self.norm(self.mix(torch.cat([mean_values, tilt, centre, torch.log1p(mass)], dim=-1)))
-        return Tokens(tokens, places, mean_values[..., -1])
+        return Tokens(tokens, kernel_offsets, mean_values[..., -1])
 
 
 class GridConvolution(nn.Module):

@@ -61,21 +61,21 @@ def likelihood(error: Tensor, log_std: Tensor, mask: Tensor, beta: float) -> Ten
     return (terms * mask).sum((0, 1)) / count
 
 
-def cross_entropy(logits: Tensor, places: Tensor, lines: Tensor, mask: Tensor) -> Tensor:
+def cross_entropy(logits: Tensor, kernel_offsets: Tensor, lines: Tensor, mask: Tensor) -> Tensor:
     """Return the mean cross-entropy (L,) of softmax(logits) over kernel points against the lines' true places.
 
     The truth is shared linearly by the two kernel points around a line; one beyond the outermost belongs to that.
 
     Args:
         logits: (B, S, K, L).
-        places: (B, S, K) places of the kernel points (before they move), at equal spacing, m.
+        kernel_offsets: (B, S, K) y of the kernel points (before they move), at equal spacing, m.
         lines: (B, S, L) y of the lines, m.
         mask: (B, S, L) lines that are known.
     """
-    first_place, last_place = places[..., :1], places[..., -1:]
-    spacing = (last_place - first_place) / (places.shape[-1] - 1)
-    line_places = torch.where(mask, lines, first_place).clamp(first_place, last_place)
-    share = 1.0 - (line_places[:, :, None] - places[..., None]).abs() / spacing[..., None]
+    first_offset, last_offset = kernel_offsets[..., :1], kernel_offsets[..., -1:]
+    spacing = (last_offset - first_offset) / (kernel_offsets.shape[-1] - 1)
+    line_offsets = torch.where(mask, lines, first_offset).clamp(first_offset, last_offset)
+    share = 1.0 - (line_offsets[:, :, None] - kernel_offsets[..., None]).abs() / spacing[..., None]
     entropy = -(share.clamp_min(0.0) * logits.log_softmax(2)).sum(2)
     return (entropy * mask).sum((0, 1)) / mask.sum((0, 1)).clamp_min(1)
 
@@ -105,17 +105,19 @@ def centerline_loss(options: LossOptions, half_width: float) -> Callable[[nn.Mod
         # Lines as classes over places across the road.
         if options.places:
             number = output["logits"].shape[2]
-            places = torch.linspace(-half_width, half_width, number, device=estimate.device).expand(
+            kernel_offsets = torch.linspace(-half_width, half_width, number, device=estimate.device).expand(
                 *estimate.shape[:2], -1
             )
             lines = [TARGETS.index(name) for name in LINES]
-            entropy = cross_entropy(output["logits"], places, truth[..., lines], known_mask[..., lines])
+            entropy = cross_entropy(output["logits"], kernel_offsets, truth[..., lines], known_mask[..., lines])
             share = estimate.new_tensor([1.0] + [options.edges] * (len(LINES) - 1))
             value = value + options.places * (share * entropy).sum()
         # The centre as a class over fine places around the first look.
         if options.fine:
-            logits, places = output["fine_logits"][..., None], output["fine_places"]
-            value = value + options.fine * cross_entropy(logits, places, truth[..., :1], known_mask[..., :1]).sum()
+            logits, kernel_offsets = output["fine_logits"][..., None], output["fine_places"]
+            value = (
+                value + options.fine * cross_entropy(logits, kernel_offsets, truth[..., :1], known_mask[..., :1]).sum()
+            )
         center_mask = known_mask[..., 0]
         mae = float((error[..., 0].detach().abs() * center_mask).sum() / center_mask.sum().clamp_min(1))
         return value, {"center_mae": mae}

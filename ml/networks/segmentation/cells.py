@@ -32,16 +32,16 @@ Cells = dict[str, Tensor]
 - ``near{s}`` (M_s, 27 or 7) int32, early stages: the cells around each, by rising place; M_s where there is none
 - ``parent{s}`` (M_{s-1},) int64, s > 0: the cell of this stage that each one of the stage before lies in
 - ``children{s}`` (M_s, 8) int64, s > 0: the cells of the stage before in each; empty octants have another one's
-- ``grid{s}`` (M_s, 3), late stages: the cells' places, in units of their edge
+- ``grid{s}`` (M_s, 3), late stages: the cells' coordinates, in units of their edge
 - ``patch{s}`` (C, P, K) int64, late stages: the cells of each patch along each of C curves
 - ``place{s}`` (C, M_s) int64, late stages: where in all patches (P x K) each cell is asked for what it sees
-- ``filled{s}`` (P, K) bool, late stages: which places of the patches count; left out where all do
+- ``filled{s}`` (P, K) bool, late stages: which slots of the patches count; left out where all do
 """
 
 LARGEST = (1 << BITS) - 2
 """Cells along an axis of a cloud, one to either side being left free."""
 _MOST_CLOUDS = 1 << 14
-"""Clouds of a batch at most. Chosen: with three places of 16 bits each their numbers fill 62 bits of 64."""
+"""Clouds of a batch at most. Chosen: with three coordinates of 16 bits each their numbers fill 62 bits of 64."""
 _AXES = 3
 """Of space: x, y, z."""
 _CROSS = [4, 10, 12, 13, 14, 16, 22]
@@ -78,7 +78,7 @@ def build_cells(coord: Tensor, offset: Tensor, grid: Grid, *, always_masked: boo
         coord: (N, 3) floating-point numbers, m.
         offset: (B,) integers: where each cloud ends. Clouds may be empty or of one point.
         grid: options of the cells.
-        always_masked: whether ``filled{s}`` is returned even where all places count.
+        always_masked: whether ``filled{s}`` is returned even where all slots count.
 
     Raises:
         InputError: the offsets don't fit the points, a coordinate is not finite, there are more than 16,384 clouds, or
@@ -87,25 +87,25 @@ def build_cells(coord: Tensor, offset: Tensor, grid: Grid, *, always_masked: boo
     counts = _points_of_clouds(coord, offset)
     clouds = len(counts)
     cloud = torch.repeat_interleave(torch.arange(clouds, device=coord.device), counts, output_size=len(coord))
-    places, place_in_cell = _cell_places(coord, cloud, clouds, grid.cell)
-    keys, cell = torch.unique(_keys(cloud, places), return_inverse=True)
+    cell_coords, place_in_cell = _cell_coords(coord, cloud, clouds, grid.cell)
+    keys, cell = torch.unique(_keys(cloud, cell_coords), return_inverse=True)
     points = torch.bincount(cell, minlength=len(keys)).to(coord.dtype)
     cells: Cells = {"cell0": cell, "share0": points.reciprocal()[cell], "inside0": place_in_cell}
     for stage in range(grid.stages):
         if stage:
-            cloud, places = _split_keys(keys)
-            coarse_keys, parent = torch.unique(_keys(cloud, places >> 1), return_inverse=True)
-            cells |= {f"parent{stage}": parent, f"children{stage}": _children(places, parent, len(coarse_keys))}
+            cloud, cell_coords = _split_keys(keys)
+            coarse_keys, parent = torch.unique(_keys(cloud, cell_coords >> 1), return_inverse=True)
+            cells |= {f"parent{stage}": parent, f"children{stage}": _children(cell_coords, parent, len(coarse_keys))}
             keys = coarse_keys
-        cloud, places = _split_keys(keys)
+        cloud, cell_coords = _split_keys(keys)
         counts = torch.bincount(cloud, minlength=clouds)
         cells[f"ends{stage}"] = counts.cumsum(0)
         if stage < grid.attention_from:
             neighbour_table = _cells_around(keys)
             cells[f"near{stage}"] = neighbour_table[:, _CROSS].contiguous() if grid.cross else neighbour_table
             continue
-        patch, slot_of_cell, slot_mask = _patches(places, cloud, counts, grid)
-        cells |= {f"grid{stage}": places.to(coord.dtype), f"patch{stage}": patch, f"place{stage}": slot_of_cell}
+        patch, slot_of_cell, slot_mask = _patches(cell_coords, cloud, counts, grid)
+        cells |= {f"grid{stage}": cell_coords.to(coord.dtype), f"patch{stage}": patch, f"place{stage}": slot_of_cell}
         if slot_mask is not None or always_masked:
             all_slots = torch.ones(patch.shape[1:], dtype=torch.bool, device=coord.device)
             cells[f"filled{stage}"] = all_slots if slot_mask is None else slot_mask
@@ -120,7 +120,7 @@ def _points_of_clouds(coord: Tensor, offset: Tensor) -> Tensor:
     return torch.from_numpy(np.diff(ends, prepend=0)).to(coord.device)
 
 
-def _cell_places(coord: Tensor, cloud: Tensor, clouds: int, edge: float) -> tuple[Tensor, Tensor]:
+def _cell_coords(coord: Tensor, cloud: Tensor, clouds: int, edge: float) -> tuple[Tensor, Tensor]:
     """Return the points' cells (N, 3), counted from each cloud's lowest, and places in these (N, 3), -0.5 to 0.5."""
     cell_coordinates = coord / edge
     floor = cell_coordinates.floor()
@@ -136,28 +136,28 @@ def _cell_places(coord: Tensor, cloud: Tensor, clouds: int, edge: float) -> tupl
     return cells.long(), cell_coordinates - floor - 0.5
 
 
-def _keys(cloud: Tensor, places: Tensor) -> Tensor:
-    """Return the key (M,) of each cell: cloud, x, y, z in the bits from high to low, places counted from 1.
+def _keys(cloud: Tensor, cell_coords: Tensor) -> Tensor:
+    """Return the key (M,) of each cell: cloud, x, y, z in the bits from high to low, coordinates counted from 1.
 
     Counted from 1, cells around have keys too.
     """
-    x, y, z = (places + 1).unbind(1)
+    x, y, z = (cell_coords + 1).unbind(1)
     return (((cloud << BITS | x) << BITS | y) << BITS) | z
 
 
 def _split_keys(keys: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the clouds (M,) and places (M, 3) of cells' keys (M,), the inverse of `_keys`."""
+    """Return the clouds (M,) and integer coordinates (M, 3) of cells' keys (M,), the inverse of `_keys`."""
     mask = (1 << BITS) - 1
-    places = torch.stack([(keys >> 2 * BITS) & mask, (keys >> BITS) & mask, keys & mask], dim=1) - 1
-    return keys >> 3 * BITS, places
+    cell_coords = torch.stack([(keys >> 2 * BITS) & mask, (keys >> BITS) & mask, keys & mask], dim=1) - 1
+    return keys >> 3 * BITS, cell_coords
 
 
-def _children(places: Tensor, parent: Tensor, count: int) -> Tensor:
+def _children(cell_coords: Tensor, parent: Tensor, count: int) -> Tensor:
     """Return the cells (count, 8) of the stage before in each cell's octants; empty ones repeat another's cell."""
-    parity = places & 1
+    parity = cell_coords & 1
     octant = parity[:, 0] << 2 | parity[:, 1] << 1 | parity[:, 2]
-    table = torch.full((count * 8,), -1, dtype=torch.int64, device=places.device)
-    table[parent * 8 + octant] = torch.arange(len(places), device=places.device)
+    table = torch.full((count * 8,), -1, dtype=torch.int64, device=cell_coords.device)
+    table[parent * 8 + octant] = torch.arange(len(cell_coords), device=cell_coords.device)
     table = table.view(count, 8)
     return torch.where(table < 0, table.amax(dim=1, keepdim=True), table)
 
@@ -181,13 +181,13 @@ def _cells_around(keys: Tensor) -> Tensor:
     return neighbour_table.flatten(1)
 
 
-def _patches(places: Tensor, cloud: Tensor, counts: Tensor, grid: Grid) -> tuple[Tensor, Tensor, Tensor | None]:
+def _patches(cell_coords: Tensor, cloud: Tensor, counts: Tensor, grid: Grid) -> tuple[Tensor, Tensor, Tensor | None]:
     """Return the patches' cells (C, P, K), each cell's slot in them (C, M), and the mask of used slots (P, K) or None.
 
     Each cloud's curve is cut into stretches as equal as can be, as few as have room in patches. A patch has its stretch
-    in the middle and the cells before and after it; where a cloud is too small to fill one, places stay empty.
+    in the middle and the cells before and after it; where a cloud is too small to fill one, slots stay empty.
     """
-    device = places.device
+    device = cell_coords.device
     sizes: list[int] = counts.tolist()
     width = min(grid.patch, -(-max(sizes, default=0) // _MULTIPLE) * _MULTIPLE)
     numbers = [-(-size // width) if size else 0 for size in sizes]
@@ -209,10 +209,10 @@ def _patches(places: Tensor, cloud: Tensor, counts: Tensor, grid: Grid) -> tuple
     slots = begin[owner][:, None] + torch.minimum(slots, size[:, None] - 1)
 
     # By cell: its patch and slot, in the order of each curve.
-    rank = torch.arange(len(places), device=device) - begin[cloud]
+    rank = torch.arange(len(cell_coords), device=device) - begin[cloud]
     patch = first_patch[cloud] + (rank * number[cloud]).div(counts[cloud], rounding_mode="floor")
     slot = patch * width + rank - start[patch]
-    orders = [torch.argsort(cloud << 3 * BITS | curve_codes(places, curve)) for curve in grid.curves]
+    orders = [torch.argsort(cloud << 3 * BITS | curve_codes(cell_coords, curve)) for curve in grid.curves]
     order = torch.stack(orders)
     slot_of_cell = torch.empty_like(order).scatter_(1, order, slot.expand_as(order))
     return order[:, slots], slot_of_cell, None if all(size >= width for size in sizes if size) else slot_mask

@@ -110,14 +110,14 @@ class _Cells:
         _check_cells((cells_x, cells_y, cells_z), points.count)
         return cls(edge, lowest_cell, (cells_x, cells_y, cells_z))
 
-    def places(self, points: _Points) -> Tensor:
+    def cell_coords(self, points: _Points) -> Tensor:
         """Return each point's cell (N, 3), counted from 1."""
         return (torch.floor(points.xyz / self.edge) - self.low).long() + 1
 
-    def keys(self, places: Tensor, cloud: Tensor) -> Tensor:
-        """Return the keys of cells (...), given their places (..., 3) and clouds (...)."""
+    def keys(self, cell_coords: Tensor, cloud: Tensor) -> Tensor:
+        """Return the keys of cells (...), given their integer coordinates (..., 3) and clouds (...)."""
         cells_x, cells_y, cells_z = self.spans
-        return ((cloud * cells_x + places[..., 0]) * cells_y + places[..., 1]) * cells_z + places[..., 2]
+        return ((cloud * cells_x + cell_coords[..., 0]) * cells_y + cell_coords[..., 1]) * cells_z + cell_coords[..., 2]
 
 
 def _check_cells(spans: tuple[int, int, int], clouds: int) -> None:
@@ -207,10 +207,10 @@ def _pairs(queries: _Points, support: _Points, edge: float) -> Iterator[tuple[Te
     and a query's pairs are never parted.
     """
     cells = _Cells.around(support, edge)
-    key, order = cells.keys(cells.places(support), support.cloud).sort(stable=True)
+    key, order = cells.keys(cells.cell_coords(support), support.cloud).sort(stable=True)
     limits = torch.tensor(cells.spans, device=key.device) - 1
     # Of far queries too, whose cells don't hold anything: the nearest ones that are numbered.
-    query_cell = cells.places(queries).clamp(min=torch.zeros_like(limits), max=limits)
+    query_cell = cells.cell_coords(queries).clamp(min=torch.zeros_like(limits), max=limits)
     column_steps = torch.cartesian_prod(torch.arange(-1, 2), torch.arange(-1, 2)).to(query_cell)
     columns = query_cell[:, None].expand(-1, len(column_steps), 3).clone()
     columns[..., :2] += column_steps

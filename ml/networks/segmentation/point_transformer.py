@@ -70,7 +70,7 @@ class PointTransformerOptions(SegmentationNetwork):
     def _refuse_repetitions(cls, curves: tuple[Curve, ...]) -> tuple[Curve, ...]:
         """Refuse a curve that is named twice."""
         if len(set(curves)) < len(curves):
-            raise ValueError("curves must differ")
+            raise ValueError("curves must not name a curve twice")
         return curves
 
     @field_validator("patch", "head_width")
@@ -234,16 +234,16 @@ class View:
     turns: tuple[Tensor, Tensor] | None = None
 
 
-def rotations(places: Tensor, width: int) -> tuple[Tensor, Tensor]:
-    """Return cosines and sines (M, 1, width / 2) of the angles by which places (M, 3) turn a head's pairs of channels.
+def rotations(positions: Tensor, width: int) -> tuple[Tensor, Tensor]:
+    """Return cosines and sines (M, 1, width / 2) of the angles by which positions (M, 3) turn pairs of channels.
 
     A third of the pairs turns with each axis: pair k of K by the frequency ``_LONGEST_WAVE ** (-k / K)``.
     """
     # Su et al. 2021 (RoPE), in three dimensions: the product of a turned query and a turned key depends on the
-    # difference of their places alone.
+    # difference of their positions alone.
     pairs = width // 6
-    frequency = _LONGEST_WAVE ** -(torch.arange(pairs, dtype=places.dtype, device=places.device) / pairs)
-    angle = (places[:, :, None] * frequency).flatten(1)[:, None]
+    frequency = _LONGEST_WAVE ** -(torch.arange(pairs, dtype=positions.dtype, device=positions.device) / pairs)
+    angle = (positions[:, :, None] * frequency).flatten(1)[:, None]
     return angle.cos(), angle.sin()
 
 
@@ -283,10 +283,10 @@ def _block(options: PointTransformerOptions, stage: int, drop: float) -> nn.Modu
 class ConvolutionBlock(nn.Module):
     """Convolution over the cells around each, a pointwise layer, and what there was."""
 
-    def __init__(self, width: int, places: int, drop: float) -> None:
+    def __init__(self, width: int, kernel_cells: int, drop: float) -> None:
         super().__init__()
         self.norm = Norm(width)
-        self.look = CellConvolution(places, width, width)
+        self.look = CellConvolution(kernel_cells, width, width)
         self.look_norm = Norm(width)
         self.mix = nn.Linear(width, width)
         self.drop = drop

@@ -332,7 +332,7 @@ def test_the_shipped_configuration_is_as_large_as_the_others() -> None:
         ({"patch": 0}, "patch is 0"),
         ({"head_width": 20}, "head_width: must be a multiple of 6, not 20"),
         ({"curves": []}, "curves"),
-        ({"curves": ["hilbert", "hilbert"]}, "curves must differ"),
+        ({"curves": ["hilbert", "hilbert"]}, "curves must not name a curve twice"),
         ({"curves": ["peano"]}, "curves"),
         ({"kernel": "ball"}, "kernel is 'ball'"),
         ({"drop_path": 1.0}, "drop_path is 1"),
