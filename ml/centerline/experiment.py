@@ -272,10 +272,10 @@ def table(title: str, results: Results, variants: Sequence[str]) -> str:
         results: figures of variants and of rules, see `Results`; those without a seed are left out.
         variants: the variants' names; all others are rules, of which the best of each road is shown.
     """
-    started = {name: seeds for name, seeds in results.items() if seeds}
-    first_variant = next(iter(started.values()), {})
+    results_by_name = {name: seeds for name, seeds in results.items() if seeds}
+    first_variant = next(iter(results_by_name.values()), {})
     roads = list(next(iter(first_variant.values()), {}))
-    spreads = {name: _spread_figures(seeds, roads) for name, seeds in started.items()}
+    spreads = {name: _spread_figures(seeds, roads) for name, seeds in results_by_name.items()}
     lines = [
         f"# {title}",
         "",
@@ -289,10 +289,10 @@ def table(title: str, results: Results, variants: Sequence[str]) -> str:
             for name in spreads
             if name in (*variants, VIEWS)
         ]
-        if not metric.title.startswith("in ") and len(started) > len(variants):
+        if not metric.title.startswith("in ") and len(results_by_name) > len(variants):
             rows.append(_best_rule(spreads, variants, metric, figure))
         lines += [f"**{metric.title}**", "", markdown(["", *roads, "all"], rows)]
-    counts = ", ".join(f"{name} {len(started[name])}" for name in variants if name in started)
+    counts = ", ".join(f"{name} {len(results_by_name[name])}" for name in variants if name in results_by_name)
     return "\n".join([*lines, f"Seeds: {counts}.", ""])
 
 

@@ -234,6 +234,7 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
     share = _painted_share(cover, usual_width)
     grid = profiles.middles
     stretch_offsets, weights = _offsets_by_stretch(profiles, middle, np.where(track_rows, share, 0.0))
+    # Chosen: fewer than four stretches (20 m) with paint are no line.
     if (weights > 0.0).sum() < 4:
         return None
     # Width and offsets by bins; by the points themselves where these are known.

@@ -102,7 +102,7 @@ def centerline_loss(options: LossOptions, half_width: float) -> Callable[[nn.Mod
             first_look_error, torch.zeros_like(first_look_error), reduction="none", delta=_ROUGH
         )
         value = value + options.rough * first_look_cost.sum() / known_mask[..., 0].sum().clamp_min(1)
-        # Lines as classes over places across the road.
+        # The lines' places by the logits of the kernel points.
         if options.places:
             number = output["logits"].shape[2]
             kernel_offsets = torch.linspace(-half_width, half_width, number, device=estimate.device).expand(
@@ -112,7 +112,7 @@ def centerline_loss(options: LossOptions, half_width: float) -> Callable[[nn.Mod
             entropy = cross_entropy(output["logits"], kernel_offsets, truth[..., lines], known_mask[..., lines])
             share = estimate.new_tensor([1.0] + [options.edges] * (len(LINES) - 1))
             value = value + options.places * (share * entropy).sum()
-        # The centre as a class over fine places around the first look.
+        # The centre's place by the logits of the second look, around the first one's centre.
         if options.fine:
             logits, kernel_offsets = output["fine_logits"][..., None], output["fine_places"]
             value = (
