@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import Float
+from ..base.arrays import Bool, Float
 from ..road.alignment import Alignment, Element
 from ..road.profile import IntersectionPoint, Profile
 from .between import calm_swings
@@ -317,43 +317,44 @@ def refine_design(points: Float, initial_fit: DesignFit, free_knots: bool = True
             int(np.searchsorted(stations, model.knots[first_element])) if first_element else 0,
             len(station) if end_element == model.size else int(np.searchsorted(stations, model.knots[end_element])),
         )
-        part, part_pose, feet, part_offsets = _fit_part(
+        fit = _fit_part(
             points[part_points], part, part_pose, stations[part_points], first_element == 0, value_is_fixed, free_knots
         )
-        stations[part_points], offsets[part_points] = feet, part_offsets
+        stations[part_points], offsets[part_points] = fit.stations, fit.offsets
         if first_element == 0:
-            pose = part_pose
+            pose = fit.pose
         if end_element == model.size:
-            fitted_parts.append(part)
+            fitted_parts.append(fit.model)
             break
         # Keep the first elements; the others, which the points that follow change, are fitted again in the next part.
-        kept_elements = _first_elements(part, _KEPT)
+        kept_elements = _first_elements(fit.model, _KEPT)
         fitted_parts.append(kept_elements)
-        end_point, heading, _ = _alignment(kept_elements, part_pose).frame(
+        end_point, heading, _ = _alignment(kept_elements, fit.pose).frame(
             float(kept_elements.knots[-1] - kept_elements.knots[0])
         )
         part_pose = np.array([*end_point, heading])
         first_element += _KEPT
         knots = model.knots.copy()
-        knots[first_element : end_element + 1] = part.knots[_KEPT:]
+        knots[first_element : end_element + 1] = fit.model.knots[_KEPT:]
         values = model.values.copy()
-        values[first_element:end_element] = part.values[_KEPT:]
+        values[first_element:end_element] = fit.model.values[_KEPT:]
         model = replace(model, knots=knots, values=values)
-        # Points that lay before the part's moved end belong to the elements after it.
-        stations[stations > knots[end_element]] = np.maximum(
-            stations[stations > knots[end_element]], knots[end_element]
+    return DesignFit(_join_parts(fitted_parts, model.smooth), pose, stations, offsets)
+
+
+def _join_parts(parts: list[Model], smooth: Bool) -> Model:
+    """Return consecutive parts as one model; ``smooth`` says at which of its inner knots values are continuous."""
+    joined_model = parts[0]
+    for part in parts[1:]:
+        joint = joined_model.size
+        joined_model = replace(
+            joined_model,
+            knots=np.concatenate([joined_model.knots, part.knots[1:]]),
+            values=np.concatenate([joined_model.values, part.values]),
+            kinds=np.concatenate([joined_model.kinds, part.kinds]),
+            smooth=np.concatenate([joined_model.smooth, smooth[joint - 1 : joint], part.smooth]),
         )
-    refined_model = fitted_parts[0]
-    for part in fitted_parts[1:]:
-        joint = refined_model.size
-        refined_model = replace(
-            refined_model,
-            knots=np.concatenate([refined_model.knots, part.knots[1:]]),
-            values=np.concatenate([refined_model.values, part.values]),
-            kinds=np.concatenate([refined_model.kinds, part.kinds]),
-            smooth=np.concatenate([refined_model.smooth, model.smooth[joint - 1 : joint], part.smooth]),
-        )
-    return DesignFit(refined_model, pose, stations, offsets)
+    return joined_model
 
 
 def _slice(model: Model, first_element: int, end_element: int) -> Model:
@@ -369,8 +370,8 @@ def _slice(model: Model, first_element: int, end_element: int) -> Model:
 
 def _fit_part(
     points: Float, model: Model, pose: Float, station: Float, free_pose: bool, value_is_fixed: bool, free_knots: bool
-) -> tuple[Model, Float, Float, Float]:
-    """Return elements fitted to points, their pose, and the points' stations and offsets (N,), m, on them.
+) -> DesignFit:
+    """Return the fit of consecutive elements to the points (N, 2), m, along them.
 
     Args:
         points: (N, 2) m.
@@ -418,7 +419,7 @@ def _fit_part(
             damping *= 30.0
             if damping > 1e3:
                 break
-    return model, pose, feet, offsets
+    return DesignFit(model, pose, feet, offsets)
 
 
 def _jacobian(model: Model, pose: Float, station: Float) -> Float:

@@ -158,13 +158,13 @@ def _bay(side: SideSection, stations: Float, run: slice) -> Bay | None:
     if not within_road or np.nanmedian(excess_width[run]) < _NARROWEST or not _beside_line(side, run):
         return None
     fit_mask = np.isfinite(excess_width) & (stations > run_start - _AROUND) & (stations < run_end + _AROUND)
-    shape, residual, unit = _fit_trapezoid(stations[fit_mask], excess_width[fit_mask], run_start, run_end)
+    shape, residual, unit_covariance = _fit_trapezoid(stations[fit_mask], excess_width[fit_mask], run_start, run_end)
     start, low_taper, length, high_taper, width = shape.tolist()
     fits = robust_scale(residual) < _MISFIT and float(np.sqrt(np.mean(residual**2))) < 2.0 * _MISFIT
     if not fits or not _NARROWEST <= width <= _WIDEST or not _SHORTEST_BAY <= length <= _LONGEST_BAY:
         return None
     scatter = max(robust_scale(residual), _LEAST_SCATTER)
-    covariance = scatter**2 * correlation_factor(residual) * unit
+    covariance = scatter**2 * correlation_factor(residual) * unit_covariance
     std = float(np.sqrt(covariance[-1, -1]))
     return Bay(side.side, start, start + low_taper + length + high_taper, low_taper, high_taper, width, std, covariance)
 
