@@ -76,13 +76,13 @@ def run(arguments: argparse.Namespace) -> Outcome:
         road = run_reconstruction(_job(arguments), progress)
         compare_with_truth = _comparison(arguments.truth, road.cloud.place)
         _write(road, folder, arguments.no_picture)
-        result, parameters = road.report, road.found.parameters
+        result, parameters = road.report, road.reconstruction.parameters
         if compare_with_truth is not None:
             result["comparison"] = compare_with_truth(parameters)
         result["remarks"] = remarks_so_far()
         (folder / REPORT).write_text(canonical_json(result), encoding="utf-8")
         write_twin(parameters, folder, arguments.twin, progress=in_stage(progress, "twin"))
-    return 3 if road.found.judgement.is_doubtful else 0, result, summary(result, arguments.output)
+    return 3 if road.reconstruction.judgement.is_doubtful else 0, result, summary(result, arguments.output)
 
 
 def _check_truth(truth: Path) -> None:
@@ -138,7 +138,7 @@ def _write(road: ReconstructedRoad, folder: Path, no_picture: bool) -> None:
     from synthroads_addon.road.geometry import RoadGeometry
     from synthroads_addon.road.tessellation import sample_stations
 
-    result = road.found
+    result = road.reconstruction
     geometry = RoadGeometry(result.parameters)
     (folder / PARAMETERS).write_text(result.parameters.to_json(), encoding="utf-8")
     line = centerline_geojson(geometry, sample_stations(geometry, 0.005))

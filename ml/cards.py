@@ -16,13 +16,13 @@ from .configuration import Part
 WEIGHTS = Path(__file__).parent / "weights"
 """Folder of the shipped models: of each a card, NAME.json, and weights, NAME.safetensors."""
 LARGEST_MB = 10.0
-"""Weights of one model take less than this, MB."""
+"""Largest size of one model's weights, MB."""
 Platform = Literal["airborne", "uav", "mobile", "tripod"]
 Attribute = Literal["intensity", "color"]
 
 
 class Domain(Part):
-    """Clouds that a model was trained on, in terms that can be measured on any cloud."""
+    """Domain that a model was trained on, in properties that can be measured on any cloud."""
 
     density: tuple[float, float] = Field(description="Least and largest density of points on the ground, 1/m2.")
     platforms: tuple[Platform, ...] = Field(min_length=1, description="What carried the scanner.")
@@ -30,7 +30,7 @@ class Domain(Part):
 
 
 class Figure(Part):
-    """One figure that a model was measured by, beside the best rule that learns nothing where there is one."""
+    """One measured figure of a model, with that of the best untrained rule where there is one."""
 
     name: str = Field(min_length=1, description="What was measured, on what.")
     value: float = quantity(unit="1", description="Of the model, in `unit`.")
@@ -77,7 +77,9 @@ def read_card(name: str) -> ModelCard:
     """
     path = WEIGHTS / f"{name}.json"
     if not path.is_file():
-        known = sorted(one.stem for one in WEIGHTS.glob("*.json"))
-        allowed = f"must be one of {', '.join(known)}{nearest_name(name, known)}" if known else "no model is shipped"
-        raise InputError("model", name, allowed)
+        names = sorted(card_file.stem for card_file in WEIGHTS.glob("*.json"))
+        requirement = (
+            f"must be one of {', '.join(names)}{nearest_name(name, names)}" if names else "no model is shipped"
+        )
+        raise InputError("model", name, requirement)
     return ModelCard.from_dict(read_json(path), source=path.name)

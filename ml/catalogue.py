@@ -32,6 +32,7 @@ def _training(name: str) -> Entry:
 
 
 def _experiment(name: str) -> Entry:
+    """Return the entry of a shipped experiment: its configuration and the names of its variants."""
     file = shipped_file("experiment", EXPERIMENTS, name)
     data = _object(file)
     variants = data.get("variants")
@@ -43,50 +44,56 @@ def _experiment(name: str) -> Entry:
 
 
 def _model(name: str) -> Entry:
+    """Return the entry of a shipped model: its task, domain, size, figures and limits."""
     card = read_card(name)
-    low, high = card.domain.density
+    least_density, largest_density = card.domain.density
     megabytes = round(card.weights.stat().st_size / 1e6, 2) if card.weights.is_file() else None
     key_figures = {
         "task": card.task,
-        "density": f"{low:g} to {high:g}",
+        "density": f"{least_density:g} to {largest_density:g}",
         "platforms": list(card.domain.platforms),
         "megabytes": megabytes,
-        "figures": [one.to_dict() for one in card.figures],
+        "figures": [figure.to_dict() for figure in card.figures],
         "limits": list(card.limits),
     }
     return Entry(name, card.title, card.weights.with_suffix(".json"), key_figures, " ".join(card.limits))
 
 
 def _mapping(name: str) -> Entry:
-    made = load_mapping(name)
-    key_figures = {"field": made.field, "classes": list(dict.fromkeys(made.classes.values()))}
-    return Entry(name, made.title, shipped_file("mapping", MAPPINGS, name, [".json"]), key_figures)
+    """Return the entry of a shipped mapping of classes: the attribute that it reads, and its classes."""
+    mapping = load_mapping(name)
+    key_figures = {"field": mapping.field, "classes": list(dict.fromkeys(mapping.classes.values()))}
+    return Entry(name, mapping.title, shipped_file("mapping", MAPPINGS, name, [".json"]), key_figures)
 
 
 def _yardstick(name: str) -> Entry:
-    made = load_yardstick(name)
+    """Return the entry of a public data set: the form of its files, its splits and classes."""
+    yardstick = load_yardstick(name)
     key_figures = {
-        "form": made.form,
-        "splits": list(made.splits),
-        "classes": list(dict.fromkeys(made.mapping.classes.values())),
+        "form": yardstick.form,
+        "splits": list(yardstick.splits),
+        "classes": list(dict.fromkeys(yardstick.mapping.classes.values())),
     }
-    return Entry(name, made.title, shipped_file("yardstick", YARDSTICKS, name, [".json"]), key_figures, made.source)
+    return Entry(
+        name, yardstick.title, shipped_file("yardstick", YARDSTICKS, name, [".json"]), key_figures, yardstick.source
+    )
 
 
 def _object(file: Path) -> Mapping[str, Any]:
+    """Return the content of a YAML file; InputError unless it is an object."""
     data = read_yaml(file)
     if not isinstance(data, dict):
         raise InputError(str(file), None, "must be an object")
     return data
 
 
-def _paths(named: Any) -> list[str]:
+def _paths(data: Any) -> list[str]:
     """Return a flat list of the paths in nested lists of paths and of objects with a `path` or `cloud`."""
-    if isinstance(named, str):
-        return [named]
-    if isinstance(named, dict):
-        return _paths(named.get("path", named.get("cloud", ())))
-    return [path for part in named for path in _paths(part)] if isinstance(named, (list, tuple)) else []
+    if isinstance(data, str):
+        return [data]
+    if isinstance(data, dict):
+        return _paths(data.get("path", data.get("cloud", ())))
+    return [path for part in data for path in _paths(part)] if isinstance(data, (list, tuple)) else []
 
 
 KINDS = {

@@ -15,7 +15,7 @@ from .cards import ModelCard, Platform, model_names, read_card
 
 FAR = log(3.0)
 """Distance from a model's domain beyond which its results are doubtful: density three times off, another platform."""
-_OTHER_PLATFORM = log(3.0) + 1e-9
+_OTHER_PLATFORM = log(3.0) + 1e-9  # added for another platform: always beyond `FAR`
 _UNEVEN = 12.0  # of the 90th to the 20th percentile of cells' points: scanners that stand or drive on the road
 _LONG = 3.0  # of a ground-based cloud's extent along to that across: the scanner drove
 _DENSE = 60.0  # points/m2 from which an even cloud is a UAV's
@@ -27,10 +27,10 @@ class CloudTraits:
     """Traits of a cloud by which a model is chosen.
 
     Attributes:
-        density: median of the points in occupied square metres.
-        unevenness: ratio of the 90th to the 20th percentile of the same.
-        platform: that the scanner was on, judged by the two and the extent.
-        attributes: of the points that tell something: ``intensity``, ``color``.
+        density: median number of points in occupied square metres, 1/m2.
+        unevenness: ratio of the 90th to the 20th percentile of these numbers.
+        platform: likely platform of the scanner, judged by density, unevenness and extent.
+        attributes: names of the points' attributes that vary: ``intensity``, ``color``.
     """
 
     density: float
@@ -40,19 +40,19 @@ class CloudTraits:
 
     def to_text(self) -> str:
         """Return the traits as text."""
-        told = ", ".join(sorted(self.attributes)) or "no attributes"
-        return f"{self.density:.3g} points/m2, {self.platform}, {told}"
+        attributes = ", ".join(sorted(self.attributes)) or "no attributes"
+        return f"{self.density:.3g} points/m2, {self.platform}, {attributes}"
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A chosen model, and why.
+    """A model chosen for a cloud, with the cloud's traits and distance from the model's domain.
 
     Attributes:
-        card: of the model.
-        traits: of the cloud.
-        distance: from what the model was trained on: 0 inside, the logarithm of how many times the density is off
-            outside, and more on another platform.
+        card: card of the model.
+        traits: traits of the cloud.
+        distance: distance from the model's domain: 0 inside, else the logarithm of the ratio by which the density is
+            outside, plus `_OTHER_PLATFORM` on another platform.
     """
 
     card: ModelCard
@@ -61,7 +61,7 @@ class Choice:
 
     @property
     def doubtful(self) -> bool:
-        """Return whether the cloud is too far from what the model was trained on."""
+        """Return whether the cloud lies farther than `FAR` from the model's domain."""
         return self.distance > FAR
 
     def to_dict(self) -> dict[str, Any]:
@@ -75,17 +75,19 @@ class Choice:
         return {"model": self.card.name, "cloud": traits, "distance": round(self.distance, 3), "why": self.why()}
 
     def why(self) -> str:
-        """Return in one line which model was chosen and why."""
-        low, high = self.card.domain.density
-        trained = f"trained on {low:g} to {high:g} points/m2, {' and '.join(self.card.domain.platforms)}"
-        beside = (
+        """Return one line of text with the chosen model and the reason."""
+        least_density, largest_density = self.card.domain.density
+        training_domain = (
+            f"trained on {least_density:g} to {largest_density:g} points/m2, {' and '.join(self.card.domain.platforms)}"
+        )
+        reservation = (
             "" if not self.distance else "; the cloud is unlike that" if self.doubtful else "; the nearest there is"
         )
-        return f"{self.card.name} for {self.traits.to_text()}: {trained}{beside}"
+        return f"{self.card.name} for {self.traits.to_text()}: {training_domain}{reservation}"
 
 
 def choose_model(cloud: Path, task: str) -> Choice:
-    """Return the shipped model of a task that was trained on what is most like a cloud.
+    """Return the shipped model of a task whose domain is nearest to a cloud.
 
     Raises:
         MissingFileError: there is no such file.
@@ -95,31 +97,33 @@ def choose_model(cloud: Path, task: str) -> Choice:
     if not cards:
         raise InputError("RUN", None, f"no model for {task} comes with the package; `synthroads train` makes one")
     traits = cloud_traits(cloud)
-    return nearest(cards, traits)
+    return nearest_model(cards, traits)
 
 
-def nearest(cards: Sequence[ModelCard], traits: CloudTraits) -> Choice:
-    """Return which of some models (at least one) was trained on what is most like a cloud; of equal ones the first.
+def nearest_model(cards: Sequence[ModelCard], traits: CloudTraits) -> Choice:
+    """Return the choice of the model (of at least one) whose domain is nearest to a cloud; of equal ones the first.
 
     Raises:
-        InputError: the cloud lacks what each of them needs.
+        InputError: the cloud lacks attributes that each model needs.
     """
     choices = [Choice(card, traits, domain_distance(card, traits)) for card in cards]
-    best = min(choices, key=lambda choice: choice.distance)
-    if best.distance == inf:
-        needed = " or ".join(sorted({name for card in cards for name in card.domain.needs} - traits.attributes))
-        raise InputError("cloud", traits.to_text(), f"the models that come with the package need {needed}")
-    return best
+    best_choice = min(choices, key=lambda choice: choice.distance)
+    if best_choice.distance == inf:
+        missing_attributes = " or ".join(
+            sorted({name for card in cards for name in card.domain.needs} - traits.attributes)
+        )
+        raise InputError("cloud", traits.to_text(), f"the models that come with the package need {missing_attributes}")
+    return best_choice
 
 
 def domain_distance(card: ModelCard, traits: CloudTraits) -> float:
-    """Return how far a cloud is from what a model was trained on; infinite if it lacks what the model needs."""
+    """Return a cloud's distance from a model's domain (`Choice.distance`); infinite if it lacks needed attributes."""
     if not set(card.domain.needs) <= traits.attributes:
         return inf
-    low, high = card.domain.density
+    least_density, largest_density = card.domain.density
     density = max(traits.density, 1e-6)
-    beside = max(0.0, log(low / density), log(density / high))
-    return beside + (0.0 if traits.platform in card.domain.platforms else _OTHER_PLATFORM)
+    density_distance = max(0.0, log(least_density / density), log(density / largest_density))
+    return density_distance + (0.0 if traits.platform in card.domain.platforms else _OTHER_PLATFORM)
 
 
 def cloud_traits(path: Path) -> CloudTraits:
@@ -127,7 +131,7 @@ def cloud_traits(path: Path) -> CloudTraits:
 
     Raises:
         MissingFileError: there is no such file.
-        InputError: it is no cloud, or empty.
+        InputError: the file is no cloud, or empty.
     """
     cells: dict[tuple[int, int], int] = {}
     brightest, colorful = 0.0, False
@@ -137,29 +141,31 @@ def cloud_traits(path: Path) -> CloudTraits:
             if not len(block):
                 continue
             plan = np.floor(block.xyz[:, :2]).astype(np.int64)
-            places, counts = np.unique(plan, axis=0, return_counts=True)
-            for place, count in zip(map(tuple, places.tolist()), counts.tolist(), strict=True):
-                cells[place] = cells.get(place, 0) + count
+            cell_corners, counts = np.unique(plan, axis=0, return_counts=True)
+            for cell_corner, count in zip(map(tuple, cell_corners.tolist()), counts.tolist(), strict=True):
+                cells[cell_corner] = cells.get(cell_corner, 0) + count
             brightest = max(brightest, float(block.intensity.max()))
             darkest = min(darkest, float(block.intensity.min()))
             colorful = colorful or bool(cloud.header.has_color and block.rgb.any())
     if not cells:
         raise InputError(str(path), None, "has no points")
-    places, counts = np.array(list(cells)), np.array(list(cells.values()), dtype=np.float64)
-    low, median, high = np.percentile(counts, [20, 50, 90])
-    unevenness = float(high / max(low, 1.0))
+    cell_corners, counts = np.array(list(cells)), np.array(list(cells.values()), dtype=np.float64)
+    lower_count, median, upper_count = np.percentile(counts, [20, 50, 90])
+    unevenness = float(upper_count / max(lower_count, 1.0))
     names = (("intensity", brightest > darkest), ("color", colorful))
     return CloudTraits(
         density=float(median),
         unevenness=unevenness,
-        platform=_platform(float(median), unevenness, places.astype(np.float64)),
-        attributes=frozenset(name for name, there in names if there),
+        platform=_platform(float(median), unevenness, cell_corners.astype(np.float64)),
+        attributes=frozenset(name for name, is_present in names if is_present),
     )
 
 
-def _platform(density: float, unevenness: float, places: np.ndarray[Any, np.dtype[np.float64]]) -> Platform:
+def _platform(density: float, unevenness: float, cell_corners: np.ndarray[Any, np.dtype[np.float64]]) -> Platform:
     """Return the likely platform: even clouds are seen from above, uneven ones from the road."""
     if unevenness < _UNEVEN:
         return "uav" if density >= _DENSE else "airborne"
-    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(places.T)), 1.0)) if len(places) > 2 else np.ones(2)
+    spread = (
+        np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(cell_corners.T)), 1.0)) if len(cell_corners) > 2 else np.ones(2)
+    )
     return "mobile" if spread[1] > _LONG * spread[0] else "tripod"

@@ -22,7 +22,7 @@ class Part(Model):
     """Base of a configuration's parts: immutable, no unknown keys, no NaN.
 
     Attributes:
-        renamed: names that fields had before, which are still read, and the names that they have.
+        renamed: former name of a field, which is still read -> present name.
     """
 
     vendor_keys_allowed: ClassVar[bool] = False
@@ -30,11 +30,12 @@ class Part(Model):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _read_old_names(cls, data: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
+    def _read_old_names(cls, data: Any, validate: ModelWrapValidatorHandler[Self]) -> Self:
+        """Validate data after fields under their former names were renamed; a present new name wins."""
         if isinstance(data, dict):
-            renamed = {old: new for old, new in cls.renamed.items() if new not in data}
-            data = {renamed.get(name, name): value for name, value in data.items()}
-        return read(data)
+            name_changes = {old_name: new_name for old_name, new_name in cls.renamed.items() if new_name not in data}
+            data = {name_changes.get(name, name): value for name, value in data.items()}
+        return validate(data)
 
 
 class Schedule(Part):
@@ -52,6 +53,7 @@ class Schedule(Part):
 
     @model_validator(mode="after")
     def _check_rates(self) -> Self:
+        """Refuse a final learning rate above the largest one."""
         if self.final_learning_rate > self.learning_rate:
             raise ValueError(f"final_learning_rate must not exceed learning_rate, {self.learning_rate:g}")
         return self
@@ -87,7 +89,7 @@ def names_in(folder: Path) -> list[str]:
     return sorted(path.stem for path in folder.glob("*.*"))
 
 
-def shipped_file(what: str, folder: Path, name_or_file: str, endings: Sequence[str] = (".yaml", ".json")) -> Path:
+def shipped_file(field: str, folder: Path, name_or_file: str, endings: Sequence[str] = (".yaml", ".json")) -> Path:
     """Return the path of the folder's file of that name, or the given path if it has an allowed ending (may not exist).
 
     Raises:
@@ -99,17 +101,17 @@ def shipped_file(what: str, folder: Path, name_or_file: str, endings: Sequence[s
     if path.suffix.lower().replace(".yml", ".yaml") in endings:
         return path
     hint = nearest_name(name_or_file, names)
-    allowed = f"must be a {' or '.join(endings)} file or one of {', '.join(names)}{hint}"
-    raise InputError(what, name_or_file, allowed)
+    requirement = f"must be a {' or '.join(endings)} file or one of {', '.join(names)}{hint}"
+    raise InputError(field, name_or_file, requirement)
 
 
 def load_configuration(name_or_file: str, changes: Sequence[str] = (), tasks: Sequence[str] = ()) -> Any:
     """Load a shipped configuration or a YAML file and apply ``path=value`` changes.
 
     Args:
-        name_or_file: a name out of `SHIPPED`, or a file.
-        changes: as ``--set`` takes them, e.g. ``schedule.epochs=5``.
-        tasks: that are possible; all if not given.
+        name_or_file: name of a file in `SHIPPED`, or a path.
+        changes: changes as ``--set`` takes them, e.g. ``schedule.epochs=5``.
+        tasks: names of the tasks that are possible; empty for all.
 
     Raises:
         MissingFileError: there is no such file.
@@ -127,7 +129,7 @@ def from_data(data: Any, source: str, tasks: Sequence[str] = ()) -> Any:
     """Return the task's configuration validated from plain data (as read from YAML).
 
     Raises:
-        InputError: they name no task that is possible, or a field is unknown or wrong.
+        InputError: the data name no possible task, or a field is unknown or wrong.
     """
     task = data.get("task") if isinstance(data, dict) else None
     if not isinstance(task, str) or task not in (tasks or TASKS):

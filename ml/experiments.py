@@ -53,8 +53,11 @@ class Experiment(Model):
     @field_validator("variants")
     @classmethod
     def _check_names(cls, variants: dict[str, Variant]) -> dict[str, Variant]:
-        if wrong := next((name for name in variants if not _FOLDER_NAME.fullmatch(name)), None):
-            raise ValueError(f"'{wrong}' must be the name of a folder: no / and no \\ in it, and no dot before it")
+        """Refuse names of variants that can't be names of folders."""
+        if invalid_name := next((name for name in variants if not _FOLDER_NAME.fullmatch(name)), None):
+            raise ValueError(
+                f"'{invalid_name}' must be the name of a folder: no / and no \\ in it, and no dot before it"
+            )
         return variants
 
     def filled_data(self, folders: Mapping[str, str]) -> dict[str, Any]:
@@ -93,9 +96,9 @@ def configurations(experiment: Experiment, folders: Mapping[str, str], changes: 
     """Return each variant's training configuration by name, with the first seed and paths filled in.
 
     Args:
-        experiment: what is compared.
-        folders: what {NAME} in its paths stands for.
-        changes: of all variants, ``path=value``.
+        experiment: the experiment with its variants.
+        folders: folder by NAME, for {NAME} in the experiment's paths.
+        changes: changes of all variants, ``path=value``.
 
     Raises:
         InputError: a name isn't given, or a change is wrong.
@@ -127,56 +130,56 @@ def fill_path(path: str, folders: Mapping[str, str]) -> str:
         raise InputError("--data", name, f"must be given: {name}=FOLDER") from None
 
 
-def kept_figures(file: Path, name: str, made_from: Any, is_sound: Callable[[Any], bool]) -> dict[str, Any] | None:
-    """Return the figures that an experiment keeps in a file, or None if there are none, or those of something else.
+def read_figures(file: Path, name: str, made_from: Any, is_sound: Callable[[Any], bool]) -> dict[str, Any] | None:
+    """Return the figures that an experiment keeps in a file; None if there are none, or those of other data.
 
     Args:
-        file: of an object with figures and, unless ``made_from`` is None, with what they were made from.
-        name: of the figures in it.
-        made_from: what they should be made from, as JSON data.
-        is_sound: returns whether they are such figures as a table needs.
+        file: JSON file of an object with the figures and, unless ``made_from`` is None, with that as ``made_from``.
+        name: key of the figures in the object.
+        made_from: data that the figures must be made from, as JSON data; None if that doesn't matter.
+        is_sound: function that tells whether figures have the form that a table needs.
 
     Raises:
         InputError: the file is damaged.
     """
     if not file.is_file():
         return None
-    kept = read_json(file)
-    if made_from is not None and isinstance(kept, dict) and kept.get("made_from") != made_from:
+    content = read_json(file)
+    if made_from is not None and isinstance(content, dict) and content.get("made_from") != made_from:
         return None
-    if not isinstance(kept, dict) or not is_sound(kept.get(name)):
-        told = "aren't the figures of this experiment: without the file they are made anew"
-        raise InputError(f"{file}: {name}", None, told)
-    figures: dict[str, Any] = kept[name]
+    if not isinstance(content, dict) or not is_sound(content.get(name)):
+        fault = "aren't the figures of this experiment: without the file they are made anew"
+        raise InputError(f"{file}: {name}", None, fault)
+    figures: dict[str, Any] = content[name]
     return figures
 
 
 def cached_scores(
-    run: Run[Any], file: Path, score: Callable[[], dict[str, Any]], is_sound: Callable[[Any], bool], **more: Any
+    run: Run[Any], file: Path, score: Callable[[], dict[str, Any]], is_sound: Callable[[Any], bool], **dependencies: Any
 ) -> dict[str, Any]:
-    """Return a trained run's scores, from `file` where they were made of the same configuration, weights and `more`.
+    """Return a trained run's scores, from a file if they were made of the same configuration, weights and dependencies.
 
     Args:
-        run: with the configuration that it is tested with.
-        file: for the scores, which are written.
-        score: makes them.
-        is_sound: see `kept_figures`.
-        more: what else they depend on, as JSON data.
+        run: run with the configuration that it is tested with.
+        file: file in which the scores are kept.
+        score: function that computes the scores.
+        is_sound: see `read_figures`.
+        dependencies: further values that the scores depend on, as JSON data.
 
     Raises:
         InputError: the file is damaged.
     """
     configuration = lasting_data(run.configuration.to_dict())
-    made_from = {"configuration": configuration, "checkpoint_sha256": checksum(run.folder / CHECKPOINT), **more}
-    if (kept := kept_figures(file, "tests", made_from, is_sound)) is not None:
-        return kept
+    made_from = {"configuration": configuration, "checkpoint_sha256": checksum(run.folder / CHECKPOINT), **dependencies}
+    if (scores_in_file := read_figures(file, "tests", made_from, is_sound)) is not None:
+        return scores_in_file
     scores = score()
     write_file(file, canonical_json({"made_from": made_from, "tests": scores}).encode(), overwrite=True)
     return scores
 
 
 def write_results(output: Path, results: Mapping[str, Any], table: str) -> None:
-    """Write the scores that there are by now, as `RESULTS` and `TABLE`, into an experiment's folder."""
+    """Write the scores computed so far into an experiment's folder, as `RESULTS` and `TABLE`."""
     write_file(output / RESULTS, canonical_json(results).encode(), overwrite=True)
     write_file(output / TABLE, table.encode(), overwrite=True)
 

@@ -25,14 +25,14 @@ TOLERANCE = 1e-4
 
 @dataclass(frozen=True)
 class Exportable:
-    """A network with all that it takes to write it as ONNX.
+    """A network with the inputs, names and metadata by which it is written as ONNX.
 
     Attributes:
-        model: its `forward(*tensors)` takes the inputs in order, and returns a tuple of the outputs.
-        inputs: examples by name, on the CPU.
-        dynamic: by input's name the axes that may have any length, each with the length's name.
-        outputs: names.
-        metadata: texts that the file holds.
+        model: network whose `forward(*tensors)` takes the inputs in order, and returns a tuple of the outputs.
+        inputs: example of each input by name, on the CPU.
+        dynamic: by input's name the axes of any length, with the length's name.
+        outputs: names of the outputs.
+        metadata: texts for the file, by name.
     """
 
     model: nn.Module
@@ -45,8 +45,8 @@ class Exportable:
 def write_onnx(network: Exportable, target: Path, *, overwrite: bool = False) -> dict[str, Any]:
     """Write a network as an ONNX file in single precision; return its inputs, outputs, bytes and largest difference.
 
-    ``difference`` is the largest one between ONNX Runtime's outputs and PyTorch's on the example; None where ONNX
-    Runtime isn't installed.
+    ``difference`` is the largest difference between ONNX Runtime's and PyTorch's outputs on the example; None where
+    ONNX Runtime isn't installed.
 
     Raises:
         InputError: the package onnx or onnxscript isn't installed, or the difference is more than `TOLERANCE`.
@@ -72,11 +72,11 @@ def onnx_bytes(network: Exportable) -> bytes:
     Raises:
         InputError: the package onnx or onnxscript isn't installed.
     """
-    axes = {name: torch.export.Dim(name) for of in network.dynamic.values() for name in of.values()}
+    axes = {name: torch.export.Dim(name) for lengths in network.dynamic.values() for name in lengths.values()}
     shapes = tuple(
         {axis: axes[length] for axis, length in network.dynamic.get(name, {}).items()} for name in network.inputs
     )
-    for name in ("onnxscript", "torch.onnx"):  # which tell of packages that no network of ours needs
+    for name in ("onnxscript", "torch.onnx"):  # they warn of packages that these networks don't need
         logging.getLogger(name).setLevel(logging.ERROR)
     try:
         with warnings.catch_warnings(), torch.no_grad():
@@ -105,7 +105,7 @@ def onnx_bytes(network: Exportable) -> bytes:
 
 
 def largest_difference(network: Exportable, content: bytes) -> float | None:
-    """Return the largest difference of ONNX Runtime's outputs from PyTorch's on the example; None if it isn't there."""
+    """Return the largest difference of ONNX Runtime's outputs from PyTorch's on the example; None if it is missing."""
     try:
         import onnxruntime  # optional: 30 MB that only comparisons need
     except ModuleNotFoundError:
@@ -116,16 +116,19 @@ def largest_difference(network: Exportable, content: bytes) -> float | None:
     outputs = session.run(list(network.outputs), {name: value.numpy() for name, value in network.inputs.items()})
     with torch.no_grad():
         references = network.model(*network.inputs.values())
-    return max(float(np.abs(one - other.numpy()).max()) for one, other in zip(outputs, references, strict=True))
+    return max(
+        float(np.abs(output - reference.numpy()).max()) for output, reference in zip(outputs, references, strict=True)
+    )
 
 
-def described(**told: Any) -> dict[str, str]:
-    """Return metadata as texts: JSON, but for what is text already."""
+def metadata_texts(**entries: Any) -> dict[str, str]:
+    """Return metadata entries as texts: text as it is, other values as JSON."""
     return {
-        name: value if isinstance(value, str) else json.dumps(value, sort_keys=True) for name, value in told.items()
+        name: value if isinstance(value, str) else json.dumps(value, sort_keys=True) for name, value in entries.items()
     }
 
 
 def _shape(name: str, value: Tensor, network: Exportable) -> list[int | str]:
+    """Return an input's shape, with the names of its dynamic axes in the place of their lengths."""
     dynamic = network.dynamic.get(name, {})
     return [dynamic.get(axis, size) for axis, size in enumerate(value.shape)]

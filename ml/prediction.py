@@ -19,13 +19,13 @@ _ADDED = "-predicted"
 
 @dataclass(frozen=True)
 class Predicted:
-    """A prediction that was written.
+    """Result of a prediction that was written to a file.
 
     Attributes:
-        task: of the model: "segmentation" or "centerline".
+        task: task of the model: "segmentation" or "centerline".
         output: file that was written.
-        metrics: what was found, and how long it took, as JSON data.
-        choice: why this shipped model was chosen, and how doubtful that is; None if a model was given.
+        metrics: summary of the prediction, with its duration, as JSON data.
+        choice: choice of the shipped model; None if a model was given.
     """
 
     task: str
@@ -55,7 +55,7 @@ def predict(
         path: line along the road that a centreline model begins with, CSV or GeoJSON; found in the cloud if None.
         classification: write the classes' LAS codes to the field ``classification``, besides ``predicted_class``.
         overwrite: replace a file that is there.
-        progress: told how far it is.
+        progress: called with the stage and its share.
 
     Raises:
         InputError: there is no such cloud or model, or the cloud isn't what the model needs.
@@ -64,18 +64,18 @@ def predict(
     if run is None:
         choice = choose_model(cloud, "segmentation")
         run = choice.card.name
-    trained = open_run(Path(run))
-    name = trained.configuration.task
-    written = output or usual_output(cloud, name)
-    asked = Prediction(cloud, written, path, overwrite, classification, "--output" if output else "")
-    return Predicted(name, written, task(name).predict(trained, asked, progress), choice)
+    trained_run = open_run(Path(run))
+    name = trained_run.configuration.task
+    target = output or usual_output(cloud, name)
+    prediction = Prediction(cloud, target, path, overwrite, classification, "--output" if output else "")
+    return Predicted(name, target, task(name).predict(trained_run, prediction, progress), choice)
 
 
 def usual_output(cloud: Path, task_name: str) -> Path:
-    """Return the file beside a cloud that is written where none is named; another one for each cloud.
+    """Return the output file beside a cloud that is used where none is named; it differs for each cloud.
 
     Raises:
-        InputError: the cloud's is no name of a file.
+        InputError: the cloud's path has no file name.
     """
     if task_name == "segmentation":
         return path_beside(cloud, f"{cloud.stem}{_ADDED}{cloud.suffix}", "CLOUD")

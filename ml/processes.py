@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from .runs import Run
 
 _MEETING = timedelta(minutes=10)
-"""How long one waits for the others to begin."""
+"""Time that a process waits for the others to begin."""
 _GRACE = 60.0
-"""Seconds in which this process has to notice by itself that another one was lost; over NCCL it waits on instead."""
+"""Seconds in which this process should notice by itself that another one was lost, which over NCCL it doesn't."""
 _LOST = "one was lost: is memory short? --resume goes on"
 _PATIENCE = timedelta(days=2)
-"""How long for each later step: the first scores the validation data alone."""
+"""Time that a process waits for another one in later steps: the first process scores the validation data alone."""
 
 
 def process_number() -> int:
@@ -45,7 +45,7 @@ def process_count() -> int:
 
 
 def wait_for_all() -> None:
-    """Wait until all processes that train together have come here."""
+    """Wait until all processes that train together have reached this call."""
     if distributed.is_initialized():
         distributed.barrier()
 
@@ -54,10 +54,10 @@ def average(tensors: Sequence[Tensor]) -> None:
     """Replace tensors of one device and type, in place, by their means over all processes."""
     if process_count() == 1 or not tensors:
         return
-    flat = torch.cat([tensor.reshape(-1) for tensor in tensors])
-    distributed.all_reduce(flat)
-    flat /= process_count()
-    for tensor, mean in zip(tensors, flat.split([tensor.numel() for tensor in tensors]), strict=True):
+    values = torch.cat([tensor.reshape(-1) for tensor in tensors])
+    distributed.all_reduce(values)
+    values /= process_count()
+    for tensor, mean in zip(tensors, values.split([tensor.numel() for tensor in tensors]), strict=True):
         tensor.copy_(mean.view_as(tensor))
 
 
@@ -66,9 +66,9 @@ def helper_processes(run: Run[Any], learn: Callable[[Run[Any]], object], device:
     """Context in which the configuration's further processes run ``learn(run)``, joined by torch.distributed.
 
     Args:
-        run: its ``processes`` says how many take part, this one included.
-        learn: a function of a module.
-        device: that this process trains on.
+        run: run whose configuration's ``processes`` is the number of processes, this one included.
+        learn: function of a module that trains a run.
+        device: device that this process trains on.
 
     Raises:
         InputError: one of them was lost, there are fewer CUDA devices than processes, or one device is named.
@@ -79,52 +79,54 @@ def helper_processes(run: Run[Any], learn: Callable[[Run[Any]], object], device:
         return
     if device.type == "cuda":
         _check_devices(count, run.configuration.device)
+    # The processes find each other by a file in a temporary folder.
     context = multiprocessing.get_context("spawn")
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         meeting = Path(folder) / "meeting"
-        others = [
-            context.Process(target=_help, args=(learn, run, meeting, number, device.type)) for number in range(1, count)
+        helpers = [
+            context.Process(target=_run_helper, args=(learn, run, meeting, number, device.type))
+            for number in range(1, count)
         ]
-        for other in others:
-            other.start()
-        done = Event()
-        Thread(target=_exit_if_lost, args=(others, done), daemon=True).start()
+        for helper in helpers:
+            helper.start()
+        finish_event = Event()
+        Thread(target=_exit_if_lost, args=(helpers, finish_event), daemon=True).start()
         try:
-            _join(meeting, 0, count, device.type)
+            _join_group(meeting, 0, count, device.type)
             yield
-            for other in others:
-                other.join()
+            for helper in helpers:
+                helper.join()
         except RuntimeError as error:
-            for other in others:
-                other.join(1.0)
-            if all(other.is_alive() for other in others):
+            for helper in helpers:
+                helper.join(1.0)
+            if all(helper.is_alive() for helper in helpers):
                 raise
             raise InputError("processes", count, _LOST) from error
         finally:
-            done.set()
-            for other in others:
-                other.kill()
+            finish_event.set()
+            for helper in helpers:
+                helper.kill()
             if distributed.is_initialized():
                 distributed.destroy_process_group()
 
 
-def _exit_if_lost(others: Sequence[Any], done: Event) -> None:
+def _exit_if_lost(helpers: Sequence[Any], finish_event: Event) -> None:
     """Watch the other processes (in a thread); 60 s after one has failed, exit this one with code 2 if it hangs.
 
     NCCL waits for a lost process up to `_PATIENCE`, and nothing that is raised meanwhile reaches it.
 
     Args:
-        others: processes that train with this one.
-        done: set when this one waits for none of them any more.
+        helpers: processes that train with this one.
+        finish_event: event that is set once this process waits for none of them any more.
     """
-    while not done.wait(1.0):
-        if any(other.exitcode for other in others):
+    while not finish_event.wait(1.0):
+        if any(helper.exitcode for helper in helpers):
             break
-    if not done.wait(_GRACE):
-        sys.stderr.write(f"error: {InputError('processes', len(others) + 1, _LOST)}\n")
+    if not finish_event.wait(_GRACE):
+        sys.stderr.write(f"error: {InputError('processes', len(helpers) + 1, _LOST)}\n")
         sys.stderr.flush()
-        for other in others:
-            other.kill()
+        for helper in helpers:
+            helper.kill()
         remove_scratch_folders()
         os._exit(2)
 
@@ -137,16 +139,17 @@ def _check_devices(count: int, device: str) -> None:
         raise InputError("device", device, "must be cuda or auto for several processes: one GPU each")
 
 
-def _join(meeting: Path, number: int, count: int, device: str) -> None:
+def _join_group(meeting: Path, number: int, count: int, device: str) -> None:
+    """Join the process group of the training: NCCL on GPUs, Gloo on CPUs, met through a file."""
     store = FileStore(str(meeting), count)
     store.set_timeout(_MEETING)
     backend = "nccl" if device == "cuda" else "gloo"
     distributed.init_process_group(backend, store=store, rank=number, world_size=count, timeout=_PATIENCE)
 
 
-def _help(learn: Callable[[Run[Any]], object], run: Run[Any], meeting: Path, number: int, device: str) -> None:
+def _run_helper(learn: Callable[[Run[Any]], object], run: Run[Any], meeting: Path, number: int, device: str) -> None:
     """Join the training and call ``learn(run)`` in a helper process; the first process reports the project's errors."""
     with suppress(SynthRoadsError, KeyboardInterrupt):
-        _join(meeting, number, run.configuration.processes, device)
+        _join_group(meeting, number, run.configuration.processes, device)
         learn(run)
         distributed.destroy_process_group()

@@ -24,7 +24,7 @@ EFFECTS = "ml.data.effects"
 _NETWORKS: dict[str, dict[str, type[Part]]] = {task: {} for task in FOLDERS}
 _EFFECTS: dict[str, dict[str, Effect]] = {task: {} for task in FOLDERS}
 Change = Callable[[Any, Any, np.random.Generator], None]
-"""Changes a `Sample` in place: called with it, with the task's options of effects and with the sample's own stream."""
+"""Function that changes a `Sample` in place: called with the sample, the options of effects and a random stream."""
 F = TypeVar("F", bound=Change)
 
 
@@ -33,9 +33,9 @@ class Effect:
     """A registered augmentation of training samples.
 
     Attributes:
-        change: what it does.
-        order: effects of lower ones go first, those below 0 before a sample is thinned out.
-        fields: what it adds to the options.
+        change: function that changes a sample.
+        order: effects with a lower order come first, those below 0 before a sample is thinned out.
+        fields: fields that the effect adds to the options.
     """
 
     change: Change
@@ -47,13 +47,14 @@ def network(task: str) -> Callable[[type[P]], type[P]]:
     """Return a class decorator that registers a network's options for a task, by the default of their ``name``.
 
     Args:
-        task: that it learns, out of `FOLDERS`.
+        task: task of the network, out of `FOLDERS`.
 
     Raises:
         ValueError: another network of the task has this name.
     """
 
     def register(options: type[P]) -> type[P]:
+        """Register a class of options under the default of its ``name``."""
         _register(_NETWORKS[task], options.model_fields["name"].default, options, options.__module__)
         return options
 
@@ -66,26 +67,27 @@ def networks(task: str) -> dict[str, type[Part]]:
     return dict(sorted(_NETWORKS[task].items()))
 
 
-def network_union(task: str, usual: str) -> Any:
-    """Return the type annotation of a field ``network``: any options of a task, `usual` where no name is given."""
+def network_union(task: str, default: str) -> Any:
+    """Return the type annotation of a field ``network``: options of any network of a task, `default` without a name."""
     models = networks(task)
-    return discriminated_union({usual: models[usual], **models}, "name")
+    return discriminated_union({default: models[default], **models}, "name")
 
 
 def effect(*tasks: str, order: int = 100, **fields: Any) -> Callable[[F], F]:
     """Return a decorator that registers a function as an augmentation of some tasks, under the function's name.
 
     Args:
-        tasks: on whose samples it acts, out of `FOLDERS`.
-        order: see `Effect`; those that come with the package are below 100.
-        fields: declared by `quantity`, with a default at which it neither does nor draws anything. A configuration's
-            ``effects`` have them.
+        tasks: tasks on whose samples the effect acts, out of `FOLDERS`.
+        order: order of the effect (`Effect`); those that come with the package are below 100.
+        fields: fields declared by `quantity`, with a default at which the effect does and draws nothing. A
+            configuration's ``effects`` get them.
 
     Raises:
         ValueError: another effect of a task has this name.
     """
 
     def register(change: F) -> F:
+        """Register a function for each of the tasks."""
         for task in tasks:
             _register(_EFFECTS[task], change.__name__, Effect(change, order, fields), change.__module__)
         return change
@@ -96,8 +98,8 @@ def effect(*tasks: str, order: int = 100, **fields: Any) -> Callable[[F], F]:
 def effect_options(task: str, base: type[P]) -> type[P]:
     """Return a subclass of `base`'s options with the fields that registered effects of a task add."""
     _import_files(EFFECTS)
-    added = {name: field for one in _EFFECTS[task].values() for name, field in one.fields.items()}
-    fields: Any = {name: (type(field.default), field) for name, field in added.items()}
+    new_fields = {name: field for effect in _EFFECTS[task].values() for name, field in effect.fields.items()}
+    fields: Any = {name: (type(field.default), field) for name, field in new_fields.items()}
     return create_model(base.__name__, __base__=base, __module__=EFFECTS, __doc__=base.__doc__, **fields)
 
 
@@ -105,18 +107,20 @@ def apply_effects(
     task: str, sample: Any, options: Part, random: np.random.Generator, *, before_thinning: bool = False
 ) -> None:
     """Apply a task's effects to a sample in order, in place: of order below 0 if `before_thinning`, else the others."""
-    for one in sorted(_EFFECTS[task].values(), key=lambda one: one.order):
-        if (one.order < 0) == before_thinning:
-            one.change(sample, options, random)
+    for effect in sorted(_EFFECTS[task].values(), key=lambda item: item.order):
+        if (effect.order < 0) == before_thinning:
+            effect.change(sample, options, random)
 
 
-def _register(known: dict[str, Any], name: str, thing: Any, module: str) -> None:
-    if known.setdefault(name, thing) is not thing:
-        first = getattr(known[name], "change", known[name]).__module__
+def _register(registered: dict[str, Any], name: str, thing: Any, module: str) -> None:
+    """Add a named network or effect to a table; ValueError if another one has the name."""
+    if registered.setdefault(name, thing) is not thing:
+        first_module = getattr(registered[name], "change", registered[name]).__module__
         kind = "effect" if isinstance(thing, Effect) else "network"
-        raise ValueError(f"{first} and {module} both have the {kind} {name!r}")
+        raise ValueError(f"{first_module} and {module} both have the {kind} {name!r}")
 
 
 def _import_files(package: str) -> None:
+    """Import all modules of a package, which register what they define."""
     for file in iter_modules(import_module(package).__path__):
         import_module(f"{package}.{file.name}")

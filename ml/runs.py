@@ -32,7 +32,7 @@ METRICS = "metrics.json"
 CURVES = "curves.png"
 CALIBRATION = "calibration.json"
 PRETRAINING = "pretraining"
-"""Folder, within that of a fine-tuned or self-trained run, of what it began with, and of its rounds but the last."""
+"""Folder within a fine-tuned or self-trained run's that holds its pretraining, and its rounds but the last."""
 LOCK = ".lock"
 """File that the training at work in the folder holds locked; it is gone at the end."""
 NOT_FINITE = "not all that it says of the cloud is finite: its weights are beyond reason; train it anew"
@@ -40,7 +40,7 @@ NOT_FINITE = "not all that it says of the cloud is finite: its weights are beyon
 FREE_WHEN_RESUMING = ("threads", "device", "workers", "prepare_on")
 """Fields that may change between the parts of one training: they say where it runs, not what it learns."""
 _FREE_IN_STREAM = ("producers", "folder")
-"""Those of `data.stream`."""
+"""Fields of `data.stream` that may change between the parts of one training."""
 
 C = TypeVar("C", bound=Configuration)
 
@@ -50,12 +50,12 @@ class Run(Generic[C]):
     """One training: its folder, configuration and history.
 
     Attributes:
-        folder: of its files.
-        configuration: all that it depends on.
-        history: one dictionary of numbers per epoch that is done.
-        kept: epochs that the checkpoint holds, from which the training can go on.
-        resume, overwrite: whether what is in the folder is gone on with, or replaced.
-        begun: whether its configuration stands in the folder.
+        folder: folder of its files.
+        configuration: configuration that determines it.
+        history: figures by name of each finished epoch.
+        kept: number of finished epochs that the checkpoint holds.
+        resume, overwrite: whether a run in the folder is resumed, or replaced.
+        begun: whether the configuration was written to the folder.
         held: whether this process holds the folder's lock.
     """
 
@@ -80,17 +80,17 @@ class Run(Generic[C]):
         """
         run = cls(folder, configuration, resume=resume, overwrite=overwrite)
         if not process_number():  # the first process's, which alone writes
-            run._goes_on()
+            run._take_over()
         return run
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Context in which no other training is at work in the run's folder; within it, it does nothing more.
+        """Context in which this process holds the lock of the run's folder; nested contexts do nothing more.
 
-        Where the input is at fault before an epoch is kept, nothing of the run is left.
+        After an InputError before the first checkpoint nothing of the run is left.
 
         Raises:
-            OutputError: another one is, or the folder can't be written.
+            OutputError: another training holds the lock, or the folder can't be written.
         """
         if self.held or process_number():
             yield
@@ -100,15 +100,15 @@ class Run(Generic[C]):
             try:
                 yield
             except InputError:
-                self._remove_unless_kept()
+                self._remove_unless_saved()
                 raise
             finally:
                 self.held = False
 
     def begin(self) -> None:
-        """Write the run's configuration, and remove what stands of a run that it replaces; once, when data are read.
+        """Write the run's configuration and remove the files of a run that it replaces; once, after data are read.
 
-        Of several processes that train together all come here, and the first one writes.
+        All processes that train together call it, and the first one writes.
 
         Raises:
             OutputError, InputError: see `start`; or the folder can't be written.
@@ -116,31 +116,31 @@ class Run(Generic[C]):
         if self.begun:
             return
         if not process_number():
-            if not self._goes_on():
+            if not self._take_over():
                 self._clear()
             content = canonical_json(self.configuration.to_dict()).encode()
             write_file(self.folder / CONFIGURATION, content, overwrite=True)
         self.begun = True
         wait_for_all()  # nobody goes on with a checkpoint that is removed until here
 
-    def _goes_on(self) -> bool:
-        """Take over what an interrupted run has kept, and return whether there is one; for errors see `start`."""
-        if not (self.folder / CONFIGURATION).exists() or not self._kept_checkpoints():
+    def _take_over(self) -> bool:
+        """Return whether the folder's run is resumed, after taking over its history; for errors see `start`."""
+        if not (self.folder / CONFIGURATION).exists() or not self._has_checkpoints():
             return False
         if self.resume:
             self._resume(read_json(self.folder / CONFIGURATION))
         elif not self.overwrite:
-            told = "holds a run already; --resume goes on, --overwrite begins anew"
-            raise OutputError("--output", str(self.folder), told)
+            fault = "holds a run already; --resume goes on, --overwrite begins anew"
+            raise OutputError("--output", str(self.folder), fault)
         return self.resume
 
-    def _kept_checkpoints(self) -> bool:
-        """Return whether an epoch of the run, or of what it began with, is kept in its folder."""
+    def _has_checkpoints(self) -> bool:
+        """Return whether the folder holds a checkpoint of the run, or of its pretraining."""
         return (self.folder / CHECKPOINT).exists() or any((self.folder / PRETRAINING).rglob(CHECKPOINT))
 
-    def _remove_unless_kept(self) -> None:
-        """Remove what `begin` has written, and the folder if it is empty then, unless an epoch is kept."""
-        if self.begun and not self._kept_checkpoints():
+    def _remove_unless_saved(self) -> None:
+        """Remove the files that `begin` has written, unless there is a checkpoint."""
+        if self.begun and not self._has_checkpoints():
             with suppress(OSError):  # what ended the training is told
                 self._clear()
                 (self.folder / CONFIGURATION).unlink(missing_ok=True)
@@ -200,13 +200,13 @@ class Run(Generic[C]):
             raise InputError(str(path), None, "is no checkpoint of a training of ours")
         epoch, model = state["epoch"], state["model"]
         if isinstance(epoch, bool) or not isinstance(epoch, int) or epoch < 0:
-            raise InputError(f"{path}: epoch", _kind(epoch), "a whole number from 0 is needed")
+            raise InputError(f"{path}: epoch", _value_text(epoch), "a whole number from 0 is needed")
         if not isinstance(model, Mapping) or not all(isinstance(value, torch.Tensor) for value in model.values()):
-            raise InputError(f"{path}: model", _kind(model), "a dictionary of tensors is needed")
+            raise InputError(f"{path}: model", _value_text(model), "a dictionary of tensors is needed")
         return state
 
     def calibration(self) -> dict[str, Any] | None:
-        """Return the calibration of a model's deviations as JSON data, None if it has none or not yet."""
+        """Return the calibration of the model's deviations as JSON data; None if there is none (yet)."""
         path = self.folder / CALIBRATION
         return read_json(path) if path.is_file() else None
 
@@ -221,33 +221,40 @@ class Run(Generic[C]):
         if self.history:
             write_file(self.folder / CURVES, _curves(self.history), overwrite=True)
 
-    def _resume(self, before: Any) -> None:
-        if not isinstance(before, dict):
+    def _resume(self, previous_data: Any) -> None:
+        """Take over the history of an interrupted run; InputError if its configuration differs."""
+        if not isinstance(previous_data, dict):
             raise InputError(str(self.folder / CONFIGURATION), None, "must be a JSON object")
-        now = self.configuration.to_dict()
+        current_data = self.configuration.to_dict()
         with suppress(InputError):  # fields may be called otherwise by now, or be new
-            before = self.configuration.from_dict(before).to_dict()
-        begun, configuration = lasting_data(before), lasting_data(now)
-        different = [name for name in {**begun, **configuration} if begun.get(name) != configuration.get(name)]
-        if different:
-            name = different[0]
-            raise InputError(f"--resume: {name}", now.get(name), f"the run was begun with {before.get(name)!r}")
+            previous_data = self.configuration.from_dict(previous_data).to_dict()
+        previous_lasting, current_lasting = lasting_data(previous_data), lasting_data(current_data)
+        changed_fields = [
+            name
+            for name in {**previous_lasting, **current_lasting}
+            if previous_lasting.get(name) != current_lasting.get(name)
+        ]
+        if changed_fields:
+            name = changed_fields[0]
+            raise InputError(
+                f"--resume: {name}", current_data.get(name), f"the run was begun with {previous_data.get(name)!r}"
+            )
         state = self.last_checkpoint()
-        self.kept = done = 0 if state is None else state["epoch"]
-        if done:
-            self.history = _read_history(self.folder / HISTORY)[:done]
+        self.kept = epoch_count = 0 if state is None else state["epoch"]
+        if epoch_count:
+            self.history = _read_history(self.folder / HISTORY)[:epoch_count]
 
 
 def load_state(module: nn.Module | torch.optim.Optimizer, state: Any, source: str) -> None:
     """Load the weights of a checkpoint into a network, or an optimiser's state, in place.
 
     Args:
-        module: of the run's configuration.
-        state: what the checkpoint holds for it.
-        source: run or file that it is of, for the message.
+        module: network or optimiser of the run's configuration.
+        state: its state in the checkpoint.
+        source: run or file of the checkpoint, for the message.
 
     Raises:
-        InputError: it is of another network, or a weight isn't finite, so that the network would say nothing of worth.
+        InputError: the state is another network's, or a weight isn't finite.
     """
     if isinstance(module, nn.Module) and any(value.is_complex() for value in state.values()):
         raise InputError(source, None, "its checkpoint holds complex numbers, which no network of ours has")
@@ -256,14 +263,14 @@ def load_state(module: nn.Module | torch.optim.Optimizer, state: Any, source: st
     except (RuntimeError, ValueError, TypeError, LookupError, AttributeError):  # whatever doesn't fit
         raise InputError(source, None, "its checkpoint is of another network than its configuration") from None
     if isinstance(module, nn.Module):
-        wrong = [name for name, value in module.state_dict().items() if not torch.isfinite(value).all()]
-        if wrong:
-            told = f"not all of its checkpoint's numbers of {wrong[0]} are finite: it is damaged; train anew"
-            raise InputError(source, None, told)
+        damaged_names = [name for name, value in module.state_dict().items() if not torch.isfinite(value).all()]
+        if damaged_names:
+            fault = f"not all of its checkpoint's numbers of {damaged_names[0]} are finite: it is damaged; train anew"
+            raise InputError(source, None, fault)
 
 
-def _kind(value: object) -> str:
-    """Return a number or text as it is written, of anything else its type's name: tensors have long texts."""
+def _value_text(value: object) -> str:
+    """Return a number or text as in Python code, for anything else the name of its type (tensors have long texts)."""
     return repr(value) if isinstance(value, (str, int, float)) else type(value).__name__
 
 
@@ -282,12 +289,12 @@ def stream_seed(seed: int, *purpose: str | int) -> int:
 
 def lasting_data(configuration: Mapping[str, Any]) -> dict[str, Any]:
     """Return a configuration's data without the fields that may change on resuming, those of `FREE_WHEN_RESUMING`."""
-    kept = {name: value for name, value in configuration.items() if name not in FREE_WHEN_RESUMING}
-    data = kept.get("data")
+    lasting_fields = {name: value for name, value in configuration.items() if name not in FREE_WHEN_RESUMING}
+    data = lasting_fields.get("data")
     if isinstance(data, Mapping) and isinstance(data.get("stream"), Mapping):
-        lasting = {name: value for name, value in data["stream"].items() if name not in _FREE_IN_STREAM}
-        kept["data"] = {**data, "stream": lasting}
-    return kept
+        stream_data = {name: value for name, value in data["stream"].items() if name not in _FREE_IN_STREAM}
+        lasting_fields["data"] = {**data, "stream": stream_data}
+    return lasting_fields
 
 
 def to_json_data(value: Any) -> Any:
@@ -304,8 +311,8 @@ def _curves(history: list[dict[str, float]]) -> bytes:
     """Return a PNG with one small plot per figure of the history, over the epochs."""
     names = [name for name in history[-1] if name not in ("epoch", "seconds")]
     figure = new_figure(4 * min(len(names), 3), 3 * -(-len(names) // 3))
-    for place, name in enumerate(names):
-        axes = figure.add_subplot(-(-len(names) // 3), min(len(names), 3), place + 1)
+    for plot_number, name in enumerate(names):
+        axes = figure.add_subplot(-(-len(names) // 3), min(len(names), 3), plot_number + 1)
         axes.plot([epoch["epoch"] for epoch in history], [epoch.get(name, float("nan")) for epoch in history])
         axes.set(title=shown_text(name.replace("_", " ")), xlabel="epoch")
         axes.grid(alpha=0.3)

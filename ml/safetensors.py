@@ -60,15 +60,15 @@ def write_tensors(
 
 
 def read_metadata(path: Path) -> dict[str, str]:
-    """Return the texts that a safetensors file says of its tensors, without reading these.
+    """Return the metadata texts of a safetensors file, without reading its tensors.
 
     Raises:
         MissingFileError, InputError: there is no such file, or it is damaged.
     """
-    told = _header(path)[0].get(METADATA, {})
-    if not isinstance(told, dict) or not all(isinstance(text, str) for text in told.values()):
+    texts = _read_header(path)[0].get(METADATA, {})
+    if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
         raise InputError(f"{path}: {METADATA}", None, "must be texts by name")
-    return told
+    return texts
 
 
 def read_tensors(path: Path) -> dict[str, Tensor]:
@@ -77,13 +77,13 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
     Raises:
         MissingFileError, InputError: there is no such file, or it is damaged.
     """
-    header, begin = _header(path)
+    header, begin = _read_header(path)
     content = np.fromfile(path, dtype=np.uint8, offset=begin)
-    return {name: _tensor(path, name, told, content) for name, told in header.items() if name != METADATA}
+    return {name: _read_tensor(path, name, entry, content) for name, entry in header.items() if name != METADATA}
 
 
-def _header(path: Path) -> tuple[dict[str, Any], int]:
-    """Return a file's header and the offset of its data."""
+def _read_header(path: Path) -> tuple[dict[str, Any], int]:
+    """Return a file's header as a dictionary, and the offset of its data in bytes."""
     if not path.is_file():
         raise MissingFileError(str(path), None, "no such file of weights")
     with path.open("rb") as file:
@@ -98,16 +98,17 @@ def _header(path: Path) -> tuple[dict[str, Any], int]:
     return header, _LENGTH + length
 
 
-def _tensor(path: Path, name: str, told: Any, content: np.ndarray[Any, np.dtype[np.uint8]]) -> Tensor:
-    damaged = InputError(f"{path}: {name}", None, "lies outside of the file, or isn't as long as its shape says")
+def _read_tensor(path: Path, name: str, entry: Any, content: np.ndarray[Any, np.dtype[np.uint8]]) -> Tensor:
+    """Return one tensor by its entry in the header (dtype, shape, data_offsets), from the file's data bytes."""
+    damage_error = InputError(f"{path}: {name}", None, "lies outside of the file, or isn't as long as its shape says")
     try:
-        dtype, shape, (first, last) = _TYPES[told["dtype"]], list(told["shape"]), told["data_offsets"]
+        dtype, shape, (begin, end) = _TYPES[entry["dtype"]], list(entry["shape"]), entry["data_offsets"]
     except (KeyError, TypeError, ValueError):
-        raise damaged from None
-    if any(type(number) is not int for number in (*shape, first, last)):
+        raise damage_error from None
+    if any(type(number) is not int for number in (*shape, begin, end)):
         raise InputError(f"{path}: {name}", None, "its shape and data_offsets must be whole numbers")
     size = prod(shape) * dtype.itemsize
-    if not 0 <= first <= last <= len(content) or last - first != size or any(count < 0 for count in shape):
-        raise damaged
-    part = np.array(content[first:last])  # aligned and writable, as torch wants it
+    if not 0 <= begin <= end <= len(content) or end - begin != size or any(count < 0 for count in shape):
+        raise damage_error
+    part = np.array(content[begin:end])  # aligned and writable, as torch wants it
     return torch.from_numpy(part).view(dtype).reshape(shape) if size else torch.empty(shape, dtype=dtype)

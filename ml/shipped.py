@@ -23,7 +23,7 @@ class ShippedRun(Run[Any]):
     """A shipped model in the place of a run: configuration, weights and calibration come from one file.
 
     Attributes:
-        card: of the model.
+        card: card of the model.
     """
 
     card: ModelCard | None = None
@@ -36,14 +36,15 @@ class ShippedRun(Run[Any]):
         return {"model": on_device, "epoch": self.configuration.schedule.epochs}
 
     def calibration(self) -> dict[str, Any] | None:
-        """Return the calibration of its deviations as JSON data, None if it has none."""
-        told = read_metadata(self._weights()).get("calibration")
+        """Return the calibration of the model's deviations as JSON data; None if it has none."""
+        text = read_metadata(self._weights()).get("calibration")
         try:
-            return json.loads(told) if told else None
+            return json.loads(text) if text else None
         except ValueError:
             raise InputError(str(self._weights()), None, "its calibration is no JSON") from None
 
     def _weights(self) -> Path:
+        """Return the file of the model's weights."""
         assert self.card is not None
         return self.card.weights
 
@@ -52,12 +53,12 @@ def open_shipped(name: str) -> ShippedRun:
     """Open a shipped model by its name.
 
     Raises:
-        InputError: there is none of this name, or its weights are damaged.
+        InputError: there is no model of this name, or its weights are damaged.
     """
     card = read_card(name)
-    told = read_metadata(card.weights).get("configuration", "")
+    text = read_metadata(card.weights).get("configuration", "")
     try:
-        data = json.loads(told)
+        data = json.loads(text)
     except ValueError:
         raise InputError(str(card.weights), None, "says nothing of the network that its weights are of") from None
     return ShippedRun(card.weights.with_suffix(""), from_data(data, str(card.weights)), card=card)
@@ -67,7 +68,7 @@ def open_run(run: Path) -> Run[Any]:
     """Open a trained run by its folder, or a shipped model by its name; a folder of that name comes first.
 
     Raises:
-        MissingFileError, InputError: there is neither.
+        MissingFileError, InputError: there is neither such a folder nor such a model.
     """
     if run.is_dir() or len(run.parts) > 1 or str(run) not in model_names():
         if not run.exists() and (hint := nearest_name(str(run), model_names())):
@@ -79,7 +80,7 @@ def open_run(run: Path) -> Run[Any]:
 def ship(run: Run[Any], weights: Path, *, overwrite: bool = False) -> int:
     """Write a trained run's weights in half precision, with its configuration and calibration; return the bytes.
 
-    The optimiser stays behind, and paths of data and caches are those of the configuration.
+    The optimiser's state is left out; paths of data and caches stay those of the configuration.
 
     Raises:
         InputError: the run isn't finished, or the weights take more than `LARGEST_MB`.
@@ -88,23 +89,25 @@ def ship(run: Run[Any], weights: Path, *, overwrite: bool = False) -> int:
     state = run.last_checkpoint()
     if state is None or state["epoch"] < run.configuration.schedule.epochs:
         raise InputError(str(run.folder), None, "its training isn't finished; `synthroads train --resume` goes on")
-    tensors = {name: _halved(value) for name, value in state["model"].items()}
+    tensors = {name: _to_half_precision(value) for name, value in state["model"].items()}
     size = sum(value.numel() * value.element_size() for value in tensors.values())
     if size > LARGEST_MB * 1e6:
         raise InputError(str(run.folder), round(size / 1e6, 1), f"its weights must take less than {LARGEST_MB:g} MB")
-    metadata: Mapping[str, str] = {"format": "pt", "configuration": _as_text(run.configuration.to_dict())}
+    metadata: Mapping[str, str] = {"format": "pt", "configuration": _json_text(run.configuration.to_dict())}
     if (calibration := run.calibration()) is not None:
-        metadata = {**metadata, "calibration": _as_text(calibration)}
+        metadata = {**metadata, "calibration": _json_text(calibration)}
     write_tensors(weights, tensors, metadata, overwrite=overwrite)
     return weights.stat().st_size
 
 
-def _halved(value: torch.Tensor) -> torch.Tensor:
+def _to_half_precision(value: torch.Tensor) -> torch.Tensor:
     """Return a tensor in half precision; integers, and values beyond its range, as they are."""
+    # Half precision ends at 65,504.
     if not value.is_floating_point() or float(value.abs().max() if value.numel() else 0.0) > 6e4:
         return value
     return value.half()
 
 
-def _as_text(data: Any) -> str:
+def _json_text(data: Any) -> str:
+    """Return data as compact JSON with sorted keys."""
     return json.dumps(data, sort_keys=True, separators=(",", ":"))

@@ -17,10 +17,10 @@ class Evaluation:
 
     Attributes:
         data: folders of data sets, or cloud files with what they need beside them.
-        split: of the data sets.
+        split: split of the data sets.
         output: folder for tables and pictures.
-        mapping: which of a cloud's own numbers are which class; None where clouds have ours. Of use to segmentation.
-        yardstick: public data set that each of the folders holds; None where they hold ours. Of use to segmentation.
+        mapping: mapping of a cloud's class numbers to classes; None for the project's own. Used by segmentation only.
+        yardstick: public data set that each folder holds; None for the project's own. Used by segmentation only.
     """
 
     data: Sequence[Path]
@@ -37,10 +37,10 @@ class Prediction:
     Attributes:
         cloud: file to be read.
         output: file or folder to be written.
-        path: line along the road (CSV or GeoJSON); None: found in the cloud. Of use to centrelines only.
+        path: line along the road (CSV or GeoJSON); None if it is found in the cloud. Used by centrelines only.
         overwrite: whether files that are there may be replaced.
-        classification: write the classes' LAS codes to the standard field too. Of use to segmentation only.
-        output_option: what the user calls the output; empty where they named none, and it is beside the cloud.
+        classification: whether LAS codes are written to the standard field too. Used by segmentation only.
+        output_option: name of the option by which the user named the output; empty if they named none.
     """
 
     cloud: Path

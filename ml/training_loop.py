@@ -19,9 +19,9 @@ from .runs import Run, load_state, stream_seed
 M = TypeVar("M", bound=nn.Module)
 Figures = dict[str, float]
 Batches = Callable[[int, slice], Iterable[Any]]
-"""Gives those batches of an epoch whose numbers a slice names; the same for the same epoch and number."""
+"""Function that returns the batches of an epoch whose numbers a slice selects; equal calls give equal batches."""
 Loss = Callable[[M, Any], tuple[Tensor, Figures]]
-"""Returns what is minimised and further figures, which are averaged over the epoch."""
+"""Function that returns a batch's loss, which is minimised, and further figures, which are averaged over the epoch."""
 
 
 def chosen_device(configuration: Configuration) -> torch.device:
@@ -63,52 +63,58 @@ def fit(
     accumulation of one process, whose last step may have fewer. The first process alone validates and saves.
 
     Args:
-        model: on the device it is trained on.
-        run: keeps checkpoint and history.
-        batches: the batches of one epoch.
-        batches_per_epoch: how many those are.
-        loss: of one batch; NaN or infinity ends the training.
-        validate: further figures of an epoch, computed after it.
-        progress: told the share of all steps that is done.
+        model: model, on the device it is trained on.
+        run: run that keeps checkpoint and history.
+        batches: function that returns the batches of one epoch.
+        batches_per_epoch: number of an epoch's batches.
+        loss: loss of one batch; NaN or infinity ends the training.
+        validate: function that computes further figures after an epoch.
+        progress: called with the share of all steps that is done.
 
     Raises:
         InputError: the loss is no longer finite, or an epoch has fewer batches than there are processes.
     """
     configuration, number, count = run.configuration, process_number(), process_count()
-    together = configuration.accumulation
-    steps_per_epoch = batches_per_epoch // (count * together) if count > 1 else -(-batches_per_epoch // together)
+    batches_per_step = configuration.accumulation
+    steps_per_epoch = (
+        batches_per_epoch // (count * batches_per_step) if count > 1 else -(-batches_per_epoch // batches_per_step)
+    )
     if steps_per_epoch == 0 and count > 1:
         raise InputError("processes", count, f"must not exceed the batches of an epoch, {batches_per_epoch}")
-    share = slice(number, min(steps_per_epoch * count * together, batches_per_epoch), count)
+    # The batches of this process.
+    share = slice(number, min(steps_per_epoch * count * batches_per_step, batches_per_epoch), count)
     schedule: Schedule = configuration.schedule
     optimizer = optimizer_of(model, schedule)
     run.begin()
     state = run.last_checkpoint(next(model.parameters()).device)
-    first = 0
+    first_epoch = 0
     if state is not None:
         load_state(model, state["model"], str(run.folder))
         load_state(optimizer, state.get("optimizer"), str(run.folder))
-        first = state["epoch"]
-    for epoch in range(first, schedule.epochs):
-        begin = time.perf_counter()
+        first_epoch = state["epoch"]
+    for epoch in range(first_epoch, schedule.epochs):
+        start_time = time.perf_counter()
         torch.manual_seed(stream_seed(configuration.seed, "epoch", epoch, *([number] if number else [])))
         model.train()
         figures: list[Figures] = []
         loss_sum = 0.0
-        for step, several in enumerate(_groups(batches(epoch, share), together), start=epoch * steps_per_epoch):
+        for step, step_batches in enumerate(
+            _groups(batches(epoch, share), batches_per_step), start=epoch * steps_per_epoch
+        ):
             rate = learning_rate(schedule, step, schedule.epochs * steps_per_epoch)
-            figures.append(train_step(model, optimizer, rate, configuration, loss, *several))
+            figures.append(train_step(model, optimizer, rate, configuration, loss, *step_batches))
             loss_sum += figures[-1]["loss"]
             detail = f"epoch {epoch + 1} of {schedule.epochs}, loss {loss_sum / len(figures):.3g}"
             progress(Stage("training", detail), (step + 1) / (schedule.epochs * steps_per_epoch))
         summary = {"epoch": epoch + 1, **_means(figures), "learning_rate": optimizer.param_groups[0]["lr"]}
         average([buffer for buffer in model.buffers() if buffer.is_floating_point()])  # statistics of norms
+        # Helper processes neither validate nor save.
         if number:
             continue
         if validate is not None:
             model.eval()
             summary |= validate(model, epoch + 1)
-        run.record({**summary, "seconds": round(time.perf_counter() - begin, 3)})
+        run.record({**summary, "seconds": round(time.perf_counter() - start_time, 3)})
         run.save({"model": model.state_dict(), "optimizer": optimizer.state_dict(), "epoch": epoch + 1})
 
 
@@ -122,10 +128,10 @@ def move_to_device(model: nn.Module, batch: Any) -> Any:
 
 def learning_rate(schedule: Schedule, step: int, steps: int) -> float:
     """Return the learning rate of a step from 0: linear warm-up to the largest, then a cosine to the final one."""
-    rising = schedule.warmup * steps
-    if step < rising:
-        return schedule.learning_rate * (step + 1) / (rising + 1)
-    share = (step - rising) / max(steps - 1 - rising, 1)
+    warmup_steps = schedule.warmup * steps
+    if step < warmup_steps:
+        return schedule.learning_rate * (step + 1) / (warmup_steps + 1)
+    share = (step - warmup_steps) / max(steps - 1 - warmup_steps, 1)
     span = schedule.learning_rate - schedule.final_learning_rate
     return schedule.final_learning_rate + 0.5 * span * (1 + math.cos(math.pi * min(share, 1.0)))
 
@@ -141,7 +147,7 @@ def optimizer_of(model: nn.Module, schedule: Schedule) -> torch.optim.AdamW:
 def train_step(
     model: M, optimizer: torch.optim.Optimizer, rate: float, configuration: Configuration, loss: Loss[M], *batches: Any
 ) -> Figures:
-    """Do one optimiser step, gradients averaged over batches and processes; return mean loss and mean other figures.
+    """Do one optimiser step with gradients averaged over batches and processes; return mean loss and other figures.
 
     The loss is the mean over all processes, the other figures are this process's.
 
@@ -151,11 +157,11 @@ def train_step(
     for group in optimizer.param_groups:
         group["lr"] = rate
     optimizer.zero_grad(set_to_none=True)
-    half = configuration.precision == "bfloat16"
+    uses_bfloat16 = configuration.precision == "bfloat16"
     values: list[Tensor] = []
     parts: list[Figures] = []
     for batch in batches:
-        with torch.autocast(next(model.parameters()).device.type, torch.bfloat16, enabled=half):
+        with torch.autocast(next(model.parameters()).device.type, torch.bfloat16, enabled=uses_bfloat16):
             value, figures = loss(model, move_to_device(model, batch))
         (value / len(batches)).backward()
         values.append(value.detach())
@@ -175,17 +181,18 @@ def train_step(
 
 def _groups(batches: Iterable[Any], size: int) -> Iterator[list[Any]]:
     """Yield batches in lists of a size; the last one may be shorter."""
-    several: list[Any] = []
+    group: list[Any] = []
     for batch in batches:
-        several.append(batch)
-        if len(several) == size:
-            yield several
-            several = []
-    if several:
-        yield several
+        group.append(batch)
+        if len(group) == size:
+            yield group
+            group = []
+    if group:
+        yield group
 
 
 def _means(figures: list[Figures]) -> Figures:
+    """Return the mean of each figure over steps; InputError without any."""
     if not figures:
         raise InputError("training data", 0, "an epoch has no batch: more data or a smaller batch are needed")
     return {name: math.fsum(step[name] for step in figures) / len(figures) for name in figures[0]}

@@ -22,7 +22,7 @@ def main(output: Path, cloud: Path | None = None) -> None:
         generate(Job(load_scenario("rq31-600m", SMALL), output / "scan"))
         cloud, truth = output / "scan" / "cloud.laz", output / "scan" / "parameters.json"
     road = run_reconstruction(ReconstructionJob(cloud))
-    parameters = road.found.parameters
+    parameters = road.reconstruction.parameters
     (output / "twin").mkdir(parents=True, exist_ok=True)
     (output / "parameters.json").write_text(parameters.to_json(), encoding="utf-8")
     write_twin(parameters, output / "twin", FORMATS)

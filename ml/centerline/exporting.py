@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from ..data.corridor import CORRIDOR
 from ..data.slices import FEATURES
 from ..networks.centerline.models import CenterlineModel
-from ..onnx_export import Exportable, described
+from ..onnx_export import Exportable, metadata_texts
 from .predictor import CenterlinePredictor
 
 INPUTS = ("coord", "feat", "mask", "frame")
@@ -37,24 +37,26 @@ def exportable_network(predictor: CenterlinePredictor, seed: int) -> Exportable:
 
     Args:
         predictor: the trained model.
-        seed: of the example.
+        seed: seed of the random example.
     """
     settings = predictor.settings
-    draw = torch.Generator().manual_seed(seed)
+    generator = torch.Generator().manual_seed(seed)
     shape = (2, settings.slices, min(settings.points_per_slice, 64))
     spread = torch.tensor([settings.thickness, 2.0 * settings.half_width, 0.5])
     frame = torch.zeros(*shape[:2], 4, dtype=torch.float64)
     frame[..., 0] = settings.spacing * torch.arange(settings.slices)
     inputs = {
-        "coord": spread * (torch.rand(*shape, 3, generator=draw) - 0.5),
-        "feat": torch.randn(*shape, len(FEATURES), generator=draw),
-        "mask": torch.rand(*shape, generator=draw) < 0.9,
+        "coord": spread * (torch.rand(*shape, 3, generator=generator) - 0.5),
+        "feat": torch.randn(*shape, len(FEATURES), generator=generator),
+        "mask": torch.rand(*shape, generator=generator) < 0.9,
         "frame": frame,
     }
     points = {0: "sequences", 2: "points"}
     dynamic = {"coord": points, "feat": points, "mask": points, "frame": {0: "sequences"}}
-    calibration: dict[str, Any] = {name: one.to_dict() for name, one in predictor.calibration.items()}
-    metadata = described(
+    calibration: dict[str, Any] = {
+        name: calibration_of_target.to_dict() for name, calibration_of_target in predictor.calibration.items()
+    }
+    metadata = metadata_texts(
         task="centerline",
         slices=settings.to_dict(),
         features=list(FEATURES),

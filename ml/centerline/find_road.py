@@ -29,8 +29,8 @@ def find_road(
     Args:
         predictor: a trained model.
         cloud: file with the road's points.
-        line: along the road, map coordinates; None: it is found in the cloud, as the middle of its ground.
-        progress: told the share that is done.
+        line: line along the road, map coordinates; None if it is found in the cloud, as the middle of its ground.
+        progress: called with the share that is done.
 
     Raises:
         MissingFileError, InputError: the file is missing or damaged, or the cloud holds no ground.
@@ -39,35 +39,37 @@ def find_road(
     line = line or path_through(ground)
     frames = frames_along(line, predictor.settings.frame_spacing)
     shape = (len(frames), len(TARGETS))
-    value, raw, std = (np.full(shape, np.nan) for _ in range(3))
+    value, raw_std, std = (np.full(shape, np.nan) for _ in range(3))
     widths = np.full((*shape, 2), np.nan)
-    for road, local, rows in strips(cloud, ground, line, frames, progress):
-        regression = predictor.regress(road, local)
+    for road, local_frames, rows in strips(cloud, ground, line, frames, progress):
+        regression = predictor.regress(road, local_frames)
         # Frames keep their stations, which rise strictly, from strip to strip.
-        number = np.searchsorted(frames.station, regression.frames.station[rows])
-        value[number] = regression.value[rows]
-        value[number, _HEIGHT] += road.origin[2]
-        raw[number], std[number], widths[number] = (
+        frame_numbers = np.searchsorted(frames.station, regression.frames.station[rows])
+        value[frame_numbers] = regression.value[rows]
+        value[frame_numbers, _HEIGHT] += road.origin[2]
+        raw_std[frame_numbers], std[frame_numbers], widths[frame_numbers] = (
             regression.raw_std[rows],
             regression.std[rows],
             regression.widths[rows],
         )
-        progress("finding the road", float(number[-1] + 1) / len(frames) if len(number) else 0.0)
-    kept = _found_span(value[:, 0])
+        progress("finding the road", float(frame_numbers[-1] + 1) / len(frames) if len(frame_numbers) else 0.0)
+    found_span = _found_span(value[:, 0])
     codes = (ground.header.epsg, ground.header.height_epsg)
-    return Regression(frames.select(kept), value[kept], raw[kept], std[kept], widths[kept], *codes)
+    return Regression(
+        frames.select(found_span), value[found_span], raw_std[found_span], std[found_span], widths[found_span], *codes
+    )
 
 
 def _found_span(center: Float) -> slice:
     """Return the slice from the first to the last frame whose `center` isn't NaN; of all frames if all are NaN."""
-    there = np.flatnonzero(np.isfinite(center))
-    return slice(int(there[0]), int(there[-1]) + 1) if len(there) else slice(None)
+    found_frames = np.flatnonzero(np.isfinite(center))
+    return slice(int(found_frames[0]), int(found_frames[-1]) + 1) if len(found_frames) else slice(None)
 
 
 DIGITS = 4
-"""Decimals: 0.1 mm."""
+"""Decimals of lengths in files: 0.1 mm."""
 UNITS = {"lanes": "1", "heading": "rad"}
-"""All other numbers are in metres."""
+"""Units of the corridor's columns that aren't in metres."""
 
 
 def centerline_geojson(regression: Regression, name: str, spacing: float) -> dict[str, Any]:
@@ -78,18 +80,18 @@ def centerline_geojson(regression: Regression, name: str, spacing: float) -> dic
 
     Args:
         regression: by the model.
-        name: of the collection.
-        spacing: of the frames, m.
+        name: name of the collection.
+        spacing: distance between frames, m.
     """
     features = []
     for line in ("center", "left_edge", "right_edge"):
         column = TARGETS.index(line)
         points = regression.points(line)
-        there = np.isfinite(points).all(axis=1)
-        far = np.concatenate([[True], np.diff(regression.frames.station) > 1.5 * spacing])
-        ends = np.flatnonzero(far | ~there | ~np.concatenate([[False], there[:-1]]))
-        for stretch in np.split(np.arange(len(there)), ends):
-            part = stretch[there[stretch]]
+        is_found = np.isfinite(points).all(axis=1)
+        after_gap = np.concatenate([[True], np.diff(regression.frames.station) > 1.5 * spacing])
+        ends = np.flatnonzero(after_gap | ~is_found | ~np.concatenate([[False], is_found[:-1]]))
+        for stretch in np.split(np.arange(len(is_found)), ends):
+            part = stretch[is_found[stretch]]
             if len(part) < 2:
                 continue
             properties = {
@@ -109,11 +111,11 @@ def centerline_geojson(regression: Regression, name: str, spacing: float) -> dic
 
 
 def corridor_json(regression: Regression, calibration: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the corridor as JSON data: per column a list of one number per frame, None where nothing was found.
+    """Return the corridor as JSON data: per column a list of one number per frame, None where the model found nothing.
 
     Args:
         regression: by the model.
-        calibration: what is said about how far its deviations can be trusted.
+        calibration: calibration of the deviations, as JSON data.
     """
     frames = regression.frames
     columns: dict[str, Any] = {
@@ -140,4 +142,5 @@ def corridor_json(regression: Regression, calibration: Mapping[str, Any]) -> dic
 
 
 def _as_list(values: Float, digits: int = DIGITS) -> list[float | None]:
+    """Return numbers rounded for JSON, None where they aren't finite; adding 0.0 turns -0.0 into 0.0."""
     return [round(value, digits) + 0.0 if np.isfinite(value) else None for value in values.tolist()]

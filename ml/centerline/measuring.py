@@ -61,7 +61,7 @@ def measure_run(
         the model's mean figures; ``tables`` has those of all predictors and roads, ``corridor`` its errors by target,
         ``files`` the names of what was written. And tables for people.
     """
-    shown = read_cases(configuration, evaluation, progress)
+    cases = read_cases(configuration, evaluation, progress)
     name = f"{configuration.network.name}, seed {configuration.seed}"
     width = configuration.slices.half_width
     predictors: dict[str, Sequence[Predictor]] = {name: [predictor]}
@@ -71,16 +71,16 @@ def measure_run(
     }
     predictors |= {"skeleton": [skeleton_predictor(SkeletonSettings())], **trivial_predictors(width)}
     progress("measuring", 0.0)
-    measured = measure(predictors, lambda seed: shown, [configuration.seed])
-    corridor = corridor_figures(predictor, shown)
-    files = [*write_tables(evaluation.output, "centerline", measured), "corridor.json"]
+    spreads = measure(predictors, lambda seed: cases, [configuration.seed])
+    corridor = corridor_figures(predictor, cases)
+    files = [*write_tables(evaluation.output, "centerline", spreads), "corridor.json"]
     write_file(evaluation.output / files[-1], canonical_json(corridor).encode(), overwrite=True)
-    for number, one in enumerate(shown[:PICTURES]):
-        progress("drawing", number / min(len(shown), PICTURES))
-        files += _draw(evaluation.output, one, predictor, name)
-    results = {"corridor": corridor, "tables": as_data(measured), "files": files}
-    means = {figure: nan_to_none(spread.mean) for figure, spread in measured[name]["all"].items()}
-    return {"roads": len(shown), **means, **results}, report(measured, corridor)
+    for number, case in enumerate(cases[:PICTURES]):
+        progress("drawing", number / min(len(cases), PICTURES))
+        files += _draw_road(evaluation.output, case, predictor, name)
+    results = {"corridor": corridor, "tables": as_data(spreads), "files": files}
+    means = {figure: nan_to_none(spread.mean) for figure, spread in spreads[name]["all"].items()}
+    return {"roads": len(cases), **means, **results}, report(spreads, corridor)
 
 
 def read_cases(
@@ -93,61 +93,61 @@ def read_cases(
         InputError: something is damaged, or no road has a truth of the configuration's kind.
     """
     settings, seed = configuration.slices, configuration.seed
-    shown: list[Case] = []
+    cases: list[Case] = []
     for path in evaluation.data:
-        progress(f"reading {path.name}", len(shown) / max(1, len(evaluation.data)))
+        progress(f"reading {path.name}", len(cases) / max(1, len(evaluation.data)))
         if (path / MANIFEST).is_file():
             cache = Path(configuration.data.cache) if configuration.data.cache else None
             for folder in scene_folders(path, evaluation.split):
                 # Nothing is written where a run's file says: it may be somebody else's.
                 for road in read_scene(folder, settings.truth, cache, keep=False):
-                    shown.append(make_case(road, seed, cropping=None, estimated=False, settings=settings))
+                    cases.append(make_case(road, seed, cropping=None, estimated=False, settings=settings))
         else:
             for cloud in clouds_with_axes(path) if path.is_dir() else [path]:
                 road = read_measured(cloud, axis_beside(cloud), settings.truth)
-                shown.append(measured_case(road, seed, settings))
-    if not shown:
+                cases.append(measured_case(road, seed, settings))
+    if not cases:
         names = ", ".join(str(path) for path in evaluation.data)
         raise InputError("data", names, f"holds no road with a {settings.truth} of the kind that was learned")
-    return shown
+    return cases
 
 
 def measured_case(road: LearningRoad, seed: int, settings: SliceSettings) -> Case:
-    """Return a real road as it is measured on: both sides cropped, anew every 50 m, the path found in what is left."""
+    """Return a real road as a case: both sides cropped, anew every 50 m, the path found in the points left."""
     return make_case(road, seed, cropping=STRETCHES, estimated=True, settings=settings)
 
 
-def corridor_figures(predictor: CenterlinePredictor, shown: Sequence[Case]) -> dict[str, dict[str, float | None]]:
-    """Return mean absolute error, coverage, ... of each target over all roads' frames; None without known truth."""
-    error, std, wide = [], [], []
-    for one in shown:
-        regression = predictor.regress(one.road, one.frames)
-        error.append(target_errors(regression, one.road.known_truth))
+def corridor_figures(predictor: CenterlinePredictor, cases: Sequence[Case]) -> dict[str, dict[str, float | None]]:
+    """Return the figures `TARGET_METRICS` of each target over all roads' frames; None without known truth."""
+    error, std, interval_widths = [], [], []
+    for case in cases:
+        regression = predictor.regress(case.road, case.frames)
+        error.append(target_errors(regression, case.road.known_truth))
         std.append(regression.std)
-        wide.append(regression.widths)
-    every, deviation, widths = np.concatenate(error), np.concatenate(std), np.concatenate(wide)
+        interval_widths.append(regression.widths)
+    all_errors, deviation, widths = np.concatenate(error), np.concatenate(std), np.concatenate(interval_widths)
     rows = {}
     for index, name in enumerate(TARGETS):
-        known = np.isfinite(every[:, index]) & np.isfinite(deviation[:, index])
-        size = np.abs(every[known, index])
-        target = TargetErrors(size, deviation[known, index], widths[known, index], name == "lanes")
+        is_known = np.isfinite(all_errors[:, index]) & np.isfinite(deviation[:, index])
+        size = np.abs(all_errors[is_known, index])
+        target = TargetErrors(size, deviation[is_known, index], widths[is_known, index], name == "lanes")
         rows[name] = {figure: nan_to_none(value) for figure, value in figures(TARGET_METRICS, target).items()}
     return rows
 
 
-def _draw(folder: Path, one: Case, predictor: CenterlinePredictor, name: str) -> list[str]:
+def _draw_road(folder: Path, case: Case, predictor: CenterlinePredictor, name: str) -> list[str]:
     """Write two PNG pictures of a road, its centrelines and its corridor, to a folder; return their file names."""
-    length = one.road.known_truth.axis.length
+    length = case.road.known_truth.axis.length
     view = PictureView(max(0.0, 0.5 * (length - _VIEW)), min(length, 0.5 * (length + _VIEW)))
-    prediction = predictor(one.road, one.frames)
+    prediction = predictor(case.road, case.frames)
     lines: Mapping[str, Float] = {
         name: prediction[:, 0],
-        "skeleton": skeleton_predictor(SkeletonSettings())(one.road, one.frames)[:, 0],
+        "skeleton": skeleton_predictor(SkeletonSettings())(case.road, case.frames)[:, 0],
     }
     pictures = {
-        "lines": lines_picture(one, lines, view, f"{one.road.name}: centrelines"),
-        "corridor": corridor_picture(one, prediction, view, f"{one.road.name}: corridor of {name}"),
+        "lines": lines_picture(case, lines, view, f"{case.road.name}: centrelines"),
+        "corridor": corridor_picture(case, prediction, view, f"{case.road.name}: corridor of {name}"),
     }
     for kind, content in pictures.items():
-        write_file(folder / f"{one.road.name}-{kind}.png", content, overwrite=True)
-    return [f"{one.road.name}-{kind}.png" for kind in pictures]
+        write_file(folder / f"{case.road.name}-{kind}.png", content, overwrite=True)
+    return [f"{case.road.name}-{kind}.png" for kind in pictures]

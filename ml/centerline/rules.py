@@ -31,25 +31,29 @@ def road_cloud(road: LearningRoad) -> RoadCloud:
     """Return a road's ground points as the reconstruction reads them from a file; unsorted ones count as ground."""
     table = np.full(256, PointKind.OTHER, dtype=np.uint8)
     for number, name in road.class_names.items():
-        unsorted = name in UNSORTED_CLASSES
-        table[number] = PointKind.GROUND if unsorted else KIND_OF_CLASS.get(name, PointKind.OTHER)
+        is_unclassified = name in UNSORTED_CLASSES
+        table[number] = PointKind.GROUND if is_unclassified else KIND_OF_CLASS.get(name, PointKind.OTHER)
     rows = np.asarray(road.belonging)
     kind: UInt8 = table[road.class_id[rows]]
-    paved = np.isin(kind, (PointKind.PAVEMENT, PointKind.MARKING))
-    labelled = bool(paved.sum() > _LABELLED_SHARE * len(kind))
-    marked = labelled and bool((kind == PointKind.MARKING).sum() > _MARKED_SHARE * paved.sum())
+    is_pavement = np.isin(kind, (PointKind.PAVEMENT, PointKind.MARKING))
+    has_pavement_class = bool(is_pavement.sum() > _LABELLED_SHARE * len(kind))
+    has_marking_class = has_pavement_class and bool(
+        (kind == PointKind.MARKING).sum() > _MARKED_SHARE * is_pavement.sum()
+    )
     intensity = np.asarray(road.intensity[rows], dtype=np.float32)
     xyz = np.asarray(road.xyz[rows], dtype=np.float64)
-    return RoadCloud(xyz, intensity, kind, np.zeros(3), Placement(), labelled, marked, len(kind), {})
+    return RoadCloud(
+        xyz, intensity, kind, np.zeros(3), Placement(), has_pavement_class, has_marking_class, len(kind), {}
+    )
 
 
 def views_predictor(network: Predictor | None = None) -> Predictor:
-    """Return a predictor of centres with deviations and intervals, m, by all views that learn nothing, and a network's.
+    """Return a predictor of centres with deviations and intervals, m, by all rule-based views, and perhaps a network's.
 
     Where no road can be made out nothing is predicted.
 
     Args:
-        network: the predictor whose centres are one more view; None without.
+        network: predictor whose centres are one more view; None for rule-based views alone.
     """
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
@@ -60,8 +64,8 @@ def views_predictor(network: Predictor | None = None) -> Predictor:
             cloud = road_cloud(road)
             if len(cloud.xyz) < _FEWEST:
                 raise InputError("road", len(cloud.xyz), f"at least {_FEWEST} points are needed")
-            path, half_width_seen = straighten_path(cloud, options)
-            road_axis = find_axis(cloud, path, half_width_seen, options)
+            path, profile_reach = straighten_path(cloud, options)
+            road_axis = find_axis(cloud, path, profile_reach, options)
         except InputError:
             return np.full((len(frames), len(CORRIDOR_COLUMNS)), np.nan)
         return _in_frames(road_axis, frames)
@@ -70,35 +74,37 @@ def views_predictor(network: Predictor | None = None) -> Predictor:
 
 
 def _network_view(network: Predictor, road: LearningRoad, frames: Frames) -> AxisPredictor:
+    """Return a network's centres on a road as a view for the reconstruction: a function of cloud and path."""
     centres = network(road, frames)
 
     def predict(cloud: RoadCloud, path: CloudPath) -> tuple[Float, Float]:
-        known = np.isfinite(centres[:, 0])
+        """Return offset and standard deviation (M,), m, of the network's centreline along a path; NaN beyond it."""
+        is_predicted = np.isfinite(centres[:, 0])
         offset, std = np.full(len(path.points), np.nan), np.full(len(path.points), np.nan)
-        if known.sum() < 2:
+        if is_predicted.sum() < 2:
             return offset, std
-        station, beside = path.project(frames.at(centres[:, 0])[known])
+        station, offsets = path.project(frames.at(centres[:, 0])[is_predicted])
         order = np.argsort(station, kind="stable")
-        inside = (path.stations >= station.min()) & (path.stations <= station.max())
-        offset = np.where(inside, np.interp(path.stations, station[order], beside[order]), np.nan)
-        std = np.where(inside, np.interp(path.stations, station[order], centres[known, 1][order]), np.nan)
+        in_range = (path.stations >= station.min()) & (path.stations <= station.max())
+        offset = np.where(in_range, np.interp(path.stations, station[order], offsets[order]), np.nan)
+        std = np.where(in_range, np.interp(path.stations, station[order], centres[is_predicted, 1][order]), np.nan)
         return offset, std
 
     return predict
 
 
 def _in_frames(road: FoundRoad, frames: Frames) -> Float:
-    """Return y (m) at which a found axis crosses each of M frames, its deviation and intervals there, and no corridor.
+    """Return y (m) at which a found axis crosses each of M frames, with its deviation and intervals.
 
-    In the columns `CORRIDOR_COLUMNS`; what isn't known is NaN.
+    The columns are `CORRIDOR_COLUMNS`; unknown ones are NaN.
     """
     axis = road.axis
-    along = road.path.stations
-    points = road.path.place(along, np.interp(along, axis.stations, axis.offsets))
+    stations = road.path.stations
+    points = road.path.place(stations, np.interp(stations, axis.stations, axis.offsets))
     y, _ = MeasuredAxis(points).crossing(frames.position, frames.direction)
     station, _ = road.path.project(frames.position)
-    halves = [half_width(axis, share, factor, DEFINITION) for share, factor in INTERVALS.values()]
-    spread = [np.hypot(DEFINITION, axis.std), *halves]
+    interval_widths = [half_width(axis, share, factor, DEFINITION) for share, factor in INTERVALS.values()]
+    spread = [np.hypot(DEFINITION, axis.std), *interval_widths]
     columns = [np.where(np.isfinite(y), np.interp(station, axis.stations, values), np.nan) for values in spread]
-    known = dict(zip(("center_std", "center_68", "center_95"), columns, strict=True)) | {"center": y}
-    return np.column_stack([known.get(name, np.full(len(y), np.nan)) for name in CORRIDOR_COLUMNS])
+    named_columns = dict(zip(("center_std", "center_68", "center_95"), columns, strict=True)) | {"center": y}
+    return np.column_stack([named_columns.get(name, np.full(len(y), np.nan)) for name in CORRIDOR_COLUMNS])

@@ -112,6 +112,7 @@ def train_network(run: Run[CenterlineConfiguration], progress: Progress = silent
     run.begin()
 
     def batches_of(roads: Roads) -> Batches:
+        """Return the configuration's training batches of some roads."""
         return Batches(
             roads,
             configuration.slices,
@@ -169,25 +170,26 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
     check_file_target(lines, prediction.output_option, prediction.overwrite, ending=".geojson")
     corridor = lines.with_suffix(".corridor.json")
     check_file_target(corridor, prediction.output_option, prediction.overwrite)
-    ready = load_predictor(run)
-    line = None if prediction.path is None else read_path(prediction.path, place=_place_of(prediction.cloud))
-    regression = find_road(ready, prediction.cloud, line, progress)
+    predictor = load_predictor(run)
+    line = None if prediction.path is None else read_path(prediction.path, place=_read_placement(prediction.cloud))
+    regression = find_road(predictor, prediction.cloud, line, progress)
     name = prediction.cloud.stem
-    text = canonical_json(centerline_geojson(regression, name, ready.settings.frame_spacing))
-    calibration = {name: one.to_dict() for name, one in ready.calibration.items()}
+    text = canonical_json(centerline_geojson(regression, name, predictor.settings.frame_spacing))
+    calibration = {name: target_calibration.to_dict() for name, target_calibration in predictor.calibration.items()}
     table = canonical_json(to_json_data(corridor_json(regression, calibration)))
     write_file(lines, text.encode(), overwrite=prediction.overwrite)
     write_file(corridor, table.encode(), overwrite=prediction.overwrite)
-    there = np.isfinite(regression.value[:, 0])
+    is_found = np.isfinite(regression.value[:, 0])
     return {
-        "slices": len(there),
-        "found": float(there.mean()) if len(there) else 0.0,
-        "mean_std": float(regression.std[there, 0].mean()) if there.any() else None,
+        "slices": len(is_found),
+        "found": float(is_found.mean()) if len(is_found) else 0.0,
+        "mean_std": float(regression.std[is_found, 0].mean()) if is_found.any() else None,
         "files": [str(lines), str(corridor)],
     }
 
 
-def _place_of(cloud: Path) -> Placement:
+def _read_placement(cloud: Path) -> Placement:
+    """Return the coordinate system of a cloud's file."""
     with open_cloud(cloud) as reader:
         return reader.header.place
 
@@ -209,34 +211,35 @@ def load_predictor(run: Run[CenterlineConfiguration]) -> CenterlinePredictor:
     """
     configuration = run.configuration
     device = chosen_device(configuration)
-    told = run.calibration()
+    calibration_data = run.calibration()
     state = run.last_checkpoint(device)
-    if state is None or state["epoch"] < configuration.schedule.epochs or told is None:
+    if state is None or state["epoch"] < configuration.schedule.epochs or calibration_data is None:
         raise InputError(str(run.folder), None, "its training isn't finished; `synthroads train --resume` goes on")
     model = _empty_model(configuration).to(device)
     load_state(model, state["model"], str(run.folder))
-    calibration = _calibration_of(told, run.folder)
+    calibration = _calibration_of(calibration_data, run.folder)
     return CenterlinePredictor(model, configuration.slices, configuration.use, calibration)
 
 
-def _calibration_of(told: Any, folder: Path) -> dict[str, IntervalCalibration]:
+def _calibration_of(data: Any, folder: Path) -> dict[str, IntervalCalibration]:
     """Return the calibration of each target from JSON data; InputError if it isn't one."""
     try:
-        calibration = {name: IntervalCalibration.from_dict(one) for name, one in told.items()}
+        calibration = {name: IntervalCalibration.from_dict(target_data) for name, target_data in data.items()}
     except (TypeError, ValueError, LookupError, AttributeError, OverflowError):
         calibration = None
-    if calibration is None or any(not 0.0 < one.factor < np.inf for one in calibration.values()):
+    if calibration is None or any(not 0.0 < target_data.factor < np.inf for target_data in calibration.values()):
         remedy = "`synthroads train --resume` makes it anew"
         raise InputError(str(folder), None, f"its calibration isn't that of a model's deviations; {remedy}")
     return calibration
 
 
 def _empty_model(configuration: CenterlineConfiguration) -> CenterlineModel:
+    """Return the configuration's model with random weights."""
     return configuration.network.build(configuration.slices.half_width, configuration.slices.slices)
 
 
 def _first_model(configuration: CenterlineConfiguration) -> CenterlineModel:
-    """Return the model before its first step: weights seeded at random, or those of the run `begin_with`.
+    """Return the model that training begins with: random weights by the seed, or those of the run `begin_with`.
 
     Raises:
         MissingFileError, InputError: there is no such run, or its model is another.
@@ -260,15 +263,16 @@ def _validation(configuration: CenterlineConfiguration, roads: Roads) -> Any:
     """Return a function (model, epoch) -> mean absolute error (m) and coverage of the centre on fixed sequences."""
     crop = crop_only_effects(configuration.effects.crop)
     count = configuration.batches.validation
-    known = [*roads.validation, *roads.measured_validation]
-    batches = fixed_batches(known, configuration.slices, crop, count, configuration.seed)
+    validation_roads = [*roads.validation, *roads.measured_validation]
+    batches = fixed_batches(validation_roads, configuration.slices, crop, count, configuration.seed)
 
     def validate(model: nn.Module, epoch: int) -> dict[str, float]:
+        """Return the centre's mean absolute error (m), and the shares within its 68 % and 95 % intervals."""
         error, std = _residuals(model, batches)
-        known = np.isfinite(error[:, 0])
-        ratio = np.abs(error[known, 0]) / std[known, 0]
+        is_known = np.isfinite(error[:, 0])
+        ratio = np.abs(error[is_known, 0]) / std[is_known, 0]
         return {
-            "validation_mae": float(np.abs(error[known, 0]).mean()),
+            "validation_mae": float(np.abs(error[is_known, 0]).mean()),
             "validation_68": float((ratio <= DEVIATIONS[0]).mean()),
             "validation_95": float((ratio <= DEVIATIONS[1]).mean()),
         }
@@ -277,29 +281,29 @@ def _validation(configuration: CenterlineConfiguration, roads: Roads) -> Any:
 
 
 def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: Roads) -> dict[str, Any]:
-    """Calibrate the model's deviations, write them to the run; return the metrics on the roads that they are of.
+    """Calibrate the model's deviations and write the calibration to the run; return the metrics on these roads.
 
-    Roads are gone along from end to end, as in use: joined lines are better than those of single sequences. They are
+    Roads are predicted from end to end, as in use: joined lines are better than those of single sequences. They are
     the validation's, or those held out, which are shown whole and once more as strips cut unevenly around them, as
     scans of road networks are.
     """
     configuration = run.configuration
     seed, settings = configuration.seed, configuration.slices
-    ready = CenterlinePredictor(model, settings, configuration.use)
-    whole = roads.held_out or roads.validation
-    shown = [make_case(road, seed, cropping=None, estimated=False, settings=settings) for road in whole]
-    shown += [
+    predictor = CenterlinePredictor(model, settings, configuration.use)
+    calibration_roads = roads.held_out or roads.validation
+    cases = [make_case(road, seed, cropping=None, estimated=False, settings=settings) for road in calibration_roads]
+    cases += [
         make_case(cut_strip(road, seed), seed, cropping=STRETCHES, estimated=False, settings=settings)
         for road in roads.held_out
     ]
     # Strips that were cut around their axis beforehand: the middle of the strip must not be the answer.
-    shown += [
+    cases += [
         make_case(road, seed, cropping=STRETCHES, estimated=True, settings=settings)
         for road in roads.measured_validation
     ]
-    calibrated, error = ready.calibrate((one.road, one.frames) for one in shown)
+    calibrated, error = predictor.calibrate((case.road, case.frames) for case in cases)
     calibration = calibrated.calibration
-    data = to_json_data({name: one.to_dict() for name, one in calibration.items()})
+    data = to_json_data({name: case.to_dict() for name, case in calibration.items()})
     write_file(run.folder / CALIBRATION, canonical_json(data).encode(), overwrite=True)
     center = calibration["center"]
     return {
@@ -308,7 +312,7 @@ def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: 
         "validation_95": center.after[1],
         "calibration_factor": center.factor,
         "parameters": sum(weights.numel() for weights in model.parameters()),
-        "corridor_mae": {name: _mean_size(error[:, index]) for index, name in enumerate(TARGETS)},
+        "corridor_mae": {name: _mean_absolute(error[:, index]) for index, name in enumerate(TARGETS)},
         "calibration": data,
     }
 
@@ -318,14 +322,15 @@ def _residuals(model: nn.Module, batches: Sequence[Batch]) -> tuple[Any, Any]:
     model.eval()
     error, std = [], []
     for batch in batches:
-        moved = move_to_device(model, batch)
+        batch_on_device = move_to_device(model, batch)
         with torch.no_grad():
-            output = model(moved)
-        error.append((all_targets(output) - all_targets(moved)).flatten(0, 1).cpu().numpy())
+            output = model(batch_on_device)
+        error.append((all_targets(output) - all_targets(batch_on_device)).flatten(0, 1).cpu().numpy())
         std.append(all_targets(output, "_std").flatten(0, 1).cpu().numpy())
     return np.concatenate(error).astype(np.float64), np.concatenate(std).astype(np.float64)
 
 
-def _mean_size(values: Any) -> float | None:
-    known = np.abs(values[np.isfinite(values)])
-    return float(known.mean()) if len(known) else None
+def _mean_absolute(values: Any) -> float | None:
+    """Return the mean absolute value of those values that are finite; None without any."""
+    sizes = np.abs(values[np.isfinite(values)])
+    return float(sizes.mean()) if len(sizes) else None

@@ -30,7 +30,7 @@ APART = 20.0
 
 
 class MeasuredRoad(Part):
-    """A real cloud and its axis, or all those of a folder: whole roads, or of each what lies between two stations."""
+    """A real cloud and its axis, or all those of a folder: whole roads, or the parts between two stations."""
 
     cloud: str = Field(
         min_length=1,
@@ -46,6 +46,7 @@ class MeasuredRoad(Part):
 
     @model_validator(mode="after")
     def _check_stations(self) -> Self:
+        """Refuse an end before the begin."""
         if self.last <= self.first:
             raise ValueError(f"last must be larger than first, {self.first:g}")
         return self
@@ -63,13 +64,15 @@ class MeasuredRoad(Part):
         if self.axis:
             raise InputError("axis", self.axis, f"{self.cloud} is a folder, whose clouds have their axes beside them")
         clouds_by_name = {cloud.stem: cloud for cloud in clouds_with_axes(path)}
-        for which, names in (("roads", self.roads), ("left_out", self.left_out)):
+        for field_name, names in (("roads", self.roads), ("left_out", self.left_out)):
             if unknown := sorted(set(names) - set(clouds_by_name)):
-                raise InputError(which, unknown[0], f"must be of the roads of {path}: {', '.join(clouds_by_name)}")
-        kept = [name for name in clouds_by_name if name in (self.roads or clouds_by_name) and name not in self.left_out]
-        if not kept:
+                raise InputError(field_name, unknown[0], f"must be of the roads of {path}: {', '.join(clouds_by_name)}")
+        names_kept = [
+            name for name in clouds_by_name if name in (self.roads or clouds_by_name) and name not in self.left_out
+        ]
+        if not names_kept:
             raise InputError("left_out", list(self.left_out), f"leaves no road of {path}")
-        return [(clouds_by_name[name], axis_beside(clouds_by_name[name])) for name in kept]
+        return [(clouds_by_name[name], axis_beside(clouds_by_name[name])) for name in names_kept]
 
 
 class DataOptions(Part):
@@ -105,6 +108,7 @@ class DataOptions(Part):
 
     @model_validator(mode="after")
     def _check_roads(self) -> Self:
+        """Refuse data without roads to learn from or to validate with."""
         validated = self.measured_validation or self.measured_validation_share
         if not self.data_sets and not (self.measured and validated):
             raise ValueError(
@@ -127,6 +131,7 @@ class BatchOptions(Part):
 
     @model_validator(mode="after")
     def _check_passes(self) -> Self:
+        """Refuse a number of batches that passes don't divide."""
         if self.steps % self.passes:
             raise ValueError(f"steps is {self.steps}: must be a multiple of passes, {self.passes}")
         return self
@@ -153,32 +158,34 @@ def read_roads(data: DataOptions, truth: Learned, progress: Progress = silent) -
     train = _read_scenes(data.data_sets, data.train_split, truth, cache, progress) if data.train_split else []
     validation = _read_scenes(data.data_sets, data.validation_split, truth, cache, progress)
     share = 0.0 if data.measured_validation else data.measured_validation_share
-    measured: list[LearningRoad] = []
+    measured_roads: list[LearningRoad] = []
     measured_validation: list[LearningRoad] = []
-    for learned, kept in (_learned_and_kept(road, share) for road in _read_measured(data.measured, truth, progress)):
-        measured.append(learned)
-        measured_validation += kept
+    for training_part, validation_part in (
+        _split_road(road, share) for road in _read_measured(data.measured, truth, progress)
+    ):
+        measured_roads.append(training_part)
+        measured_validation += validation_part
     measured_validation += _read_measured(data.measured_validation, truth, progress)
-    if not train and not measured and data.stream is None:
+    if not train and not measured_roads and data.stream is None:
         raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to learn from")
     if not validation and not measured_validation:
         raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to validate with")
     calibration = data.calibration_split
     held_out = _read_scenes(data.data_sets, calibration, truth, cache, progress) if calibration else []
-    return Roads(train, measured, validation, measured_validation, held_out)
+    return Roads(train, measured_roads, validation, measured_validation, held_out)
 
 
 class Batches:
     """Random training batches: called with an epoch's number it yields them, determined by seed and epoch alone.
 
     Args:
-        roads: to learn from.
+        roads: roads to learn from.
         settings: how slices are cut.
-        effects: drawn for each sample.
-        options: how many.
-        seed: of everything random.
-        measured_share: of the samples from real roads, where there are both kinds.
-        workers: processes that draw samples; 0: this one. All give the same.
+        effects: augmentation, drawn for each sample.
+        options: sizes of batches and epochs.
+        seed: seed of all random choices.
+        measured_share: share of the samples from real roads, where there are both kinds.
+        workers: processes that draw samples; 0 for this one. The samples don't depend on it.
     """
 
     def __init__(
@@ -196,12 +203,16 @@ class Batches:
         self.seed = seed
         self.drawn_per_epoch = options.size * options.steps // options.passes
         kinds = ((roads.train, 1.0 - measured_share), (roads.measured, measured_share))
-        there = [(group, share) for group, share in kinds if group]
-        total = sum(share for _, share in there)
+        nonempty_groups = [(group, share) for group, share in kinds if group]
+        total = sum(share for _, share in nonempty_groups)
         self.shares = (
-            np.array([share / total for _, share in there]) if total else np.full(len(there), 1.0 / len(there))
+            np.array([share / total for _, share in nonempty_groups])
+            if total
+            else np.full(len(nonempty_groups), 1.0 / len(nonempty_groups))
         )
-        self.datasets = [SliceDataset(group, settings, self.drawn_per_epoch, seed, effects) for group, _ in there]
+        self.datasets = [
+            SliceDataset(group, settings, self.drawn_per_epoch, seed, effects) for group, _ in nonempty_groups
+        ]
 
     def kinds(self, epoch: int) -> Index:
         """Return the index in `datasets` of each sample that an epoch draws, (drawn_per_epoch,), random by shares."""
@@ -211,34 +222,37 @@ class Batches:
     def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Batch]:
         """Yield the batches of an epoch whose numbers, from 0, `share` selects; every second pass is mirrored."""
         kind = self.kinds(epoch)
-        plan = [self._planned(epoch, number) for number in range(self.options.steps)[share]]
-        new = _first_occurrences([numbers for _, numbers in plan])
-        kept: dict[int, Sample] = {}
-        draws = load_batches(_Draws(self.datasets, kind, epoch), new, _as_arrays, self.workers)
-        for (turn, numbers), indices, drawn in zip(plan, new, draws, strict=True):
-            kept |= zip(indices, map(_as_tensors, drawn), strict=True)
-            batch = collate([kept[n] for n in numbers])
+        plan = [self._batch_plan(epoch, number) for number in range(self.options.steps)[share]]
+        new_numbers = _first_occurrences([numbers for _, numbers in plan])
+        samples: dict[int, Sample] = {}
+        draws = load_batches(_Draws(self.datasets, kind, epoch), new_numbers, _as_arrays, self.workers)
+        for (turn, numbers), indices, drawn_samples in zip(plan, new_numbers, draws, strict=True):
+            samples |= zip(indices, map(_as_tensors, drawn_samples), strict=True)
+            batch = collate([samples[n] for n in numbers])
             if self.options.passes == 1:
-                kept.clear()
+                samples.clear()
             yield mirror_batch(batch) if turn % 2 else batch
 
-    def _planned(self, epoch: int, number: int) -> tuple[int, list[int]]:
-        """Return which pass over an epoch's samples a batch belongs to, and the numbers of its samples."""
-        size, each = self.options.size, self.options.steps // self.options.passes
-        turn, place = divmod(number, each)
+    def _batch_plan(self, epoch: int, number: int) -> tuple[int, list[int]]:
+        """Return the pass over an epoch's samples that a batch belongs to, and the numbers of its samples.
+
+        The first pass takes the samples in the order in which they are drawn, further ones in random order.
+        """
+        size, steps_per_pass = self.options.size, self.options.steps // self.options.passes
+        turn, batch_in_pass = divmod(number, steps_per_pass)
         order = stream(self.seed, "order", epoch, turn).permutation(self.drawn_per_epoch)
         numbers = order if turn else np.arange(len(order))
-        return turn, numbers[place * size : (place + 1) * size].tolist()
+        return turn, numbers[batch_in_pass * size : (batch_in_pass + 1) * size].tolist()
 
 
 class StreamedBatches:
     """Training batches like those of `Batches`, whose synthetic roads are also those of a stream's scenes.
 
     Args:
-        roads: to learn from; the stream's come behind the synthetic ones.
-        batches: makes an epoch's `Batches` of the roads that it draws from.
-        stream: of the scenes.
-        truth: what is learned.
+        roads: roads to learn from; the stream's come behind the synthetic ones.
+        batches: function that makes an epoch's `Batches` of the roads that it draws from.
+        stream: stream of scenes.
+        truth: kind of truth that is learned.
     """
 
     def __init__(self, roads: Roads, batches: Callable[[Roads], Batches], stream: SceneStream, truth: Learned) -> None:
@@ -265,13 +279,13 @@ class StreamedBatches:
 
 
 def _first_occurrences(batches: Sequence[Sequence[int]]) -> list[list[int]]:
-    """Return of each batch the numbers that no batch before it has."""
-    seen: set[int] = set()
-    new = []
+    """Return the numbers of each batch that occur in no batch before it."""
+    numbers_before: set[int] = set()
+    new_numbers = []
     for batch in batches:
-        new.append([number for number in batch if number not in seen])
-        seen.update(batch)
-    return new
+        new_numbers.append([number for number in batch if number not in numbers_before])
+        numbers_before.update(batch)
+    return new_numbers
 
 
 @dataclass(frozen=True)
@@ -292,6 +306,7 @@ def _as_arrays(samples: list[Sample]) -> list[dict[str, Any]]:
 
 
 def _as_tensors(sample: Mapping[str, Any]) -> Sample:
+    """Return a sample's arrays as tensors."""
     return {name: torch.as_tensor(value) for name, value in sample.items()}
 
 
@@ -301,15 +316,15 @@ def fixed_batches(
     """Return `count` validation sequences in batches of up to 32, drawn from the seed: always the same.
 
     Args:
-        roads: with a truth.
+        roads: roads with a known truth.
         settings: how slices are cut.
-        effects: what is done to the points; None: nothing.
-        count: of sequences.
-        seed: of what is drawn.
+        effects: augmentation of the points; None for none.
+        count: number of sequences.
+        seed: seed of the drawn sequences.
     """
     dataset = SliceDataset(roads, settings, count, seed, effects, "validation slices")
     samples = [dataset.draw_sample(number) for number in range(count)]
-    return [collate(samples[first : first + 32]) for first in range(0, len(samples), 32)]
+    return [collate(samples[start : start + 32]) for start in range(0, len(samples), 32)]
 
 
 def crop_only_effects(crop: SequenceCrop) -> SequenceEffects:
@@ -321,6 +336,7 @@ def crop_only_effects(crop: SequenceCrop) -> SequenceEffects:
 def _read_scenes(
     data_sets: Sequence[str], split: str, truth: Learned, cache: Path | None, progress: Progress
 ) -> list[LearningRoad]:
+    """Read the roads of all finished scenes of a split of some data sets."""
     folders = [folder for data_set in data_sets for folder in scene_folders(Path(data_set), split)]
     roads: list[LearningRoad] = []
     for number, folder in enumerate(folders):
@@ -339,18 +355,21 @@ def _read_measured(roads: Sequence[MeasuredRoad], truth: Learned, progress: Prog
     return learning_roads
 
 
-def _clip(road: LearningRoad, first: float, last: float, field: str) -> LearningRoad:
-    """Return a road whose true axis is clipped to the stations `first` to `last`, m; the field is for the error."""
+def _clip(road: LearningRoad, first_station: float, last_station: float, field: str) -> LearningRoad:
+    """Return a road with its true axis clipped between two stations, m; ``field`` names the input in the error."""
     axis = road.known_truth.axis
-    inside = (axis.station >= first) & (axis.station <= last)
-    if np.count_nonzero(inside) < 2:
-        raise InputError(field, first, f"leaves nothing of an axis of {axis.length:.0f} m")
-    part = MeasuredAxis(axis.points[inside], axis.joined[inside[:-1] & inside[1:]])
+    in_part = (axis.station >= first_station) & (axis.station <= last_station)
+    if np.count_nonzero(in_part) < 2:
+        raise InputError(field, first_station, f"leaves nothing of an axis of {axis.length:.0f} m")
+    part = MeasuredAxis(axis.points[in_part], axis.joined[in_part[:-1] & in_part[1:]])
     return replace(road, truth=Truth.of_axis(part, road.known_truth.kind))
 
 
-def _learned_and_kept(road: LearningRoad, share: float) -> tuple[LearningRoad, list[LearningRoad]]:
-    """Return a road without a share of its length at the end, and that end, `APART` behind it; no end if that is 0."""
+def _split_road(road: LearningRoad, share: float) -> tuple[LearningRoad, list[LearningRoad]]:
+    """Return a road's part to learn from, and in a list the end to validate with, a share of its length.
+
+    Both lie `APART` from each other; with a share of 0 the whole road is learned from.
+    """
     if not share:
         return road, []
     length = road.known_truth.axis.length

@@ -36,7 +36,7 @@ class LabelMapping(Model):
         """Return the names that the mapped truth distinguishes, in order: its groups if it has any, else `names`.
 
         Args:
-            names: of the scheme's classes.
+            names: names of the scheme's classes.
 
         Raises:
             InputError: a number stands for something that is neither a class nor a group, or a group names no class.
@@ -46,23 +46,25 @@ class LabelMapping(Model):
                 if member not in names:
                     hint = nearest_name(member, names)
                     raise InputError(f"groups.{group}", member, f"must be one of {', '.join(names)}{hint}")
-        known = tuple(self.groups) if self.groups else names
+        target_names = tuple(self.groups) if self.groups else names
         for number, name in self.classes.items():
             if not number.lstrip("-").isdigit():
                 raise InputError("classes", number, 'must be whole numbers as text, e.g. "40"')
-            if name not in known:
+            if name not in target_names:
                 raise InputError(
-                    f"classes.{number}", name, f"must be one of {', '.join(known)}{nearest_name(name, known)}"
+                    f"classes.{number}",
+                    name,
+                    f"must be one of {', '.join(target_names)}{nearest_name(name, target_names)}",
                 )
-        return known
+        return target_names
 
     def label(self, numbers: NDArray[np.integer], names: tuple[str, ...]) -> NDArray[np.int16]:
         """Return the index in `targets(names)` of each number (N,) of a file; `IGNORED` (-1) where it isn't mapped."""
-        places = {name: place for place, name in enumerate(self.targets(names))}
-        table = {int(number): places[name] for number, name in self.classes.items()}
-        known, inverse = np.unique(numbers, return_inverse=True)
-        indices = np.array([table.get(int(number), IGNORED) for number in known], dtype=np.int16)
-        return indices[inverse.reshape(-1)] if len(known) else np.zeros(0, dtype=np.int16)
+        index_by_name = {name: class_index for class_index, name in enumerate(self.targets(names))}
+        table = {int(number): index_by_name[name] for number, name in self.classes.items()}
+        distinct_numbers, inverse = np.unique(numbers, return_inverse=True)
+        indices = np.array([table.get(int(number), IGNORED) for number in distinct_numbers], dtype=np.int16)
+        return indices[inverse.reshape(-1)] if len(distinct_numbers) else np.zeros(0, dtype=np.int16)
 
     def group_of(self, names: tuple[str, ...]) -> NDArray[np.int16]:
         """Return the index in `targets(names)` of each predicted class (C,); `IGNORED` (-1) where no group has it."""
@@ -70,8 +72,8 @@ class LabelMapping(Model):
         if not self.groups:
             return np.arange(len(names), dtype=np.int16)
         table = np.full(len(names), IGNORED, dtype=np.int16)
-        for place, group in enumerate(targets):
-            table[[names.index(member) for member in self.groups[group]]] = place
+        for group_index, group in enumerate(targets):
+            table[[names.index(member) for member in self.groups[group]]] = group_index
         return table
 
 
@@ -80,7 +82,7 @@ def load_mapping(name_or_file: str) -> LabelMapping:
 
     Raises:
         MissingFileError: there is no such file.
-        InputError: it is no mapping.
+        InputError: the file holds no mapping.
     """
     path = shipped_file("mapping", MAPPINGS, name_or_file, [".json"])
     return LabelMapping.from_dict(read_json(path), str(name_or_file))
@@ -98,27 +100,27 @@ def table_between(source: Mapping[int, str], scheme: ClassScheme, where: str) ->
     become 5, and the 5 never 17.
 
     Args:
-        source: names by id.
-        scheme: what is learned.
-        where: the source, for messages.
+        source: the source's class names by id.
+        scheme: scheme of the classes that are learned.
+        where: name of the source, for messages.
 
     Raises:
         InputError: a class of the source has no place in the scheme.
     """
     names = class_names(scheme)
-    full = {row.id: row.name for row in class_scheme("17").rows}
+    full_names = {row.id: row.name for row in class_scheme("17").rows}
     members: dict[str, int] = {}
-    for place, row in enumerate(scheme.rows):
+    for class_index, row in enumerate(scheme.rows):
         for member in row.of:
             if not isinstance(member, ClassSelector):
-                members[full.get(member, "") if isinstance(member, int) else member] = place
+                members[full_names.get(member, "") if isinstance(member, int) else member] = class_index
     table = np.full(256, IGNORED, dtype=np.int16)
     for number, name in source.items():
         if number == UNLABELLED or name == "unlabelled":
             continue
         index = names.index(name) if name in names else members.get(name)
         if index is None:
-            known = ", ".join(names)
-            raise InputError(f"{where}: classes", name, f"has no place in the scheme {scheme.name} ({known})")
+            class_list = ", ".join(names)
+            raise InputError(f"{where}: classes", name, f"has no place in the scheme {scheme.name} ({class_list})")
         table[number] = index
     return table

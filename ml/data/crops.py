@@ -30,7 +30,7 @@ Item = dict[str, Tensor]
 NO_EFFECTS = CropEffects(
     rotation=False, smallest_scale=1.0, largest_scale=1.0, jitter=0.0, jitter_limit=0.0, color_drop=0.0
 )
-"""For validation and prediction."""
+"""Options that change nothing, for validation and prediction."""
 MISSING_SIGMA = 0.02
 """Standard deviation of the noise that stands for a missing feature: nothing, but never exactly the same."""
 COORDINATE_SPAN = 10.0
@@ -69,7 +69,7 @@ class Seeds:
         tiles: of all scenes.
         classes: number of classes.
         balanced: draw the class first, then the tile by its number of points of that class, then one of these.
-        groups: numbers of tiles, one after another, of the groups that a balanced draw doesn't leave; one if empty.
+        groups: number of tiles of each consecutive group within which a balanced draw stays; one group if empty.
     """
 
     def __init__(self, tiles: Sequence[CloudTile], classes: int, balanced: bool, groups: Sequence[int] = ()) -> None:
@@ -84,13 +84,15 @@ class Seeds:
         """
         if self._counts is not None:
             group = int(np.searchsorted(self._ends, tile, side="right"))
-            first, end = int(self._ends[group - 1]) if group else 0, int(self._ends[group])
-            counts = self._counts[first:end]
+            first_tile, end_tile = int(self._ends[group - 1]) if group else 0, int(self._ends[group])
+            counts = self._counts[first_tile:end_tile]
             per_class = counts.sum(axis=0)
             if per_class.any():
                 label = random.choice(np.flatnonzero(per_class))
-                chosen = first + int(random.choice(end - first, p=counts[:, label] / per_class[label]))
-                return chosen, int(random.choice(np.flatnonzero(self._tiles[chosen].segment == label)))
+                chosen_tile = first_tile + int(
+                    random.choice(end_tile - first_tile, p=counts[:, label] / per_class[label])
+                )
+                return chosen_tile, int(random.choice(np.flatnonzero(self._tiles[chosen_tile].segment == label)))
         return tile, int(random.integers(len(self._tiles[tile])))
 
 
@@ -101,13 +103,13 @@ class CropDataset(Dataset[Item]):
     The same seed, epoch and place give the same item, in whichever worker and order.
 
     Args:
-        tiles: thinned to the training voxel.
-        scalings: of intensities by scene.
-        settings: how items are made.
-        plan: the crops.
-        seeds: where they are cut out.
-        effects: what happens to them.
-        seed, epoch: of all that is random.
+        tiles: tiles, thinned to the training voxel.
+        scalings: scaling of intensities by scene.
+        settings: size, voxel and features of the items.
+        plan: planned crops of the epoch.
+        seeds: sampler of the crops' centres.
+        effects: augmentation of the crops.
+        seed, epoch: key of the random streams.
     """
 
     tiles: Sequence[CloudTile]
@@ -122,13 +124,13 @@ class CropDataset(Dataset[Item]):
     def __len__(self) -> int:
         return len(self.plan)
 
-    def __getitem__(self, place: int) -> Item:
-        crop, random = self.crop(place)
+    def __getitem__(self, crop_index: int) -> Item:
+        crop, random = self.crop(crop_index)
         return make_item(crop, self.settings, random)
 
-    def crop(self, place: int) -> tuple[Crop, np.random.Generator]:
-        """Return a planned crop with its effects, and the random stream that goes on after them."""
-        draw = self.plan[place]
+    def crop(self, crop_index: int) -> tuple[Crop, np.random.Generator]:
+        """Return a planned crop after its effects, and the random stream to go on with."""
+        draw = self.plan[crop_index]
         random = stream(self.seed, "crop", self.epoch, draw.tile, draw.number)
         return _draw_crop(self, draw.tile, random), random
 
@@ -160,8 +162,8 @@ def cut_crop(tile: CloudTile, middle: Float32, points: int, scaling: Scaling) ->
     Columns rather than balls: a gantry stays with its posts and a crown with its trunk.
     """
     if len(tile) > points:
-        away = ((tile.coord[:, :2] - middle[:2]) ** 2).sum(axis=1)
-        keep = np.sort(np.argpartition(away, points - 1)[:points])
+        squared_distance = ((tile.coord[:, :2] - middle[:2]) ** 2).sum(axis=1)
+        keep = np.sort(np.argpartition(squared_distance, points - 1)[:points])
         tile = tile.select(keep)
     return crop_of(tile, scaling)
 
@@ -172,7 +174,7 @@ def crop_of(tile: CloudTile, scaling: Scaling) -> Crop:
     return Crop(tile.coord, None if tile.strength is None else scaling.apply(tile.strength), color, tile.segment)
 
 
-def centred(coord: AnyArray) -> Float32:
+def centre_coordinates(coord: AnyArray) -> Float32:
     """Return coordinates (N, 3) less the mean of x and y and the median of z."""
     middle = [*coord[:, :2].mean(axis=0, dtype=np.float64), np.median(coord[:, 2])]
     return np.asarray((coord - np.array(middle)).astype(np.float32))
@@ -181,7 +183,7 @@ def centred(coord: AnyArray) -> Float32:
 def make_item(crop: Crop, settings: CropSettings, random: np.random.Generator) -> Item:
     """Return a crop as a dictionary of tensors (see the module), centred; noise stands for missing features.
 
-    It is centred on the mean of x and y and the median of z. What is missing is small noise from ``random``.
+    The crop is centred on the mean of x and y and the median of z. Missing colours and intensities are small noise.
 
     Raises:
         InputError: the crop has no points.
@@ -189,27 +191,27 @@ def make_item(crop: Crop, settings: CropSettings, random: np.random.Generator) -
     count = len(crop)
     if count == 0:
         raise InputError("crop", 0, "has no points")
-    coord = centred(crop.coord)
+    coord = centre_coordinates(crop.coord)
     color = _noise(random, (count, 3)) if crop.color is None else crop.color
     strength = _noise(random, (count, 1)) if crop.strength is None else crop.strength[:, None]
     columns = np.concatenate([coord / COORDINATE_SPAN, color, strength], axis=1)
-    chosen = [FEATURES.index(name) for name in settings.features]
+    feature_columns = [FEATURES.index(name) for name in settings.features]
     grid = np.floor(coord / settings.voxel).astype(np.int32)
     arrays: dict[str, AnyArray] = {
         "coord": coord,
         "grid_coord": grid - grid.min(axis=0),
         "color": color,
         "strength": strength,
-        "feat": columns[:, chosen],
+        "feat": columns[:, feature_columns],
         "segment": crop.segment.astype(np.int64),
         "offset": np.array([count], dtype=np.int64),
     }
     return {name: torch.from_numpy(np.ascontiguousarray(array)) for name, array in arrays.items()}
 
 
-def _draw_crop(crops: CropDataset | CropStream, place: int, random: np.random.Generator) -> Crop:
+def _draw_crop(crops: CropDataset | CropStream, tile_index: int, random: np.random.Generator) -> Crop:
     """Return an augmented crop around a random point of the tile, or of the tile that the seeds choose."""
-    number, point = crops.seeds.draw(place, random)
+    number, point = crops.seeds.draw(tile_index, random)
     tile = crops.tiles[number]
     crop = cut_crop(tile, tile.coord[point], crops.settings.points, crops.scalings[tile.scene])
     apply_effects("segmentation", crop, crops.effects, random)
@@ -223,4 +225,5 @@ def collate(items: Sequence[Item]) -> Item:
 
 
 def _noise(random: np.random.Generator, shape: tuple[int, int]) -> Float32:
+    """Return small normal noise that stands for a missing feature."""
     return random.normal(0.0, MISSING_SIGMA, shape).astype(np.float32)

@@ -15,7 +15,7 @@ from synthroads_addon.base.arrays import Bool
 from synthroads_addon.base.random_streams import stream
 
 from .classes import IGNORED
-from .crops import CropDataset, Item, centred, make_item
+from .crops import CropDataset, Item, centre_coordinates, make_item
 from .samples import Crop
 
 
@@ -25,7 +25,7 @@ class ExchangedCrops:
 
     Attributes:
         synthetic, target: the crops of an epoch, as many of each.
-        seed, epoch: of the choice of classes.
+        seed, epoch: key of the random choice of classes.
     """
 
     synthetic: CropDataset
@@ -36,33 +36,35 @@ class ExchangedCrops:
     def __len__(self) -> int:
         return len(self.synthetic)
 
-    def __getitem__(self, place: int) -> list[Item]:
+    def __getitem__(self, pair_index: int) -> list[Item]:
         """Return the pair at a place as two items."""
-        given, random = self.synthetic.crop(place)
-        target_crop, _ = self.target.crop(place)
-        pair = exchanged(given, target_crop, stream(self.seed, "exchange", self.epoch, place))
+        synthetic_crop, random = self.synthetic.crop(pair_index)
+        target_crop, _ = self.target.crop(pair_index)
+        pair = exchange_classes(synthetic_crop, target_crop, stream(self.seed, "exchange", self.epoch, pair_index))
         return [make_item(crop, self.synthetic.settings, random) for crop in pair]
 
 
-def exchanged(one: Crop, other: Crop, random: np.random.Generator) -> tuple[Crop, Crop]:
-    """Return two crops, centred, each with the other's points of a random half of the other's classes laid into it."""
-    centred_pair = [replace(crop, coord=centred(crop.coord)) for crop in (one, other)]
-    taken = [_some_classes(crop, random) for crop in centred_pair]
-    first, second = centred_pair
-    return _joined(first, second, taken[1]), _joined(second, first, taken[0])
+def exchange_classes(one: Crop, other_crop: Crop, random: np.random.Generator) -> tuple[Crop, Crop]:
+    """Return two crops, centred, each with the points of a random half of the other's classes added."""
+    centred_pair = [replace(crop, coord=centre_coordinates(crop.coord)) for crop in (one, other_crop)]
+    class_masks = [_random_classes(crop, random) for crop in centred_pair]
+    first_crop, second_crop = centred_pair
+    return _append_points(first_crop, second_crop, class_masks[1]), _append_points(
+        second_crop, first_crop, class_masks[0]
+    )
 
 
-def _some_classes(crop: Crop, random: np.random.Generator) -> Bool:
+def _random_classes(crop: Crop, random: np.random.Generator) -> Bool:
     """Return a mask (N,) of the points of a random half of a crop's classes, at least one where it has any."""
-    there = np.unique(crop.segment[crop.segment != IGNORED])
-    chosen = random.permutation(there)[: -(-len(there) // 2)]
-    return np.asarray(np.isin(crop.segment, chosen))
+    present_classes = np.unique(crop.segment[crop.segment != IGNORED])
+    chosen_classes = random.permutation(present_classes)[: -(-len(present_classes) // 2)]
+    return np.asarray(np.isin(crop.segment, chosen_classes))
 
 
-def _joined(crop: Crop, other: Crop, keep: Bool) -> Crop:
-    """Return a crop with some of another's points behind its own; what either lacks is missing in all."""
+def _append_points(crop: Crop, other_crop: Crop, keep: Bool) -> Crop:
+    """Return a crop with some of another's points appended; attributes that either lacks are None."""
     parts: dict[str, Any] = {}
     for name in crop.per_point:
-        values, more = getattr(crop, name), getattr(other, name)
-        parts[name] = None if values is None or more is None else np.concatenate([values, more[keep]])
+        values, other_values = getattr(crop, name), getattr(other_crop, name)
+        parts[name] = None if values is None or other_values is None else np.concatenate([values, other_values[keep]])
     return replace(crop, **parts)

@@ -28,11 +28,11 @@ SPACING = 1.0
 _BIN = 4.0
 """Length along a path over which the points' extent across it is taken, m."""
 _STRAY = 0.02
-"""Share of the points on either side that don't count for the extent."""
+"""Share of the outermost points on either side that don't count for the extent, as they may be stray."""
 _WHOLE = 0.75
-"""Share of the usual extent that a place must have to count."""
+"""Share of the median extent that a place must have to count."""
 _WAVES = 12
-"""Cosines that make up a random deviation."""
+"""Number of cosines that make up a random deviation."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,8 @@ class Frames:
 
     def at(self, y: ArrayLike) -> Float:
         """Return the points (M, 2) in plan that lie y (M,) to the left of the frames' origins."""
-        left = np.column_stack([-np.sin(self.direction), np.cos(self.direction)])
-        return self.position + np.asarray(y, dtype=np.float64)[:, None] * left
+        left_normals = np.column_stack([-np.sin(self.direction), np.cos(self.direction)])
+        return self.position + np.asarray(y, dtype=np.float64)[:, None] * left_normals
 
     def reverse(self) -> Frames:
         """Return the frames in reverse order, turned by pi: the path travelled the other way."""
@@ -72,7 +72,7 @@ def frames_along(path: MeasuredAxis, spacing: float = SPACING, reach: float = 5.
     Args:
         path: the path.
         spacing: between two frames, m.
-        reach: a frame has the direction of the path from this far before to this far behind it, m.
+        reach: distance before and behind a frame between which the path's chord gives its direction, m.
     """
     station = path.stations(spacing)
     return Frames(path.position(station), path.direction(station, reach), station)
@@ -84,8 +84,8 @@ def displace_frames(
     """Return frames moved sideways and turned by smooth random amounts.
 
     Args:
-        frames: where they would be without.
-        rng: of the deviation.
+        frames: frames without displacement.
+        rng: random stream of the deviation.
         window: the deviation is uniform in -window / 2 to window / 2, m.
         direction_deg: standard deviation of the error of direction beside what the deviation's own slope makes, deg.
         length: correlation length of the deviation, m; that of the error of direction is a third of it.
@@ -127,30 +127,31 @@ def sequences(frames: Frames, length: int, step: int | None = None, spacing: flo
         spacing: of a run's frames, m; to the nearest multiple of the frames' own.
     """
     step = step or length
-    every = interleave_count(frames, spacing)
+    stride = interleave_count(frames, spacing)
     runs = []
     for stretch in stretches(frames, spacing):
-        for some in (stretch[first::every] for first in range(min(every, len(stretch)))):
-            starts = np.arange(0, max(1, len(some) - length + 1), step)
-            if starts[-1] + length < len(some):
-                starts = np.append(starts, len(some) - length)
-            runs.append(some[np.minimum(starts[:, None] + np.arange(length), len(some) - 1)])
+        for frame_indices in (stretch[offset::stride] for offset in range(min(stride, len(stretch)))):
+            starts = np.arange(0, max(1, len(frame_indices) - length + 1), step)
+            if starts[-1] + length < len(frame_indices):
+                starts = np.append(starts, len(frame_indices) - length)
+            runs.append(frame_indices[np.minimum(starts[:, None] + np.arange(length), len(frame_indices) - 1)])
     return np.concatenate(runs) if runs else np.empty((0, length), dtype=np.intp)
 
 
 def interleave_count(frames: Frames, spacing: float) -> int:
     """Return the ratio, rounded and at least 1, of a sequence's spacing (m) to the frames' own: every n-th is taken."""
-    return max(1, round(spacing / _own_spacing(frames, spacing)))
+    return max(1, round(spacing / _frame_spacing(frames, spacing)))
 
 
 def stretches(frames: Frames, spacing: float = SPACING) -> list[Index]:
     """Return the frames' indices per gapless stretch; a gap is more than 1.5 times their spacing, `spacing` at most."""
-    gaps = np.abs(np.diff(frames.station)) > 1.5 * _own_spacing(frames, spacing)
+    gaps = np.abs(np.diff(frames.station)) > 1.5 * _frame_spacing(frames, spacing)
     return [part for part in np.split(np.arange(len(frames)), np.flatnonzero(gaps) + 1) if len(part)]
 
 
-def _own_spacing(frames: Frames, most: float) -> float:
-    return min(float(np.median(np.abs(np.diff(frames.station)))), most) if len(frames) > 1 else most
+def _frame_spacing(frames: Frames, largest: float) -> float:
+    """Return the median distance of neighbouring frames, m, at most ``largest``."""
+    return min(float(np.median(np.abs(np.diff(frames.station)))), largest) if len(frames) > 1 else largest
 
 
 def read_path(
@@ -163,27 +164,27 @@ def read_path(
         origin: (3,) map coordinates that were subtracted from the cloud's points.
         tolerance: points are dropped until one lies at least this far from the next, m: a platform that stands still
             has no direction.
-        place: the cloud's coordinate system, see `read_axis`.
+        place: coordinate system of the cloud, see `read_axis`.
 
     Raises:
         MissingFileError, InputError: see `read_axis`.
     """
-    whole = MeasuredAxis.read(file, np.inf, place).translate(-np.asarray(origin, dtype=np.float64))
-    keep, last = [0], 0.0
-    for index, station in enumerate(whole.station[1:], 1):
-        if station - last >= tolerance:
+    full_path = MeasuredAxis.read(file, np.inf, place).translate(-np.asarray(origin, dtype=np.float64))
+    keep, last_station = [0], 0.0
+    for index, station in enumerate(full_path.station[1:], 1):
+        if station - last_station >= tolerance:
             keep.append(index)
-            last = station
+            last_station = station
     if len(keep) < 2:
-        raise InputError(str(file), whole.length, f"must be a path of at least {tolerance:g} m")
-    return MeasuredAxis(whole.points[keep])
+        raise InputError(str(file), full_path.length, f"must be a path of at least {tolerance:g} m")
+    return MeasuredAxis(full_path.points[keep])
 
 
 def estimated_path(xyz: Float, cell: float = 4.0, window: float = 60.0, half_width: float = 40.0) -> MeasuredAxis:
     """Return the line along the middle of a strip of points, found from the points alone, however the strip bends.
 
     The two ends of the strip are the cells of a grid that lie farthest apart along it. The shortest way between them is
-    smoothed, then three times over drawn to the middle of the points' extent across it and smoothed.
+    smoothed, then three times moved to the middle of the points' extent across it and smoothed.
 
     Args:
         xyz: (N, 2 or 3) points of the road, or of a strip around it, m.
@@ -196,8 +197,12 @@ def estimated_path(xyz: Float, cell: float = 4.0, window: float = 60.0, half_wid
     """
     plan = np.asarray(xyz, dtype=np.float64)[:, :2]
     cells = _cells(plan, cell)
-    rough = MeasuredAxis(cells[_way_through(cells, cell)])
-    path = _smooth_line(rough.position(rough.stations(SPACING)), window) if rough.length > 4 * SPACING else rough
+    rough_path = MeasuredAxis(cells[_shortest_way(cells, cell)])
+    path = (
+        _smooth_line(rough_path.position(rough_path.stations(SPACING)), window)
+        if rough_path.length > 4 * SPACING
+        else rough_path
+    )
     for _ in range(3):
         path = _centre_path(path, plan, window, half_width)
     return path
@@ -205,25 +210,26 @@ def estimated_path(xyz: Float, cell: float = 4.0, window: float = 60.0, half_wid
 
 def _cells(plan: Float, cell: float) -> Float:
     """Return the mean (C, 2) of the points in every occupied cell of a grid of edge `cell`, m."""
-    at = np.floor((plan - plan.min(axis=0)) / cell).astype(np.int64)
-    _, owner, counts = np.unique(at @ np.array([1 << 32, 1]), return_inverse=True, return_counts=True)
+    cell_index = np.floor((plan - plan.min(axis=0)) / cell).astype(np.int64)
+    _, owner, counts = np.unique(cell_index @ np.array([1 << 32, 1]), return_inverse=True, return_counts=True)
     if len(counts) < 2:
         raise InputError("cloud", len(plan), f"must reach farther than {cell:g} m for its road to be found")
     return np.column_stack([np.bincount(owner, plan[:, column]) for column in (0, 1)]) / counts[:, None]
 
 
-def _way_through(cells: Float, cell: float) -> Index:
+def _shortest_way(cells: Float, cell: float) -> Index:
     """Return the indices of the cells on the shortest path between the two farthest apart along the strip."""
+    # Chosen: cells two apart are still neighbours, a tenth more as the means lie off their cells' middles.
     pairs = cKDTree(cells).query_pairs(2.1 * cell, output_type="ndarray")
     pairs = _bridge_cells(cells, pairs)
     graph = _graph(len(cells), pairs, np.hypot(*(cells[pairs[:, 0]] - cells[pairs[:, 1]]).T))
     start = 0
     for _ in range(2):
         start = int(np.argmax(dijkstra(graph, directed=False, indices=start)))
-    distance, before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
+    distance, predecessors = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
     way = [int(np.argmax(distance))]
     while way[-1] != start:
-        way.append(int(before[way[-1]]))
+        way.append(int(predecessors[way[-1]]))
     # From the lower to the higher x (or y), so that the direction doesn't hang on the order of the points.
     return np.array(way if tuple(cells[way[0]]) < tuple(cells[way[-1]]) else way[::-1])
 
@@ -234,41 +240,46 @@ def _bridge_cells(cells: Float, pairs: Index) -> Index:
         count, part = connected_components(_graph(len(cells), pairs, np.ones(len(pairs))), directed=False)
         if count == 1:
             return pairs
-        component, others = np.flatnonzero(part == part[0]), np.flatnonzero(part != part[0])
-        distance, nearest = cKDTree(cells[component]).query(cells[others])
-        closest = int(np.argmin(distance))
-        pairs = np.concatenate([pairs, [[component[nearest[closest]], others[closest]]]])
+        component, other_cells = np.flatnonzero(part == part[0]), np.flatnonzero(part != part[0])
+        distance, nearest_index = cKDTree(cells[component]).query(cells[other_cells])
+        closest_index = int(np.argmin(distance))
+        pairs = np.concatenate([pairs, [[component[nearest_index[closest_index]], other_cells[closest_index]]]])
 
 
 def _graph(count: int, pairs: Index, weights: Float) -> Any:
+    """Return the sparse graph of cells whose linked pairs (P, 2) have weights (P,)."""
     return coo_array((weights, (pairs[:, 0], pairs[:, 1])), shape=(count, count)).tocsr()
 
 
 def _centre_path(path: MeasuredAxis, plan: Float, window: float, half_width: float) -> MeasuredAxis:
     """Return a path moved to the middle of the points' extent across it and smoothed over `window`, m."""
     station, offset = path.project(plan)
-    near = np.abs(offset) <= half_width
-    station, offset = station[near], offset[near]
+    is_near = np.abs(offset) <= half_width
+    station, offset = station[is_near], offset[is_near]
     bins = ((station - station.min()) / _BIN).astype(int)
     order = np.lexsort((offset, bins))
-    sorted_offset, filled = offset[order], np.unique(bins)
-    start, end = (np.searchsorted(bins[order], filled, side) for side in ("left", "right"))
+    sorted_offset, occupied_bins = offset[order], np.unique(bins)
+    start, end = (np.searchsorted(bins[order], occupied_bins, side) for side in ("left", "right"))
     # Not the outermost points, which may be stray.
-    low = sorted_offset[start + (_STRAY * (end - start)).astype(int)]
-    high = sorted_offset[end - 1 - (_STRAY * (end - start)).astype(int)]
+    right_extent = sorted_offset[start + (_STRAY * (end - start)).astype(int)]
+    left_extent = sorted_offset[end - 1 - (_STRAY * (end - start)).astype(int)]
     # Where a strip is cut off askew, or one side is hidden, the middle of what is left isn't the strip's.
-    whole = high - low >= _WHOLE * np.median(high - low)
-    middle, low, high = station.min() + _BIN * (filled[whole] + 0.5), low[whole], high[whole]
-    every = np.arange(station.min(), station.max() + 0.5 * SPACING, SPACING)
-    return _smooth_line(_on_path(path, every).at(np.interp(every, middle, 0.5 * (low + high))), window)
+    is_wide_enough = left_extent - right_extent >= _WHOLE * np.median(left_extent - right_extent)
+    middle = station.min() + _BIN * (occupied_bins[is_wide_enough] + 0.5)
+    right_extent = right_extent[is_wide_enough]
+    left_extent = left_extent[is_wide_enough]
+    stations = np.arange(station.min(), station.max() + 0.5 * SPACING, SPACING)
+    return _smooth_line(
+        _on_path(path, stations).at(np.interp(stations, middle, 0.5 * (right_extent + left_extent))), window
+    )
 
 
 def _on_path(path: MeasuredAxis, station: Float) -> Frames:
-    """Return frames at stations of a path without gaps, which goes on straight beyond its ends."""
-    inside = np.clip(station, 0.0, path.length)
-    direction = path.direction(inside, reach=8.0)
-    beyond = (station - inside)[:, None] * np.column_stack([np.cos(direction), np.sin(direction)])
-    return Frames(path.position(inside) + beyond, direction, station)
+    """Return frames at stations (M,), m, of a path without gaps, extended straight beyond its ends."""
+    clipped_station = np.clip(station, 0.0, path.length)
+    direction = path.direction(clipped_station, reach=8.0)
+    overshoot = (station - clipped_station)[:, None] * np.column_stack([np.cos(direction), np.sin(direction)])
+    return Frames(path.position(clipped_station) + overshoot, direction, station)
 
 
 def _smooth_line(points: Float, window: float) -> MeasuredAxis:

@@ -11,17 +11,17 @@ import numpy as np
 from synthroads_addon.base.arrays import Float
 
 DARKEST = 0.01
-"""Intensities below this share of the median count as it."""
+"""Share of the median intensity to which smaller intensities are raised."""
 _BIN = 0.5
 """Width across the road over which a median is taken, m."""
 _AROUND = 3
-"""Bins to either side whose medians' median is what is around: wider than any line, narrower than a lane's."""
+"""Bins to either side over whose medians the local level is a median: wider than any line, narrower than a lane."""
 QUIETEST = 0.15
-"""Noise by the distance of the logarithms' 10th and 90th percentiles: less is taken for this."""
+"""Least noise, as a share of the distance of the logarithms' 10th and 90th percentiles."""
 _SPREAD_20_80 = 1.683
 """Distance of a Gaussian's 20th and 80th percentiles, in deviations."""
 _SMALLEST = 1e-3
-"""Logarithms that differ by less are the same."""
+"""Least spread of logarithms by which they are divided."""
 
 
 def logarithms(intensity: Float) -> Float:
@@ -38,8 +38,9 @@ def level(logs: Float) -> Float:
 
 
 def _decile_spread(logs: Float) -> float:
-    low, high = np.percentile(logs, (10.0, 90.0))
-    return float(high - low)
+    """Return the distance of the 10th and the 90th percentile of logarithms."""
+    lower_decile, upper_decile = np.percentile(logs, (10.0, 90.0))
+    return float(upper_decile - lower_decile)
 
 
 def contrast(logs: Float, y: Float) -> Float:
@@ -49,22 +50,24 @@ def contrast(logs: Float, y: Float) -> Float:
     `QUIETEST` where there is less.
 
     Args:
-        logs: of the intensities of a sequence's points.
+        logs: (K,) logarithms of the intensities of a sequence's points.
         y: (K,) their places across the road, m.
     """
     cell = np.floor(y / _BIN).astype(np.intp)
-    first = int(cell.min())
-    cell -= first
+    first_bin = int(cell.min())
+    cell -= first_bin
     order = np.lexsort((logs, cell))
     counts = np.bincount(cell)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     # The lower median, of the bins that have points.
-    there = counts > 0
+    has_points = counts > 0
     medians = np.full(len(counts) + 2 * _AROUND, np.nan)
-    medians[_AROUND:-_AROUND][there] = logs[order[starts[there] + (counts[there] - 1) // 2]]
-    windows = np.lib.stride_tricks.sliding_window_view(medians, 2 * _AROUND + 1)[there]
-    around = np.nanmedian(windows, axis=1)
-    usual = np.interp(y, _BIN * (first + np.flatnonzero(there) + 0.5), around)
-    rest = logs - usual
-    low, high = np.percentile(rest, (20.0, 80.0))
-    return rest / max(float(high - low) / _SPREAD_20_80, QUIETEST * max(_decile_spread(logs), _SMALLEST))
+    medians[_AROUND:-_AROUND][has_points] = logs[order[starts[has_points] + (counts[has_points] - 1) // 2]]
+    windows = np.lib.stride_tricks.sliding_window_view(medians, 2 * _AROUND + 1)[has_points]
+    smooth_medians = np.nanmedian(windows, axis=1)
+    local_level = np.interp(y, _BIN * (first_bin + np.flatnonzero(has_points) + 0.5), smooth_medians)
+    excess = logs - local_level
+    lower_quintile, upper_quintile = np.percentile(excess, (20.0, 80.0))
+    return excess / max(
+        float(upper_quintile - lower_quintile) / _SPREAD_20_80, QUIETEST * max(_decile_spread(logs), _SMALLEST)
+    )

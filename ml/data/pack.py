@@ -24,7 +24,7 @@ from .sources import Source, labelled_blocks, read_tiles, tile_of
 from .tiles import CloudTile
 
 CROP = 24_000
-"""Points of a crop, in which the size of a packed set is told."""
+"""Points of a crop, the unit in which the size of a packed set is reported."""
 _SPACING = 0.5
 """Distance of the points of a centreline, m."""
 _SMALLEST = 2_000
@@ -39,11 +39,11 @@ def corridor_tiles(
     The thinned corridor of one scene is held in memory: about 100 MB per km.
 
     Args:
-        scene: its folder in the data set.
-        scheme: classes wanted.
+        scene: folder of the scene in the data set.
+        scheme: scheme of the classes to learn.
         voxel: edge of the cells of which one point each is kept, m.
         corridor: largest horizontal distance from the centreline, m.
-        length: of a tile along the road, m.
+        length: length of a tile along the road, m.
     """
     line = MeasuredAxis.read(scene / "centerline.geojson")
     tree = cKDTree(line.position(line.stations(_SPACING)))
@@ -59,8 +59,8 @@ def corridor_tiles(
     if not blocks:
         return
     points = concatenate(blocks)
-    _, nearest = tree.query(points.xyz[:, :2])
-    station = nearest * _SPACING // length
+    _, nearest_index = tree.query(points.xyz[:, :2])
+    station = nearest_index * _SPACING // length
     for number in np.unique(station):
         part = points.select(station == number)
         if len(part) >= _SMALLEST:
@@ -92,32 +92,32 @@ def choose_tiles(tiles: Iterable[Packed], limit: int, seed: int) -> list[Packed]
 
     Args:
         tiles: of all scenes.
-        limit: bytes of the file.
-        seed: of the choice.
+        limit: largest size of the file, bytes.
+        seed: seed of the choice.
     """
-    given = list(tiles)
-    order = stream(seed, "packed tiles").permutation(len(given))
+    all_tiles = list(tiles)
+    order = stream(seed, "packed tiles").permutation(len(all_tiles))
     turns: dict[str, int] = {}
     ranked = []
-    for place in order.tolist():
-        scene = str(given[place].notes["scene"])
-        ranked.append((turns.get(scene, 0), place))
+    for tile_index in order.tolist():
+        scene = str(all_tiles[tile_index].notes["scene"])
+        ranked.append((turns.get(scene, 0), tile_index))
         turns[scene] = turns.get(scene, 0) + 1
-    size, chosen = 1 << 16, []  # room for the notes' frame
-    for _, place in sorted(ranked):
-        more = len(given[place].content) + 700  # and for the tile's own notes and names
-        if size + more <= limit:
-            size += more
-            chosen.append(place)
-    return [given[place] for place in sorted(chosen)]
+    size, chosen_places = 1 << 16, []  # room for the notes' frame
+    for _, tile_index in sorted(ranked):
+        tile_size = len(all_tiles[tile_index].content) + 700  # and for the tile's own notes and names
+        if size + tile_size <= limit:
+            size += tile_size
+            chosen_places.append(tile_index)
+    return [all_tiles[tile_index] for tile_index in sorted(chosen_places)]
 
 
 def pack_summary(notes: Sequence[Mapping[str, Any]], size: int) -> dict[str, Any]:
     """Return a packed file's counts as JSON data: bytes, tiles, scenes, points, bytes per point and crops' worth.
 
     Args:
-        notes: of each tile.
-        size: of the file, bytes.
+        notes: notes of each tile.
+        size: size of the file, bytes.
     """
     points = sum(int(tile["points"]) for tile in notes)
     return {

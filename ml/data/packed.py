@@ -34,7 +34,7 @@ CUBE = 1024
 """Steps across a cube."""
 _NO_CLASS = 31
 _TIME = (1980, 1, 1, 0, 0, 0)
-"""No wall clock in files."""
+"""Fixed time of the archive's members, so that equal content gives equal files."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class Packed:
     """One tile of training data as it is stored: compressed points and notes.
 
     Attributes:
-        notes: scene, origin, number of points, what is missing.
-        content: compressed.
+        notes: scene, origin, number of points, and whether there are colours and intensities.
+        content: compressed cubes and points.
     """
 
     notes: dict[str, Any]
@@ -60,20 +60,21 @@ def encode_words(tile: CloudTile) -> tuple[NDArray[np.uint64], NDArray[np.int32]
         raise InputError("classes", int(tile.segment.max()) + 1, f"must be at most {_NO_CLASS}")
     steps = np.rint(tile.coord.astype(np.float64) / STEP).astype(np.int64)
     cubes = steps // CUBE
-    inside = steps - cubes * CUBE
+    cube_steps = steps - cubes * CUBE
     keys = cell_keys(cubes.astype(np.float64))
-    order = np.lexsort((inside[:, 0], inside[:, 1], inside[:, 2], keys))
+    order = np.lexsort((cube_steps[:, 0], cube_steps[:, 1], cube_steps[:, 2], keys))
     starts = np.flatnonzero(np.r_[True, np.diff(keys[order]) != 0])
     counts = np.diff(np.r_[starts, len(order)])
     word = np.zeros(len(tile), dtype=np.uint64)
-    for values, shift in _fields(tile, inside):
+    for values, shift in _fields(tile, cube_steps):
         word |= values.astype(np.uint64) << np.uint64(shift)
     return word[order], cubes[order[starts]].astype(np.int32), counts
 
 
-def _fields(tile: CloudTile, inside: Int) -> Iterator[tuple[AnyArray, int]]:
+def _fields(tile: CloudTile, cube_steps: Int) -> Iterator[tuple[AnyArray, int]]:
+    """Yield (values (N,), lowest bit) of each part of the points' 64-bit words, see the module."""
     for axis in range(3):
-        yield inside[:, axis], 10 * axis
+        yield cube_steps[:, axis], 10 * axis
     if tile.color is not None:
         color = tile.color.astype(np.int64)
         yield color[:, 0] >> 3, 30
@@ -100,22 +101,26 @@ def pack_tile(tile: CloudTile) -> Packed:
     return Packed(notes, zlib.compress(content, 9))
 
 
-def unpack_tile(packed: Packed) -> CloudTile:
+def unpack_tile(packed_tile: Packed) -> CloudTile:
     """Return the decompressed tile: coordinates to half a step (5 mm), colours and intensities to their stored bits."""
-    notes = packed.notes
+    notes = packed_tile.notes
     points, cubes = int(notes["points"]), int(notes["cubes"])
-    content = zlib.decompress(packed.content)
+    content = zlib.decompress(packed_tile.content)
+    # Per cube three int32 of place and one of its points' number; per point one word, stored byte by byte.
     if len(content) != 16 * cubes + 8 * points:
-        raise ValueError("length")
-    places = np.frombuffer(content, "<i4", 3 * cubes).reshape(-1, 3).astype(np.int64)
+        raise ValueError("must be as long as its numbers of cubes and points say")
+    cube_indices = np.frombuffer(content, "<i4", 3 * cubes).reshape(-1, 3).astype(np.int64)
     counts = np.frombuffer(content, "<i4", cubes, 12 * cubes)
     planes = np.frombuffer(content, np.uint8, 8 * points, 16 * cubes).reshape(8, points)
     word = np.ascontiguousarray(planes.T).view("<u8").reshape(-1)
 
     def bits(shift: int, count: int) -> Int:
+        """Return the numbers (N,) in some bits of all words, from the lowest bit ``shift`` on."""
         return ((word >> np.uint64(shift)) & np.uint64((1 << count) - 1)).astype(np.int64)
 
-    steps = np.stack([bits(10 * axis, 10) for axis in range(3)], axis=1) + np.repeat(places * CUBE, counts, axis=0)
+    steps = np.stack([bits(10 * axis, 10) for axis in range(3)], axis=1) + np.repeat(
+        cube_indices * CUBE, counts, axis=0
+    )
     color = np.stack([bits(30, 5) * 255 / 31, bits(35, 6) * 255 / 63, bits(41, 5) * 255 / 31], axis=1)
     segment = bits(59, 5)
     return CloudTile(
@@ -144,8 +149,8 @@ def write_pack(path: Path, tiles: list[Packed], scheme: ClassScheme, voxel: floa
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_STORED) as archive:
         archive.writestr(zipfile.ZipInfo("notes.json", _TIME), json.dumps(notes))
-        for place, tile in enumerate(tiles):
-            archive.writestr(zipfile.ZipInfo(f"{place:06d}", _TIME), tile.content)
+        for tile_index, tile in enumerate(tiles):
+            archive.writestr(zipfile.ZipInfo(f"{tile_index:06d}", _TIME), tile.content)
     write_file(path, content.getvalue(), overwrite=overwrite)
     return len(content.getvalue())
 
@@ -156,11 +161,11 @@ class PackReader:
     Attributes:
         scheme: classes that the tiles' ``segment`` counts.
         voxel: edge of the cells of which one point each was kept, m.
-        notes: of each tile.
+        notes: notes of each tile.
 
     Raises:
         MissingFileError: there is no such file.
-        InputError: it isn't such a file, or damaged.
+        InputError: the file holds no packed tiles, or is damaged.
     """
 
     def __init__(self, path: Path) -> None:
@@ -179,9 +184,9 @@ class PackReader:
     def __len__(self) -> int:
         return len(self.notes)
 
-    def tile(self, place: int) -> CloudTile:
+    def tile(self, tile_index: int) -> CloudTile:
         """Return the tile of an index, decompressed; raise `InputError` if the file is damaged there."""
         try:
-            return unpack_tile(Packed(self.notes[place], self._archive.read(f"{place:06d}")))
+            return unpack_tile(Packed(self.notes[tile_index], self._archive.read(f"{tile_index:06d}")))
         except (*ARCHIVE_FAULTS, TypeError):
-            raise InputError(str(self.path), None, f"is damaged at tile {place}") from None
+            raise InputError(str(self.path), None, f"is damaged at tile {tile_index}") from None

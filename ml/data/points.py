@@ -36,7 +36,7 @@ class Points:
         class_names: name of each class by its id.
         has_color: whether the points have colours; a file whose colours are all 0 has none.
         epsg: code of the map coordinate system, None if the file doesn't say.
-        place: the coordinate system, and that of the file that they are from.
+        place: coordinate system of the points, and that of their file.
     """
 
     origin: Float
@@ -75,18 +75,18 @@ def read_points(path: Path, classes: Collection[str] | None = None) -> Points:
 
     Raises:
         MissingFileError: there is no such file.
-        InputError: it is no cloud, is damaged, or holds no point of these classes.
+        InputError: the file is no cloud, is damaged, or holds no point of these classes.
     """
     with open_cloud(path) as cloud:
         header = cloud.header
         names = header.scheme.names()
         class_mask = np.array([classes is None or names.get(number) in classes for number in range(256)])
-        kept = [block.select(class_mask[block.class_id]) for block in cloud.usable_blocks()]
-    kept = [block for block in kept if len(block)]
-    if not kept:
-        what = "no point at all" if classes is None else f"no point of the classes {', '.join(sorted(classes))}"
-        raise InputError(str(path), None, f"holds {what}")
-    return points_of(header, kept)
+        blocks = [block.select(class_mask[block.class_id]) for block in cloud.usable_blocks()]
+    blocks = [block for block in blocks if len(block)]
+    if not blocks:
+        lack = "no point at all" if classes is None else f"no point of the classes {', '.join(sorted(classes))}"
+        raise InputError(str(path), None, f"holds {lack}")
+    return points_of(header, blocks)
 
 
 def read_ground(path: Path) -> Points:
@@ -94,7 +94,7 @@ def read_ground(path: Path) -> Points:
 
     Raises:
         MissingFileError: there is no such file.
-        InputError: it is no cloud, is damaged, or is classified but has no ground.
+        InputError: the file is no cloud, is damaged, or is classified but has no ground.
     """
     points = read_points(path)
     ground = points.of_class(GROUND_CLASSES)
@@ -109,9 +109,9 @@ def points_of(header: CloudHeader, blocks: Sequence[PointBlock], colored: bool |
     """Return blocks of a cloud concatenated as `Points`: shifted to a local origin, intensities and colours as shares.
 
     Args:
-        header: of the cloud.
-        blocks: at least one.
-        colored: whether the cloud has any colour that isn't black; looked up in the blocks if not given.
+        header: header of the cloud's file.
+        blocks: blocks of the cloud, at least one.
+        colored: whether the cloud has any colour that isn't black; None to look it up in the blocks.
     """
     xyz, intensity, rgb, class_id = (
         np.concatenate([getattr(block, name) for block in blocks]) for name in ("xyz", "intensity", "rgb", "class_id")
@@ -149,8 +149,8 @@ def voxel_sample(coord: NDArray[np.floating[Any]], cell: float) -> Index:
     cells = np.floor(steps)
     key = cell_keys(cells)
     order = np.lexsort((np.square(steps - cells - 0.5).sum(axis=1), key))
-    first = np.r_[True, np.diff(key[order]) != 0]
-    return np.sort(order[first])
+    is_first = np.r_[True, np.diff(key[order]) != 0]
+    return np.sort(order[is_first])
 
 
 def cell_keys(cells: Float) -> Int:
@@ -159,11 +159,11 @@ def cell_keys(cells: Float) -> Int:
     Raises:
         InputError: the cells span more than 64 bits can tell apart.
     """
-    low = cells.min(axis=0)
-    spans = cells.max(axis=0) - low + 1
+    lowest_cell = cells.min(axis=0)
+    spans = cells.max(axis=0) - lowest_cell + 1
     if not float(np.prod(spans)) < 2**62:  # so that NaN is refused too
         text = " x ".join(f"{span:.0f}" for span in spans)
         raise InputError("coord", text, "must span fewer than 2^62 cells in all")
-    relative = (cells - low).astype(np.int64)
+    relative = (cells - lowest_cell).astype(np.int64)
     width, depth = int(spans[0]), int(spans[1])
     return np.asarray((relative[:, 2] * depth + relative[:, 1]) * width + relative[:, 0])

@@ -28,7 +28,7 @@ from .frames import Frames
 from .points import GROUND_CLASSES, Points, read_ground, read_points
 
 REACH = 45.0
-"""Points farther from the line that they are sorted along aren't kept, m."""
+"""Distance from the reference line beyond which points are dropped, m."""
 CLOUD, PARAMETERS = "cloud.laz", "parameters.json"
 STRIP = (6.0, 20.0)
 """Least and largest half width of strips that scans of road networks are cut into, m."""
@@ -54,10 +54,10 @@ class LearningRoad(Points):
     Arrays may be mapped from files. Coordinates are float32 here (0.25 mm at 4 km), colours 8 bits of sRGB.
 
     Attributes:
-        name: of the road.
+        name: name of the road.
         station: (N,) float32 along ``reference``, m, ascending.
-        reference: the line that the points are sorted along.
-        truth: the centreline, None if it isn't known.
+        reference: line along which the points are sorted.
+        truth: centreline and corridor; None if unknown.
     """
 
     name: str
@@ -71,7 +71,7 @@ class LearningRoad(Points):
         """Return the road's truth, never None.
 
         Raises:
-            InputError: it isn't known.
+            InputError: the road has no known truth.
         """
         if self.truth is None:
             raise InputError("road", self.name, "must have a known centreline to be measured on")
@@ -83,8 +83,8 @@ class LearningRoad(Points):
     ) -> LearningRoad:
         """Return the points within ``reach`` (m) of a line, sorted by station along it, as a road."""
         station, offset = reference.project(points.xyz)
-        near = np.flatnonzero(np.abs(offset) <= reach)
-        order = near[np.argsort(station[near], kind="stable")]
+        rows_near = np.flatnonzero(np.abs(offset) <= reach)
+        order = rows_near[np.argsort(station[rows_near], kind="stable")]
         return cls(
             name=name,
             origin=points.origin,
@@ -101,41 +101,43 @@ class LearningRoad(Points):
 
     @cached_property
     def belonging(self) -> Bool:
-        """Mask (N,) of the points within the truth's `room`: of a carriageway up to the median's middle; cached."""
+        """Return the mask (N,) of the points within the truth's `room`, of a carriageway up to the median; cached."""
         if self.truth is None or not np.isfinite(self.truth.room).any():
             return np.ones(len(self), dtype=bool)
         station, offset = self.truth.axis.project(self.xyz)
-        nearest = np.clip(np.searchsorted(self.truth.axis.station, station), 0, len(self.truth.room) - 1)
-        room = self.truth.room[nearest]
+        nearest_vertex = np.clip(np.searchsorted(self.truth.axis.station, station), 0, len(self.truth.room) - 1)
+        room = self.truth.room[nearest_vertex]
         return np.asarray((offset <= room[:, 0]) & (-offset <= room[:, 1]))
 
     def slices(self, frames: Frames, half_width: float, thickness: float = 1.0) -> Slices:
-        """Return which points lie in the slice across the road at each of M frames, and where in it.
+        """Return the points in the slice across the road at each of M frames, with their places in it.
 
         A point is in a slice where it lies within half the thickness before or behind the frame's origin and within
         half_width (both m) beside it.
         """
-        half = 0.5 * thickness
-        ahead = np.column_stack([np.cos(frames.direction), np.sin(frames.direction)])
+        half_thickness = 0.5 * thickness
+        forward = np.column_stack([np.cos(frames.direction), np.sin(frames.direction)])
         corners = [
-            replace(frames, position=frames.position + x * ahead).at(np.full(len(frames), y))
-            for x in (-half, half)
+            replace(frames, position=frames.position + x * forward).at(np.full(len(frames), y))
+            for x in (-half_thickness, half_thickness)
             for y in (-half_width, half_width)
         ]
         stations = self.reference.project(np.concatenate(corners))[0].reshape(4, -1)
-        first = np.searchsorted(self.station, stations.min(axis=0) - _MARGIN)
-        last = np.searchsorted(self.station, stations.max(axis=0) + _MARGIN)
-        index, place, counts = [], [], []
-        for at, direction, low, high in zip(frames.position, frames.direction, first, last, strict=True):
-            delta = self.xyz[low:high, :2] - at
+        first_points = np.searchsorted(self.station, stations.min(axis=0) - _MARGIN)
+        end_points = np.searchsorted(self.station, stations.max(axis=0) + _MARGIN)
+        index, local_points, counts = [], [], []
+        for origin, direction, begin, end in zip(
+            frames.position, frames.direction, first_points, end_points, strict=True
+        ):
+            delta = self.xyz[begin:end, :2] - origin
             cos, sin = np.cos(direction), np.sin(direction)
             x, y = cos * delta[:, 0] + sin * delta[:, 1], cos * delta[:, 1] - sin * delta[:, 0]
-            inside = np.flatnonzero((np.abs(x) <= half) & (np.abs(y) <= half_width))
-            index.append(low + inside)
-            place.append(np.column_stack([x[inside], y[inside]]))
-            counts.append(len(inside))
+            rows = np.flatnonzero((np.abs(x) <= half_thickness) & (np.abs(y) <= half_width))
+            index.append(begin + rows)
+            local_points.append(np.column_stack([x[rows], y[rows]]))
+            counts.append(len(rows))
         number = np.repeat(np.arange(len(frames)), counts)
-        return Slices(np.concatenate(index), number, np.concatenate(place))
+        return Slices(np.concatenate(index), number, np.concatenate(local_points))
 
 
 @dataclass(frozen=True)
@@ -158,13 +160,13 @@ def scene_folders(data_set: Path, split: str | None) -> list[Path]:
 
     Raises:
         MissingFileError: there is no manifest.
-        InputError: no scene of the split is done.
+        InputError: no scene of the split is finished.
     """
-    done = [scene for scene in read_manifest(data_set).scenes if scene.status == "done"]
-    folders = [data_set / "scenes" / scene.name for scene in done if split in (None, scene.split)]
+    finished_scenes = [scene for scene in read_manifest(data_set).scenes if scene.status == "done"]
+    folders = [data_set / "scenes" / scene.name for scene in finished_scenes if split in (None, scene.split)]
     if not folders:
-        known = ", ".join(sorted({scene.split for scene in done}))
-        raise InputError(f"{data_set}: split", split, f"has no scene that is done; there is {known or 'none at all'}")
+        splits = ", ".join(sorted({scene.split for scene in finished_scenes}))
+        raise InputError(f"{data_set}: split", split, f"has no scene that is done; there is {splits or 'none at all'}")
     return folders
 
 
@@ -172,12 +174,12 @@ def read_scene(folder: Path, kind: Learned, cache: Path | None = None, keep: boo
     """Read a data set's scene as roads: its ground points, with the truth of each road or carriageway of `kind`.
 
     Args:
-        folder: with ``cloud.laz`` and ``parameters.json``.
-        kind: of the truth. A road with carriageways of two lanes gives a `LearningRoad` for each of them with the kind
+        folder: folder of the scene, with ``cloud.laz`` and ``parameters.json``.
+        kind: kind of truth. A road with carriageways of two lanes gives a `LearningRoad` for each of them with the kind
             ``carriageway``, perhaps none; with ``either`` the whole road, and each of them that has no shoulders. Names
             of several end with their number.
-        cache: folder in which the sorted points are kept, to be mapped into memory the next time; None: nowhere.
-        keep: whether they are written there; else what is there is read, and no more.
+        cache: folder in which sorted points are kept, to be mapped into memory the next time; None for no cache.
+        keep: whether points are written to the cache; if not, it is only read.
 
     Raises:
         MissingFileError, InputError: a file is missing or damaged.
@@ -186,20 +188,20 @@ def read_scene(folder: Path, kind: Learned, cache: Path | None = None, keep: boo
         if not (folder / name).is_file():
             raise MissingFileError(str(folder / name), None, "no such file; a scene of a data set has one")
     parameters = read_parameters(folder / PARAMETERS)
-    whole = _read_cache(folder, cache) if cache else None
-    if whole is None:
+    scene_road = _read_cache(folder, cache) if cache else None
+    if scene_road is None:
         points = read_points(folder / CLOUD, GROUND_CLASSES)
         reference = truths(parameters, "road", points.origin)[0].axis
-        whole = LearningRoad.of_points(folder.name, points, reference)
+        scene_road = LearningRoad.of_points(folder.name, points, reference)
         if cache and keep:
-            _write_cache(whole, folder, cache)
-    road_truths = truths(parameters, kind, whole.origin)
+            _write_cache(scene_road, folder, cache)
+    road_truths = truths(parameters, kind, scene_road.origin)
     names = (
         [folder.name]
         if len(road_truths) == 1
         else [f"{folder.name}-{number + 1}" for number in range(len(road_truths))]
     )
-    return [replace(whole, name=name, truth=truth) for name, truth in zip(names, road_truths, strict=True)]
+    return [replace(scene_road, name=name, truth=truth) for name, truth in zip(names, road_truths, strict=True)]
 
 
 def axis_beside(cloud: Path) -> Path:
@@ -211,26 +213,26 @@ def axis_beside(cloud: Path) -> Path:
     if not cloud.exists():
         raise MissingFileError(str(cloud), None, "no such cloud, nor a data set's folder")
     candidates = [cloud.with_name(cloud.stem + ending) for ending in AXIS_ENDINGS]
-    there = next((path for path in candidates if path.is_file()), None)
-    if there is None:
+    axis_file = next((path for path in candidates if path.is_file()), None)
+    if axis_file is None:
         names = " or ".join(path.name for path in candidates)
         raise MissingFileError(str(cloud), None, f"has no axis beside it, {names}")
-    return there
+    return axis_file
 
 
 def clouds_with_axes(folder: Path) -> list[Path]:
     """Return a folder's clouds that have an axis beside them, by name; other files in it don't matter.
 
     Raises:
-        MissingFileError: there is none.
+        MissingFileError: the folder holds no such cloud.
     """
     clouds = sorted(path for path in folder.iterdir() if path.suffix.lower() in ENDINGS and path.is_file())
     clouds_with_axis = [
         path for path in clouds if any(path.with_name(path.stem + end).is_file() for end in AXIS_ENDINGS)
     ]
     if not clouds_with_axis:
-        allowed = f"holds no cloud with its axis beside it, NAME{' or NAME'.join(AXIS_ENDINGS)}"
-        raise MissingFileError(str(folder), None, allowed)
+        fault = f"holds no cloud with its axis beside it, NAME{' or NAME'.join(AXIS_ENDINGS)}"
+        raise MissingFileError(str(folder), None, fault)
     return clouds_with_axis
 
 
@@ -240,7 +242,7 @@ def read_measured(cloud: Path, axis: Path, kind: Learned, gap: float | None = No
     Args:
         cloud: the cloud.
         axis: CSV with columns x, y, z (``s`` and others aren't used) or GeoJSON.
-        kind: what the axis is the middle of; ``either`` is a whole road's.
+        kind: road or carriageway whose middle the axis is; ``either`` counts as a whole road.
         gap: see `MeasuredAxis.read`.
 
     Raises:
@@ -261,10 +263,10 @@ def crop_road(road: LearningRoad, share: float, seed: int, length: float = 1.0) 
     left, but may lie anywhere from (1 - share) / (2 - share) of its width on, where both sides reached as far.
 
     Args:
-        road: its truth is where the sides are measured from; it says nothing else.
+        road: road with a known truth, from whose axis the sides are measured.
         share: largest part of R that is cut off, below 1.
-        seed: the same cuts for the same seed.
-        length: metres of the station that share their cuts; cuts of single slices average out over many.
+        seed: seed of the cuts.
+        length: length along the axis that shares its cuts, m; cuts of single slices average out over many.
 
     Raises:
         InputError: the road has no truth, or the share is out of its limits.
@@ -289,8 +291,8 @@ def cut_strip(road: LearningRoad, seed: int) -> LearningRoad:
     """
     if road.truth is None:
         return road
-    low, high = np.log(STRIP)
-    reach = float(np.exp(stream(seed, "strip", road.name).uniform(low, high)))
+    log_least, log_largest = np.log(STRIP)
+    reach = float(np.exp(stream(seed, "strip", road.name).uniform(log_least, log_largest)))
     _, offset = road.truth.axis.project(road.xyz)
     return road.select(np.abs(offset) <= reach)
 
@@ -298,15 +300,15 @@ def cut_strip(road: LearningRoad, seed: int) -> LearningRoad:
 def cut_beside_median(road: LearningRoad, error: float, rng: np.random.Generator) -> LearningRoad:
     """Return the road with its truth's `room` shifted by a random distance up to `error` (m); points stay.
 
-    So where the other carriageway is cut off later, beside the median's middle, doesn't tell where this one lies.
+    Thus the place where the other carriageway is cut off doesn't reveal the place of this one.
 
     Args:
-        road: with a truth; a road that is no carriageway stays as it is.
-        error: how far from the middle of the median it may be at most, m.
-        rng: draws it, uniformly.
+        road: road with a truth; only a carriageway's room is finite and changes.
+        error: largest distance of the cut from the middle of the median, m.
+        rng: random stream of the uniform shift.
     """
-    aside = rng.uniform(-error, error)
-    return road if road.truth is None else replace(road, truth=replace(road.truth, room=road.truth.room + aside))
+    shift = rng.uniform(-error, error)
+    return road if road.truth is None else replace(road, truth=replace(road.truth, room=road.truth.room + shift))
 
 
 def _cache_folder(folder: Path, cache: Path) -> Path:
@@ -321,39 +323,42 @@ def _write_cache(road: LearningRoad, folder: Path, cache: Path) -> None:
     Raises:
         OutputError: the cache can't be written.
     """
-    place = _cache_folder(folder, cache)
+    cache_folder = _cache_folder(folder, cache)
     notes = {"origin": road.origin.tolist(), "classes": road.class_names, "has_color": road.has_color}
     try:
         cache.mkdir(parents=True, exist_ok=True)
         with scratch_folder(cache) as scratch:
-            made = scratch / place.name
-            made.mkdir()
+            new_folder = scratch / cache_folder.name
+            new_folder.mkdir()
             for array in _CACHED:
-                np.save(made / f"{array}.npy", getattr(road, array))
-            np.save(made / "reference.npy", road.reference.points)
-            (made / "notes.json").write_text(json.dumps(notes), encoding="utf-8")
-            shutil.rmtree(place, ignore_errors=True)
+                np.save(new_folder / f"{array}.npy", getattr(road, array))
+            np.save(new_folder / "reference.npy", road.reference.points)
+            (new_folder / "notes.json").write_text(json.dumps(notes), encoding="utf-8")
+            shutil.rmtree(cache_folder, ignore_errors=True)
             with suppress(OSError):  # another training has just kept the same
-                made.rename(place)
+                new_folder.rename(cache_folder)
     except OSError as error:
         raise OutputError("data.cache", str(cache), f"cannot be written ({error.strerror})") from None
 
 
 def _read_cache(folder: Path, cache: Path) -> LearningRoad | None:
     """Return a scene's road from the cache, arrays memory-mapped; None if it isn't there or damaged."""
-    place = _cache_folder(folder, cache)
+    cache_folder = _cache_folder(folder, cache)
     try:
-        notes = json.loads((place / "notes.json").read_text(encoding="utf-8"))
-        arrays = {name: np.load(place / f"{name}.npy", mmap_mode="r") for name in _CACHED}
+        notes = json.loads((cache_folder / "notes.json").read_text(encoding="utf-8"))
+        arrays = {name: np.load(cache_folder / f"{name}.npy", mmap_mode="r") for name in _CACHED}
         count = len(arrays["xyz"])
-        if any(arrays[name].dtype != of[0] or arrays[name].shape != (count, *of[1]) for name, of in _CACHED.items()):
+        if any(
+            arrays[name].dtype != type_and_shape[0] or arrays[name].shape != (count, *type_and_shape[1])
+            for name, type_and_shape in _CACHED.items()
+        ):
             return None
         return LearningRoad(
             name=folder.name,
             origin=np.array(notes["origin"], dtype=np.float64).reshape(3),
             class_names={int(number): str(name) for number, name in notes["classes"].items()},
             has_color=bool(notes["has_color"]),
-            reference=MeasuredAxis(np.load(place / "reference.npy")),
+            reference=MeasuredAxis(np.load(cache_folder / "reference.npy")),
             **arrays,
         )
     except (*ARCHIVE_FAULTS, TypeError, AttributeError, InputError):

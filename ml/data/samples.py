@@ -16,7 +16,7 @@ LEFT, RIGHT, HEADING, HEIGHT = (CORRIDOR.index(name) for name in ("left_edge", "
 
 @dataclass
 class Sample:
-    """N points that augmentation changes: by assigning new arrays, never within these, which may be a tile's own.
+    """N points that augmentation changes by assigning new arrays, never in place, as arrays may be shared with a tile.
 
     Attributes:
         coord: (N, 3) m.
@@ -90,7 +90,7 @@ class Stretch(Sample):
         return np.column_stack([self.corridor[:, LEFT] - self.center, self.center - self.corridor[:, RIGHT]])
 
     def without_shoulders(self) -> bool:
-        """Return whether it is a carriageway whose pavement ends within 1.2 m of its edge lines, in all slices."""
-        beyond = self.paved_sides() - self.lines
-        beyond = beyond[np.isfinite(beyond)]
-        return self.carriageway and bool(len(beyond)) and float(beyond.max()) <= NO_SHOULDER
+        """Return whether a carriageway's pavement ends within `NO_SHOULDER` of its edge lines everywhere."""
+        excesses = self.paved_sides() - self.lines
+        excesses = excesses[np.isfinite(excesses)]
+        return self.carriageway and bool(len(excesses)) and float(excesses.max()) <= NO_SHOULDER

@@ -45,14 +45,14 @@ from ..configuration import Part
 from ..processes import process_number, wait_for_all
 
 SCENES = "scenes"
-"""Folder of the scenes in that of a run, where no other is named."""
+"""Name of the scenes' folder within a run's, unless the options name another one."""
 LOG = "producer.log"
 PRODUCER: Sequence[str] = module_command("jobs.dataset.scene_producer")
-"""Command that makes scenes, a program of its own: learning doesn't import what makes them."""
+"""Command that makes scenes, run as a program of its own, so that learning doesn't import the generator."""
 _TICK = 0.05
 """Seconds between two looks for a scene."""
 _END = 30.0
-"""Seconds that the producers have to end."""
+"""Seconds after which producers that don't end are killed."""
 
 
 class StreamOptions(Part):
@@ -73,6 +73,7 @@ class StreamOptions(Part):
 
     @model_validator(mode="after")
     def _check_keep(self) -> Self:
+        """Refuse a folder too small for the scenes of an epoch and the next one."""
         if self.keep < 2 * self.scenes_per_epoch:
             raise ValueError(
                 f"keep is {self.keep}: must be at least twice scenes_per_epoch, {2 * self.scenes_per_epoch}: for this "
@@ -89,15 +90,15 @@ class StreamOptions(Part):
 class SceneStream:
     """The scenes of a training, as a context in which producers make them.
 
-    Of several processes that train together the first one has them made; all wait and read.
+    Of several processes that train together the first one runs the producers; all wait and read.
 
     Args:
-        options: of the stream.
-        seed: of the training, which the scenes depend on too.
-        run_folder: of the run.
-        epochs: how many the training has; no scenes are made for more.
-        layouts: of the scenes, in the place of the recipe's.
-        progress: told while the training waits.
+        options: options of the stream.
+        seed: seed of the training, on which the scenes depend too.
+        run_folder: folder of the run.
+        epochs: number of the training's epochs; no scenes are made for more.
+        layouts: layouts of the scenes, instead of the recipe's.
+        progress: called while the training waits.
 
     Raises:
         InputError: there is no such recipe, or something in it is wrong.
@@ -152,7 +153,7 @@ class SceneStream:
     def begin_epoch(self, epoch: int) -> dict[int, Path]:
         """Return the folders of the scenes that an epoch draws from by number, when all are there.
 
-        What no later epoch draws from is removed, and those of the next epoch are begun.
+        Scenes that no later epoch draws from are removed, and those of the next epoch are requested.
 
         Raises:
             InputError: a scene can't be made.
@@ -163,20 +164,20 @@ class SceneStream:
             for number in scene_numbers(self.folder):
                 if number < window.start:
                     remove_scene(self.folder, number)
-            last = min(epoch + 1, self.epochs - 1)
-            write_wanted(self.folder, range(window.start, self.options.window(last).stop))
-        while missing := [number for number in window if not is_made(self.folder, number)]:
-            self.progress("waiting for scenes", 1.0 - len(missing) / len(window))
-            self._check_producers(missing)
+            last_epoch = min(epoch + 1, self.epochs - 1)
+            write_wanted(self.folder, range(window.start, self.options.window(last_epoch).stop))
+        while missing_numbers := [number for number in window if not is_made(self.folder, number)]:
+            self.progress("waiting for scenes", 1.0 - len(missing_numbers) / len(window))
+            self._check_producers(missing_numbers)
             time.sleep(_TICK)
-        failed = [read_entry(self.folder, number) for number in window]
-        if all(entry.status == "failed" for entry in failed):
-            told = f"can't be made ({failed[0].error}), like all others of the epoch"
-            raise InputError("data.stream", failed[0].name, told)
+        entries = [read_entry(self.folder, number) for number in window]
+        if all(entry.status == "failed" for entry in entries):
+            fault = f"can't be made ({entries[0].error}), like all others of the epoch"
+            raise InputError("data.stream", entries[0].name, fault)
         return {number: scene_folder(self.folder, number) for number in window}
 
     def remove(self) -> None:
-        """Remove the folder, when the training has ended and the producers too; what is not the stream's stays."""
+        """Remove the stream's files, and the folder if it is empty then, after training and producers have ended."""
         if process_number():
             return
         for number in scene_numbers(self.folder):
@@ -206,7 +207,7 @@ class SceneStream:
         write_atomically(plan, text)
 
     def _begin(self) -> None:
-        """Start the producers, in a session of their own: Ctrl-C is the training's, which then ends them."""
+        """Start the producers in a session of their own: Ctrl-C reaches the training alone, which then ends them."""
         with path_inside(self.folder, LOG, self.folder, follow=True).open("wb") as log:
             self._process = subprocess.Popen(
                 [*PRODUCER, str(self.folder), str(self.options.producers)],
@@ -217,40 +218,42 @@ class SceneStream:
                 env=module_environment(),
             )
 
-    def _check_producers(self, missing: Sequence[int]) -> None:
-        """Raise `InputError` if a scene failed, or nobody is there any more to make those that are missing."""
+    def _check_producers(self, missing_numbers: Sequence[int]) -> None:
+        """Raise `InputError` if a scene failed, or if the producers ended before the missing scenes were made."""
         code = None if self._process is None else self._process.poll()
         if (failure := read_failure(self.folder)) is not None:
-            named = f"scene {failure.number}" + (f", {failure.name}" if failure.name else "")
-            told = f"couldn't be made: {failure.error}; --resume tries again"
+            scene_name = f"scene {failure.number}" + (f", {failure.name}" if failure.name else "")
+            fault = f"couldn't be made: {failure.error}; --resume tries again"
         elif code is not None:
             lines = (self.folder / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
-            named = f"scene {missing[0]}"
-            told = f"isn't made: the producer has ended with code {code} ({lines[-1] if lines else 'without a word'}); "
-            told += "--resume tries again"
+            scene_name = f"scene {missing_numbers[0]}"
+            fault = (
+                f"isn't made: the producer has ended with code {code} ({lines[-1] if lines else 'without a word'}); "
+            )
+            fault += "--resume tries again"
         else:
             return
-        raise InputError("data.stream", named, told)
+        raise InputError("data.stream", scene_name, fault)
 
 
 class EpochScenes:
-    """Reader of the scenes of an epoch, which keeps what it has read as long as later ones draw from it.
+    """Reader of an epoch's scenes with a cache of those from which the epoch draws.
 
     Args:
-        stream: of the scenes.
+        stream: stream of scenes.
         read: reads a scene that was made, of a number and a folder.
     """
 
-    def __init__(self, stream: SceneStream, read: Callable[[int, Path], list[Any]]) -> None:
-        self._stream, self._read = stream, read
+    def __init__(self, stream: SceneStream, read_scene: Callable[[int, Path], list[Any]]) -> None:
+        self._stream, self._read = stream, read_scene
         self._kept: dict[int, list[Any]] = {}
 
     def __call__(self, epoch: int) -> list[Any]:
-        """Return all that is read of the scenes that an epoch draws from, in their order."""
+        """Return the items read from all scenes that an epoch draws from, in their order."""
         folders = self._stream.begin_epoch(epoch)
         for number, folder in folders.items():
             if number not in self._kept:
-                failed = read_entry(self._stream.folder, number).status == "failed"
-                self._kept[number] = [] if failed else self._read(number, folder)
+                has_failed = read_entry(self._stream.folder, number).status == "failed"
+                self._kept[number] = [] if has_failed else self._read(number, folder)
         self._kept = {number: self._kept[number] for number in folders}
-        return [one for crops in self._kept.values() for one in crops]
+        return [item for crops in self._kept.values() for item in crops]

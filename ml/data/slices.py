@@ -78,12 +78,12 @@ class SliceDataset(Dataset[Sample]):
     The n-th sample of an epoch depends on the seed, the epoch and n alone.
 
     Args:
-        roads: with a known truth.
+        roads: roads with a known truth.
         settings: how slices are cut.
         samples: sequences per epoch.
-        seed: of everything random.
-        effects: None: none. The path still strays.
-        purpose: of the samples: those of another purpose are others.
+        seed: seed of all random choices.
+        effects: augmentation; None for none, though the path still strays.
+        purpose: name of the random stream, so that samples for other purposes differ.
 
     Raises:
         InputError: no road is long enough for a sequence.
@@ -99,8 +99,8 @@ class SliceDataset(Dataset[Sample]):
     def __post_init__(self) -> None:
         """Find the stations at which sequences can begin."""
         self.epoch = 0
-        places = (_starts(road, number, self.settings) for number, road in enumerate(self.roads))
-        self._starts = [starts for starts in places if starts]
+        starts_by_road = (_starts(road, number, self.settings) for number, road in enumerate(self.roads))
+        self._starts = [starts for starts in starts_by_road if starts]
         if not self._starts:
             length = self.settings.spacing * (self.settings.slices - 1)
             raise InputError("roads", len(self.roads), f"none has a known {self.settings.truth} over {length:g} m")
@@ -121,20 +121,20 @@ class SliceDataset(Dataset[Sample]):
         """Return the random sample that a key of any integers (epoch, number, ...) determines."""
         rng = stream(self.seed, self.purpose, *key)
         starts = self._starts[rng.integers(len(self._starts))]
-        lengths = np.array([high - low + 1e-3 for _, low, high in starts])
-        number, low, high = starts[rng.choice(len(starts), p=lengths / lengths.sum())]
+        lengths = np.array([last_start - first_start + 1e-3 for _, first_start, last_start in starts])
+        number, first_start, last_start = starts[rng.choice(len(starts), p=lengths / lengths.sum())]
         settings = self.settings
         road = cut_beside_median(self.roads[number], settings.median_error, rng)
-        station = rng.uniform(low, high) + settings.spacing * np.arange(settings.slices)
+        station = rng.uniform(first_start, last_start) + settings.spacing * np.arange(settings.slices)
         axis = road.known_truth.axis
-        exact = Frames(axis.position(station), axis.direction(station), station)
-        path = displace_frames(exact, rng, settings.window, settings.direction_deg, settings.wander_length)
-        cut = cut_stretch(road, path, settings)
+        true_frames = Frames(axis.position(station), axis.direction(station), station)
+        path = displace_frames(true_frames, rng, settings.window, settings.direction_deg, settings.wander_length)
+        stretch = cut_stretch(road, path, settings)
         if self.effects is not None:
-            apply_effects("centerline", cut, self.effects, rng, before_thinning=True)
-            thin_slices(cut, settings.points_per_slice, rng)
-            apply_effects("centerline", cut, self.effects, rng)
-        return make_sample(cut, settings, rng, number, np.arange(settings.slices))
+            apply_effects("centerline", stretch, self.effects, rng, before_thinning=True)
+            thin_slices(stretch, settings.points_per_slice, rng)
+            apply_effects("centerline", stretch, self.effects, rng)
+        return make_sample(stretch, settings, rng, number, np.arange(settings.slices))
 
 
 @dataclass(eq=False)
@@ -145,8 +145,8 @@ class IterableSlices(IterableDataset[Sample]):
 
     def __iter__(self) -> Iterator[Sample]:
         worker = get_worker_info()
-        first, step = (0, 1) if worker is None else (worker.id, worker.num_workers)
-        number = first
+        offset, step = (0, 1) if worker is None else (worker.id, worker.num_workers)
+        number = offset
         while True:
             yield self.dataset.draw_sample(*divmod(number, self.dataset.samples))
             number += step
@@ -156,14 +156,14 @@ class IterableSlices(IterableDataset[Sample]):
 class FrameSlices(Dataset[Sample]):
     """Map-style data set of the sequences that cover all frames along one road, in order, without effects.
 
-    Which points are left out where a slice has too many depends on the place alone, so that cutting a road into parts
+    The points left out where a slice has too many depend on the place alone, so that cutting a road into parts
     changes nothing.
 
     Args:
-        road: with or without a truth.
+        road: road with or without a truth.
         frames: M frames; ``number`` of a sample says which.
         settings: how slices are cut.
-        step: slices from one sequence's start to the next one's; so many as a sequence has if not given.
+        step: slices from one sequence's start to the next one's; None for a sequence's length.
     """
 
     road: LearningRoad
@@ -181,10 +181,10 @@ class FrameSlices(Dataset[Sample]):
 
     def __getitem__(self, number: int) -> Sample:
         run = self.runs[number]
-        chosen = self.frames.select(run)
-        place = int(np.floor(1000.0 * chosen.station[0])) & 0xFFFFFFFF
-        cut = cut_stretch(self.road, chosen, self.settings)
-        return make_sample(cut, self.settings, stream(0, "frames", place), 0, run)
+        run_frames = self.frames.select(run)
+        station_key = int(np.floor(1000.0 * run_frames.station[0])) & 0xFFFFFFFF
+        stretch = cut_stretch(self.road, run_frames, self.settings)
+        return make_sample(stretch, self.settings, stream(0, "frames", station_key), 0, run)
 
 
 def cut_stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> Stretch:
@@ -198,9 +198,9 @@ def cut_stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> 
         unknown = np.full((len(frames), len(CORRIDOR)), np.nan)
         center, corridor, lines, room = unknown[:, 0], unknown, unknown[:, :2], unknown[:, :2]
     else:
-        there = road.truth.at(frames)
-        center, corridor, lines, room = there.center, there.corridor, there.lines, there.room
-    cut = Stretch(
+        crossings = road.truth.at(frames)
+        center, corridor, lines, room = crossings.center, crossings.corridor, crossings.lines, crossings.room
+    stretch = Stretch(
         coord=np.column_stack([slices.xy, road.xyz[slices.index, 2].astype(np.float64)]),
         strength=road.intensity[slices.index].astype(np.float64),
         color=road.rgb[slices.index] / 255.0 if road.has_color else None,
@@ -215,28 +215,30 @@ def cut_stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> 
         carriageway=road.truth is not None and road.truth.kind == "carriageway",
     )
     if np.isfinite(room).any():
-        y = cut.coord[:, 1] - center[cut.number]
-        cut.keep(~((y > room[cut.number, 0]) | (-y > room[cut.number, 1])))
-    return cut
+        y = stretch.coord[:, 1] - center[stretch.number]
+        stretch.keep(~((y > room[stretch.number, 0]) | (-y > room[stretch.number, 1])))
+    return stretch
 
 
-def make_sample(cut: Stretch, settings: SliceSettings, rng: np.random.Generator, road: int, number: Index) -> Sample:
-    """Return a sequence as a dictionary of tensors (see the module); thins `cut` to `points_per_slice`, in place."""
-    thin_slices(cut, settings.points_per_slice, rng)
-    ends = np.searchsorted(cut.number, np.arange(len(cut.center)), side="right")
-    height = _medians(cut.coord[:, 2], ends)
-    coord: Float = cut.coord - np.column_stack([np.zeros((len(cut.number), 2)), height[cut.number]])
-    corridor = cut.corridor.copy()
+def make_sample(
+    stretch: Stretch, settings: SliceSettings, rng: np.random.Generator, road: int, number: Index
+) -> Sample:
+    """Return a sequence as a dictionary of tensors (see the module); it is thinned to `points_per_slice` in place."""
+    thin_slices(stretch, settings.points_per_slice, rng)
+    ends = np.searchsorted(stretch.number, np.arange(len(stretch.center)), side="right")
+    height = _medians(stretch.coord[:, 2], ends)
+    coord: Float = stretch.coord - np.column_stack([np.zeros((len(stretch.number), 2)), height[stretch.number]])
+    corridor = stretch.corridor.copy()
     corridor[:, HEIGHT] -= height
-    frame = np.column_stack([cut.frames.position, cut.frames.direction, height])
+    frame = np.column_stack([stretch.frames.position, stretch.frames.direction, height])
     return {
         "coord": torch.from_numpy(coord.astype(np.float32)),
-        "feat": torch.from_numpy(_features(cut, rng).astype(np.float32)),
+        "feat": torch.from_numpy(_features(stretch, rng).astype(np.float32)),
         "offset": torch.from_numpy(ends.astype(np.int64)),
-        "center": torch.from_numpy(cut.center.astype(np.float32)),
+        "center": torch.from_numpy(stretch.center.astype(np.float32)),
         "corridor": torch.from_numpy(corridor.astype(np.float32)),
         "frame": torch.from_numpy(frame),
-        "station": torch.from_numpy(cut.frames.station.copy()),
+        "station": torch.from_numpy(stretch.frames.station.copy()),
         "number": torch.from_numpy(np.asarray(number, dtype=np.int64)),
         "road": torch.tensor(road),
     }
@@ -250,61 +252,65 @@ def collate(samples: Sequence[Mapping[str, Tensor]]) -> Batch:
     slices = len(samples[0]["center"])
     starts = [torch.cat([item["offset"].new_zeros(1), item["offset"][:-1]]) for item in samples]
     counts = [item["offset"] - start for item, start in zip(samples, starts, strict=True)]
-    most = max(1, int(torch.stack(counts).max()))
+    largest_count = max(1, int(torch.stack(counts).max()))
     batch = {
         name: torch.stack([item[name] for item in samples])
         for name in samples[0]
         if name not in ("coord", "feat", "offset")
     }
-    mask = torch.arange(most) < torch.stack(counts)[:, :, None]
+    mask = torch.arange(largest_count) < torch.stack(counts)[:, :, None]
     batch["mask"] = mask
     for name in ("coord", "feat"):
-        padded = torch.zeros(len(samples), slices, most, samples[0][name].shape[1])
+        padded_values = torch.zeros(len(samples), slices, largest_count, samples[0][name].shape[1])
         # Both run through the points slice by slice.
-        padded[mask] = torch.cat([item[name] for item in samples])
-        batch[name] = padded
+        padded_values[mask] = torch.cat([item[name] for item in samples])
+        batch[name] = padded_values
     return batch
 
 
 def _starts(road: LearningRoad, number: int, settings: SliceSettings) -> list[tuple[int, float, float]]:
-    """Return (road's number, first, last station, m) per part of the true axis: where a sequence can begin."""
+    """Return (road's number, first, last station, m) at which a sequence can begin, for each part of the true axis."""
     if road.truth is None:
         return []
     length = settings.spacing * (settings.slices - 1)
     parts = road.truth.axis.parts
-    return [(number, low, high - length) for low, high in parts.tolist() if high - low >= length]
+    return [
+        (number, first_station, last_station - length)
+        for first_station, last_station in parts.tolist()
+        if last_station - first_station >= length
+    ]
 
 
-def thin_slices(cut: Stretch, most: int, rng: np.random.Generator) -> None:
-    """Drop random points so that each slice keeps at most ``most``, in place."""
-    counts = np.bincount(cut.number, minlength=len(cut.center))
-    if counts.max() <= most:
+def thin_slices(stretch: Stretch, largest_count: int, rng: np.random.Generator) -> None:
+    """Drop random points so that each slice keeps at most ``largest_count``, in place."""
+    counts = np.bincount(stretch.number, minlength=len(stretch.center))
+    if counts.max() <= largest_count:
         return
-    order = np.lexsort((rng.random(len(cut.number)), cut.number))
-    rank = np.arange(len(cut.number)) - np.repeat(np.cumsum(counts) - counts, counts)
-    keep = np.zeros(len(cut.number), dtype=bool)
-    keep[order[rank < most]] = True
-    cut.keep(keep)
+    order = np.lexsort((rng.random(len(stretch.number)), stretch.number))
+    rank = np.arange(len(stretch.number)) - np.repeat(np.cumsum(counts) - counts, counts)
+    keep = np.zeros(len(stretch.number), dtype=bool)
+    keep[order[rank < largest_count]] = True
+    stretch.keep(keep)
 
 
 def _medians(z: Float, ends: Index) -> Float:
     """Return the median z (S,) of each slice's points, m; of all points for an empty slice, 0 if there are none."""
-    whole = float(np.median(z)) if len(z) else 0.0
+    overall_median = float(np.median(z)) if len(z) else 0.0
     starts = np.concatenate([[0], ends[:-1]])
-    return np.array([np.median(z[a:b]) if b > a else whole for a, b in zip(starts, ends, strict=True)])
+    return np.array([np.median(z[a:b]) if b > a else overall_median for a, b in zip(starts, ends, strict=True)])
 
 
-def _features(cut: Stretch, rng: np.random.Generator) -> Float:
+def _features(stretch: Stretch, rng: np.random.Generator) -> Float:
     """Return the points' input features (K, 6), columns `FEATURES`; noise stands for missing intensities, colours."""
-    count = len(cut.number)
-    if cut.strength.any():
-        logs = intensity.logarithms(cut.strength)
-        seen = np.column_stack([intensity.level(logs), intensity.contrast(logs, cut.coord[:, 1])])
-        brightness = np.clip(seen, -FEATURE_LIMIT, FEATURE_LIMIT)
+    count = len(stretch.number)
+    if stretch.strength.any():
+        logs = intensity.logarithms(stretch.strength)
+        levels = np.column_stack([intensity.level(logs), intensity.contrast(logs, stretch.coord[:, 1])])
+        brightness = np.clip(levels, -FEATURE_LIMIT, FEATURE_LIMIT)
     else:
         brightness = MISSING_NOISE * rng.standard_normal((count, 2))
-    colors = MISSING_NOISE * rng.standard_normal((count, 3)) if cut.color is None else cut.color
-    return np.column_stack([brightness, colors, np.full(count, float(cut.color is not None))])
+    colors = MISSING_NOISE * rng.standard_normal((count, 3)) if stretch.color is None else stretch.color
+    return np.column_stack([brightness, colors, np.full(count, float(stretch.color is not None))])
 
 
 _OTHER_SIDE = {"left_edge": "right_edge", "right_edge": "left_edge"}
@@ -315,13 +321,13 @@ _TURNED = ("left_edge", "right_edge", "heading")
 def mirror_batch(batch: Batch) -> Batch:
     """Return a copy of the batch mirrored left to right, truth and frames included."""
     flip = batch["coord"].new_tensor([1.0, -1.0, 1.0])
-    other = dict(batch, coord=batch["coord"] * flip)
-    other["frame"] = batch["frame"] * batch["frame"].new_tensor([1.0, -1.0, -1.0, 1.0])
+    mirrored = dict(batch, coord=batch["coord"] * flip)
+    mirrored["frame"] = batch["frame"] * batch["frame"].new_tensor([1.0, -1.0, -1.0, 1.0])
     if "center" in batch:
-        other["center"] = -batch["center"]
+        mirrored["center"] = -batch["center"]
     if "corridor" in batch:
-        other["corridor"] = mirrored_corridor(batch["corridor"])
-    return other
+        mirrored["corridor"] = mirrored_corridor(batch["corridor"])
+    return mirrored
 
 
 def mirrored_corridor(corridor: Tensor) -> Tensor:

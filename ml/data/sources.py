@@ -62,18 +62,18 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None, *, labe
     """Yield the tiles of a source of labelled points, thinned to one point per voxel, ordered by name.
 
     Args:
-        source: where they are.
+        source: source of the tiles.
         scheme: classes that are learned.
         voxel: edge of the cells of which one point each is kept, m; None for all points.
-        labels: whether labels are read; else all are `IGNORED`, and clouds need none.
+        labels: whether labels are read; if not, all are `IGNORED`, and clouds need none.
 
     Raises:
-        MissingFileError: there is nothing.
+        MissingFileError: there is no such file or folder.
         InputError: a file is damaged or has no labels, or its classes don't fit the scheme.
     """
     path = Path(source.path)
     if source.yardstick and source.mapping:
-        raise InputError("mapping", source.mapping, "a yardstick has its own mapping")
+        raise InputError("mapping", source.mapping, "must be left out: a yardstick has its own mapping")
     if source.split and path.is_file():
         raise InputError("split", source.split, f"{path.name} is a file, which has no splits")
     if source.yardstick:
@@ -89,14 +89,19 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None, *, labe
         raise MissingFileError(str(path), None, f"no such file or folder of labelled points{hint}")
     for tile in tiles:
         try:
-            kept = slice(None) if voxel is None else voxel_sample(tile.coord, voxel)
+            sample = slice(None) if voxel is None else voxel_sample(tile.coord, voxel)
         except ValueError:
             raise InputError(str(path), None, f"a tile of {tile.scene} is too large for cells of {voxel:g} m") from None
-        thin = tile.select(kept)
-        yield thin if labels else replace(thin, segment=np.full(len(thin), IGNORED, dtype=np.int16))
+        thinned_tile = tile.select(sample)
+        yield (
+            thinned_tile
+            if labels
+            else replace(thinned_tile, segment=np.full(len(thinned_tile), IGNORED, dtype=np.int16))
+        )
 
 
 def _is_pack(path: Path) -> bool:
+    """Return whether an NPZ file holds packed tiles."""
     try:
         with zipfile.ZipFile(path) as archive:
             return "notes.json" in archive.namelist()
@@ -105,21 +110,23 @@ def _is_pack(path: Path) -> bool:
 
 
 def _packed_tiles(path: Path, scheme: ClassScheme, voxel: float | None) -> Iterator[CloudTile]:
+    """Yield the tiles of a file of packed tiles with the scheme's class indices."""
     pack = PackReader(path)
     if voxel is not None and pack.voxel > voxel * (1.0 + 1e-9):
         raise InputError("voxel", voxel, f"must be at least {pack.voxel:g} m, as the points of {path} were thinned")
     table = table_between(dict(enumerate(class_names(pack.scheme))), scheme, str(path))
-    for place in range(len(pack)):
-        tile = pack.tile(place)
-        yield replace(tile, segment=_places(tile.segment, tile.segment != IGNORED, table))
+    for tile_index in range(len(pack)):
+        tile = pack.tile(tile_index)
+        yield replace(tile, segment=_class_indices(tile.segment, tile.segment != IGNORED, table))
 
 
-def _places(numbers: AnyArray, known: Bool, table: NDArray[np.int16]) -> NDArray[np.int16]:
-    """Return the scheme's class indices (N,) of a source's numbers by a table; `IGNORED` where `known` is False."""
-    return np.where(known, table[np.where(known, numbers, 0)], IGNORED).astype(np.int16)
+def _class_indices(numbers: AnyArray, is_known: Bool, table: NDArray[np.int16]) -> NDArray[np.int16]:
+    """Return the scheme's class indices (N,) of a source's numbers by a table; `IGNORED` where `is_known` is False."""
+    return np.where(is_known, table[np.where(is_known, numbers, 0)], IGNORED).astype(np.int16)
 
 
 def _folder_tiles(path: Path, scheme: ClassScheme, source: Source, *, labels: bool) -> Iterator[CloudTile]:
+    """Yield the tiles of a folder: in Pointcept's layout, or of the clouds in it and below it."""
     root = pointcept_root(path)
     if root is not None:
         yield from pointcept_tiles(root, scheme, source.split)
@@ -139,7 +146,7 @@ def clouds_below(folder: Path) -> list[Path]:
 
 
 def pointcept_root(path: Path) -> Path | None:
-    """Return the folder with ``classes.json``, this one or the data set's only one; None if there is none."""
+    """Return the folder with ``classes.json``: the given one or the only one of a data set; None if there is none."""
     if (path / "classes.json").is_file():
         return path
     roots = sorted(file.parent for file in path.glob("pointcept/*/classes.json"))
@@ -156,9 +163,9 @@ def pointcept_tiles(root: Path, scheme: ClassScheme, split: str | None) -> Itera
         MissingFileError: there is no such split, or it is empty.
         InputError: an array is missing or of another length.
     """
-    told = read_json(root / "classes.json")
+    class_data = read_json(root / "classes.json")
     try:
-        names = dict(zip((int(number) for number in told["ids"]), map(str, told["classes"]), strict=True))
+        names = dict(zip((int(number) for number in class_data["ids"]), map(str, class_data["classes"]), strict=True))
     except (KeyError, TypeError, ValueError):
         raise InputError(str(root / "classes.json"), None, "must hold lists of classes and their ids") from None
     table = table_between(names, scheme, str(root))
@@ -180,6 +187,7 @@ def pointcept_folders(root: Path, split: str | None) -> list[Path]:
 
 
 def _pointcept_tile(folder: Path, table: NDArray[np.int16]) -> CloudTile:
+    """Return the tile of a folder of arrays, its classes by a table of the scheme's indices."""
     coord, segment = _array(folder, "coord", (3,), "f4"), _array(folder, "segment", (), "i8")
     color = _array(folder, "color", (3,), "u1") if (folder / "color.npy").exists() else None
     strength = _array(folder, "strength", (), "f4") if (folder / "strength.npy").exists() else None
@@ -193,14 +201,14 @@ def _pointcept_tile(folder: Path, table: NDArray[np.int16]) -> CloudTile:
         origin = np.array(notes.get("origin", [0.0, 0.0, 0.0]), dtype=np.float64).reshape(3)
     except (AttributeError, TypeError, ValueError):
         raise InputError(str(folder / "tile.json"), None, "must be an object whose origin is three numbers") from None
-    known = (segment >= 0) & (segment < UNLABELLED)
+    is_known = (segment >= 0) & (segment < UNLABELLED)
     return CloudTile(
         str(notes.get("scene", folder.name)),
         origin,
         coord,
         color if color is not None and color.any() else None,
         strength if strength is not None and strength.any() else None,
-        _places(segment, known, table),
+        _class_indices(segment, is_known, table),
     )
 
 
@@ -238,8 +246,8 @@ def cloud_tiles(
         if not cloud.header.count:
             raise InputError(str(path), 0, "holds no points to learn from")
         scale = steps_per_unit(cloud)
-        low = np.min([block.xyz.min(axis=0) for block in cloud.blocks() if len(block)], axis=0)
-        origin = np.floor(low)
+        lowest = np.min([block.xyz.min(axis=0) for block in cloud.blocks() if len(block)], axis=0)
+        origin = np.floor(lowest)
         with TileSorter(source.tile, origin, Path(folder)) as sorter:
             sorter.add(labelled_blocks(cloud, scheme, source) if labels else unlabelled_blocks(cloud))
             for part in sorter.tiles():
@@ -247,16 +255,16 @@ def cloud_tiles(
 
 
 def unlabelled_blocks(cloud: CloudReader) -> Iterator[PointBlock]:
-    """Yield a cloud's blocks without labels, whatever they are."""
+    """Yield a cloud's blocks with all labels replaced by `IGNORED`."""
     for block in cloud.usable_blocks():
-        yield _with_places(block, np.full(len(block), IGNORED, dtype=np.int16))
+        yield _with_class_indices(block, np.full(len(block), IGNORED, dtype=np.int16))
 
 
 def yardstick_tiles(folder: Path, scheme: ClassScheme, source: Source) -> Iterator[CloudTile]:
     """Yield the labelled points of a public data set in a folder, file by file, as square tiles, in bounded memory.
 
     Args:
-        folder: of the data set.
+        folder: folder of the data set.
         scheme: classes that are learned.
         source: yardstick, split, and edge of the tiles; a sweep is one tile.
 
@@ -270,13 +278,13 @@ def yardstick_tiles(folder: Path, scheme: ClassScheme, source: Source) -> Iterat
     edge = 1000.0 if yardstick.form == "sweeps" else source.tile
     for path in yardstick.files(folder, source.split):
         scene = path.relative_to(folder).with_suffix("").as_posix()
-        low = np.min([block.xyz.min(axis=0) for block, _ in numbered_blocks(path, yardstick) if len(block)], axis=0)
-        with tempfile.TemporaryDirectory() as scratch, TileSorter(edge, np.floor(low), Path(scratch)) as sorter:
+        lowest = np.min([block.xyz.min(axis=0) for block, _ in numbered_blocks(path, yardstick) if len(block)], axis=0)
+        with tempfile.TemporaryDirectory() as scratch, TileSorter(edge, np.floor(lowest), Path(scratch)) as sorter:
             for block, numbers in numbered_blocks(path, yardstick):
-                places = mapping.label(numbers, names)
+                class_indices = mapping.label(numbers, names)
                 if mapping.ignore_zero_intensity:
-                    places = np.where(block.intensity > 0, places, IGNORED).astype(np.int16)
-                sorter.add([_with_places(block, places)])
+                    class_indices = np.where(block.intensity > 0, class_indices, IGNORED).astype(np.int16)
+                sorter.add([_with_class_indices(block, class_indices)])
             for part in sorter.tiles():
                 yield tile_of(part.points, scene, part.corner, FULL)
 
@@ -285,9 +293,9 @@ def tile_of(points: PointBlock, scene: str, origin: Float, scale: float) -> Clou
     """Return a block as a tile: local float32 coordinates, 8-bit colours, intensities as shares of 16 bits.
 
     Args:
-        points: N of them; ``class_id`` is the class's index in the scheme, 255: ignored.
+        points: N points; ``class_id`` is the class's index in the scheme, 255: ignored.
         scene: name of the scene.
-        origin: (3,) map coordinates that the tile's count from, m.
+        origin: (3,) map coordinates of the tile's local origin, m.
         scale: 16-bit steps per unit of intensity.
     """
     strength = (levels(points.intensity, scale) / FULL).astype(np.float32)
@@ -306,23 +314,24 @@ def labelled_blocks(cloud: CloudReader, scheme: ClassScheme, source: Source) -> 
     mapping, names = source.label_mapping(), class_names(scheme)
     if mapping is None:
         if not cloud.header.labelled:
-            allowed = "has no labels of ours: `mapping` must say which of its numbers is which class"
-            raise InputError(str(cloud.header.path), None, allowed)
+            fault = "has no labels of ours: `mapping` must say which of its numbers is which class"
+            raise InputError(str(cloud.header.path), None, fault)
         table = table_between({row.id: row.name for row in cloud.header.scheme.rows}, scheme, str(cloud.header.path))
         for block in cloud.usable_blocks():
-            yield _with_places(block, table[block.class_id])
+            yield _with_class_indices(block, table[block.class_id])
         return
-    for every, every_number in zip(cloud.blocks(), _numbers(cloud, mapping.field), strict=True):
-        kept = cloud.usable_points(every, noise=True)  # it is for the mapping to say what numbers mean
-        block, numbers = without_flags(every.select(kept)), every_number[kept]
-        places = mapping.label(numbers, names)
+    for file_block, file_numbers in zip(cloud.blocks(), _numbers(cloud, mapping.field), strict=True):
+        is_usable = cloud.usable_points(file_block, noise=True)  # it is for the mapping to say what numbers mean
+        block, numbers = without_flags(file_block.select(is_usable)), file_numbers[is_usable]
+        class_indices = mapping.label(numbers, names)
         if mapping.ignore_zero_intensity:
-            places = np.where(block.intensity > 0, places, IGNORED).astype(np.int16)
-        yield _with_places(block, places)
+            class_indices = np.where(block.intensity > 0, class_indices, IGNORED).astype(np.int16)
+        yield _with_class_indices(block, class_indices)
 
 
-def _with_places(block: PointBlock, places: NDArray[np.int16]) -> PointBlock:
-    return replace(block, class_id=np.where(places == IGNORED, UNLABELLED, places).astype(np.uint8))
+def _with_class_indices(block: PointBlock, class_indices: NDArray[np.int16]) -> PointBlock:
+    """Return a block with class indices (N,) as its class ids, 255 where they are `IGNORED`."""
+    return replace(block, class_id=np.where(class_indices == IGNORED, UNLABELLED, class_indices).astype(np.uint8))
 
 
 def _numbers(cloud: CloudReader, field: str) -> Iterator[AnyArray]:

@@ -20,7 +20,7 @@ from .points import GROUND_CLASSES, UNSORTED_CLASSES, points_of
 from .roads import REACH, LearningRoad
 
 LENGTH = 500.0
-"""Of a strip along the path, m."""
+"""Length of a strip along the path, m."""
 MARGIN = 40.0
 """How far a strip's points and frames reach beyond its ends, m: more than a sequence of slices is long."""
 _CELL = 1.0
@@ -32,7 +32,7 @@ class GroundReading:
     """Ground classes, colours and occupied cells of a cloud, from a first pass through it.
 
     Attributes:
-        header: of the cloud.
+        header: header of the cloud's file.
         classes: ids of the classes that its ground has.
         colored: whether any of its points has a colour that isn't black.
         cells: (C, 2) places in plan of some ground points, one in each square metre, map coordinates.
@@ -87,54 +87,58 @@ def path_through(ground: GroundReading) -> MeasuredAxis:
 def strips(
     cloud: Path, ground: GroundReading, path: MeasuredAxis, frames: Frames, progress: Progress = silent
 ) -> Iterator[tuple[LearningRoad, Frames, Bool]]:
-    """Yield a long road in overlapping strips along its path: ground points, local frames, mask of its own frames.
+    """Yield a long road in overlapping strips along its path: ground points, local frames, mask of the strip's frames.
 
     The points lie in a temporary folder meanwhile, and in memory only those of one strip.
 
     Args:
         cloud: the cloud.
-        ground: what `find_ground` found in it.
-        path: along the road, map coordinates.
-        frames: along the path, map coordinates.
-        progress: told about the sorting.
+        ground: ground of the cloud, by `find_ground`.
+        path: path along the road, map coordinates.
+        frames: frames along the path, map coordinates.
+        progress: called with the share of points that are sorted.
 
     Yields:
-        the strip's points, its frames in the points' local coordinates, and which of them are its own: the others
-        belong to its neighbours and are only there so that sequences of slices reach across.
+        the strip's points, its frames in the points' local coordinates, and a mask of the frames within the strip: the
+        others belong to the neighbouring strips and are given so that sequences of slices reach across.
     """
     with tempfile.TemporaryDirectory(prefix="synthroads-strips-") as folder, TileFiles(Path(folder)) as files:
         _sort_points(files, cloud, ground, path, progress)
         strip_numbers = np.floor(frames.station / LENGTH).astype(np.int64)
         for (number, _), block in files.by_tile():
-            first, last = number * LENGTH - MARGIN, (number + 1) * LENGTH + MARGIN
-            seen = (frames.station >= first) & (frames.station < last)
+            first_station, last_station = number * LENGTH - MARGIN, (number + 1) * LENGTH + MARGIN
+            in_strip = (frames.station >= first_station) & (frames.station < last_station)
             if number in strip_numbers:
                 points = points_of(ground.header, [block], ground.colored)
-                line = _part(path, first - REACH, last + REACH).translate(-points.origin)
-                local = Frames(frames.position - points.origin[:2], frames.direction, frames.station).select(seen)
-                yield LearningRoad.of_points(cloud.stem, points, line), local, strip_numbers[seen] == number
+                line = _cut_path(path, first_station - REACH, last_station + REACH).translate(-points.origin)
+                local_frames = Frames(frames.position - points.origin[:2], frames.direction, frames.station).select(
+                    in_strip
+                )
+                yield LearningRoad.of_points(cloud.stem, points, line), local_frames, strip_numbers[in_strip] == number
 
 
 def _sort_points(files: TileFiles, cloud: Path, ground: GroundReading, path: MeasuredAxis, progress: Progress) -> None:
     """Write the cloud's ground points near the path to a file per strip, margins included."""
-    done = 0
+    points_done = 0
     with open_cloud(cloud) as reader:
         for block in reader.usable_blocks():
-            done += len(block)
-            some = block.select(ground.classes[block.class_id])
-            station, offset = path.project(some.xyz)
-            near = np.abs(offset) <= REACH
-            some, station = some.select(near), station[near]
-            beside = np.concatenate([np.floor((station + by) / LENGTH) for by in (-MARGIN, MARGIN)])
-            for number in np.unique(beside).astype(np.int64):
-                inside = (station >= number * LENGTH - MARGIN) & (station < (number + 1) * LENGTH + MARGIN)
-                files.append(some.select(inside), np.tile([number, 0], (np.count_nonzero(inside), 1)))
-            progress("sorting points", done / max(ground.header.count, 1))
+            points_done += len(block)
+            ground_points = block.select(ground.classes[block.class_id])
+            station, offset = path.project(ground_points.xyz)
+            is_near = np.abs(offset) <= REACH
+            ground_points, station = ground_points.select(is_near), station[is_near]
+            touched_strips = np.concatenate([np.floor((station + margin) / LENGTH) for margin in (-MARGIN, MARGIN)])
+            for number in np.unique(touched_strips).astype(np.int64):
+                in_strip = (station >= number * LENGTH - MARGIN) & (station < (number + 1) * LENGTH + MARGIN)
+                files.append(ground_points.select(in_strip), np.tile([number, 0], (np.count_nonzero(in_strip), 1)))
+            progress("sorting points", points_done / max(ground.header.count, 1))
 
 
-def _part(path: MeasuredAxis, first: float, last: float) -> MeasuredAxis:
-    """Return the part of a path from station `first` to `last` (m), with one vertex beyond on either side."""
-    low = max(0, int(np.searchsorted(path.station, first, "right")) - 1)
-    high = min(len(path.points), int(np.searchsorted(path.station, last, "left")) + 1)
-    low = min(low, high - 2) if high >= 2 else 0
-    return MeasuredAxis(path.points[low : max(high, 2)], path.joined[low : max(high, 2) - 1])
+def _cut_path(path: MeasuredAxis, first_station: float, last_station: float) -> MeasuredAxis:
+    """Return the part of a path between two stations (m), with one more vertex on either side."""
+    first_vertex = max(0, int(np.searchsorted(path.station, first_station, "right")) - 1)
+    end_vertex = min(len(path.points), int(np.searchsorted(path.station, last_station, "left")) + 1)
+    first_vertex = min(first_vertex, end_vertex - 2) if end_vertex >= 2 else 0
+    return MeasuredAxis(
+        path.points[first_vertex : max(end_vertex, 2)], path.joined[first_vertex : max(end_vertex, 2) - 1]
+    )

@@ -20,7 +20,7 @@ class CloudTile:
 
     Attributes:
         scene: name of the scene; intensities are scaled scene by scene.
-        origin: (3,) float64 map coordinates that ``coord`` counts from, m.
+        origin: (3,) float64 map coordinates of the origin of ``coord``, m.
         coord: (N, 3) float32, m.
         color: (N, 3) uint8 sRGB, or None where the scene has none.
         strength: (N,) float32 intensity as a share of 16 bits, or None where the scene has none.
@@ -79,17 +79,17 @@ def robust_scaling(strengths: Sequence[Float32]) -> Scaling:
     values = np.concatenate(strengths) if strengths else np.zeros(0, dtype=np.float32)
     if len(values) == 0:
         return Scaling()
-    low, middle, high = np.percentile(values, [10.0, 50.0, 90.0])
-    return Scaling(float(middle), float(high - low) if high > low else 1.0)
+    lower_decile, median, upper_decile = np.percentile(values, [10.0, 50.0, 90.0])
+    return Scaling(float(median), float(upper_decile - lower_decile) if upper_decile > lower_decile else 1.0)
 
 
 def scalings(tiles: Sequence[CloudTile], kind: str, voxel: float | None = None) -> dict[str, Scaling]:
     """Return the intensity scaling of each scene, by the scene's name.
 
     Args:
-        tiles: of all scenes.
+        tiles: tiles of all scenes.
         kind: ``robust``, or ``share``: the share of 16 bits as it stands.
-        voxel: edge of the cells of which one point counts, m; None: all points do, as where tiles are thinned out.
+        voxel: edge of the cells of which one point counts, m; None if all points count, as of thinned tiles.
     """
     if kind == "share":
         return dict.fromkeys((tile.scene for tile in tiles), Scaling())

@@ -36,14 +36,14 @@ def load_batches(
     *,
     pin_memory: bool = False,
 ) -> Iterator[B]:
-    """Yield what `collate` makes of each batch's items, in order, prepared by so many processes (0: by this one).
+    """Yield the batches that `collate` makes of items, in order, prepared by worker processes (0: by this one).
 
     Args:
-        items: what the batches are of.
-        numbers: of each batch's items.
-        collate: called in the worker with a batch's items.
-        workers: processes.
-        pin_memory: whether tensors come in memory from which a GPU copies faster.
+        items: items of the batches, by number.
+        numbers: numbers of each batch's items.
+        collate: function that makes a batch of its items, called in the worker.
+        workers: number of processes.
+        pin_memory: whether tensors are put in pinned memory, from which a GPU copies faster.
     """
     loader: DataLoader[Any] = DataLoader(
         items,  # type: ignore[arg-type]
@@ -69,32 +69,33 @@ def load_batches(
 
 
 def shorten_sockets() -> None:
-    """Have the sockets by which workers hand tensors on lie in a folder whose name is short enough for the system.
+    """Place the sockets by which workers pass tensors in a folder whose name is short enough for the system.
 
-    Where it is too long no batch would ever arrive, and PyTorch would wait for it.
+    With too long a name no batch would ever arrive, and PyTorch would wait for it.
 
     Raises:
-        OutputError: there is no such folder.
+        OutputError: there is no folder with a short enough name.
     """
-    place = tempfile.gettempdir()
-    if sys.platform == "win32" or _fits(place) or _socket_folders:
+    default_folder = tempfile.gettempdir()
+    if sys.platform == "win32" or _fits(default_folder) or _socket_folders:
         return
-    for other in _SHORT_PLACES:
+    for short_place in _SHORT_PLACES:
         with suppress(OSError):
             stack = ExitStack()
-            folder = str(stack.enter_context(scratch_folder(Path(other))))
+            folder = str(stack.enter_context(scratch_folder(Path(short_place))))
             _socket_folders.append(stack)
             Finalize(None, stack.close, exitpriority=_AFTER_SOCKETS)
-            before, tempfile.tempdir = tempfile.tempdir, folder
+            previous_folder, tempfile.tempdir = tempfile.tempdir, folder
             try:
                 get_temp_dir()  # once for this process and its workers
             finally:
-                tempfile.tempdir = before
+                tempfile.tempdir = previous_folder
             return
-    raise OutputError("temporary folder", place, "has too long a name for data workers; TMPDIR names another")
+    raise OutputError("temporary folder", default_folder, "has too long a name for data workers; TMPDIR names another")
 
 
 def _fits(folder: str) -> bool:
+    """Return whether a socket's path in a folder is short enough for every system."""
     return len(os.fsencode(folder)) + len(_SOCKET) <= _LONGEST_SOCKET
 
 
@@ -114,7 +115,7 @@ def report_lost_workers(workers: int) -> Iterator[None]:
     """Context that turns PyTorch's error about a killed data worker into an `InputError` of one line.
 
     Args:
-        workers: how many there are.
+        workers: number of workers.
 
     Raises:
         InputError: a worker was lost.
@@ -124,20 +125,21 @@ def report_lost_workers(workers: int) -> Iterator[None]:
     except RuntimeError as error:
         if not str(error).startswith("DataLoader worker (pid"):
             raise
-        said = " ".join(str(error).partition(". ")[0].split())
-        allowed = f"one of these processes was lost ({said}): is memory short? --resume goes on, with fewer too"
-        raise InputError("workers", workers, allowed) from None
+        message = " ".join(str(error).partition(". ")[0].split())
+        fault = f"one of these processes was lost ({message}): is memory short? --resume goes on, with fewer too"
+        raise InputError("workers", workers, fault) from None
 
 
 def silence_lost_pipes(_worker: int) -> None:
     """Initialise a data worker so that it prints no broken-pipe traceback after its trainer ended."""
-    said = sys.excepthook
+    previous_hook = sys.excepthook
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # its end by PyTorch, put off by `defer_interrupt`
 
     def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        """Print an error's traceback unless it is that of a lost connection."""
         if not issubclass(kind, (EOFError, ConnectionError)):
-            said(kind, error, trace)
+            previous_hook(kind, error, trace)
 
     sys.excepthook = hook
 
@@ -152,8 +154,8 @@ def defer_interrupt() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
+    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)

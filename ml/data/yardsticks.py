@@ -49,7 +49,11 @@ class Yardstick(Part):
 
     @model_validator(mode="after")
     def _check_paths(self) -> Self:
-        for name in (*([self.names] if self.names else []), *(one for some in self.splits.values() for one in some)):
+        """Refuse paths and patterns that lead out of the data set's folder."""
+        for name in (
+            *([self.names] if self.names else []),
+            *(pattern for patterns in self.splits.values() for pattern in patterns),
+        ):
             if not stays_below(name):
                 raise ValueError(f"'{name}' must lie in the data set's folder: a relative path with / and without ..")
         return self
@@ -63,9 +67,14 @@ class Yardstick(Part):
         """
         if split is not None and split not in self.splits:
             raise InputError("split", split, f"must be one of {', '.join(self.splits)}")
-        patterns = [one for name, some in self.splits.items() if split in (None, name) for one in some]
+        patterns = [
+            pattern
+            for name, split_patterns in self.splits.items()
+            if split in (None, name)
+            for pattern in split_patterns
+        ]
         readable = (".bin", ".ply", ".las", ".laz", ".npy")
-        paths = {path for one in patterns for path in folder.glob(one) if path.suffix.lower() in readable}
+        paths = {path for pattern in patterns for path in folder.glob(pattern) if path.suffix.lower() in readable}
         if not paths:
             raise MissingFileError(str(folder), None, f"holds no file like {' or '.join(patterns[:4])}")
         return sorted(paths)
@@ -88,12 +97,12 @@ class Yardstick(Part):
             raise MissingFileError(
                 str(path), None, f'must say which number is which class: {{"1": "NAME", ...}}, of {class_names}'
             )
-        told = read_json(path)
-        if not isinstance(told, dict) or not all(isinstance(name, str) for name in told.values()):
+        name_data = read_json(path)
+        if not isinstance(name_data, dict) or not all(isinstance(name, str) for name in name_data.values()):
             raise InputError(
                 str(path), None, 'must be an object of numbers as text and names, e.g. {"1": "RoadSurface"}'
             )
-        return self.mapping.model_copy(update={"classes": self._named(told)})
+        return self.mapping.model_copy(update={"classes": self._named(name_data)})
 
     def _named(self, names: Mapping[str, str]) -> dict[str, str]:
         """Return number -> class, by the names of the numbers."""
@@ -162,36 +171,41 @@ def _array(path: Path) -> Iterator[tuple[PointBlock, NDArray[np.int64]]]:
         raise InputError(str(path), shape, "must be numbers of shape (N, 4): x, y, z, class")
     if array.shape[1] > 4:
         warn(f"{path.name}: its columns after the fourth (x, y, z, class) are ignored")
-    for done in range(0, len(array), BLOCK):
-        rows = np.asarray(array[done : done + BLOCK], dtype=np.float64)
+    for rows_done in range(0, len(array), BLOCK):
+        rows = np.asarray(array[rows_done : rows_done + BLOCK], dtype=np.float64)
         xyz = _finite(path, rows[:, :3])
         label = np.where(np.isfinite(rows[:, 3]), rows[:, 3], -1.0)
         yield _block(xyz, np.zeros(len(rows)), None), np.rint(label).astype(np.int64)
 
 
 def _ply(path: Path, yardstick: Yardstick) -> Iterator[tuple[PointBlock, NDArray[np.int64]]]:
-    """Yield the points of a PLY file, whatever its attributes are called."""
+    """Yield the points of a PLY file with their label numbers, by the yardstick's names of attributes."""
     with path.open("rb") as file:
         count, kind, _ = read_ply_header(path, file)
         names = kind.names or ()
         for name in ("x", "y", "z", yardstick.mapping.field):
             if name not in names:
                 raise InputError(f"{path}: attribute", name, f"must be one of {', '.join(names)}")
-        full = _largest(kind, yardstick.intensity) if yardstick.intensity in names else 1.0
-        for done in range(0, count, BLOCK):
-            rows = min(BLOCK, count - done)
+        full_intensity = _largest(kind, yardstick.intensity) if yardstick.intensity in names else 1.0
+        for points_done in range(0, count, BLOCK):
+            rows = min(BLOCK, count - points_done)
             data = file.read(rows * kind.itemsize)
             if len(data) != rows * kind.itemsize:
                 raise InputError(str(path), None, f"is truncated: {count} points are in its header")
             record = np.frombuffer(data, dtype=kind)
             xyz = _finite(path, np.stack([record[axis].astype(np.float64) for axis in "xyz"], axis=1))
-            given = record[yardstick.intensity].astype(np.float64) if yardstick.intensity in names else np.zeros(rows)
+            intensity = (
+                record[yardstick.intensity].astype(np.float64) if yardstick.intensity in names else np.zeros(rows)
+            )
             rgb = np.stack([record[name] for name in ("red", "green", "blue")], axis=1) if "red" in names else None
-            yield _block(xyz, given / full, rgb), np.rint(record[yardstick.mapping.field]).astype(np.int64)
+            yield (
+                _block(xyz, intensity / full_intensity, rgb),
+                np.rint(record[yardstick.mapping.field]).astype(np.int64),
+            )
 
 
 def _largest(kind: np.dtype[Any], name: str) -> float:
-    """Return what a full intensity is in an attribute: of 8 bits what they can hold, of all wider ones 16 bits."""
+    """Return the full intensity of an attribute: the largest number of 8 bits, or of 16 bits for all wider types."""
     part = kind[name]
     return float(np.iinfo(part).max) if part.itemsize == 1 else _FULL
 
@@ -203,16 +217,17 @@ def _las(path: Path, field: str) -> Iterator[tuple[PointBlock, NDArray[np.int64]
         if field not in names:
             raise InputError(f"{path}: attribute", field, f"must be one of {', '.join(names)}")
         scale = cloud.header.intensity_scale or 1.0
-        for every, record in zip(cloud.blocks(), file.chunk_iterator(BLOCK), strict=True):
-            kept = cloud.usable_points(every, noise=True)  # the mapping says what the numbers mean
-            block = every.select(kept)
+        for file_block, record in zip(cloud.blocks(), file.chunk_iterator(BLOCK), strict=True):
+            is_usable = cloud.usable_points(file_block, noise=True)  # the mapping says what the numbers mean
+            block = file_block.select(is_usable)
             yield (
                 _block(block.xyz, block.intensity * scale / _FULL, block.rgb),
-                np.asarray(record[field])[kept].astype(np.int64),
+                np.asarray(record[field])[is_usable].astype(np.int64),
             )
 
 
 def _finite(path: Path, xyz: Float) -> Float:
+    """Return coordinates; InputError unless all are finite."""
     if not np.isfinite(xyz).all():
         raise InputError(str(path), None, "must hold finite coordinates")
     return xyz
@@ -222,13 +237,13 @@ def _block(xyz: Float, intensity: Float, rgb: AnyArray | None) -> PointBlock:
     """Return a block of N points with intensities as shares and, if there are any, colours of 8 or 16 bits."""
     count = len(xyz)
     zeros = np.zeros(count)
-    wide = np.zeros((count, 3), dtype=np.uint16) if rgb is None else rgb.astype(np.uint16)
+    colors = np.zeros((count, 3), dtype=np.uint16) if rgb is None else rgb.astype(np.uint16)
     if rgb is not None and rgb.dtype.itemsize == 1:
-        wide = wide * np.uint16(257)
+        colors = colors * np.uint16(257)
     return PointBlock(
         xyz=xyz,
         intensity=np.clip(intensity, 0.0, 1.0),
-        rgb=wide,
+        rgb=colors,
         class_id=np.zeros(count, dtype=np.uint8),
         instance_id=np.zeros(count, dtype=np.uint32),
         return_number=np.ones(count, dtype=np.uint8),

@@ -21,13 +21,17 @@ def full_precision(function: Callable[P, R]) -> Callable[P, R]:
     """Wrap a function of tensors to run in float32 even under bfloat16 autocast, in which 60 m would be 0.25 m off."""
 
     @wraps(function)
-    def exact(*given: P.args, **named: P.kwargs) -> R:
-        device = next(one.device.type for one in given if isinstance(one, Tensor))
+    def exact(*arguments: P.args, **keywords: P.kwargs) -> R:
+        """Call the function without autocast, its bfloat16 tensors widened to float32."""
+        device = next(argument.device.type for argument in arguments if isinstance(argument, Tensor))
         if not torch.is_autocast_enabled(device):
-            return function(*given, **named)
-        wide: Any = [one.float() if isinstance(one, Tensor) and one.dtype == torch.bfloat16 else one for one in given]
+            return function(*arguments, **keywords)
+        widened_arguments: Any = [
+            argument.float() if isinstance(argument, Tensor) and argument.dtype == torch.bfloat16 else argument
+            for argument in arguments
+        ]
         with torch.autocast(device, enabled=False):
-            return function(*wide, **named)
+            return function(*widened_arguments, **keywords)
 
     return exact
 
@@ -37,8 +41,8 @@ class OnnxInputs:
     """Tensors that a network's ONNX file takes beside the features.
 
     Attributes:
-        inputs: an example of each by name.
-        lengths: of each the axes that may have any length, and the lengths' names; ``points0`` is that of the features.
+        inputs: example of each tensor by name.
+        lengths: by tensor's name its axes of any length, with the length's name; ``points0`` is the features'.
     """
 
     inputs: Batch
@@ -63,14 +67,14 @@ class SegmentationNetwork(Part):
         raise NotImplementedError
 
     def prepare(self, batch: Batch) -> Batch:
-        """Return the batch with what the network needs precomputed, on the batch's device; here unchanged."""
+        """Return the batch with the geometry that the network needs added, on the batch's device; here unchanged."""
         return batch
 
     def onnx_inputs(self, batch: Batch) -> OnnxInputs:
-        """Return what the network needs of a batch beside the features, so that it can be written as ONNX.
+        """Return the tensors that the network needs of a batch beside the features, for its ONNX file.
 
         Raises:
-            InputError: it can't.
+            InputError: the network can't be written as ONNX.
         """
         raise InputError("network.name", self.name, "can't be written as ONNX: it doesn't say what it needs of a cloud")
 
@@ -78,7 +82,7 @@ class SegmentationNetwork(Part):
         """Add offsets (C,) to the class scores of a network, in place: to the bias of its last linear layer.
 
         Raises:
-            InputError: it has no such layer with as many outputs.
+            InputError: the network's last linear layer hasn't as many outputs.
         """
         layers = [layer for layer in model.modules() if isinstance(layer, nn.Linear)]
         bias = layers[-1].bias if layers and layers[-1].out_features == len(offsets) else None

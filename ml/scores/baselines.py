@@ -50,23 +50,23 @@ def extent_middle(y: Float, intensity: Float) -> float:
 
 def bright_middle(y: Float, intensity: Float) -> float:
     """Return the middle between the 5 % and the 95 % quantile of the bright points' y, m."""
-    low, high = np.quantile(intensity, [_TAIL, 1.0 - _TAIL])
-    bright = y[intensity >= (low + high) / 2.0]
-    return float(np.quantile(bright, [_TAIL, 1.0 - _TAIL]).mean())
+    lower_intensity, upper_intensity = np.quantile(intensity, [_TAIL, 1.0 - _TAIL])
+    bright_y = y[intensity >= (lower_intensity + upper_intensity) / 2.0]
+    return float(np.quantile(bright_y, [_TAIL, 1.0 - _TAIL]).mean())
 
 
 def between_brightest(y: Float, intensity: Float) -> float:
     """Return the middle between the brightest strips left and right of the extent's middle, m; NaN without either."""
     middle = extent_middle(y, intensity)
     number = np.floor((y - middle) / STRIP).astype(np.intp)
-    first = int(number.min())
-    count = np.bincount(number - first)
-    mean = np.bincount(number - first, intensity) / np.maximum(count, 1)
+    first_strip = int(number.min())
+    count = np.bincount(number - first_strip)
+    mean = np.bincount(number - first_strip, intensity) / np.maximum(count, 1)
     mean[count < FEWEST_OF_STRIP] = -np.inf
-    right, left = mean[: max(0, -first)], mean[max(0, -first) :]
-    if not np.isfinite(right).any() or not np.isfinite(left).any():
+    right_strips, left_strips = mean[: max(0, -first_strip)], mean[max(0, -first_strip) :]
+    if not np.isfinite(right_strips).any() or not np.isfinite(left_strips).any():
         return float("nan")
-    numbers = (int(right.argmax()) + first, int(left.argmax()) + max(0, first))
+    numbers = (int(right_strips.argmax()) + first_strip, int(left_strips.argmax()) + max(0, first_strip))
     return middle + STRIP * (sum(numbers) + 1.0) / 2.0
 
 
@@ -89,10 +89,10 @@ def slice_centers(rule: Rule, number: Index, y: Float, intensity: Float, count: 
 
     Args:
         rule: one of `RULES`.
-        number: (N,) the slice that each point lies in.
-        y: (N,) across, in its slice's frame, m.
+        number: (N,) index of the slice that each point lies in.
+        y: (N,) place across, in the slice's frame, m.
         intensity: (N,) of any scale.
-        count: M, of slices.
+        count: number M of slices.
     """
     result = np.full(count, np.nan)
     order = np.argsort(number, kind="stable")
@@ -138,8 +138,8 @@ def skeleton_centers(
     Args:
         xy: (N, 2) the road's points, m.
         intensity: (N,) of any scale; needed for the mask ``dark`` only.
-        origin: (M, 2) of the slices' frames, about a metre apart, in their order along the path.
-        direction: (M,) of the frames, rad.
+        origin: (M, 2) origins of the slices' frames, m, about a metre apart, in their order along the path.
+        direction: (M,) directions of the frames, rad.
         settings: raster, branches, mask, bins.
     """
     return centers_on(skeletons(xy, intensity, origin, settings), origin, direction, settings.bin)
@@ -147,27 +147,27 @@ def skeleton_centers(
 
 def skeletons(xy: Float, intensity: Float | None, origin: Float, settings: SkeletonSettings) -> list[Float]:
     """Return per window of 100 slices the points (K, 2), m, of the pruned skeleton of the road's raster."""
-    place = cKDTree(origin)
-    slice_of = place.query(xy)[1]
+    frame_tree = cKDTree(origin)
+    slice_of = frame_tree.query(xy)[1]
     order = np.argsort(slice_of, kind="stable")
     sorted_slices = slice_of[order]
     result = []
-    for first in range(0, len(origin), WINDOW):
-        last = min(first + WINDOW, len(origin))
-        begin, end = np.searchsorted(sorted_slices, [first - MARGIN, last + MARGIN])
+    for first_slice in range(0, len(origin), WINDOW):
+        end_slice = min(first_slice + WINDOW, len(origin))
+        begin, end = np.searchsorted(sorted_slices, [first_slice - MARGIN, end_slice + MARGIN])
         indices = order[begin:end]
         line = np.empty((0, 2))
         if len(indices):
             line = skeleton_points(xy[indices], None if intensity is None else intensity[indices], settings)
-        belongs = place.query(line)[1] if len(line) else np.empty(0, dtype=np.intp)
-        result.append(line[(belongs >= first) & (belongs < last)])
+        nearest_slice = frame_tree.query(line)[1] if len(line) else np.empty(0, dtype=np.intp)
+        result.append(line[(nearest_slice >= first_slice) & (nearest_slice < end_slice)])
     return result
 
 
 def centers_on(lines: Sequence[Float], origin: Float, direction: Float, width: float) -> Float:
     """Return y (M,), m, where windows' skeletons (K, 2), averaged in bins of `width` (m), cross the frames; or NaN."""
     result = np.full(len(origin), np.nan)
-    parts = [slice(first, first + WINDOW) for first in range(0, len(origin), WINDOW)]
+    parts = [slice(first_slice, first_slice + WINDOW) for first_slice in range(0, len(origin), WINDOW)]
     chains = [average_along(line, width, direction[part]) for line, part in zip(lines, parts, strict=True)]
     for number, part in enumerate(parts):
         # With its neighbours, as the line goes on from window to window.
@@ -192,8 +192,8 @@ def skeleton_points(xy: Float, intensity: Float | None, settings: SkeletonSettin
 def _in_dark_pixels(cell: Index, shape: tuple[int, ...], intensity: Float) -> Bool:
     """Return a mask (N,) of the points in pixels whose median intensity is at most Otsu's threshold of the medians."""
     number = np.ravel_multi_index((cell[:, 0], cell[:, 1]), shape)
-    used, owner = np.unique(number, return_inverse=True)
-    median = ndimage.median(intensity, owner, np.arange(len(used)))
+    pixels, owner = np.unique(number, return_inverse=True)
+    median = ndimage.median(intensity, owner, np.arange(len(pixels)))
     return (median <= otsu_threshold(median))[owner]
 
 
@@ -205,11 +205,11 @@ def prune_skeleton(skeleton: Bool, shortest: float) -> Bool:
         shortest: length in pixels along the branch, a diagonal step being the root of two.
     """
     while True:
-        number, free = _branches(skeleton)
-        short = [label for label, length in _lengths(number, free) if length < shortest]
-        if not short:
+        number, free_labels = _branches(skeleton)
+        short_labels = [label for label, length in _lengths(number, free_labels) if length < shortest]
+        if not short_labels:
             return skeleton
-        skeleton = skeletonize(skeleton & ~np.isin(number, short))
+        skeleton = skeletonize(skeleton & ~np.isin(number, short_labels))
 
 
 def _branches(skeleton: Bool) -> tuple[NDArray[np.int32], list[int]]:
@@ -219,25 +219,27 @@ def _branches(skeleton: Bool) -> tuple[NDArray[np.int32], list[int]]:
     step in a line have three neighbours as well, but only two lines: they join them.
     """
     neighbours = ndimage.convolve(skeleton.astype(np.int8), _AROUND.astype(np.int8), mode="constant") - 1
-    crowded = skeleton & (neighbours > 2)
-    number, _ = ndimage.label(skeleton & ~crowded, structure=_AROUND)
-    knots, _ = ndimage.label(crowded, structure=_AROUND)
+    knot_pixels = skeleton & (neighbours > 2)
+    line_labels, _ = ndimage.label(skeleton & ~knot_pixels, structure=_AROUND)
+    knot_labels, _ = ndimage.label(knot_pixels, structure=_AROUND)
+    # A knot is a junction if more than two lines touch it.
     junction = np.zeros_like(skeleton)
-    for knot, part in enumerate(ndimage.find_objects(knots), 1):
-        box = tuple(slice(max(0, side.start - 1), side.stop + 1) for side in part)
-        knot_mask = knots[box] == knot
-        touching = np.unique(number[box][ndimage.binary_dilation(knot_mask, _AROUND)])
-        junction[box] |= knot_mask & (np.count_nonzero(touching) > 2)
-    number, _ = ndimage.label(skeleton & ~junction, structure=_AROUND)
+    for knot, knot_box in enumerate(ndimage.find_objects(knot_labels), 1):
+        box = tuple(slice(max(0, side.start - 1), side.stop + 1) for side in knot_box)
+        knot_mask = knot_labels[box] == knot
+        touching_labels = np.unique(line_labels[box][ndimage.binary_dilation(knot_mask, _AROUND)])
+        junction[box] |= knot_mask & (np.count_nonzero(touching_labels) > 2)
+    # Label again: the other knots join the lines they lie on.
+    line_labels, _ = ndimage.label(skeleton & ~junction, structure=_AROUND)
     ends = skeleton & ~junction & (neighbours <= 1)
-    return number, [int(label) for label in np.unique(number[ends])]
+    return line_labels, [int(label) for label in np.unique(line_labels[ends])]
 
 
-def _lengths(number: NDArray[np.int32], chosen: list[int]) -> Iterator[tuple[int, float]]:
+def _lengths(line_labels: NDArray[np.int32], labels: list[int]) -> Iterator[tuple[int, float]]:
     """Yield label and length in pixels of each of the chosen lines, a diagonal step counting the root of two."""
-    boxes = ndimage.find_objects(number)
-    for label in chosen:
-        mask = number[boxes[label - 1]] == label
+    boxes = ndimage.find_objects(line_labels)
+    for label in labels:
+        mask = line_labels[boxes[label - 1]] == label
         diagonal = np.count_nonzero(mask[1:, 1:] & mask[:-1, :-1]) + np.count_nonzero(mask[1:, :-1] & mask[:-1, 1:])
         yield label, np.count_nonzero(mask) + (2.0**0.5 - 1.0) * diagonal
 
@@ -246,9 +248,9 @@ def average_along(points: Float, width: float, direction: Float) -> Float:
     """Return the means (J, 2), m, of points (K, 2) in bins along their principal axis, ordered along the path.
 
     Args:
-        points: of a window's skeleton.
-        width: of a bin, m.
-        direction: (M,) of the window's frames, rad: which way the path runs.
+        points: (K, 2) points of a window's skeleton, m.
+        width: width of a bin, m.
+        direction: (M,) directions of the window's frames, rad, which tell the way of the path.
     """
     if len(points) < 2:
         return np.empty((0, 2))

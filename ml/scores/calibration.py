@@ -27,10 +27,10 @@ class IntervalCalibration:
     """Correction of one target's standard deviations: a factor, and interval widths for 68 % and 95 %.
 
     Attributes:
-        factor: on the model's standard deviation.
+        factor: factor on the model's standard deviation.
         widths: half-widths of the 68 % and the 95 % interval in units of the model's (uncorrected) standard deviation.
         before, after: shares that the Gaussian intervals cover on the validation roads, without and with the factor.
-        count: of the errors that it was found on.
+        count: number of errors that the calibration was found on.
     """
 
     factor: float = 1.0
@@ -41,8 +41,11 @@ class IntervalCalibration:
 
     @property
     def holds(self) -> bool:
-        """Whether the one factor brings both shares within their tolerances."""
-        return all(abs(share - level) <= by for share, level, by in zip(self.after, LEVELS, TOLERANCES, strict=True))
+        """Return whether the one factor brings both shares within their tolerances."""
+        return all(
+            abs(share - level) <= tolerance
+            for share, level, tolerance in zip(self.after, LEVELS, TOLERANCES, strict=True)
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the calibration as JSON data, with `holds`."""
@@ -51,8 +54,8 @@ class IntervalCalibration:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
         """Return the calibration from `to_dict`'s data; None in pairs becomes NaN."""
-        widths, before, after = (_pair(data[name]) for name in ("widths", "before", "after"))
-        return cls(float(data["factor"]), widths, before, after, int(data["count"]))
+        widths, share_before, share_after = (_pair(data[name]) for name in ("widths", "before", "after"))
+        return cls(float(data["factor"]), widths, share_before, share_after, int(data["count"]))
 
 
 def calibrate_target(error: Float, std: Float) -> IntervalCalibration:
@@ -62,40 +65,44 @@ def calibrate_target(error: Float, std: Float) -> IntervalCalibration:
         error: (N,) errors; those that aren't finite don't count.
         std: (N,) the model's standard deviations in the same unit, > 0.
     """
-    known = np.isfinite(error) & np.isfinite(std)
-    ratio = np.sort(np.abs(error[known]) / std[known])
+    is_known = np.isfinite(error) & np.isfinite(std)
+    ratio = np.sort(np.abs(error[is_known]) / std[is_known])
     if not len(ratio):
         return IntervalCalibration()
     widths = tuple(_conformal(ratio, level) for level in LEVELS)
     # The share that is covered changes only where the interval's end passes an error.
-    tried = np.unique(np.concatenate([ratio / deviation for deviation in DEVIATIONS]))
-    tried = tried[tried > 0.0]
-    factor = float(tried[np.argmin(_share_error(ratio, tried))]) if len(tried) else 1.0
+    candidate_factors = np.unique(np.concatenate([ratio / deviation for deviation in DEVIATIONS]))
+    candidate_factors = candidate_factors[candidate_factors > 0.0]
+    factor = (
+        float(candidate_factors[np.argmin(_share_error(ratio, candidate_factors))]) if len(candidate_factors) else 1.0
+    )
     return IntervalCalibration(
         factor, (widths[0], widths[1]), _covered_share(ratio, 1.0), _covered_share(ratio, factor), len(ratio)
     )
 
 
 def _pair(values: Sequence[float | None]) -> tuple[float, float]:
-    first, second = (float("nan") if value is None else float(value) for value in values)
-    return first, second
+    """Return two numbers as floats, NaN for None."""
+    first_value, second_value = (float("nan") if value is None else float(value) for value in values)
+    return first_value, second_value
 
 
 def _conformal(ratio: Float, level: float) -> float:
-    """Return the split conformal quantile of ascending ratios: a new one is at most it with probability >= `level`."""
+    """Return the split conformal quantile of ascending ratios: a new one is below it with probability >= `level`."""
     rank = int(np.ceil(level * (len(ratio) + 1)))
     return float(ratio[min(rank, len(ratio)) - 1])
 
 
 def _covered_share(ratio: Float, factor: float) -> tuple[float, float]:
+    """Return the shares of errors within the 68 % and 95 % intervals of deviations times a factor."""
     shares = [float(np.searchsorted(ratio, factor * d, side="right") / len(ratio)) for d in DEVIATIONS]
     return shares[0], shares[1]
 
 
 def _share_error(ratio: Float, factors: Float) -> Float:
     """Return for each factor (F,) the larger of the two levels' coverage errors, in units of `TOLERANCES`."""
-    missed = [
+    errors = [
         np.abs(np.searchsorted(ratio, factors * deviation, side="right") / len(ratio) - level) / tolerance
         for deviation, level, tolerance in zip(DEVIATIONS, LEVELS, TOLERANCES, strict=True)
     ]
-    return np.maximum(*missed)
+    return np.maximum(*errors)

@@ -35,31 +35,31 @@ class Confusion:
         self.counts = np.zeros((len(self.names), len(self.names)), dtype=np.int64)
         self.ignored = 0
 
-    def add(self, truth: NDArray[np.integer[Any]], predicted: NDArray[np.integer[Any]]) -> None:
+    def add(self, truth: NDArray[np.integer[Any]], prediction: NDArray[np.integer[Any]]) -> None:
         """Add points' true and predicted classes (N,) to the matrix, in place; those with `IGNORED` truth don't count.
 
         Raises:
             InputError: the lengths differ, or a class is out of range.
         """
-        if truth.shape != predicted.shape:
-            raise InputError("predicted", predicted.shape, f"must be of the truth's shape, {truth.shape}")
-        known = truth != IGNORED
-        self.ignored += int(np.count_nonzero(~known))
-        rows, columns = truth[known].astype(np.int64), predicted[known].astype(np.int64)
+        if truth.shape != prediction.shape:
+            raise InputError("predicted", prediction.shape, f"must be of the truth's shape, {truth.shape}")
+        has_label = truth != IGNORED
+        self.ignored += int(np.count_nonzero(~has_label))
+        rows, columns = truth[has_label].astype(np.int64), prediction[has_label].astype(np.int64)
         count = len(self.names)
         for name, values in (("truth", rows), ("predicted", columns)):
             if len(values) and (values.min() < 0 or values.max() >= count):
-                worst = int(values.min() if values.min() < 0 else values.max())
-                raise InputError(name, worst, f"must be a class from 0 to {count - 1}")
+                invalid_class = int(values.min() if values.min() < 0 else values.max())
+                raise InputError(name, invalid_class, f"must be a class from 0 to {count - 1}")
         self.counts += np.bincount(rows * count + columns, minlength=count * count).reshape(count, count)
 
     @property
-    def right(self) -> Int:
+    def true_positives(self) -> Int:
         """Return the true positives of each class (C,)."""
         return self.counts.diagonal()
 
     @property
-    def found(self) -> Int:
+    def predicted_counts(self) -> Int:
         """Return the number of points predicted as each class (C,)."""
         return self.counts.sum(axis=0)
 
@@ -85,8 +85,9 @@ class Confusion:
         """Return per-class scores, means, accuracy, counts and the matrix as JSON data; NaN becomes None."""
         columns = {metric: self.values(metric) for metric in METRICS}
         rows = {
-            name: {metric: nan_to_none(values[place]) for metric, values in columns.items()} | {"support": int(support)}
-            for place, (name, support) in enumerate(zip(self.names, self.support, strict=True))
+            name: {metric: nan_to_none(values[class_index]) for metric, values in columns.items()}
+            | {"support": int(support)}
+            for class_index, (name, support) in enumerate(zip(self.names, self.support, strict=True))
         }
         return {
             "classes": rows,
@@ -98,15 +99,18 @@ class Confusion:
         }
 
 
-def _ratio(part: Any, whole: Any) -> Any:
-    whole = np.asarray(whole, dtype=np.float64)
-    return np.divide(part, whole, out=np.full_like(whole, np.nan), where=whole > 0)
+def _ratio(numerator: Any, denominator: Any) -> Any:
+    """Return a quotient element by element; NaN where the denominator is 0."""
+    denominator = np.asarray(denominator, dtype=np.float64)
+    return np.divide(numerator, denominator, out=np.full_like(denominator, np.nan), where=denominator > 0)
 
 
 METRICS = {
-    "precision": Metric(lambda of: _ratio(of.right, of.found), "precision", 100.0, 1),
-    "recall": Metric(lambda of: _ratio(of.right, of.support), "recall", 100.0, 1),
-    "iou": Metric(lambda of: _ratio(of.right, of.support + of.found - of.right), "IoU", 100.0, 1),
+    "precision": Metric(lambda of: _ratio(of.true_positives, of.predicted_counts), "precision", 100.0, 1),
+    "recall": Metric(lambda of: _ratio(of.true_positives, of.support), "recall", 100.0, 1),
+    "iou": Metric(
+        lambda of: _ratio(of.true_positives, of.support + of.predicted_counts - of.true_positives), "IoU", 100.0, 1
+    ),
 }
 """Metrics of each class (C,) of a `Confusion`; what is here is in its data and in all tables."""
 Scores = Mapping[str, Any]
@@ -120,8 +124,8 @@ def are_scores(data: Any, names: Sequence[str]) -> bool:
     rows = [*data["classes"].values(), {name: data.get(f"mean_{name}", "") for name in METRICS}]
     counts = [data.get("points"), *(row.get("support") for row in rows[:-1] if isinstance(row, dict))]
     of_metrics = [row.get(name, "") for row in rows if isinstance(row, dict) for name in METRICS]
-    whole = all(isinstance(row, dict) for row in rows) and all(type(count) is int for count in counts)
-    return whole and all(value is None or is_number(value) for value in of_metrics)
+    is_complete = all(isinstance(row, dict) for row in rows) and all(type(count) is int for count in counts)
+    return is_complete and all(value is None or is_number(value) for value in of_metrics)
 
 
 NOTE = "mean (standard deviation, ddof = 1) over seeds; - where undefined"
@@ -133,8 +137,8 @@ def score_table(scores: Scores) -> str:
         [label, *cells, f"{points:,}"] for label, points, cells in _class_rows([([scores], name) for name in METRICS])
     ]
     lines = text_table(["class", *(metric.title for metric in METRICS.values()), "points"], rows)
-    unlabelled = f", {scores['ignored']:,} without a class left out" if scores["ignored"] else ""
-    return "\n".join([*lines, f"{percent([scores['accuracy']])} % of the points are right{unlabelled}"])
+    ignored_text = f", {scores['ignored']:,} without a class left out" if scores["ignored"] else ""
+    return "\n".join([*lines, f"{percent([scores['accuracy']])} % of the points are right{ignored_text}"])
 
 
 def tables_by_test(results: Mapping[str, Mapping[str, Mapping[str, Scores]]], rows: Sequence[str] = ()) -> str:
@@ -144,12 +148,12 @@ def tables_by_test(results: Mapping[str, Mapping[str, Mapping[str, Scores]]], ro
         results: variant -> seed -> test -> scores; variants without a seed are left out.
         rows: further rows, cells joined by ``|``, that the first test's table ends with.
     """
-    done = {name: list(seeds.values()) for name, seeds in results.items() if seeds}
+    variant_runs = {name: list(seeds.values()) for name, seeds in results.items() if seeds}
     lines = [f"IoU in %, {NOTE}.", ""]
-    for place, test in enumerate(next(iter(done.values()))[0] if done else ()):
-        body = _class_rows([([run[test] for run in runs], "iou") for runs in done.values()])
-        lines += [f"**{test}**", "", *_class_table(list(done), body), *(rows if place == 0 else ()), ""]
-    counts = ", ".join(f"{name} {len(runs)}" for name, runs in done.items())
+    for test_number, test in enumerate(next(iter(variant_runs.values()))[0] if variant_runs else ()):
+        body = _class_rows([([run[test] for run in runs], "iou") for runs in variant_runs.values()])
+        lines += [f"**{test}**", "", *_class_table(list(variant_runs), body), *(rows if test_number == 0 else ()), ""]
+    counts = ", ".join(f"{name} {len(runs)}" for name, runs in variant_runs.items())
     return "\n".join([*lines, f"Seeds: {counts}."])
 
 
@@ -162,8 +166,8 @@ def table_by_class(runs: Sequence[Scores]) -> str:
         runs: scores of one test, a run per seed.
     """
     *classes, mean = _class_rows([(runs, name) for name in METRICS])
-    shown = [row for row in classes if row[1]]
-    body = [*shown, mean] if len(shown) == len(classes) else shown
+    classes_with_points = [row for row in classes if row[1]]
+    body = [*classes_with_points, mean] if len(classes_with_points) == len(classes) else classes_with_points
     return "\n".join(_class_table([metric.title for metric in METRICS.values()], body))
 
 
@@ -173,16 +177,17 @@ _ClassRow = tuple[str, int, list[str]]
 
 def _class_rows(columns: Sequence[tuple[Sequence[Scores], str]]) -> list[_ClassRow]:
     """Return a row for each class and one for their mean, with a cell per column: a metric over some runs, %."""
-    first = columns[0][0][0]
+    first_scores = columns[0][0][0]
     rows = [
         (label, row["support"], [percent([run["classes"][label][metric] for run in runs]) for runs, metric in columns])
-        for label, row in first["classes"].items()
+        for label, row in first_scores["classes"].items()
     ]
     means = [percent([run[f"mean_{metric}"] for run in runs]) for runs, metric in columns]
-    return [*rows, ("mean", first["points"], means)]
+    return [*rows, ("mean", first_scores["points"], means)]
 
 
 def _class_table(titles: Sequence[str], rows: Sequence[_ClassRow]) -> list[str]:
+    """Return the lines of a Markdown table with a row for each class."""
     body = [[label, f"{points:,}", *cells] for label, points, cells in rows]
     return markdown(["class", "points", *titles], body, ["---", "--:", *["--:"] * len(titles)]).splitlines()
 

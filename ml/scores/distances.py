@@ -40,7 +40,7 @@ DEGREE = 3
 _FEWEST = 2 * (DEGREE + 1)
 """Predicted centres that a window's polynomial needs."""
 _PAST_END = 1.0
-"""Points farther than this, m, past a line's end are beside none of it."""
+"""Distance past a line's end, m, from which on points have no offset from the line."""
 
 
 @dataclass(frozen=True)
@@ -104,20 +104,22 @@ class Comparison:
         """Chamfer distances between polynomials of the predicted and the true line, m; cached."""
         return chamfer(self.predicted, self.true, self.station)
 
-    def coverage(self, place: int) -> float | None:
+    def coverage(self, level_index: int) -> float | None:
         """Return the share of distances within the predicted interval of `LEVELS[place]`; None without deviations."""
         if self.std is None:
             return None
         if self.intervals is None:
-            return coverage(self.distance, self.std[self.both], LEVELS[place])
-        return _mean((self.distance <= self.intervals[self.both, place]).astype(np.float64))
+            return coverage(self.distance, self.std[self.both], LEVELS[level_index])
+        return _mean((self.distance <= self.intervals[self.both, level_index]).astype(np.float64))
 
 
 def _mean(values: Float) -> float:
+    """Return the mean of values; NaN without any."""
     return float(values.mean()) if len(values) else np.nan
 
 
 def _deviation(road: Comparison) -> float | None:
+    """Return a road's mean predicted standard deviation, m; None if none was predicted."""
     return None if road.std is None else _mean(road.std[road.both][np.isfinite(road.std[road.both])])
 
 
@@ -161,9 +163,9 @@ class TargetErrors:
     widths: Float
     whole: bool
 
-    def inside(self, place: int) -> float:
+    def inside(self, level_index: int) -> float:
         """Return the share of errors within the predicted interval of `LEVELS[place]`; NaN without slices."""
-        return _mean((self.size <= self.widths[:, place]).astype(np.float64))
+        return _mean((self.size <= self.widths[:, level_index]).astype(np.float64))
 
 
 TARGET_METRICS = {
@@ -183,17 +185,17 @@ TARGET_METRICS = {
 """Metrics of `TargetErrors`."""
 
 
-def lateral_errors(points: Float, true: Float, station: Float) -> Float:
+def lateral_errors(points: Float, true_points: Float, station: Float) -> Float:
     """Return the signed offsets (N,) of points (N, 2) from the true line, m, left positive; NaN beside its gaps.
 
     The line runs through the true centres (M, 2) in the order of their stations (M,) and is broken at gaps.
     """
-    known = np.flatnonzero(np.isfinite(true).all(axis=1))
-    nothing = np.full(len(points), np.nan)
-    if len(known) < 2 or not len(points) or not np.ptp(true[known], axis=0).any():
-        return nothing
-    line = MeasuredAxis(true[known], np.diff(station[known]) <= GAP)
-    return line.beside(points, np.inf, _PAST_END)[1] if len(line.parts) else nothing
+    known_rows = np.flatnonzero(np.isfinite(true_points).all(axis=1))
+    no_offsets = np.full(len(points), np.nan)
+    if len(known_rows) < 2 or not len(points) or not np.ptp(true_points[known_rows], axis=0).any():
+        return no_offsets
+    line = MeasuredAxis(true_points[known_rows], np.diff(station[known_rows]) <= GAP)
+    return line.beside(points, np.inf, _PAST_END)[1] if len(line.parts) else no_offsets
 
 
 def coverage(error: Float, std: Float, level: float) -> float:
@@ -201,84 +203,84 @@ def coverage(error: Float, std: Float, level: float) -> float:
 
     Errors and standard deviations (N,) are in m; those that aren't finite are left out.
     """
-    known = np.isfinite(error) & np.isfinite(std)
-    return _mean((np.abs(error[known]) <= ndtri(0.5 + level / 2.0) * std[known]).astype(np.float64))
+    is_finite = np.isfinite(error) & np.isfinite(std)
+    return _mean((np.abs(error[is_finite]) <= ndtri(0.5 + level / 2.0) * std[is_finite]).astype(np.float64))
 
 
-def chamfer(predicted: Float, true: Float, station: Float, window: float = WINDOW) -> Chamfer:
+def chamfer(predicted_points: Float, true_points: Float, station: Float, window: float = WINDOW) -> Chamfer:
     """Return Chamfer distances (m) between cubics fitted to predicted and true centres, averaged over windows.
 
     Args:
-        predicted: (M, 2) m, NaN where there is none.
-        true: (M, 2) m, NaN in the truth's gaps.
+        predicted_points: (M, 2) m, NaN where there is none.
+        true_points: (M, 2) m, NaN in the truth's gaps.
         station: (M,) of the slices along their path, m, growing.
         window: length of a window, m.
     """
-    known = np.isfinite(true).all(axis=1)
-    parts = windows(station, known, window)
-    rows, weights, whole = [], [], 0.0
+    is_known = np.isfinite(true_points).all(axis=1)
+    parts = windows(station, is_known, window)
+    rows, weights, total_length = [], [], 0.0
     for part in parts:
         length = float(station[part[-1]] - station[part[0]])
-        whole += length
-        kept = predicted[part][np.isfinite(predicted[part]).all(axis=1)]
-        distances = _window_chamfer(kept, true[part])
+        total_length += length
+        found_points = predicted_points[part][np.isfinite(predicted_points[part]).all(axis=1)]
+        distances = _window_chamfer(found_points, true_points[part])
         if distances is not None:
             rows.append(distances)
             weights.append(length)
     if not rows:
         return Chamfer(np.nan, np.nan, 0.0, len(parts))
-    full, common = np.average(np.array(rows), axis=0, weights=weights)
-    return Chamfer(float(full), float(common), sum(weights) / whole, len(parts))
+    mean_full, mean_common = np.average(np.array(rows), axis=0, weights=weights)
+    return Chamfer(float(mean_full), float(mean_common), sum(weights) / total_length, len(parts))
 
 
-def windows(station: Float, known: Bool, window: float = WINDOW) -> list[Index]:
+def windows(station: Float, truth_mask: Bool, window: float = WINDOW) -> list[Index]:
     """Return an index array of slices for each window of about `window` (m) of gapless truth, short pieces left out.
 
     Args:
         station: (M,) m, growing.
-        known: (M,) whether the truth is.
+        truth_mask: (M,) mask of the slices with a known truth.
         window: length, m.
     """
-    inside = np.flatnonzero(known)
-    pieces = np.split(inside, np.flatnonzero(np.diff(station[inside]) > GAP) + 1) if len(inside) else []
+    known_rows = np.flatnonzero(truth_mask)
+    pieces = np.split(known_rows, np.flatnonzero(np.diff(station[known_rows]) > GAP) + 1) if len(known_rows) else []
     result: list[Index] = []
     for piece in pieces:
-        along = station[piece] - station[piece[0]]
-        if along[-1] < SHORTEST:
+        distance = station[piece] - station[piece[0]]
+        if distance[-1] < SHORTEST:
             continue
-        count = max(1, round(along[-1] / window))
-        number = np.minimum((along * (count / along[-1])).astype(np.intp), count - 1)
+        count = max(1, round(distance[-1] / window))
+        number = np.minimum((distance * (count / distance[-1])).astype(np.intp), count - 1)
         result.extend(piece[number == index] for index in range(count))
     return result
 
 
-def _window_chamfer(predicted: Float, true: Float) -> tuple[float, float] | None:
+def _window_chamfer(predicted_points: Float, true_points: Float) -> tuple[float, float] | None:
     """Return one window's Chamfer distances over full and common extent, m; None if too little was predicted."""
-    if len(predicted) < _FEWEST or len(true) < _FEWEST:
+    if len(predicted_points) < _FEWEST or len(true_points) < _FEWEST:
         return None
-    origin = true.mean(axis=0)
-    axes = np.linalg.svd(true - origin, full_matrices=False)[2]
-    local = [(points - origin) @ axes.T for points in (predicted, true)]
+    origin = true_points.mean(axis=0)
+    axes = np.linalg.svd(true_points - origin, full_matrices=False)[2]
+    local = [(points - origin) @ axes.T for points in (predicted_points, true_points)]
     scale = float(np.abs(local[1][:, 0]).max())
     extents = [(points[:, 0].min(), points[:, 0].max()) for points in local]
-    common = (max(low for low, _ in extents), min(high for _, high in extents))
+    common_extent = (max(start for start, _ in extents), min(end for _, end in extents))
     fits = [np.polynomial.Polynomial.fit(p[:, 0] / scale, p[:, 1] / scale, DEGREE) for p in local]
-    full = [_sample_polynomial(fit, scale, extent) for fit, extent in zip(fits, extents, strict=True)]
-    shared = [_sample_polynomial(fit, scale, common) for fit in fits]
-    if not all(len(points) for points in (*full, *shared)):
+    full_samples = [_sample_polynomial(fit, scale, extent) for fit, extent in zip(fits, extents, strict=True)]
+    common_samples = [_sample_polynomial(fit, scale, common_extent) for fit in fits]
+    if not all(len(points) for points in (*full_samples, *common_samples)):
         return None
-    return _both_ways(*full), _both_ways(*shared)
+    return _mutual_distance(*full_samples), _mutual_distance(*common_samples)
 
 
 def _sample_polynomial(fit: np.polynomial.Polynomial, scale: float, extent: tuple[float, float]) -> Float:
     """Return a scaled polynomial's points (N, 2), m, at the whole metres within an extent (m)."""
-    along = np.arange(np.ceil(extent[0] - 1e-9), np.floor(extent[1] + 1e-9) + 1.0)
-    return np.column_stack([along, scale * fit(along / scale)])
+    metres = np.arange(np.ceil(extent[0] - 1e-9), np.floor(extent[1] + 1e-9) + 1.0)
+    return np.column_stack([metres, scale * fit(metres / scale)])
 
 
-def _both_ways(one: Float, other: Float) -> float:
+def _mutual_distance(points: Float, other_points: Float) -> float:
     """Return the Chamfer distance of two point sets: both directed mean nearest distances added, m."""
-    return float(cKDTree(other).query(one)[0].mean() + cKDTree(one).query(other)[0].mean())
+    return float(cKDTree(other_points).query(points)[0].mean() + cKDTree(points).query(other_points)[0].mean())
 
 
 def over_roads(rows: Iterable[Mapping[str, float]]) -> dict[str, float]:
@@ -292,8 +294,8 @@ def over_roads(rows: Iterable[Mapping[str, float]]) -> dict[str, float]:
     result = {}
     for name in ("slices", *dict.fromkeys(name for row in rows for name in row if name != "slices")):
         values = np.array([row.get(name, np.nan) for row in rows])
-        counted = windows > 0 if name.startswith("chamfer_") else np.ones(len(rows), dtype=bool)
-        weight = slices[counted]
-        mean = float((values[counted] * weight).sum() / weight.sum()) if weight.sum() else np.nan
+        counts = windows > 0 if name.startswith("chamfer_") else np.ones(len(rows), dtype=bool)
+        weight = slices[counts]
+        mean = float((values[counts] * weight).sum() / weight.sum()) if weight.sum() else np.nan
         result[name] = float(values.sum()) if METRICS[name].summed else mean
     return result

@@ -77,33 +77,35 @@ def make_case(
     """Return a road, cropped if asked, with frames along its axis or an estimated path, displaced by the seed.
 
     Args:
-        road: with a known truth.
-        seed: of cuts and of how the path strays.
-        cropping: None: all points stay.
+        road: road with a known truth.
+        seed: seed of the cuts and of the path's displacement.
+        cropping: options of cutting off the sides; None to keep all points.
         estimated: whether the path is found in the points; else it is the axis. Both stray.
-        settings: how far the path strays; those of `SliceSettings` if not given.
+        settings: options of the path's displacement; None for the defaults.
 
     Raises:
         InputError: the road has no truth.
     """
     settings = settings or SliceSettings()
-    seen = road if cropping is None else crop_road(road, cropping.share, seed, cropping.length)
-    seen = cut_beside_median(seen, settings.median_error, stream(seed, "median", road.name))
-    path = estimated_path(seen.xyz.astype(np.float64)) if estimated else road.known_truth.axis
+    visible_road = road if cropping is None else crop_road(road, cropping.share, seed, cropping.length)
+    visible_road = cut_beside_median(visible_road, settings.median_error, stream(seed, "median", road.name))
+    path = estimated_path(visible_road.xyz.astype(np.float64)) if estimated else road.known_truth.axis
     rng = stream(seed, "frames", road.name)
-    strayed = displace_frames(frames_along(path), rng, settings.window, settings.direction_deg, settings.wander_length)
-    return Case(seen, strayed)
+    displaced_frames = displace_frames(
+        frames_along(path), rng, settings.window, settings.direction_deg, settings.wander_length
+    )
+    return Case(visible_road, displaced_frames)
 
 
-def evaluate(predictor: Predictor, shown: Case) -> dict[str, float]:
+def evaluate(predictor: Predictor, case: Case) -> dict[str, float]:
     """Return one predictor's metrics (`distances.METRICS`) on one road, by name; undefined ones are NaN or missing."""
-    frames = shown.frames
-    predicted = predictor(shown.road, frames)
-    true, _ = shown.road.known_truth.axis.crossing(frames.position, frames.direction)
-    std = predicted[:, 1] if predicted.shape[1] > 1 else None
-    intervals = predicted[:, -2:] if predicted.shape[1] == len(CORRIDOR_COLUMNS) else None
-    compared = Comparison(frames.at(predicted[:, 0]), frames.at(true), frames.station, std, intervals)
-    return figures(METRICS, compared)
+    frames = case.frames
+    prediction = predictor(case.road, frames)
+    true_y, _ = case.road.known_truth.axis.crossing(frames.position, frames.direction)
+    std = prediction[:, 1] if prediction.shape[1] > 1 else None
+    intervals = prediction[:, -2:] if prediction.shape[1] == len(CORRIDOR_COLUMNS) else None
+    comparison = Comparison(frames.at(prediction[:, 0]), frames.at(true_y), frames.station, std, intervals)
+    return figures(METRICS, comparison)
 
 
 def measure(
@@ -112,9 +114,9 @@ def measure(
     """Return each metric's mean and deviation over seeds, by predictor, road (`all`: combined) and metric.
 
     Args:
-        predictors: by name; one per seed, as models that were trained with it, or one for all seeds.
-        cases: the roads as a seed shows them.
-        seeds: of cuts and frames. The n-th predictor is measured with the n-th seed.
+        predictors: predictors by name; one per seed, as models trained with it, or one for all seeds.
+        cases: function that returns the cases of a seed.
+        seeds: seeds of cuts and frames. The n-th predictor is measured with the n-th seed.
 
     Raises:
         InputError: two roads have the same name, by which figures are told apart.
@@ -124,27 +126,30 @@ def measure(
         if len(versions) not in (1, len(seeds)):
             raise ValueError(f"{name}: {len(versions)} predictors for {len(seeds)} seeds")
     for index, seed in enumerate(seeds):
-        shown = cases(seed)
-        names = [one.road.name for one in shown]
-        if twice := {name for name in names if names.count(name) > 1}:
-            raise InputError("road", sorted(twice)[0], "is the name of several roads; give data sets of other names")
+        seed_cases = cases(seed)
+        names = [case.road.name for case in seed_cases]
+        if repeated_names := {name for name in names if names.count(name) > 1}:
+            raise InputError(
+                "road", sorted(repeated_names)[0], "is the name of several roads; give data sets of other names"
+            )
         metrics_by_road: dict[str, dict[str, dict[str, float]]] = {name: {} for name in predictors}
-        for one in shown:  # road by road: predictors share what they cut out of it
+        for case in seed_cases:  # road by road: predictors share what they cut out of it
             for name, versions in predictors.items():
-                metrics_by_road[name][one.road.name] = evaluate(versions[0 if len(versions) == 1 else index], one)
+                metrics_by_road[name][case.road.name] = evaluate(versions[0 if len(versions) == 1 else index], case)
         for name, by_name in metrics_by_road.items():
             for road, row in (*by_name.items(), ("all", over_roads(by_name.values()))):
                 rows[name].setdefault(road, []).append(row)
     return {name: {road: over_seeds(values) for road, values in by_road.items()} for name, by_road in rows.items()}
 
 
-def trivial_predictor(name: str, cut: SliceCache | None = None) -> Predictor:
-    """Return the untrained predictor of a rule's name in `baselines.RULES`; `cut` shares slices between predictors."""
+def trivial_predictor(name: str, slice_cache: SliceCache | None = None) -> Predictor:
+    """Return the untrained predictor of a rule of `baselines.RULES`; predictors may share a cache of slices."""
     rule, length = baselines.RULES[name]
-    cut = cut or SliceCache()
+    slice_cache = slice_cache or SliceCache()
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
-        slices = cut(road, frames, length)
+        """Return each slice's centre (M, 1), m, by the rule."""
+        slices = slice_cache(road, frames, length)
         belonging = road.belonging[slices.index]
         y, intensity = slices.xy[belonging, 1], road.intensity[slices.index[belonging]].astype(np.float64)
         return baselines.slice_centers(rule, slices.number[belonging], y, intensity, len(frames))[:, None]
@@ -156,7 +161,7 @@ class SliceCache:
     """Cache of the slices of the last road and frames, per thickness.
 
     Args:
-        half_width: points up to this are seen beside a frame, m.
+        half_width: reach of a slice to either side of its frame, m.
     """
 
     def __init__(self, half_width: float = HALF_WIDTH) -> None:
@@ -177,6 +182,7 @@ def skeleton_predictor(settings: baselines.SkeletonSettings) -> Predictor:
     """Return the untrained predictor of centres (M, 1), m, by the road's morphological skeleton."""
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
+        """Return the skeleton's centres (M, 1), m, in the frames."""
         xy, intensity = mask_points(road, settings.mask)
         return baselines.skeleton_centers(xy, intensity, frames.position, frames.direction, settings)[:, None]
 
@@ -191,17 +197,17 @@ def mask_points(road: LearningRoad, mask: str) -> tuple[Float, Float]:
 
 
 def predict_path(road: LearningRoad, frames: Frames) -> Float:
-    """Predict the centre at each frame's origin: zeros (M, 1); what the displaced path alone is worth."""
+    """Return zeros (M, 1): the centre predicted at each frame's origin, which measures the displaced path itself."""
     return np.zeros((len(frames), 1))
 
 
 def trivial_predictors(half_width: float = HALF_WIDTH) -> dict[str, list[Predictor]]:
     """Return all untrained baseline predictors by name, one each, for `measure`; they share the slices cut out."""
     predictors: dict[str, list[Predictor]] = {"the displaced path": [predict_path]}
-    cut = SliceCache(half_width)
-    predictors |= {name: [trivial_predictor(name, cut)] for name in baselines.RULES}
+    slice_cache = SliceCache(half_width)
+    predictors |= {name: [trivial_predictor(name, slice_cache)] for name in baselines.RULES}
     for name in baselines.SPANNED:
-        rule = trivial_predictor(name, cut)
+        rule = trivial_predictor(name, slice_cache)
         predictors[f"{name}, parabola of {baselines.SPAN:.0f} m"] = [along_parabolas(rule, baselines.SPAN)]
     return predictors
 
@@ -210,16 +216,19 @@ def along_parabolas(predictor: Predictor, length: float) -> Predictor:
     """Return a predictor that smooths another's centres by a parabola fitted over `length` (m) around each frame."""
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
+        """Return the centres (M, 1), m, of parabolas through the other predictor's centres."""
         y = predictor(road, frames)[:, 0]
-        place, result = frames.at(y), np.full(len(y), np.nan)
+        center_points, result = frames.at(y), np.full(len(y), np.nan)
         for part in stretches(frames):
-            known = part[np.isfinite(y[part])]
+            found_rows = part[np.isfinite(y[part])]
             for index in part:
-                near = known[np.abs(frames.station[known] - frames.station[index]) <= 0.5 * length]
-                if len(near) >= baselines.FEWEST:
+                neighbours = found_rows[np.abs(frames.station[found_rows] - frames.station[index]) <= 0.5 * length]
+                if len(neighbours) >= baselines.FEWEST:
                     cos, sin = np.cos(frames.direction[index]), np.sin(frames.direction[index])
-                    x, aside = ((place[near] - frames.position[index]) @ np.array([[cos, -sin], [sin, cos]])).T
-                    result[index] = np.polyfit(x, aside, 2)[2]
+                    x, lateral_offset = (
+                        (center_points[neighbours] - frames.position[index]) @ np.array([[cos, -sin], [sin, cos]])
+                    ).T
+                    result[index] = np.polyfit(x, lateral_offset, 2)[2]
         return result[:, None]
 
     return predict

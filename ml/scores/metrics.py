@@ -13,12 +13,12 @@ class Metric:
     """A named figure of predictions: how it is computed, and how tables show it.
 
     Attributes:
-        value: makes it of what was compared; None: there is none.
-        title: of its column in tables, which have none without.
-        factor: on it in tables.
-        decimals: there.
-        place: of the column, behind those of lower ones.
-        summed: whether that of several roads is their sum, and not a mean.
+        value: function that computes the figure of a comparison; None as its result: there is none.
+        title: title of the figure's column in tables; empty for none.
+        factor: factor on the figure in tables.
+        decimals: decimals in tables.
+        place: order of the column: ascending.
+        summed: whether the figure of several roads is their sum instead of a mean.
     """
 
     value: Callable[[Any], Any]
@@ -31,13 +31,13 @@ class Metric:
 
 def in_tables(metrics: Mapping[str, Metric]) -> dict[str, Metric]:
     """Return the metrics that have a title, in the order of the tables' columns."""
-    shown = {name: metric for name, metric in metrics.items() if metric.title}
-    return dict(sorted(shown.items(), key=lambda item: item[1].place))
+    titled_metrics = {name: metric for name, metric in metrics.items() if metric.title}
+    return dict(sorted(titled_metrics.items(), key=lambda item: item[1].place))
 
 
-def figures(metrics: Mapping[str, Metric], compared: object) -> dict[str, float]:
+def figures(metrics: Mapping[str, Metric], comparison: object) -> dict[str, float]:
     """Return the values of all metrics of a comparison by name, without those that are None."""
-    values = {name: metric.value(compared) for name, metric in metrics.items()}
+    values = {name: metric.value(comparison) for name, metric in metrics.items()}
     return {name: float(value) for name, value in values.items() if value is not None}
 
 
@@ -52,14 +52,14 @@ class Spread:
     @classmethod
     def over(cls, values: Iterable[float]) -> Self:
         """Return mean, deviation and count of values; the mean is NaN without any or where one is NaN."""
-        known = np.array([*values], dtype=np.float64)
-        std = float(known.std(ddof=1)) if len(known) > 1 else math.nan
-        return cls(float(known.mean()) if len(known) else math.nan, std, len(known))
+        numbers = np.array([*values], dtype=np.float64)
+        std = float(numbers.std(ddof=1)) if len(numbers) > 1 else math.nan
+        return cls(float(numbers.mean()) if len(numbers) else math.nan, std, len(numbers))
 
-    def text(self, decimals: int, missing: str, factor: float = 1.0) -> str:
-        """Return the text ``mean (std)``, times a factor; the mean alone if std is NaN, `missing` if the mean is."""
+    def text(self, decimals: int, nan_text: str, factor: float = 1.0) -> str:
+        """Return the text ``mean (std)``, times a factor; the mean alone if std is NaN, `nan_text` if the mean is."""
         if math.isnan(self.mean):
-            return missing
+            return nan_text
         mean = f"{factor * self.mean:,.{decimals}f}"
         return mean if math.isnan(self.std) else f"{mean} ({factor * self.std:,.{decimals}f})"
 
@@ -93,10 +93,11 @@ def markdown(head: Sequence[str], body: Iterable[Sequence[str]], rule: Sequence[
         body: rows of cells.
         rule: what stands below the titles; three dashes each if not given.
     """
-    dashes = " | ".join(["---"] * len(head)) if rule is None else None
-    second = f"| {dashes} |" if dashes else f"|{'|'.join(rule or ())}|"
-    return "".join(f"{line}\n" for line in (_row(head), second, *map(_row, body)))
+    dash_cells = " | ".join(["---"] * len(head))
+    separator = f"| {dash_cells} |" if rule is None else f"|{'|'.join(rule)}|"
+    return "".join(f"{line}\n" for line in (_row(head), separator, *map(_row, body)))
 
 
 def _row(cells: Sequence[str]) -> str:
+    """Return a row of a Markdown table."""
     return f"| {' | '.join(cells)} |"

@@ -20,9 +20,9 @@ from ..data.roads import LearningRoad
 REACH = 1.2
 """A line is looked for up to so far from the axis, m."""
 LENGTH = 10.0
-"""Of road of which one place of the line is taken, m."""
+"""Length of road from which one place of the line is taken, m."""
 STEP = 2.0
-"""Distance of the places, m."""
+"""Distance from one place to the next, m."""
 CELL = 0.05
 """Width of a cell across the road, m."""
 LINE = 0.3
@@ -30,7 +30,7 @@ LINE = 0.3
 BRIGHTER = 0.7
 """A line is brighter than the median beside the axis by at least so much of the logarithms' 20th to 80th percentile."""
 FEWEST = 100
-"""Points of which a place is taken."""
+"""Points that a place needs at least."""
 
 
 def with_painted_line(road: LearningRoad) -> LearningRoad:
@@ -42,21 +42,24 @@ def with_painted_line(road: LearningRoad) -> LearningRoad:
     truth = road.known_truth
     axis = truth.axis
     station, offset = axis.project(road.xyz)
-    near = np.abs(offset) <= REACH + LINE
-    station, offset = station[near], offset[near]
-    logs = logarithms(road.intensity[near].astype(np.float64))
+    is_near = np.abs(offset) <= REACH + LINE
+    station, offset = station[is_near], offset[is_near]
+    logs = logarithms(road.intensity[is_near].astype(np.float64))
     order = np.argsort(station, kind="stable")
     station, offset, logs = station[order], offset[order], logs[order]
-    places = axis.stations(STEP)
-    first, last = (np.searchsorted(station, places + side * 0.5 * LENGTH) for side in (-1.0, 1.0))
-    aside = np.array([_ridge(offset[a:b], logs[a:b]) for a, b in zip(first, last, strict=True)])
-    there = np.isfinite(aside)
-    if there.sum() < 2:
+    place_stations = axis.stations(STEP)
+    begins, ends = (np.searchsorted(station, place_stations + side * 0.5 * LENGTH) for side in (-1.0, 1.0))
+    line_offsets = np.array([_ridge(offset[a:b], logs[a:b]) for a, b in zip(begins, ends, strict=True)])
+    has_line = np.isfinite(line_offsets)
+    if has_line.sum() < 2:
         raise InputError("road", road.name, "has no painted line beside its axis")
-    direction = axis.direction(places[there])
-    left = np.column_stack([-np.sin(direction), np.cos(direction)])
-    points = axis.position(places[there]) + aside[there, None] * left
-    line = MeasuredAxis(np.column_stack([points, axis.elevation(places[there])]), np.diff(places[there]) < 1.5 * STEP)
+    direction = axis.direction(place_stations[has_line])
+    left_normals = np.column_stack([-np.sin(direction), np.cos(direction)])
+    points = axis.position(place_stations[has_line]) + line_offsets[has_line, None] * left_normals
+    line = MeasuredAxis(
+        np.column_stack([points, axis.elevation(place_stations[has_line])]),
+        np.diff(place_stations[has_line]) < 1.5 * STEP,
+    )
     return replace(road, truth=Truth.of_axis(line, truth.kind))
 
 
@@ -67,12 +70,12 @@ def _ridge(offset: Float, logs: Float) -> float:
     middles = np.arange(-REACH, REACH + 0.5 * CELL, CELL)
     order = np.argsort(offset)
     total = np.concatenate([[0.0], np.cumsum(logs[order])])
-    low, high = (np.searchsorted(offset[order], middles + side * 0.5 * LINE) for side in (-1.0, 1.0))
-    count = high - low
-    mean = np.where(count > 0, (total[high] - total[low]) / np.maximum(count, 1), -np.inf)
+    begin, end = (np.searchsorted(offset[order], middles + side * 0.5 * LINE) for side in (-1.0, 1.0))
+    count = end - begin
+    mean = np.where(count > 0, (total[end] - total[begin]) / np.maximum(count, 1), -np.inf)
     spread = float(np.subtract(*np.percentile(logs, (80.0, 20.0))))
     excess = mean - float(np.median(logs)) - BRIGHTER * spread
-    best = int(np.argmax(excess))
+    best_cell = int(np.argmax(excess))
     # At the end of the reach the brightest may be the flank of something else.
-    inside = 0 < best < len(middles) - 1
-    return float(middles[best]) if inside and excess[best] > 0.0 else float("nan")
+    is_inner = 0 < best_cell < len(middles) - 1
+    return float(middles[best_cell]) if is_inner and excess[best_cell] > 0.0 else float("nan")

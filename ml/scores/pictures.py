@@ -43,44 +43,42 @@ def small_png(figure: Any, dpi: float | None = None) -> bytes:
     """Draw a Matplotlib figure; return it as a PNG of at most 256 colours, a fourth as large as with all.
 
     Args:
-        figure: is drawn.
+        figure: figure to draw.
         dpi: pixels per inch; the figure's own if not given.
     """
-    drawn, content = io.BytesIO(), io.BytesIO()
-    save_figure(figure, drawn, dpi=dpi or figure.dpi)
-    image = Image.open(drawn, formats=("PNG",)).convert("RGB").quantize(_PALETTE, dither=Image.Dither.NONE)
+    full_png, content = io.BytesIO(), io.BytesIO()
+    save_figure(figure, full_png, dpi=dpi or figure.dpi)
+    image = Image.open(full_png, formats=("PNG",)).convert("RGB").quantize(_PALETTE, dither=Image.Dither.NONE)
     image.save(content, format="png", optimize=True)
     return content.getvalue()
 
 
 @dataclass(frozen=True)
 class PictureView:
-    """Stations along a road's true axis from which to which it is drawn, m."""
+    """Stations along a road's true axis, m, between which the road is drawn."""
 
     first: float
     last: float
 
 
 @literal_texts()
-def lines_picture(
-    shown: Case, lines: Mapping[str, Float], view: PictureView, title: str, height: float = 12.0
-) -> bytes:
+def lines_picture(case: Case, lines: Mapping[str, Float], view: PictureView, title: str, height: float = 12.0) -> bytes:
     """Return a PNG of a road straightened: predicted centrelines over the cloud, and their offsets from the true axis.
 
     Args:
-        shown: road and frames.
-        lines: y of the centres in the frames (M,), m, by the predictor's name.
+        case: road and frames.
+        lines: y (M,) of the centres in the frames, m, by the predictor's name.
         view: what of the road.
         title: of the picture.
         height: of the upper panel to either side of the axis, m.
     """
-    figure, panels = _panels(title, (2.2, 1.0), view, height)
-    _cloud(panels[0], shown, view, height)
-    _true(panels[0], shown, view)
+    figure, panels = _new_panels(title, (2.2, 1.0), view, height)
+    _draw_cloud(panels[0], case, view, height)
+    _draw_truth(panels[0], case, view)
     panels[1].axhline(0.0, color="black", lw=1.0, label="true axis")
     largest = 0.0
     for (name, y), color in zip(lines.items(), COLORS, strict=False):
-        station, offset = _beside(shown, shown.frames.at(y), view)
+        station, offset = _project_points(case, case.frames.at(y), view)
         panels[0].plot(station, offset, color=color, lw=1.2, label=shown_text(name))
         panels[1].plot(station, offset, color=color, lw=1.2)
         largest = max(largest, float(np.nanquantile(np.abs(offset), 0.98)) if np.isfinite(offset).any() else 0.0)
@@ -94,11 +92,11 @@ def lines_picture(
 
 
 @literal_texts()
-def corridor_picture(shown: Case, prediction: Float, view: PictureView, title: str, height: float = 16.0) -> bytes:
+def corridor_picture(case: Case, prediction: Float, view: PictureView, title: str, height: float = 16.0) -> bytes:
     """Return a PNG of a corridor: centre and edges with 95 % bands over the cloud, the centre's error, the lanes.
 
     Args:
-        shown: road and frames.
+        case: road and frames.
         prediction: (M, 2 to 4 + 2 K) columns `CORRIDOR_COLUMNS`; panels of what isn't there stay away.
         view: what of the road.
         title: of the picture.
@@ -106,20 +104,21 @@ def corridor_picture(shown: Case, prediction: Float, view: PictureView, title: s
     """
     column = {name: prediction[:, i] for i, name in enumerate(CORRIDOR_COLUMNS[: prediction.shape[1]])}
     with_lanes = "lanes" in column and bool(np.isfinite(column["lanes"]).any())
-    figure, panels = _panels(title, (2.4, 1.0, 0.8) if with_lanes else (2.4, 1.0), view, height)
-    _cloud(panels[0], shown, view, height)
-    _true(panels[0], shown, view, edges=True)
+    figure, panels = _new_panels(title, (2.4, 1.0, 0.8) if with_lanes else (2.4, 1.0), view, height)
+    _draw_cloud(panels[0], case, view, height)
+    _draw_truth(panels[0], case, view, edges=True)
     for name, color, label in (("center", CENTER, "centre"), ("left_edge", EDGE, "edges"), ("right_edge", EDGE, None)):
         if name in column:
-            _band(panels[0], shown, view, column[name], _half_width(column, name, 95), color, label)
+            _draw_band(panels[0], case, view, column[name], _interval_half_width(column, name, 95), color, label)
     panels[0].legend(loc="upper right", ncols=4, fontsize=8, framealpha=0.9)
-    _center_error(panels[1], shown, view, column)
+    _draw_center_error(panels[1], case, view, column)
     if with_lanes:
-        _lanes(panels[2], shown, view, column)
+        _draw_lanes(panels[2], case, view, column)
     return small_png(figure, dpi=110)
 
 
-def _panels(title: str, heights: Sequence[float], view: PictureView, height: float) -> tuple[Any, Sequence[Any]]:
+def _new_panels(title: str, heights: Sequence[float], view: PictureView, height: float) -> tuple[Any, Sequence[Any]]:
+    """Return a figure and its panels below each other, the upper one with the view's limits."""
     figure = new_figure(13.0, 1.6 + 2.0 * sum(heights))
     panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
     figure.suptitle(shown_text(title), fontsize=11)
@@ -130,50 +129,55 @@ def _panels(title: str, heights: Sequence[float], view: PictureView, height: flo
     return figure, panels
 
 
-def _cloud(axes: Axes, shown: Case, view: PictureView, height: float) -> None:
+def _draw_cloud(axes: Axes, case: Case, view: PictureView, height: float) -> None:
     """Draw a road's points by intensity rank, straightened along the true axis, into the axes.
 
     Where only an axis is known, as of real scans that may not be passed on, means of cells are drawn and no points.
     """
-    indices = np.flatnonzero(shown.road.belonging)
-    station, offset = shown.road.known_truth.axis.project(shown.road.xyz[indices])
-    near = np.flatnonzero((station >= view.first) & (station <= view.last) & (np.abs(offset) <= height))
-    intensity = shown.road.intensity[indices[near]]
+    indices = np.flatnonzero(case.road.belonging)
+    station, offset = case.road.known_truth.axis.project(case.road.xyz[indices])
+    visible_points = np.flatnonzero((station >= view.first) & (station <= view.last) & (np.abs(offset) <= height))
+    intensity = case.road.intensity[indices[visible_points]]
     # By their ranks: a scanner beside the road sees its near side a hundred times as bright as the far one.
-    intensity = rankdata(intensity) / max(1, len(near))
-    look: dict[str, Any] = {"cmap": "gray", "vmin": -0.5, "vmax": 1.0, "rasterized": True}
+    intensity = rankdata(intensity) / max(1, len(visible_points))
+    style: dict[str, Any] = {"cmap": "gray", "vmin": -0.5, "vmax": 1.0, "rasterized": True}
     axes.set_facecolor("#101418")
-    if shown.road.known_truth.left is None:
-        along, aside = np.arange(view.first, view.last + 0.5), np.arange(-height, height + 0.125, 0.25)
-        places = np.column_stack([station[near], offset[near]])
-        count, _ = np.histogramdd(places, bins=[along, aside])
-        total, _ = np.histogramdd(places, bins=[along, aside], weights=intensity)
-        axes.pcolormesh(along, aside, np.where(count > 0, total / np.maximum(count, 1), np.nan).T, **look)
+    if case.road.known_truth.left is None:
+        station_edges, offset_edges = np.arange(view.first, view.last + 0.5), np.arange(-height, height + 0.125, 0.25)
+        plan_points = np.column_stack([station[visible_points], offset[visible_points]])
+        count, _ = np.histogramdd(plan_points, bins=[station_edges, offset_edges])
+        total, _ = np.histogramdd(plan_points, bins=[station_edges, offset_edges], weights=intensity)
+        axes.pcolormesh(
+            station_edges, offset_edges, np.where(count > 0, total / np.maximum(count, 1), np.nan).T, **style
+        )
         return
-    some = slice(None, None, max(1, len(near) // _MOST_POINTS))
-    size = float(np.clip(60_000 / max(len(near), 1), 0.4, 6.0))
-    axes.scatter(station[near][some], offset[near][some], c=intensity[some], s=size, lw=0, **look)
+    sample = slice(None, None, max(1, len(visible_points) // _MOST_POINTS))
+    size = float(np.clip(60_000 / max(len(visible_points), 1), 0.4, 6.0))
+    axes.scatter(
+        station[visible_points][sample], offset[visible_points][sample], c=intensity[sample], s=size, lw=0, **style
+    )
 
 
-def _true(axes: Axes, shown: Case, view: PictureView, edges: bool = False) -> None:
-    truth = shown.road.known_truth
+def _draw_truth(axes: Axes, case: Case, view: PictureView, edges: bool = False) -> None:
+    """Draw the true axis, and if asked the true edges, into the axes."""
+    truth = case.road.known_truth
     station = np.arange(view.first, view.last, 0.5)
     axes.plot(station, np.where(truth.axis.inside(station), 0.0, np.nan), color=TRUE, lw=2.5, label="true axis")
     if edges:
         lines = [line for line in (truth.left, truth.right) if line is not None]
         for line, label in zip(lines, ("true edges", None), strict=False):
-            along, aside = truth.axis.project(line.points)
-            order = np.argsort(along)
-            axes.plot(along[order], aside[order], color=TRUE, lw=2.0, ls="--", label=label)
+            line_station, line_offset = truth.axis.project(line.points)
+            order = np.argsort(line_station)
+            axes.plot(line_station[order], line_offset[order], color=TRUE, lw=2.0, ls="--", label=label)
 
 
-def _beside(shown: Case, points: Float, view: PictureView) -> tuple[Float, Float]:
+def _project_points(case: Case, points: Float, view: PictureView) -> tuple[Float, Float]:
     """Return ascending stations and offsets (m) of the points (M, 2) in the view; NaN rows separate stretches."""
-    truth = shown.road.known_truth
-    there = np.isfinite(points).all(axis=1)
-    station, offset = truth.axis.project(points[there])
-    inside = (station >= view.first) & (station <= view.last) & truth.axis.inside(station)
-    return _by_station(station[inside], offset[inside])
+    truth = case.road.known_truth
+    is_finite = np.isfinite(points).all(axis=1)
+    station, offset = truth.axis.project(points[is_finite])
+    in_view = (station >= view.first) & (station <= view.last) & truth.axis.inside(station)
+    return _by_station(station[in_view], offset[in_view])
 
 
 def _by_station(station: Float, offset: Float) -> tuple[Float, Float]:
@@ -184,7 +188,7 @@ def _by_station(station: Float, offset: Float) -> tuple[Float, Float]:
     return np.insert(station, breaks, np.nan), np.insert(offset, breaks, np.nan)
 
 
-def _half_width(column: Mapping[str, Float], name: str, level: int) -> Float:
+def _interval_half_width(column: Mapping[str, Float], name: str, level: int) -> Float:
     """Return half-widths (M,) of a column's `level` % interval: predicted, else by its standard deviation, else 0."""
     if f"{name}_{level}" in column:
         width = column[f"{name}_{level}"]
@@ -193,50 +197,64 @@ def _half_width(column: Mapping[str, Float], name: str, level: int) -> Float:
     return np.nan_to_num(width)
 
 
-def _band(axes: Axes, shown: Case, view: PictureView, y: Float, width: Float, color: str, label: str | None) -> None:
+def _draw_band(
+    axes: Axes, case: Case, view: PictureView, y: Float, width: Float, color: str, label: str | None
+) -> None:
     """Draw a predicted line and the band of its 95 % interval into the axes."""
-    station, offset = _beside(shown, shown.frames.at(y), view)
-    _, low = _across(shown, y - width, view)
-    at, high = _across(shown, y + width, view)
-    axes.fill_between(at, low, high, color=color, alpha=0.35, lw=0, label=None if label is None else f"{label}, 95 %")
+    station, offset = _project_points(case, case.frames.at(y), view)
+    _, lower_offset = _offsets_at_frames(case, y - width, view)
+    band_station, upper_offset = _offsets_at_frames(case, y + width, view)
+    axes.fill_between(
+        band_station,
+        lower_offset,
+        upper_offset,
+        color=color,
+        alpha=0.35,
+        lw=0,
+        label=None if label is None else f"{label}, 95 %",
+    )
     axes.plot(station, offset, color=color, lw=1.3, label=label)
 
 
-def _across(shown: Case, y: Float, view: PictureView) -> tuple[Float, Float]:
+def _offsets_at_frames(case: Case, y: Float, view: PictureView) -> tuple[Float, Float]:
     """Return ascending stations where frames cross the true axis and the offsets of their points y (m), NaN at gaps."""
-    axis, frames = shown.road.known_truth.axis, shown.frames
+    axis, frames = case.road.known_truth.axis, case.frames
     _, station = axis.crossing(frames.position, frames.direction)
-    inside = (station >= view.first) & (station <= view.last) & np.isfinite(y)
-    return _by_station(station[inside], axis.project(frames.at(y)[inside])[1])
+    in_view = (station >= view.first) & (station <= view.last) & np.isfinite(y)
+    return _by_station(station[in_view], axis.project(frames.at(y)[in_view])[1])
 
 
-def _center_error(axes: Axes, shown: Case, view: PictureView, column: Mapping[str, Float]) -> None:
+def _draw_center_error(axes: Axes, case: Case, view: PictureView, column: Mapping[str, Float]) -> None:
+    """Draw the predicted centre's offset from the true axis with its 68 % and 95 % bands."""
     y = column["center"]
-    station, offset = _across(shown, y, view)
+    station, offset = _offsets_at_frames(case, y, view)
     for level, alpha in ((95, 0.2), (68, 0.35)):
-        width = _half_width(column, "center", level)
+        width = _interval_half_width(column, "center", level)
         if width.any():
-            at, low = _across(shown, y - width, view)
-            _, high = _across(shown, y + width, view)
-            axes.fill_between(at, low, high, color=CENTER, alpha=alpha, lw=0, label=f"{level} %")
+            band_station, lower_offset = _offsets_at_frames(case, y - width, view)
+            _, upper_offset = _offsets_at_frames(case, y + width, view)
+            axes.fill_between(
+                band_station, lower_offset, upper_offset, color=CENTER, alpha=alpha, lw=0, label=f"{level} %"
+            )
     axes.plot(station, offset, color=CENTER, lw=1.2, label="predicted centre")
     axes.axhline(0.0, color="black", lw=1.0)
     axes.set(ylabel="centre, m")
     axes.legend(loc="upper right", ncols=3, fontsize=8)
 
 
-def _lanes(axes: Axes, shown: Case, view: PictureView, column: Mapping[str, Float]) -> None:
-    there = shown.road.known_truth.at(shown.frames)
-    inside = np.flatnonzero((there.station >= view.first) & (there.station <= view.last))
-    inside = inside[np.argsort(there.station[inside])]
-    station = there.station[inside]
+def _draw_lanes(axes: Axes, case: Case, view: PictureView, column: Mapping[str, Float]) -> None:
+    """Draw the predicted and true number and width of lanes over the station."""
+    truth = case.road.known_truth.at(case.frames)
+    in_view = np.flatnonzero((truth.station >= view.first) & (truth.station <= view.last))
+    in_view = in_view[np.argsort(truth.station[in_view])]
+    station = truth.station[in_view]
     for name, color in (("lanes", CENTER), ("lane_width", EDGE)):
-        value, label = column[name][inside], name.replace("_", " ") + (", m" if name == "lane_width" else "")
-        spread = _half_width(column, name, 95)[inside]
+        value, label = column[name][in_view], name.replace("_", " ") + (", m" if name == "lane_width" else "")
+        spread = _interval_half_width(column, name, 95)[in_view]
         axes.fill_between(station, value - spread, value + spread, color=color, alpha=0.25, lw=0)
         axes.plot(station, value, color=color, lw=1.2, label=label)
-        true = there.corridor[inside, CORRIDOR.index(name)]
-        axes.plot(station, true, color="black", lw=1.0, ls="--", label="true" if name == "lanes" else None)
+        true_value = truth.corridor[in_view, CORRIDOR.index(name)]
+        axes.plot(station, true_value, color="black", lw=1.0, ls="--", label="true" if name == "lanes" else None)
     axes.set(ylabel="lanes")
     axes.legend(loc="upper right", ncols=3, fontsize=8)
 
@@ -252,26 +270,26 @@ _WRONG = np.array([[0.75, 0.75, 0.75], [0.9, 0.1, 0.1]])
 
 @literal_texts()
 def comparison(
-    tile: CloudTile, predicted: NDArray[np.int16], names: Sequence[str], scheme: ClassScheme | None = None
+    tile: CloudTile, prediction: NDArray[np.int16], names: Sequence[str], scheme: ClassScheme | None = None
 ) -> bytes:
     """Return a PNG with three top views of a tile: true classes, predicted classes, and where they differ.
 
     Args:
-        tile: with its truth.
-        predicted: (N,) classes.
-        names: of the classes.
-        scheme: that they are of, for their colours; a built-in one if None.
+        tile: tile with its true classes.
+        prediction: (N,) classes.
+        names: names of the classes.
+        scheme: scheme of the classes, for their colours; None for a built-in one.
     """
     from matplotlib.patches import Patch  # takes half a second, which only pictures need
 
     colors = class_colors(names, scheme)
-    wrong = np.where(tile.segment == IGNORED, IGNORED, (predicted != tile.segment).astype(np.int16))
-    shown = ((tile.segment, colors, "truth"), (predicted, colors, "predicted"), (wrong, _WRONG, "wrong"))
-    known = tile.coord[tile.segment != IGNORED, :2] if (tile.segment != IGNORED).any() else tile.coord[:, :2]
-    extent = np.percentile(known, _OUTSIDE, axis=0)
-    views = [top_view(tile.coord, labels, table, extent) for labels, table, _ in shown]
+    is_wrong = np.where(tile.segment == IGNORED, IGNORED, (prediction != tile.segment).astype(np.int16))
+    panels = ((tile.segment, colors, "truth"), (prediction, colors, "predicted"), (is_wrong, _WRONG, "wrong"))
+    labelled_points = tile.coord[tile.segment != IGNORED, :2] if (tile.segment != IGNORED).any() else tile.coord[:, :2]
+    extent = np.percentile(labelled_points, _OUTSIDE, axis=0)
+    views = [top_view(tile.coord, labels, table, extent) for labels, table, _ in panels]
     figure = new_figure(15, 0.8 + 4.9 * views[0].shape[0] / _PIXELS)
-    for axes, view, (_, _, title) in zip(figure.subplots(1, 3), views, shown, strict=True):
+    for axes, view, (_, _, title) in zip(figure.subplots(1, 3), views, panels, strict=True):
         axes.imshow(view, origin="lower", interpolation="nearest")
         axes.set(title=title, xticks=[], yticks=[])
     patches = [
@@ -285,8 +303,8 @@ def comparison(
 def class_colors(names: Sequence[str], scheme: ClassScheme | None = None) -> Float:
     """Return the display colours (C, 3), 0 to 1, of class names; grey for a name that no scheme has."""
     schemes = (class_scheme("17"), class_scheme("5"), *([scheme] if scheme else []))
-    known = {row.name: row.color for one in schemes for row in one.rows}
-    return np.array([known.get(name, (150, 150, 150)) for name in names]) / 255.0
+    color_by_name = {row.name: row.color for scheme_row_source in schemes for row in scheme_row_source.rows}
+    return np.array([color_by_name.get(name, (150, 150, 150)) for name in names]) / 255.0
 
 
 def top_view(coord: Float32, labels: NDArray[np.int16], colors: Float, extent: NDArray[np.floating]) -> Float:
@@ -298,13 +316,13 @@ def top_view(coord: Float32, labels: NDArray[np.int16], colors: Float, extent: N
         colors: (C, 3).
         extent: (2, 2) smallest and largest x and y shown, m.
     """
-    low, high = extent
-    cell = max(float((high - low).max()) / _PIXELS, 0.05)
-    size = np.floor((high - low) / cell).astype(int) + 1
+    lower_corner, upper_corner = extent
+    cell = max(float((upper_corner - lower_corner).max()) / _PIXELS, 0.05)
+    size = np.floor((upper_corner - lower_corner) / cell).astype(int) + 1
     image = np.full((size[1], size[0], 3), _UNKNOWN, dtype=np.float64)
     order = np.argsort(coord[:, 2], kind="stable")
-    inside = ((coord[:, :2] >= low) & (coord[:, :2] <= high)).all(axis=1)
-    order = order[inside[order] & (labels[order] != IGNORED)]
-    column, row = np.floor((coord[order, :2] - low) / cell).astype(int).T
+    in_view = ((coord[:, :2] >= lower_corner) & (coord[:, :2] <= upper_corner)).all(axis=1)
+    order = order[in_view[order] & (labels[order] != IGNORED)]
+    column, row = np.floor((coord[order, :2] - lower_corner) / cell).astype(int).T
     image[row, column] = colors[labels[order]]
     return image

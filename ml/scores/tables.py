@@ -31,17 +31,17 @@ TARGETS_SHOWN = {
 """Targets of the corridor: title and factor."""
 
 
-def table(measured: Measured, road: str = "all", columns: Columns = COLUMNS) -> str:
+def table(spreads: Measured, road: str = "all", columns: Columns = COLUMNS) -> str:
     """Return a Markdown table of all predictors on one road, or on `all` combined; empty columns are left out."""
-    return markdown(*_cells({name: rows.get(road, {}) for name, rows in measured.items()}, columns))
+    return markdown(*_cells({name: rows.get(road, {}) for name, rows in spreads.items()}, columns))
 
 
-def report(measured: Measured, corridor: Mapping[str, Mapping[str, float | None]]) -> str:
+def report(spreads: Measured, corridor: Mapping[str, Mapping[str, float | None]]) -> str:
     """Return text tables: all predictors, the first one road by road, and its corridor errors by target."""
-    model = next(iter(measured))
-    roads = {road: rows for road, rows in measured[model].items() if road != "all"}
-    together = {name: rows.get("all", {}) for name, rows in measured.items()}
-    parts = [f"{len(roads)} road{'s' if len(roads) > 1 else ''}:", *text_table(*_cells(together, COLUMNS))]
+    model = next(iter(spreads))
+    roads = {road: rows for road, rows in spreads[model].items() if road != "all"}
+    combined = {name: rows.get("all", {}) for name, rows in spreads.items()}
+    parts = [f"{len(roads)} road{'s' if len(roads) > 1 else ''}:", *text_table(*_cells(combined, COLUMNS))]
     if len(roads) > 1:
         parts += ["", f"{model}, by road:", *text_table(*_cells(roads, COLUMNS))]
     targets = {
@@ -53,15 +53,18 @@ def report(measured: Measured, corridor: Mapping[str, Mapping[str, float | None]
 
 def shown_figures(target: str, figures: Mapping[str, float | None]) -> dict[str, float]:
     """Return a corridor target's figures with the mean error in the unit of `TARGETS_SHOWN`; NaN for None."""
-    known = {name: math.nan if figure is None else figure for name, figure in figures.items()}
-    return known | {"mae": TARGETS_SHOWN[target][1] * known["mae"]}
+    numbers = {name: math.nan if figure is None else figure for name, figure in figures.items()}
+    return numbers | {"mae": TARGETS_SHOWN[target][1] * numbers["mae"]}
 
 
 def _cells(rows: Mapping[str, Mapping[str, Spread]], columns: Columns) -> tuple[list[str], list[list[str]]]:
     """Return head and body of a table with a row of figures per name; columns that no row has are left out."""
-    used = {figure: metric for figure, metric in columns.items() if any(figure in row for row in rows.values())}
-    body = [[name, *(cell(row.get(figure), metric) for figure, metric in used.items())] for name, row in rows.items()]
-    return ["", *(metric.title for metric in used.values())], body
+    used_columns = {figure: metric for figure, metric in columns.items() if any(figure in row for row in rows.values())}
+    body = [
+        [name, *(cell(row.get(figure), metric) for figure, metric in used_columns.items())]
+        for name, row in rows.items()
+    ]
+    return ["", *(metric.title for metric in used_columns.values())], body
 
 
 def cell(spread: Spread | None, metric: Metric) -> str:
@@ -71,7 +74,7 @@ def cell(spread: Spread | None, metric: Metric) -> str:
     return replace(spread, std=spread.std or math.nan).text(metric.decimals, "–", metric.factor)
 
 
-def as_data(measured: Measured) -> dict[str, Any]:
+def as_data(spreads: Measured) -> dict[str, Any]:
     """Return measured figures as JSON data (mean, std, seeds), rounded to 6 decimals; None where undefined."""
     return {
         name: {
@@ -81,19 +84,19 @@ def as_data(measured: Measured) -> dict[str, Any]:
             }
             for road, figures in rows.items()
         }
-        for name, rows in measured.items()
+        for name, rows in spreads.items()
     }
 
 
-def write_tables(folder: Path, name: str, measured: Measured) -> list[str]:
+def write_tables(folder: Path, name: str, spreads: Measured) -> list[str]:
     """Write figures as ``NAME.json`` and as tables in ``NAME.md``, overwriting; return the two files' names.
 
     Raises:
         OutputError: the folder can't be written.
     """
-    write_file(folder / f"{name}.json", canonical_json(as_data(measured)).encode(), overwrite=True)
-    roads = dict.fromkeys(road for rows in measured.values() for road in rows)
-    parts = [f"## {road}\n\n{table(measured, road)}" for road in sorted(roads, key=lambda road: road != "all")]
+    write_file(folder / f"{name}.json", canonical_json(as_data(spreads)).encode(), overwrite=True)
+    roads = dict.fromkeys(road for rows in spreads.values() for road in rows)
+    parts = [f"## {road}\n\n{table(spreads, road)}" for road in sorted(roads, key=lambda road: road != "all")]
     text = f"# {name}\n\nMean (standard deviation over seeds, ddof 1).\n\n" + "\n".join(parts)
     write_file(folder / f"{name}.md", text.encode(), overwrite=True)
     return [f"{name}.json", f"{name}.md"]

@@ -13,11 +13,11 @@ from synthroads_addon.base.schema import read_json
 
 from ..data.sources import Source
 from ..experiments import Experiment as AnyExperiment
-from ..experiments import cached_scores, fill_path, kept_figures, with_seed, write_results
+from ..experiments import cached_scores, fill_path, read_figures, with_seed, write_results
 from ..runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting_data
 from ..scores.confusion import are_scores, tables_by_test
 from .recipes import Data, SegmentationConfiguration
-from .scoring import score_all, told_apart, trained_model
+from .scoring import score_all, target_names, trained_model
 from .task import train
 
 
@@ -32,6 +32,7 @@ class Experiment(AnyExperiment):
         """Return training data and tests with {NAME} in all paths replaced by its folder; see the base class."""
 
         def fill(source: Source) -> Source:
+            """Return a source with {NAME} in its path replaced by its folder."""
             return source.model_copy(update={"path": fill_path(source.path, folders)})
 
         return Data(
@@ -46,7 +47,7 @@ class Experiment(AnyExperiment):
 
 def run_experiment(
     experiment: Experiment,
-    configured: Mapping[str, SegmentationConfiguration],
+    configurations: Mapping[str, SegmentationConfiguration],
     output: Path,
     seeds: Sequence[int],
     progress: Progress = silent,
@@ -54,16 +55,16 @@ def run_experiment(
     """Train (unless done) and test all variants with the given seeds; return the scores, written after each.
 
     Args:
-        experiment: what is compared.
-        configured: see `configurations`.
+        experiment: the experiment with its variants.
+        configurations: see `configurations`.
         output: folder; ``VARIANT/seed-N`` are the runs, `RESULTS` and `TABLE` the scores.
         seeds: one after another, each over all variants: a table is there as soon as the first is through.
-        progress: of each training.
+        progress: called with each training's stage and share.
     """
-    results: dict[str, dict[str, Any]] = {name: {} for name in configured}
+    results: dict[str, dict[str, Any]] = {name: {} for name in configurations}
     for seed in seeds:
         for name, variant in experiment.variants.items():
-            configuration = with_seed(configured[name], seed)
+            configuration = with_seed(configurations[name], seed)
             folder = output / (variant.of or name) / f"seed-{seed}"
             if variant.of is None:
                 tests = _train_variant(configuration, folder, output, progress)
@@ -77,7 +78,7 @@ def run_experiment(
 def _train_variant(
     configuration: SegmentationConfiguration, folder: Path, output: Path, progress: Progress
 ) -> dict[str, Any]:
-    """Return a run's test scores by test, training it first unless it is already."""
+    """Return a run's scores by test, after training it unless that is done."""
     run = Run.start(folder, configuration, resume=True)
     with run.alone():
         if not (folder / METRICS).is_file():
@@ -85,16 +86,16 @@ def _train_variant(
                 run.begin()
                 _reuse_pretraining(configuration, run.part(PRETRAINING), output)
             train(run, progress)
-    kept = kept_figures(folder / METRICS, "tests", None, partial(_are_tests, configuration))
-    assert kept is not None, "the training has written it"
-    return kept
+    tests = read_figures(folder / METRICS, "tests", None, partial(_are_tests, configuration))
+    assert tests is not None, "the training has written it"
+    return tests
 
 
-def _are_tests(configuration: SegmentationConfiguration, kept: Any) -> bool:
+def _are_tests(configuration: SegmentationConfiguration, data: Any) -> bool:
     """Return whether JSON data are scores of a configuration's tests, as `score_all` makes them."""
     tests, scheme = configuration.data.tests, configuration.scheme()
-    there = isinstance(kept, dict) and kept.keys() == tests.keys()
-    return there and all(are_scores(kept[name], told_apart(sources, scheme)) for name, sources in tests.items())
+    has_tests = isinstance(data, dict) and data.keys() == tests.keys()
+    return has_tests and all(are_scores(data[name], target_names(sources, scheme)) for name, sources in tests.items())
 
 
 def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, output: Path) -> None:
@@ -103,8 +104,8 @@ def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, o
     if (target / CONFIGURATION).is_file():
         return
     for file in sorted(output.glob(f"*/*/{CONFIGURATION}")):
-        told = read_json(file)
-        if isinstance(told, dict) and lasting_data(told) == data and (file.parent / METRICS).is_file():
+        stored = read_json(file)
+        if isinstance(stored, dict) and lasting_data(stored) == data and (file.parent / METRICS).is_file():
             for name in (CONFIGURATION, CHECKPOINT, HISTORY):
                 write_file(target / name, (file.parent / name).read_bytes(), overwrite=True)
             return
@@ -123,9 +124,9 @@ def table(title: str, results: Mapping[str, Mapping[str, Any]], variants: Sequen
     """Return a Markdown page with a table per test: IoU of each class and variant, %, mean (standard deviation).
 
     Args:
-        title: above the tables.
+        title: title above the tables.
         results: variant -> seed -> test -> scores as of `Confusion.to_dict`.
-        variants: those that are shown; all if none.
+        variants: names of the variants to show; empty for all.
     """
-    shown = {name: results[name] for name in variants or results}
-    return f"# {title}\n\n{tables_by_test(shown)}\n"
+    chosen_results = {name: results[name] for name in variants or results}
+    return f"# {title}\n\n{tables_by_test(chosen_results)}\n"

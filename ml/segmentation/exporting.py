@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from ..data.classes import class_names
-from ..onnx_export import Exportable, described
+from ..onnx_export import Exportable, metadata_texts
 from .recipes import SegmentationConfiguration
 
 _CLOUDS = 3
@@ -25,7 +25,7 @@ class _FromTensors(nn.Module):
         self.model, self.names = model, names
 
     def forward(self, *tensors: Tensor) -> tuple[Tensor]:
-        """Return the class scores (N, C) of N points, of their features (N, F) and what was prepared, in order."""
+        """Return the class scores (N, C) of N points from their features (N, F) and the prepared geometry, in order."""
         feat, *prepared = tensors
         return (self.model(feat, dict(zip(self.names, prepared, strict=True))),)
 
@@ -33,24 +33,24 @@ class _FromTensors(nn.Module):
 def exportable_network(model: nn.Module, configuration: SegmentationConfiguration) -> Exportable:
     """Return a trained network with an example, random points, to be written as ONNX.
 
-    What it needs of the clouds' geometry (the stages' points, who looks at whom) are inputs beside the features.
+    The geometry that the network needs (the stages' points, their neighbours) are inputs beside the features.
 
     Args:
         model: the trained network.
-        configuration: that it was trained by.
+        configuration: configuration of its training.
 
     Raises:
         InputError: the network can't be written as ONNX.
     """
-    draw = torch.Generator().manual_seed(configuration.seed)
+    generator = torch.Generator().manual_seed(configuration.seed)
     points = _CLOUDS * _POINTS
-    coord = torch.rand(points, 3, generator=draw) * torch.tensor([_CUBE, _CUBE, 1.0])
+    coord = torch.rand(points, 3, generator=generator) * torch.tensor([_CUBE, _CUBE, 1.0])
     offset = torch.arange(_POINTS, points + 1, _POINTS)
     geometry = configuration.network.onnx_inputs({"coord": coord, "offset": offset})
-    feat = torch.randn(points, len(configuration.features), generator=draw)
+    feat = torch.randn(points, len(configuration.features), generator=generator)
     names = tuple(geometry.inputs)
     dynamic = {"feat": {0: "points0"}, **geometry.lengths}
-    metadata = described(
+    metadata = metadata_texts(
         task="segmentation",
         classes=list(class_names(configuration.scheme())),
         features=list(configuration.features),
@@ -58,5 +58,5 @@ def exportable_network(model: nn.Module, configuration: SegmentationConfiguratio
         intensity=configuration.intensity,
         network=configuration.network.to_dict(),
     )
-    wrapped = _FromTensors(model, names).eval()
-    return Exportable(wrapped, {"feat": feat, **geometry.inputs}, dynamic, ("scores",), metadata)
+    tensor_model = _FromTensors(model, names).eval()
+    return Exportable(tensor_model, {"feat": feat, **geometry.inputs}, dynamic, ("scores",), metadata)

@@ -31,8 +31,8 @@ _TILES = 8
 def forecast(configuration: SegmentationConfiguration, steps: int) -> dict[str, Any]:
     """Time some training steps; return seconds per step, the steps and hours of the whole training, ..., as JSON data.
 
-    A step is all that a training does for a batch: crops cut out, neighbours found, loss, gradients, weights changed.
-    One more step goes first and isn't counted.
+    A step is all that a training does for a batch: cutting crops, finding neighbours, loss, gradients, changing
+    weights. One more step is run first and not counted.
 
     Raises:
         InputError: the data are missing, or their tiles have fewer points than a crop; or the set-up has several
@@ -41,15 +41,15 @@ def forecast(configuration: SegmentationConfiguration, steps: int) -> dict[str, 
     if configuration.set_up in ("fine_tuned", "self_trained"):
         raise InputError("set_up", configuration.set_up, "has several trainings: forecast each by itself")
     if configuration.data.stream is not None:
-        allowed = "makes its scenes while it trains: forecast with data that are there, and data.stream=null"
-        raise InputError("data.stream", configuration.data.stream.recipe, allowed)
+        remedy = "makes its scenes while it trains: forecast with data that are there, and data.stream=null"
+        raise InputError("data.stream", configuration.data.stream.recipe, remedy)
     device = chosen_device(configuration)
     sources = [source for rows in configuration.needed_sources().values() for source in rows]
     count = sum(tile_count(source, configuration) for source in sources)
     wall, cpu = timed_steps(configuration, _first_tiles(sources, configuration), steps, device)
     crops = configuration.crops_per_epoch or configuration.crops_per_tile * count
-    per_epoch = math.ceil(crops / configuration.batch) // configuration.processes
-    whole = per_epoch * configuration.schedule.epochs
+    steps_per_epoch = math.ceil(crops / configuration.batch) // configuration.processes
+    step_count = steps_per_epoch * configuration.schedule.epochs
     return {
         "title": configuration.title,
         "device": str(device),
@@ -59,9 +59,9 @@ def forecast(configuration: SegmentationConfiguration, steps: int) -> dict[str, 
         "steps_measured": steps,
         "seconds_per_step": round(wall, 4),
         "cpu_seconds_per_step": round(cpu, 4),
-        "steps_per_epoch": per_epoch,
-        "steps": whole,
-        "hours": round(whole * wall / 3600.0, 2),
+        "steps_per_epoch": steps_per_epoch,
+        "steps": step_count,
+        "hours": round(step_count * wall / 3600.0, 2),
         "peak_memory_mb": peak_memory_mb(),
     }
 
@@ -96,13 +96,13 @@ def timed_steps(
     optimizer = optimizer_of(model, configuration.schedule)
     loss = objective(configuration, tiles, device)
     wall, cpu = [], []
-    few = {"crops_per_tile": configuration.batch, "crops_per_epoch": None}
-    enough = CropBatches(configuration.model_copy(update=few), [tiles], device)
-    batches = chain.from_iterable(map(enough, count()))  # epoch after epoch
+    crop_numbers = {"crops_per_tile": configuration.batch, "crops_per_epoch": None}
+    crop_batches = CropBatches(configuration.model_copy(update=crop_numbers), [tiles], device)
+    batches = chain.from_iterable(map(crop_batches, count()))  # epoch after epoch
     for _ in range(steps + 1):
-        begin = time.perf_counter(), time.process_time()
+        start_times = time.perf_counter(), time.process_time()
         batch = next(batches)
         train_step(model, optimizer, configuration.schedule.learning_rate, configuration, loss, batch)
-        wall.append(time.perf_counter() - begin[0])
-        cpu.append(time.process_time() - begin[1])
+        wall.append(time.perf_counter() - start_times[0])
+        cpu.append(time.process_time() - start_times[1])
     return median(wall[1:]), median(cpu[1:])

@@ -21,7 +21,7 @@ from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, scalings
 from ..data.workers import load_batches
 from .network import gpu_prepares, overlay_clouds
-from .recipes import SegmentationConfiguration, mapped_intensities, plan
+from .recipes import SegmentationConfiguration, map_intensities, plan
 
 SMALLEST_SHARE = 0.25
 """Of a crop's points: tiles with fewer are left out of training, unless all have. Chosen: a smaller tile shows too
@@ -48,16 +48,16 @@ def prepare_domains(
     domains: Mapping[str, Sequence[CloudTile]], configuration: SegmentationConfiguration
 ) -> dict[str, list[CloudTile]]:
     """Return domains without slivers, synthetic intensities mapped for `mixed_mapped`; see `read_domains`."""
-    prepared = {domain: large_enough(tiles, configuration) for domain, tiles in domains.items()}
+    prepared = {domain: drop_slivers(tiles, configuration) for domain, tiles in domains.items()}
     if configuration.set_up == "mixed_mapped" and "real" in prepared and "synthetic" in prepared:
-        prepared["synthetic"] = mapped_intensities(prepared["synthetic"], prepared["real"])
+        prepared["synthetic"] = map_intensities(prepared["synthetic"], prepared["real"])
     return prepared
 
 
-def large_enough(tiles: Sequence[CloudTile], configuration: SegmentationConfiguration) -> list[CloudTile]:
+def drop_slivers(tiles: Sequence[CloudTile], configuration: SegmentationConfiguration) -> list[CloudTile]:
     """Return the tiles with at least `SMALLEST_SHARE` of a crop's points; all with any point if there are none."""
-    least = SMALLEST_SHARE * configuration.crop_points
-    return [tile for tile in tiles if len(tile) >= least] or [tile for tile in tiles if len(tile)]
+    smallest_size = SMALLEST_SHARE * configuration.crop_points
+    return [tile for tile in tiles if len(tile) >= smallest_size] or [tile for tile in tiles if len(tile)]
 
 
 def thin_tiles(
@@ -65,16 +65,16 @@ def thin_tiles(
 ) -> Iterator[CloudTile]:
     """Yield the sources' tiles thinned to one point per training voxel, scenes renamed to ``TITLE/PLACE/SCENE``.
 
-    Scenes of two sources may have one name: here they have others, so that their intensities are scaled apart.
+    Scenes of two sources may share a name: the new names keep the scaling of their intensities separate.
 
     Args:
-        sources, configuration: of the training.
-        title: of the domain.
+        sources, configuration: sources of the tiles, and configuration of the training.
+        title: title of the domain.
         labels: whether labels are read; else all are `IGNORED`.
     """
-    for place, source in enumerate(sources):
+    for source_number, source in enumerate(sources):
         for tile in read_tiles(source, configuration.scheme(), configuration.voxel, labels=labels):
-            yield replace(tile, scene=f"{title}/{place}/{tile.scene}")
+            yield replace(tile, scene=f"{title}/{source_number}/{tile.scene}")
 
 
 class CropBatches:
@@ -82,8 +82,8 @@ class CropBatches:
 
     Args:
         configuration: of the training.
-        domains: the tiles of each; the synthetic ones first where there are two.
-        device: that they are for; on a GPU the network may prepare them itself.
+        domains: tiles by domain; the synthetic ones first where there are two.
+        device: device of the training; on a GPU the network may prepare batches itself.
     """
 
     def __init__(
@@ -100,29 +100,41 @@ class CropBatches:
         self.seeds = self._seeds()
 
     def __len__(self) -> int:
-        given = self.configuration
-        return math.ceil((given.crops_per_epoch or given.crops_per_tile * len(self.tiles)) / given.batch)
+        configuration = self.configuration
+        return math.ceil(
+            (configuration.crops_per_epoch or configuration.crops_per_tile * len(self.tiles)) / configuration.batch
+        )
 
     def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Item]:
         """Yield the batches of an epoch whose numbers, from 0, `share` selects."""
-        given, sizes = self.configuration, [len(tiles) for tiles in self.domains]
-        draws = plan(sizes, given.crops_per_tile, given.synthetic_share, given.seed, epoch, given.crops_per_epoch)
+        configuration, sizes = self.configuration, [len(tiles) for tiles in self.domains]
+        draws = plan(
+            sizes,
+            configuration.crops_per_tile,
+            configuration.synthetic_share,
+            configuration.seed,
+            epoch,
+            configuration.crops_per_epoch,
+        )
         crops = self._crops(self.tiles, draws, self.seeds[0], epoch)
-        yield from _load_crops(crops, given, epoch, given.adaptation.mix3d, share, self.device)
+        yield from _load_crops(crops, configuration, epoch, configuration.adaptation.mix3d, share, self.device)
 
     def _seeds(self) -> list[Seeds]:
-        """Return where crops are cut out, in all tiles.
+        """Return the sampler of crop centres in all tiles.
 
         Where a share is stated, a crop stays in the domain that it was planned in, whatever class is looked for.
         """
-        given = self.configuration
-        groups = [len(tiles) for tiles in self.domains] if given.synthetic_share is not None else ()
-        return [Seeds(self.tiles, len(class_names(given.scheme())), given.balanced, groups)]
+        configuration = self.configuration
+        groups = [len(tiles) for tiles in self.domains] if configuration.synthetic_share is not None else ()
+        return [Seeds(self.tiles, len(class_names(configuration.scheme())), configuration.balanced, groups)]
 
     def _crops(self, tiles: Sequence[CloudTile], draws: Sequence[Draw], seeds: Seeds, epoch: int) -> CropDataset:
-        given = self.configuration
-        settings, scaling = given.crop_settings(), self.scaling
-        return CropDataset(tiles, scaling, settings, draws, seeds, effects=given.effects, seed=given.seed, epoch=epoch)
+        """Return the data set of an epoch's planned crops of some tiles."""
+        configuration = self.configuration
+        settings, scaling = configuration.crop_settings(), self.scaling
+        return CropDataset(
+            tiles, scaling, settings, draws, seeds, effects=configuration.effects, seed=configuration.seed, epoch=epoch
+        )
 
 
 class ExchangedBatches(CropBatches):
@@ -132,7 +144,7 @@ class ExchangedBatches(CropBatches):
     """
 
     def _seeds(self) -> list[Seeds]:
-        """Return where crops of each domain are cut out; believed labels are too few to balance classes by them."""
+        """Return a sampler of crop centres per domain; guessed labels are too few to balance classes by."""
         classes, (synthetic, target) = len(class_names(self.configuration.scheme())), self.domains
         return [Seeds(synthetic, classes, self.configuration.balanced), Seeds(target, classes, balanced=False)]
 
@@ -141,27 +153,28 @@ class ExchangedBatches(CropBatches):
 
     def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Item]:
         """Yield the batches of an epoch whose numbers, from 0, `share` selects."""
-        given = self.configuration
+        configuration = self.configuration
         synthetic, target = (
-            self._crops(tiles, self._draws(len(tiles), place, epoch), seeds, epoch)
-            for place, (tiles, seeds) in enumerate(zip(self.domains, self.seeds, strict=True))
+            self._crops(tiles, self._draws(len(tiles), domain_number, epoch), seeds, epoch)
+            for domain_number, (tiles, seeds) in enumerate(zip(self.domains, self.seeds, strict=True))
         )
-        pairs = ExchangedCrops(synthetic, target, given.seed, epoch)
-        yield from _load_crops(pairs, given, epoch, 0.0, share, self.device, self._pairs_per_batch())
+        pairs = ExchangedCrops(synthetic, target, configuration.seed, epoch)
+        yield from _load_crops(pairs, configuration, epoch, 0.0, share, self.device, self._pairs_per_batch())
 
     def _pairs(self) -> int:
         """Return the pairs of an epoch: as many as there are crops of synthetic tiles."""
-        given = self.configuration
-        return given.crops_per_epoch or given.crops_per_tile * len(self.domains[0])
+        configuration = self.configuration
+        return configuration.crops_per_epoch or configuration.crops_per_tile * len(self.domains[0])
 
     def _pairs_per_batch(self) -> int:
+        """Return the pairs of a batch: half of its crops, at least one."""
         return max(self.configuration.batch // 2, 1)
 
-    def _draws(self, tiles: int, place: int, epoch: int) -> list[Draw]:
+    def _draws(self, tiles: int, domain_number: int, epoch: int) -> list[Draw]:
         """Return one draw of a domain's tiles for each pair, all tiles as often, in random order."""
-        order = stream(self.configuration.seed, "pairs", place, epoch).permutation(self._pairs())
+        order = stream(self.configuration.seed, "pairs", domain_number, epoch).permutation(self._pairs())
         # Crops of the two domains have numbers, and with them random streams, of their own.
-        return [Draw(int(number % tiles), int(number // tiles) * 2 + place) for number in order]
+        return [Draw(int(number % tiles), int(number // tiles) * 2 + domain_number) for number in order]
 
 
 class StreamedCropBatches:
@@ -174,8 +187,8 @@ class StreamedCropBatches:
         device: see `CropBatches`.
 
     Attributes:
-        epoch: the one that was begun last, None before the first.
-        tiles: those of that epoch.
+        epoch: epoch that was begun last; None before the first.
+        tiles: tiles of that epoch.
     """
 
     def __init__(
@@ -191,9 +204,9 @@ class StreamedCropBatches:
         self.epoch: int | None = None
 
     def __len__(self) -> int:
-        given = self.configuration
-        assert given.crops_per_epoch is not None, "the configuration has seen to it"
-        return math.ceil(given.crops_per_epoch / given.batch)
+        configuration = self.configuration
+        assert configuration.crops_per_epoch is not None, "the configuration has seen to it"
+        return math.ceil(configuration.crops_per_epoch / configuration.batch)
 
     def domains(self, epoch: int) -> dict[str, list[CloudTile]]:
         """Return an epoch's tiles by domain, when all its scenes are there.
@@ -214,7 +227,7 @@ class StreamedCropBatches:
 
 
 def streamed_tiles(configuration: SegmentationConfiguration, number: int, folder: Path) -> list[CloudTile]:
-    """Return the thinned tiles of a stream's scene; none of one without tiles."""
+    """Return the thinned tiles of a stream's scene; an empty list if it has none."""
     if not any(folder.glob("pointcept/*/*/*/coord.npy")):
         return []
     return list(thin_tiles([Source(path=str(folder))], configuration, f"stream/{number}"))
@@ -229,11 +242,21 @@ def _load_crops(
     device: torch.device,
     size: int | None = None,
 ) -> Iterator[Item]:
-    """Yield batches of so many elements of a data set; as the configuration says if not given."""
+    """Yield the batches of an epoch that a share selects, prepared by the configuration's workers.
+
+    Args:
+        dataset: crops or pairs of crops of the epoch.
+        configuration: of the training.
+        epoch: number of the epoch.
+        mix3d: share of batches that are overlaid (Mix3D).
+        share: slice of the batches' numbers.
+        device: device of the training.
+        size: elements of a batch; None for the configuration's.
+    """
     numbers, size = range(len(dataset)), size or configuration.batch
     return load_batches(
         dataset,
-        [numbers[first : first + size] for first in numbers[::size][share]],
+        [numbers[start : start + size] for start in numbers[::size][share]],
         Collate(configuration, epoch, mix3d, gpu_prepares(configuration, device)),
         configuration.workers,
         pin_memory=device.type == "cuda",
@@ -255,17 +278,17 @@ class Collate:
     mix3d: float
     left_to_gpu: bool
 
-    def __call__(self, drawn: Sequence[Item] | Sequence[list[Item]]) -> Item:
+    def __call__(self, samples: Sequence[Item] | Sequence[list[Item]]) -> Item:
         """Return the batch of items or of pairs, perhaps overlaid, prepared unless the GPU does that."""
-        items = [item for each in drawn for item in (each if isinstance(each, list) else [each])]
+        items = [item for sample in samples for item in (sample if isinstance(sample, list) else [sample])]
         batch = collate(items)
         if self.mix3d and self._chance(items[0]) < self.mix3d:
             batch = overlay_clouds(batch)
         return batch if self.left_to_gpu else self.configuration.network.prepare(batch)
 
-    def _chance(self, first: Item) -> float:
+    def _chance(self, item: Item) -> float:
         """Return a random number from 0 to 1 seeded by the first item's points: workers don't know batch numbers."""
-        content = zlib.crc32(first["coord"].numpy().tobytes())
+        content = zlib.crc32(item["coord"].numpy().tobytes())
         return float(stream(self.configuration.seed, "mix3d", self.epoch, content).random())
 
 
@@ -278,12 +301,12 @@ def adaptation_batches(
     # By their points: a sliver says as much of the scene as it holds of it.
     shares = np.array([len(tile) for tile in tiles]) / sum(map(len, tiles))
     random = stream(configuration.seed, "adaptation")
-    chosen = random.choice(len(tiles), configuration.adaptation.adabn_crops, p=shares)
+    tile_indices = random.choice(len(tiles), configuration.adaptation.adabn_crops, p=shares)
     dataset = CropDataset(
         tiles,
         scalings(tiles, configuration.intensity),
         configuration.crop_settings(),
-        [Draw(int(tile), number) for number, tile in enumerate(chosen)],
+        [Draw(int(tile), number) for number, tile in enumerate(tile_indices)],
         Seeds(tiles, 0, balanced=False),
         seed=configuration.seed,
     )

@@ -36,9 +36,9 @@ def gpu_prepares(configuration: SegmentationConfiguration, device: torch.device)
 
 
 def prepare_on_gpu(configuration: SegmentationConfiguration, batch: Item) -> Item:
-    """Return a batch prepared where it lies on a GPU and the network can do it there; else as it is."""
-    late = gpu_prepares(configuration, batch["coord"].device)
-    return configuration.network.prepare(batch) if late else batch
+    """Return a batch prepared by the network if it lies on a GPU where the network can do that; else unchanged."""
+    prepares_here = gpu_prepares(configuration, batch["coord"].device)
+    return configuration.network.prepare(batch) if prepares_here else batch
 
 
 def adapt_network(model: nn.Module, batches: Iterable[Item], configuration: SegmentationConfiguration) -> nn.Module:
@@ -47,11 +47,13 @@ def adapt_network(model: nn.Module, batches: Iterable[Item], configuration: Segm
     Raises:
         InputError: there are no points.
     """
-    other = deepcopy(model)
+    adapted = deepcopy(model)
     adapt_norms(
-        other, batches, lambda batch: scores_of(other, prepare_on_gpu(configuration, move_to_device(other, batch)))
+        adapted,
+        batches,
+        lambda batch: scores_of(adapted, prepare_on_gpu(configuration, move_to_device(adapted, batch))),
     )
-    return other
+    return adapted
 
 
 Batch = dict[str, Tensor]
@@ -65,9 +67,9 @@ def adapt_norms(model: nn.Module, batches: Iterable[B], scores: Callable[[B], Te
     own statistics, as in training, and those of all batches are pooled, by their numbers of points. Weights stay.
 
     Args:
-        model: comes back with the modes that it had; if an error comes up, also with its old statistics.
-        batches: of the other domain, without effects; crops as large as in training.
-        scores: runs the model on a batch; returns one row per point.
+        model: network; its modes are restored, and after an error its statistics too.
+        batches: batches of the other domain, without effects; crops as large as in training.
+        scores: function that runs the model on a batch and returns one row per point.
 
     Returns:
         The number of points looked at.
@@ -75,11 +77,11 @@ def adapt_norms(model: nn.Module, batches: Iterable[B], scores: Callable[[B], Te
     Raises:
         InputError: there are no points.
     """
-    norms = [each for each in model.modules() if isinstance(each, _BatchNorm) and each.running_mean is not None]
-    before = [{name: value.clone() for name, value in norm.state_dict().items()} for norm in norms]
-    modes, momenta = [(each, each.training) for each in model.modules()], [norm.momentum for norm in norms]
+    norms = [module for module in model.modules() if isinstance(module, _BatchNorm) and module.running_mean is not None]
+    previous_states = [{name: value.clone() for name, value in norm.state_dict().items()} for norm in norms]
+    modes, momenta = [(module, module.training) for module in model.modules()], [norm.momentum for norm in norms]
     pools = [_Pool(norm) for norm in norms]
-    done = False
+    has_succeeded = False
     try:
         model.eval()  # no dropout
         for norm in norms:
@@ -88,20 +90,21 @@ def adapt_norms(model: nn.Module, batches: Iterable[B], scores: Callable[[B], Te
         points = sum(_pool_statistics(pools, scores, batch) for batch in batches)
         if not points:
             raise InputError("adaptation", 0, "needs points of the domain to adapt to")
-        done = True
+        has_succeeded = True
     finally:
-        for norm, state, momentum in zip(norms, before, momenta, strict=True):
+        for norm, state, momentum in zip(norms, previous_states, momenta, strict=True):
             norm.load_state_dict(state)
             norm.momentum = momentum
-        for each, training in modes:
-            each.training = training
-    if done:
+        for module, training in modes:
+            module.training = training
+    if has_succeeded:
         for pool in pools:
             pool.store()
     return points
 
 
 def _pool_statistics(pools: list[_Pool], scores: Callable[[B], Tensor], batch: B) -> int:
+    """Run the model on a batch, add its norms' statistics to their pools, and return its points."""
     with torch.no_grad():
         points = len(scores(batch))
         for pool in pools:
@@ -121,12 +124,13 @@ class _Pool:
         self.square = torch.zeros_like(self.mean)
 
     def _batches(self) -> int:
+        """Return the number of batches that the norm has seen."""
         return 0 if self.norm.num_batches_tracked is None else int(self.norm.num_batches_tracked)
 
     def add(self, points: int) -> None:
         """Add the statistics of the norm's last batch of `points`, unless it updated none (a single point)."""
-        seen, self.seen = self.seen, self._batches()
-        if self.seen == seen or self.norm.running_mean is None or self.norm.running_var is None:
+        previous_count, self.seen = self.seen, self._batches()
+        if self.seen == previous_count or self.norm.running_mean is None or self.norm.running_var is None:
             return
         mean, variance = self.norm.running_mean.double(), self.norm.running_var.double()
         self.weight += points

@@ -30,48 +30,49 @@ def fit_offsets(tiles: Sequence[CloudTile], classifier: Classifier, configuratio
     """Return the offsets (C,) of the classes' scores by which the mean IoU over thinned, labelled tiles is largest.
 
     Args:
-        tiles: of the training.
-        classifier: scores of the trained network.
-        configuration: of the training.
+        tiles: thinned training tiles.
+        classifier: function that returns the trained network's scores.
+        configuration: configuration of the training.
     """
-    every = -(-sum(map(len, tiles)) // MOST_POINTS)
-    chosen = tiles[::every]
+    stride = -(-sum(map(len, tiles)) // MOST_POINTS)
+    sampled_tiles = tiles[::stride]
     scaling = scalings(tiles, configuration.intensity)
     # By one view thresholds hardly differ, and it takes a part of the time.
     settings = replace(configuration.crop_settings(), votes=1)
     scores: list[Float32] = []
     truth: list[Int] = []
-    for tile in chosen:
-        for inside, piece in piece_scores(tile, scaling[tile.scene], classifier, settings):
-            known = tile.segment[inside] != IGNORED
-            scores.append(piece.float().cpu().numpy()[known])
-            truth.append(tile.segment[inside][known].astype(np.int64))
+    for tile in sampled_tiles:
+        for indices, piece_score in piece_scores(tile, scaling[tile.scene], classifier, settings):
+            has_label = tile.segment[indices] != IGNORED
+            scores.append(piece_score.float().cpu().numpy()[has_label])
+            truth.append(tile.segment[indices][has_label].astype(np.int64))
     return best_offsets(np.concatenate(scores), np.concatenate(truth))
 
 
 def best_offsets(scores: Float32, truth: Int) -> Float:
     """Return the offsets (C,) at which the mean IoU of the largest scores (N, C) against true classes (N,) is largest.
 
-    It goes up one class at a time, by ever smaller steps. Classes without a point get none.
+    Coordinate ascent: one class's offset changes at a time, by ever smaller steps. Classes without a point keep 0.
     """
-    there = np.unique(truth)
+    present_classes = np.unique(truth)
     offsets = np.zeros(scores.shape[1])
-    best = _mean_iou(scores, truth)
+    best_iou = _mean_iou(scores, truth)
     for step in _STEPS:
         improved = True
         while improved:
             improved = False
-            for place in there:
+            for class_index in present_classes:
                 for change in (step, -step):
-                    tried = offsets.copy()
-                    tried[place] += change
-                    reached = _mean_iou(scores + tried.astype(np.float32), truth)
-                    if reached > best + _LEAST_GAIN:
-                        offsets, best, improved = tried, reached, True
+                    trial_offsets = offsets.copy()
+                    trial_offsets[class_index] += change
+                    trial_iou = _mean_iou(scores + trial_offsets.astype(np.float32), truth)
+                    if trial_iou > best_iou + _LEAST_GAIN:
+                        offsets, best_iou, improved = trial_offsets, trial_iou, True
     return offsets
 
 
 def _mean_iou(scores: Float32, truth: Int) -> float:
-    confusion = Confusion([str(place) for place in range(scores.shape[1])])
+    """Return the mean IoU of the classes of largest scores (N, C) against true classes (N,)."""
+    confusion = Confusion([str(class_index) for class_index in range(scores.shape[1])])
     confusion.add(truth, scores.argmax(axis=1))
     return confusion.mean("iou")

@@ -45,7 +45,7 @@ TILE = 48.0
 MARGIN = 6.0
 """Width that a tile sees of the tiles around it, m: at least that of the pieces within."""
 _RECORD = np.dtype([("place", "<f4", 3), ("rgb", "<u2", 3), ("intensity", "<u2"), ("index", "<i8")])
-"""Fields that are kept of a point in a tile's file."""
+"""Fields of a point in a tile's file."""
 
 _COPC = "copc"
 """User id of the records of cloud-optimised files."""
@@ -56,10 +56,10 @@ class Labelling:
     """A trained classifier with the settings by which it labels points.
 
     Attributes:
-        classifier: scores of a batch.
-        settings: voxel and features.
-        scheme: classes.
-        intensity: ``share`` or ``robust``, as in training.
+        classifier: function that returns the scores of a batch.
+        settings: voxel, features and votes.
+        scheme: scheme of the classes.
+        intensity: scaling of intensities, ``share`` or ``robust``, as in training.
     """
 
     classifier: Classifier
@@ -85,10 +85,10 @@ def predict_file(
 
     Args:
         source, target: ending in .las or .laz; the target appears when it is whole.
-        labelling: what labels the points.
+        labelling: classifier that labels the points, with its settings.
         classification: write the classes' LAS codes to the standard field ``classification`` too.
         overwrite: whether the target may be replaced.
-        progress: told stage and share.
+        progress: called with the stage and its share.
 
     Raises:
         MissingFileError: there is no such file.
@@ -96,7 +96,7 @@ def predict_file(
         OutputError: the target is there already or can't be written.
     """
     _check(source, target, overwrite, labelling.scheme, classification)
-    begin = time.perf_counter()
+    start_time = time.perf_counter()
     with writable_folder(target.parent, shown_path=target), scratch_folder(target.parent) as folder:
         store = TileStore(folder)
         count = store.fill(source, progress)
@@ -105,14 +105,14 @@ def predict_file(
         labels = np.memmap(folder / "labels", dtype=np.uint8, mode="w+", shape=(count,))
         labels[:] = UNLABELLED
         scaling = store.scaling(labelling.intensity, labelling.settings.voxel)
-        done = 0
+        labelled_count = 0
         for tile, core, index in store.tiles():
             labels[index] = label_tile(tile, scaling, labelling.classifier, labelling.settings, core)
-            done += len(index)
-            progress("labelling", done / store.count)
+            labelled_count += len(index)
+            progress("labelling", labelled_count / store.count)
         counts = write_copy(source, target, labels, labelling.scheme, classification, progress)
         del labels
-    seconds = time.perf_counter() - begin
+    seconds = time.perf_counter() - start_time
     names = [row.name for row in labelling.scheme.rows]
     return {
         "attribute": PREDICTED,
@@ -126,9 +126,9 @@ def predict_file(
 
 def _check(source: Path, target: Path, overwrite: bool, scheme: ClassScheme, classification: bool) -> None:
     """Raise `InputError` or `OutputError` if source or target can't be used."""
-    for path, what in ((source, "cloud"), (target, "--output")):
+    for path, field in ((source, "cloud"), (target, "--output")):
         if path.suffix.lower() not in (".las", ".laz"):
-            raise InputError(what, str(path), "must end in .las or .laz")
+            raise InputError(field, str(path), "must end in .las or .laz")
     check_file_target(target, overwrite=overwrite)
     with open_cloud(source) as cloud:
         if cloud.header.count == 0:
@@ -141,8 +141,8 @@ class TileStore:
     """A cloud sorted into square tiles on disk.
 
     Args:
-        folder: for the tiles' files.
-        edge: of a tile, m.
+        folder: folder for the tiles' files.
+        edge: edge of a tile, m.
 
     Attributes:
         count: number of points in the tiles.
@@ -152,24 +152,24 @@ class TileStore:
         self._folder, self._edge = folder / "tiles", edge
         self._folder.mkdir()
         self.count = 0
-        self._known: set[tuple[int, int]] = set()
+        self._written_tiles: set[tuple[int, int]] = set()
         self._has_intensity = False
         self._colored = False
 
     def fill(self, source: Path, progress: Progress) -> int:
-        """Sort a cloud's points that may be worked with into the tiles' files; return how many points it has in all."""
-        done = 0
+        """Sort a cloud's usable points into the tiles' files; return the number of all its points."""
+        read_count = 0
         with open_cloud(source) as cloud:
             self._origin = np.floor(np.asarray(cloud.header.offset, dtype=np.float64))
             scale = cloud.header.intensity_scale or 1.0
-            for whole in cloud.blocks(BLOCK):
-                kept = cloud.usable_points(whole)
-                index = done + np.flatnonzero(kept)
-                done += len(whole)
-                progress("reading", done / cloud.header.count)
+            for file_block in cloud.blocks(BLOCK):
+                is_usable = cloud.usable_points(file_block)
+                index = read_count + np.flatnonzero(is_usable)
+                read_count += len(file_block)
+                progress("reading", read_count / cloud.header.count)
                 if not len(index):
                     continue
-                block = whole.select(kept)
+                block = file_block.select(is_usable)
                 if self.count == 0:
                     self._origin = np.floor(block.xyz.min(axis=0))
                 record = np.empty(len(block), dtype=_RECORD)
@@ -182,23 +182,25 @@ class TileStore:
                 self._colored |= bool(block.rgb.any())
                 self._append(tile, record)
                 self.count += len(block)
-        return done
+        return read_count
 
     def scaling(self, kind: str, voxel: float) -> Scaling:
         """Return the scaling of the cloud's intensities, ``share`` or ``robust`` over one point per voxel (m)."""
         if kind == "share" or not self._has_intensity:
             return Scaling()
         histogram = np.zeros(LEVELS, dtype=np.int64)
-        for row, column in self._known:
+        for row, column in self._written_tiles:
             record = np.fromfile(self._folder / f"{row}_{column}", dtype=_RECORD)
             histogram += np.bincount(record["intensity"][voxel_sample(record["place"], voxel)], minlength=LEVELS)
         share = np.cumsum(histogram) / histogram.sum()
-        low, middle, high = (int(np.searchsorted(share, at)) / FULL for at in (0.1, 0.5, 0.9))
-        return Scaling(middle, high - low if high > low else 1.0)
+        lower_decile, median, upper_decile = (
+            int(np.searchsorted(share, cumulative_share)) / FULL for cumulative_share in (0.1, 0.5, 0.9)
+        )
+        return Scaling(median, upper_decile - lower_decile if upper_decile > lower_decile else 1.0)
 
     def tiles(self) -> Iterator[tuple[CloudTile, Bool, Int]]:
-        """Yield each tile with its margin, the mask of its own points, and their indices in the file."""
-        for row, column in sorted(self._known):
+        """Yield each tile with its margin, the mask of the points within the tile, and their indices in the file."""
+        for row, column in sorted(self._written_tiles):
             parts, cores = [], []
             for north in (-1, 0, 1):
                 for east in (-1, 0, 1):
@@ -218,8 +220,13 @@ class TileStore:
             yield tile, core, record["index"][core]
 
     def _near(self, row: int, column: int, north: int, east: int) -> AnyArray:
-        """Return a tile's points within `MARGIN` of the tile that it is ``north`` and ``east`` of, relative to that."""
-        if (row, column) not in self._known:
+        """Return a tile's points within `MARGIN` of a neighbouring tile, in that one's coordinates.
+
+        Args:
+            row, column: place of the tile.
+            north, east: rows and columns by which it lies north and east of the neighbour, -1 to 1.
+        """
+        if (row, column) not in self._written_tiles:
             return np.empty(0, dtype=_RECORD)
         record = np.fromfile(self._folder / f"{row}_{column}", dtype=_RECORD)
         record["place"][:, 0] += np.float32(east * self._edge)
@@ -227,8 +234,8 @@ class TileStore:
         plan = record["place"][:, :2]
         if north == 0 and east == 0:
             return record
-        inside: AnyArray = record[np.all((plan >= -MARGIN) & (plan < self._edge + MARGIN), axis=1)]
-        return inside
+        margin_points: AnyArray = record[np.all((plan >= -MARGIN) & (plan < self._edge + MARGIN), axis=1)]
+        return margin_points
 
     def _corner(self, tile: Int) -> Float:
         """Return the map coordinates (N, 3) of the corners of tiles (N, 2): column and row."""
@@ -236,14 +243,15 @@ class TileStore:
         return np.concatenate([plan, np.full((len(tile), 1), self._origin[2])], axis=1)
 
     def _append(self, tile: Int, record: AnyArray) -> None:
+        """Append records (N,) to the files of their tiles (N, 2: column, row)."""
         order = np.lexsort(tile.T)
         tile, record = tile[order], record[order]
         starts = np.flatnonzero(np.r_[True, np.any(tile[1:] != tile[:-1], axis=1)])
-        for first, last in zip(starts, np.r_[starts[1:], len(tile)], strict=True):
-            column, row = int(tile[first, 0]), int(tile[first, 1])
-            self._known.add((row, column))
+        for begin, end in zip(starts, np.r_[starts[1:], len(tile)], strict=True):
+            column, row = int(tile[begin, 0]), int(tile[begin, 1])
+            self._written_tiles.add((row, column))
             with (self._folder / f"{row}_{column}").open("ab") as file:
-                file.write(record[first:last].tobytes())
+                file.write(record[begin:end].tobytes())
 
 
 def write_copy(
@@ -269,17 +277,17 @@ def write_copy(
             header = extended_header(reader.header, scheme, classification)
             compress = target.suffix.lower() == ".laz"
             with laspy.open(temporary, "w", header=header, do_compress=compress) as writer:
-                done = 0
-                for old in reader.chunk_iterator(BLOCK):
-                    places = np.asarray(labels[done : done + len(old)])
-                    writer.write_points(extended_record(old, header, ids[places], codes))
-                    counts += np.bincount(places, minlength=256)
-                    done += len(old)
-                    progress("writing", done / reader.header.point_count)
-                if done != len(labels):
-                    raise damage_error(source, done, len(labels))
-                if kept := [record for record in reader.evlrs or () if record.user_id != _COPC]:
-                    writer.write_evlrs(type(reader.evlrs)(kept))
+                written_count = 0
+                for source_points in reader.chunk_iterator(BLOCK):
+                    class_indices = np.asarray(labels[written_count : written_count + len(source_points)])
+                    writer.write_points(extended_record(source_points, header, ids[class_indices], codes))
+                    counts += np.bincount(class_indices, minlength=256)
+                    written_count += len(source_points)
+                    progress("writing", written_count / reader.header.point_count)
+                if written_count != len(labels):
+                    raise damage_error(source, written_count, len(labels))
+                if extended_records := [record for record in reader.evlrs or () if record.user_id != _COPC]:
+                    writer.write_evlrs(type(reader.evlrs)(extended_records))
             copy_header_texts(source, temporary)
             sync_file(temporary)
             temporary.replace(target)
@@ -292,25 +300,25 @@ def write_copy(
 
 def copy_header_texts(source: Path, target: Path) -> None:
     """Copy a LAS file's system identifier and generating software byte by byte into another, in place."""
-    with source.open("rb") as old, target.open("r+b") as new:
-        old.seek(HEADER_TEXTS.start)
-        new.seek(HEADER_TEXTS.start)
-        new.write(old.read(len(HEADER_TEXTS)))
+    with source.open("rb") as source_file, target.open("r+b") as target_file:
+        source_file.seek(HEADER_TEXTS.start)
+        target_file.seek(HEADER_TEXTS.start)
+        target_file.write(source_file.read(len(HEADER_TEXTS)))
 
 
-def extended_header(old: laspy.LasHeader, scheme: ClassScheme, needs_codes: bool) -> laspy.LasHeader:
+def extended_header(source_header: laspy.LasHeader, scheme: ClassScheme, needs_codes: bool) -> laspy.LasHeader:
     """Return a copy of a LAS header with the predicted-class attribute, without COPC records and identifier texts.
 
-    A record of ours names the scheme's classes, in place of one from an earlier run.
+    One of its variable-length records names the scheme's classes, in place of one from an earlier run.
 
     Raises:
         InputError: LAS codes are wanted, and the file's point format holds those up to 31 only.
     """
-    header = deepcopy(old)
+    header = deepcopy(source_header)
     # An index of the points as they were ordered and compressed in a COPC file; the copy is a plain LAZ file.
-    dropped = (_COPC, None), (OWN, PREDICTED_CLASSES)
-    kept = (v for v in header.vlrs if not {(v.user_id, None), (v.user_id, v.record_id)} & set(dropped))
-    header.vlrs = type(header.vlrs)(kept)
+    dropped_records = (_COPC, None), (OWN, PREDICTED_CLASSES)
+    kept_records = (v for v in header.vlrs if not {(v.user_id, None), (v.user_id, v.record_id)} & set(dropped_records))
+    header.vlrs = type(header.vlrs)(kept_records)
     names = compact_json(scheme.to_dict()).encode()
     header.vlrs.append(laspy.VLR(OWN, PREDICTED_CLASSES, "predicted classes", names))
     # laspy gives bytes where they aren't ASCII, and doesn't take them back.
@@ -325,17 +333,17 @@ def extended_header(old: laspy.LasHeader, scheme: ClassScheme, needs_codes: bool
 
 
 def extended_record(
-    old: Any, header: laspy.LasHeader, ids: UInt8, codes: ClassScheme | None
+    source_points: Any, header: laspy.LasHeader, ids: UInt8, codes: ClassScheme | None
 ) -> laspy.ScaleAwarePointRecord:
     """Return a copy of LAS points with predicted class ids, all else bit for bit.
 
     With `codes`, points that aren't `UNLABELLED` have the LAS codes of these classes too.
     """
-    record = laspy.ScaleAwarePointRecord.zeros(len(old), header=header)
-    for name in old.array.dtype.names:
-        record.array[name] = old.array[name]
+    record = laspy.ScaleAwarePointRecord.zeros(len(source_points), header=header)
+    for name in source_points.array.dtype.names:
+        record.array[name] = source_points.array[name]
     record.array[PREDICTED] = ids
     if codes is not None:
-        labelled = ids != UNLABELLED
-        record.array["classification"][labelled] = codes.las_codes()[ids[labelled]]
+        has_label = ids != UNLABELLED
+        record.array["classification"][has_label] = codes.las_codes()[ids[has_label]]
     return record

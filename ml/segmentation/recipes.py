@@ -126,12 +126,14 @@ class SegmentationConfiguration(Configuration):
     @field_validator("features")
     @classmethod
     def _refuse_repetitions(cls, features: tuple[Feature, ...]) -> tuple[Feature, ...]:
+        """Refuse a feature that is named twice."""
         if len(set(features)) < len(features):
-            raise ValueError("features must differ")
+            raise ValueError("features must not name a feature twice")
         return features
 
     @model_validator(mode="after")
     def _check_data(self) -> SegmentationConfiguration:
+        """Refuse options that don't fit the set-up or the stream of scenes."""
         if self.synthetic_share is not None and not self.set_up.startswith("mixed"):
             raise ValueError(f"synthetic_share is for mixed set-ups, not for {self.set_up}")
         if self.start_share and not self.start:
@@ -156,8 +158,8 @@ class SegmentationConfiguration(Configuration):
         Raises:
             InputError: the set-up needs data of a kind and none are named.
         """
-        alone = {"real": ("real",), "synthetic": ("synthetic",), "self_trained": ("synthetic",)}
-        domains = alone.get(self.set_up, ("synthetic", "real"))
+        single_domains = {"real": ("real",), "synthetic": ("synthetic",), "self_trained": ("synthetic",)}
+        domains = single_domains.get(self.set_up, ("synthetic", "real"))
         sources = {"real": self.data.real, "synthetic": self.data.synthetic}
         for domain in domains:
             if not sources[domain] and not (domain == "synthetic" and self.data.stream is not None):
@@ -181,11 +183,12 @@ def class_shares(tiles: Sequence[CloudTile], classes: int) -> Float:
 
 def class_weights(shares: Float, power: float = 1.0) -> Float:
     """Return the classes' loss weights (C,): 1 / (share + 0.02) to a power, scaled to the mean 1."""
+    # Chosen: 0.02 bounds the weight of a rare class to 50 times that of one that is everywhere.
     weights = (shares + 0.02) ** -power
     return np.asarray(weights / weights.mean(), dtype=np.float64)
 
 
-def mapped_intensities(synthetic: Sequence[CloudTile], real: Sequence[CloudTile]) -> list[CloudTile]:
+def map_intensities(synthetic: Sequence[CloudTile], real: Sequence[CloudTile]) -> list[CloudTile]:
     """Return the synthetic tiles with intensities quantile-mapped to the real tiles' distribution.
 
     Both are training data: nothing of a test is looked at.
@@ -193,8 +196,8 @@ def mapped_intensities(synthetic: Sequence[CloudTile], real: Sequence[CloudTile]
     Raises:
         InputError: one of them has no intensities.
     """
-    have, want = _histogram(synthetic, "data.synthetic"), _histogram(real, "data.real")
-    mapping = QuantileMap(have, want)
+    synthetic_histogram, real_histogram = _histogram(synthetic, "data.synthetic"), _histogram(real, "data.real")
+    mapping = QuantileMap(synthetic_histogram, real_histogram)
     return [
         replace(tile, strength=(mapping.map(_levels(tile)) / FULL).astype(np.float32))
         if tile.strength is not None
@@ -204,11 +207,13 @@ def mapped_intensities(synthetic: Sequence[CloudTile], real: Sequence[CloudTile]
 
 
 def _levels(tile: CloudTile) -> Index:
+    """Return a tile's intensities (N,) as 16-bit levels."""
     assert tile.strength is not None
     return np.rint(np.clip(tile.strength, 0.0, 1.0) * FULL).astype(np.intp)
 
 
 def _histogram(tiles: Sequence[CloudTile], where: str) -> Int:
+    """Return the number of points by 16-bit intensity level over all tiles; InputError without any."""
     counts = np.zeros(LEVELS, dtype=np.int64)
     for tile in tiles:
         if tile.strength is not None:
@@ -230,23 +235,23 @@ def plan(
 
     Args:
         domains: number of tiles of each domain, the synthetic one first where there are two.
-        per_tile: crops of a tile; all tiles' together are the epoch's.
+        per_tile: number of crops of a tile; the epoch has those of all tiles.
         synthetic_share: share of the first domain's crops; None for ``per_tile`` crops of every tile.
-        seed, epoch: of the order, and of which tiles have one crop more where the share leaves a rest.
-        total: the epoch's crops, in the place of ``per_tile``.
+        seed, epoch: key of the random order, which also decides the tiles with one crop more where a rest is left.
+        total: number of the epoch's crops, in the place of ``per_tile``; None for that.
     """
-    whole = sum(domains)
-    total = per_tile * whole if total is None else total
+    tile_count = sum(domains)
+    total = per_tile * tile_count if total is None else total
     random = stream(seed, "plan", epoch)
     if synthetic_share is None or len(domains) < 2:
-        counts = np.diff(np.rint(total * np.cumsum([0, *domains]) / whole).astype(int)).tolist()
+        counts = np.diff(np.rint(total * np.cumsum([0, *domains]) / tile_count).astype(int)).tolist()
     else:
-        first = min(max(round(total * synthetic_share), 1), total - 1)
-        counts = [first, total - first]
+        synthetic_crops = min(max(round(total * synthetic_share), 1), total - 1)
+        counts = [synthetic_crops, total - synthetic_crops]
     draws: list[Draw] = []
     begin = 0
     for tiles, count in zip(domains, counts, strict=True):
         order = random.permutation(tiles)
         draws += [Draw(begin + int(order[k % tiles]), k // tiles) for k in range(count)]
         begin += tiles
-    return [draws[place] for place in random.permutation(len(draws))]
+    return [draws[draw_index] for draw_index in random.permutation(len(draws))]

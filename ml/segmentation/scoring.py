@@ -47,37 +47,45 @@ Classifier = Callable[[Item], torch.Tensor]
 
 def overlapping_pieces(
     plan: NDArray[np.floating[Any]],
-    own: Bool | None = None,
+    core_mask: Bool | None = None,
     edge: float = EDGE,
     margin: float = MARGIN,
     largest: int = LARGEST,
 ) -> Iterator[tuple[Index, Index]]:
-    """Yield square pieces of a tile as (indices of their own points, indices of these and the points around).
+    """Yield square pieces of a tile as (indices of the points within, indices of these and of the points around).
 
-    Every point that is to be in a piece is in exactly one.
+    Every point of the core lies within exactly one piece.
 
     Args:
         plan: (N, 2) m.
-        own: (N,) which points are to be in a piece, the others being seen only; all if not given.
-        edge: of the squares, m.
-        margin: seen around them, m.
-        largest: points seen; squares with more are cut in four.
+        core_mask: (N,) mask of the points to lie within pieces, the others being context; None for all.
+        edge: edge of the squares, m.
+        margin: width of the context around a square, m.
+        largest: largest number of points of a piece with its context; squares with more are cut in four.
     """
-    members = np.arange(len(plan)) if own is None else np.flatnonzero(own)
+    members = np.arange(len(plan)) if core_mask is None else np.flatnonzero(core_mask)
     if len(members) == 0:
         return
     position = np.asarray(plan, dtype=np.float64)
 
-    def cut(inside: Index, seen: Index, low: Float, edge: float, margin: float) -> Iterator[tuple[Index, Index]]:
-        """Yield the pieces of squares counted from ``low``, recursively smaller; ``seen`` are candidates around."""
-        cells = np.floor((position[inside] - low) / edge).astype(np.int64)
+    def cut(members: Index, candidates: Index, low: Float, edge: float, margin: float) -> Iterator[tuple[Index, Index]]:
+        """Yield the pieces in squares of a grid from a corner on, recursively smaller where points are many."""
+        cells = np.floor((position[members] - low) / edge).astype(np.int64)
         for cell in np.unique(cells, axis=0):
-            core, corner, near = inside[np.all(cells == cell, axis=1)], low + cell * edge, position[seen]
-            around = seen[np.all((near >= corner - margin) & (near < corner + edge + margin), axis=1)]
-            if len(around) > largest and edge / 2 >= _SMALLEST_EDGE:
-                yield from cut(core, around, corner, edge / 2, min(margin, edge / 2))
+            core = members[np.all(cells == cell, axis=1)]
+            square_corner = low + cell * edge
+            candidate_positions = position[candidates]
+            visible_points = candidates[
+                np.all(
+                    (candidate_positions >= square_corner - margin)
+                    & (candidate_positions < square_corner + edge + margin),
+                    axis=1,
+                )
+            ]
+            if len(visible_points) > largest and edge / 2 >= _SMALLEST_EDGE:
+                yield from cut(core, visible_points, square_corner, edge / 2, min(margin, edge / 2))
             else:
-                yield core, around
+                yield core, visible_points
 
     yield from cut(members, np.arange(len(plan)), position[members].min(axis=0), edge, margin)
 
@@ -94,20 +102,20 @@ def label_tile(
 
     Args:
         tile: N points of any density; its labels aren't looked at.
-        scaling: of its intensities.
+        scaling: scaling of the tile's intensities.
         classifier: scores (n, C) of a batch.
         settings: voxel and features.
-        core: (N,) the points whose class is wanted, in their order; all if not given.
-        seed: of the noise that stands for missing features.
+        core: (N,) mask of the points to label; None for all.
+        seed: seed of the noise that stands for missing features.
     """
-    keep = voxel_sample(tile.coord, settings.voxel)
-    small = tile.select(keep)
-    needed_rows = _needed_points(small.coord, tile.coord, core, settings.voxel)
-    labels = np.zeros(len(small), dtype=np.int16)
-    for inside, scores in piece_scores(small, scaling, classifier, settings, needed_rows, seed):
-        labels[inside] = scores.argmax(dim=1).cpu().numpy()
+    voxel_points = voxel_sample(tile.coord, settings.voxel)
+    thinned_tile = tile.select(voxel_points)
+    needed_rows = _needed_points(thinned_tile.coord, tile.coord, core, settings.voxel)
+    labels = np.zeros(len(thinned_tile), dtype=np.int16)
+    for indices, scores in piece_scores(thinned_tile, scaling, classifier, settings, needed_rows, seed):
+        labels[indices] = scores.argmax(dim=1).cpu().numpy()
     return nearest_labels(
-        small.coord[needed_rows], labels[needed_rows], tile.coord if core is None else tile.coord[core]
+        thinned_tile.coord[needed_rows], labels[needed_rows], tile.coord if core is None else tile.coord[core]
     )
 
 
@@ -116,49 +124,51 @@ def piece_scores(
     scaling: Scaling,
     classifier: Classifier,
     settings: CropSettings,
-    own: Bool | None = None,
+    core_mask: Bool | None = None,
     seed: int = 0,
 ) -> Iterator[tuple[Index, Tensor]]:
     """Yield the class scores (n, C) of a thinned tile's points, piece by piece, with the points' indices (n,).
 
-    With several votes they are logarithms of the views' mean probabilities, of all points at once.
+    With several votes the scores are logarithms of the views' mean probabilities, of all points at once.
 
     Args:
         tile: N points, one per voxel; its labels aren't looked at.
         scaling, classifier, settings, seed: see `label_tile`.
-        own: (N,) which points' scores are wanted; all if not given.
+        core_mask: (N,) mask of the points to score; None for all.
     """
     tile = replace(tile, segment=np.full(len(tile), IGNORED, dtype=np.int16))
     if settings.votes == 1:
-        yield from _view_scores(tile, scaling, classifier, settings, own, seed)
+        yield from _view_scores(tile, scaling, classifier, settings, core_mask, seed)
         return
     total: Tensor | None = None
     for view in range(settings.votes):
-        for inside, scores in _view_scores(_turned(tile, view), scaling, classifier, settings, own, seed):
+        for indices, scores in _view_scores(_rotate_tile(tile, view), scaling, classifier, settings, core_mask, seed):
             if total is None:
                 total = scores.new_zeros(len(tile), scores.shape[1], dtype=torch.float32)
-            total[torch.from_numpy(inside)] += scores.float().softmax(dim=1)
+            total[torch.from_numpy(indices)] += scores.float().softmax(dim=1)
     if total is not None:
-        rows = np.arange(len(tile)) if own is None else np.flatnonzero(own)
+        rows = np.arange(len(tile)) if core_mask is None else np.flatnonzero(core_mask)
         yield rows, (total[torch.from_numpy(rows)] / settings.votes).clamp_min(1e-9).log()
 
 
 def _view_scores(
-    tile: CloudTile, scaling: Scaling, classifier: Classifier, settings: CropSettings, own: Bool | None, seed: int
+    tile: CloudTile, scaling: Scaling, classifier: Classifier, settings: CropSettings, core_mask: Bool | None, seed: int
 ) -> Iterator[tuple[Index, Tensor]]:
     """Yield the scores of a tile's points in one view, piece by piece, with the points' indices; see `piece_scores`."""
-    for number, (inside, seen) in enumerate(overlapping_pieces(tile.coord[:, :2], own)):
-        batch = make_item(crop_of(tile.select(seen), scaling), settings, stream(seed, "missing features", number))
+    for number, (indices, visible_points) in enumerate(overlapping_pieces(tile.coord[:, :2], core_mask)):
+        batch = make_item(
+            crop_of(tile.select(visible_points), scaling), settings, stream(seed, "missing features", number)
+        )
         scores = classifier(batch)
         if not torch.isfinite(scores).all():
             raise InputError("network", None, NOT_FINITE)
-        yield inside, scores[torch.from_numpy(np.searchsorted(seen, inside))]
+        yield indices, scores[torch.from_numpy(np.searchsorted(visible_points, indices))]
 
 
-def _turned(tile: CloudTile, view: int) -> CloudTile:
-    """Return a tile as a view sees it: the first as it is, each further one turned on, every second one mirrored.
+def _rotate_tile(tile: CloudTile, view: int) -> CloudTile:
+    """Return a tile turned for a view: by the golden angle times its number, and mirrored for odd numbers.
 
-    Pieces are cut where it is turned to, so that each view has other borders.
+    Pieces are cut after turning, so that each view has other borders.
     """
     if view == 0:
         return tile
@@ -172,26 +182,27 @@ def _turned(tile: CloudTile, view: int) -> CloudTile:
     return replace(tile, coord=coord)
 
 
-def _needed_points(small: Float32, full: Float32, core: Bool | None, voxel: float) -> Bool:
+def _needed_points(thinned_points: Float32, all_points: Float32, core: Bool | None, voxel: float) -> Bool:
     """Return a mask of the thinned points within two voxels of the core's bounding box in plan; all without a core."""
     if core is None:
-        return np.ones(len(small), dtype=bool)
-    low, high = full[core][:, :2].min(axis=0) - 2 * voxel, full[core][:, :2].max(axis=0) + 2 * voxel
-    return np.asarray(np.all((small[:, :2] >= low) & (small[:, :2] <= high), axis=1))
+        return np.ones(len(thinned_points), dtype=bool)
+    lower_corner = all_points[core][:, :2].min(axis=0) - 2 * voxel
+    upper_corner = all_points[core][:, :2].max(axis=0) + 2 * voxel
+    return np.asarray(np.all((thinned_points[:, :2] >= lower_corner) & (thinned_points[:, :2] <= upper_corner), axis=1))
 
 
-def nearest_labels(known: Float32, labels: NDArray[np.int16], points: Float32) -> NDArray[np.int16]:
+def nearest_labels(labelled_points: Float32, labels: NDArray[np.int16], points: Float32) -> NDArray[np.int16]:
     """Return for each point (M,) the label of the nearest known point in 3D.
 
     Args:
-        known: (N, 3) m, at least one.
+        labelled_points: (N, 3) m, at least one.
         labels: (N,).
         points: (M, 3) m.
     """
     if len(points) == 0:
         return np.zeros(0, dtype=np.int16)
-    _, nearest = cKDTree(known).query(points)
-    return labels[nearest]
+    _, nearest_index = cKDTree(labelled_points).query(points)
+    return labels[nearest_index]
 
 
 def trained_model(run: Run[SegmentationConfiguration]) -> nn.Module:
@@ -221,6 +232,7 @@ def classifier(model: nn.Module, configuration: SegmentationConfiguration) -> Cl
     """Return a function from an item to class scores (N, C) by the model in evaluation mode, without gradients."""
 
     def scores(batch: Item) -> Tensor:
+        """Return the class scores (N, C) of an item's points."""
         model.eval()
         with torch.inference_mode():
             if not gpu_prepares(configuration, next(model.parameters()).device):
@@ -239,7 +251,7 @@ def check_tests(configuration: SegmentationConfiguration) -> None:
     """
     scheme = configuration.scheme()
     for sources in configuration.data.tests.values():
-        told_apart(sources, scheme)
+        target_names(sources, scheme)
         for source in sources:
             _groups(source, scheme)
             if next(read_tiles(source, scheme, None), None) is None:
@@ -268,33 +280,34 @@ def score(
         InputError: the sources tell different classes apart, or a mapping's groups leave out a class.
     """
     scheme = configuration.scheme()
-    confusion = Confusion(told_apart(sources, scheme))
+    confusion = Confusion(target_names(sources, scheme))
     if configuration.adaptation.adabn:
         tiles = list(thin_tiles(sources, configuration, "test"))
         with report_lost_workers(configuration.workers):
             batches = adaptation_batches(tiles, configuration, next(model.parameters()).device)
             model = adapt_network(model, batches, configuration)
     scores = classifier(model, configuration)
-    shown = None
+    largest_result = None
     for source in sources:
         groups = _groups(source, scheme)
-        for _, together in groupby(read_tiles(source, scheme, None), key=lambda tile: tile.scene):
-            scene = list(together)
+        for _, scene_tiles in groupby(read_tiles(source, scheme, None), key=lambda tile: tile.scene):
+            scene = list(scene_tiles)
             scaling = scalings(scene, configuration.intensity, configuration.voxel)
             for tile in scene:
                 labels = label_tile(tile, scaling[tile.scene], scores, configuration.crop_settings())
                 confusion.add(tile.segment, groups[labels])
-                if shown is None or len(tile) > len(shown[0]):
-                    shown = (tile, groups[labels])
+                if largest_result is None or len(tile) > len(largest_result[0]):
+                    largest_result = (tile, groups[labels])
+            # Half way: the number of tiles isn't known before they are read.
             progress("scoring", 0.5)
-    return confusion, shown
+    return confusion, largest_result
 
 
-def told_apart(sources: Sequence[Source], scheme: ClassScheme) -> tuple[str, ...]:
-    """Return the names of the classes, or groups, that the sources of one test tell apart.
+def target_names(sources: Sequence[Source], scheme: ClassScheme) -> tuple[str, ...]:
+    """Return the names of the classes, or groups, that the truth of one test's sources distinguishes.
 
     Raises:
-        InputError: they differ in this.
+        InputError: the sources distinguish different classes.
     """
     names = {source.targets(scheme) for source in sources}
     if len(names) != 1:

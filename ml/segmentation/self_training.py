@@ -17,7 +17,7 @@ from synthroads_addon.base.errors import InputError
 
 from ..data.classes import IGNORED, class_names
 from ..data.tiles import CloudTile, scalings
-from .loading import large_enough, thin_tiles
+from .loading import drop_slivers, thin_tiles
 from .recipes import SegmentationConfiguration
 from .scoring import Classifier, piece_scores
 
@@ -28,42 +28,44 @@ def target_tiles(configuration: SegmentationConfiguration) -> list[CloudTile]:
     Raises:
         MissingFileError, InputError: there are none, they are damaged, or hold no points.
     """
-    thinned = thin_tiles(configuration.data.target, configuration, "target", labels=False)
-    tiles = large_enough(list(thinned), configuration)
+    thin_tiles_of_target = thin_tiles(configuration.data.target, configuration, "target", labels=False)
+    tiles = drop_slivers(list(thin_tiles_of_target), configuration)
     if not tiles:
         raise InputError("data.target", 0, "holds no points to learn from")
     return tiles
 
 
-def believed_labels(
+def label_confident_points(
     tiles: Sequence[CloudTile], classifier: Classifier, configuration: SegmentationConfiguration
 ) -> list[CloudTile]:
-    """Return tiles labelled by a network where it is surest: of the points that it calls a class, that class's share.
+    """Return tiles labelled where a network is surest: of each class the same share of the points predicted as it.
 
     Args:
-        tiles: thinned ones, whose labels aren't looked at.
-        classifier: scores of the network.
-        configuration: of the training; ``self_training.believed`` is the share.
+        tiles: thinned tiles; their labels aren't used.
+        classifier: function that returns the network's scores.
+        configuration: configuration of the training; ``self_training.believed`` is the share.
     """
     scaling = scalings(tiles, configuration.intensity)
     labels, sureness = [], []
     for tile in tiles:
-        label, sure = np.zeros(len(tile), dtype=np.int16), np.zeros(len(tile), dtype=np.float32)
-        for inside, scores in piece_scores(tile, scaling[tile.scene], classifier, configuration.crop_settings()):
-            largest = scores.float().softmax(dim=1).max(dim=1)
-            label[inside], sure[inside] = largest.indices.cpu().numpy(), largest.values.cpu().numpy()
+        label, probability = np.zeros(len(tile), dtype=np.int16), np.zeros(len(tile), dtype=np.float32)
+        for indices, scores in piece_scores(tile, scaling[tile.scene], classifier, configuration.crop_settings()):
+            best_class = scores.float().softmax(dim=1).max(dim=1)
+            label[indices], probability[indices] = best_class.indices.cpu().numpy(), best_class.values.cpu().numpy()
         labels.append(label)
-        sureness.append(sure)
-    least = _thresholds(np.concatenate(labels), np.concatenate(sureness), configuration)
+        sureness.append(probability)
+    thresholds = _thresholds(np.concatenate(labels), np.concatenate(sureness), configuration)
     return [
-        replace(tile, segment=np.where(sure >= least[label], label, IGNORED).astype(np.int16))
-        for tile, label, sure in zip(tiles, labels, sureness, strict=True)
+        replace(tile, segment=np.where(probability >= thresholds[label], label, IGNORED).astype(np.int16))
+        for tile, label, probability in zip(tiles, labels, sureness, strict=True)
     ]
 
 
 def _thresholds(labels: AnyArray, sureness: Float32, configuration: SegmentationConfiguration) -> Float32:
-    """Return for each class (C,) the probability from which its label is believed; 2, which none has, without any."""
-    least = np.full(len(class_names(configuration.scheme())), 2.0, dtype=np.float32)
-    for place in np.unique(labels):
-        least[place] = np.quantile(sureness[labels == place], 1.0 - configuration.self_training.believed)
-    return least
+    """Return each class's least probability (C,) for its label to be kept; 2, which none reaches, without points."""
+    thresholds = np.full(len(class_names(configuration.scheme())), 2.0, dtype=np.float32)
+    for class_index in np.unique(labels):
+        thresholds[class_index] = np.quantile(
+            sureness[labels == class_index], 1.0 - configuration.self_training.believed
+        )
+    return thresholds

@@ -39,7 +39,7 @@ from .offsets import fit_offsets
 from .prediction import Labelling, predict_file
 from .recipes import SegmentationConfiguration, class_shares, class_weights
 from .scoring import check_tests, classifier, label_tile, load_weights, score, score_all, trained_model
-from .self_training import believed_labels, target_tiles
+from .self_training import label_confident_points, target_tiles
 
 OFFSETS = "offsets"
 """Key of the checkpoint's offsets that were added to the network's scores, (C,)."""
@@ -66,6 +66,7 @@ def train(run: SegmentationRun, progress: Progress = silent) -> dict[str, Any]:
 
 
 def _train_alone(run: SegmentationRun, progress: Progress) -> dict[str, Any]:
+    """Train a run's network as `train` does, with the run's folder locked."""
     configuration = run.configuration
     check_tests(configuration)
     device = chosen_device(configuration)
@@ -101,13 +102,13 @@ def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = 
     files: list[str] = []
     for path, name in zip(evaluation.data, _names(evaluation), strict=True):
         source = _test_source(path, evaluation)
-        confusion, shown = score(model, configuration, [source], progress)
+        confusion, largest_result = score(model, configuration, [source], progress)
         results[name] = confusion.to_dict()
         tables[name] = score_table(results[name]) + "\n"
         files.append(f"{name}.txt")
         write_file(evaluation.output / files[-1], tables[name].encode(), overwrite=True)
-        if shown is not None:
-            tile, labels = shown
+        if largest_result is not None:
+            tile, labels = largest_result
             scheme = configuration.scheme()
             files.append(f"{name}.png")
             picture = comparison(tile, labels, source.targets(scheme), scheme)
@@ -127,28 +128,31 @@ def exportable(run: SegmentationRun) -> Exportable:
 
 
 def _names(evaluation: Evaluation) -> list[str]:
-    """Return a unique name for each of the data: its path's last parts, as many as tell all apart.
+    """Return a unique name for each of the data: the last parts of its path, as few as make all names differ.
 
     Raises:
-        InputError: data are given twice.
+        InputError: a path is given twice.
     """
-    places = [
+    unique_paths = [
         path.parent / f"{path.name}-{evaluation.split}" if path.is_dir() else path.with_suffix("")
-        for path in (given.absolute() for given in evaluation.data)
+        for path in (path_places.absolute() for path_places in evaluation.data)
     ]
-    given = zip(evaluation.data, places, strict=True)
-    if twice := sorted(str(path) for path, place in given if places.count(place) > 1):
-        raise InputError("data", twice[0], "is given twice, or with two endings")
-    longest = max(len(place.parts) for place in places)
-    tried = (["-".join(place.parts[-parts:]) for place in places] for parts in range(1, longest + 1))
-    return next(names for names in tried if len(set(names)) == len(names))
+    path_places = zip(evaluation.data, unique_paths, strict=True)
+    if repeated_paths := sorted(str(path) for path, unique_path in path_places if unique_paths.count(unique_path) > 1):
+        raise InputError("data", repeated_paths[0], "is given twice, or with two endings")
+    longest = max(len(unique_path.parts) for unique_path in unique_paths)
+    name_candidates = (
+        ["-".join(unique_path.parts[-parts:]) for unique_path in unique_paths] for parts in range(1, longest + 1)
+    )
+    return next(names for names in name_candidates if len(set(names)) == len(names))
 
 
 def _test_source(path: Path, evaluation: Evaluation) -> Source:
-    """Return a test's source; a cloud of up to 5 million points is one tile, as tiles' edges see less around them."""
+    """Return a test's source; a cloud of up to 5 million points is one tile, as points at tiles' edges lack context."""
     if path.is_dir():
-        told = {"mapping": evaluation.mapping, "yardstick": evaluation.yardstick}
-        return Source(path=str(path), split=evaluation.split, **told)
+        class_options = {"mapping": evaluation.mapping, "yardstick": evaluation.yardstick}
+        return Source(path=str(path), split=evaluation.split, **class_options)
+    # Chosen: tiles of 60 m bound memory; 1 km takes in a small cloud as a whole.
     tile = 60.0
     if path.suffix.lower() in ENDINGS and path.is_file():
         with suppress(InputError), open_cloud(path) as cloud:  # a packed file is no cloud
@@ -194,7 +198,7 @@ def train_network(run: Run[SegmentationConfiguration], progress: Progress = sile
     model = build(configuration).to(device)
     if configuration.start:
         _begin_with(model, configuration)
-    begun = deepcopy(model.state_dict())
+    start_weights = deepcopy(model.state_dict())
     target = target_tiles(configuration) if configuration.set_up == "self_trained" else []
     run.begin()
     with _scene_stream(run, progress) as stream:
@@ -202,12 +206,12 @@ def train_network(run: Run[SegmentationConfiguration], progress: Progress = sile
             _self_train(model, run, domains, target, validation, progress)
         elif configuration.set_up == "fine_tuned":
             _fit(model, _pretraining(run), {"synthetic": domains["synthetic"]}, validation, progress, stream)
-            second = configuration.model_copy(update={"schedule": configuration.fine_tuning})
-            _fit(model, replace(run, configuration=second), {"real": domains["real"]}, validation, progress)
+            fine_tuning = configuration.model_copy(update={"schedule": configuration.fine_tuning})
+            _fit(model, replace(run, configuration=fine_tuning), {"real": domains["real"]}, validation, progress)
         else:
             _fit(model, run, domains, validation, progress, stream)
         if configuration.start_share:
-            _mix_with_start(model, run, begun)
+            _mix_with_start(model, run, start_weights)
         if configuration.fitted_offsets:
             _shift_scores(model, run, domains, stream)
     if stream is not None:
@@ -227,17 +231,17 @@ def _scene_stream(
     return SceneStream(options, configuration.seed, run.folder, epochs, ("pointcept",), progress)
 
 
-def _mix_with_start(model: nn.Module, run: Run[SegmentationConfiguration], begun: Mapping[str, Tensor]) -> None:
-    """Set the weights to a mean of those that the training began and ended with, in place, and save them; once.
+def _mix_with_start(model: nn.Module, run: Run[SegmentationConfiguration], start_weights: Mapping[str, Tensor]) -> None:
+    """Set the weights to a weighted mean of those at the training's start and end, in place, and save them; once.
 
-    Wortsman et al., "Robust fine-tuning of zero-shot models" (2022): what few labels say nothing of isn't forgotten.
+    Wortsman et al., "Robust fine-tuning of zero-shot models" (2022): classes that the new labels lack aren't forgotten.
     """
     state, share = run.last_checkpoint(next(model.parameters()).device), run.configuration.start_share
     if process_number() or state is None or MIXED in state:
         return
     for name, value in model.state_dict().items():
         if value.is_floating_point():
-            value.lerp_(begun[name], share)
+            value.lerp_(start_weights[name], share)
     run.save({**state, "model": model.state_dict(), MIXED: share})
 
 
@@ -254,25 +258,27 @@ def _shift_scores(
         device = next(model.parameters()).device
         batches = StreamedCropBatches(configuration, domains, stream, device)
         domains = batches.domains(configuration.schedule.epochs - 1)
-    tiles = [tile for several in domains.values() for tile in several]
+    tiles = [tile for domain_tiles in domains.values() for tile in domain_tiles]
     offsets = torch.from_numpy(fit_offsets(tiles, classifier(model, configuration), configuration))
     configuration.network.shift_scores(model, offsets)
     run.save({**state, "model": model.state_dict(), OFFSETS: offsets})
 
 
 def _begin_with(model: nn.Module, configuration: SegmentationConfiguration) -> None:
-    """Load the weights that a training begins with, in place.
+    """Load the weights of the run or model `start` into a network, in place.
 
     Raises:
         MissingFileError: there is no such run or model.
-        InputError: it is of another network, of other classes, or sees other features.
+        InputError: it has another network, other classes or other features.
     """
-    before = open_run(Path(configuration.start))
+    start_run = open_run(Path(configuration.start))
     for name in ("task", "classes", "features", "intensity", "network"):
-        told, value = getattr(before.configuration, name, None), getattr(configuration, name)
-        if told != value:
-            raise InputError("start", configuration.start, f"must have the same {name}: it has {told}, not {value}")
-    load_weights(model, before)
+        start_value, value = getattr(start_run.configuration, name, None), getattr(configuration, name)
+        if start_value != value:
+            raise InputError(
+                "start", configuration.start, f"must have the same {name}: it has {start_value}, not {value}"
+            )
+    load_weights(model, start_run)
 
 
 def _self_train(
@@ -287,13 +293,17 @@ def _self_train(
     configuration, rounds = run.configuration, run.configuration.self_training.rounds
     if not configuration.start:
         _fit(model, _pretraining(run), domains, validation, progress)
-    part = configuration.model_copy(update={"schedule": configuration.fine_tuning})
+    round_configuration = configuration.model_copy(update={"schedule": configuration.fine_tuning})
     for number in range(1, rounds + 1):
         folder = run.part(PRETRAINING, f"round-{number}")
-        last = number == rounds
-        round_run = replace(run, configuration=part) if last else Run.start(folder, part, resume=True)
-        labelled = believed_labels(target, classifier(model, configuration), configuration)
-        _fit(model, round_run, {**domains, "target": labelled}, validation, progress)
+        is_last_round = number == rounds
+        round_run = (
+            replace(run, configuration=round_configuration)
+            if is_last_round
+            else Run.start(folder, round_configuration, resume=True)
+        )
+        labelled_tiles = label_confident_points(target, classifier(model, configuration), configuration)
+        _fit(model, round_run, {**domains, "target": labelled_tiles}, validation, progress)
 
 
 def _pretraining(run: Run[SegmentationConfiguration]) -> Run[SegmentationConfiguration]:
@@ -337,9 +347,9 @@ def smoothed_loss(scores: Tensor, truth: Tensor, weights: Tensor, smoothing: flo
         weights: (C,).
         smoothing: from 0 to below 1.
     """
-    known = truth != IGNORED
-    losses = functional.cross_entropy(scores[known], truth[known], reduction="none", label_smoothing=smoothing)
-    weight = weights[truth[known]]
+    has_label = truth != IGNORED
+    losses = functional.cross_entropy(scores[has_label], truth[has_label], reduction="none", label_smoothing=smoothing)
+    weight = weights[truth[has_label]]
     return (losses * weight).sum() / weight.sum().clamp_min(1e-12)
 
 
@@ -355,11 +365,12 @@ def objective(
     weights = torch.from_numpy(class_weights(shares, configuration.class_weights).astype(np.float32)).to(device)
 
     def loss(model: nn.Module, batch: Item) -> tuple[Tensor, Figures]:
+        """Return the loss of a batch, and the share of labelled points with the right class."""
         scores, truth = scores_of(model, prepare_on_gpu(configuration, batch)), batch["segment"]
         value = smoothed_loss(scores, truth, weights, configuration.label_smoothing)
-        known = truth != IGNORED
-        right = (scores.detach().argmax(dim=1) == truth) & known
-        return value, {"accuracy": float(right.sum() / known.sum().clamp_min(1))}
+        has_label = truth != IGNORED
+        is_correct = (scores.detach().argmax(dim=1) == truth) & has_label
+        return value, {"accuracy": float(is_correct.sum() / has_label.sum().clamp_min(1))}
 
     return loss
 
@@ -371,9 +382,11 @@ def _objective_of_epochs(
 
     @lru_cache(maxsize=1)
     def of_epoch(epoch: int | None) -> Callable[[nn.Module, Item], tuple[Tensor, Figures]]:
+        """Return the objective of the epoch under way; the number only tells epochs apart in the cache."""
         return objective(batches.configuration, batches.tiles, device)
 
     def loss(model: nn.Module, batch: Item) -> tuple[Tensor, Figures]:
+        """Return the loss of a batch by the objective of the epoch under way."""
         return of_epoch(batches.epoch)(model, batch)
 
     return loss
@@ -382,9 +395,11 @@ def _objective_of_epochs(
 def _validation(
     configuration: SegmentationConfiguration, tiles: list[CloudTile]
 ) -> Callable[[nn.Module, int], Figures]:
+    """Return a function (model, epoch) -> mean IoU on the validation tiles."""
     scaling = scalings(tiles, configuration.intensity)
 
     def validate(model: nn.Module, epoch: int) -> Figures:
+        """Return the mean IoU over all validation tiles."""
         confusion = Confusion(class_names(configuration.scheme()))
         scores = classifier(model, configuration)
         for tile in tiles:

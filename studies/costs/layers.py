@@ -66,7 +66,7 @@ def compare_sources(name: str, length: float, stretches: int, seconds: float, *c
     emission = replace(plan.emission, path=spread_stretches(plan.path, stretches, seconds))
     points = join_results(record_as_measured(replace(plan, emission=emission))).seen
     assert points is not None
-    request = replace(plan.layers.request, wanted=LAYERS)
+    request = replace(plan.layers.request, names=LAYERS)
     nodes, nodes_seconds = sampled(request, points, "nodes")
     truth, truth_seconds = sampled(request, points, "returns")
     rows = truth.source == FROM_RETURN

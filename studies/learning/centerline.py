@@ -184,12 +184,12 @@ class RememberingPredictor(CenterlinePredictor):
 
     memory: dict[str, tuple[Float, Float]]
 
-    def _regress(self, road: LearningRoad, frames: Frames) -> tuple[Float, Float]:
+    def _combine_sequences(self, road: LearningRoad, frames: Frames) -> tuple[Float, Float]:
         """Return the prediction and its deviations, from memory if the same points and frames came before."""
         parts = (road.xyz, road.intensity, frames.position, frames.direction)
         key = hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in parts)).hexdigest()
         if key not in self.memory:
-            self.memory[key] = super()._regress(road, frames)
+            self.memory[key] = super()._combine_sequences(road, frames)
         return self.memory[key]
 
 

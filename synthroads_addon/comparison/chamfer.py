@@ -22,8 +22,8 @@ MOST_PAIRS = 400
 twentieth of one's deviation."""
 
 
-def density_aware_chamfer(one: Float, other: Float, scale: float) -> float:
-    """Return the distance of two sets of points (N, 3), (M, 3), 0 to 1.
+def density_aware_chamfer(points: Float, other_points: Float, scale: float) -> float:
+    """Return the density-aware Chamfer distance of two sets of points (N, 3), (M, 3), 0 to 1.
 
     Args:
         one, other: the points, m.
@@ -36,17 +36,18 @@ def density_aware_chamfer(one: Float, other: Float, scale: float) -> float:
         >>> [round(float(density_aware_chamfer(plane, other, scale=0.05)), 2) for other in (plane, raised)]
         [0.0, 0.63]
     """
-    return 0.5 * (_one_way(one, other, scale) + _one_way(other, one, scale))
+    return 0.5 * (_one_way(points, other_points, scale) + _one_way(other_points, points, scale))
 
 
-def _one_way(points: Float, others: Float, scale: float) -> float:
-    distance, nearest = cKDTree(others).query(points)
+def _one_way(points: Float, other_points: Float, scale: float) -> float:
+    """Return the mean term of one set's points against their nearest ones of the other set, 0 to 1."""
+    distance, nearest_index = cKDTree(other_points).query(points)
     # Wu et al. 2021: mean of 1 - exp(-a d) / n over the points, n of which share their nearest one.
-    count = np.bincount(nearest, minlength=len(others))[nearest]
+    count = np.bincount(nearest_index, minlength=len(other_points))[nearest_index]
     return float(np.mean(1.0 - np.exp(-distance / scale) / count))
 
 
-def mean_chamfer(one: Patches, other: Patches) -> float:
-    """Return the mean distance of patches of equal density, row by row; see `patches.match_density`."""
-    pairs = list(zip(one.points, other.points, one.density, strict=True))[:MOST_PAIRS]
+def mean_chamfer(patches: Patches, other_patches: Patches) -> float:
+    """Return the mean density-aware Chamfer distance of pairs of patches of equal density (`patches.match_density`)."""
+    pairs = list(zip(patches.points, other_patches.points, patches.density, strict=True))[:MOST_PAIRS]
     return float(np.mean([density_aware_chamfer(a, b, density**-0.5) for a, b, density in pairs]))

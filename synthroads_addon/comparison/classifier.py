@@ -41,8 +41,8 @@ class Distinction:
     """Measures of how well two sets of patches are told apart: AUC of classifiers and features, and MMD.
 
     Attributes:
-        patches: of each side.
-        auc: by group of `GROUPS`, and ``all``; empty without `has_classifier`.
+        patches: number of patches of each side.
+        auc: AUC of a classifier by group of statistics (`GROUPS`), and by all; empty without `has_classifier`.
         features: AUC of each statistic alone, 0.5 to 1.
         mmd: squared maximum mean discrepancy of all statistics.
         chamfer: mean density-aware Chamfer distance of the patches' points, 0 to 1.
@@ -56,10 +56,15 @@ class Distinction:
 
     def to_dict(self) -> dict[str, Any]:
         """Return patch count, AUC and squared maximum mean discrepancy as JSON data."""
-        shown = {
+        rounded_measures = {
             name: {key: round(value, 4) for key, value in getattr(self, name).items()} for name in ("auc", "features")
         }
-        return {"patches": self.patches, **shown, "mmd": round(self.mmd, 6), "chamfer": round(self.chamfer, 5)}
+        return {
+            "patches": self.patches,
+            **rounded_measures,
+            "mmd": round(self.mmd, 6),
+            "chamfer": round(self.chamfer, 5),
+        }
 
 
 def has_classifier() -> bool:
@@ -67,39 +72,39 @@ def has_classifier() -> bool:
     return find_spec("sklearn") is not None
 
 
-def distinguish(one: Patches, other: Patches, seed: int, name: str) -> Distinction:
+def distinguish(patches: Patches, other_patches: Patches, seed: int, name: str) -> Distinction:
     """Return how well a classifier tells two sets of patches apart: AUC and discrepancy at equal densities.
 
     Args:
         one, other: the sets.
-        seed: draws the patches and the folds.
-        name: of the first, for errors.
+        seed: seed by which patches and folds are drawn.
+        name: name of the first set, for errors.
 
     Raises:
         InputError: fewer than `FEWEST` patches of each have the same densities.
     """
-    first, second = match_density(one, other, seed, MOST)
-    if len(first) < FEWEST:
-        low, high = np.quantile(other.density, (0.05, 0.95))
+    first_sample, second_sample = match_density(patches, other_patches, seed, MOST)
+    if len(first_sample) < FEWEST:
+        lower_density, upper_density = np.quantile(other_patches.density, (0.05, 0.95))
         raise InputError(
             name,
-            len(first),
+            len(first_sample),
             f"at least {FEWEST} patches must have a density like the compared clouds, "
-            f"{low:.0f} to {high:.0f} points/m2",
+            f"{lower_density:.0f} to {upper_density:.0f} points/m2",
         )
-    values = np.concatenate([first.values, second.values])
-    truth = np.arange(len(values)) < len(first)
-    blocks = np.concatenate([_blocks(first, 0), _blocks(second, 1)])
+    values = np.concatenate([first_sample.values, second_sample.values])
+    truth = np.arange(len(values)) < len(first_sample)
+    blocks = np.concatenate([_blocks(first_sample, 0), _blocks(second_sample, 1)])
     columns = {group: [FEATURES.index(feature) for feature in names] for group, names in GROUPS.items()}
     columns = {"all": list(range(len(FEATURES))), **columns} if has_classifier() else {}
-    auc = {group: _auc(values[:, chosen], truth, blocks, seed) for group, chosen in columns.items()}
+    auc = {group: _auc(values[:, column_numbers], truth, blocks, seed) for group, column_numbers in columns.items()}
     features = {name: _auc_alone(values[:, number], truth) for number, name in enumerate(FEATURES)}
     discrepancy = squared_discrepancy(values[truth], values[~truth])
-    return Distinction(len(first), auc, features, discrepancy, mean_chamfer(first, second))
+    return Distinction(len(first_sample), auc, features, discrepancy, mean_chamfer(first_sample, second_sample))
 
 
 def _blocks(patches: Patches, side: int) -> Index:
-    """Return the id (P,) of the square of `BLOCK` that each patch lies in; the two sides share no id."""
+    """Return the id (P,) of the square of edge `BLOCK` that each patch lies in; the two sides share no id."""
     square = np.floor(patches.place / BLOCK).astype(np.int64)
     return np.asarray(np.unique(square, axis=0, return_inverse=True)[1].ravel() * 2 + side)
 
@@ -107,20 +112,20 @@ def _blocks(patches: Patches, side: int) -> Index:
 def _auc(values: Float, truth: Bool, blocks: Index, seed: int) -> float:
     """Return the cross-validated mean AUC of gradient-boosted trees, with whole blocks held out.
 
-    The mean over the folds, not that of all answers together: a fold that learned fewer of one kind would answer lower.
+    The mean over the folds, not the AUC of all answers: a fold trained on fewer patches of one kind answers lower.
     """
     from sklearn.ensemble import HistGradientBoostingClassifier  # an extra brings it
     from sklearn.metrics import roc_auc_score
     from sklearn.model_selection import StratifiedGroupKFold
 
     folds = min(FOLDS, *(len(np.unique(blocks[truth == side])) for side in (True, False)))
-    split = StratifiedGroupKFold(max(folds, 2), shuffle=True, random_state=seed)
-    answers = []
-    for learned, asked in split.split(values, truth, blocks):
+    splitter = StratifiedGroupKFold(max(folds, 2), shuffle=True, random_state=seed)
+    fold_aucs = []
+    for training_rows, test_rows in splitter.split(values, truth, blocks):
         trees = HistGradientBoostingClassifier(max_iter=_TREES, random_state=seed)
-        answer = trees.fit(values[learned], truth[learned]).predict_proba(values[asked])[:, 1]
-        answers.append(roc_auc_score(truth[asked], answer))
-    return float(np.nanmean(answers))
+        probabilities = trees.fit(values[training_rows], truth[training_rows]).predict_proba(values[test_rows])[:, 1]
+        fold_aucs.append(roc_auc_score(truth[test_rows], probabilities))
+    return float(np.nanmean(fold_aucs))
 
 
 def _auc_alone(values: Float, truth: Bool) -> float:
@@ -131,20 +136,20 @@ def _auc_alone(values: Float, truth: Bool) -> float:
     return float(max(auc, 1.0 - auc))
 
 
-def squared_discrepancy(one: Float, other: Float) -> float:
+def squared_discrepancy(sample: Float, other_sample: Float) -> float:
     """Return the squared maximum mean discrepancy, unbiased, of two samples' rows (N, F) and (M, F).
 
     Statistics are replaced by their ranks among both, so that no unit and no outlier counts; the kernel is Gaussian,
     as wide as the median distance.
     """
-    one, other = one[:_MOST_OF_KERNEL], other[:_MOST_OF_KERNEL]
-    ranks = rankdata(np.concatenate([one, other]), axis=0) / (len(one) + len(other))
+    sample, other_sample = sample[:_MOST_OF_KERNEL], other_sample[:_MOST_OF_KERNEL]
+    ranks = rankdata(np.concatenate([sample, other_sample]), axis=0) / (len(sample) + len(other_sample))
     squared = cdist(ranks, ranks, "sqeuclidean")
     kernel = np.exp(-squared / max(float(np.median(squared)), 1e-12))
-    n, m = len(one), len(other)
+    n, m = len(sample), len(other_sample)
     # Gretton et al. 2012, unbiased: mean of k(x, x') + mean of k(y, y') - 2 mean of k(x, y), pairs of a row with itself
     # left out; on the diagonal k is 1.
-    within = [
+    own_means = [
         (block.sum() - len(block)) / (len(block) * (len(block) - 1)) for block in (kernel[:n, :n], kernel[n:, n:])
     ]
-    return float(sum(within) - 2.0 * kernel[:n, n:].sum() / (n * m))
+    return float(sum(own_means) - 2.0 * kernel[:n, n:].sum() / (n * m))

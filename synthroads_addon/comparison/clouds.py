@@ -27,7 +27,7 @@ _Azimuth = Annotated[float, Field(ge=-180.0, le=180.0)]
 
 
 class ListedCloud(ClosedModel):
-    """A cloud, and where its classes are: by labels, or beside an axis for a cloud without."""
+    """A cloud of a list, and what tells its classes: labels, or offsets from an axis for a cloud without labels."""
 
     cloud: str = Field(min_length=1, description="File, from the list's folder.")
     class_field: str | None = Field(None, description="Extra attribute of a LAS file that holds the classes.")
@@ -48,19 +48,21 @@ class ListedCloud(ClosedModel):
 
     @model_validator(mode="after")
     def _offsets_need_an_axis(self) -> ListedCloud:
+        """Refuse an axis without offsets of pavement, and offsets without an axis."""
         if (self.axis is None) != (not self.paved):
             raise ValueError("axis and paved locate the pavement together: one of the two is missing")
         return self
 
     @model_validator(mode="after")
     def _azimuths_need_a_scanner(self) -> ListedCloud:
+        """Refuse azimuths without the scanner's place that they are counted around."""
         if self.azimuth_deg is not None and self.scanner is None:
             raise ValueError("azimuth_deg needs scanner, about which it is counted")
         return self
 
 
 class UnlistedCloud(ListedCloud):
-    """A cloud without a list: of the usual classes those that it has are compared."""
+    """A cloud given without a list: those of the usual classes that it has are compared."""
 
     marking: str | None = "road_marking"
     vegetation: str | None = "vegetation"
@@ -79,8 +81,8 @@ class ComparedCloud:
     """A cloud's points of the classes that are compared.
 
     Attributes:
-        name: of the file.
-        classes: by name of `CLASSES`: its points, with linear intensities; ``road`` is always there.
+        name: name of the file.
+        classes: points with linear intensities by class name (`CLASSES`); ``road`` is always there.
     """
 
     name: str
@@ -88,10 +90,10 @@ class ComparedCloud:
 
 
 def find_clouds(path: Path) -> list[tuple[Path, ListedCloud]]:
-    """Return (file, how its classes are told) of each cloud that a path stands for: a file, a folder or a list.
+    """Return (file, row of the list) of each cloud that a path stands for: a file, a folder or a list.
 
     Raises:
-        InputError: nothing is there, or a list is wrong.
+        InputError: the path holds no cloud, or a list is wrong.
     """
     if path.suffix.lower() in LISTS:
         rows = CloudList.from_dict(read_yaml(path), str(path)).clouds
@@ -109,24 +111,24 @@ def read_compared(path: Path, row: ListedCloud) -> ComparedCloud:
     Raises:
         InputError: the file can't be read, has too few points of the road, or a list names a class that it has none of.
     """
-    everything = read_real_cloud(path, row.class_field, f"{path.name}: class_field")
-    cloud = between_azimuths(everything, row)
+    whole_cloud = read_real_cloud(path, row.class_field, f"{path.name}: class_field")
+    cloud = between_azimuths(whole_cloud, row)
     if row.axis is not None:
-        beside = road_classes(
+        axis_classes = road_classes(
             cloud, RoadClasses(path.parent / row.axis, row.paved, row.lines, row.line_width), f"{path.name}: "
         )
-        classes = {ROAD: beside["paved"]} | ({"marking": beside["line"]} if "line" in beside else {})
+        classes = {ROAD: axis_classes["paved"]} | ({"marking": axis_classes["line"]} if "line" in axis_classes else {})
     else:
         classes = {ROAD: _road(cloud, row, path.name)}
         classes |= _other_classes(cloud, row, path.name)
         if "marking" in classes:
             classes[ROAD] = _clear_of(classes[ROAD], classes["marking"])
-    classes[ROAD] = with_points_beside(everything, classes[ROAD])
+    classes[ROAD] = with_points_beside(whole_cloud, classes[ROAD])
     return ComparedCloud(name_of(path, row), {name: _with_view(points, row) for name, points in classes.items()})
 
 
 def name_of(path: Path, row: ListedCloud) -> str:
-    """Return the name of a listed cloud: its file's, and which part of it counts."""
+    """Return the name of a listed cloud: its file's, with the azimuths between which its points count."""
     if row.azimuth_deg is None:
         return path.stem
     return "{} ({:g} to {:g} deg)".format(path.stem, *row.azimuth_deg)
@@ -137,23 +139,27 @@ def between_azimuths(cloud: RealCloud, row: ListedCloud) -> RealCloud:
     if row.azimuth_deg is None or row.scanner is None:
         return cloud
     east, north, _ = (cloud.xyz - np.asarray(row.scanner)).T
-    low, high = row.azimuth_deg
+    first_azimuth, last_azimuth = row.azimuth_deg
     azimuth = np.rad2deg(np.arctan2(north, east))
-    inside = (azimuth >= low) & (azimuth <= high) if low <= high else (azimuth >= low) | (azimuth <= high)
+    in_sector = (
+        (azimuth >= first_azimuth) & (azimuth <= last_azimuth)
+        if first_azimuth <= last_azimuth
+        else (azimuth >= first_azimuth) | (azimuth <= last_azimuth)
+    )
     arrays = {name: value for name, value in vars(cloud).items() if isinstance(value, np.ndarray)}
-    return replace(cloud, **{name: value[inside] for name, value in arrays.items()})
+    return replace(cloud, **{name: value[in_sector] for name, value in arrays.items()})
 
 
 def _clear_of(road: RealClass, marking: RealClass) -> RealClass:
-    """Return the pavement's points that are `CLEAR` of every marking, as those told beside an axis are.
+    """Return the pavement's points at least `CLEAR` away from every marking, as `road_classes` leaves them.
 
-    Where a marking was taken out the pavement has a gap, which says nothing about the scanner.
+    A marking leaves a gap in the pavement's points that says nothing about the scanner.
     """
-    nearest = cKDTree(marking.place[:, :2]).query(road.place[:, :2], distance_upper_bound=CLEAR)[0]
-    kept = ~np.isfinite(nearest)
+    marking_distance = cKDTree(marking.place[:, :2]).query(road.place[:, :2], distance_upper_bound=CLEAR)[0]
+    is_clear = ~np.isfinite(marking_distance)
     names = ("place", "intensity", "distance", "incidence", "returns")
-    time = None if road.time is None else road.time[kept]
-    return replace(road, time=time, **{name: getattr(road, name)[kept] for name in names})
+    time = None if road.time is None else road.time[is_clear]
+    return replace(road, time=time, **{name: getattr(road, name)[is_clear] for name in names})
 
 
 def _road(cloud: RealCloud, row: ListedCloud, file: str) -> RealClass:
@@ -168,7 +174,7 @@ def _road(cloud: RealCloud, row: ListedCloud, file: str) -> RealClass:
 
 
 def _other_classes(cloud: RealCloud, row: ListedCloud, file: str) -> dict[str, RealClass]:
-    """Return the marking and vegetation points, by class, as far as the cloud has enough of them."""
+    """Return the points of the marking and vegetation classes that the cloud has enough of, by class name."""
     classes = {}
     for name in CLASSES[1:]:
         code = getattr(row, name)
@@ -183,13 +189,13 @@ def _other_classes(cloud: RealCloud, row: ListedCloud, file: str) -> dict[str, R
 
 
 def _check_class(cloud: RealCloud, code: str, field: str) -> None:
-    """Refuse the name of a class that a cloud's scheme doesn't have."""
+    """Raise InputError for the name of a class that a cloud's scheme doesn't have."""
     if code.lstrip("-").isdigit():
         return
     names = [row.name for row in cloud.scheme.rows] if cloud.scheme else []
     if code not in names:
-        allowed = f"one of {', '.join(names)}" if names else "a number: the attribute has no names"
-        raise InputError(field, code, f"must be {allowed}{nearest_name(code, names)}")
+        valid_names = f"one of {', '.join(names)}" if names else "a number: the attribute has no names"
+        raise InputError(field, code, f"must be {valid_names}{nearest_name(code, names)}")
 
 
 def _with_view(points: RealClass, row: ListedCloud) -> RealClass:

@@ -31,7 +31,7 @@ class DescribedCloud:
 
     Attributes:
         cloud: the cloud.
-        patches: of its pavement.
+        patches: patches of its pavement.
     """
 
     cloud: ComparedCloud
@@ -39,15 +39,15 @@ class DescribedCloud:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the cloud's medians and the figures of its classes and ranges as JSON data."""
-        middle = np.median(self.patches.values, axis=0)
-        road = float(np.median(_decibels(self.cloud.classes[ROAD])))
+        medians = np.median(self.patches.values, axis=0)
+        road_level = float(np.median(_decibels(self.cloud.classes[ROAD])))
         return {
             "cloud": self.cloud.name,
             "patches": len(self.patches),
             "density": round(float(np.median(self.patches.density)), 2),
-            "medians": {name: _short(value) for name, value in zip(FEATURES, middle, strict=True)},
-            "classes": {name: class_figures(points, road) for name, points in self.cloud.classes.items()},
-            "by_range": range_figures(self.cloud.classes[ROAD], road),
+            "medians": {name: _short(value) for name, value in zip(FEATURES, medians, strict=True)},
+            "classes": {name: class_figures(points, road_level) for name, points in self.cloud.classes.items()},
+            "by_range": range_figures(self.cloud.classes[ROAD], road_level),
         }
 
 
@@ -56,37 +56,49 @@ class CloudComparison:
     """Result of a comparison of synthetic clouds with real ones.
 
     Attributes:
-        synthetic, real: the clouds.
-        told: each synthetic cloud against all real ones.
-        yardstick: each real cloud against the other real ones; of a single one, half of its patches against the rest.
+        synthetic, real: the described clouds of both sides.
+        distinctions: distinction of each synthetic cloud from all real ones.
+        yardstick: distinction of each real cloud from the other real ones; of a single one, of its two halves.
     """
 
     synthetic: tuple[DescribedCloud, ...]
     real: tuple[DescribedCloud, ...]
-    told: tuple[Distinction, ...]
+    distinctions: tuple[Distinction, ...]
     yardstick: tuple[Distinction, ...]
 
     def realism(self) -> dict[str, float]:
-        """Return by group 1 - AUC over that among real clouds: 1 if synthetic ones are as hard to tell apart."""
-        return {group: _mean(self.told, group) / max(_mean(self.yardstick, group), 1e-9) for group in self.told[0].auc}
+        """Return 1 - AUC of synthetic clouds over that of real ones, by group: 1 if both are as hard to tell apart."""
+        return {
+            group: _mean(self.distinctions, group) / max(_mean(self.yardstick, group), 1e-9)
+            for group in self.distinctions[0].auc
+        }
 
     def giveaways(self) -> dict[str, tuple[float, float]]:
         """Return by statistic its mean AUC alone (synthetic, real), ordered from the largest synthetic one."""
         means = {
-            name: tuple(float(np.mean([one.features[name] for one in rows])) for rows in (self.told, self.yardstick))
+            name: tuple(
+                float(np.mean([distinction.features[name] for distinction in rows]))
+                for rows in (self.distinctions, self.yardstick)
+            )
             for name in FEATURES
         }
         return dict(sorted(means.items(), key=lambda item: -item[1][0]))  # type: ignore[arg-type]
 
     def discrepancy(self) -> float:
         """Return the mean squared discrepancy of synthetic clouds as a multiple of that among real ones."""
-        told, real = (float(np.mean([max(one.mmd, 0.0) for one in rows])) for rows in (self.told, self.yardstick))
-        return told / max(real, 1e-6)
+        synthetic_mean, real_mean = (
+            float(np.mean([max(distinction.mmd, 0.0) for distinction in rows]))
+            for rows in (self.distinctions, self.yardstick)
+        )
+        return synthetic_mean / max(real_mean, 1e-6)
 
     def chamfer(self) -> float:
         """Return the mean density-aware Chamfer distance of synthetic patches to real ones over the yardstick's."""
-        told, real = (float(np.mean([one.chamfer for one in rows])) for rows in (self.told, self.yardstick))
-        return told / max(real, 1e-6)
+        synthetic_mean, real_mean = (
+            float(np.mean([distinction.chamfer for distinction in rows]))
+            for rows in (self.distinctions, self.yardstick)
+        )
+        return synthetic_mean / max(real_mean, 1e-6)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the comparison's measures and all clouds' figures as JSON data."""
@@ -96,19 +108,19 @@ class CloudComparison:
             "discrepancy": round(self.discrepancy(), 3),
             "chamfer": round(self.chamfer(), 4),
             "giveaways": {name: [round(value, 4) for value in pair] for name, pair in self.giveaways().items()},
-            "synthetic": _joined(self.synthetic, self.told),
+            "synthetic": _joined(self.synthetic, self.distinctions),
             "real": _joined(self.real, self.yardstick),
         }
 
 
 def _joined(clouds: tuple[DescribedCloud, ...], distinctions: tuple[Distinction, ...]) -> list[dict[str, Any]]:
     """Return for each cloud its figures and its distinction from the others, merged, as JSON data."""
-    return [one.to_dict() | told.to_dict() for one, told in zip(clouds, distinctions, strict=True)]
+    return [cloud.to_dict() | distinction.to_dict() for cloud, distinction in zip(clouds, distinctions, strict=True)]
 
 
 def _mean(rows: Sequence[Distinction], group: str) -> float:
     """Return the mean of 1 - AUC in a group, with an AUC below 0.5, worse than chance, counted as 0.5."""
-    return float(np.mean([1.0 - max(one.auc[group], 0.5) for one in rows]))
+    return float(np.mean([1.0 - max(distinction.auc[group], 0.5) for distinction in rows]))
 
 
 def compare(synthetic: Path, real: Path, seed: int = 1, progress: Progress = silent) -> CloudComparison:
@@ -121,7 +133,7 @@ def compare_steps(synthetic: Path, real: Path, seed: int = 1) -> Generator[float
 
     Args:
         synthetic, real: a cloud, a folder of clouds, or a list of them, see `find_clouds`.
-        seed: draws patches and folds.
+        seed: seed by which patches and folds are drawn.
 
     Raises:
         InputError: a cloud can't be read, has too little pavement, or none of the other side's density.
@@ -131,35 +143,38 @@ def compare_steps(synthetic: Path, real: Path, seed: int = 1) -> Generator[float
 
 
 def _compare_steps(synthetic: Path, real: Path, seed: int) -> Generator[float, None, CloudComparison]:
+    """Compare as `compare_steps` does: read all clouds, distinguish real ones from each other, then synthetic ones."""
     clouds = [find_clouds(path) for path in (synthetic, real)]
-    total, done = 2 * sum(map(len, clouds)), 0
-    described: list[list[DescribedCloud]] = [[], []]
-    for side, rows in zip(described, clouds, strict=True):
+    step_count, steps_done = 2 * sum(map(len, clouds)), 0
+    described_sides: list[list[DescribedCloud]] = [[], []]
+    for side, rows in zip(described_sides, clouds, strict=True):
         for path, row in rows:
             cloud = read_compared(path, row)
             side.append(DescribedCloud(cloud, make_patches(cloud.classes[ROAD], cloud.name)))
-            done += 1
-            yield done / total
-    others, yardstick = described[1], []
-    for number, one in enumerate(others):
-        yardstick.append(_against_others(one, others[:number] + others[number + 1 :], seed))
-        done += 1
-        yield done / total
-    told, everything = [], join_patches([one.patches for one in others])
-    for one in described[0]:
-        told.append(distinguish(one.patches, everything, seed, one.cloud.name))
-        done += 1
-        yield done / total
-    return CloudComparison(tuple(described[0]), tuple(others), tuple(told), tuple(yardstick))
+            steps_done += 1
+            yield steps_done / step_count
+    real_clouds, yardstick = described_sides[1], []
+    for number, described_cloud in enumerate(real_clouds):
+        yardstick.append(_against_others(described_cloud, real_clouds[:number] + real_clouds[number + 1 :], seed))
+        steps_done += 1
+        yield steps_done / step_count
+    distinctions, real_patches = [], join_patches([described_cloud.patches for described_cloud in real_clouds])
+    for described_cloud in described_sides[0]:
+        distinctions.append(distinguish(described_cloud.patches, real_patches, seed, described_cloud.cloud.name))
+        steps_done += 1
+        yield steps_done / step_count
+    return CloudComparison(tuple(described_sides[0]), tuple(real_clouds), tuple(distinctions), tuple(yardstick))
 
 
-def _against_others(one: DescribedCloud, others: list[DescribedCloud], seed: int) -> Distinction:
+def _against_others(cloud: DescribedCloud, other_clouds: list[DescribedCloud], seed: int) -> Distinction:
     """Return the distinction of a real cloud from the other real ones, or of its halves if it is the only one."""
-    if others:
-        return distinguish(one.patches, join_patches([other.patches for other in others]), seed, one.cloud.name)
-    dealt = np.random.default_rng(seed).permutation(len(one.patches))
-    halves = [one.patches.select(dealt[start::2]) for start in (0, 1)]
-    return distinguish(halves[0], halves[1], seed, one.cloud.name)
+    if other_clouds:
+        return distinguish(
+            cloud.patches, join_patches([other_cloud.patches for other_cloud in other_clouds]), seed, cloud.cloud.name
+        )
+    shuffled_rows = np.random.default_rng(seed).permutation(len(cloud.patches))
+    halves = [cloud.patches.select(shuffled_rows[start::2]) for start in (0, 1)]
+    return distinguish(halves[0], halves[1], seed, cloud.cloud.name)
 
 
 def _decibels(points: RealClass) -> Float:
@@ -169,29 +184,37 @@ def _decibels(points: RealClass) -> Float:
 
 def class_figures(points: RealClass, road: float) -> dict[str, float]:
     """Return counts, dB median over the pavement's (``road``, dB) and dB spread of a class as JSON data."""
-    level = _decibels(points)
-    low, middle, high = np.quantile(level, (0.25, 0.5, 0.75))
-    total = len(level) + points.zeros
+    decibels = _decibels(points)
+    lower_quartile, median, upper_quartile = np.quantile(decibels, (0.25, 0.5, 0.75))
+    total = len(decibels) + points.zeros
     return {
-        "points": len(level),
+        "points": len(decibels),
         "zero_intensities": round(points.zeros / total, 4),
         "several_returns": round(float(np.mean(points.returns > 1)), 4),
-        "median_over_road_db": round(float(middle - road), 3),
-        "iqr_db": round(float(high - low), 3),
-        "std_db": round(float(level.std()), 3),
+        "median_over_road_db": round(float(median - road), 3),
+        "iqr_db": round(float(upper_quartile - lower_quartile), 3),
+        "std_db": round(float(decibels.std()), 3),
     }
 
 
 def range_figures(points: RealClass, road: float) -> list[dict[str, float]]:
     """Return points and dB median over the pavement's in each ring of range as JSON data; empty without ranges."""
     rows = []
-    for low, high in pairwise(RINGS):
-        inside = (points.distance >= low) & (points.distance < high)
-        if inside.sum() >= _FEWEST_OF_RING:
-            middle = float(np.median(_decibels(points)[inside])) - road
-            rows.append({"from": low, "to": high, "points": int(inside.sum()), "median_over_road_db": round(middle, 3)})
+    for ring_start, ring_end in pairwise(RINGS):
+        in_ring = (points.distance >= ring_start) & (points.distance < ring_end)
+        if in_ring.sum() >= _FEWEST_OF_RING:
+            median = float(np.median(_decibels(points)[in_ring])) - road
+            rows.append(
+                {
+                    "from": ring_start,
+                    "to": ring_end,
+                    "points": int(in_ring.sum()),
+                    "median_over_road_db": round(median, 3),
+                }
+            )
     return rows
 
 
 def _short(value: float) -> float:
+    """Return a number rounded to five significant digits."""
     return float(f"{value:.5g}")

@@ -39,8 +39,8 @@ def save_picture(result: CloudComparison, path: Path, overwrite: bool = False) -
     figure.legend(loc="outside upper center", ncols=2)
     for number, name in enumerate(FEATURES):
         _draw_feature(axes[number + 1], result, number, name)
-    for empty in axes[len(FEATURES) + 1 :]:
-        empty.set_axis_off()
+    for unused_axes in axes[len(FEATURES) + 1 :]:
+        unused_axes.set_axis_off()
     data = io.BytesIO()
     save_figure(figure, data, dpi=100)
     write_file(path, data.getvalue(), overwrite=overwrite)
@@ -48,12 +48,12 @@ def save_picture(result: CloudComparison, path: Path, overwrite: bool = False) -
 
 def _draw_groups(axes: Any, result: CloudComparison) -> None:
     """Draw bars of the mean AUC of each group, of synthetic clouds and of real ones."""
-    groups = list(result.told[0].auc)
+    groups = list(result.distinctions[0].auc)
     for shift, rows, colour, label in (
-        (-0.2, result.told, _SYNTHETIC, "synthetic"),
+        (-0.2, result.distinctions, _SYNTHETIC, "synthetic"),
         (0.2, result.yardstick, _REAL, "real, each from the others"),
     ):
-        auc = [[one.auc[group] for one in rows] for group in groups]
+        auc = [[distinction.auc[group] for distinction in rows] for group in groups]
         axes.barh(np.arange(len(groups)) + shift, np.mean(auc, axis=1), 0.38, color=colour, label=label)
     axes.set(yticks=range(len(groups)), yticklabels=groups, xlim=(0.5, 1.0), title="told apart (AUC)")
     axes.invert_yaxis()
@@ -62,16 +62,16 @@ def _draw_groups(axes: Any, result: CloudComparison) -> None:
 def _draw_feature(axes: Any, result: CloudComparison, number: int, name: str) -> None:
     """Draw the histograms of one statistic over the patches of synthetic and real clouds."""
     sides = [_values(clouds, number) for clouds in (result.synthetic, result.real)]
-    low, high = np.quantile(np.concatenate(sides), (0.005, 0.995))
-    edges = np.linspace(low, max(high, low + 1e-9), _BINS)
+    lower_limit, upper_limit = np.quantile(np.concatenate(sides), (0.005, 0.995))
+    edges = np.linspace(lower_limit, max(upper_limit, lower_limit + 1e-9), _BINS)
     for values, colour in zip(sides, (_SYNTHETIC, _REAL), strict=True):
-        axes.hist(np.clip(values, low, high), edges, density=True, color=colour, alpha=0.6)
-    told, real = result.giveaways()[name]
-    axes.set_title(f"{name.replace('_', ' ')}\nAUC {told:.2f}, real {real:.2f}", fontsize=8)
+        axes.hist(np.clip(values, lower_limit, upper_limit), edges, density=True, color=colour, alpha=0.6)
+    synthetic_auc, real_auc = result.giveaways()[name]
+    axes.set_title(f"{name.replace('_', ' ')}\nAUC {synthetic_auc:.2f}, real {real_auc:.2f}", fontsize=8)
     axes.set_yticks([])
     axes.tick_params(labelsize=7)
 
 
 def _values(clouds: tuple[DescribedCloud, ...], number: int) -> Float:
     """Return one statistic, by its column number, of all patches of some clouds (P,)."""
-    return np.concatenate([one.patches.values[:, number] for one in clouds])
+    return np.concatenate([cloud.patches.values[:, number] for cloud in clouds])

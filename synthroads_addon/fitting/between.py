@@ -17,48 +17,55 @@ from .chain import FREE
 from .design import Model
 
 
-def without_swings(model: Model, station: Float, heights: Float, allowed: float) -> Model:
-    """Return a model of grades without the swings between points.
+def calm_swings(model: Model, station: Float, heights: Float, largest_swing: float) -> Model:
+    """Return a model of grades in which parabolas from point to point replace elements that swing between points.
 
     Args:
-        model: of order 1, near the heights.
+        model: model of grades (order 1), near the heights.
         station, heights: (N,) of the points, m.
-        allowed: distance (m) from which a swing is one.
+        largest_swing: swing that stays, m (`excess_swings`).
     """
-    swinging = swings(model, station, heights) > allowed
-    if not swinging.any():
+    is_swing = excess_swings(model, station, heights) > largest_swing
+    if not is_swing.any():
         return model
-    padded = np.pad(swinging, 1)
-    wide = padded[:-2] | padded[1:-1] | padded[2:]  # beside a swing the elements are askew as well
+    padded_flags = np.pad(is_swing, 1)
+    # Beside a swing the elements are askew as well.
+    widened_flags = padded_flags[:-2] | padded_flags[1:-1] | padded_flags[2:]
     grade = np.gradient(heights, station)
-    for first, last in reversed(_runs(wide)):
-        part = slice(first, last + 2)
-        model = _with_parabolas(model, station[part], heights[part], grade[part])
+    for first_chord, last_chord in reversed(_runs(widened_flags)):
+        points = slice(first_chord, last_chord + 2)
+        model = _insert_parabolas(model, station[points], heights[points], grade[points])
     return model
 
 
-def swings(model: Model, station: Float, heights: Float) -> Float:
-    """Return how much farther (N - 1,) a model is from the middles of chords than the bends around allow, m.
+def excess_swings(model: Model, station: Float, heights: Float) -> Float:
+    """Return a model's swing (N - 1,), m, between points: its distance off a chord's middle beyond the bends around.
 
-    Of a bend of the curvature k a chord of the length h has a sagitta of k h^2 / 8.
+    A bend of curvature k has the sagitta k h^2 / 8 over a chord of length h; the bends are those at the points around.
     """
     chord = np.diff(station)
     bend = np.diff(np.diff(heights) / chord) / (0.5 * (chord[1:] + chord[:-1]))
-    padded = np.pad(bend, 2, mode="edge") if len(bend) else np.zeros(len(chord) + 3)
-    around = np.lib.stride_tricks.sliding_window_view(padded, 4)[: len(chord)]
-    off = model.evaluate(0.5 * (station[1:] + station[:-1])) - 0.5 * (heights[1:] + heights[:-1])
-    low, high = (-0.125 * chord**2 * limit for limit in (around.max(axis=1), around.min(axis=1)))
-    return np.asarray(np.maximum(np.maximum(low - off, off - high), 0.0))
+    padded_bend = np.pad(bend, 2, mode="edge") if len(bend) else np.zeros(len(chord) + 3)
+    around = np.lib.stride_tricks.sliding_window_view(padded_bend, 4)[: len(chord)]
+    distance = model.evaluate(0.5 * (station[1:] + station[:-1])) - 0.5 * (heights[1:] + heights[:-1])
+    lower_limit, upper_limit = (-0.125 * chord**2 * limit for limit in (around.max(axis=1), around.min(axis=1)))
+    return np.asarray(np.maximum(np.maximum(lower_limit - distance, distance - upper_limit), 0.0))
 
 
 def _runs(flags: Bool) -> list[tuple[int, int]]:
-    """Return the first and the last index of each run of flags."""
+    """Return the first and the last index, included, of each run of true flags."""
     edges = np.flatnonzero(np.diff(np.pad(flags, 1).astype(np.int8)))
     return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
 
 
-def _with_parabolas(model: Model, station: Float, heights: Float, grade: Float) -> Model:
-    """Return a model with two parabolas from point to point of a stretch (N,), which ends where it did."""
+def _insert_parabolas(model: Model, station: Float, heights: Float, grade: Float) -> Model:
+    """Return a model in which two parabolas from point to point replace the elements along a stretch of points.
+
+    Args:
+        model: model of grades; its elevations at the stretch's ends stay.
+        station, heights: (N,) of the stretch's points, m.
+        grade: (N,) grade at each point, m/m.
+    """
     heights = heights.copy()
     heights[[0, -1]] = model.evaluate(station[[0, -1]])
     chord = np.diff(station)
@@ -68,31 +75,32 @@ def _with_parabolas(model: Model, station: Float, heights: Float, grade: Float) 
     values = np.empty((2 * len(chord), 2))
     values[::2] = np.column_stack([grade[:-1], middle])
     values[1::2] = np.column_stack([middle, grade[1:]])
-    before, after = _part(model, -np.inf, float(station[0])), _part(model, float(station[-1]), np.inf)
-    rows = [row for row in (before, (knots, values), after) if len(row[1])]
-    joined = np.concatenate([rows[0][0][:1], *(row[0][1:] for row in rows)])
-    count = sum(len(row[1]) for row in rows)
-    start = model.evaluate(joined[:1]) if len(before[1]) else heights[:1]
+    model_before = _cut_elements(model, -np.inf, float(station[0]))
+    model_after = _cut_elements(model, float(station[-1]), np.inf)
+    sections = [row for row in (model_before, (knots, values), model_after) if len(row[1])]
+    all_knots = np.concatenate([sections[0][0][:1], *(row[0][1:] for row in sections)])
+    count = sum(len(row[1]) for row in sections)
+    start = model.evaluate(all_knots[:1]) if len(model_before[1]) else heights[:1]
     return replace(
         model,
         start=start,
-        knots=joined,
-        values=np.concatenate([row[1] for row in rows]),
+        knots=all_knots,
+        values=np.concatenate([row[1] for row in sections]),
         kinds=np.full(count, FREE),
         smooth=np.zeros(count - 1, dtype=bool),
     )
 
 
-def _part(model: Model, low: float, high: float) -> tuple[Float, Float]:
-    """Return knots (K + 1,) and values (K, 2) of a model's elements within two stations, m, the outer ones cut."""
+def _cut_elements(model: Model, lower_station: float, upper_station: float) -> tuple[Float, Float]:
+    """Return knots (K + 1,) and values (K, 2) of a model's elements between two stations, m, the outermost ones cut."""
     knots, values = list[float](), list[list[float]]()
-    for e, (first, last) in enumerate(model.values.tolist()):
+    for e, (start_value, end_value) in enumerate(model.values.tolist()):
         a, b = float(model.knots[e]), float(model.knots[e + 1])
-        begin, end = max(a, low), min(b, high)
+        begin, end = max(a, lower_station), min(b, upper_station)
         if end - begin <= 1e-6:
             continue
-        slope = (last - first) / (b - a)
+        slope = (end_value - start_value) / (b - a)
         knots += [begin] if not knots else []
         knots.append(end)
-        values.append([first + slope * (begin - a), first + slope * (end - a)])
+        values.append([start_value + slope * (begin - a), start_value + slope * (end - a)])
     return np.array(knots), np.array(values).reshape(-1, 2)

@@ -47,11 +47,11 @@ class Model:
     """Elements with linear curvature (order 2) or grade (order 1).
 
     Attributes:
-        start: (order,) value at the first knot, and with order 2 the first derivative there.
+        start: (order,) the function's value at the first knot, and with order 2 its first derivative there.
         knots: (M + 1,) stations, m.
-        values: (M, 2) at the elements' starts and ends.
+        values: (M, 2) curvature or grade at each element's start and end.
         kinds: (M,) FREE, EQUAL or ZERO.
-        smooth: (M - 1,) whether the value of the element before a knot goes on in the one after it.
+        smooth: (M - 1,) whether curvature or grade is continuous at each inner knot.
     """
 
     start: Float
@@ -72,22 +72,22 @@ class Model:
 
     @cached_property
     def tie(self) -> Float:
-        """Return the matrix (2 M, G) that gives all elements' values from the free ones."""
+        """Return the matrix (2 M, G) that gives the start and end values of all elements from the free values."""
         label = np.arange(2 * self.size)
-        fixed = np.zeros(2 * self.size, bool)
+        is_zero = np.zeros(2 * self.size, bool)
         for e, kind in enumerate(self.kinds):
             if e and self.smooth[e - 1]:
                 label[2 * e] = label[2 * e - 1]
             if kind != FREE:
                 label[2 * e + 1] = label[2 * e]
             if kind == ZERO:
-                fixed[label[2 * e]] = True
-        held = fixed[label]
-        names = np.unique(label[~held])
-        return np.asarray(((label[:, None] == names) & ~held[:, None]).astype(np.float64))
+                is_zero[label[2 * e]] = True
+        is_fixed = is_zero[label]
+        free_labels = np.unique(label[~is_fixed])
+        return np.asarray(((label[:, None] == free_labels) & ~is_fixed[:, None]).astype(np.float64))
 
-    def tied(self) -> Model:
-        """Return the model with values that obey its kinds: those tied together are set to their mean."""
+    def tie_values(self) -> Model:
+        """Return the model with values that obey its elements' kinds: those tied together are set to their mean."""
         mean = self.tie.T @ self.values.ravel() / np.maximum(self.tie.sum(axis=0), 1.0)
         return replace(self, values=(self.tie @ mean).reshape(-1, 2))
 
@@ -96,42 +96,47 @@ class Model:
         return self.order + self.tie.shape[1] + self.size - 1
 
     def ramps(self, station: Float) -> tuple[Float, Float]:
-        """Return what values of 1 at each element's start and end, alone, give at stations: twice (N, M)."""
+        """Return the function at stations (N,) by unit values at each element's start, and at its end, (N, M) each.
+
+        The integral (order 1) or double integral (order 2) of the falling and the rising ramp of each element.
+        """
         length = np.diff(self.knots)
-        first = np.arange(self.size) == 0
-        last = np.arange(self.size) == self.size - 1
-        u = station[:, None] - self.knots[:-1]
-        inside = np.where(first, np.minimum(u, length), np.clip(u, 0.0, length))
-        inside = np.where(last, np.where(u > 0.0, u, 0.0) if self.size > 1 else u, inside)
-        beyond = np.where(last, 0.0, np.maximum(u - length, 0.0))
+        is_first = np.arange(self.size) == 0
+        is_last = np.arange(self.size) == self.size - 1
+        distance = station[:, None] - self.knots[:-1]
+        inner_distance = np.where(is_first, np.minimum(distance, length), np.clip(distance, 0.0, length))
+        inner_distance = np.where(
+            is_last, np.where(distance > 0.0, distance, 0.0) if self.size > 1 else distance, inner_distance
+        )
+        distance_beyond = np.where(is_last, 0.0, np.maximum(distance - length, 0.0))
         if self.order == 1:
-            rise = inside**2 / (2.0 * length)
-            return inside - rise, rise
-        rise = inside**3 / (6.0 * length) + 0.5 * length * beyond
-        return 0.5 * inside**2 + length * beyond - rise, rise
+            rise = inner_distance**2 / (2.0 * length)
+            return inner_distance - rise, rise
+        rise = inner_distance**3 / (6.0 * length) + 0.5 * length * distance_beyond
+        return 0.5 * inner_distance**2 + length * distance_beyond - rise, rise
 
     def evaluate(self, station: Float) -> Float:
         """Return the function (N,) at stations (N,), m."""
         fall, rise = self.ramps(station)
-        level = self.start[0] + (self.start[1] * (station - self.knots[0]) if self.order == 2 else 0.0)
-        return np.asarray(level + fall @ self.values[:, 0] + rise @ self.values[:, 1])
+        straight_part = self.start[0] + (self.start[1] * (station - self.knots[0]) if self.order == 2 else 0.0)
+        return np.asarray(straight_part + fall @ self.values[:, 0] + rise @ self.values[:, 1])
 
     def jacobian(self, station: Float) -> Float:
         """Return the derivatives (N, P) of the function by start, free values and inner knots."""
         fall, rise = self.ramps(station)
-        both = np.stack((fall, rise), axis=2).reshape(len(station), -1)
+        end_ramps = np.stack((fall, rise), axis=2).reshape(len(station), -1)
         slope = np.diff(self.values)[:, 0] / np.diff(self.knots)
-        past = station[:, None] - self.knots[1:-1]
-        step = np.maximum(past, 0.0) if self.order == 2 else (past > 0.0).astype(np.float64)
+        distance_past = station[:, None] - self.knots[1:-1]
+        step = np.maximum(distance_past, 0.0) if self.order == 2 else (distance_past > 0.0).astype(np.float64)
         jump = self.values[:-1, 1] - self.values[1:, 0]
         knots = -slope[:-1] * rise[:, :-1] - slope[1:] * fall[:, 1:] + jump * step
         head = [np.ones((len(station), 1))]
         if self.order == 2:
             head.append((station - self.knots[0])[:, None])
-        return np.hstack((*head, both @ self.tie, knots))
+        return np.hstack((*head, end_ramps @ self.tie, knots))
 
-    def moved(self, step: Float) -> Model:
-        """Return the model after a step (P,) of its parameters, its knots kept in order."""
+    def apply_step(self, step: Float) -> Model:
+        """Return the model after a step (P,) of its parameters, limited so that knots keep their order."""
         count = self.tie.shape[1]
         values = self.values + (self.tie @ step[self.order : self.order + count]).reshape(-1, 2)
         values = np.clip(values, -_LIMIT[self.order], _LIMIT[self.order])
@@ -147,7 +152,7 @@ class Match:
 
     Attributes:
         model: the model.
-        rest: (N,) values less the model's, m.
+        rest: (N,) residuals: values less the model's, m.
     """
 
     model: Model
@@ -160,43 +165,43 @@ class Match:
 
     @property
     def worst(self) -> float:
-        """Return the largest distance, m."""
+        """Return the largest absolute residual, m."""
         return float(np.abs(self.rest).max())
 
 
-def match(model: Model, station: Float, values: Float, enough: float = 0.0) -> Match:
+def match(model: Model, station: Float, values: Float, close_enough: float = 0.0) -> Match:
     """Return a model fitted to values (N,) at stations (N,) by Levenberg and Marquardt's steps.
 
     Args:
-        model: to begin with.
-        station, values: m.
-        enough: largest distance (m) at which it is good enough to stop.
+        model: model whose kinds and knots the fit begins with.
+        station, values: (N,) m.
+        close_enough: largest residual (m) at which the fit stops.
     """
-    model = _started(model, station, values)
-    best = Match(model, values - model.evaluate(station))
+    model = _fit_linearly(model, station, values)
+    best_match = Match(model, values - model.evaluate(station))
     damping, matrix = 1e-6, model.jacobian(station)
     for _ in range(_STEPS):
-        if best.worst <= enough:
+        if best_match.worst <= close_enough:
             break
         scale = np.maximum(np.sqrt((matrix**2).sum(axis=0)), 1e-12)
         normal = np.vstack((matrix / scale, np.sqrt(damping) * np.eye(len(scale))))
-        step = np.linalg.lstsq(normal, np.append(best.rest, np.zeros(len(scale))), rcond=None)[0] / scale
-        model = best.model.moved(step)
+        step = np.linalg.lstsq(normal, np.append(best_match.rest, np.zeros(len(scale))), rcond=None)[0] / scale
+        model = best_match.model.apply_step(step)
         trial = Match(model, values - model.evaluate(station))
-        if trial.square < best.square:
-            gain = 1.0 - trial.square / best.square
-            best, damping, matrix = trial, max(0.1 * damping, _UNDAMPED), trial.model.jacobian(station)
+        if trial.square < best_match.square:
+            gain = 1.0 - trial.square / best_match.square
+            best_match, damping, matrix = trial, max(0.1 * damping, _UNDAMPED), trial.model.jacobian(station)
             if gain < _ENOUGH and damping <= _UNDAMPED:
                 break
         else:
             damping *= 10.0
             if damping > 1e3:
                 break
-    return best
+    return best_match
 
 
-def _started(model: Model, station: Float, values: Float) -> Model:
-    """Return a model with start and values from a linear fit, its knots as they are."""
+def _fit_linearly(model: Model, station: Float, values: Float) -> Model:
+    """Return the model with start and values fitted linearly to values (N,) at stations (N,), m; its knots stay."""
     model = replace(model, values=np.zeros_like(model.values))
     matrix = model.jacobian(station)[:, : model.order + model.tie.shape[1]]
     scale = np.maximum(np.sqrt((matrix**2).sum(axis=0)), 1e-12)
@@ -205,79 +210,104 @@ def _started(model: Model, station: Float, values: Float) -> Model:
     return replace(model, start=solution[: model.order], values=ends)
 
 
-def joined(pieces: Sequence[Piece], station: Float, order: int) -> Model:
-    """Return the model of pieces, with short elements between those that meet at an angle (order 2)."""
+def model_of_pieces(pieces: Sequence[Piece], station: Float, order: int) -> Model:
+    """Return the model with an element for each piece, and in plan short ones between pieces that meet at an angle.
+
+    Args:
+        pieces: consecutive pieces over all points.
+        station: (N,) of the points, m.
+        order: 2 in plan, 1 in height.
+    """
     knots, kinds = [float(station[0])], [_kind(pieces[0], order)]
-    smooth: list[bool] = []
-    for before, after in itertools.pairwise(pieces):
-        low, high = float(station[before.last]), float(station[after.first])
-        wide = high - low
-        least = 0.5 * (float(station[before.first]) + low) if before.first < before.last else low
-        most = 0.5 * (high + float(station[after.last])) if after.first < after.last else high
-        border = border_between(before, after, max(low - wide, least), min(high + wide, most))
+    is_smooth: list[bool] = []
+    for piece_before, piece_after in itertools.pairwise(pieces):
+        last_station, next_station = float(station[piece_before.last]), float(station[piece_after.first])
+        gap = next_station - last_station
+        # The border lies within a gap's length beside the gap, and not beyond the middles of both pieces.
+        earliest = (
+            0.5 * (float(station[piece_before.first]) + last_station)
+            if piece_before.first < piece_before.last
+            else last_station
+        )
+        latest = (
+            0.5 * (next_station + float(station[piece_after.last]))
+            if piece_after.first < piece_after.last
+            else next_station
+        )
+        border = border_between(
+            piece_before, piece_after, max(last_station - gap, earliest), min(next_station + gap, latest)
+        )
         border = max(border, knots[-1] + _SHORT)
-        kind = _kind(after, order)
-        turn = before.at(border, order - 1) - after.at(border, order - 1)
+        kind = _kind(piece_after, order)
+        turn = piece_before.at(border, order - 1) - piece_after.at(border, order - 1)
+        # An angle between the pieces: a short arc around the border turns by it.
         if order == 2 and abs(turn) > _KINK:
-            half = 0.25 * wide
-            start = max(border - half, 0.5 * (knots[-1] + border))
-            knots += [start, border + half]
+            half_length = 0.25 * gap
+            start = max(border - half_length, 0.5 * (knots[-1] + border))
+            knots += [start, border + half_length]
             kinds += [EQUAL, kind]
-            smooth += [False, False]
+            is_smooth += [False, False]
             continue
-        free = FREE in (kind, kinds[-1])
+        has_free_element = FREE in (kind, kinds[-1])
         knots.append(border)
         kinds.append(kind)
-        smooth.append(free and (order == 2 or abs(turn) < _KINK))
+        is_smooth.append(has_free_element and (order == 2 or abs(turn) < _KINK))
     end = float(station[-1])
     knots.append(max(end, knots[-1] + _SHORT))
     count = len(kinds)
-    return Model(np.zeros(order), np.array(knots), np.zeros((count, 2)), np.array(kinds), np.array(smooth, bool))
+    return Model(np.zeros(order), np.array(knots), np.zeros((count, 2)), np.array(kinds), np.array(is_smooth, bool))
 
 
 def _kind(piece: Piece, order: int) -> int:
+    """Return the kind of element that a piece's degree makes: in height degree 1 is a constant grade."""
     return _KINDS[piece.degree] if order == 2 else (EQUAL if piece.degree == 1 else FREE)
 
 
-def repaired(fit: Match, station: Float, values: Float, allowed: float) -> Match:
-    """Return a match with elements freed, borders opened and elements put in where it is farther off than allowed."""
+def repair_match(fit: Match, station: Float, values: Float, tolerance: float) -> Match:
+    """Return a match improved where its residual exceeds a tolerance: elements freed or inserted, borders opened.
+
+    Args:
+        fit: match to begin with.
+        station, values: (N,) m.
+        tolerance: largest residual, m.
+    """
     for _ in range(_REPAIRS):
-        if fit.worst <= allowed:
+        if fit.worst <= tolerance:
             return fit
-        at = float(station[int(np.abs(fit.rest).argmax())])
+        worst_station = float(station[int(np.abs(fit.rest).argmax())])
         model = fit.model
-        element = int(np.clip(np.searchsorted(model.knots, at, "right") - 1, 0, model.size - 1))
+        element = int(np.clip(np.searchsorted(model.knots, worst_station, "right") - 1, 0, model.size - 1))
         part = _Part.about(model, element, station, values)
-        best, price = None, part.price(part.match(part.model, allowed), allowed)
-        for trial in _richer(part.model, element - part.first, at):
-            tried = part.match(trial, allowed)
-            if part.price(tried, allowed) < price:
-                best, price = tried, part.price(tried, allowed)
-        if best is None:
+        best_trial, price = None, part.price(part.match(part.model, tolerance), tolerance)
+        for trial in _richer_models(part.model, element - part.first, worst_station):
+            trial_match = part.match(trial, tolerance)
+            if part.price(trial_match, tolerance) < price:
+                best_trial, price = trial_match, part.price(trial_match, tolerance)
+        if best_trial is None:
             return fit
-        whole = _placed(part.put_back(model, best.model), station, values)
-        if whole.square >= fit.square * (1.0 - 1e-3):
-            whole = match(whole.model, station, values, 0.1 * allowed)
-            if whole.square >= fit.square * (1.0 - 1e-3):
+        whole_match = _match_fixed_knots(part.put_back(model, best_trial.model), station, values)
+        if whole_match.square >= fit.square * (1.0 - 1e-3):
+            whole_match = match(whole_match.model, station, values, 0.1 * tolerance)
+            if whole_match.square >= fit.square * (1.0 - 1e-3):
                 return fit
-        fit = whole
-    return match(fit.model, station, values, 0.1 * allowed)
+        fit = whole_match
+    return match(fit.model, station, values, 0.1 * tolerance)
 
 
-def _placed(model: Model, station: Float, values: Float) -> Match:
-    """Return the match of a model whose knots stay where they are."""
-    model = _started(model, station, values)
+def _match_fixed_knots(model: Model, station: Float, values: Float) -> Match:
+    """Return the match of a model with its start and values fitted and its knots fixed."""
+    model = _fit_linearly(model, station, values)
     return Match(model, values - model.evaluate(station))
 
 
 @dataclass(frozen=True)
 class _Part:
-    """A stretch of a model, to try edits on.
+    """A stretch of a model on which edits are tried.
 
     Attributes:
-        first, last: its elements.
-        model: of the stretch.
-        station, values: of its points, m.
+        first, last: indices of its first and last element.
+        model: model of the stretch alone.
+        station, values: (N,) of the stretch's points, m.
     """
 
     first: int
@@ -288,147 +318,172 @@ class _Part:
 
     @classmethod
     def about(cls, model: Model, element: int, station: Float, values: Float) -> _Part:
-        first, last = max(0, element - _REACH), min(model.size - 1, element + _REACH)
-        low = 0 if first == 0 else int(np.searchsorted(station, model.knots[first]))
-        high = len(station) if last == model.size - 1 else int(np.searchsorted(station, model.knots[last + 1], "right"))
+        """Return the stretch of a model within `_REACH` elements of one, with its points."""
+        first_element, last_element = max(0, element - _REACH), min(model.size - 1, element + _REACH)
+        first_point = 0 if first_element == 0 else int(np.searchsorted(station, model.knots[first_element]))
+        end_point = (
+            len(station)
+            if last_element == model.size - 1
+            else int(np.searchsorted(station, model.knots[last_element + 1], "right"))
+        )
         part = replace(
             model,
-            knots=model.knots[first : last + 2],
-            values=model.values[first : last + 1],
-            kinds=model.kinds[first : last + 1],
-            smooth=model.smooth[first:last],
+            knots=model.knots[first_element : last_element + 2],
+            values=model.values[first_element : last_element + 1],
+            kinds=model.kinds[first_element : last_element + 1],
+            smooth=model.smooth[first_element:last_element],
         )
-        return cls(first, last, part, station[low:high], values[low:high])
+        return cls(first_element, last_element, part, station[first_point:end_point], values[first_point:end_point])
 
-    def match(self, model: Model, allowed: float) -> Match:
-        return match(model, self.station, self.values, 0.1 * allowed)
+    def match(self, model: Model, tolerance: float) -> Match:
+        """Return a model of the stretch fitted to the stretch's points, to a tenth of a tolerance, m."""
+        return match(model, self.station, self.values, 0.1 * tolerance)
 
-    def price(self, fit: Match, allowed: float) -> float:
-        """Return what a match costs: least for the nearest that has few free parameters."""
-        square = max(fit.square, len(fit.rest) * (0.3 * allowed) ** 2)
+    def price(self, fit: Match, tolerance: float) -> float:
+        """Return the price of a match, lower for small residuals and few free parameters.
+
+        Residuals below 0.3 of the tolerance, m, gain nothing; halving their sum of squares is worth 2.8 parameters
+        (chosen).
+        """
+        square = max(fit.square, len(fit.rest) * (0.3 * tolerance) ** 2)
         return 4.0 * float(np.log(max(square, 1e-30))) + fit.model.freedom()
 
     def put_back(self, model: Model, part: Model) -> Model:
         """Return a model with the elements of this stretch replaced."""
-        first, last = self.first, self.last
+        first_element, last_element = self.first, self.last
         return replace(
             model,
-            knots=np.concatenate([model.knots[:first], part.knots, model.knots[last + 2 :]]),
-            values=np.concatenate([model.values[:first], part.values, model.values[last + 1 :]]),
-            kinds=np.concatenate([model.kinds[:first], part.kinds, model.kinds[last + 1 :]]),
-            smooth=np.concatenate([model.smooth[:first], part.smooth, model.smooth[last:]]),
+            knots=np.concatenate([model.knots[:first_element], part.knots, model.knots[last_element + 2 :]]),
+            values=np.concatenate([model.values[:first_element], part.values, model.values[last_element + 1 :]]),
+            kinds=np.concatenate([model.kinds[:first_element], part.kinds, model.kinds[last_element + 1 :]]),
+            smooth=np.concatenate([model.smooth[:first_element], part.smooth, model.smooth[last_element:]]),
         )
 
 
-def _richer(model: Model, element: int, place: float) -> Iterator[Model]:
-    """Yield models with one freedom more about an element: a border open, a kind freed, or an element put in."""
+def _richer_models(model: Model, element: int, station: float) -> Iterator[Model]:
+    """Yield models with more freedom around an element: a border opened, a kind freed, or an element inserted.
+
+    Args:
+        model: model of a stretch.
+        element: index of the element.
+        station: station (m) of the largest residual, at which the element may be split.
+    """
     for knot in (element - 1, element):
         if 0 <= knot < model.size - 1 and model.smooth[knot]:
-            smooth = model.smooth.copy()
-            smooth[knot] = False
-            yield replace(model, smooth=smooth)
-    for near in range(max(0, element - 1), min(model.size, element + 2)):
-        yield from (_of_kind(model, near, kind) for kind in (EQUAL, FREE) if kind < model.kinds[near])
+            is_smooth = model.smooth.copy()
+            is_smooth[knot] = False
+            yield replace(model, smooth=is_smooth)
+    for neighbour in range(max(0, element - 1), min(model.size, element + 2)):
+        yield from (_set_kind(model, neighbour, kind) for kind in (EQUAL, FREE) if kind < model.kinds[neighbour])
     for knot in (element, element + 1):
         if 0 < knot < model.size:
             kinds = (ZERO, EQUAL, FREE) if model.order == 2 else (EQUAL, FREE)
-            yield from (_put_in(model, knot, kind) for kind in kinds)
-    if model.knots[element] + _SHORT < place < model.knots[element + 1] - _SHORT:
-        yield from (_split(model, element, place, smooth_there) for smooth_there in (False, True))
+            yield from (_insert_element(model, knot, kind) for kind in kinds)
+    if model.knots[element] + _SHORT < station < model.knots[element + 1] - _SHORT:
+        yield from (_split_element(model, element, station, joins_smoothly) for joins_smoothly in (False, True))
 
 
-def _put_in(model: Model, knot: int, kind: int) -> Model:
-    """Return the model with a short element put in at an inner knot."""
-    before, after = np.diff(model.knots)[[knot - 1, knot]]
-    half = min(1.0, 0.2 * min(before, after))
-    knots = np.insert(model.knots, knot, model.knots[knot] - half)
-    knots[knot + 1] += half
+def _insert_element(model: Model, knot: int, kind: int) -> Model:
+    """Return the model with a short element of a kind, at most 2 m long, inserted at an inner knot."""
+    length_before, length_after = np.diff(model.knots)[[knot - 1, knot]]
+    half_length = min(1.0, 0.2 * min(length_before, length_after))
+    knots = np.insert(model.knots, knot, model.knots[knot] - half_length)
+    knots[knot + 1] += half_length
     kinds = np.insert(model.kinds, knot, kind)
     values = np.insert(model.values, knot, [model.values[knot - 1, 1], model.values[knot, 0]], axis=0)
-    free = kind == FREE
-    smooth = np.insert(model.smooth, knot - 1, free)
-    smooth[knot] = free
-    return replace(model, knots=knots, kinds=kinds, values=values, smooth=smooth)
+    is_free = kind == FREE
+    is_smooth = np.insert(model.smooth, knot - 1, is_free)
+    is_smooth[knot] = is_free
+    return replace(model, knots=knots, kinds=kinds, values=values, smooth=is_smooth)
 
 
-def _split(model: Model, element: int, place: float, smooth_there: bool) -> Model:
-    knots = np.insert(model.knots, element + 1, place)
+def _split_element(model: Model, element: int, station: float, joins_smoothly: bool) -> Model:
+    """Return the model with an element split at a station, m: smoothly into free ones, else by a jump into arcs."""
+    knots = np.insert(model.knots, element + 1, station)
     kinds = np.insert(model.kinds, element, model.kinds[element])
-    if smooth_there:
+    if joins_smoothly:
         kinds[element : element + 2] = FREE
     elif model.order == 2:
         kinds[element : element + 2] = np.minimum(kinds[element : element + 2], EQUAL)
-    first, last = model.values[element]
-    share = (place - model.knots[element]) / (model.knots[element + 1] - model.knots[element])
-    middle = first + share * (last - first)
-    values = np.insert(model.values, element, [first, middle], axis=0)
-    values[element + 1] = [middle, last]
-    smooth = np.insert(model.smooth, element, smooth_there)
-    return replace(model, knots=knots, kinds=kinds, values=values, smooth=smooth)
+    start_value, end_value = model.values[element]
+    share = (station - model.knots[element]) / (model.knots[element + 1] - model.knots[element])
+    middle = start_value + share * (end_value - start_value)
+    values = np.insert(model.values, element, [start_value, middle], axis=0)
+    values[element + 1] = [middle, end_value]
+    is_smooth = np.insert(model.smooth, element, joins_smoothly)
+    return replace(model, knots=knots, kinds=kinds, values=values, smooth=is_smooth)
 
 
-def simplified(fit: Match, station: Float, values: Float, allowed: float) -> Match:
-    """Return a match with what it can spare taken away: elements, their freedom, open borders."""
+def simplify_match(fit: Match, station: Float, values: Float, tolerance: float) -> Match:
+    """Return a match simplified within a tolerance: elements removed, their freedom reduced, borders closed.
+
+    Args:
+        fit: match to begin with.
+        station, values: (N,) m.
+        tolerance: largest residual that is allowed, m.
+    """
     element = 0
     while element < fit.model.size:
         part = _Part.about(fit.model, element, station, values)
         # A stretch without points, between two that lie far apart, tells nothing of what would do there.
-        simpler = sorted(_simpler(part.model, element - part.first), key=Model.freedom) if len(part.station) else ()
-        for trial in simpler:
-            tried = part.match(trial, allowed)
-            if tried.worst <= allowed and tried.model.freedom() < part.model.freedom():
-                whole = _placed(part.put_back(fit.model, tried.model), station, values)
-                if whole.worst > allowed:
-                    whole = match(whole.model, station, values, 0.1 * allowed)
-                if whole.worst <= allowed:
-                    fit, element = whole, max(-1, element - _REACH - 1)
+        trial_models = (
+            sorted(_simpler_models(part.model, element - part.first), key=Model.freedom) if len(part.station) else ()
+        )
+        for trial in trial_models:
+            trial_match = part.match(trial, tolerance)
+            if trial_match.worst <= tolerance and trial_match.model.freedom() < part.model.freedom():
+                whole_match = _match_fixed_knots(part.put_back(fit.model, trial_match.model), station, values)
+                if whole_match.worst > tolerance:
+                    whole_match = match(whole_match.model, station, values, 0.1 * tolerance)
+                if whole_match.worst <= tolerance:
+                    fit, element = whole_match, max(-1, element - _REACH - 1)
                     break
         element += 1
     return fit
 
 
-def _simpler(model: Model, element: int) -> Iterator[Model]:
-    """Yield models with less freedom about an element: without it, of a simpler kind, smooth at its end."""
+def _simpler_models(model: Model, element: int) -> Iterator[Model]:
+    """Yield models with less freedom around an element: without it, merged, of a simpler kind, or smooth at its end."""
     kinds = model.kinds
     if model.size > 1:
-        yield _without(model, element)
+        yield _remove_element(model, element)
     if 0 < element < model.size - 1:
         for kind in {int(kinds[element - 1]), int(kinds[element]), int(kinds[element + 1])}:
-            yield _as_one(model, element, kind)
+            yield _merge_with_neighbours(model, element, kind)
     for kind in (ZERO, EQUAL) if model.order == 2 else (EQUAL,):
         if kinds[element] < kind or (kinds[element] == EQUAL and kind == ZERO):
-            yield _of_kind(model, element, kind)
+            yield _set_kind(model, element, kind)
     if element < model.size - 1 and not model.smooth[element] and FREE in kinds[element : element + 2]:
-        smooth = model.smooth.copy()
-        smooth[element] = True
-        yield replace(model, smooth=smooth)
+        is_smooth = model.smooth.copy()
+        is_smooth[element] = True
+        yield replace(model, smooth=is_smooth)
 
 
-def _of_kind(model: Model, element: int, kind: int) -> Model:
-    """Return the model with an element of another kind; borders of lines and arcs alone are open."""
-    kinds, smooth = model.kinds.copy(), model.smooth.copy()
+def _set_kind(model: Model, element: int, kind: int) -> Model:
+    """Return the model with an element of another kind; borders between lines and arcs become open."""
+    kinds, is_smooth = model.kinds.copy(), model.smooth.copy()
     kinds[element] = kind
     for knot in (element - 1, element):
         if 0 <= knot < model.size - 1 and FREE not in kinds[knot : knot + 2]:
-            smooth[knot] = False
-    return replace(model, kinds=kinds, smooth=smooth)
+            is_smooth[knot] = False
+    return replace(model, kinds=kinds, smooth=is_smooth)
 
 
-def _as_one(model: Model, element: int, kind: int) -> Model:
-    """Return the model with an element and both of its neighbours as one of a kind."""
-    part = slice(element, element + 2)
-    one = replace(
+def _merge_with_neighbours(model: Model, element: int, kind: int) -> Model:
+    """Return the model with an element and both of its neighbours merged into one element of a kind."""
+    knot_pair = slice(element, element + 2)
+    merged_model = replace(
         model,
-        knots=np.delete(model.knots, part),
-        kinds=np.delete(model.kinds, part),
-        values=np.delete(model.values, part, axis=0),
+        knots=np.delete(model.knots, knot_pair),
+        kinds=np.delete(model.kinds, knot_pair),
+        values=np.delete(model.values, knot_pair, axis=0),
         smooth=np.delete(model.smooth, slice(element - 1, element + 1)),
     )
-    return _of_kind(one, element - 1, kind)
+    return _set_kind(merged_model, element - 1, kind)
 
 
-def _without(model: Model, element: int) -> Model:
-    """Return the model with an element left out, its neighbours prolonged to its middle."""
+def _remove_element(model: Model, element: int) -> Model:
+    """Return the model without an element, its neighbours prolonged to its middle."""
     middle = 0.5 * (model.knots[element] + model.knots[element + 1])
     kinds = np.delete(model.kinds, element)
     values = np.delete(model.values, element, axis=0)
@@ -438,6 +493,6 @@ def _without(model: Model, element: int) -> Model:
         return replace(model, knots=np.delete(model.knots, -2), kinds=kinds, values=values, smooth=model.smooth[:-1])
     knots = np.delete(model.knots, element + 1)
     knots[element] = middle
-    smooth = np.delete(model.smooth, element)
-    smooth[element - 1] = FREE in kinds[element - 1 : element + 1]
-    return replace(model, knots=knots, kinds=kinds, values=values, smooth=smooth)
+    is_smooth = np.delete(model.smooth, element)
+    is_smooth[element - 1] = FREE in kinds[element - 1 : element + 1]
+    return replace(model, knots=knots, kinds=kinds, values=values, smooth=is_smooth)

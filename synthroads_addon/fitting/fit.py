@@ -26,7 +26,7 @@ from ..road.parameters import AlignmentObject, HorizontalElement, VerticalPoint
 from ..road.profile import IntersectionPoint, Profile
 from ..scenario.road import RoadScenario
 from .chain import EQUAL, FREE, NEAR, ZERO, AxisData, Chain, ChainFit, Heights, Plan, Start, elevations, refine
-from .follow import followed, heights_followed
+from .follow import follow_heights, follow_points
 from .search import Goal, descent, improve_fit, independent_count
 
 _WINDOW = 1200.0
@@ -83,11 +83,11 @@ rounded."""
 
 @dataclass(frozen=True)
 class Deviations:
-    """Statistics of points' distances from what was fitted to them.
+    """Statistics of points' distances from the alignment or profile fitted to them.
 
     Attributes:
-        rms, p95, worst: of the distances, m.
-        worst_station: where the worst is, m.
+        rms, p95, worst: root mean square, 95th percentile and maximum of the absolute distances, m.
+        worst_station: station of the largest distance, m.
     """
 
     rms: float
@@ -99,11 +99,16 @@ class Deviations:
     def of(cls, station: Float, distance: Float) -> Self:
         """Return root mean square, 95th percentile and maximum of the absolute distances (N,) at stations (N,), m."""
         size = np.abs(distance)
-        worst, rms = int(size.argmax()), float(np.sqrt((size**2).mean()))
-        return cls(rms, float(np.percentile(size, 95)), float(size[worst]), float(station[worst]))
+        worst_index, rms = int(size.argmax()), float(np.sqrt((size**2).mean()))
+        return cls(rms, float(np.percentile(size, 95)), float(size[worst_index]), float(station[worst_index]))
 
     def to_dict(self, largest: str = "worst", digits: int = 2) -> dict[str, float]:
-        """Return them rounded as JSON data, m; ``largest`` names the maximum, ``digits`` are its station's."""
+        """Return the statistics rounded as JSON data, m.
+
+        Args:
+            largest: name of the maximum's field.
+            digits: decimals of its station.
+        """
         sizes = {"rms": self.rms, "p95": self.p95, largest: self.worst}
         rounded = {name: round(value, 4) for name, value in sizes.items()}
         return rounded | {f"{largest}_station": round(self.worst_station, digits)}
@@ -111,17 +116,17 @@ class Deviations:
 
 @dataclass(frozen=True)
 class AxisFit:
-    """The alignment and profile fitted to the points of an axis, and how far the points are from them.
+    """The alignment and profile fitted to the points of an axis, with the points' distances from both.
 
     Attributes:
-        alignment: starts at the foot of the first point and ends at that of the last.
+        alignment: alignment from the foot of the first point to that of the last.
         profile: elevation over the alignment's stations.
-        horizontal: of the points' horizontal distances from the alignment, also beyond its ends.
-        height: of their heights above the profile.
-        points: how many were used, i.e. without consecutive duplicates.
+        horizontal: statistics of the points' horizontal distances from the alignment, also beyond its ends.
+        height: statistics of their heights above the profile.
+        points: number of points used: without consecutive duplicates.
         stations, across, above: (N,) of the points: station, offset to the left of the alignment (beyond its ends the
             distance from these as well), height above the profile, m.
-        tolerance: that the fit aimed at, m.
+        tolerance: root mean square distance that the fit aimed at, m.
     """
 
     alignment: Alignment
@@ -143,10 +148,10 @@ class AxisFit:
         """Raise AxisRefusedError if the fit leaves a point farther away than `limit`.
 
         Args:
-            name: of the file that the points are from.
+            name: name of the file that the points are from.
 
         Raises:
-            AxisRefusedError: it does.
+            AxisRefusedError: a point is farther away.
         """
         if max(self.horizontal.worst, self.height.worst) > self.limit:
             raise AxisRefusedError(name, self)
@@ -156,21 +161,21 @@ class AxisRefusedError(InputError):
     """Raised where the road fitted to an axis leaves a point farther away than is allowed.
 
     Attributes:
-        name: of the file that the points are from.
-        fit: what was fitted, for a picture (`fitting.plot`).
+        name: name of the file that the points are from.
+        fit: the refused fit, for a picture (`fitting.plot`).
     """
 
     def __init__(self, name: str, fit: AxisFit, picture: Path | str | None = None) -> None:
         self.name, self.fit = name, fit
-        across, up = fit.horizontal, fit.height
+        horizontal, vertical = fit.horizontal, fit.height
         text = f"no road follows its points within {fit.limit:g} m, which is {REFUSED_BEYOND:g} times the tolerance of "
-        text += f"{100.0 * fit.tolerance:g} cm: the nearest is {across.worst:.2f} m off at station "
-        text += f"{across.worst_station:.1f} m, in height {up.worst:.2f} m at station {up.worst_station:.1f} m. "
-        text += "Look there for corners, jumps or points out of their order"
+        text += f"{100.0 * fit.tolerance:g} cm: the nearest is {horizontal.worst:.2f} m off at station "
+        text += f"{horizontal.worst_station:.1f} m, in height {vertical.worst:.2f} m at station "
+        text += f"{vertical.worst_station:.1f} m. Look there for corners, jumps or points out of their order"
         super().__init__(f"axis {name}", None, f"{text}; {picture} shows it" if picture else text)
 
     def with_picture(self, picture: Path | str) -> Self:
-        """Return a copy of the error that names the file of a picture, or what else shows the fit."""
+        """Return a copy of the error that names a picture's file, or something else that shows the fit."""
         return type(self)(self.name, self.fit, picture)
 
 
@@ -179,16 +184,16 @@ def axis_of_points(
     points: Float,
     declared: MapSystem | None,
     scenario: RoadScenario,
-    seen: Callable[[AxisFit], None] | None = None,
+    show_fit: Callable[[AxisFit], None] | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the alignment fitted to points (N, 3) of the scenario's system, m, the scenario for it, and a report.
 
     Args:
-        name: of their file.
-        points: in their order along the road.
-        declared: system that the file names, whose heights count where the scenario's has none.
-        scenario: limits of the road.
-        seen: gets the fit, to draw it.
+        name: name of the points' file.
+        points: (N, 3) in their order along the road, m.
+        declared: map system that the file names; its height system is taken where the scenario's names none.
+        scenario: scenario whose map system and limits apply.
+        show_fit: function that is called with the fit, to draw it; None if nothing is drawn.
 
     Returns:
         the alignment in local coordinates, the scenario with the length and map origin that follow from it, and with
@@ -206,8 +211,8 @@ def axis_of_points(
     fit = fit_axis(points - origin, follow=True)
     fit.check(name)
     _tell_misfit(name, fit)
-    if seen:
-        seen(fit)
+    if show_fit:
+        show_fit(fit)
     alignment = alignment_object(fit)
     road = scenario.model_copy(
         update={"length": alignment.length, "map_origin": tuple(origin.tolist()), "height_epsg": heights}
@@ -225,10 +230,10 @@ def axis_of_points(
 def _tell_misfit(name: str, fit: AxisFit) -> None:
     """Warn where the road fitted to an axis is farther off its points than the fit aimed at (root mean square)."""
     rows = (("across", fit.horizontal, fit.tolerance), ("in height", fit.height, _HEIGHT_SHARE * fit.tolerance))
-    for way, deviations, aim in rows:
+    for direction, deviations, aim in rows:
         if deviations.rms > aim:
             text = "%s: the fitted road is off its points by %.1f cm %s (rms), which is to be %g cm at most: worst"
-            sizes = (100.0 * deviations.rms, way, 100.0 * aim, 100.0 * deviations.worst, deviations.worst_station)
+            sizes = (100.0 * deviations.rms, direction, 100.0 * aim, 100.0 * deviations.worst, deviations.worst_station)
             warn(f"{text} %.1f cm at station %.0f m", name, *sizes)
 
 
@@ -236,7 +241,7 @@ def alignment_object(fit: AxisFit) -> AlignmentObject:
     """Return a fitted axis as the alignment of a parameter set, with the instance number 1.
 
     Raises:
-        InputError: what was fitted is no road: its bends, lengths or elevations are beyond all limits.
+        InputError: the fitted alignment is no road's: its bends, lengths or elevations are beyond all limits.
     """
     start, heading, _ = fit.alignment.frame(0.0)
     elements = [(round_value(e.length), e.curvature_start, e.curvature_end) for e in fit.alignment.elements]
@@ -251,8 +256,8 @@ def alignment_object(fit: AxisFit) -> AlignmentObject:
         )
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
-        field, wrong = fault["loc"][0] if fault["loc"] else "axis", str(fault["msg"]).lower()
-        raise InputError(f"axis: {field}", fault.get("input"), f"no road runs through its points ({wrong})") from None
+        field, message = fault["loc"][0] if fault["loc"] else "axis", str(fault["msg"]).lower()
+        raise InputError(f"axis: {field}", fault.get("input"), f"no road runs through its points ({message})") from None
 
 
 def fit_heights(station: Float, heights: Float, length: float, tolerance: float) -> tuple[VerticalPoint, ...]:
@@ -260,7 +265,7 @@ def fit_heights(station: Float, heights: Float, length: float, tolerance: float)
 
     Args:
         station, heights: (N,), m.
-        length: of the road, m.
+        length: length of the road, m.
         tolerance: root mean square of the heights that the fit aims at, m.
 
     Example:
@@ -276,12 +281,13 @@ def fit_heights(station: Float, heights: Float, length: float, tolerance: float)
 
 
 def _vertical_points(profile: Profile) -> tuple[VerticalPoint, ...]:
+    """Return a profile's points of vertical intersection as objects of a parameter set."""
     rows = [(round_value(p.station), round_value(p.elevation), p.radius) for p in profile.points]
     return tuple(VerticalPoint(station=s, elevation=z, radius=_written_radius(radius)) for s, z, radius in rows)
 
 
 def _written_radius(radius: float) -> float:
-    """Return a rounding's radius (m) as written: a little less, lest roundings overlap; 0 for one too flat."""
+    """Return the radius (m) to write for a rounding: a little smaller, so that none overlap; 0 if it is too flat."""
     return radius * (1.0 - _PLAY) if radius < _FLATTEST else 0.0
 
 
@@ -310,78 +316,82 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05, design_ends: bool = Fal
         >>> arc.kind, round(1.0 / arc.mean_curvature)
         ('arc', 500)
     """
-    given = _check_points(points)
+    axis_points = _check_points(points)
     if not (np.isfinite(tolerance) and tolerance > 0):
         raise InputError("tolerance", tolerance, "a finite length above 0 m is needed")
-    origin = np.append(np.round(given[:, :2].mean(axis=0)), 0.0)
-    local, weights = _bridge_gaps(given - origin)
-    real = weights == 1.0
-    design = _follow_plan(local, real, tolerance) if follow else None
-    alignment, near = design or _fit_plan(local[:, :2], weights, _MARGIN * tolerance, design_ends)
-    reach = max(NEAR, 5.0 * float(np.median(np.diff(near))))
-    station, offset = alignment.project_near(local[:, :2], near, reach)
-    across = np.hypot(*(local[:, :2] - alignment.position(station)).T)
+    origin = np.append(np.round(axis_points[:, :2].mean(axis=0)), 0.0)
+    local, weights = _bridge_gaps(axis_points - origin)
+    is_point = weights == 1.0
+    design = _follow_plan(local, is_point, tolerance) if follow else None
+    alignment, approximate_stations = design or _fit_plan(local[:, :2], weights, _MARGIN * tolerance, design_ends)
+    reach = max(NEAR, 5.0 * float(np.median(np.diff(approximate_stations))))
+    station, offset = alignment.project_near(local[:, :2], approximate_stations, reach)
+    # Each point's station and distance on the fitted alignment.
+    axis_distance = np.hypot(*(local[:, :2] - alignment.position(station)).T)
     # The road ends at its last point's foot: points before its begin or behind its end, out of their order, are off it.
-    across = np.hypot(across, np.maximum(np.maximum(-station, station - alignment.length), 0.0))
+    axis_distance = np.hypot(axis_distance, np.maximum(np.maximum(-station, station - alignment.length), 0.0))
     # Where points go back their feet may all be the begin: heights are then fitted along the points, to be refused.
     run = station if station.max() > 0.0 else np.append(0.0, np.cumsum(np.hypot(*np.diff(local[:, :2], axis=0).T)))
-    along = np.argsort(run, kind="stable")
-    level = run[along], local[along, 2], weights[along], alignment.length, _HEIGHT_SHARE * tolerance
-    profile = _follow_heights(*level) if follow else _fit_heights(*level)
+    order = np.argsort(run, kind="stable")
+    height_data = run[order], local[order, 2], weights[order], alignment.length, _HEIGHT_SHARE * tolerance
+    profile = _follow_heights(*height_data) if follow else _fit_heights(*height_data)
     heading = alignment.start_heading
-    placed = Alignment(alignment.elements, alignment.x + origin[0], alignment.y + origin[1], heading)
-    station, above = station[real], local[real, 2] - profile.elevation(station[real])
-    aside, up = Deviations.of(station, across[real]), Deviations.of(station, above)
-    signed = np.copysign(across, offset)[real]
-    return AxisFit(placed, profile, aside, up, len(given), station, signed, above, tolerance)
+    map_alignment = Alignment(alignment.elements, alignment.x + origin[0], alignment.y + origin[1], heading)
+    station, height_error = station[is_point], local[is_point, 2] - profile.elevation(station[is_point])
+    horizontal, vertical = Deviations.of(station, axis_distance[is_point]), Deviations.of(station, height_error)
+    signed_offset = np.copysign(axis_distance, offset)[is_point]
+    return AxisFit(
+        map_alignment, profile, horizontal, vertical, len(axis_points), station, signed_offset, height_error, tolerance
+    )
 
 
-def _follow_plan(local: Float, real: NDArray[Any], tolerance: float) -> tuple[Alignment, Float] | None:
-    """Return what `_fit_plan` does, of points of a design (`follow.followed`); None where they aren't one's.
+def _follow_plan(local: Float, is_point: NDArray[Any], tolerance: float) -> tuple[Alignment, Float] | None:
+    """Return the alignment through points of a design and their approximate stations (M,); None for points with noise.
 
     Args:
-        local: (N, 3) points and the light ones between them, m.
-        real: (N,) which are points.
+        local: (M, 3) points, and points of small weight on the chords between, m.
+        is_point: (M,) mask of the points themselves.
         tolerance: m.
     """
-    points = local[real, :2]
+    points = local[is_point, :2]
     try:
-        design = followed(points, tolerance)
+        design = follow_points(points, tolerance)
     except (InputError, np.linalg.LinAlgError):  # lines that turn on the spot
         return None
     if design is None:
         return None
     run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(local[:, :2], axis=0).T))])
     if design.rank(points, tolerance)[0]:
-        usual, near = _fit_plan(points, np.ones(len(points)), _MARGIN * tolerance, False)
+        plain_alignment, approximate_stations = _fit_plan(points, np.ones(len(points)), _MARGIN * tolerance, False)
         # Fewer elements are likelier than many where sparse points tell neither.
-        if np.abs(usual.project_near(points, near, NEAR)[1]).max() <= 0.5 * tolerance:
-            return usual, np.interp(run, run[real], near)
-    return design.alignment, np.interp(run, run[real], design.stations)
+        if np.abs(plain_alignment.project_near(points, approximate_stations, NEAR)[1]).max() <= 0.5 * tolerance:
+            return plain_alignment, np.interp(run, run[is_point], approximate_stations)
+    return design.alignment, np.interp(run, run[is_point], design.stations)
 
 
 def _follow_heights(station: Float, heights: Float, weights: Float, length: float, tolerance: float) -> Profile:
-    """Return the profile that heights of a design lie on, or that of `_fit_heights` where it is nearer to them."""
-    real = weights == 1.0
-    at, level = station[real], heights[real]
+    """Return the profile that heights of a design lie on, or that of `_fit_heights` if it is nearer to the heights."""
+    is_point = weights == 1.0
+    point_stations, point_heights = station[is_point], heights[is_point]
 
-    def worst(profile: Profile) -> float:
-        return float(np.abs(profile.elevation(at) - level).max())
+    def largest_error(profile: Profile) -> float:
+        """Return a profile's largest distance from the heights, m."""
+        return float(np.abs(profile.elevation(point_stations) - point_heights).max())
 
     design: Profile | None = None
-    if (np.diff(at) > 0.0).all():
+    if (np.diff(point_stations) > 0.0).all():
         try:
-            design = heights_followed(at, level, length, tolerance)
+            design = follow_heights(point_stations, point_heights, length, tolerance)
         except (InputError, np.linalg.LinAlgError):  # grades that no road has
             design = None
-    if design is not None and worst(design) <= tolerance:
+    if design is not None and largest_error(design) <= tolerance:
         return design
-    usual = _fit_heights(station, heights, weights, length, tolerance)
-    return usual if design is None or worst(usual) <= worst(design) else design
+    plain_profile = _fit_heights(station, heights, weights, length, tolerance)
+    return plain_profile if design is None or largest_error(plain_profile) <= largest_error(design) else design
 
 
 def _check_points(points: ArrayLike) -> Float:
-    """Return the points as (N, 3), N >= 2, without consecutive duplicates in plan; InputError for what isn't finite."""
+    """Return the points as (N, 3), N >= 2, without consecutive duplicates in plan; InputError for values not finite."""
     array = finite_array("points", points)
     if array.ndim != 2 or array.shape[1] not in (2, 3):
         raise InputError("points", array.shape, "an array of shape (N, 3) or (N, 2) is needed")
@@ -396,19 +406,21 @@ def _check_points(points: ArrayLike) -> Float:
 
 
 def _bridge_gaps(points: Float) -> tuple[Float, Float]:
-    """Return points (M, 3) with light ones added on the chords of long gaps, and all points' weights (M,).
+    """Return points (M, 3) with points of small weight added on the chords of long gaps, and all weights (M,).
 
     A polyline with dense points on its curves only would leave the fit without a hold on the straights between. The
     added points weigh next to nothing, so a curve across a gap is still bridged as a curve.
     """
     step = np.hypot(*np.diff(points[:, :2], axis=0).T)
-    usual = float(np.median(step))
-    added = np.where(step > max(_GAP, 5.0 * usual), np.ceil(step / max(Plan.spacings.first, 2.0 * usual)) - 1.0, 0.0)
-    owner = np.repeat(np.arange(len(step)), added.astype(np.int64) + 1)
+    median_step = float(np.median(step))
+    added_count = np.where(
+        step > max(_GAP, 5.0 * median_step), np.ceil(step / max(Plan.spacings.first, 2.0 * median_step)) - 1.0, 0.0
+    )
+    owner = np.repeat(np.arange(len(step)), added_count.astype(np.int64) + 1)
     nth = np.arange(len(owner)) - np.searchsorted(owner, owner)
-    share = (nth / (added[owner] + 1.0))[:, None]
-    dense = points[owner] + share * (points[owner + 1] - points[owner])
-    return np.vstack((dense, points[-1:])), np.append(np.where(nth == 0, 1.0, _CHORD_WEIGHT), 1.0)
+    share = (nth / (added_count[owner] + 1.0))[:, None]
+    dense_points = points[owner] + share * (points[owner + 1] - points[owner])
+    return np.vstack((dense_points, points[-1:])), np.append(np.where(nth == 0, 1.0, _CHORD_WEIGHT), 1.0)
 
 
 def _fit_plan(points: Float, weights: Float, tolerance: float, design_ends: bool) -> tuple[Alignment, Float]:
@@ -419,85 +431,101 @@ def _fit_plan(points: Float, weights: Float, tolerance: float, design_ends: bool
 
 
 def _fit_heights(station: Float, heights: Float, weights: Float, length: float, tolerance: float) -> Profile:
+    """Return the profile fitted to weighted heights (N,), m, at stations (N,), m, clipped to the road's length."""
     order = np.argsort(station, kind="stable")
     station = np.clip(station[order], 0.0, length)
     return _profile(_fit_windows(Heights(heights[order], weights[order], station), station, tolerance)[0])
 
 
 def _fit_windows(data: AxisData, run: Float, tolerance: float, design_ends: bool = False) -> tuple[Chain, Float]:
-    """Fit window after window; return the whole chain and the approximate stations (N,) of all points on it, m.
+    """Fit data window after window; return the whole chain and the approximate stations (N,) of all points on it, m.
 
     Args:
         data: points of the axis, or heights.
-        run: (N,) how far along they are, roughly as well, m.
+        run: (N,) approximate stations of the data, m.
         tolerance: m.
         design_ends: see `fit_axis`.
     """
     step = float(np.median(np.diff(run)))
+    # Chosen: at least 60 points in a window, and 15 that the next window fits again.
     window, tail = max(_WINDOW, 60.0 * step), max(_TAIL, 15.0 * step)
     pieces: list[Chain] = []
     start: Start | None = None
-    first, origin, lost = 0, 0.0, False
+    first_point, origin, is_refused = 0, 0.0, False
     station = np.empty(len(run))
     while True:
-        whole = run[-1] - run[first] <= window + tail
-        end = len(run) if whole else int(np.searchsorted(run, run[first] + window))
-        end = max(end, min(first + 8, len(run)))
-        every = -(-(end - first) // _MOST_POINTS)
-        chosen = np.unique(np.append(np.arange(first, end, every), end - 1))
-        length = float(run[end - 1] - run[first])
-        if lost:  # that it is refused needs no search for few elements
-            fit = data.fit_window(chosen, max(data.spacings.first, _KNOTS * length / len(chosen)), start, origin)
+        # The window's points, thinned where they are too many.
+        is_last_window = run[-1] - run[first_point] <= window + tail
+        end = len(run) if is_last_window else int(np.searchsorted(run, run[first_point] + window))
+        end = max(end, min(first_point + 8, len(run)))
+        stride = -(-(end - first_point) // _MOST_POINTS)
+        indices = np.unique(np.append(np.arange(first_point, end, stride), end - 1))
+        length = float(run[end - 1] - run[first_point])
+        if is_refused:  # an axis that is refused needs no search for few elements
+            fit = data.fit_window(indices, max(data.spacings.first, _KNOTS * length / len(indices)), start, origin)
         else:
-            fit = _fit_window(data, chosen, start, origin, length, tolerance)
-            lost = _is_lost(fit, tolerance)
+            fit = _fit_window(data, indices, start, origin, length, tolerance)
+            is_refused = _is_lost(fit, tolerance)
         if design_ends:
             ends = (["first"] if start is None else []) + (["last"] if end == len(run) else [])
             fit = _end_on_design(fit, ends, tolerance)
-        station[first:end] = origin + np.interp(np.arange(first, end), chosen, fit.stations)
+        station[first_point:end] = origin + np.interp(np.arange(first_point, end), indices, fit.stations)
         if end == len(run):
             return _join_pieces([*pieces, fit.chain]), station
-        cut = _window_end(fit.chain, tail)
-        start = data.state_at(fit.chain, cut)
-        pieces.append(_cut_chain(fit.chain, cut))
-        first, origin = int(chosen[np.argmax(fit.stations >= cut)]), origin + cut
+        # The last part of the window is fitted again in the next one, with points to both sides.
+        end_station = _window_end(fit.chain, tail)
+        start = data.state_at(fit.chain, end_station)
+        pieces.append(_cut_chain(fit.chain, end_station))
+        first_point, origin = int(indices[np.argmax(fit.stations >= end_station)]), origin + end_station
 
 
 def _fit_window(
-    data: AxisData, chosen: Int, start: Start | None, origin: float, length: float, tolerance: float
+    data: AxisData, indices: Int, start: Start | None, origin: float, length: float, tolerance: float
 ) -> ChainFit:
-    """Return the fit of one window: as exact data if they are, else with knots as dense as the tolerance needs."""
-    scale = _KNOTS * length / len(chosen)
-    count = independent_count(length, len(chosen))
-    exact = Goal(tolerance, 2.0 * tolerance, _EXACT, count, int(length / 15.0) + 5)
-    rich = data.fit_window(chosen, max(data.spacings.exact, scale), start, origin)
-    if rich.rms < 3.0 * _ROUNDED:
-        best = min(descent(rich, exact), key=exact.rank)
-        if _is_exact(best) and exact.rank(best)[:2] == (False, False):
-            return best
+    """Return the fit of one window: of exact data by few elements, of others by knots as dense as the tolerance needs.
+
+    Args:
+        data: points of the axis, or heights.
+        indices: of the window's points.
+        start: pose and value at the end of the previous window; None for the first one.
+        origin: station at which the window begins, m.
+        length: length of the window, m.
+        tolerance: root mean square of the residuals that the fit aims at, m.
+    """
+    scale = _KNOTS * length / len(indices)
+    count = independent_count(length, len(indices))
+    # Chosen: at most one element per 15 m for exact points, per 30 m for measured ones, five more or at least five.
+    exact_goal = Goal(tolerance, 2.0 * tolerance, _EXACT, count, int(length / 15.0) + 5)
+    dense_fit = data.fit_window(indices, max(data.spacings.exact, scale), start, origin)
+    if dense_fit.rms < 3.0 * _ROUNDED:
+        best_fit = min(descent(dense_fit, exact_goal), key=exact_goal.rank)
+        if _is_exact(best_fit) and exact_goal.rank(best_fit)[:2] == (False, False):
+            return best_fit
     goal = Goal(tolerance, 2.0 * tolerance, _NEGLIGIBLE * tolerance, count, int(max(5.0, length / 30.0 - 0.01)))
     spacing = max(data.spacings.first, scale)
-    rich = data.fit_window(chosen, spacing, start, origin)
-    while not goal.is_met(rich) and 0.5 * spacing >= max(data.spacings.finest, scale):
+    dense_fit = data.fit_window(indices, spacing, start, origin)
+    while not goal.is_met(dense_fit) and 0.5 * spacing >= max(data.spacings.finest, scale):
         spacing *= 0.5
-        finer = data.fit_window(chosen, spacing, start, origin)
-        if finer.noise > _FINER_HELPS * rich.noise:
+        finer_fit = data.fit_window(indices, spacing, start, origin)
+        if finer_fit.noise > _FINER_HELPS * dense_fit.noise:
             break
-        rich = finer
-    if _is_lost(rich, tolerance):
-        return rich  # fewer elements are no nearer
-    room = _SCATTER if goal.is_met(rich) else _RELAXED
-    goal = replace(goal, rms=max(goal.rms, room * rich.noise), p95=max(goal.p95, room * rich.p95))
-    return improve_fit(min(descent(rich, goal), key=goal.rank), goal)
+        dense_fit = finer_fit
+    if _is_lost(dense_fit, tolerance):
+        return dense_fit  # fewer elements are no nearer
+    noise_factor = _SCATTER if goal.is_met(dense_fit) else _RELAXED
+    goal = replace(
+        goal, rms=max(goal.rms, noise_factor * dense_fit.noise), p95=max(goal.p95, noise_factor * dense_fit.p95)
+    )
+    return improve_fit(min(descent(dense_fit, goal), key=goal.rank), goal)
 
 
 def _is_lost(fit: ChainFit, tolerance: float) -> bool:
-    """Return whether a fit leaves a point so far off that the axis is refused, whatever its elements are."""
+    """Return whether a fit leaves a point so far off that the axis is refused however many elements it has."""
     return bool(np.abs(fit.residuals).max() > _NO_ROAD * REFUSED_BEYOND * tolerance)
 
 
 def _end_on_design(fit: ChainFit, ends: Iterable[str], tolerance: float) -> ChainFit:
-    """Return a fit whose first and last elements (by ``ends``) are lines or arcs as far as its data allow it.
+    """Return a fit whose first or last element (as ``ends`` says) is a line or an arc, as far as its data allow it.
 
     An arc in place of a clothoid's last metres bends the axis by millimetres: the data can't tell it from noise, and
     by their number of parameters alone every road would begin and end in a clothoid.
@@ -507,10 +535,14 @@ def _end_on_design(fit: ChainFit, ends: Iterable[str], tolerance: float) -> Chai
         if fit.chain.kinds[0 if end == "first" else -1] != FREE or _is_exact(fit):
             continue
         count = independent_count(float(fit.chain.knots[-1]), len(fit.residuals))
-        worst = (fit.sum_of_squares / len(fit.residuals) + floor**2) * np.exp(_SPARED / count)
+        largest_square = (fit.sum_of_squares / len(fit.residuals) + floor**2) * np.exp(_SPARED / count)
         trials = [refine(fit.data, chain, fit.stations, True, 20) for chain in _end_chains(fit.chain, end)]
-        allowed = [one for one in trials if one.sum_of_squares / len(one.residuals) + floor**2 <= worst]
-        fit = min(allowed, key=lambda one: (one.chain.freedom(), one.sum_of_squares), default=fit)
+        allowed_fits = [
+            end_fit
+            for end_fit in trials
+            if end_fit.sum_of_squares / len(end_fit.residuals) + floor**2 <= largest_square
+        ]
+        fit = min(allowed_fits, key=lambda trial: (trial.chain.freedom(), trial.sum_of_squares), default=fit)
     return fit
 
 
@@ -519,9 +551,9 @@ def _end_chains(chain: Chain, end: str) -> Iterator[Chain]:
     length = chain.knots[1] if end == "first" else chain.knots[-1] - chain.knots[-2]
     part = min(_END_ELEMENT, 0.25 * length)
     knot = part if end == "first" else chain.knots[-1] - part
-    at = int(np.searchsorted(chain.knots, knot))
-    knots = np.insert(chain.knots, at, knot)
-    values = np.insert(chain.values, at, np.interp(knot, chain.knots, chain.values))
+    knot_index = int(np.searchsorted(chain.knots, knot))
+    knots = np.insert(chain.knots, knot_index, knot)
+    values = np.insert(chain.values, knot_index, np.interp(knot, chain.knots, chain.values))
     for kind in (ZERO, EQUAL):
         kinds = np.insert(chain.kinds, 0 if end == "first" else chain.size, kind)
         yield replace(chain, knots=knots, values=values, kinds=kinds).tie_values()
@@ -529,34 +561,36 @@ def _end_chains(chain: Chain, end: str) -> Iterator[Chain]:
 
 def _is_exact(fit: ChainFit) -> bool:
     """Return whether the residuals are no more than the rounding of coordinates leaves."""
-    r = fit.residuals
-    return fit.rms < _EXACT or (fit.rms < _ROUNDED and float(r[1:] @ r[:-1]) < _RANDOM * fit.sum_of_squares)
+    residuals = fit.residuals
+    return fit.rms < _EXACT or (
+        fit.rms < _ROUNDED and float(residuals[1:] @ residuals[:-1]) < _RANDOM * fit.sum_of_squares
+    )
 
 
 def _window_end(chain: Chain, tail: float) -> float:
-    """Return the station (m) at which to leave a window: its last knot before the tail, or within a long element."""
+    """Return the station (m) at which to cut a window's chain: its last knot before the tail, or in a long element."""
     latest = max(chain.knots[-1] - tail, 0.5 * chain.knots[-1])  # points that turn back make a short chain
-    good = chain.knots[(chain.knots <= latest) & (chain.knots >= 0.4 * latest)]
-    return float(good[-1]) if len(good) else float(latest)
+    candidate_knots = chain.knots[(chain.knots <= latest) & (chain.knots >= 0.4 * latest)]
+    return float(candidate_knots[-1]) if len(candidate_knots) else float(latest)
 
 
-def _cut_chain(chain: Chain, cut: float) -> Chain:
+def _cut_chain(chain: Chain, end_station: float) -> Chain:
     """Return the part of a chain up to a station (m)."""
-    count = int(np.searchsorted(chain.knots, cut - 1e-9))  # elements that begin before the cut
-    knots = np.append(chain.knots[:count], cut)
-    values = np.append(chain.values[:count], np.interp(cut, chain.knots, chain.values))
+    count = int(np.searchsorted(chain.knots, end_station - 1e-9))  # elements that begin before the cut
+    knots = np.append(chain.knots[:count], end_station)
+    values = np.append(chain.values[:count], np.interp(end_station, chain.knots, chain.values))
     return replace(chain, knots=knots, values=values, kinds=chain.kinds[:count])
 
 
 def _join_pieces(pieces: list[Chain]) -> Chain:
-    """Return the pieces as one chain; lines, arcs and constant grades that a cut went through become one again."""
+    """Return the windows' pieces joined as one chain; lines, arcs and constant grades cut in two become one again."""
     knots, values = [0.0], [float(pieces[0].values[0])]
     kinds: list[int] = []
     offset = 0.0
     for piece in pieces:
         for e, kind in enumerate(piece.kinds):
-            same = bool(kinds) and e == 0 and kind != FREE and kinds[-1] != FREE and piece.values[0] == values[-1]
-            if same:
+            continues = bool(kinds) and e == 0 and kind != FREE and kinds[-1] != FREE and piece.values[0] == values[-1]
+            if continues:
                 knots[-1] = offset + piece.knots[1]
                 continue
             kinds.append(int(kind))
@@ -566,20 +600,20 @@ def _join_pieces(pieces: list[Chain]) -> Chain:
     return Chain(pieces[0].pose, np.array(knots), np.array(values), np.array(kinds))
 
 
-def _trim_ends(chain: Chain, first: float, last: float) -> Alignment:
+def _trim_ends(chain: Chain, first_station: float, last_station: float) -> Alignment:
     """Return the alignment from the first point's foot to the last one's, the outer elements cut or prolonged."""
     knots, values = chain.knots.copy(), chain.values.copy()
     heading, (x, y) = float(chain.pose[2]), chain.pose[:2]
     slope = chain.slopes
-    if first < knots[1]:
-        value = values[0] + slope[0] * first
-        turn = 0.5 * first * (values[0] + value)
+    if first_station < knots[1]:
+        value = values[0] + slope[0] * first_station
+        turn = 0.5 * first_station * (values[0] + value)
         # A prolongation of centimetres: the chord's direction is its mean heading.
-        x, y = x + first * np.cos(heading + 0.5 * turn), y + first * np.sin(heading + 0.5 * turn)
-        heading, knots[0], values[0] = heading + turn, first, value
-    if last > knots[-2]:
-        values[-1] += slope[-1] * (last - knots[-1])
-        knots[-1] = last
+        x, y = x + first_station * np.cos(heading + 0.5 * turn), y + first_station * np.sin(heading + 0.5 * turn)
+        heading, knots[0], values[0] = heading + turn, first_station, value
+    if last_station > knots[-2]:
+        values[-1] += slope[-1] * (last_station - knots[-1])
+        knots[-1] = last_station
     return replace(chain, pose=np.array([x, y, heading]), knots=knots, values=values).alignment
 
 
@@ -587,11 +621,11 @@ def _profile(chain: Chain) -> Profile:
     """Return the profile whose grade is the chain; each parabola's intersection lies at its middle."""
     middle = 0.5 * (chain.knots[1:] + chain.knots[:-1])
     gap, change = np.diff(chain.knots), np.diff(chain.values)
-    level = elevations(chain, chain.knots)
-    points = [IntersectionPoint(0.0, float(level[0]))]
+    knot_elevations = elevations(chain, chain.knots)
+    points = [IntersectionPoint(0.0, float(knot_elevations[0]))]
     for e in range(chain.size):
         if abs(change[e]) * gap[e] > 1e-7:  # less is no kink that anything could show
-            elevation = level[e] + 0.5 * gap[e] * chain.values[e]
+            elevation = knot_elevations[e] + 0.5 * gap[e] * chain.values[e]
             points.append(IntersectionPoint(float(middle[e]), float(elevation), float(gap[e] / abs(change[e]))))
-    points.append(IntersectionPoint(float(chain.knots[-1]), float(level[-1])))
+    points.append(IntersectionPoint(float(chain.knots[-1]), float(knot_elevations[-1])))
     return Profile(points)

@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import Float
+from ..base.arrays import Bool, Float
 from ..road.alignment import Alignment, Element
 from ..road.profile import IntersectionPoint, Profile
-from .between import without_swings
+from .between import calm_swings
 from .chain import EQUAL, FREE, NEAR, Chain, quadrature_grid, ramp_integrals
-from .design import Match, Model, joined, match, repaired, simplified
-from .pieces import Piece, cut_into_pieces, noise_of, unrolled
+from .design import Match, Model, match, model_of_pieces, repair_match, simplify_match
+from .pieces import Piece, cut_into_pieces, noise_std, unroll_points
 
 _WINDOW = 400
 """Points of a window. Chosen: bounds the work, which grows with its square."""
@@ -66,12 +66,12 @@ many with either."""
 
 
 @dataclass(frozen=True)
-class Followed:
+class DesignFit:
     """A model fitted to points of a plan.
 
     Attributes:
-        model: elements, stations from the first point.
-        pose: x, y (m) and heading (rad) at the first knot.
+        model: the elements; stations count from the first point.
+        pose: (3,) x, y (m) and heading (rad) at the first knot.
         stations, offsets: (N,) of the points, m.
     """
 
@@ -86,14 +86,14 @@ class Followed:
         return float(np.abs(self.offsets).max())
 
     def rank(self, points: Float, tolerance: float) -> tuple[bool, float, int]:
-        """Return a sort key, least for the best: whether it misses the tolerance, how far off it is, parameters.
+        """Return a sort key, least for the best fit: whether it misses the tolerance, its deviation, its parameters.
 
-        Half of the tolerance counts at the points (N, 2), m, the whole one between them.
+        Half of the tolerance (m) applies at the points (N, 2), m, all of it to the bend between points.
         """
-        between = bend_between(self.alignment, points, self.stations - self.model.knots[0])
-        missed = self.worst > 0.5 * tolerance or between > tolerance
-        off = max(self.worst, between) if missed else round(self.worst / _ALLOWED) * _ALLOWED
-        return missed, off, self.model.freedom()
+        bend = excess_bend(self.alignment, points, self.stations - self.model.knots[0])
+        misses_tolerance = self.worst > 0.5 * tolerance or bend > tolerance
+        deviation = max(self.worst, bend) if misses_tolerance else round(self.worst / _ALLOWED) * _ALLOWED
+        return misses_tolerance, deviation, self.model.freedom()
 
     @property
     def alignment(self) -> Alignment:
@@ -102,85 +102,98 @@ class Followed:
 
 
 def _alignment(model: Model, pose: Float) -> Alignment:
+    """Return a model's elements as an alignment that starts at a pose (x, y in m, heading in rad)."""
     rows = zip(np.diff(model.knots).tolist(), model.values.tolist(), strict=True)
     return Alignment([Element(length, *ends) for length, ends in rows], *(float(v) for v in pose))
 
 
-def bend_between(alignment: Alignment, points: Float, stations: Float) -> float:
-    """Return how much farther from the chords of points (N, 2) an alignment bends than the points around suggest, m.
+def excess_bend(alignment: Alignment, points: Float, stations: Float) -> float:
+    """Return the largest distance, m, by which an alignment bends off chords of points (N, 2) more than they suggest.
 
     Args:
-        alignment: along the points.
-        points: m.
-        stations: (N,) of the points on it, m.
+        alignment: alignment along the points.
+        points: (N, 2) m.
+        stations: (N,) of the points on the alignment, m.
     """
-    move = np.diff(points, axis=0)
-    chord = np.hypot(*move.T)
-    bend = np.diff(np.unwrap(np.arctan2(move[:, 1], move[:, 0]))) / (0.5 * (chord[1:] + chord[:-1]))
-    padded = np.pad(bend, 2, mode="edge") if len(bend) else np.zeros(len(chord) + 3)
-    around = np.lib.stride_tricks.sliding_window_view(padded, 4)[: len(chord)]
-    out = alignment.position(0.5 * (stations[1:] + stations[:-1])) - 0.5 * (points[1:] + points[:-1])
-    sagitta = (move[:, 1] * out[:, 0] - move[:, 0] * out[:, 1]) / chord
-    low, high = (0.125 * chord**2 * limit for limit in (around.min(axis=1), around.max(axis=1)))
-    return float(np.maximum(np.maximum(low - sagitta, sagitta - high), 0.0).max(initial=0.0))
+    chord_vectors = np.diff(points, axis=0)
+    chord = np.hypot(*chord_vectors.T)
+    bend = np.diff(np.unwrap(np.arctan2(chord_vectors[:, 1], chord_vectors[:, 0]))) / (0.5 * (chord[1:] + chord[:-1]))
+    padded_bend = np.pad(bend, 2, mode="edge") if len(bend) else np.zeros(len(chord) + 3)
+    around = np.lib.stride_tricks.sliding_window_view(padded_bend, 4)[: len(chord)]
+    chord_deviation = alignment.position(0.5 * (stations[1:] + stations[:-1])) - 0.5 * (points[1:] + points[:-1])
+    sagitta = (chord_vectors[:, 1] * chord_deviation[:, 0] - chord_vectors[:, 0] * chord_deviation[:, 1]) / chord
+    lower_limit, upper_limit = (0.125 * chord**2 * limit for limit in (around.min(axis=1), around.max(axis=1)))
+    return float(np.maximum(np.maximum(lower_limit - sagitta, sagitta - upper_limit), 0.0).max(initial=0.0))
 
 
-def elements_of(station: Float, values: Float, order: int, unsure: float = 0.0) -> Model:
+def find_elements(station: Float, values: Float, order: int, values_error: float = 0.0) -> Model:
     """Return the model of values (N,) at stations (N,): the unrolled line (order 2) or heights (order 1), in m.
 
     Args:
         station, values: m.
-        order: of the derivative that is linear on an element.
-        unsure: what the values may be off, beside noise, m.
+        order: order of the derivative that is linear on an element.
+        values_error: error of the values beside their noise, m.
     """
-    fine = max(_NOISES * noise_of(station, values, order + 1), _FINE, unsure)
+    piece_tolerance = max(_NOISES * noise_std(station, values, order + 1), _FINE, values_error)
     parts: list[Model] = []
-    first, width = 0, _WINDOW
+    first_point, width = 0, _WINDOW
     while True:
-        end = min(first + width, len(station))
-        here, there = station[first:end], values[first:end]
-        model = _window(here, there, order, fine).model
+        end = min(first_point + width, len(station))
+        window_station, window_values = station[first_point:end], values[first_point:end]
+        model = _window(window_station, window_values, order, piece_tolerance).model
         if end == len(station):
             parts.append(model)
-            return _chained(parts)
-        keep = _cut_after(model, here)
+            return _chain_models(parts)
+        keep = _count_kept_elements(model, window_station)
         if keep == 0:
             width *= 2
             continue
         parts.append(_first_elements(model, keep))
-        first, width = int(np.searchsorted(station, model.knots[keep])), _WINDOW
+        first_point, width = int(np.searchsorted(station, model.knots[keep])), _WINDOW
 
 
-def _window(station: Float, values: Float, order: int, fine: float) -> Match:
+def _window(station: Float, values: Float, order: int, piece_tolerance: float) -> Match:
+    """Return the model of one window's values (N,) at stations (N,), m: cut into pieces, joined, repaired, simplified.
+
+    Args:
+        station, values: m.
+        order: 2 in plan, 1 in height.
+        piece_tolerance: distance of a value from its piece's polynomial, m, unless coarser pieces do.
+    """
     degrees = tuple(range(1, order + 2))
-    coarser = _COARSE if order == 2 else _COARSE[:1]
-    tolerance = min(fine, coarser[-1])
+    coarse_tolerances = _COARSE if order == 2 else _COARSE[:1]
+    tolerance = min(piece_tolerance, coarse_tolerances[-1])
     pieces = cut_into_pieces(station, values, degrees, tolerance)
-    for coarse in coarser:
+    for coarse_tolerance in coarse_tolerances:
         # Of a plan elements are wanted as they are, unless the points don't tell them; of heights as few as will do.
-        if coarse <= tolerance or (order == 2 and not _too_many(pieces, len(station))):
+        if coarse_tolerance <= tolerance or (order == 2 and not _too_many(pieces, len(station))):
             continue
-        rough = cut_into_pieces(station, values, degrees, coarse)
-        if order == 2 or len(pieces) > _MANY * len(rough) + 2:
-            pieces, tolerance = rough, coarse
-    allowed = max(_PLAY * tolerance, _ALLOWED)
-    fit = match(joined(pieces, station, order), station, values, 0.1 * tolerance)
-    return simplified(repaired(fit, station, values, allowed), station, values, allowed)
+        coarse_pieces = cut_into_pieces(station, values, degrees, coarse_tolerance)
+        if order == 2 or len(pieces) > _MANY * len(coarse_pieces) + 2:
+            pieces, tolerance = coarse_pieces, coarse_tolerance
+    fit_tolerance = max(_PLAY * tolerance, _ALLOWED)
+    fit = match(model_of_pieces(pieces, station, order), station, values, 0.1 * tolerance)
+    return simplify_match(repair_match(fit, station, values, fit_tolerance), station, values, fit_tolerance)
 
 
-def _cut_after(model: Model, station: Float) -> int:
-    """Return how many elements of a window to keep: those before one with points of its own, well before the end."""
-    latest = station[0] + _TRUSTED * (station[-1] - station[0])
-    inside = np.diff(np.searchsorted(station, model.knots))
-    good = [e for e in range(1, model.size) if model.knots[e] <= latest and inside[e] >= _OWN]
-    return good[-1] if good else 0
+def _count_kept_elements(model: Model, station: Float) -> int:
+    """Return the number of a window's elements to keep: up to the last well before its end that `_OWN` points follow.
+
+    0 if none does; the window must then be longer.
+    """
+    latest_station = station[0] + _TRUSTED * (station[-1] - station[0])
+    point_counts = np.diff(np.searchsorted(station, model.knots))
+    candidates = [e for e in range(1, model.size) if model.knots[e] <= latest_station and point_counts[e] >= _OWN]
+    return candidates[-1] if candidates else 0
 
 
 def _too_many(pieces: list[Piece], count: int) -> bool:
+    """Return whether pieces have so many coefficients that each follows the ``count`` points' own errors."""
     return sum(piece.degree for piece in pieces) > _SHARE * count
 
 
 def _first_elements(model: Model, count: int) -> Model:
+    """Return the model of a model's first elements alone."""
     return replace(
         model,
         knots=model.knots[: count + 1],
@@ -190,172 +203,215 @@ def _first_elements(model: Model, count: int) -> Model:
     )
 
 
-def _chained(parts: list[Model]) -> Model:
-    """Return parts that follow each other as one model."""
-    whole = parts[0]
+def _chain_models(parts: list[Model]) -> Model:
+    """Return consecutive parts joined as one model, smooth where values at a joint differ by at most 2 % (chosen)."""
+    chained_model = parts[0]
     for part in parts[1:]:
-        smooth = FREE in (whole.kinds[-1], part.kinds[0]) and bool(
-            abs(whole.values[-1, 1] - part.values[0, 0]) <= 0.02 * max(np.abs(whole.values[-1]).max(), 1e-6)
+        is_smooth = FREE in (chained_model.kinds[-1], part.kinds[0]) and bool(
+            abs(chained_model.values[-1, 1] - part.values[0, 0])
+            <= 0.02 * max(np.abs(chained_model.values[-1]).max(), 1e-6)
         )
-        whole = replace(
-            whole,
-            knots=np.concatenate([whole.knots, part.knots[1:]]),
-            values=np.concatenate([whole.values, part.values]),
-            kinds=np.concatenate([whole.kinds, part.kinds]),
-            smooth=np.concatenate([whole.smooth, [smooth], part.smooth]),
+        chained_model = replace(
+            chained_model,
+            knots=np.concatenate([chained_model.knots, part.knots[1:]]),
+            values=np.concatenate([chained_model.values, part.values]),
+            kinds=np.concatenate([chained_model.kinds, part.kinds]),
+            smooth=np.concatenate([chained_model.smooth, [is_smooth], part.smooth]),
         )
-    return whole.tied()
+    return chained_model.tie_values()
 
 
-def followed(points: Float, tolerance: float) -> Followed | None:
-    """Return the elements that points (N, 2), m, of a design lie on; None for points with noise.
+def follow_points(points: Float, tolerance: float) -> DesignFit | None:
+    """Return the fit of the elements that points (N, 2), m, of a design lie on; None for points with noise.
 
-    What unrolling takes for arcs is corrected by what was found, and the elements are found again; where they keep the
-    tolerance neither at the points nor between them, they are looked for again with less trust in single points, and
-    clothoids from point to point stand in for elements too short to be seen.
+    Unrolling takes every chord for an arc's: it is corrected by the elements found, which are then found again; where
+    they keep the tolerance neither at the points nor between them, elements are looked for again with less trust in
+    single points, and clothoids from point to point stand in for elements too short to be seen.
     """
-    station, values = unrolled(points)
-    if len(points) > _SPARSE and noise_of(station, values, 3) > _NOISY:
+    station, values = unroll_points(points)
+    if len(points) > _SPARSE and noise_std(station, values, 3) > _NOISY:
         return None
-    best = _searched(points, 0.0, tolerance)
-    if best.rank(points, tolerance)[0] and len(points) <= _SPARSE:
-        best = min(best, through(points), key=lambda one: one.rank(points, tolerance))
-    for least in _TRUST if len(points) > _SPARSE else ():
-        if not best.rank(points, tolerance)[0]:
+    best_fit = _search_elements(points, 0.0, tolerance)
+    if best_fit.rank(points, tolerance)[0] and len(points) <= _SPARSE:
+        best_fit = min(best_fit, clothoids_through(points), key=lambda candidate: candidate.rank(points, tolerance))
+    for values_error in _TRUST if len(points) > _SPARSE else ():
+        if not best_fit.rank(points, tolerance)[0]:
             break
-        best = min(best, _searched(points, least, tolerance), key=lambda one: one.rank(points, tolerance))
-    return replace(best, model=_with_end(best.model, float(best.stations[-1])))
+        best_fit = min(
+            best_fit,
+            _search_elements(points, values_error, tolerance),
+            key=lambda candidate: candidate.rank(points, tolerance),
+        )
+    return replace(best_fit, model=_move_end(best_fit.model, float(best_fit.stations[-1])))
 
 
-def _searched(points: Float, least: float, tolerance: float) -> Followed:
-    """Return the elements found in points that may be off pieces by a least distance (m), the best of some passes."""
-    station, values = unrolled(points)
-    unsure = max(_unrolling_error(points), least)
-    best: Followed | None = None
-    for _ in range(1 if least else _PASSES):
-        model = elements_of(station, values, 2, unsure)
-        trial = refined(points, Followed(model, _pose(points, model), station, np.zeros(len(station))))
-        if best is None or trial.rank(points, tolerance) < best.rank(points, tolerance):
-            best = trial
+def _search_elements(points: Float, values_error: float, tolerance: float) -> DesignFit:
+    """Return the best fit of some passes of unrolling and fitting points (N, 2), m.
+
+    Args:
+        points: m.
+        values_error: least distance that points may be off pieces, m.
+        tolerance: of the fit, m.
+    """
+    station, values = unroll_points(points)
+    piece_error = max(_unrolling_error(points), values_error)
+    best_fit: DesignFit | None = None
+    for _ in range(1 if values_error else _PASSES):
+        model = find_elements(station, values, 2, piece_error)
+        trial = refine_design(points, DesignFit(model, _pose(points, model), station, np.zeros(len(station))))
+        if best_fit is None or trial.rank(points, tolerance) < best_fit.rank(points, tolerance):
+            best_fit = trial
         if trial.worst <= _ALLOWED or (np.diff(trial.stations) <= 0.0).any():
             break
-        station, unsure = trial.stations, least
+        station, piece_error = trial.stations, values_error
         values = trial.model.evaluate(station) + trial.offsets
-    assert best is not None  # nosec B101 (there is one pass at least)
-    return best
+    assert best_fit is not None  # nosec B101 (there is one pass at least)
+    return best_fit
 
 
-def through(points: Float) -> Followed:
-    """Return clothoids from point to point, their curvatures continuous, that pass through points (N, 2), m."""
-    station, values = unrolled(points)
+def clothoids_through(points: Float) -> DesignFit:
+    """Return the fit of clothoids from point to point of points (N, 2), m, with continuous curvature."""
+    station, values = unroll_points(points)
     count = len(points) - 1
     kinds = np.full(count, FREE)
     kinds[[0, -1]] = EQUAL  # else two parameters more than points
     model = Model(np.zeros(2), station, np.zeros((count, 2)), kinds, np.ones(count - 1, bool))
     model = match(model, station, values).model
-    return refined(points, Followed(model, _pose(points, model), station, np.zeros(len(station))), False)
+    return refine_design(points, DesignFit(model, _pose(points, model), station, np.zeros(len(station))), False)
 
 
 def _unrolling_error(points: Float) -> float:
-    """Return what the unrolled line may be off, m, where its curvature changes between two points."""
-    move = np.diff(points, axis=0)
-    turn = np.diff(np.unwrap(np.arctan2(move[:, 1], move[:, 0])))
-    chord = np.hypot(*move.T)
+    """Return the largest error of the unrolled line, m, where its curvature changes between two points (N, 2)."""
+    chord_vectors = np.diff(points, axis=0)
+    turn = np.diff(np.unwrap(np.arctan2(chord_vectors[:, 1], chord_vectors[:, 0])))
+    chord = np.hypot(*chord_vectors.T)
     return float((np.minimum(chord[1:], chord[:-1]) * np.abs(turn) ** 3).max(initial=0.0)) * _CUBIC
 
 
 def _pose(points: Float, model: Model) -> Float:
-    move = points[1] - points[0]
-    return np.array([*points[0], np.arctan2(move[1], move[0]) - 0.5 * model.values[0, 0] * np.hypot(*move)])
+    """Return the pose (3,) at the first point: the first chord's direction less half of the first element's turn."""
+    first_chord = points[1] - points[0]
+    return np.array(
+        [*points[0], np.arctan2(first_chord[1], first_chord[0]) - 0.5 * model.values[0, 0] * np.hypot(*first_chord)]
+    )
 
 
-def refined(points: Float, found: Followed, free_knots: bool = True) -> Followed:
-    """Return the elements fitted to the points themselves, by the exact alignment."""
-    model, pose, station = found.model, found.pose, found.stations
-    first, here = 0, pose
-    done: list[Model] = []
+def refine_design(points: Float, initial_fit: DesignFit, free_knots: bool = True) -> DesignFit:
+    """Return elements fitted to points (N, 2), m, by the exact alignment's offsets, a part of `_ELEMENTS` at a time.
+
+    Args:
+        points: m.
+        initial_fit: elements to begin with.
+        free_knots: whether knots may move.
+    """
+    model, pose, station = initial_fit.model, initial_fit.pose, initial_fit.stations
+    first_element, part_pose = 0, pose
+    fitted_parts: list[Model] = []
     stations, offsets = station.copy(), np.zeros(len(station))
     while True:
-        last = min(first + _ELEMENTS, model.size)
-        part = _slice(model, first, last)
-        held = bool(first and model.smooth[first - 1])
-        inside = slice(
-            int(np.searchsorted(stations, model.knots[first])) if first else 0,
-            len(station) if last == model.size else int(np.searchsorted(stations, model.knots[last])),
+        # Fit the next part to the points along it; it starts at the pose at which the part before ends.
+        end_element = min(first_element + _ELEMENTS, model.size)
+        part = _slice(model, first_element, end_element)
+        value_is_fixed = bool(first_element and model.smooth[first_element - 1])
+        part_points = slice(
+            int(np.searchsorted(stations, model.knots[first_element])) if first_element else 0,
+            len(station) if end_element == model.size else int(np.searchsorted(stations, model.knots[end_element])),
         )
-        part, here, feet, off = _fit_part(points[inside], part, here, stations[inside], first == 0, held, free_knots)
-        stations[inside], offsets[inside] = feet, off
-        if first == 0:
-            pose = here
-        if last == model.size:
-            done.append(part)
+        fit = _fit_part(
+            points[part_points], part, part_pose, stations[part_points], first_element == 0, value_is_fixed, free_knots
+        )
+        stations[part_points], offsets[part_points] = fit.stations, fit.offsets
+        if first_element == 0:
+            pose = fit.pose
+        if end_element == model.size:
+            fitted_parts.append(fit.model)
             break
-        kept = _first_elements(part, _KEPT)
-        done.append(kept)
-        there, heading, _ = _alignment(kept, here).frame(float(kept.knots[-1] - kept.knots[0]))
-        here = np.array([*there, heading])
-        first += _KEPT
-        knots = model.knots.copy()  # the rest begins where this part ends
-        knots[first : last + 1] = part.knots[_KEPT:]
-        values = model.values.copy()
-        values[first:last] = part.values[_KEPT:]
-        model = replace(model, knots=knots, values=values)
-        stations[stations > knots[last]] = np.maximum(stations[stations > knots[last]], knots[last])
-    whole = done[0]
-    for part in done[1:]:
-        joint = whole.size
-        whole = replace(
-            whole,
-            knots=np.concatenate([whole.knots, part.knots[1:]]),
-            values=np.concatenate([whole.values, part.values]),
-            kinds=np.concatenate([whole.kinds, part.kinds]),
-            smooth=np.concatenate([whole.smooth, model.smooth[joint - 1 : joint], part.smooth]),
+        # Keep the first elements; the others, which the points that follow change, are fitted again in the next part.
+        kept_elements = _first_elements(fit.model, _KEPT)
+        fitted_parts.append(kept_elements)
+        end_point, heading, _ = _alignment(kept_elements, fit.pose).frame(
+            float(kept_elements.knots[-1] - kept_elements.knots[0])
         )
-    return Followed(whole, pose, stations, offsets)
+        part_pose = np.array([*end_point, heading])
+        first_element += _KEPT
+        knots = model.knots.copy()
+        knots[first_element : end_element + 1] = fit.model.knots[_KEPT:]
+        values = model.values.copy()
+        values[first_element:end_element] = fit.model.values[_KEPT:]
+        model = replace(model, knots=knots, values=values)
+    return DesignFit(_join_parts(fitted_parts, model.smooth), pose, stations, offsets)
 
 
-def _slice(model: Model, first: int, last: int) -> Model:
+def _join_parts(parts: list[Model], smooth: Bool) -> Model:
+    """Return consecutive parts as one model; ``smooth`` says at which of its inner knots values are continuous."""
+    joined_model = parts[0]
+    for part in parts[1:]:
+        joint = joined_model.size
+        joined_model = replace(
+            joined_model,
+            knots=np.concatenate([joined_model.knots, part.knots[1:]]),
+            values=np.concatenate([joined_model.values, part.values]),
+            kinds=np.concatenate([joined_model.kinds, part.kinds]),
+            smooth=np.concatenate([joined_model.smooth, smooth[joint - 1 : joint], part.smooth]),
+        )
+    return joined_model
+
+
+def _slice(model: Model, first_element: int, end_element: int) -> Model:
+    """Return the model of the elements from a first one to before an end."""
     return replace(
         model,
-        knots=model.knots[first : last + 1],
-        values=model.values[first:last],
-        kinds=model.kinds[first:last],
-        smooth=model.smooth[first : last - 1],
+        knots=model.knots[first_element : end_element + 1],
+        values=model.values[first_element:end_element],
+        kinds=model.kinds[first_element:end_element],
+        smooth=model.smooth[first_element : end_element - 1],
     )
 
 
 def _fit_part(
-    points: Float, model: Model, pose: Float, station: Float, free_pose: bool, held: bool, free_knots: bool
-) -> tuple[Model, Float, Float, Float]:
-    """Return elements fitted to points from a pose on, that pose, and the points' stations and offsets (N,), m."""
+    points: Float, model: Model, pose: Float, station: Float, free_pose: bool, value_is_fixed: bool, free_knots: bool
+) -> DesignFit:
+    """Return the fit of consecutive elements to the points (N, 2), m, along them.
 
-    def measure(model: Model, pose: Float, near: Float) -> tuple[Float, Float]:
-        feet, off = _alignment(model, pose).project_near(points, near - model.knots[0], NEAR)
-        return feet + model.knots[0], off
+    Args:
+        points: (N, 2) m.
+        model: elements to begin with.
+        pose: (3,) x, y (m), heading (rad) at their start.
+        station: (N,) approximate stations of the points, m.
+        free_pose: whether the pose may change; if not, the part goes on from the one before.
+        value_is_fixed: whether the first element's start value may not change.
+        free_knots: whether knots may move.
+    """
 
-    feet, off = measure(model, pose, station)
-    damping = 1e-6
+    def measure(model: Model, pose: Float, approximate_stations: Float) -> tuple[Float, Float]:
+        """Return the points' stations and offsets (N,), m, on a model's elements, near approximate stations."""
+        feet, lateral_offsets = _alignment(model, pose).project_near(
+            points, approximate_stations - model.knots[0], NEAR
+        )
+        return feet + model.knots[0], lateral_offsets
+
+    feet, offsets = measure(model, pose, station)
     matrix = _jacobian(model, pose, feet)
+    # Parameters in order: the pose's two, the free values from the start's on, the knots between elements.
+    first_free = 0 if free_pose else 3 if value_is_fixed else 2
+    end_free = matrix.shape[1] if free_knots else matrix.shape[1] - model.size + 1
+    # Levenberg-Marquardt; the factors of the damping are chosen.
+    damping = 1e-6
     for _ in range(_STEPS):
-        used = matrix if free_pose else matrix[:, 2:]
-        if held:
-            used = used[:, 1:] if not free_pose else used
-        if not free_knots:
-            used = used[:, : used.shape[1] - model.size + 1]
-        scale = np.maximum(np.sqrt((used**2).sum(axis=0)), 1e-12)
-        rows = np.vstack((used / scale, np.sqrt(damping) * np.eye(len(scale))))
-        step = np.linalg.lstsq(rows, np.append(off, np.zeros(len(scale))), rcond=None)[0] / scale
-        full = np.zeros(matrix.shape[1])
-        end = matrix.shape[1] if free_knots else matrix.shape[1] - model.size + 1
-        full[end - len(step) : end] = step
-        across, turn = full[0], full[1]
-        moved = model.moved(full)
-        there = pose + np.array([-np.sin(pose[2]) * across, np.cos(pose[2]) * across, turn])
-        new_feet, new_off = measure(moved, there, feet)
-        if new_off @ new_off < off @ off:
-            gain = 1.0 - (new_off @ new_off) / (off @ off)
-            model, pose, feet, off = moved, there, new_feet, new_off
-            if gain < 1e-3 or np.abs(off).max() < 1e-6:
+        free_columns = matrix[:, first_free:end_free]
+        scale = np.maximum(np.sqrt((free_columns**2).sum(axis=0)), 1e-12)
+        rows = np.vstack((free_columns / scale, np.sqrt(damping) * np.eye(len(scale))))
+        step = np.linalg.lstsq(rows, np.append(offsets, np.zeros(len(scale))), rcond=None)[0] / scale
+        full_step = np.zeros(matrix.shape[1])
+        full_step[first_free:end_free] = step
+        lateral_step, turn = full_step[0], full_step[1]
+        trial_model = model.apply_step(full_step)
+        trial_pose = pose + np.array([-np.sin(pose[2]) * lateral_step, np.cos(pose[2]) * lateral_step, turn])
+        new_feet, new_offsets = measure(trial_model, trial_pose, feet)
+        if new_offsets @ new_offsets < offsets @ offsets:
+            gain = 1.0 - (new_offsets @ new_offsets) / (offsets @ offsets)
+            model, pose, feet, offsets = trial_model, trial_pose, new_feet, new_offsets
+            if gain < 1e-3 or np.abs(offsets).max() < 1e-6:
                 break
             damping = max(0.01 * damping, 1e-12)
             matrix = _jacobian(model, pose, feet)
@@ -363,65 +419,73 @@ def _fit_part(
             damping *= 30.0
             if damping > 1e3:
                 break
-    return model, pose, feet, off
+    return DesignFit(model, pose, feet, offsets)
 
 
 def _jacobian(model: Model, pose: Float, station: Float) -> Float:
-    """Return the derivatives (N, P) of the alignment's place across itself at stations (N,), by `Model`'s parameters.
+    """Return the derivatives (N, P) of the alignment's lateral position at stations (N,) by the model's parameters.
 
-    A change of curvature at s' turns the rest about the place there: it moves by t(s) . (z(s) - z(s')) across.
+    A change of curvature at s' turns the rest about the place there, which moves it by t(s) . (z(s) - z(s')) across.
     """
     alignment = _alignment(model, pose)
     shift = model.knots[0]
     chain = Chain(pose, model.knots - shift, np.append(model.values[:, 0], 0.0), model.kinds)
-    at = station - shift
-    grid = quadrature_grid(chain, at)
+    chain_stations = station - shift
+    grid = quadrature_grid(chain, chain_stations)
     origin = np.array([alignment.x, alignment.y])
-    position, heading, _ = alignment.frame(at)
+    position, heading, _ = alignment.frame(chain_stations)
     tangent = np.exp(-1j * heading)
     z = (position - origin) @ np.array([1.0, 1j])
     weight = (alignment.position(0.5 * (grid[1:] + grid[:-1])) - origin) @ np.array([1.0, 1j])
     lever = (tangent * z).real
-    plain = ramp_integrals(chain, at, grid, np.ones(len(weight)))
-    turned = ramp_integrals(chain, at, grid, weight)
-    rise, fall = (lever[:, None] * a - (tangent[:, None] * b).real for a, b in zip(plain, turned, strict=True))
-    both = np.stack((fall, rise), axis=2).reshape(len(at), -1)
+    ramp_sums = ramp_integrals(chain, chain_stations, grid, np.ones(len(weight)))
+    ramp_moments = ramp_integrals(chain, chain_stations, grid, weight)
+    rise, fall = (
+        lever[:, None] * a - (tangent[:, None] * b).real for a, b in zip(ramp_sums, ramp_moments, strict=True)
+    )
+    end_ramps = np.stack((fall, rise), axis=2).reshape(len(chain_stations), -1)
     slope = np.diff(model.values)[:, 0] / np.diff(model.knots)
     borders = (alignment.position(chain.knots[1:-1]) - origin) @ np.array([1.0, 1j])
-    past = (at[:, None] > chain.knots[1:-1]) * (lever[:, None] - (tangent[:, None] * borders).real)
+    jump_effect = (chain_stations[:, None] > chain.knots[1:-1]) * (lever[:, None] - (tangent[:, None] * borders).real)
     jump = model.values[:-1, 1] - model.values[1:, 0]
-    knots = -slope[:-1] * rise[:, :-1] - slope[1:] * fall[:, 1:] + jump * past
-    across = (tangent * np.exp(1j * alignment.start_heading)).real
-    return np.hstack((across[:, None], lever[:, None], both @ model.tie, knots))
+    knots = -slope[:-1] * rise[:, :-1] - slope[1:] * fall[:, 1:] + jump * jump_effect
+    start_shift = (tangent * np.exp(1j * alignment.start_heading)).real
+    return np.hstack((start_shift[:, None], lever[:, None], end_ramps @ model.tie, knots))
 
 
-def heights_followed(station: Float, heights: Float, length: float, tolerance: float = np.inf) -> Profile | None:
-    """Return the profile that heights of a design lie on, over a road of a length; None for heights with noise.
+def follow_heights(station: Float, heights: Float, length: float, tolerance: float = np.inf) -> Profile | None:
+    """Return the profile that heights (N,) of a design lie on, over a road's length; None for heights with noise.
 
     Args:
         station, heights: (N,) of the points, m.
-        length: of the road, m.
-        tolerance: distance (m) from which the heights between two points may not swing (`fitting.between`).
+        length: length of the road, m.
+        tolerance: largest swing of the heights between two points, m (`fitting.between`).
     """
-    if len(station) > 2 * _SPARSE and noise_of(station, heights, 2) > _NOISY:
+    if len(station) > 2 * _SPARSE and noise_std(station, heights, 2) > _NOISY:
         return None
-    model = match(elements_of(station, heights, 1), station, heights).model
-    return profile_of(without_swings(model, station, heights, tolerance), length)
+    model = match(find_elements(station, heights, 1), station, heights).model
+    return profile_from_grades(calm_swings(model, station, heights, tolerance), length)
 
 
-def profile_of(model: Model, length: float) -> Profile:
+def profile_from_grades(model: Model, length: float) -> Profile:
     """Return the profile of a model of grades from 0 to a length, m: parabolas and the kinks between grades."""
-    model = _with_end(model, length)
+    model = _move_end(model, length)
     knots = model.knots
-    level = model.evaluate(knots)
-    rows = [(0.0, float(level[0] - model.values[0, 0] * knots[0]), 0.0)]  # station, elevation, tangent
-    for e, (first, last) in enumerate(model.values.tolist()):
-        long = float(knots[e + 1] - knots[e])
-        if e and abs(first - model.values[e - 1, 1]) > _FLAT:
-            rows.append((float(knots[e]), float(level[e]), 0.0))
-        if abs(last - first) > _FLAT:
-            rows.append((float(knots[e]) + 0.5 * long, float(level[e]) + 0.5 * long * first, 0.5 * long))
-    rows.append((length, float(level[-1]), 0.0))
+    knot_heights = model.evaluate(knots)
+    rows = [(0.0, float(knot_heights[0] - model.values[0, 0] * knots[0]), 0.0)]  # station, elevation, tangent
+    for e, (start_grade, end_grade) in enumerate(model.values.tolist()):
+        element_length = float(knots[e + 1] - knots[e])
+        if e and abs(start_grade - model.values[e - 1, 1]) > _FLAT:
+            rows.append((float(knots[e]), float(knot_heights[e]), 0.0))
+        if abs(end_grade - start_grade) > _FLAT:
+            rows.append(
+                (
+                    float(knots[e]) + 0.5 * element_length,
+                    float(knot_heights[e]) + 0.5 * element_length * start_grade,
+                    0.5 * element_length,
+                )
+            )
+    rows.append((length, float(knot_heights[-1]), 0.0))
     station, height, tangent = np.array(rows).T
     grades = np.diff(height) / np.diff(station)
     change = np.abs(np.concatenate([[0.0], np.diff(grades), [0.0]]))
@@ -429,11 +493,12 @@ def profile_of(model: Model, length: float) -> Profile:
     return Profile([IntersectionPoint(*(float(v) for v in row)) for row in zip(station, height, radius, strict=True)])
 
 
-def _with_end(model: Model, end: float) -> Model:
+def _move_end(model: Model, end: float) -> Model:
     """Return a model whose last element is cut or prolonged to a station (m)."""
     knots, values = model.knots.copy(), model.values.copy()
-    long = knots[-1] - knots[-2]
-    end = max(end, knots[-2] + 0.1 * long)
-    values[-1, 1] = values[-1, 0] + (values[-1, 1] - values[-1, 0]) * (end - knots[-2]) / long
+    last_length = knots[-1] - knots[-2]
+    # Chosen: a tenth of the last element stays.
+    end = max(end, knots[-2] + 0.1 * last_length)
+    values[-1, 1] = values[-1, 0] + (values[-1, 1] - values[-1, 0]) * (end - knots[-2]) / last_length
     knots[-1] = end
     return replace(model, knots=knots, values=values)

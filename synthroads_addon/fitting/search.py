@@ -54,11 +54,11 @@ class Edit:
 
     @property
     def span(self) -> tuple[int, int]:
-        """Return the first and the last element concerned."""
+        """Return the first and the last element that the edit changes."""
         return (self.index - 1, self.index) if self.kind == "merge" else (self.index, self.index)
 
 
-#: An edit, the linear conditions (C, P) that it imposes on the free parameters, and how far they are from true (C,).
+#: An edit, the linear conditions (C, P) that it imposes on the free parameters, and by how much each is violated (C,).
 Condition = tuple[Edit, Float, Float]
 
 
@@ -67,22 +67,24 @@ class Goal:
     """Bounds of a fit and scoring of chains in the search.
 
     Attributes:
-        rms, p95: bounds of the residuals, m.
-        floor: residual below which nothing is worth an element, m.
-        count: observations that the score counts as independent.
-        most: elements wanted at most.
+        rms, p95: bounds of the residuals' root mean square and 95th percentile, m.
+        floor: residual below which no improvement is worth an element, m.
+        count: number of observations that the score counts as independent.
+        max_elements: largest number of elements that is wanted.
     """
 
     rms: float
     p95: float
     floor: float
     count: float
-    most: int
+    max_elements: int
 
     def is_met(self, fit: ChainFit) -> bool:
+        """Return whether a fit's residuals keep the bounds."""
         return fit.rms <= self.rms and fit.p95 <= self.p95
 
     def score(self, fit: ChainFit) -> float:
+        """Return the score of a fit, see `expected_score`."""
         return self.expected_score(fit.sum_of_squares, fit.chain, len(fit.residuals))
 
     def expected_score(self, square: float, chain: Chain, points: int) -> float:
@@ -94,7 +96,7 @@ class Goal:
 
     def rank(self, fit: ChainFit) -> tuple[bool, bool, float]:
         """Return a sort key, least for the best fit: bounds first, then the number of elements, then the score."""
-        return (not self.is_met(fit), fit.chain.size > self.most, self.score(fit))
+        return (not self.is_met(fit), fit.chain.size > self.max_elements, self.score(fit))
 
 
 def independent_count(length: float, points: int) -> float:
@@ -103,31 +105,36 @@ def independent_count(length: float, points: int) -> float:
 
 
 def apply_edits(chain: Chain, edits: Sequence[Edit]) -> tuple[Chain, list[int]]:
-    """Return the chain after edits, its values as they are, and the indices of the knots that stay.
+    """Return the chain after edits, with unchanged values, and the indices of the knots that stay.
 
-    Constant elements that come to lie side by side are one.
+    Constant elements that come to lie side by side become one.
     """
-    gone = {edit.index for edit in edits if edit.kind == "merge"}
-    snapped = {edit.index: edit.kind for edit in edits if edit.kind != "merge"}
-    keep, merged_kinds = [0], set()
+    removed_knots = {edit.index for edit in edits if edit.kind == "merge"}
+    snapped_kinds = {edit.index: edit.kind for edit in edits if edit.kind != "merge"}
+    kept_indices, merged_kinds = [0], set()
     kinds: list[int] = []
     for e, kind in enumerate(chain.kinds.tolist()):
-        merged_kinds.add(snapped.get(e, kind))
-        if e + 1 in gone:
+        merged_kinds.add(snapped_kinds.get(e, kind))
+        if e + 1 in removed_knots:
             continue
-        new = merged_kinds.pop() if len(merged_kinds) == 1 else FREE
+        merged_kind = merged_kinds.pop() if len(merged_kinds) == 1 else FREE
         merged_kinds = set()
-        if new != FREE and kinds and kinds[-1] != FREE:
-            kinds[-1] = max(new, kinds[-1])  # a line beside an arc is one with it
-            keep[-1] = e + 1
+        if merged_kind != FREE and kinds and kinds[-1] != FREE:
+            kinds[-1] = max(merged_kind, kinds[-1])  # a line beside an arc is one with it
+            kept_indices[-1] = e + 1
         else:
-            kinds.append(new)
-            keep.append(e + 1)
-    return replace(chain, knots=chain.knots[keep], values=chain.values[keep], kinds=np.array(kinds)), keep
+            kinds.append(merged_kind)
+            kept_indices.append(e + 1)
+    return replace(
+        chain, knots=chain.knots[kept_indices], values=chain.values[kept_indices], kinds=np.array(kinds)
+    ), kept_indices
 
 
 def _interpolation(chain: Chain, keep: list[int]) -> tuple[Float, Float]:
-    """Return matrices from the kept values, (M + 1, K), and from the knots, (M + 1, M + 1), to the old values."""
+    """Return the derivatives of a chain's values interpolated between the knots that stay.
+
+    Those by the values at the knots that stay, (M + 1, K), and those by all knots' stations, (M + 1, M + 1).
+    """
     weights = np.zeros((chain.size + 1, len(keep)))
     weights[keep, np.arange(len(keep))] = 1.0
     shifts = np.zeros((chain.size + 1, chain.size + 1))
@@ -141,41 +148,43 @@ def _interpolation(chain: Chain, keep: list[int]) -> tuple[Float, Float]:
     return weights, shifts
 
 
-def _lift_matrix(chain: Chain, new: Chain, keep: list[int]) -> Float:
-    """Return the matrix that gives all parameters of the chain from those of the edited one."""
+def _lift_matrix(chain: Chain, edited_chain: Chain, keep: list[int]) -> Float:
+    """Return the matrix from changes of an edited chain's parameters to changes of all the chain's parameters."""
     weights, shifts = _interpolation(chain, keep)
-    inner = [i for i in keep if 0 < i < chain.size]
-    old_knots, new_knots = chain.value_columns.stop, new.value_columns.stop
-    lift = np.zeros((old_knots + chain.size - 1, new_knots + new.size - 1))
+    inner_knots = [i for i in keep if 0 < i < chain.size]
+    old_knots, new_knots = chain.value_columns.stop, edited_chain.value_columns.stop
+    lift = np.zeros((old_knots + chain.size - 1, new_knots + edited_chain.size - 1))
     lift[: chain.pose_size, : chain.pose_size] = np.eye(chain.pose_size)
-    lift[chain.value_columns, new.value_columns] = weights
-    lift[chain.value_columns, new_knots:] = shifts[:, inner]
-    lift[[old_knots + i - 1 for i in inner], range(new_knots, new_knots + len(inner))] = 1.0
+    lift[chain.value_columns, edited_chain.value_columns] = weights
+    lift[chain.value_columns, new_knots:] = shifts[:, inner_knots]
+    lift[[old_knots + i - 1 for i in inner_knots], range(new_knots, new_knots + len(inner_knots))] = 1.0
     return lift
 
 
 def predict_edits(fit: ChainFit, edits: Sequence[Edit], free_knots: bool, goal: Goal) -> tuple[Chain, float]:
-    """Return the edited chain at the optimum of the linearised problem, and the sum of squares expected there."""
-    new, keep = apply_edits(fit.chain, edits)
-    new = new.tie_values()
-    basis, lift = new.basis(free_knots), _lift_matrix(fit.chain, new, keep)
-    start = np.zeros(len(lift))  # the jump to the new chain's values
+    """Return the edited chain at the optimum of the linearised problem, and the sum of squares (m^2) expected there."""
+    edited_chain, keep = apply_edits(fit.chain, edits)
+    edited_chain = edited_chain.tie_values()
+    basis, lift = edited_chain.basis(free_knots), _lift_matrix(fit.chain, edited_chain, keep)
+    start = np.zeros(len(lift))  # change of the parameters by the edits themselves
     values = fit.chain.value_columns
-    start[values] = lift[values, new.value_columns] @ new.values - fit.chain.values
-    r, projected = fit.linear
-    matrix, target = r @ (lift @ basis), -(projected + r @ start)
-    held = _allowance(fit, goal) * knot_penalty(fit.data, new, basis.shape[1]) if free_knots else matrix[:0]
+    start[values] = lift[values, edited_chain.value_columns] @ edited_chain.values - fit.chain.values
+    upper_factor, projected_residuals = fit.linear
+    matrix, target = upper_factor @ (lift @ basis), -(projected_residuals + upper_factor @ start)
+    knot_rows = (
+        _allowance(fit, goal) * knot_penalty(fit.data, edited_chain, basis.shape[1]) if free_knots else matrix[:0]
+    )
     scale = column_scale(matrix)
-    rows = np.vstack((matrix / scale, held / scale, 1e-6 * np.eye(len(scale))))
-    scaled = least_squares(rows, np.concatenate((target, np.zeros(len(rows) - len(target)))))
-    rest = rows @ scaled
-    rest[: len(target)] -= target
-    square = float(rest @ rest) - float(projected @ projected) + fit.sum_of_squares
-    return apply_step(fit.data, new, basis @ (scaled / scale)), square
+    rows = np.vstack((matrix / scale, knot_rows / scale, 1e-6 * np.eye(len(scale))))
+    scaled_step = least_squares(rows, np.concatenate((target, np.zeros(len(rows) - len(target)))))
+    residuals = rows @ scaled_step
+    residuals[: len(target)] -= target
+    square = float(residuals @ residuals) - float(projected_residuals @ projected_residuals) + fit.sum_of_squares
+    return apply_step(fit.data, edited_chain, basis @ (scaled_step / scale)), square
 
 
 def _allowance(fit: ChainFit, goal: Goal) -> float:
-    """Return the cost of a knot's step over its whole room, m: the root of all squared residuals, floors included."""
+    """Return the cost of a knot's step over its whole room, m: the root of the sum of squared residuals and floors."""
     return float(np.sqrt(fit.sum_of_squares + len(fit.residuals) * goal.floor**2))
 
 
@@ -192,7 +201,7 @@ def _covariance_root(fit: ChainFit, free_knots: bool, goal: Goal) -> Float:
 
 def rank_edits(fit: ChainFit, free_knots: bool, goal: Goal) -> list[tuple[float, Edit]]:
     """Return (expected change of score, edit) for all single edits, cheapest first, by their Wald statistics."""
-    chain, present = fit.chain, goal.score(fit)
+    chain, current_score = fit.chain, goal.score(fit)
     root = _covariance_root(fit, free_knots, goal)
     basis = chain.basis(free_knots)
     conditions = list(_merges(chain, basis, free_knots))
@@ -209,88 +218,90 @@ def rank_edits(fit: ChainFit, free_knots: bool, goal: Goal) -> list[tuple[float,
         if (np.diag(square) > 0).all():
             cost = float(violation @ np.linalg.solve(square, violation))
             score = goal.expected_score(fit.sum_of_squares + cost, apply_edits(chain, [edit])[0], len(fit.residuals))
-            result.append((score - present, edit))
+            result.append((score - current_score, edit))
     return sorted(result, key=lambda pair: pair[0])
 
 
 def _merges(chain: Chain, basis: Float, free_knots: bool) -> Iterator[Condition]:
-    """Yield for each inner knot its removal, on condition that its value is that of the straight past it."""
+    """Yield the removal of each inner knot, on condition that its value is interpolated between its neighbours'."""
     rows, knots, values = basis[chain.value_columns], chain.knots, chain.values
-    first = basis.shape[1] - chain.size  # + i: the column of inner knot i
+    first_knot_column = basis.shape[1] - chain.size  # + i: the column of inner knot i
     for i in range(1, chain.size):
         length, change = knots[i + 1] - knots[i - 1], values[i + 1] - values[i - 1]
         share = (knots[i] - knots[i - 1]) / length
         condition = rows[i] - (1.0 - share) * rows[i - 1] - share * rows[i + 1]
         if free_knots and i > 1:
-            condition[first + i - 1] += change * (1.0 - share) / length
+            condition[first_knot_column + i - 1] += change * (1.0 - share) / length
         if free_knots and i < chain.size - 1:
-            condition[first + i + 1] += change * share / length
+            condition[first_knot_column + i + 1] += change * share / length
         if condition.any():
             yield Edit("merge", i), condition[None], np.array([values[i] - values[i - 1] - share * change])
 
 
 def _snaps(data: AxisData, chain: Chain, basis: Float) -> Iterator[Condition]:
-    """Yield for each element its snaps, on condition that its ends' values are equal, or that they are zero."""
+    """Yield the snaps of each element, on condition that the values at its ends are equal, or that they are zero."""
     rows = basis[chain.value_columns]
     for e, kind in enumerate(chain.kinds):
         pair, ends = rows[[e, e + 1]], chain.values[[e, e + 1]]
-        tied = kind != FREE or bool((pair[0] == pair[1]).all())
-        if EQUAL in data.snaps and not tied:
+        is_constant = kind != FREE or bool((pair[0] == pair[1]).all())
+        if EQUAL in data.snaps and not is_constant:
             yield Edit(EQUAL, e), pair[1:] - pair[:1], ends[1:] - ends[:1]
         if ZERO in data.snaps and kind != ZERO:
-            free = pair.any(axis=1)
-            if tied:
-                free[1] = False  # one condition says it all
-            given = ends[~pair.any(axis=1)]  # zero already, or pinned
-            if free.any() and not given.any():
-                yield Edit(ZERO, e), pair[free], ends[free]
+            is_free = pair.any(axis=1)
+            if is_constant:
+                is_free[1] = False  # one condition says it all
+            fixed_values = ends[~pair.any(axis=1)]  # zero already, or pinned
+            if is_free.any() and not fixed_values.any():
+                yield Edit(ZERO, e), pair[is_free], ends[is_free]
 
 
-def _disjoint_edits(ways: list[tuple[float, Edit]], most: int, gain: float) -> list[tuple[float, Edit]]:
-    """Return (change of score, edit) of edits that pay and don't touch each other, cheapest first."""
-    taken: set[int] = set()
-    chosen: list[tuple[float, Edit]] = []
-    for change, edit in ways:
-        low, high = edit.span
-        if len(chosen) >= most or change > -gain:
+def _disjoint_edits(
+    ranked_edits: list[tuple[float, Edit]], largest_number: int, gain: float
+) -> list[tuple[float, Edit]]:
+    """Return (change of score, edit) of edits that lower the score by a gain and don't touch each other, best first."""
+    used_elements: set[int] = set()
+    chosen_edits: list[tuple[float, Edit]] = []
+    for change, edit in ranked_edits:
+        first_element, last_element = edit.span
+        if len(chosen_edits) >= largest_number or change > -gain:
             break
-        if taken.isdisjoint(range(low - 1, high + 2)):
-            taken.update(range(low, high + 1))
-            chosen.append((change, edit))
-    return chosen
+        if used_elements.isdisjoint(range(first_element - 1, last_element + 2)):
+            used_elements.update(range(first_element, last_element + 1))
+            chosen_edits.append((change, edit))
+    return chosen_edits
 
 
 def simplify_fit(fit: ChainFit, free_knots: bool, goal: Goal) -> ChainFit | None:
-    """Return the fit after the edit, or the edits at once, that cost least; None if there is nothing to take away."""
-    ways = rank_edits(fit, free_knots, goal)
-    batch = _disjoint_edits(ways, max(1, fit.chain.size // 3), 0.5 * np.log(goal.count))
-    present = goal.score(fit)
+    """Return the fit after the cheapest edit, or several cheap edits at once; None if no edit is possible."""
+    ranked_edits = rank_edits(fit, free_knots, goal)
+    batch = _disjoint_edits(ranked_edits, max(1, fit.chain.size // 3), 0.5 * np.log(goal.count))
+    current_score = goal.score(fit)
     while len(batch) > 1:
         chain, _ = predict_edits(fit, [edit for _, edit in batch], free_knots, goal)
         trial = refine(fit.data, chain, fit.stations, free_knots, _STEPS)
-        if goal.score(trial) - present <= 0.5 * math.fsum(change for change, _ in batch):
+        if goal.score(trial) - current_score <= 0.5 * math.fsum(change for change, _ in batch):
             return trial
         batch = batch[: len(batch) // 2]
     trials = []
-    for trial in _trials(fit, [edit for _, edit in ways[: 3 * _TRIALS]], free_knots, goal):
-        if goal.score(trial) < present:
+    for trial in _trials(fit, [edit for _, edit in ranked_edits[: 3 * _TRIALS]], free_knots, goal):
+        if goal.score(trial) < current_score:
             return trial
         trials.append(trial)
     return min(trials, key=goal.score, default=None)
 
 
 def _trials(fit: ChainFit, edits: list[Edit], free_knots: bool, goal: Goal) -> Iterator[ChainFit]:
-    """Yield the refined fits of the edits that are expected to score best, in that order."""
-    predicted = [predict_edits(fit, [edit], free_knots, goal) for edit in edits]
-    scores = [goal.expected_score(square, chain, len(fit.residuals)) for chain, square in predicted]
+    """Yield the refined fits of the `_TRIALS` edits that are expected to score best, in that order."""
+    predictions = [predict_edits(fit, [edit], free_knots, goal) for edit in edits]
+    scores = [goal.expected_score(square, chain, len(fit.residuals)) for chain, square in predictions]
     for i in np.argsort(scores, kind="stable")[:_TRIALS]:
-        yield refine(fit.data, predicted[i][0], fit.stations, free_knots, _STEPS)
+        yield refine(fit.data, predictions[i][0], fit.stations, free_knots, _STEPS)
 
 
 def descent(fit: ChainFit, goal: Goal) -> list[ChainFit]:
-    """Return all fits on the way from a rich chain down to few elements: with fixed knots, then with free ones.
+    """Return all fits on the way from a chain of many elements down to few: with fixed knots, then with free ones.
 
-    It goes on past the bounds, since a poor removal may be made good by the next, but not hopelessly far.
+    The descent goes on past the goal's bounds, as the next removal may make a poor one good, but not hopelessly far.
     """
     path, free_knots = [fit], False
     while fit.rms < _HOPELESS * max(goal.rms, path[0].rms):
@@ -309,26 +320,28 @@ def split_chains(fit: ChainFit) -> list[Chain]:
     """Return chains with one element more, or one freed from being an arc or line, the most helpful first."""
     chain, data = fit.chain, fit.data
     cuts = np.linspace(0.0, 1.0, _PARTS + 1)[:-1]
-    fine = np.append((chain.knots[:-1, None] + np.diff(chain.knots)[:, None] * cuts).ravel(), chain.knots[-1])
-    dense = replace(chain, knots=fine, values=np.interp(fine, chain.knots, chain.values))
-    dense = replace(dense, kinds=np.full(len(fine) - 1, FREE))
-    hats = data.jacobian(dense, fit.stations)[:, dense.value_columns]
-    full = data.jacobian(chain, fit.stations)
-    matrix = full @ chain.basis(True)
+    fine_knots = np.append((chain.knots[:-1, None] + np.diff(chain.knots)[:, None] * cuts).ravel(), chain.knots[-1])
+    fine_chain = replace(chain, knots=fine_knots, values=np.interp(fine_knots, chain.knots, chain.values))
+    fine_chain = replace(fine_chain, kinds=np.full(len(fine_knots) - 1, FREE))
+    hats = data.jacobian(fine_chain, fit.stations)[:, fine_chain.value_columns]
+    chain_jacobian = data.jacobian(chain, fit.stations)
+    matrix = chain_jacobian @ chain.basis(True)
     q, _ = np.linalg.qr(matrix / column_scale(matrix))
-    rest = fit.residuals - q @ (q.T @ fit.residuals)
-    ways = []
+    residuals = fit.residuals - q @ (q.T @ fit.residuals)
+    candidates = []
     for e, kind in enumerate(chain.kinds):
-        freed = chain.kinds.copy()
-        freed[e] = FREE
-        ends = [] if kind == FREE else list(full[:, chain.value_columns][:, e : e + 2].T)
+        freed_kinds = chain.kinds.copy()
+        freed_kinds[e] = FREE
+        ends = [] if kind == FREE else list(chain_jacobian[:, chain.value_columns][:, e : e + 2].T)
         if ends:
-            ways.append((_square_gain(ends, q, rest), replace(chain, kinds=freed)))
-        for knot in fine[e * _PARTS + 1 : (e + 1) * _PARTS]:
-            if min(knot - chain.knots[e], chain.knots[e + 1] - knot) >= data.least:
-                hat = hats @ np.interp(fine, [chain.knots[e], knot, chain.knots[e + 1]], [0.0, 1.0, 0.0])
-                ways.append((_square_gain([hat, *ends], q, rest), _split_element(chain, freed, e, knot)))
-    return [new for _, new in sorted(ways, key=lambda way: -way[0])]
+            candidates.append((_square_gain(ends, q, residuals), replace(chain, kinds=freed_kinds)))
+        for knot in fine_knots[e * _PARTS + 1 : (e + 1) * _PARTS]:
+            if min(knot - chain.knots[e], chain.knots[e + 1] - knot) >= data.min_length:
+                hat = hats @ np.interp(fine_knots, [chain.knots[e], knot, chain.knots[e + 1]], [0.0, 1.0, 0.0])
+                candidates.append(
+                    (_square_gain([hat, *ends], q, residuals), _split_element(chain, freed_kinds, e, knot))
+                )
+    return [split_chain for _, split_chain in sorted(candidates, key=lambda candidate: -candidate[0])]
 
 
 def _split_element(chain: Chain, freed: Int, e: int, knot: float) -> Chain:
@@ -337,39 +350,45 @@ def _split_element(chain: Chain, freed: Int, e: int, knot: float) -> Chain:
     return replace(chain, knots=np.insert(chain.knots, e + 1, knot), values=values, kinds=np.insert(freed, e, FREE))
 
 
-def _square_gain(columns: list[Float], q: Float, rest: Float) -> float:
-    """Return by how much (m^2) new columns, beside the old ones q, would lower the sum of squares."""
-    new = np.stack(columns, axis=1)
-    new = new - q @ (q.T @ new)
-    new /= column_scale(new)
-    solution = np.linalg.lstsq(new, rest, rcond=1e-6)[0]
-    return float(rest @ (new @ solution))
+def _square_gain(columns: list[Float], q: Float, residuals: Float) -> float:
+    """Return the decrease (m^2) of the sum of squares by further columns (N,) of a linear problem.
+
+    Args:
+        columns: the new columns.
+        q: (N, P) orthonormal basis of the present ones.
+        rest: (N,) residuals that the present ones leave.
+    """
+    new_columns = np.stack(columns, axis=1)
+    new_columns = new_columns - q @ (q.T @ new_columns)
+    new_columns /= column_scale(new_columns)
+    solution = np.linalg.lstsq(new_columns, residuals, rcond=1e-6)[0]
+    return float(residuals @ (new_columns @ solution))
 
 
 def improve_fit(fit: ChainFit, goal: Goal, steps: int = 60) -> ChainFit:
-    """Return a fit grown until the bounds are met, then edited while its rank falls, in at most ``steps`` rounds."""
+    """Return a fit grown until it meets the bounds, then edited while its rank falls, in at most ``steps`` rounds."""
     for _ in range(steps):
         while goal.is_met(fit):
-            ways = [edit for _, edit in rank_edits(fit, True, goal)[: 3 * _TRIALS]]
-            best = min(_trials(fit, ways, True, goal), key=goal.rank, default=None)
-            if best is None or not _better(best, fit, goal):
+            edits = [edit for _, edit in rank_edits(fit, True, goal)[: 3 * _TRIALS]]
+            best_fit = min(_trials(fit, edits, True, goal), key=goal.rank, default=None)
+            if best_fit is None or not _better(best_fit, fit, goal):
                 break
-            fit = best
-        grown = [refine(fit.data, chain, fit.stations, True, _STEPS) for chain in split_chains(fit)[:_TRIALS]]
-        best = min(grown, key=goal.score, default=None)
-        if best is None:
+            fit = best_fit
+        grown_fits = [refine(fit.data, chain, fit.stations, True, _STEPS) for chain in split_chains(fit)[:_TRIALS]]
+        best_fit = min(grown_fits, key=goal.score, default=None)
+        if best_fit is None:
             return fit
-        if goal.is_met(fit) and not _better(best, fit, goal):
+        if goal.is_met(fit) and not _better(best_fit, fit, goal):
             # A split may pay only together with the removal that it makes possible.
-            ways = [edit for _, edit in rank_edits(best, True, goal)[: 3 * _TRIALS]]
-            best = min(_trials(best, ways, True, goal), key=goal.rank, default=None)
-            if best is None or not _better(best, fit, goal):
+            edits = [edit for _, edit in rank_edits(best_fit, True, goal)[: 3 * _TRIALS]]
+            best_fit = min(_trials(best_fit, edits, True, goal), key=goal.rank, default=None)
+            if best_fit is None or not _better(best_fit, fit, goal):
                 return fit
-        fit = best
+        fit = best_fit
     return fit
 
 
-def _better(new: ChainFit, old: ChainFit, goal: Goal) -> bool:
-    """Return whether a fit beats another: by its bounds or number of elements, or by a score worth it."""
-    coarse_new, coarse_old = goal.rank(new)[:2], goal.rank(old)[:2]
-    return coarse_new < coarse_old or (coarse_new == coarse_old and goal.score(new) < goal.score(old) - _WORTH)
+def _better(new_fit: ChainFit, old_fit: ChainFit, goal: Goal) -> bool:
+    """Return whether a new fit beats an old one: by bounds or number of elements, or by `_WORTH` of score."""
+    new_rank, old_rank = goal.rank(new_fit)[:2], goal.rank(old_fit)[:2]
+    return new_rank < old_rank or (new_rank == old_rank and goal.score(new_fit) < goal.score(old_fit) - _WORTH)

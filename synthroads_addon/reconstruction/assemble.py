@@ -50,14 +50,14 @@ class RoadMeasurements:
 
     Attributes:
         fit: the alignment in local coordinates.
-        cloud: the points; what they know of their map system and of paint.
+        cloud: the points, with their map system and whether classes tell paint from pavement.
         section: the cross-section.
         stations: (K,) stations that the crossfall was measured at.
         crossfall: (K,) m/m by side; NaN where unknown.
-        rotation: axis of rotation of the crossfall.
-        barriers, posts: what stands.
-        ground: what lies beside.
-        title: for people.
+        rotation: name of the line about which the crossfall turns.
+        barriers, posts: barriers and delineators that stand along the road.
+        ground: shape of the ground beside the road.
+        title: title of the parameter set.
         bays: emergency bays.
     """
 
@@ -74,59 +74,64 @@ class RoadMeasurements:
     bays: list[Bay] = field(default_factory=list)
 
 
-def assemble_parameters(measured: RoadMeasurements) -> RoadParameters:
+def assemble_parameters(measurements: RoadMeasurements) -> RoadParameters:
     """Return the parameter set of a measured road, validated against the schema.
 
     Raises:
         InputError: a value lies beyond what a parameter set allows.
     """
-    items: dict[str, RoadObject] = {"alignment": alignment_object(measured.fit)}
-    if measured.section.kind == "dual":
+    items: dict[str, RoadObject] = {"alignment": alignment_object(measurements.fit)}
+    if measurements.section.kind == "dual":
         items["median"] = Median(instance=1)
     for side in SIDES:
-        items[f"carriageway-{side}"] = _carriageway(measured, measured.section.sides[side])
-    items |= dict(_bays(measured))
-    items |= dict(_markings(measured))
-    items |= dict(_furniture(measured))
-    items["terrain"] = _terrain(measured.ground)
-    metadata = {"identifier": "reconstructed", "title": measured.title, "generator": generator()}
+        items[f"carriageway-{side}"] = _carriageway(measurements, measurements.section.sides[side])
+    items |= dict(_bays(measurements))
+    items |= dict(_markings(measurements))
+    items |= dict(_furniture(measurements))
+    items["terrain"] = _terrain(measurements.ground)
+    metadata = {"identifier": "reconstructed", "title": measurements.title, "generator": generator()}
     data = {
-        "metadata": metadata | _systems(measured.cloud),
-        "transform": {"translate": measured.cloud.origin.tolist()},
-        "design_class": _design_class(measured),
+        "metadata": metadata | _systems(measurements.cloud),
+        "transform": {"translate": measurements.cloud.origin.tolist()},
+        "design_class": _design_class(measurements),
         "objects": {name: item.to_dict() | {"instance": i} for i, (name, item) in enumerate(items.items(), 1)},
     }
-    # Once more as a whole: each value within its limits, each name known.
+    # The whole set is validated once more: each value within its limits, each reference to an existing object.
     return RoadParameters.from_dict(data, source="reconstructed road")
 
 
 def _systems(cloud: RoadCloud) -> dict[str, str]:
-    """Return the metadata that name map and vertical system: a cloud's own, of whose map one must have a code.
+    """Return the metadata fields that name the cloud's map system and height system by their EPSG codes.
+
+    A cloud that names no map system gets `UNKNOWN_EPSG`.
 
     Raises:
         InputError: the cloud names a map system that has no code, by which a parameter set would name it.
     """
     system = cloud.place.system
     if system is not None and system.epsg is None and not system.local:
-        allowed = "has no EPSG code, by which a parameter set names it: convert the cloud to a system that has one"
-        raise InputError("cloud: coordinate system", system.name, allowed)
+        requirement = "has no EPSG code, by which a parameter set names it: convert the cloud to a system that has one"
+        raise InputError("cloud: coordinate system", system.name, requirement)
     systems = {"referenceSystem": EPSG_URI.format(cloud.epsg or UNKNOWN_EPSG)}
     if cloud.place.height_epsg:
         systems["heightReferenceSystem"] = EPSG_URI.format(cloud.place.height_epsg)
     return systems
 
 
-def _design_class(measured: RoadMeasurements) -> str:
+def _design_class(measurements: RoadMeasurements) -> str:
     """Return the design class that the radii and the nearest standard cross-section allow, the fastest first."""
-    # Curvature times the class' least radius is at most 1; 2 % are the fit's.
-    bend = max(max(abs(e.curvature_start), abs(e.curvature_end)) for e in measured.fit.alignment.elements)
-    fast = [name for name, limits in LIMITS.items() if bend * limits.radius <= 1.02]
-    preferred = fast[0] if fast else "EKA3"
-    nearest = measured.section.nearest
-    return design_class_of(nearest, preferred) if nearest in STANDARD_CROSS_SECTIONS else preferred
+    # Curvature (1/m) times the class' least radius (m) is at most 1; 2 % more are allowed for the fit's error.
+    largest_curvature = max(
+        max(abs(e.curvature_start), abs(e.curvature_end)) for e in measurements.fit.alignment.elements
+    )
+    possible_classes = [name for name, limits in LIMITS.items() if largest_curvature * limits.radius <= 1.02]
+    preferred = possible_classes[0] if possible_classes else "EKA3"
+    standard_name = measurements.section.nearest
+    return design_class_of(standard_name, preferred) if standard_name in STANDARD_CROSS_SECTIONS else preferred
 
 
-def _carriageway(measured: RoadMeasurements, side: SideSection) -> Carriageway:
+def _carriageway(measurements: RoadMeasurements, side: SideSection) -> Carriageway:
+    """Return one side's measured cross-section as the carriageway of a parameter set, lengths in m."""
     return Carriageway(
         instance=1,
         side=side.side,
@@ -135,45 +140,45 @@ def _carriageway(measured: RoadMeasurements, side: SideSection) -> Carriageway:
         outer_edge_strip_width=_length(side.strip.value, 0.0, 2.0),
         lanes=tuple(Lane(width=_length(lane.value, 2.0, 6.0)) for lane in reversed(side.lanes)),
         inner_edge_strip_width=_length(side.inner_strip.value),
-        verge_width=_length(measured.ground.verge_width),
-        crossfall=crossfall_points(measured.stations, measured.crossfall[side.side]),
-        rotation_axis=measured.rotation,
+        verge_width=_length(measurements.ground.verge_width),
+        crossfall=crossfall_points(measurements.stations, measurements.crossfall[side.side]),
+        rotation_axis=measurements.rotation,
     )
 
 
 def crossfall_points(stations: Float, fall: Float) -> tuple[CrossfallPoint, ...]:
-    """Return the corners of a polyline that the crossfall (K,), m/m, keeps within 0.15 % of, in percent."""
-    known = np.isfinite(fall)
-    if not known.any():
+    """Return the corners, in percent, of a polyline within `_CROSSFALL_TOLERANCE` of a crossfall (K,), m/m."""
+    is_measured = np.isfinite(fall)
+    if not is_measured.any():
         return (CrossfallPoint(station=0.0, crossfall_percent=0.0),)
-    station, percent = stations[known], np.clip(100.0 * fall[known], -12.0, 12.0)
+    station, percent = stations[is_measured], np.clip(100.0 * fall[is_measured], -12.0, 12.0)
     corners = _corners(station, percent, _CROSSFALL_TOLERANCE)
     if len(corners) == 2 and abs(percent[corners[0]] - percent[corners[1]]) <= _CROSSFALL_TOLERANCE:
         return (CrossfallPoint(station=0.0, crossfall_percent=round(float(np.median(percent)), 3)),)
     rows = [(_length(station[i]), round(float(percent[i]), 3)) for i in corners]
-    return tuple(CrossfallPoint(station=at, crossfall_percent=value) for at, value in rows)
+    return tuple(CrossfallPoint(station=corner_station, crossfall_percent=value) for corner_station, value in rows)
 
 
 def _corners(station: Float, value: Float, tolerance: float) -> list[int]:
-    """Return the indices that Douglas and Peucker's line simplification keeps, ascending."""
-    kept, stack = {0, len(station) - 1}, [(0, len(station) - 1)]
+    """Return the indices, ascending, of the corners that Douglas and Peucker (1973) keep of a line value(station)."""
+    corners, stack = {0, len(station) - 1}, [(0, len(station) - 1)]
     while stack:
-        low, high = stack.pop()
-        if high - low < 2:
+        start, end = stack.pop()
+        if end - start < 2:
             continue
-        inner = slice(low + 1, high)
-        chord = np.interp(station[inner], station[[low, high]], value[[low, high]])
-        away = np.abs(value[inner] - chord)
-        if away.max() > tolerance:
-            middle = low + 1 + int(away.argmax())
-            kept.add(middle)
-            stack += [(low, middle), (middle, high)]
-    return sorted(kept)
+        inner_rows = slice(start + 1, end)
+        chord = np.interp(station[inner_rows], station[[start, end]], value[[start, end]])
+        deviation = np.abs(value[inner_rows] - chord)
+        if deviation.max() > tolerance:
+            middle = start + 1 + int(deviation.argmax())
+            corners.add(middle)
+            stack += [(start, middle), (middle, end)]
+    return sorted(corners)
 
 
-def _bays(measured: RoadMeasurements) -> Iterator[tuple[str, Turnout]]:
-    """Yield the emergency bays by id; tapers are named in the direction of traffic."""
-    for number, bay in enumerate(measured.bays, 1):
+def _bays(measurements: RoadMeasurements) -> Iterator[tuple[str, Turnout]]:
+    """Yield (id, turnout) of each emergency bay; its tapers are named in the direction of traffic."""
+    for number, bay in enumerate(measurements.bays, 1):
         with_stations = bay.side == "right"
         tapers = (bay.low_taper, bay.high_taper) if with_stations else (bay.high_taper, bay.low_taper)
         yield (
@@ -192,42 +197,49 @@ def _bays(measured: RoadMeasurements) -> Iterator[tuple[str, Turnout]]:
         )
 
 
-def _markings(measured: RoadMeasurements) -> Iterator[tuple[str, LineMarking]]:
-    section = measured.section
-    length = round_value(measured.fit.alignment.length)
+def _markings(measurements: RoadMeasurements) -> Iterator[tuple[str, LineMarking]]:
+    """Yield (id, marking) of each line of the carriageways, and of a single carriageway's middle line.
+
+    Lines that weren't seen are left out at a side's borders, as are those of assumed cross-sections.
+    """
+    section = measurements.section
+    length = round_value(measurements.fit.alignment.length)
     for side in SIDES:
         measured_side = section.sides[side]
-        last = len(measured_side.lines) - 1
+        outermost = len(measured_side.lines) - 1
         for number, line in enumerate(measured_side.lines):
             if number == 0 and section.kind == "single":
                 continue
-            if line is None and (number in (0, last) or measured_side.assumed) and not measured_side.mirrored:
+            if line is None and (number in (0, outermost) or measured_side.assumed) and not measured_side.mirrored:
                 continue
-            kind = _line_kind(number, last, measured_side.closed)
+            kind = _line_kind(number, outermost, measured_side.closed)
             marking = LineMarking(
                 instance=1,
                 carriageway=f"carriageway-{side}",
                 kind=kind,
-                boundary=last - number,
-                width=line_width(line, kind, section.kind, measured.cloud.marked),
+                boundary=outermost - number,
+                width=line_width(line, kind, section.kind, measurements.cloud.marked),
                 **_dashes(line, length, kind == "outer_edge"),
             )
-            yield f"carriageway-{side}-line-{last - number}", marking
+            yield f"carriageway-{side}-line-{outermost - number}", marking
     if section.middle is not None:
         fields = {"carriageway": "carriageway-right", **_dashes(section.middle, length)}
-        width = line_width(section.middle, "lane", "single", measured.cloud.marked)
+        width = line_width(section.middle, "lane", "single", measurements.cloud.marked)
         yield "middle-line", LineMarking(instance=1, kind="free", width=width, **fields)
 
 
-def _line_kind(number: int, last: int, closed: bool) -> LineKind:
-    """Return the kind of a carriageway's line, counted from inside."""
-    if number == last:
-        return "outer_edge" if closed else "lane"
+def _line_kind(number: int, outermost: int, is_edge_line: bool) -> LineKind:
+    """Return the kind of a carriageway's line by its number, 0 for the innermost."""
+    if number == outermost:
+        return "outer_edge" if is_edge_line else "lane"
     return "lane" if number else "inner_edge"
 
 
 def _dashes(line: Line | None, length: float, edge: bool = False) -> dict[str, float]:
-    """Return dash and gap lengths and start and end stations, m, of a marking as fields of `LineMarking`."""
+    """Return dash and gap lengths and start and end stations, m, of a marking as fields of `LineMarking`.
+
+    A line that wasn't seen gets the usual dashes along the whole road, as an edge line none.
+    """
     dash, gap, start, end = (0.0, 0.0, 0.0, length) if edge else (6.0, 12.0, 0.0, length)
     if line is not None:
         dash, gap, start, end = line.dash, line.gap, max(0.0, line.start), min(length, line.end)
@@ -240,15 +252,15 @@ def _dashes(line: Line | None, length: float, edge: bool = False) -> dict[str, f
     return {"dash_length": dash, "gap_length": gap, "start_station": start, "end_station": end}
 
 
-def _furniture(measured: RoadMeasurements) -> Iterator[tuple[str, RoadObject]]:
+def _furniture(measurements: RoadMeasurements) -> Iterator[tuple[str, RoadObject]]:
     """Yield (id, object) of the barriers, and of a delineator for each post beside the road."""
-    length = round_value(measured.fit.alignment.length)
-    for number, barrier in enumerate(measured.barriers, 1):
+    length = round_value(measurements.fit.alignment.length)
+    for number, barrier in enumerate(measurements.barriers, 1):
         start = 0.0 if barrier.start < _END else _length(barrier.start)
         end = length if barrier.end > length - _END else _length(barrier.end)
         if end - start > _SHORTEST_BARRIER:
             yield f"barrier-{number}", barrier_object(barrier, start, end, length)
-    posts = [post for post in measured.posts if 0.0 <= post.station <= length]
+    posts = [post for post in measurements.posts if 0.0 <= post.station <= length]
     for number, post in enumerate(posts, 1):
         delineator = Delineator(
             instance=1,
@@ -262,18 +274,19 @@ def _furniture(measured: RoadMeasurements) -> Iterator[tuple[str, RoadObject]]:
 
 def barrier_object(barrier: FoundBarrier, start: float, end: float, length: float) -> RoadObject:
     """Return a found barrier between two stations as an object of the road; ramped down where it ends on the road."""
-    place = {"instance": 1, "start_station": start, "end_station": end, "offset": _length(barrier.offset)}
-    inside = start > 0.0 or end < length
-    terminal = round(min(_TERMINAL, (end - start) / 4.0), 2) if inside else 0.0
+    common_fields = {"instance": 1, "start_station": start, "end_station": end, "offset": _length(barrier.offset)}
+    ends_on_road = start > 0.0 or end < length
+    terminal = round(min(_TERMINAL, (end - start) / 4.0), 2) if ends_on_road else 0.0
     if barrier.kind == "noise":
-        return NoiseBarrier(**place, height=_length(barrier.height, 1.0, 12.0))
+        return NoiseBarrier(**common_fields, height=_length(barrier.height, 1.0, 12.0))
     if barrier.kind == "concrete":
-        return ConcreteBarrier(**place, height=_length(barrier.height, 0.4, 2.0), terminal_length=terminal)
+        return ConcreteBarrier(**common_fields, height=_length(barrier.height, 0.4, 2.0), terminal_length=terminal)
     height = _length(barrier.height, 0.3, 1.5)
-    return Guardrail(**place, height=height, faces=barrier.faces, terminal_length=terminal)
+    return Guardrail(**common_fields, height=height, faces=barrier.faces, terminal_length=terminal)
 
 
 def _terrain(ground: GroundShape) -> Terrain:
+    """Return the terrain of a parameter set by the measured shape of the ground; its wavelength is chosen."""
     return Terrain(
         instance=1,
         half_width=_length(ground.half_width, 5.0, 1000.0),
@@ -284,6 +297,6 @@ def _terrain(ground: GroundShape) -> Terrain:
     )
 
 
-def _length(value: float, low: float = -np.inf, high: float = np.inf) -> float:
+def _length(value: float, lower_limit: float = -np.inf, upper_limit: float = np.inf) -> float:
     """Return a length (m) between two limits, rounded to a tenth of a millimetre."""
-    return round(float(np.clip(value, low, high)), 4)
+    return round(float(np.clip(value, lower_limit, upper_limit)), 4)

@@ -18,7 +18,7 @@ from .views.look import find_fused_axis
 from .views.view import View
 
 Predictor = Callable[[RoadCloud, CloudPath], tuple[Float, Float]]
-"""Returns offset and standard deviation (M,) of the axis at each point of a path; NaN where it knows none."""
+"""Function that returns the axis' offset and standard deviation (M,), m, at each point of a path; NaN where unknown."""
 
 
 _HALF_WIDTHS = (12.0, 45.0)
@@ -41,12 +41,12 @@ class Options:
     """Settings of a reconstruction.
 
     Attributes:
-        road: dual or single carriageway, where it is known.
-        tolerance: of the alignment's fit to the axis, m (`fit_axis`).
-        path: course of the road in local coordinates (K, 2), where the cloud alone doesn't show it.
-        predictor: one more view of the axis, beside those that learn nothing.
-        snap: take the standard cross-section's widths where the measured ones are near enough.
-        title: of the parameter set.
+        road: dual or single carriageway; None if the cloud must tell.
+        tolerance: root mean square distance that the alignment may keep from the axis, m (`fit_axis`).
+        path: rough course of the road in local coordinates (K, 2), m; None if the cloud must show it.
+        predictor: trained network that gives one more view of the axis; None for rule-based views alone.
+        snap: whether measured widths near a standard cross-section's are replaced by the standard ones.
+        title: title of the parameter set.
     """
 
     road: RoadKind | None = None
@@ -63,13 +63,13 @@ class FoundRoad:
 
     Attributes:
         cloud: the points that it was found in.
-        half: width beside it within which there is something to see, m.
-        layout: that profiles along a path parallel to the road show.
-        axis: that all views of it agree on.
+        half_width: reach of the cross profiles to either side of the path, m.
+        layout: carriageways and lines that profiles along a path parallel to the road show.
+        axis: offsets of the axis from that path, on which all views agree.
     """
 
     cloud: RoadCloud
-    half: float
+    half_width: float
     layout: RoadLayout
     axis: FusedAxis
 
@@ -80,118 +80,120 @@ class FoundRoad:
 
     def layout_along(self, path: CloudPath, kind: RoadKind | None) -> RoadLayout:
         """Return the layout that profiles along another path show; InputError if they show no road of that kind."""
-        profiles = make_profiles(self.cloud, path, self.half, exact=True)
+        profiles = make_profiles(self.cloud, path, self.half_width, keep_points=True)
         return find_layout(profiles, find_lines(profiles), kind)
 
     def open_along(self, path: CloudPath, stations: Float) -> Bool:
-        """Return a mask (K,) of stations, m, along a path beside which the views of the axis disagree."""
+        """Return at which of the stations (K,), m, along a path the views of the axis disagree, as a mask (K,)."""
         station, _ = path.project(self.path.place(self.axis.stations, self.axis.offsets))
         return np.interp(stations, station, self.axis.open.astype(np.float64)) > 0.5
 
     def parted_line(self, path: CloudPath, stations: Float) -> Float | None:
-        """Return the offsets (K,), m, from a path of what lies midway between a parted middle line's branches.
+        """Return the offsets (K,), m, from a path of the line midway between both branches of a middle line that parts.
 
-        NaN where the middle line isn't seen; None where it doesn't part. Along an axis that goes between the branches
-        neither is easily followed, so that they are those that were followed here.
+        NaN where the middle line isn't seen; None if it parts nowhere. Along an axis that runs between the branches
+        neither can be followed well, so the branches of this road's own path are used.
 
         Args:
-            path: near the axis.
-            stations: (K,) along it, m.
+            path: another path near the axis.
+            stations: (K,) along that path, m.
         """
         branch = self.layout.bands[0].branch
         if branch is None or not np.any(branch):
             return None
         (guide,) = axis_guides(self.layout)
-        known = np.isfinite(guide.measured)
-        station, offset = path.project(self.path.place(guide.stations[known], guide.measured[known]))
+        seen_mask = np.isfinite(guide.measured)
+        station, offset = path.project(self.path.place(guide.stations[seen_mask], guide.measured[seen_mask]))
         order = np.argsort(station, kind="stable")
         distance = np.abs(stations[:, None] - station[None]).min(axis=1)
         return np.where(distance <= STRETCH, np.interp(stations, station[order], offset[order]), np.nan)
 
 
 def straighten_path(cloud: RoadCloud, options: Options, progress: Progress = silent) -> tuple[CloudPath, float]:
-    """Return a path parallel to the road, and the half width (m) beside it within which there is something to see.
+    """Return a path parallel to the road, and the reach of cross profiles to either side of it, m.
 
-    `progress` is told the share of its passes that are done at most.
+    ``progress`` is called before each pass with the share of `_REGISTRATIONS` passes that are done.
     """
     xy = cloud.xyz[cloud.of(PointKind.PAVEMENT, PointKind.MARKING) if cloud.labelled else cloud.surface, :2]
     path = path_through(options.path) if options.path is not None else first_path(xy)
+    # Chosen: 200,000 points tell the road's width.
     _, offset = path.project(xy[:: max(1, len(xy) // 200_000)])
-    near = np.abs(offset)[np.abs(offset) < _HALF_WIDTHS[1]]
-    if not len(near):
+    distances = np.abs(offset)[np.abs(offset) < _HALF_WIDTHS[1]]
+    if not len(distances):
         raise InputError("--path", None, "no point of the road lies within 45 m of it")
-    half = float(np.clip(np.percentile(near, 99) + _MARGIN, *_HALF_WIDTHS))
-    # Until it lies still: where a kink is left in it, the lines beside it bend by more than they can be followed.
+    half_width = float(np.clip(np.percentile(distances, 99) + _MARGIN, *_HALF_WIDTHS))
+    # Repeated until the path moves by less than `_PARALLEL`: beside a kink in it lines bend too much to be followed.
     for number in range(_REGISTRATIONS):
         progress("path", number / _REGISTRATIONS)
-        before, path = path, register_path(path, make_profiles(cloud, path, half))
-        if float(np.abs(before.project(path.points)[1]).max()) <= _PARALLEL:
+        previous_path, path = path, register_path(path, make_profiles(cloud, path, half_width))
+        if float(np.abs(previous_path.project(path.points)[1]).max()) <= _PARALLEL:
             break
-    return path, half
+    return path, half_width
 
 
 def find_axis(
-    cloud: RoadCloud, path: CloudPath, half: float, options: Options, progress: Progress = silent
+    cloud: RoadCloud, path: CloudPath, half_width: float, options: Options, progress: Progress = silent
 ) -> FoundRoad:
     """Return profiles along the road, the layout of lines that they show, and the axis that all views agree on.
 
-    Along the path that is given, and again along the axis that was found beside it until it lies still, as a straight
-    line is smoothed and followed better than a bent one, and as a path that has slipped by a lane comes back. Where the
-    middle line parts in two that path follows one branch; the axis then goes between both. `progress` is told the share
-    of its passes that are done at most.
+    The axis is looked for along the given path, then again along the axis just found, until that moves no more: a
+    straight line is followed better than a bent one, and a path that has slipped by a lane comes back. Where the middle
+    line parts in two the path follows one branch, the axis runs between both. ``progress`` is called with the share of
+    the passes that are done.
     """
     progress("lines", 0.0)
-    road = _look_along(cloud, path, half, options)
+    road = _look_along(cloud, path, half_width, options)
     for number in range(1, _PASSES):
         progress("lines", number / _PASSES)
         if number > 1 and float(np.abs(road.axis.offsets).max()) <= _STILL:
             break
         # The next path is the axis itself: lines beside it are then straight, and smoothing bends none of them.
         offsets = np.interp(road.path.stations, road.axis.stations, road.axis.offsets)
-        road = _look_along(cloud, road.path.shift_by(offsets), half, options)
+        road = _look_along(cloud, road.path.shift_by(offsets), half_width, options)
     layout = with_branch(road.layout)
-    learned = _learned_view(cloud, layout.profiles, options)
-    first = find_fused_axis(layout, learned)
-    others = [_axis_in_grid(road, learned, share * ACROSS) for share in _GRIDS]
-    return replace(road, layout=layout, axis=mean_axis(first, [axis for axis in others if axis is not None]))
+    learned_views = _learned_view(cloud, layout.profiles, options)
+    path_axis = find_fused_axis(layout, learned_views)
+    shifted_axes = [_axis_in_grid(road, learned_views, share * ACROSS) for share in _GRIDS]
+    return replace(road, layout=layout, axis=mean_axis(path_axis, [axis for axis in shifted_axes if axis is not None]))
 
 
-def _axis_in_grid(road: FoundRoad, learned: list[View], shift: float) -> FusedAxis | None:
+def _axis_in_grid(road: FoundRoad, learned_views: list[View], shift: float) -> FusedAxis | None:
     """Return the axis as another grid of bins shows it, with offsets from the same path; None where it shows no road.
 
     Args:
-        road: along the path.
-        learned: views that don't come from a grid.
-        shift: m to the left of the path that the grid lies.
+        road: the road as it was found along the path.
+        learned_views: views by a network, which don't come from a grid of bins.
+        shift: distance by which the grid is shifted to the left, m.
     """
     try:
         layout = with_branch(road.layout_along(road.path.beside(shift), road.layout.kind))
-        axis = find_fused_axis(layout, [replace(view, offsets=view.offsets - shift) for view in learned])
+        axis = find_fused_axis(layout, [replace(view, offsets=view.offsets - shift) for view in learned_views])
     except InputError:
         return None
     return replace(axis, offsets=axis.offsets + shift, raw=axis.raw + shift)
 
 
-def _look_along(cloud: RoadCloud, path: CloudPath, half: float, options: Options) -> FoundRoad:
-    """Return what a path shows: profiles, layout, and the axis by the views that learn nothing."""
-    profiles = make_profiles(cloud, path, half, exact=True)
+def _look_along(cloud: RoadCloud, path: CloudPath, half_width: float, options: Options) -> FoundRoad:
+    """Return the road that profiles along a path show: its layout, and its axis by the rule-based views."""
+    profiles = make_profiles(cloud, path, half_width, keep_points=True)
     layout = find_layout(profiles, find_lines(profiles), options.road)
-    return FoundRoad(cloud, half, layout, find_fused_axis(layout))
+    return FoundRoad(cloud, half_width, layout, find_fused_axis(layout))
 
 
 def _learned_view(cloud: RoadCloud, profiles: Profiles, options: Options) -> list[View]:
-    """Return what the learned predictor says of the axis in the profiles' stretches, as a view; nothing without one.
+    """Return the predictor's axis in the profiles' stretches as a list of one view; an empty list without a predictor.
 
     Raises:
-        InputError: the model tells the axis nowhere in this cloud.
+        InputError: the model predicts no axis anywhere in this cloud.
     """
     if options.predictor is None:
         return []
     offset, std = options.predictor(cloud, profiles.path)
-    along, known = profiles.path.stations, np.isfinite(offset)
-    if not known.any():
-        raise InputError("--run", None, "the model tells the axis nowhere in this cloud")
-    seen = np.interp(profiles.middles, along, known.astype(np.float64)) > 0.5
-    value = np.interp(profiles.middles, along[known], offset[known])
-    deviation = np.interp(profiles.middles, along[known], np.maximum(std[known], 0.01))
-    return [View("network", np.where(seen, value, np.nan), np.where(seen, deviation, np.inf))]
+    path_stations, is_predicted = profiles.path.stations, np.isfinite(offset)
+    if not is_predicted.any():
+        raise InputError("--run", None, "the model predicts no axis anywhere in this cloud")
+    has_axis = np.interp(profiles.middles, path_stations, is_predicted.astype(np.float64)) > 0.5
+    value = np.interp(profiles.middles, path_stations[is_predicted], offset[is_predicted])
+    # Chosen: no prediction counts as better than 1 cm, so that one view can't outweigh all the others.
+    deviation = np.interp(profiles.middles, path_stations[is_predicted], np.maximum(std[is_predicted], 0.01))
+    return [View("network", np.where(has_axis, value, np.nan), np.where(has_axis, deviation, np.inf))]

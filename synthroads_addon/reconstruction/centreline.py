@@ -35,14 +35,14 @@ class Centreline:
     """A centreline with a vertex each metre, in the cloud's local coordinates.
 
     Attributes:
-        kind: of the road.
-        path: the line, M vertices.
-        height: (M,) of the ground at it, m.
+        kind: dual or single carriageway.
+        path: the centreline's M vertices.
+        height: (M,) of the ground at each vertex, m.
         std: (M,) standard deviation across the road, m.
-        half_widths: by `INTERVALS` (M,) half-widths of the intervals that the road's centreline lies in, m.
-        axis: the views that it was made from, along another path.
-        judgement: where it isn't to be trusted; stations are those of the path.
-        notes: what a reader must know.
+        half_widths: by name of `INTERVALS` the half-widths (M,) of the intervals that hold the true centreline, m.
+        axis: the fused axis with its views, along the path that was found first.
+        judgement: stretches where the line isn't to be trusted; stations are those of the path.
+        notes: remarks on what was left out.
     """
 
     kind: RoadKind
@@ -60,52 +60,55 @@ def find_centreline(cloud: RoadCloud, options: Options | None = None, progress: 
     """Return the centreline of the road that a cloud shows, by all views of it, with its deviations and doubts.
 
     Raises:
-        InputError: no road can be made out in it.
+        InputError: no road can be made out in the cloud.
     """
     options = options or Options()
-    path, half = straighten_path(cloud, options, part_of(progress, 0.0, 0.4))
-    road = find_axis(cloud.near(path, half), path, half, options, part_of(progress, 0.4, 0.8))
-    shown = _seen_part(road.path, road.axis)
-    offsets = np.interp(shown.stations, road.axis.stations, road.axis.offsets)
-    line = shown.shift_by(offsets)
+    path, profile_half_width = straighten_path(cloud, options, part_of(progress, 0.0, 0.4))
+    road = find_axis(
+        cloud.near(path, profile_half_width), path, profile_half_width, options, part_of(progress, 0.4, 0.8)
+    )
+    seen_path = _seen_part(road.path, road.axis)
+    offsets = np.interp(seen_path.stations, road.axis.stations, road.axis.offsets)
+    line = seen_path.shift_by(offsets)
     progress("judging", 0.8)
-    profiles = make_profiles(cloud, line, half, exact=True)
+    profiles = make_profiles(cloud, line, profile_half_width, keep_points=True)
     layout = find_layout(profiles, find_lines(profiles), options.road)
     cores = [0.5 * (band.low + band.high) for band in layout.bands] if layout.kind == "dual" else [0.0]
-    beside, _ = line.project(road.path.place(road.axis.stations, road.axis.offsets))
+    axis_stations, _ = line.project(road.path.place(road.axis.stations, road.axis.offsets))
     rivals = road.open_along(line, profiles.middles)
     # Two independent errors: of the axis, and of where people say that an axis lies.
-    std = np.hypot(DEFINITION, np.interp(line.stations, beside, road.axis.std))
-    halves = {
-        name: np.interp(line.stations, beside, half_width(road.axis, share, factor, DEFINITION))
+    std = np.hypot(DEFINITION, np.interp(line.stations, axis_stations, road.axis.std))
+    half_widths = {
+        name: np.interp(line.stations, axis_stations, half_width(road.axis, share, factor, DEFINITION))
         for name, (share, factor) in INTERVALS.items()
     }
     judgement = judge(layout, cores, rivals, road.parted_line(line, profiles.middles))
-    return Centreline(layout.kind, line, _heights(profiles), std, halves, road.axis, judgement, layout.notes)
+    return Centreline(layout.kind, line, _heights(profiles), std, half_widths, road.axis, judgement, layout.notes)
 
 
 def _seen_part(path: CloudPath, axis: FusedAxis) -> CloudPath:
     """Return the part of a path from the first to the last stretch in which any view sees the axis."""
-    seen = axis.stations[np.isfinite(axis.raw)]
-    if not len(seen):
+    seen_stations = axis.stations[np.isfinite(axis.raw)]
+    if not len(seen_stations):
         return path
-    inside = (path.stations >= seen[0] - 2.5) & (path.stations <= seen[-1] + 2.5)
-    first = int(np.flatnonzero(inside)[0])
-    return CloudPath(path.points[inside], path.heading[inside], path.start + first)
+    # 2.5 m: half of a stretch, to its ends.
+    in_part = (path.stations >= seen_stations[0] - 2.5) & (path.stations <= seen_stations[-1] + 2.5)
+    first_point = int(np.flatnonzero(in_part)[0])
+    return CloudPath(path.points[in_part], path.heading[in_part], path.start + first_point)
 
 
 def _heights(profiles: Profiles) -> Float:
-    """Return the ground's height (M,), m, at the profiles' axis, smoothed and bridged; NaN without any ground."""
-    near = np.abs(profiles.offsets) < _AT_AXIS
-    bins = profiles.height[:, near].astype(np.float64)
-    known = np.isfinite(bins)
-    count = known.sum(axis=1)
-    mean = np.where(count > 0, np.where(known, bins, 0.0).sum(axis=1) / np.maximum(count, 1), np.nan)
+    """Return the ground's height (M,), m, along the profiles' path, smoothed and bridged; NaN if none is seen."""
+    at_axis = np.abs(profiles.offsets) < _AT_AXIS
+    bins = profiles.height[:, at_axis].astype(np.float64)
+    has_points = np.isfinite(bins)
+    count = has_points.sum(axis=1)
+    mean = np.where(count > 0, np.where(has_points, bins, 0.0).sum(axis=1) / np.maximum(count, 1), np.nan)
     if not np.isfinite(mean).any():
         return np.full(len(profiles.path.points), np.nan)
-    smoothed = smooth(mean, np.isfinite(mean).astype(np.float64), 1.0, _WAVELENGTH).values
-    held = fill_gaps(np.where(np.isfinite(mean), smoothed, np.nan))
-    return np.interp(profiles.path.stations, profiles.stations, held)
+    smooth_heights = smooth(mean, np.isfinite(mean).astype(np.float64), 1.0, _WAVELENGTH).values
+    bridged_heights = fill_gaps(np.where(np.isfinite(mean), smooth_heights, np.nan))
+    return np.interp(profiles.path.stations, profiles.stations, bridged_heights)
 
 
 def centreline_geojson(centreline: Centreline, cloud: RoadCloud, name: str) -> dict[str, Any]:
@@ -120,7 +123,7 @@ def centreline_geojson(centreline: Centreline, cloud: RoadCloud, name: str) -> d
         "feature": "centerline",
         "stations": _rounded(centreline.path.stations - centreline.path.start),
         "std": _rounded(centreline.std),
-        **{name: _rounded(half) for name, half in centreline.half_widths.items()},
+        **{name: _rounded(half_width) for name, half_width in centreline.half_widths.items()},
         "doubtful": _from_start(centreline),
     }
     geometry = {"type": "LineString", "coordinates": np.round(points, _DIGITS).tolist()}
@@ -131,13 +134,15 @@ def centreline_geojson(centreline: Centreline, cloud: RoadCloud, name: str) -> d
 
 
 def centreline_report(centreline: Centreline, cloud: RoadCloud) -> dict[str, Any]:
-    """Return what the views of a centreline say, and how far it is to be trusted, as JSON data; lengths in m."""
+    """Return a centreline's report as JSON data: its views with their differences from it, deviations, doubts; m."""
     views = []
     for view in centreline.axis.views:
         member = centreline.axis.members[view.name]
-        beside = difference_figures(view.offsets - centreline.axis.offsets, "mean", "rms", "largest")
-        used = round(float(member.mean()), 4)
-        views.append({"name": view.name, "seen": round(view.seen, 4), "used": used, "from_centreline": beside})
+        difference = difference_figures(view.offsets - centreline.axis.offsets, "mean", "rms", "largest")
+        used_share = round(float(member.mean()), 4)
+        views.append(
+            {"name": view.name, "seen": round(view.seen, 4), "used": used_share, "from_centreline": difference}
+        )
     return {
         "road": centreline.kind,
         "length": round(centreline.path.length, 2),
@@ -152,8 +157,11 @@ def centreline_report(centreline: Centreline, cloud: RoadCloud) -> dict[str, Any
 def _from_start(centreline: Centreline) -> list[dict[str, Any]]:
     """Return the doubtful stretches as JSON data, stations counted from the line's first vertex."""
     start, data = centreline.path.start, centreline.judgement.to_dict()["doubtful"]
-    return [one | {"start": round(one["start"] - start, 1), "end": round(one["end"] - start, 1)} for one in data]
+    return [
+        doubt | {"start": round(doubt["start"] - start, 1), "end": round(doubt["end"] - start, 1)} for doubt in data
+    ]
 
 
 def _rounded(values: Float) -> list[float | None]:
+    """Return values (M,) rounded for a JSON file, None where they aren't finite; adding 0.0 turns -0.0 into 0.0."""
     return [round(value, _DIGITS) + 0.0 if np.isfinite(value) else None for value in values.tolist()]

@@ -80,7 +80,7 @@ KIND_OF_CLASS = {
     "unclassified": PointKind.UNSORTED,
     "unlabelled": PointKind.UNSORTED,
 }
-"""Names of classes of the project and of LAS; what isn't here is not used."""
+"""Kind of point by class name, of the project's schemes and of LAS; points of other classes are not used."""
 
 
 @dataclass(frozen=True)
@@ -88,16 +88,16 @@ class RoadCloud:
     """N points of a cloud that a road is reconstructed from, sorted by what they lie on.
 
     Attributes:
-        xyz: (N, 3) m, less the origin.
+        xyz: (N, 3) local coordinates, m: map coordinates less the origin.
         intensity: (N,) float32, in the file's own unit.
         kind: (N,) uint8 of `PointKind`; none is OTHER.
         origin: (3,) map coordinates, m, whole metres.
-        place: the map system, and that of the file that they are from.
-        labelled: whether pavement is told from ground by class.
-        marked: whether markings are told from pavement by class.
-        read: points in the file that are neither withheld nor noise.
-        classes: number of them by class name.
-        strays: points far from all others, which aren't used.
+        place: map system of the coordinates, and that of the file.
+        labelled: whether classes tell pavement from ground.
+        marked: whether classes tell markings from pavement.
+        read: number of the file's points that are neither withheld nor noise.
+        classes: number of these points by class name.
+        strays: number of points far from all others, which aren't used.
     """
 
     xyz: Float
@@ -123,8 +123,8 @@ class RoadCloud:
 
     def near(self, path: CloudPath, distance: float) -> Self:
         """Return the cloud with only the points within a distance (m) of a path, to some 4 m."""
-        kept = path.within(self.xyz[:, :2], distance)
-        return replace(self, xyz=self.xyz[kept], intensity=self.intensity[kept], kind=self.kind[kept])
+        near_mask = path.within(self.xyz[:, :2], distance)
+        return replace(self, xyz=self.xyz[near_mask], intensity=self.intensity[near_mask], kind=self.kind[near_mask])
 
     def of(self, *kinds: PointKind) -> Bool:
         """Return a mask (N,) of the points of these kinds."""
@@ -132,15 +132,15 @@ class RoadCloud:
 
 
 def read_road_cloud(path: FilePath, progress: Progress = silent) -> RoadCloud:
-    """Read those points of a cloud file that a reconstruction uses, sorted by what they lie on.
+    """Read the points of a cloud file that a reconstruction uses, each with the kind of surface or object it lies on.
 
-    `progress` is told the share of the file's points that were read, after each block. Classes are those that the file
-    itself says: the project's own, in any scheme whose names are known, or the LAS classification; what is withheld or
-    noise is left out. A cloud that is for the most part unclassified is sorted into ground and what stands on it.
+    ``progress`` is called after each block with the share of the file's points that were read. Classes are those that
+    the file holds: the project's own, in any scheme whose names are known, or the LAS classification; withheld points
+    and noise are left out. A mostly unclassified cloud is split by height into ground and objects.
 
     Raises:
         MissingFileError: there is no such file.
-        InputError: it is no cloud, or holds too few points of ground or road.
+        InputError: the file is no cloud, or holds too few points of ground or road.
     """
     parts: list[_Points] = []
     with open_cloud(path) as cloud:
@@ -151,12 +151,12 @@ def read_road_cloud(path: FilePath, progress: Progress = silent) -> RoadCloud:
         for block in cloud.usable_blocks():
             kind = table[block.class_id]
             counts += np.bincount(block.class_id, minlength=256)
-            kept = kind != PointKind.OTHER
-            parts.append((block.xyz[kept], block.intensity[kept].astype(np.float32), kind[kept]))
+            is_used = kind != PointKind.OTHER
+            parts.append((block.xyz[is_used], block.intensity[is_used].astype(np.float32), kind[is_used]))
             progress("cloud", min(1.0, float(counts.sum()) / max(header.count, 1)))
     if not sum(len(part[0]) for part in parts):
-        known = ", ".join(KIND_OF_CLASS)
-        raise InputError(str(path), None, f"holds no points of a class that a road is made from ({known})")
+        class_names = ", ".join(KIND_OF_CLASS)
+        raise InputError(str(path), None, f"holds no points of a class that a road is made from ({class_names})")
     xyz, intensity, kind = map(np.concatenate, zip(*parts, strict=True))
     strays = Strays()
     strays.add(xyz)
@@ -174,26 +174,33 @@ def _kind_table(scheme: ClassScheme) -> NDArray[np.uint8]:
     return table
 
 
-def _sort_by_height(path: FilePath, points: _Points, place: Placement, classes: dict[str, int]) -> RoadCloud:
-    """Return the cloud, its unclassified points sorted by height above ground if most are such, else left out."""
+def _sort_by_height(path: FilePath, points: _Points, placement: Placement, classes: dict[str, int]) -> RoadCloud:
+    """Return the cloud with unclassified points left out, or told apart by height if most points are unclassified.
+
+    Below 0.12 m above the ground they are ground, from 0.2 m to 8 m they are furniture (chosen: kerbs lie between,
+    trees and bridges above).
+    """
     xyz, intensity, kind = points
     origin = np.round(np.append(xyz[:, :2].mean(axis=0), xyz[:, 2].min()))
     xyz = xyz - origin
-    unsorted = kind == PointKind.UNSORTED
-    if unsorted.mean() > _UNSORTED_SHARE and np.isin(kind, SURFACE).sum() < FEWEST_POINTS:
+    is_unclassified = kind == PointKind.UNSORTED
+    if is_unclassified.mean() > _UNSORTED_SHARE and np.isin(kind, SURFACE).sum() < FEWEST_POINTS:
         height = above_ground(xyz)
-        kind = np.where(unsorted & (np.abs(height) < 0.12), PointKind.GROUND, kind).astype(np.uint8)
-        kind = np.where(unsorted & (height >= 0.2) & (height < 8.0), PointKind.FURNITURE, kind).astype(np.uint8)
-    kept = kind != PointKind.UNSORTED
-    xyz, intensity, kind = xyz[kept], intensity[kept], kind[kept]
+        kind = np.where(is_unclassified & (np.abs(height) < 0.12), PointKind.GROUND, kind).astype(np.uint8)
+        kind = np.where(is_unclassified & (height >= 0.2) & (height < 8.0), PointKind.FURNITURE, kind).astype(np.uint8)
+    has_kind = kind != PointKind.UNSORTED
+    xyz, intensity, kind = xyz[has_kind], intensity[has_kind], kind[has_kind]
     surface = np.isin(kind, SURFACE)
     if surface.sum() < FEWEST_POINTS:
-        allowed = f"at least {FEWEST_POINTS} points of ground or road are needed"
-        raise InputError(str(path), int(surface.sum()), allowed)
-    paved = np.isin(kind, (PointKind.PAVEMENT, PointKind.MARKING))
-    labelled = bool(paved.sum() > _LABELLED_SHARE * surface.sum())
-    marked = labelled and bool((kind == PointKind.MARKING).sum() > 0.001 * paved.sum())
-    return RoadCloud(xyz, intensity, kind, origin, place, labelled, marked, sum(classes.values()), classes)
+        requirement = f"at least {FEWEST_POINTS} points of ground or road are needed"
+        raise InputError(str(path), int(surface.sum()), requirement)
+    is_pavement = np.isin(kind, (PointKind.PAVEMENT, PointKind.MARKING))
+    has_pavement_class = bool(is_pavement.sum() > _LABELLED_SHARE * surface.sum())
+    # Chosen: a scan with markings shows them on more than 0.1 % of its pavement; fewer points are stray.
+    has_marking_class = has_pavement_class and bool((kind == PointKind.MARKING).sum() > 0.001 * is_pavement.sum())
+    return RoadCloud(
+        xyz, intensity, kind, origin, placement, has_pavement_class, has_marking_class, sum(classes.values()), classes
+    )
 
 
 def above_ground(xyz: Float) -> Float:
@@ -215,29 +222,29 @@ def above_ground(xyz: Float) -> Float:
     groups = {(int(tile[part[0], 0]), int(tile[part[0], 1])): part for part in np.split(order, starts[1:])}
     for (column, row), rows in groups.items():
         corner = np.array([column, row]) * CELL * _TILE
-        beside = [groups.get((column + i, row + j)) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
-        around = np.concatenate([rows, *(part for part in beside if part is not None)])
-        reach = xyz[around, :2] - corner
-        near = np.all((reach >= -_MARGIN * CELL) & (reach < (_TILE + _MARGIN) * CELL), axis=1)
-        near[: len(rows)] = True
-        result[rows] = _above_grid(xyz[around[near]])[: len(rows)]
+        adjacent_points = [groups.get((column + i, row + j)) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
+        tile_points = np.concatenate([rows, *(part for part in adjacent_points if part is not None)])
+        corner_offset = xyz[tile_points, :2] - corner
+        in_margin = np.all((corner_offset >= -_MARGIN * CELL) & (corner_offset < (_TILE + _MARGIN) * CELL), axis=1)
+        in_margin[: len(rows)] = True
+        result[rows] = _above_grid(xyz[tile_points[in_margin]])[: len(rows)]
     return result
 
 
 def _above_grid(xyz: Float) -> Float:
-    """Return the heights (N,), m, of points above the ground that one grid over them gives."""
-    low = np.floor(xyz[:, :2].min(axis=0) / CELL)
-    cell = (np.floor(xyz[:, :2] / CELL) - low).astype(np.int64)
+    """Return the heights (N,), m, of points (N, 3) above the ground surface of one grid that covers them all."""
+    lowest_cell = np.floor(xyz[:, :2].min(axis=0) / CELL)
+    cell = (np.floor(xyz[:, :2] / CELL) - lowest_cell).astype(np.int64)
     shape = tuple(cell.max(axis=0) + 1)
     lowest = np.full(shape, np.inf)
     np.minimum.at(lowest, (cell[:, 0], cell[:, 1]), xyz[:, 2])
-    empty = ~np.isfinite(lowest)
-    nearest = ndimage.distance_transform_edt(empty, return_distances=False, return_indices=True)
-    filled = lowest[tuple(nearest)]
+    is_empty = ~np.isfinite(lowest)
+    nearest_cells = ndimage.distance_transform_edt(is_empty, return_distances=False, return_indices=True)
+    filled_heights = lowest[tuple(nearest_cells)]
     # Opening: the largest of the smallest in a window, which nothing narrower than the window survives.
-    opened = ndimage.grey_opening(filled, size=(WINDOW, WINDOW))
+    opened = ndimage.grey_opening(filled_heights, size=(WINDOW, WINDOW))
     # Where little was opened away the lowest points themselves are the ground: an opening cuts off every crest.
-    ground = ndimage.uniform_filter(np.where(filled - opened > _STEP, opened, filled), 3)
-    place = xyz[:, :2] / CELL - low - 0.5
-    under = ndimage.map_coordinates(ground, place.T, order=1, mode="nearest")
-    return xyz[:, 2] - np.asarray(under)
+    ground = ndimage.uniform_filter(np.where(filled_heights - opened > _STEP, opened, filled_heights), 3)
+    grid_position = xyz[:, :2] / CELL - lowest_cell - 0.5
+    ground_below = ndimage.map_coordinates(ground, grid_position.T, order=1, mode="nearest")
+    return xyz[:, 2] - np.asarray(ground_below)

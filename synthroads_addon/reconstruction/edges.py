@@ -41,26 +41,26 @@ class Edge:
 
 @dataclass(frozen=True)
 class Pavement:
-    """Cross profiles and the pavement in them.
+    """Cross profiles and the share of pavement in each of their bins.
 
     Attributes:
-        profiles: S rows along a path.
-        share: (S, U) of pavement, from classes or from brightness; NaN without points.
+        profiles: cross profiles with S rows along a path and U bins across.
+        share: (S, U) share of pavement by bin, from classes or from brightness; NaN without points.
     """
 
     profiles: Profiles
     share: Grid
 
     def edge(self, begin: Float, sign: int, farthest: float | Float = FARTHEST) -> Edge:
-        """Return in each of K stretches the offset, m, at which the pavement ends beyond a given one; NaN if unseen.
+        """Return the pavement's edge in each of K stretches, beyond an offset that is surely paved; NaN where unseen.
 
         Args:
-            begin: (K,) offsets that are paved for sure, one per stretch, m.
-            sign: +1 looks to the left, -1 to the right.
-            farthest: how far beyond ``begin`` it is looked for, m; a number, or (K,).
+            begin: (K,) offsets that are surely paved, one per stretch, m.
+            sign: +1 for the edge to the left, -1 for the one to the right.
+            farthest: distance beyond ``begin`` in which the edge is looked for, m; a number, or (K,).
 
-        The edge parts pavement from what isn't so that the fewest bins are on the wrong side; around it the shares of
-        both are weighed, so that it is found more exactly than the bins.
+        The edge lies where the fewest bins are on the wrong side, paved outside or unpaved inside; around it the shares
+        of both are weighed, so that the edge is found more exactly than to a bin.
         """
         profiles = self.profiles
         edges, gaps = np.full(len(begin), np.nan), np.zeros(len(begin))
@@ -79,48 +79,61 @@ class Pavement:
 
 
 def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int) -> tuple[float, float]:
-    """Return an edge's offset, m, refined to midway between the points beside it, and the distance of these, m."""
-    near = points.near(stretch, edge - _MIXED, edge + _MIXED)
-    offset, paved = points.offset[near][::sign], points.paved[near][::sign]
+    """Return an edge's offset refined to midway between the points beside it, and the distance of these points, m.
+
+    Args:
+        points: surface points with their classes.
+        stretch: index of the stretch.
+        edge: offset of the edge by bins, m.
+        sign: +1 if the pavement lies to the right of the edge, -1 if to the left.
+    """
+    point_slice = points.near(stretch, edge - _MIXED, edge + _MIXED)
+    offset, paved = points.offset[point_slice][::sign], points.paved[point_slice][::sign]
     if len(offset) < _FEWEST_POINTS:
         return edge, 0.0
+    # The split after n points, outwards, leaves the fewest on the wrong side where paved less unpaved ones are most.
     gain = np.append(0, np.cumsum(np.where(paved, 1, -1)))
-    best = np.flatnonzero(
-        gain == gain.max()
-    )  # where points of both lie mingled there are several: the first is no edge
-    first, last = int(best[0]), int(best[-1])
-    if first == 0 or last == len(offset):
+    # Where points of both lie mingled there are several: the first is no edge.
+    best_splits = np.flatnonzero(gain == gain.max())
+    first_split, last_split = int(best_splits[0]), int(best_splits[-1])
+    if first_split == 0 or last_split == len(offset):
         return edge, 0.0
-    gaps = [abs(float(offset[at] - offset[at - 1])) for at in (first, last)]
-    places = [0.5 * float(offset[at - 1] + offset[at]) for at in (first, last)]
-    return 0.5 * (places[0] + places[1]), max(*gaps, abs(places[1] - places[0]))
+    gaps = [abs(float(offset[split] - offset[split - 1])) for split in (first_split, last_split)]
+    border_offsets = [0.5 * float(offset[split - 1] + offset[split]) for split in (first_split, last_split)]
+    return 0.5 * (border_offsets[0] + border_offsets[1]), max(*gaps, abs(border_offsets[1] - border_offsets[0]))
 
 
 def _find_edge(share: Float, begin: float, sign: int) -> float:
     """Return the offset, m, of the edge in a profile (C,) of paved shares that starts at ``begin``; NaN if unseen."""
-    known = np.isfinite(share)
-    if known.sum() < 4:
+    has_points = np.isfinite(share)
+    if has_points.sum() < 4:
         return float("nan")
     # The sum of (share - 1/2) up to an edge is largest where the fewest bins are on its wrong side.
-    gain = np.append(0.0, np.cumsum(np.where(known, share - 0.5, 0.0)))
-    at = int(gain.argmax())  # bins before it are paved
+    gain = np.append(0.0, np.cumsum(np.where(has_points, share - 0.5, 0.0)))
+    edge_bin = int(gain.argmax())  # bins before it are paved
     reach = round(_MIXED / ACROSS)
-    low, high = max(0, at - reach), min(len(share), at + reach)
-    near = share[low:high]
-    seen = np.isfinite(near)
+    first_bin, end_bin = max(0, edge_bin - reach), min(len(share), edge_bin + reach)
+    share_around = share[first_bin:end_bin]
+    has_share = np.isfinite(share_around)
     # An edge that the cloud or the search ends at is no edge.
-    if at >= len(share) - 1 or at == 0 or seen.mean() < _FEWEST or not np.isfinite(share[at : at + reach]).any():
+    if (
+        edge_bin >= len(share) - 1
+        or edge_bin == 0
+        or has_share.mean() < _FEWEST
+        or not np.isfinite(share[edge_bin : edge_bin + reach]).any()
+    ):
         return float("nan")
     # Around it the paved shares add up to the width that is paved: the edge is found to a part of a bin. Unknown bins
     # count as what their side of the edge is.
-    filled = np.where(seen, near, (np.arange(low, high) < at).astype(np.float64))
-    return begin + sign * ACROSS * (low - 0.5 + float(filled.sum()))
+    filled_share = np.where(has_share, share_around, (np.arange(first_bin, end_bin) < edge_bin).astype(np.float64))
+    return begin + sign * ACROSS * (first_bin - 0.5 + float(filled_share.sum()))
 
 
 def _mean(values: Grid) -> Float:
-    known = np.isfinite(values)
-    count = known.sum(axis=0)
-    total = np.where(known, values, 0.0).sum(axis=0)
+    """Return the mean over the rows of values (S, C) that are known, (C,); NaN in columns without any."""
+    has_points = np.isfinite(values)
+    count = has_points.sum(axis=0)
+    total = np.where(has_points, values, 0.0).sum(axis=0)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
@@ -137,29 +150,33 @@ class Surface:
     fall: Float
 
 
-def fit_surface(profiles: Profiles, low: Float, high: Float, pivot: Float) -> Surface:
-    """Return height and crossfall between two edges (K,), by a robust line (bisquare) across each stretch.
+def fit_surface(profiles: Profiles, right_edge: Float, left_edge: Float, pivot: Float) -> Surface:
+    """Return the surface between two edges in K stretches, by a robust line (bisquare) through each stretch's bins.
 
     Args:
-        profiles: of the road.
+        profiles: cross profiles along the road.
         low, high: (K,) offsets of the pavement's right and left edge, m.
-        pivot: (K,) offsets at which the height is wanted, m.
+        pivot: (K,) offsets at which the height is taken, m.
     """
     result = np.full((2, len(pivot)), np.nan)
     # Along the road heights differ by the grade more than across it by the crossfall: it is taken off first.
     slope = _grade(profiles)
     for number in range(len(pivot)):
-        if not (np.isfinite(low[number]) and np.isfinite(high[number]) and high[number] - low[number] > 1.0):
+        if not (
+            np.isfinite(right_edge[number])
+            and np.isfinite(left_edge[number])
+            and left_edge[number] - right_edge[number] > 1.0
+        ):
             continue
         rows = slice(number * STRETCH, (number + 1) * STRETCH)
-        columns = slice(profiles.column(low[number] + _CLEAR), profiles.column(high[number] - _CLEAR) + 1)
+        columns = slice(profiles.column(right_edge[number] + _CLEAR), profiles.column(left_edge[number] - _CLEAR) + 1)
         height = profiles.height[rows, columns].astype(np.float64)
-        along = profiles.stations[rows] - profiles.stations[rows].mean()
-        height = height - slope[number] * along[:, None]
-        across = np.broadcast_to(profiles.offsets[columns] - pivot[number], height.shape)
-        known = np.isfinite(height)
-        if known.sum() >= _FEWEST_BINS:
-            result[:, number] = _fit_line(across[known], height[known])
+        station_shift = profiles.stations[rows] - profiles.stations[rows].mean()
+        height = height - slope[number] * station_shift[:, None]
+        pivot_distance = np.broadcast_to(profiles.offsets[columns] - pivot[number], height.shape)
+        has_points = np.isfinite(height)
+        if has_points.sum() >= _FEWEST_BINS:
+            result[:, number] = _fit_line(pivot_distance[has_points], height[has_points])
     return Surface(*result)
 
 
@@ -167,17 +184,17 @@ def _grade(profiles: Profiles) -> Float:
     """Return the grade (K,), m/m, of the surface along the path in each stretch."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # rows without points
-        middle = np.nanmedian(profiles.height, axis=1)
+        row_heights = np.nanmedian(profiles.height, axis=1)
     # 31 m: short enough for vertical curves, long enough for the noise of a median over some rows.
-    smoothed = np.convolve(np.pad(fill_gaps(middle), 15, mode="edge"), np.ones(31) / 31, mode="valid")
-    grade = np.gradient(smoothed, SPACING)
+    smooth_heights = np.convolve(np.pad(fill_gaps(row_heights), 15, mode="edge"), np.ones(31) / 31, mode="valid")
+    grade = np.gradient(smooth_heights, SPACING)
     return grade[np.minimum(np.arange(profiles.stretches) * STRETCH + STRETCH // 2, len(grade) - 1)]
 
 
-def _fit_line(across: Float, height: Float) -> Float:
+def _fit_line(offsets: Float, height: Float) -> Float:
     """Return height at 0, m, and slope, m/m, (2,), of a robust line (bisquare) through bins (N,)."""
-    matrix = np.column_stack([np.ones(len(across)), across])
-    weight, solution = np.ones(len(across)), np.zeros(2)
+    matrix = np.column_stack([np.ones(len(offsets)), offsets])
+    weight, solution = np.ones(len(offsets)), np.zeros(2)
     for _ in range(_ROUNDS):
         inverse = np.linalg.pinv(matrix.T @ (weight[:, None] * matrix))
         solution = inverse @ (matrix.T @ (weight * height))

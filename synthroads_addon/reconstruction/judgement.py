@@ -49,7 +49,7 @@ _SHORTEST = 3
 
 @dataclass(frozen=True)
 class Doubt:
-    """A stretch of the road where the reconstructed axis isn't to be trusted: stations, m, and reasons."""
+    """A stretch of the road where the reconstruction isn't to be trusted: start and end stations, m, and reasons."""
 
     start: float
     end: float
@@ -61,12 +61,12 @@ class Judgement:
     """Assessment of how far a reconstruction's axis is to be trusted, and where it isn't.
 
     Attributes:
-        doubts: the stretches where it isn't, in order.
-        trusted: share of the length outside of them.
-        lines: (K,) how far to the left of the axis the lines or edges that make it lie, m; NaN where they aren't seen.
-        middles: (K,) how far to the left of the axis the middle of the pavement, or of what lies between both, is, m;
-            NaN where not both of its edges are seen.
-        sections: the stretches where the pavement isn't as wide as the reconstructed cross-section, whatever the axis.
+        doubts: stretches where the axis isn't to be trusted, in order of stations.
+        trusted: share of the road's length outside of these stretches.
+        lines: (K,) offset of the lines or edges that make the axis from it, m, left positive; NaN where unseen.
+        middles: (K,) offset from the axis of the pavement's middle, or of the median's, m, left positive;
+            NaN where not both edges are seen.
+        sections: stretches where the pavement is wider or narrower than the reconstructed cross-section.
     """
 
     doubts: list[Doubt]
@@ -102,32 +102,36 @@ def judge(
     rivals: Bool | None = None,
     parted: Float | None = None,
 ) -> Judgement:
-    """Assess where an axis, offset 0 of its profiles, isn't to be trusted, and why.
+    """Return the judgement of an axis, offset 0 of the layout's profiles: where it isn't to be trusted, and why.
 
     Args:
-        layout: that profiles along the axis show.
-        cores: offsets of the carriageways' middles, m, about which is pavement for sure.
-        rivals: (K,) where views of the axis disagree; nowhere if not given.
-        parted: (K,) m, the middle between both branches of the middle line, where that parts (`FoundRoad.parted_line`).
+        layout: carriageways and lines that profiles along the axis show.
+        cores: offsets of the carriageways' middles, m, around which is surely pavement.
+        rivals: (K,) mask of the stretches where views of the axis disagree; None if nowhere.
+        parted: (K,) offsets of the line midway between both branches of a middle line that parts, m
+            (`FoundRoad.parted_line`); None if it parts nowhere.
     """
     profiles, guides = layout.profiles, axis_guides(layout)
     lines = np.mean([guide.measured for guide in guides], axis=0) if parted is None else parted
-    if parted is None and np.isfinite(lines).any():  # else nothing tells how far the others are from the axis
-        lines = np.where(np.isfinite(lines), lines, _carried(layout))
+    if parted is None and np.isfinite(lines).any():  # without any guide's offset the other lines' distances are unknown
+        lines = np.where(np.isfinite(lines), lines, _axis_by_votes(layout))
     middles = np.mean(pavement_edges(profiles, cores, layout.kind == "dual"), axis=0)
-    if profiles.paved is not None:  # where neither brightness nor height tells the edge the classes do
+    if profiles.paved is not None:  # classes tell the edges that neither brightness nor height shows
         middles = np.where(np.isfinite(middles), middles, _middles_by_class(layout))
-    what, edges = "the pavement's middle", "the pavement's edges aren't seen on both sides"
+    middle_name, edges_reason = "the pavement's middle", "the pavement's edges aren't seen on both sides"
     unseen = np.isnan(middles)
     if layout.kind == "dual":
-        what, edges = "the median's middle", "neither the median's edges nor lines on both sides of it are seen"
-        painted = np.all([_is_painted(band, guide) for band, guide in zip(layout.bands, guides, strict=True)], axis=0)
-        unseen &= ~_is_seen_nearby(painted)
+        middle_name = "the median's middle"
+        edges_reason = "neither the median's edges nor lines on both sides of it are seen"
+        both_painted = np.all(
+            [_is_painted(band, guide) for band, guide in zip(layout.bands, guides, strict=True)], axis=0
+        )
+        unseen &= ~_widen_mask(both_painted)
     reasons = {
-        "neither lines nor edges are seen": ~_is_seen_nearby(np.isfinite(lines)),
+        "neither lines nor edges are seen": ~_widen_mask(np.isfinite(lines)),
         f"the lines lie more than {FARTHEST_LINES:g} m beside it": np.abs(lines) > FARTHEST_LINES,
-        edges: unseen,
-        f"{what} lies more than {FARTHEST_MIDDLE:g} m beside it": np.abs(middles) > FARTHEST_MIDDLE,
+        edges_reason: unseen,
+        f"{middle_name} lies more than {FARTHEST_MIDDLE:g} m beside it": np.abs(middles) > FARTHEST_MIDDLE,
         "the ground on its lanes is too rough for a pavement": lane_roughness(profiles, cores) > ROUGHEST,
     }
     reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(layout) > RAISED
@@ -135,27 +139,27 @@ def judge(
         reasons[f"views of it disagree by more than {APART:g} m"] = rivals
     masks = {reason: _without_short_runs(mask) for reason, mask in reasons.items()}
     doubtful = ndimage.binary_dilation(np.any(list(masks.values()), axis=0), iterations=_SHORTEST - 1)
-    if doubtful.any():  # what lies between doubts, or beside one at an end, is trusted only if it is long enough
+    if doubtful.any():  # between doubts, or between a doubt and the road's end, only long stretches are trusted
         doubtful = ~ndimage.binary_opening(~doubtful, np.ones(_SHORTEST_TRUST))
     doubts = list(_doubts(profiles, doubtful, masks))
     return Judgement(doubts, float(1.0 - doubtful.mean()), lines, middles)
 
 
 def _middles_by_class(layout: RoadLayout) -> Float:
-    """Return the middle (K,), m, of what the classes call the pavement, or of what lies between two; NaN if unseen."""
-    (right, left) = (layout.bands[0], layout.bands[-1])
+    """Return the middle (K,), m, of the pavement by class, or of the median of a dual carriageway; NaN if unseen."""
+    (right_band, left_band) = (layout.bands[0], layout.bands[-1])
     if layout.kind == "dual":
-        return 0.5 * (right.edges[1].measured + left.edges[0].measured)
-    return 0.5 * (right.edges[0].measured + right.edges[1].measured)
+        return 0.5 * (right_band.edges[1].measured + left_band.edges[0].measured)
+    return 0.5 * (right_band.edges[0].measured + right_band.edges[1].measured)
 
 
-def _carried(layout: RoadLayout) -> Float:
-    """Return how far to the left of the axis (K,), m, all lines together say that it is; NaN where there are none."""
+def _axis_by_votes(layout: RoadLayout) -> Float:
+    """Return the axis' offset (K,), m, by the votes of all lines of a layout; a single NaN if it has no lines."""
     return axis_from_lines(layout).raw if any(band.lines for band in layout.bands) else np.array(np.nan)
 
 
 def _is_painted(band: Band, guide: Line) -> Bool:
-    """Return in which stretches (K,) a carriageway's paint is seen: the line beside the median, or one parallel to it.
+    """Return a mask (K,) of stretches in which paint of a carriageway is seen: a painted line, if its guide is painted.
 
     A line narrower than the distance of two rows of points may lie between them for long.
     """
@@ -174,44 +178,45 @@ def lane_roughness(profiles: Profiles, cores: Sequence[float]) -> Float:
     result = np.full(profiles.stretches, np.nan)
     for number in range(profiles.stretches):
         rows = step[max(0, (number - _NEAR) * STRETCH) : (number + _NEAR + 1) * STRETCH]
-        known = rows[np.isfinite(rows)]
-        if len(known) >= _FEWEST_STEPS:
+        steps = rows[np.isfinite(rows)]
+        if len(steps) >= _FEWEST_STEPS:
             # A difference of two heights has sqrt(2) of their deviation.
-            result[number] = robust_scale(known) / np.sqrt(2.0)
+            result[number] = robust_scale(steps) / np.sqrt(2.0)
     return result
 
 
 def raised_lines(layout: RoadLayout) -> Float:
-    """Return how far (K,), m, the painted lines stand above the ground to both sides of them; NaN where not seen.
+    """Return the height (K,), m, of the painted lines above the higher ground beside them; NaN where not seen.
 
-    The middle one of all lines counts: one may lie on a seam, or beside a gutter.
+    It is the median over all lines: a single one may lie on a seam, or beside a gutter.
     """
-    painted = [line for band in layout.bands for line in band.lines if line.width > 0.0]
+    painted_lines = [line for band in layout.bands for line in band.lines if line.width > 0.0]
     profiles, height = layout.profiles, remove_grade(layout.profiles.height)
-    result = np.full((max(len(painted), 1), profiles.stretches), np.nan)
-    for row, line in enumerate(painted):
+    result = np.full((max(len(painted_lines), 1), profiles.stretches), np.nan)
+    for row, line in enumerate(painted_lines):
         for number in np.flatnonzero(np.isfinite(line.measured)):
             rows = height[max(0, (number - _NEAR) * STRETCH) : (number + _NEAR + 1) * STRETCH]
-            on, *beside = (
+            line_height, *side_heights = (
                 _mean_height(profiles, rows, float(line.measured[number]), *reach) for reach in _ON_AND_BESIDE
             )
-            result[row, number] = on - np.maximum(beside[0], beside[1])  # unseen where either side is
+            # Unseen where either side is.
+            result[row, number] = line_height - np.maximum(side_heights[0], side_heights[1])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # stretches without lines
         return np.asarray(np.nanmedian(result, axis=0))
 
 
-def _mean_height(profiles: Profiles, rows: Float, offset: float, low: float, high: float) -> float:
-    """Return the median height, m, of some rows' bins between two distances (m) from an offset; NaN without any."""
+def _mean_height(profiles: Profiles, rows: Float, offset: float, start: float, end: float) -> float:
+    """Return the median height, m, of bins (R, U) between two distances (m) to the left of an offset; NaN if empty."""
     # A median: a car beside the line doesn't raise the ground.
-    bins = rows[:, profiles.column(offset + low) : profiles.column(offset + high) + 1]
-    known = bins[np.isfinite(bins)]
-    return float(np.median(known)) if len(known) else np.nan
+    bins = rows[:, profiles.column(offset + start) : profiles.column(offset + end) + 1]
+    heights = bins[np.isfinite(bins)]
+    return float(np.median(heights)) if len(heights) else np.nan
 
 
-def _is_seen_nearby(seen: Bool) -> Bool:
-    """Return a mask (K,) of the stretches that have something seen within `_NEAR` stretches."""
-    return ndimage.binary_dilation(seen, iterations=_NEAR)
+def _widen_mask(seen_mask: Bool) -> Bool:
+    """Return the mask (K,) widened by `_NEAR` stretches to either side."""
+    return ndimage.binary_dilation(seen_mask, iterations=_NEAR)
 
 
 def _without_short_runs(mask: Bool) -> Bool:
@@ -222,12 +227,14 @@ def _without_short_runs(mask: Bool) -> Bool:
 def _doubts(profiles: Profiles, doubtful: Bool, masks: dict[str, Bool]) -> Iterator[Doubt]:
     """Yield each run of a mask (K,) as a doubt with the reasons whose masks hold anywhere in it."""
     label, _ = ndimage.label(doubtful)
-    half, length = 0.5 * STRETCH, float(profiles.stations[-1])
+    half_stretch, length = 0.5 * STRETCH, float(profiles.stations[-1])
     for (run,) in ndimage.find_objects(label):
-        start, end = profiles.middles[run.start] - half, min(profiles.middles[run.stop - 1] + half, length)
+        start = profiles.middles[run.start] - half_stretch
+        end = min(profiles.middles[run.stop - 1] + half_stretch, length)
         reasons = tuple(reason for reason, mask in masks.items() if mask[run].any())
         yield Doubt(round(float(start), 1), round(float(end), 1), reasons)
 
 
 def _share_known(values: Float) -> float:
+    """Return the share of values that are finite, rounded."""
     return round(float(np.isfinite(values).mean()), 4)

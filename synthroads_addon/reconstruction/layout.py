@@ -83,13 +83,13 @@ class Band:
     """One carriageway's strip of pavement in the profiles, with its lines.
 
     Attributes:
-        low, high: offsets of its pavement's edges, m, from right to left.
-        lines: its lines from right to left.
-        edges: its pavement's right and left edge as if they were lines, for want of lines.
-        missing: offsets of lines that must be between its lines but aren't seen, m.
-        usual: (K,) the stretches in which it is as wide as usual; all if not given.
-        branch: (K,) m beside its middle line, positive to the left, where another branch of that runs (`find_branch`);
-            nowhere if not given.
+        low, high: offsets of the pavement's right and left edge, m.
+        lines: the carriageway's lines from right to left.
+        edges: the pavement's right and left edge in the form of lines, to use where lines are missing.
+        missing: offsets of lines that must lie between the seen ones but aren't seen, m.
+        usual: (K,) mask of the stretches in which the pavement is as wide as usual; None if in all.
+        branch: (K,) distance from the middle line to its other branch, m, positive to the left (`find_branch`);
+            None without a branch.
     """
 
     low: float
@@ -110,8 +110,8 @@ class Band:
         middle = self.middle
         if middle is None or self.branch is None or not np.any(self.branch):
             return middle
-        measured, offsets = (values + 0.5 * self.branch for values in (middle.measured, middle.offsets))
-        return replace(middle, measured=measured, offsets=offsets)
+        stretch_offsets, offsets = (values + 0.5 * self.branch for values in (middle.measured, middle.offsets))
+        return replace(middle, measured=stretch_offsets, offsets=offsets)
 
     @property
     def width(self) -> float:
@@ -122,9 +122,9 @@ class Band:
     def middle(self) -> Line | None:
         """Return the most painted of the lines near the band's middle, a dashed one first; None if there is none."""
         middle = 0.5 * (self.low + self.high)
-        near = [line for line in self.lines if abs(line.offset - middle) < _IN_THE_MIDDLE * self.width]
-        near = [line for line in near if (line.dash, line.gap) in STANDARD_DASHES] or near
-        return max(near, key=lambda line: line.length * line.width, default=None)
+        central_lines = [line for line in self.lines if abs(line.offset - middle) < _IN_THE_MIDDLE * self.width]
+        central_lines = [line for line in central_lines if (line.dash, line.gap) in STANDARD_DASHES] or central_lines
+        return max(central_lines, key=lambda line: line.length * line.width, default=None)
 
     def guide(self, sign: int) -> Line:
         """Return the outermost line to the right (-1) or left (+1), or the pavement's edge if no line is near it."""
@@ -138,9 +138,9 @@ class RoadLayout:
     """Layout of a road in profiles: its carriageways, with their lines, and the pavement.
 
     Attributes:
-        kind: dual carriageway, or a single one.
-        bands: from right to left: two of a dual carriageway, one of a single one.
-        pavement: in the profiles.
+        kind: dual or single carriageway.
+        bands: carriageways from right to left: two of a dual carriageway, one of a single one.
+        pavement: cross profiles with their share of pavement.
         notes: what was left out, in words.
     """
 
@@ -151,7 +151,7 @@ class RoadLayout:
 
     @property
     def profiles(self) -> Profiles:
-        """Return the profiles that show it."""
+        """Return the cross profiles that show the layout."""
         return self.pavement.profiles
 
 
@@ -160,8 +160,8 @@ def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = N
 
     Args:
         profiles: along a path parallel to the road.
-        lines: all that were found.
-        kind: the kind of road, where it is known.
+        lines: all line markings found in the profiles.
+        kind: dual or single carriageway; None if the profiles must tell.
 
     Raises:
         InputError: no carriageway can be made out.
@@ -170,10 +170,10 @@ def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = N
     pavement, notes = Pavement(profiles, share), []
     spans = paved_spans(pavement)
     # Rural roads have gaps in their lines, and no turnouts.
-    least = _SEEN_RURAL if len(spans) == 1 or kind == "single" else _SEEN
+    seen_share = _SEEN_RURAL if len(spans) == 1 or kind == "single" else _SEEN
     parts = [_Part.of(pavement, spans, number) for number in range(len(spans))]
-    bands = [_band(pavement, part, part.main(lines, least)) for part in parts]
-    left_out = sum(all(line not in part.main(lines, least) for part in parts) for line in lines)
+    bands = [_band(pavement, part, part.main(lines, seen_share)) for part in parts]
+    left_out = sum(all(line not in part.main(lines, seen_share) for part in parts) for line in lines)
     if left_out:
         notes.append(f"{left_out} lines were seen on a small part of the road and left out")
     if not bands:
@@ -181,18 +181,18 @@ def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = N
     pair = None if kind == "single" else _carriageway_pair(bands)
     if pair is None and kind == "dual":
         raise InputError("--road", "dual", "only one carriageway can be made out in the cloud")
-    chosen = pair or (max(bands, key=lambda band: (len(band.lines), band.width)),)
-    if len(bands) > len(chosen):
-        notes.append(f"{len(bands) - len(chosen)} other strips of pavement were left out")
-    return RoadLayout("dual" if pair else "single", chosen, pavement, tuple(notes))
+    carriageways = pair or (max(bands, key=lambda band: (len(band.lines), band.width)),)
+    if len(bands) > len(carriageways):
+        notes.append(f"{len(bands) - len(carriageways)} other strips of pavement were left out")
+    return RoadLayout("dual" if pair else "single", carriageways, pavement, tuple(notes))
 
 
 def with_branch(layout: RoadLayout) -> RoadLayout:
     """Return a layout that tells where the middle line of a single carriageway parts into two.
 
     Args:
-        layout: that profiles along the middle line show; along an axis that lies midway between two branches neither is
-            easily followed.
+        layout: shown by profiles along the middle line; along an axis that lies midway between two branches neither is
+            followed well.
     """
     band = layout.bands[0]
     if layout.kind == "dual" or band.middle is None:
@@ -205,10 +205,10 @@ class _Part:
     """The part of the road on which a strip of pavement is as wide as usual.
 
     Attributes:
-        span: offsets of its edges there, m.
-        usual: (K,) the stretches of the part.
-        seen: its share of the road's length.
-        length: of the road that the cloud shows, m.
+        span: offsets of the strip's right and left edge on the part, m.
+        usual: (K,) mask of the stretches of the part.
+        seen: share of the road's length that the part has.
+        length: length of the road that the cloud shows, m.
     """
 
     span: tuple[float, float]
@@ -218,66 +218,82 @@ class _Part:
 
     @classmethod
     def of(cls, pavement: Pavement, spans: list[tuple[float, float]], number: int) -> Self:
-        """Return the part of one of the strips: where lanes begin or end, or beside a turnout, another one begins."""
-        profiles, (low, high) = pavement.profiles, spans[number]
-        begin = np.full(profiles.stretches, 0.5 * (low + high))
-        usual, span = np.ones(profiles.stretches, dtype=bool), [low, high]
-        for side, sign in enumerate((-1, 1)):
-            next_to = number + sign
-            room = abs(spans[next_to][1 - side] - span[side]) if 0 <= next_to < len(spans) else 2.0 * FARTHEST
-            edge = pavement.edge(begin, sign, 0.5 * (high - low) + min(FARTHEST, 0.5 * room)).offsets
-            place = usual_place(sign * edge)
-            if place is None:
-                continue
-            other = np.isfinite(edge) & (np.abs(sign * edge - place) > _OTHER_EDGE)
-            closed = ndimage.binary_closing(np.pad(other, 3, mode="edge"), np.ones(3))[3:-3]
-            other = ndimage.binary_opening(closed, np.ones(_OTHER_STRETCHES))
-            if other.any():
-                usual &= ~other
-                span[side] = sign * place
-        if usual.sum() < _FEWEST_USUAL * len(usual):
-            return cls((low, high), np.ones(len(usual), dtype=bool), 1.0, profiles.covered_length)
-        return cls((span[0], span[1]), usual, float(usual.mean()), profiles.covered_length)
+        """Return the usual part of a strip of pavement: less stretches whose edge lies elsewhere for a while.
 
-    def main(self, lines: list[Line], least: float) -> list[Line]:
-        """Return the lines that are seen along at least a share of the part."""
-        return [line for line in lines if self._along(line) >= least * self.seen * self.length]
+        Lanes that begin or end and turnouts move an edge; a part that would be too short gives way to the whole road.
+
+        Args:
+            pavement: cross profiles with their share of pavement.
+            spans: right and left edge of all strips, m, from right to left.
+            number: index of the strip.
+        """
+        profiles, (right_edge, left_edge) = pavement.profiles, spans[number]
+        middle_offsets = np.full(profiles.stretches, 0.5 * (right_edge + left_edge))
+        usual_mask, span = np.ones(profiles.stretches, dtype=bool), [right_edge, left_edge]
+        for side, sign in enumerate((-1, 1)):
+            neighbour = number + sign
+            room = abs(spans[neighbour][1 - side] - span[side]) if 0 <= neighbour < len(spans) else 2.0 * FARTHEST
+            edge = pavement.edge(
+                middle_offsets, sign, 0.5 * (left_edge - right_edge) + min(FARTHEST, 0.5 * room)
+            ).offsets
+            usual_distance = usual_place(sign * edge)
+            if usual_distance is None:
+                continue
+            elsewhere = np.isfinite(edge) & (np.abs(sign * edge - usual_distance) > _OTHER_EDGE)
+            bridged_mask = ndimage.binary_closing(np.pad(elsewhere, 3, mode="edge"), np.ones(3))[3:-3]
+            elsewhere = ndimage.binary_opening(bridged_mask, np.ones(_OTHER_STRETCHES))
+            if elsewhere.any():
+                usual_mask &= ~elsewhere
+                span[side] = sign * usual_distance
+        if usual_mask.sum() < _FEWEST_USUAL * len(usual_mask):
+            return cls((right_edge, left_edge), np.ones(len(usual_mask), dtype=bool), 1.0, profiles.covered_length)
+        return cls((span[0], span[1]), usual_mask, float(usual_mask.mean()), profiles.covered_length)
+
+    def main(self, lines: list[Line], seen_share: float) -> list[Line]:
+        """Return the lines that are seen along at least a share ``seen_share`` of the part."""
+        return [line for line in lines if self._along(line) >= seen_share * self.seen * self.length]
 
     def _along(self, line: Line) -> float:
-        inside = self.usual & (line.stations > line.start) & (line.stations < line.end)
-        return min(line.length, STRETCH * SPACING * float(inside.sum()))
+        """Return the length of a line within the part, m: at most the line's own."""
+        usual_part = self.usual & (line.stations > line.start) & (line.stations < line.end)
+        return min(line.length, STRETCH * SPACING * float(usual_part.sum()))
 
 
 def usual_place(distance: Float) -> float | None:
-    """Return where an edge lies usually, m, of its distances (K,) along the road: the innermost of common places.
+    """Return the usual distance, m, of an edge by its distances (K,) along the road: the innermost common one.
 
     Turnouts and lanes that begin make the pavement wider, and on a short road may be longer than what lies between
-    them. None where it isn't seen.
+    them. None if the edge is seen nowhere.
     """
-    known = distance[np.isfinite(distance)]
-    if not len(known):
+    distances = distance[np.isfinite(distance)]
+    if not len(distances):
         return None
-    edges = np.arange(known.min() - 0.25, known.max() + 0.36, 0.1)
-    count = ndimage.uniform_filter1d(np.histogram(known, edges)[0].astype(np.float64), 3)
+    # Bins of 0.1 m that reach beyond both ends; the chosen 0.4 m to both sides of a peak hold an edge's own spread.
+    edges = np.arange(distances.min() - 0.25, distances.max() + 0.36, 0.1)
+    count = ndimage.uniform_filter1d(np.histogram(distances, edges)[0].astype(np.float64), 3)
     peak = int(find_peaks(np.pad(count, 1), height=_COMMON * count.max())[0][0]) - 1
-    near = known[np.abs(known - edges[peak] - 0.05) < 0.4]
-    return float(np.median(near))
+    peak_distances = distances[np.abs(distances - edges[peak] - 0.05) < 0.4]
+    return float(np.median(peak_distances))
 
 
 def paved_spans(pavement: Pavement) -> list[tuple[float, float]]:
-    """Return the (low, high) offsets, m, of the strips that are paved along most of the road, wide ones only."""
-    profiles, known = pavement.profiles, np.isfinite(pavement.share)
-    rows = known.sum(axis=0)
-    share = np.where(known, pavement.share, 0.0).sum(axis=0) / np.maximum(rows, 1)
+    """Return the right and left edge, m, of each strip that is paved along most of the road and as wide as a lane."""
+    profiles, has_points = pavement.profiles, np.isfinite(pavement.share)
+    rows = has_points.sum(axis=0)
+    share = np.where(has_points, pavement.share, 0.0).sum(axis=0) / np.maximum(rows, 1)
     strip = (share > 0.5) & (rows > _COVERED * profiles.covered_length)
     strip = ndimage.binary_closing(strip, iterations=round(_CRACK / ACROSS))
     columns = [part[0] for part in ndimage.find_objects(ndimage.label(strip)[0])]
     spans = [(profiles.offsets[c.start] - ACROSS / 2, profiles.offsets[c.stop - 1] + ACROSS / 2) for c in columns]
-    return [(float(low), float(high)) for low, high in spans if high - low >= _NARROWEST_BAND]
+    return [
+        (float(right_edge), float(left_edge))
+        for right_edge, left_edge in spans
+        if left_edge - right_edge >= _NARROWEST_BAND
+    ]
 
 
 def paved_by_brightness(profiles: Profiles, lines: list[Line]) -> Grid:
-    """Return a mask of pavement (S, U), 1 or 0, told by brightness near the lane lines; NaN without points.
+    """Return a mask of pavement (S, U), 1 or 0, by brightness alike that near the lane lines; NaN without points.
 
     Pavement is what is about as bright as the strips on both sides of the lane lines, after a blur of some metres:
     grass, soil and gravel are mostly brighter. Without a dashed line it is as bright as the smoother of two kinds of
@@ -285,68 +301,68 @@ def paved_by_brightness(profiles: Profiles, lines: list[Line]) -> Grid:
     pavement.
     """
     brightness = _blur(profiles.brightness)
-    known = np.isfinite(brightness)
-    everywhere = np.where(known, 1.0, np.nan).astype(np.float32)
+    has_points = np.isfinite(brightness)
+    everywhere = np.where(has_points, 1.0, np.nan).astype(np.float32)
     if any(is_dashed(line) for line in lines):
-        reference = _bins_beside(profiles, _lane_lines(lines)) & known
+        reference = _bins_beside(profiles, _lane_lines(lines)) & has_points
     else:
         reference = _smoother_ground(profiles, brightness.astype(np.float64))
     if not reference.any():
         return everywhere
     difference = np.abs(brightness - _level_along(brightness, reference)[:, None])
-    threshold = otsu_threshold(np.asarray(difference[known], dtype=np.float64))
-    pavement = float(np.median(difference[known & (difference <= threshold)]))
-    other_ground = float(np.median(difference[known & (difference > threshold)]))
+    threshold = otsu_threshold(np.asarray(difference[has_points], dtype=np.float64))
+    pavement = float(np.median(difference[has_points & (difference <= threshold)]))
+    other_ground = float(np.median(difference[has_points & (difference > threshold)]))
     # Otsu's method splits any histogram: the parts are two kinds of ground only if they lie clearly apart.
     if other_ground - pavement < _LIKE * robust_scale(difference[reference]):
         return everywhere
     # Paint is brighter than the threshold, but lies on pavement: narrow gaps across are closed.
-    mask = ndimage.grey_closing(np.where(known, difference <= threshold, 0.0), size=(1, _PAINT))
-    return np.where(known, mask, np.nan).astype(np.float32)
+    mask = ndimage.grey_closing(np.where(has_points, difference <= threshold, 0.0), size=(1, _PAINT))
+    return np.where(has_points, mask, np.nan).astype(np.float32)
 
 
 def _bins_beside(profiles: Profiles, lines: list[Line]) -> Bool:
-    """Return a mask (S, U) of the bins to both sides of lines, as far off as `_AROUND_DASHES` says."""
+    """Return a mask (S, U) of the bins to both sides of lines, within the distances of `_AROUND_DASHES`."""
     mask = np.zeros(profiles.brightness.shape, dtype=bool)
     rows = np.arange(len(profiles.stations))
     for line in lines:
         offset = np.interp(profiles.stations, line.stations, line.offsets, left=np.nan, right=np.nan)
-        for low, high in ((-_AROUND_DASHES[1], -_AROUND_DASHES[0]), _AROUND_DASHES):
-            for shift in np.arange(low, high + 1e-9, ACROSS):
+        for start, end in ((-_AROUND_DASHES[1], -_AROUND_DASHES[0]), _AROUND_DASHES):
+            for shift in np.arange(start, end + 1e-9, ACROSS):
                 column = np.rint((offset + shift - profiles.offsets[0]) / ACROSS)
-                inside = np.isfinite(column) & (column >= 0) & (column < len(profiles.offsets))
-                mask[rows[inside], column[inside].astype(np.int64)] = True
+                in_grid = np.isfinite(column) & (column >= 0) & (column < len(profiles.offsets))
+                mask[rows[in_grid], column[in_grid].astype(np.int64)] = True
     return mask
 
 
 def _level_along(brightness: Grid, reference: Bool) -> Float:
-    """Return the mean brightness (S,) of reference bins (S, U), smoothed along the road, and bridged where none is."""
+    """Return the mean brightness (S,) of a row's reference bins (mask (S, U)), smoothed and bridged along the road."""
     count = np.maximum(reference.sum(axis=1), 1)
-    level = np.where(reference, brightness, 0.0).sum(axis=1) / count
-    known = reference.any(axis=1)
-    rows = np.arange(len(level))
-    level = np.interp(rows, rows[known], level[known])
-    return np.asarray(ndimage.gaussian_filter1d(level, _LEVEL_BLUR, mode="nearest"))
+    mean_brightness = np.where(reference, brightness, 0.0).sum(axis=1) / count
+    has_reference = reference.any(axis=1)
+    rows = np.arange(len(mean_brightness))
+    mean_brightness = np.interp(rows, rows[has_reference], mean_brightness[has_reference])
+    return np.asarray(ndimage.gaussian_filter1d(mean_brightness, _LEVEL_BLUR, mode="nearest"))
 
 
 def is_dashed(line: Line) -> bool:
-    """Return whether a line has dashes as lane lines have."""
+    """Return whether a line has dashes as lane lines have: below 10 m (chosen: the longest standard dash has 6 m)."""
     return not line.solid and line.dash < 10.0
 
 
 def _smoother_ground(profiles: Profiles, brightness: Float) -> Bool:
-    """Return a mask (S, U) of the smoother of dark and bright ground; of all that is known if that is little."""
-    known = np.isfinite(brightness)
-    if known.sum() < 2:
-        return known
-    dark = known & (brightness <= otsu_threshold(np.asarray(brightness[known], dtype=np.float64)))
-    bright = known & ~dark
+    """Return a mask (S, U) of the smoother one of dark and bright ground; of all bins with points if these are few."""
+    has_points = np.isfinite(brightness)
+    if has_points.sum() < 2:
+        return has_points
+    dark_ground = has_points & (brightness <= otsu_threshold(np.asarray(brightness[has_points], dtype=np.float64)))
+    bright_ground = has_points & ~dark_ground
     step = np.abs(np.diff(profiles.height, axis=1, append=np.nan))
-    rough = [
+    roughness = [
         float(np.median(of_kind)) if len(of_kind := step[kind & np.isfinite(step)]) else np.inf
-        for kind in (dark, bright)
+        for kind in (dark_ground, bright_ground)
     ]
-    return dark if rough[0] <= rough[1] else bright
+    return dark_ground if roughness[0] <= roughness[1] else bright_ground
 
 
 def _lane_lines(lines: list[Line]) -> list[Line]:
@@ -357,51 +373,58 @@ def _lane_lines(lines: list[Line]) -> list[Line]:
 
 
 def _blur(values: Grid) -> Grid:
-    known = np.isfinite(values)
-    weight = ndimage.gaussian_filter(known.astype(np.float32), _BLUR)
-    mean = ndimage.gaussian_filter(np.where(known, values, 0.0).astype(np.float32), _BLUR)
+    """Return values (S, U) blurred by a Gaussian over bins with points; NaN where there are hardly any around."""
+    has_points = np.isfinite(values)
+    weight = ndimage.gaussian_filter(has_points.astype(np.float32), _BLUR)
+    mean = ndimage.gaussian_filter(np.where(has_points, values, 0.0).astype(np.float32), _BLUR)
     with np.errstate(invalid="ignore", divide="ignore"):
+        # Chosen: points in 5 % of the blur's reach tell its value.
         return np.where(weight > 0.05, mean / weight, np.nan)
 
 
-def _place_in(line: Line, usual: Bool | None) -> float:
+def _place_in(line: Line, usual_mask: Bool | None) -> float:
     """Return a line's median offset, m, in the stretches of a mask (K,), or in all where it is seen in none of them."""
-    inside = line.offsets[usual] if usual is not None else line.offsets
-    return float(np.nanmedian(inside)) if np.isfinite(inside).any() else line.offset
+    usual_offsets = line.offsets[usual_mask] if usual_mask is not None else line.offsets
+    return float(np.nanmedian(usual_offsets)) if np.isfinite(usual_offsets).any() else line.offset
 
 
 def _band(pavement: Pavement, part: _Part, lines: list[Line]) -> Band:
-    """Return a strip of pavement with its lines; of two nearer than a lane the longer, more painted one is kept."""
-    low, high = part.span
-    place = {id(line): _place_in(line, part.usual) for line in lines}
-    inside = [line for line in lines if low - _BAND_MARGIN < place[id(line)] < high + _BAND_MARGIN]
-    kept: list[Line] = []
-    for line in sorted(inside, key=lambda item: -item.length * (0.2 + item.width)):
-        if all(abs(place[id(line)] - place[id(other)]) >= _NARROWEST_LANE for other in kept):
-            kept.append(line)
-    kept.sort(key=lambda line: place[id(line)])
-    missing = []
-    for right, left in pairwise(place[id(line)] for line in kept):
-        if left - right > _WIDEST_LANE:
-            count = round((left - right) / _USUAL_LANE)
-            missing += [right + (left - right) * (i + 1) / count for i in range(count - 1)]
+    """Return a strip of pavement as a band with its lines; of two nearer than a lane the more painted one stays."""
+    right_edge, left_edge = part.span
+    line_offset = {id(line): _place_in(line, part.usual) for line in lines}
+    band_lines = [
+        line for line in lines if right_edge - _BAND_MARGIN < line_offset[id(line)] < left_edge + _BAND_MARGIN
+    ]
+    chosen_lines: list[Line] = []
+    # Painted area, with 0.2 m on the width (chosen): of lines as long the wider one, of others mostly the longer one.
+    for line in sorted(band_lines, key=lambda item: -item.length * (0.2 + item.width)):
+        if all(
+            abs(line_offset[id(line)] - line_offset[id(chosen_line)]) >= _NARROWEST_LANE for chosen_line in chosen_lines
+        ):
+            chosen_lines.append(line)
+    chosen_lines.sort(key=lambda line: line_offset[id(line)])
+    missing_offsets = []
+    for right_line, left_line in pairwise(line_offset[id(line)] for line in chosen_lines):
+        if left_line - right_line > _WIDEST_LANE:
+            count = round((left_line - right_line) / _USUAL_LANE)
+            missing_offsets += [right_line + (left_line - right_line) * (i + 1) / count for i in range(count - 1)]
     edges = _edge_line(pavement, part.span, -1), _edge_line(pavement, part.span, 1)
-    return Band(low, high, kept, edges, missing, part.usual)
+    return Band(right_edge, left_edge, chosen_lines, edges, missing_offsets, part.usual)
 
 
 def _edge_line(pavement: Pavement, span: tuple[float, float], sign: int) -> Line:
-    """Return one edge of a strip of pavement, smoothed, in the form of a line without paint."""
-    low, high = span
+    """Return the right (-1) or left (+1) edge of a strip of pavement, smoothed, in the form of a line without paint."""
+    right_edge, left_edge = span
     stations = pavement.profiles.middles
-    begin = np.full(len(stations), 0.5 * (low + high))
-    edge = pavement.edge(begin, sign, 0.5 * (high - low) + _BESIDE)
+    begin = np.full(len(stations), 0.5 * (right_edge + left_edge))
+    edge = pavement.edge(begin, sign, 0.5 * (left_edge - right_edge) + _BESIDE)
     weights = np.isfinite(edge.offsets).astype(np.float64)
-    smoothed = smooth(edge.offsets, weights, STRETCH * SPACING, WAVELENGTH, usual=USUAL)
+    smooth_edge = smooth(edge.offsets, weights, STRETCH * SPACING, WAVELENGTH, usual_std=USUAL)
     return Line(
         stations=stations,
         measured=edge.offsets,
-        offsets=smoothed.values if weights.any() else np.full(len(stations), high if sign > 0 else low),
-        std=smoothed.std,
+        offsets=smooth_edge.values if weights.any() else np.full(len(stations), left_edge if sign > 0 else right_edge),
+        std=smooth_edge.std,
         spacing=edge.spacing,
         cover=np.zeros(len(stations)),
         start=float(stations[0]),
@@ -410,11 +433,13 @@ def _edge_line(pavement: Pavement, span: tuple[float, float], sign: int) -> Line
 
 
 def _carriageway_pair(bands: list[Band]) -> tuple[Band, Band] | None:
-    """Return the neighbouring bands with the most lines that a median may lie between; None if there are none."""
+    """Return the two neighbouring bands between which a median may lie, those with most lines; None without any."""
     pairs = [
-        (right, left)
-        for right, left in pairwise(bands)
-        if _NARROWEST_MEDIAN <= left.low - right.high <= _WIDEST_MEDIAN and _is_whole(right) and _is_whole(left)
+        (right_band, left_band)
+        for right_band, left_band in pairwise(bands)
+        if _NARROWEST_MEDIAN <= left_band.low - right_band.high <= _WIDEST_MEDIAN
+        and _is_whole(right_band)
+        and _is_whole(left_band)
     ]
     return max(pairs, key=lambda pair: len(pair[0].lines) + len(pair[1].lines)) if pairs else None
 
@@ -432,7 +457,7 @@ class FoundAxis:
         stations: (K,) m along the path.
         offsets: (K,) of the axis, m; smoothed.
         std: (K,) standard deviation, m.
-        raw: (K,) before smoothing; NaN where no line was seen.
+        raw: (K,) offsets before smoothing, m; NaN where no line was seen.
     """
 
     stations: Float
@@ -442,7 +467,7 @@ class FoundAxis:
 
 
 def axis_from_lines(layout: RoadLayout) -> FoundAxis:
-    """Return the axis of a layout, on whose movement along the road all lines vote.
+    """Return the axis of a layout, from its middle or innermost lines, by a vote of all lines on its course.
 
     Of a dual carriageway it is the middle between its two innermost lines, of a single one the line in its middle, or
     what lies midway between both branches of that; for want of lines the pavement's edges take their place. All lines
@@ -458,44 +483,56 @@ def axis_from_lines(layout: RoadLayout) -> FoundAxis:
     )
     lines = list(guides) + [line for band in layout.bands for line in band.lines if line not in guide_lines]
     stations = lines[0].stations
-    centre = np.mean([line.measured for line in guides], axis=0)  # where the axis is by its own lines
-    raw, start = centre, centre
+    centre = np.mean([line.measured for line in guides], axis=0)  # the axis by its guides alone
+    voted_offsets, start = centre, centre
     if not any(np.isfinite(line.measured).any() for line in lines):
         raise InputError("road", None, "neither lines nor edges of a carriageway can be made out in the cloud")
     if not np.isfinite(centre).any():
-        measured = np.array([line.measured for line in lines])
-        known = np.isfinite(measured).sum(axis=0)
-        start = np.where(known > 0, np.nansum(measured, axis=0) / np.maximum(known, 1), np.nan)
+        # Without guides begin with the mean of all lines.
+        line_offsets = np.array([line.measured for line in lines])
+        has_votes = np.isfinite(line_offsets).sum(axis=0)
+        start = np.where(has_votes > 0, np.nansum(line_offsets, axis=0) / np.maximum(has_votes, 1), np.nan)
+    # Repeated, as a line's mean distance is from the axis of the round before.
     axis = fill_gaps(start)
     for _ in range(_ROUNDS):
-        raw = _vote_axis(lines, axis)
-        # The votes fix the movement; where the axis lies, its own lines say.
-        raw = raw + _level(centre - raw)
-        axis = fill_gaps(raw)
-    smoothed = smooth(raw, np.where(np.isfinite(raw), 1.0, 0.0), STRETCH * SPACING, _AXIS_WAVELENGTH, usual=USUAL)
-    level_std = mean_with_std(centre - raw)[1]
-    level_std = float(np.hypot(level_std if np.isfinite(level_std) else 0.0, _shared_error(guides, smoothed.scatter)))
-    known = np.isfinite(raw)
-    held = np.interp(stations, stations[known], smoothed.values[known])  # no curve is guessed where nothing was seen
-    return FoundAxis(stations, held, np.hypot(smoothed.std, level_std), raw)
+        voted_offsets = _vote_axis(lines, axis)
+        # The votes give the axis up to a constant, which its guides fix.
+        voted_offsets = voted_offsets + _mean_difference(centre - voted_offsets)
+        axis = fill_gaps(voted_offsets)
+    smooth_axis = smooth(
+        voted_offsets,
+        np.where(np.isfinite(voted_offsets), 1.0, 0.0),
+        STRETCH * SPACING,
+        _AXIS_WAVELENGTH,
+        usual_std=USUAL,
+    )
+    # The deviation of the constant, which smoothing along the road doesn't lessen.
+    level_std = mean_with_std(centre - voted_offsets)[1]
+    level_std = float(
+        np.hypot(level_std if np.isfinite(level_std) else 0.0, _shared_error(guides, smooth_axis.scatter))
+    )
+    has_votes = np.isfinite(voted_offsets)
+    # No curve is guessed where nothing was seen.
+    axis_offsets = np.interp(stations, stations[has_votes], smooth_axis.values[has_votes])
+    return FoundAxis(stations, axis_offsets, np.hypot(smooth_axis.std, level_std), voted_offsets)
 
 
 def axis_guides(layout: RoadLayout) -> tuple[Line, ...]:
     """Return the lines, or edges in their place, whose mean offset is the axis: one or two."""
     if layout.kind == "dual":
-        right, left = layout.bands
-        return right.guide(1), left.guide(-1)
+        right_band, left_band = layout.bands
+        return right_band.guide(1), left_band.guide(-1)
     (band,) = layout.bands
     if band.axis_line is not None:
         return (band.axis_line,)
     guides = band.guide(-1), band.guide(1)
     # A line on one side and the pavement's edge on the other have nothing between them that is the middle of both.
-    alike = (guides[0].width > 0.0) == (guides[1].width > 0.0)
-    return guides if alike and _seen_together(guides) >= _TOGETHER * _seen_together(band.edges) else band.edges
+    same_kind = (guides[0].width > 0.0) == (guides[1].width > 0.0)
+    return guides if same_kind and _seen_together(guides) >= _TOGETHER * _seen_together(band.edges) else band.edges
 
 
 def _seen_together(pair: tuple[Line, Line]) -> int:
-    """Return in how many stretches both of two lines are seen."""
+    """Return the number of stretches in which both of two lines are seen."""
     return int((np.isfinite(pair[0].measured) & np.isfinite(pair[1].measured)).sum())
 
 
@@ -506,13 +543,13 @@ def _vote_axis(lines: list[Line], axis: Float) -> Float:
     distance = offsets - axis
     mean = np.array([mean_with_std(row)[0] for row in distance])
     scatter = np.array([_robust_spread(row - value) for row, value in zip(distance, mean, strict=True)])
-    known = np.isfinite(offsets) & np.isfinite(std)
-    # Inverse variances: of how steady a line is, and of each of its offsets; 1 mm^2 keeps them finite.
-    weight = np.where(known, 1.0 / (scatter[:, None] ** 2 + np.where(known, std, 1.0) ** 2 + 1e-6), 0.0)
+    is_measured = np.isfinite(offsets) & np.isfinite(std)
+    # Inverse variances: the scatter of a line's distance and the error of each offset add up; 1 mm^2 keeps them finite.
+    weight = np.where(is_measured, 1.0 / (scatter[:, None] ** 2 + np.where(is_measured, std, 1.0) ** 2 + 1e-6), 0.0)
     # A line whose distance changes, where a lane begins or ends, has no vote there.
-    residual = np.where(known, distance - mean[:, None], 0.0)
+    residual = np.where(is_measured, distance - mean[:, None], 0.0)
     weight *= np.array([bisquare(row, max(sigma, USUAL)) for row, sigma in zip(residual, scatter, strict=True)])
-    votes = np.where(known, offsets - mean[:, None], 0.0)
+    votes = np.where(is_measured, offsets - mean[:, None], 0.0)
     total = weight.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(total > 0.0, (weight * votes).sum(axis=0) / total, np.nan)
@@ -524,10 +561,12 @@ def _shared_error(guides: tuple[Line, ...], scatter: float) -> float:
 
 
 def _robust_spread(values: Float) -> float:
-    known = values[np.isfinite(values)]
-    return max(robust_scale(known), 0.003) if len(known) else np.inf
+    """Return the robust deviation of values, m, at least 3 mm (chosen: paint isn't laid better); inf without any."""
+    finite_values = values[np.isfinite(values)]
+    return max(robust_scale(finite_values), 0.003) if len(finite_values) else np.inf
 
 
-def _level(difference: Float) -> float:
+def _mean_difference(difference: Float) -> float:
+    """Return the robust mean of differences, m; 0 without any."""
     value = mean_with_std(difference)[0]
     return value if np.isfinite(value) else 0.0

@@ -90,13 +90,23 @@ class StandingPoints:
     kind: NDArray[np.uint8]
 
     def select(self, mask: Bool | Index) -> StandingPoints:
-        """Return the points chosen by a mask or by indices."""
+        """Return the points that a mask (N,) or indices choose."""
         return StandingPoints(self.station[mask], self.offset[mask], self.height[mask], self.kind[mask])
 
 
 @dataclass(frozen=True)
 class FoundBarrier:
-    """A barrier that was found: stations, offset of its axis and height, m; beam's side; deviation; points."""
+    """A barrier found in the cloud.
+
+    Attributes:
+        kind: guardrail, concrete barrier or noise barrier.
+        start, end: stations of its ends, m.
+        offset: of its axis, m.
+        height: m.
+        faces: side on which a guardrail has its beam.
+        offset_std: standard deviation of the offset, m.
+        points: number of points on it.
+    """
 
     kind: BarrierKind
     start: float
@@ -110,7 +120,7 @@ class FoundBarrier:
 
 @dataclass(frozen=True)
 class FoundPost:
-    """A delineator that was found: station, offset, height and standard deviation of its place, m; points."""
+    """A delineator found in the cloud: station, offset, height and standard deviation of its place, m; point count."""
 
     station: float
     offset: float
@@ -121,7 +131,15 @@ class FoundPost:
 
 @dataclass(frozen=True)
 class GroundShape:
-    """Shape of the ground beside the road: reach, height of the axis above it, spread, verge's width, all in m."""
+    """Shape of the ground beside the road.
+
+    Attributes:
+        half_width: distance from the axis to which ground is seen, m.
+        embankment_height: height of the axis above the ground beyond the verges, m.
+        undulation: standard deviation of that ground's height, m.
+        verge_width: m.
+        verge_seen: whether the verge's width was measured; if not, it is the usual one.
+    """
 
     half_width: float
     embankment_height: float
@@ -130,42 +148,42 @@ class GroundShape:
     verge_seen: bool
 
 
-def find_barriers(standing: StandingPoints) -> tuple[list[FoundBarrier], Bool]:
-    """Return the barriers along the road, and a mask (N,) of the points that belong to one."""
+def find_barriers(points: StandingPoints) -> tuple[list[FoundBarrier], Bool]:
+    """Return the barriers along the road, and a mask (N,) of the points that lie on barriers."""
     barriers: list[FoundBarrier] = []
-    used = np.zeros(len(standing.station), dtype=bool)
+    barrier_mask = np.zeros(len(points.station), dtype=bool)
     for kind in (PointKind.GUARDRAIL, PointKind.BARRIER, PointKind.NOISE_BARRIER, PointKind.FURNITURE):
-        of_kind = np.flatnonzero(standing.kind == kind)
-        for members in _linear_clusters(standing.station[of_kind], standing.offset[of_kind]):
-            part = standing.select(of_kind[members])
+        of_kind = np.flatnonzero(points.kind == kind)
+        for members in _linear_clusters(points.station[of_kind], points.offset[of_kind]):
+            part = points.select(of_kind[members])
             for piece in _split_at_jumps(part):
                 barrier = _barrier(part.select(piece), kind)
                 if barrier is not None:
                     barriers.append(barrier)
-                    used[of_kind[members][piece]] = True
-    return sorted(barriers, key=lambda item: (item.start, item.offset)), used
+                    barrier_mask[of_kind[members][piece]] = True
+    return sorted(barriers, key=lambda item: (item.start, item.offset)), barrier_mask
 
 
 def _linear_clusters(station: Float, offset: Float) -> list[Index]:
-    """Return the point indices of each long cluster of connected cells; small holes along the road are bridged."""
+    """Return the point indices of each cluster of connected cells as long as a barrier; small holes are bridged."""
     if len(station) < _FEWEST_OF_BARRIER:
         return []
     row = np.floor((station - station.min()) / CELL_ALONG).astype(np.int64)
     column = np.floor((offset - offset.min()) / CELL_ACROSS).astype(np.int64)
     reach = round(_JOIN / CELL_ACROSS)
-    filled = np.zeros((row.max() + 2 * _HOLE + 1, column.max() + 2 * reach + 1), dtype=bool)
-    filled[row + _HOLE, column + reach] = True
+    occupied = np.zeros((row.max() + 2 * _HOLE + 1, column.max() + 2 * reach + 1), dtype=bool)
+    occupied[row + _HOLE, column + reach] = True
     # Across first, so that the two faces of a barrier are one; along only holes are closed, as a gap is a gap.
-    filled = ndimage.binary_dilation(filled, np.ones((1, 2 * reach + 1)))
-    filled = ndimage.binary_closing(filled, np.ones((_HOLE, 1)))
-    label, count = ndimage.label(filled, np.ones((3, 3)))
+    occupied = ndimage.binary_dilation(occupied, np.ones((1, 2 * reach + 1)))
+    occupied = ndimage.binary_closing(occupied, np.ones((_HOLE, 1)))
+    label, count = ndimage.label(occupied, np.ones((3, 3)))
     cluster = label[row + _HOLE, column + reach]
     groups = [np.flatnonzero(cluster == number) for number in range(1, count + 1)]
     return [g for g in groups if len(g) >= _FEWEST_OF_BARRIER and np.ptp(station[g]) >= SHORTEST_BARRIER]
 
 
 def _split_at_jumps(part: StandingPoints) -> list[Bool]:
-    """Return masks (N,) of the pieces of a linear cluster, split where its offset jumps."""
+    """Return masks (N,) of the pieces of a linear cluster, split where its median offset jumps by more than `_STEP`."""
     index = np.floor((part.station - part.station.min()) / _STRETCH).astype(np.int64)
     order = np.argsort(index, kind="stable")
     begins = np.searchsorted(index[order], np.arange(index.max() + 1))
@@ -181,47 +199,48 @@ def _split_at_jumps(part: StandingPoints) -> list[Bool]:
 
 
 def _barrier(part: StandingPoints, kind: PointKind) -> FoundBarrier | None:
-    """Return the barrier that some points show; None if they are too few, too short or of another shape."""
+    """Return the barrier that a cluster of points shows; None if it has too few, is too short or of another shape."""
     count = len(part.station)
     if count < _FEWEST_OF_BARRIER:
         return None
-    # Of many points single ones lie beyond the end: percentiles, if a percentile is more than a point.
+    # Of many points single ones may lie beyond the barrier's ends: percentiles leave those out.
     start, end = np.percentile(part.station, [0.2, 99.8]) if count > 1000 else (part.station.min(), part.station.max())
     height = float(np.percentile(part.height, 95))
     if end - start < SHORTEST_BARRIER or not 0.2 < height < 12.0:
         return None
     index = np.floor((part.station - start) / _STRETCH).astype(np.int64)
     # The upper part: the lower one is posts, grass and what is hidden behind.
-    upper = part.height > 0.4 * height
-    middles = np.array([np.median(part.offset[upper & (index == i)]) for i in np.unique(index[upper])])
+    upper_part = part.height > 0.4 * height
+    middles = np.array([np.median(part.offset[upper_part & (index == i)]) for i in np.unique(index[upper_part])])
     offset, std = mean_with_std(middles)
     barrier_kind: BarrierKind = {PointKind.BARRIER: "concrete", PointKind.NOISE_BARRIER: "noise"}.get(kind, "guardrail")  # type: ignore[assignment]
     if kind == PointKind.FURNITURE:
-        if not _BARRIER_HEIGHTS[0] < height or np.std(part.offset[upper]) > 0.35:
+        # Chosen: the upper part of a rail or a wall keeps within 0.35 m across the road; bushes don't.
+        if not _BARRIER_HEIGHTS[0] < height or np.std(part.offset[upper_part]) > 0.35:
             return None
         barrier_kind = "noise" if height > _NOISE_FROM else "guardrail"
     return FoundBarrier(barrier_kind, float(start), float(end), offset, height, "both", std, count)
 
 
 def turn_beam(barrier: FoundBarrier, side: Literal["left", "right", "both"]) -> FoundBarrier:
-    """Return a guardrail with its beam on a side and its axis shifted behind the beam, which alone is seen."""
+    """Return a guardrail with its beam on a side, its axis shifted behind the beam, as only the beam is seen."""
     if barrier.kind != "guardrail" or side == "both":
         return barrier
-    behind = -1.0 if side == "left" else 1.0
-    return replace(barrier, offset=barrier.offset + behind * (_BEAM + sizes.SPACER[side]), faces=side)
+    beam_direction = -1.0 if side == "left" else 1.0
+    return replace(barrier, offset=barrier.offset + beam_direction * (_BEAM + sizes.SPACER[side]), faces=side)
 
 
-def find_posts(standing: StandingPoints, barrier_points: Bool) -> list[FoundPost]:
-    """Return the delineators: small clusters of their class, or lone ones of their height where the class is unknown.
+def find_posts(points: StandingPoints, barrier_points: Bool) -> list[FoundPost]:
+    """Return the delineators: small clusters of their class, or lone ones of their height where classes don't tell.
 
     Args:
-        standing: N points.
-        barrier_points: (N,) which of them belong to barriers.
+        points: N points.
+        barrier_points: (N,) mask of the points that lie on barriers.
     """
     posts: list[FoundPost] = []
     for kind in (PointKind.POST, PointKind.FURNITURE):
-        part = standing.select((standing.kind == kind) & ~barrier_points)
-        tree = cKDTree(np.column_stack([standing.station, standing.offset])) if kind == PointKind.FURNITURE else None
+        part = points.select((points.kind == kind) & ~barrier_points)
+        tree = cKDTree(np.column_stack([points.station, points.offset])) if kind == PointKind.FURNITURE else None
         for members in _clusters(part):
             post = _post(part.select(members), kind)
             if post is not None and (tree is None or _stands_alone(tree, post, len(members))):
@@ -230,7 +249,7 @@ def find_posts(standing: StandingPoints, barrier_points: Bool) -> list[FoundPost
 
 
 def _clusters(part: StandingPoints) -> list[Index]:
-    """Return the point indices of each cluster of points nearer to each other than a post's size."""
+    """Return the point indices of each cluster of points linked by distances of at most `_POST_APART`."""
     if not len(part.station):
         return []
     pairs = cKDTree(np.column_stack([part.station, part.offset])).query_pairs(_POST_APART, output_type="ndarray")
@@ -242,36 +261,40 @@ def _clusters(part: StandingPoints) -> list[Index]:
 
 
 def _post(part: StandingPoints, kind: PointKind) -> FoundPost | None:
-    """Return the delineator that a cluster shows; None if the cluster hasn't a post's size."""
+    """Return the delineator that a cluster of points shows; None if the cluster hasn't a post's size."""
     count = len(part.station)
     top = float(part.height.max())
-    low, high = _POST_HEIGHTS[kind]
-    if count < _FEWEST_OF_POST or not low < top < high:
+    least_height, largest_height = _POST_HEIGHTS[kind]
+    if count < _FEWEST_OF_POST or not least_height < top < largest_height:
         return None
     if max(np.ptp(part.station), np.ptp(part.offset)) > _POST_WIDEST:
         return None
-    # Root mean square of both directions, over sqrt(n) as of a mean.
+    # Standard error of a mean of n points: the root mean square of both directions' deviations, over sqrt(n).
     spread = float(np.hypot(part.station.std(), part.offset.std())) / np.sqrt(2.0)
     std = float(np.hypot(spread / np.sqrt(count), 0.02))  # what is seen of a post is one side of it
     return FoundPost(float(np.median(part.station)), float(np.median(part.offset)), max(top, USUAL_POST), std, count)
 
 
 def _stands_alone(tree: cKDTree, post: FoundPost, count: int) -> bool:
+    """Return whether no more standing points lie within `_ALONE` of a post than the ``count`` of its own cluster."""
     around = tree.query_ball_point([post.station, post.offset], _ALONE, return_length=True)
     return bool(around <= count)
 
 
 def standing_points(cloud: RoadCloud, profiles: Profiles, section: MeasuredSection) -> StandingPoints:
     """Return the standing points within reach of the road, with heights above the surface below them."""
-    chosen, path = cloud.of(*STANDING), profiles.path
-    xyz, kind = cloud.xyz[chosen], cloud.kind[chosen]
+    is_standing, path = cloud.of(*STANDING), profiles.path
+    xyz, kind = cloud.xyz[is_standing], cloud.kind[is_standing]
     station, offset = path.project(xyz[:, :2])
     reach = max(_outer(section, 1), _outer(section, -1)) + _FARTHEST
-    near = (station > -5.0) & (station < path.length + 5.0) & (np.abs(offset) < reach)
-    station, offset, kind, height = station[near], offset[near], kind[near], xyz[near, 2]
-    outside = np.where(offset > 0.0, offset - _outer(section, 1), -offset - _outer(section, -1))
-    kept = (outside < _FARTHEST_UNKNOWN) | (kind != PointKind.FURNITURE)
-    station, offset, kind, height = station[kept], offset[kept], kind[kept], height[kept]
+    in_reach = (station > -5.0) & (station < path.length + 5.0) & (np.abs(offset) < reach)
+    station, offset, kind, height = station[in_reach], offset[in_reach], kind[in_reach], xyz[in_reach, 2]
+    edge_distance = np.where(offset > 0.0, offset - _outer(section, 1), -offset - _outer(section, -1))
+    is_plausible = (edge_distance < _FARTHEST_UNKNOWN) | (kind != PointKind.FURNITURE)
+    station = station[is_plausible]
+    offset = offset[is_plausible]
+    kind = kind[is_plausible]
+    height = height[is_plausible]
     return StandingPoints(station, offset, height - profiles.surface_height(station, offset), kind)
 
 
@@ -281,6 +304,7 @@ def face_guardrails(barriers: list[FoundBarrier], section: MeasuredSection) -> l
 
 
 def _face(offset: float, section: MeasuredSection) -> Literal["left", "right", "both"]:
+    """Return the side of a guardrail at an offset, m, that faces traffic: outwards in a median, else inwards."""
     side = section.sides["left" if offset > 0.0 else "right"]
     if abs(offset) <= side.inner_offset.value:
         if abs(offset) < _IN_THE_MIDDLE:
@@ -290,37 +314,44 @@ def _face(offset: float, section: MeasuredSection) -> Literal["left", "right", "
 
 
 def measure_ground(cloud: RoadCloud, path: CloudPath, section: MeasuredSection, axis_height: Float) -> GroundShape:
-    """Return the shape of the ground beside the road; usual values where the cloud doesn't show it.
+    """Return the shape of the ground beside the road; usual values stand in where the cloud doesn't show it.
 
     Args:
-        cloud: with ground beyond the verges, or without.
-        path: the alignment.
-        section: of the road.
+        cloud: all points that were read, with or without ground beyond the verges.
+        path: the alignment as a path.
+        section: the road's measured cross-section.
         axis_height: (M,) height of the axis at each point of the path, m.
     """
-    chosen = np.flatnonzero(cloud.of(PointKind.GROUND, PointKind.VERGE))
-    chosen = chosen[:: max(1, len(chosen) // 300_000)]
-    station, offset = path.project(cloud.xyz[chosen, :2])
-    inside = (station > 0.0) & (station < path.length)
-    chosen, station, offset = chosen[inside], station[inside], offset[inside]
-    beyond = np.where(offset > 0.0, offset - _outer(section, 1), -offset - _outer(section, -1))
-    beside = _is_beside_usual_edge(section, station, offset)
-    verge = beyond[(cloud.kind[chosen] == PointKind.VERGE) & (beyond > 0.1) & beside]
-    seen = len(verge) > 200
-    width = float(np.clip(np.percentile(verge, 97), 0.5, 5.0)) if seen else USUAL_VERGE
-    far = beyond > width + _BEYOND
+    ground_points = np.flatnonzero(cloud.of(PointKind.GROUND, PointKind.VERGE))
+    # Chosen: 300,000 points tell the ground's shape, and as few as 200 a verge's width or the ground beyond it.
+    ground_points = ground_points[:: max(1, len(ground_points) // 300_000)]
+    station, offset = path.project(cloud.xyz[ground_points, :2])
+    on_road_length = (station > 0.0) & (station < path.length)
+    ground_points, station, offset = ground_points[on_road_length], station[on_road_length], offset[on_road_length]
+    edge_distance = np.where(offset > 0.0, offset - _outer(section, 1), -offset - _outer(section, -1))
+    at_usual_edge = _is_beside_usual_edge(section, station, offset)
+    verge = edge_distance[(cloud.kind[ground_points] == PointKind.VERGE) & (edge_distance > 0.1) & at_usual_edge]
+    verge_seen = len(verge) > 200
+    # Chosen: 3 % of the points may be wrongly classified; verges are 0.5 to 5 m wide.
+    width = float(np.clip(np.percentile(verge, 97), 0.5, 5.0)) if verge_seen else USUAL_VERGE
+    beyond_verge = edge_distance > width + _BEYOND
     outermost = max(_outer(section, 1), _outer(section, -1)) + width
-    if far.sum() < 200:
-        return GroundShape(outermost + 10.0, 0.0, 0.05, width, seen)
+    if beyond_verge.sum() < 200:
+        # Chosen: flat ground for 10 m, with 5 cm of unevenness.
+        return GroundShape(outermost + 10.0, 0.0, 0.05, width, verge_seen)
     # How far the ground lies below the axis at the same station.
-    below = axis_height[np.clip(station[far].astype(np.int64), 0, len(axis_height) - 1)] - cloud.xyz[chosen[far], 2]
-    reach = float(np.percentile(np.abs(offset[far]), 99))
-    spread = float(np.clip(0.5 * (np.percentile(below, 84) - np.percentile(below, 16)), 0.05, 2.0))
-    return GroundShape(max(reach, outermost + 5.0), float(np.median(below)), spread, width, seen)
+    depth = (
+        axis_height[np.clip(station[beyond_verge].astype(np.int64), 0, len(axis_height) - 1)]
+        - cloud.xyz[ground_points[beyond_verge], 2]
+    )
+    # Percentiles keep stray points out; 16 and 84 % lie one deviation below and above a normal distribution's mean.
+    reach = float(np.percentile(np.abs(offset[beyond_verge]), 99))
+    spread = float(np.clip(0.5 * (np.percentile(depth, 84) - np.percentile(depth, 16)), 0.05, 2.0))
+    return GroundShape(max(reach, outermost + 5.0), float(np.median(depth)), spread, width, verge_seen)
 
 
 def _is_beside_usual_edge(section: MeasuredSection, station: Float, offset: Float) -> Bool:
-    """Return a mask (N,) of places where the pavement's edge on their side is the road's own, not a turnout's."""
+    """Return a mask (N,) of places beside which the pavement's edge is the road's, not a turnout's."""
     result = np.zeros(len(station), dtype=bool)
     for side in section.sides.values():
         stretch = np.clip((station / (STRETCH * SPACING)).astype(np.int64), 0, len(side.usual) - 1)

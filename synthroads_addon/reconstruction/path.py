@@ -72,18 +72,18 @@ class CloudPath:
     def frame(self, station: ArrayLike) -> tuple[Float, Float]:
         """Return positions (N, 2) and headings (N,) at stations (N,), straight on beyond the ends."""
         station = np.asarray(station, dtype=np.float64)
-        place = (station - self.start) / SPACING
-        at = np.clip(place.astype(np.int64), 0, len(self.points) - 2)
-        share = (place - at)[:, None]
-        position = self.points[at] + share * (self.points[at + 1] - self.points[at])
-        return position, np.interp(place, np.arange(len(self.heading)), self.heading)
+        vertex_position = (station - self.start) / SPACING
+        index = np.clip(vertex_position.astype(np.int64), 0, len(self.points) - 2)
+        share = (vertex_position - index)[:, None]
+        position = self.points[index] + share * (self.points[index + 1] - self.points[index])
+        return position, np.interp(vertex_position, np.arange(len(self.heading)), self.heading)
 
     def place(self, station: ArrayLike, offset: ArrayLike) -> Float:
         """Return points (N, 2) at stations and offsets (N,), the offset positive to the left."""
         position, heading = self.frame(station)
         # Unit vector to the left of the heading.
-        left = np.column_stack([-np.sin(heading), np.cos(heading)])
-        return np.asarray(position + np.asarray(offset, dtype=np.float64)[:, None] * left)
+        left_normal = np.column_stack([-np.sin(heading), np.cos(heading)])
+        return np.asarray(position + np.asarray(offset, dtype=np.float64)[:, None] * left_normal)
 
     def project(self, points: Float) -> tuple[Float, Float]:
         """Return stations and offsets (N,), m, of points (N, 2); beyond the ends along the tangents there."""
@@ -95,74 +95,80 @@ class CloudPath:
         return self.start + station, offset
 
     def within(self, points: Float, distance: float) -> Bool:
-        """Return a mask (N,) of the points (N, 2) within a distance (m) of the path, to the nearest cell of 4 m."""
+        """Return a mask (N,) of the points (N, 2) within a distance (m) of the path, judged by their cells of 4 m."""
         middles, owner = _cells(points)
-        away, _ = cKDTree(self.points).query(middles)
-        return np.asarray((away < distance + _CELL)[owner])
+        path_distance, _ = cKDTree(self.points).query(middles)
+        return np.asarray((path_distance < distance + _CELL)[owner])
 
     def _near(self, points: Float) -> Float:
-        """Return rough distances (N,), m, along the path of points (N, 2): of each cell of 4 m that of its middle."""
+        """Return rough distances (N,), m, along the path of points (N, 2): those of the middles of their 4 m cells."""
         middles, owner = _cells(points)
-        _, nearest = cKDTree(self.points).query(middles)
-        return np.asarray(SPACING * nearest[owner].astype(np.float64))
+        _, nearest_index = cKDTree(self.points).query(middles)
+        return np.asarray(SPACING * nearest_index[owner].astype(np.float64))
 
     def beside(self, offset: float) -> CloudPath:
-        """Return the path that lies an offset, m, of a fraction of its spacing to the left, with the same stations."""
+        """Return the path shifted to the left by an offset, m, far below its spacing, with the same stations."""
         return CloudPath(self.place(self.stations, np.full(len(self.points), offset)), self.heading, self.start)
 
     def shift_by(self, offset: Float) -> CloudPath:
-        """Return a path whose points lie offsets (M,), m, to the left of this one's, spaced anew each metre."""
+        """Return the path shifted to the left by offsets (M,), m, and sampled again each metre."""
         return path_through(self.place(self.stations, offset))
 
 
 def _cells(points: Float) -> tuple[Float, Index]:
     """Return the centres (C, 2) of the 4 m cells that points (N, 2) lie in, and each point's cell index (N,)."""
     cell = np.floor(points / _CELL).astype(np.int64)
-    low = cell.min(axis=0)
-    key = (cell[:, 0] - low[0]) * (cell[:, 1].max() - low[1] + 1) + (cell[:, 1] - low[1])
-    _, first, owner = np.unique(key, return_index=True, return_inverse=True)
-    return (cell[first] + 0.5) * _CELL, owner
+    lowest_cell = cell.min(axis=0)
+    key = (cell[:, 0] - lowest_cell[0]) * (cell[:, 1].max() - lowest_cell[1] + 1) + (cell[:, 1] - lowest_cell[1])
+    _, first_points, owner = np.unique(key, return_index=True, return_inverse=True)
+    return (cell[first_points] + 0.5) * _CELL, owner
 
 
-def _project(frames: Float, points: Float, along: Float) -> tuple[Float, Float]:
-    """Return distances along a path of frames (M, 3: x, y, heading), and offsets (N,), from rough distances."""
-    last = len(frames) - 2
+def _project(frames: Float, points: Float, station: Float) -> tuple[Float, Float]:
+    """Return distances along a path and offsets (N,), m, of points (N, 2), by Newton's method.
+
+    Args:
+        frames: (M, 3) x, y (m) and heading (rad) of the path's points.
+        points: (N, 2) m.
+        station: (N,) rough distances along the path, m, to begin with.
+    """
+    last_index = len(frames) - 2
     offset = np.empty(0)
     for round_ in range(_ROUNDS):
-        place = along / SPACING
-        at = np.clip(place.astype(np.int64), 0, last)
-        share = np.clip(place - at, 0.0, 1.0)
-        low = frames[at]
-        change = frames[at + 1] - low
-        heading = low[:, 2] + share * change[:, 2]
-        beyond = (place - at)[:, None]
-        vector = points - low[:, :2] - beyond * change[:, :2]
+        vertex_position = station / SPACING
+        index = np.clip(vertex_position.astype(np.int64), 0, last_index)
+        share = np.clip(vertex_position - index, 0.0, 1.0)
+        frame = frames[index]
+        change = frames[index + 1] - frame
+        heading = frame[:, 2] + share * change[:, 2]
+        step_share = (vertex_position - index)[:, None]
+        vector = points - frame[:, :2] - step_share * change[:, :2]
         cos, sin = np.cos(heading), np.sin(heading)
         offset = vector[:, 1] * cos - vector[:, 0] * sin
         if round_ < _ROUNDS - 1:
             # On the inside of a curve a step along the path is a shorter one beside it.
             # ds along the path is dt / (1 - kappa offset), of a step dt beside it.
             shorter = np.maximum(1.0 - offset * change[:, 2] / SPACING, 0.2)
-            along = along + (vector[:, 0] * cos + vector[:, 1] * sin) / shorter
-    return along, offset
+            station = station + (vector[:, 0] * cos + vector[:, 1] * sin) / shorter
+    return station, offset
 
 
 def path_through(points: Float) -> CloudPath:
     """Return a path with a point each metre along a polyline (K, 2).
 
     Raises:
-        InputError: it is shorter than `SHORTEST`.
+        InputError: the polyline is shorter than `SHORTEST`.
     """
     step = np.hypot(*np.diff(points, axis=0).T)
-    kept = np.append(True, step > 1e-6)
-    points, step = points[kept], step[kept[1:]]
+    distinct_points = np.append(True, step > 1e-6)
+    points, step = points[distinct_points], step[distinct_points[1:]]
     run = np.append(0.0, np.cumsum(step))
     if run[-1] < SHORTEST:
         raise InputError("road", round(float(run[-1]), 1), f"at least {SHORTEST:g} m of road are needed in the cloud")
     station = np.arange(0.0, run[-1], SPACING)
-    even = np.column_stack([np.interp(station, run, points[:, i]) for i in range(2)])
-    change = np.gradient(even, axis=0)
-    return CloudPath(even, np.unwrap(np.arctan2(change[:, 1], change[:, 0])))
+    even_points = np.column_stack([np.interp(station, run, points[:, i]) for i in range(2)])
+    change = np.gradient(even_points, axis=0)
+    return CloudPath(even_points, np.unwrap(np.arctan2(change[:, 1], change[:, 0])))
 
 
 def alignment_path(alignment: Alignment) -> CloudPath:
@@ -184,10 +190,11 @@ def first_path(xy: Float) -> CloudPath:
     """
     cells = np.unique(np.floor(xy).astype(np.int64), axis=0) + 0.5
     tree = cKDTree(cells)
-    start, direction, half = _march_start(cells, tree)
-    ahead = _march(cells, tree, start, direction, half)
-    back = _march(cells, tree, start, direction + np.pi, half)
-    line = np.array([*back[::-1], *ahead[1:]])
+    start, direction, half_width = _march_start(cells, tree)
+    forward_points = _march(cells, tree, start, direction, half_width)
+    backward_points = _march(cells, tree, start, direction + np.pi, half_width)
+    line = np.array([*backward_points[::-1], *forward_points[1:]])
+    # Eastwards; the angle of 0.01 rad decides the way of a line that runs due north.
     if (line[-1] - line[0]) @ (np.cos(0.01), np.sin(0.01)) < 0.0:
         line = line[::-1]
     return smooth_path(path_through(line), _WAVELENGTH)
@@ -195,52 +202,70 @@ def first_path(xy: Float) -> CloudPath:
 
 def smooth_path(path: CloudPath, wavelength: float) -> CloudPath:
     """Return a path smoothed so that swings shorter than a wavelength (m) vanish."""
-    kept = path.points[::5]
-    weights = np.ones(len(kept))
-    smoothed = [smooth(kept[:, i], weights, 5.0 * SPACING, wavelength).values for i in range(2)]
-    return path_through(np.column_stack(smoothed))
+    sparse_points = path.points[::5]
+    weights = np.ones(len(sparse_points))
+    smooth_coordinates = [smooth(sparse_points[:, i], weights, 5.0 * SPACING, wavelength).values for i in range(2)]
+    return path_through(np.column_stack(smooth_coordinates))
 
 
 def _march_start(cells: Float, tree: cKDTree) -> tuple[Float, float, float]:
-    """Return the point (2,) at which the march begins, its direction (rad), and the surface's half width there (m)."""
+    """Return start point (2,), direction (rad) and half width (m) of the march along surface cells (N, 2)."""
     _, middle = tree.query(np.median(cells, axis=0))
     for radius in _START_RADII:
-        near = cells[tree.query_ball_point(cells[middle], radius)]
-        centre = near.mean(axis=0)
+        cells_around = cells[tree.query_ball_point(cells[middle], radius)]
+        centre = cells_around.mean(axis=0)
         # Principal axes: the surface runs along that of the larger variance.
-        spread, axes = np.linalg.eigh(np.cov((near - centre).T)) if len(near) > 2 else (np.ones(2), np.eye(2))
+        spread, axes = (
+            np.linalg.eigh(np.cov((cells_around - centre).T)) if len(cells_around) > 2 else (np.ones(2), np.eye(2))
+        )
         if np.sqrt(spread[1]) > _LONGISH * np.sqrt(max(spread[0], 1e-9)):
-            half = float(np.percentile(np.abs((near - centre) @ axes[:, 0]), 98))
-            return centre, float(np.arctan2(axes[1, 1], axes[0, 1])), min(half + _MARGIN, _REACH)
+            # Chosen: 2 % of the cells may lie off the road, in drives and junctions.
+            half_width = float(np.percentile(np.abs((cells_around - centre) @ axes[:, 0]), 98))
+            return centre, float(np.arctan2(axes[1, 1], axes[0, 1])), min(half_width + _MARGIN, _REACH)
     raise InputError("road", None, "its surface in the cloud is nowhere longer than wide: --path says how it runs")
 
 
-def _march(cells: Float, tree: cKDTree, start: Float, direction: float, half: float) -> list[Float]:
-    """Return the points of a march along the surface's middle from a start in a direction (rad), to its end."""
-    line, at, missing = [start], start, 0.0
-    while missing <= _GAP:
+def _march(cells: Float, tree: cKDTree, start: Float, direction: float, half_width: float) -> list[Float]:
+    """Return the points of a march along the surface's middle, in steps of `_STEP`, until no surface follows.
+
+    Args:
+        cells: (N, 2) middles of the surface's metre cells.
+        tree: of the cells.
+        start: (2,) point at which it begins.
+        direction: in which it begins, rad.
+        half_width: distance to either side in which the surface is looked for first, m.
+    """
+    line, point, gap_length = [start], start, 0.0
+    while gap_length <= _GAP:
         forward = np.array([np.cos(direction), np.sin(direction)])
-        ahead = at + _STEP * forward
-        near = cells[tree.query_ball_point(ahead, np.hypot(half, _STEP))] - ahead
-        along, across = near @ forward, near @ (-forward[1], forward[0])
-        inside = (np.abs(along) <= _STEP) & (np.abs(across) <= half)
-        at = ahead
-        if inside.sum() < _FEWEST_CELLS:
-            missing += _STEP
+        next_point = point + _STEP * forward
+        relative_cells = cells[tree.query_ball_point(next_point, np.hypot(half_width, _STEP))] - next_point
+        along_distance, across_distance = relative_cells @ forward, relative_cells @ (-forward[1], forward[0])
+        in_window = (np.abs(along_distance) <= _STEP) & (np.abs(across_distance) <= half_width)
+        point = next_point
+        if in_window.sum() < _FEWEST_CELLS:
+            gap_length += _STEP
             continue
-        missing = 0.0
+        gap_length = 0.0
         # Percentiles: single cells of an entrance or a side road don't turn the march.
-        low, high = np.percentile(across[inside], [3, 97])
-        at = ahead + 0.5 * (low + high) * np.array([-forward[1], forward[0]])
-        half = min(0.5 * (high - low) + _MARGIN, _REACH)
-        line.append(at)
+        right_edge, left_edge = np.percentile(across_distance[in_window], [3, 97])
+        point = next_point + 0.5 * (right_edge + left_edge) * np.array([-forward[1], forward[0]])
+        half_width = min(0.5 * (left_edge - right_edge) + _MARGIN, _REACH)
+        line.append(point)
         direction = _march_direction(line, direction)
     return line
 
 
-def _march_direction(line: list[Float], before: float) -> float:
-    """Return the direction (rad) after a march's latest points, turned from the one before by 0.12 rad at most."""
-    last = np.array(line[-6:])
-    chord = last[-1] - last[max(0, len(last) - 4)] if len(last) > 2 else last[-1] - last[0]
-    turn = float(np.angle(np.exp(1j * (np.arctan2(chord[1], chord[0]) - before))))
-    return before + float(np.clip(turn, -0.12, 0.12))
+def _march_direction(line: list[Float], previous_direction: float) -> float:
+    """Return the direction (rad) of a march's latest points, turned from the previous direction by 0.12 rad at most.
+
+    0.12 rad in a step of 10 m is a curve of 83 m radius (chosen: sharper ones are faults).
+    """
+    latest_points = np.array(line[-6:])
+    chord = (
+        latest_points[-1] - latest_points[max(0, len(latest_points) - 4)]
+        if len(latest_points) > 2
+        else latest_points[-1] - latest_points[0]
+    )
+    turn = float(np.angle(np.exp(1j * (np.arctan2(chord[1], chord[0]) - previous_direction))))
+    return previous_direction + float(np.clip(turn, -0.12, 0.12))

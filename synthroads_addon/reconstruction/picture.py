@@ -47,7 +47,7 @@ def draw(reconstruction: Reconstruction, cloud: RoadCloud, path: FilePath) -> No
 def plan(axes: Any, reconstruction: Reconstruction, geometry: RoadGeometry, span: tuple[float, float]) -> None:
     """Draw the road unrolled (offset over station), the reconstruction over the cloud's brightness."""
     profiles = reconstruction.carriageways.profiles
-    low, high = _reach(geometry)
+    right_limit, left_limit = _reach(geometry)
     axes.imshow(
         _brightness(profiles).T,
         origin="lower",
@@ -67,7 +67,7 @@ def plan(axes: Any, reconstruction: Reconstruction, geometry: RoadGeometry, span
         axes.axvspan(doubt.start, doubt.end, color=DOUBT, alpha=0.25, lw=0, label=None if number else "doubtful")
     _markings(axes, geometry, span)
     _objects(axes, geometry)
-    axes.set(xlim=span, ylim=(low, high), xlabel="station, m", ylabel="offset, m")
+    axes.set(xlim=span, ylim=(right_limit, left_limit), xlabel="station, m", ylabel="offset, m")
     axes.legend(loc="upper right", fontsize=7, ncols=5)
 
 
@@ -78,18 +78,18 @@ def across(axes: Any, reconstruction: Reconstruction, geometry: RoadGeometry) ->
     rows = slice(max(0, row - 5), row + 5)
     station = profiles.stations[rows]
     height = profiles.height[rows].astype(np.float64)
-    level = geometry.profile.elevation(station)
-    axes.plot(profiles.offsets, (height - level[:, None]).T, ".", ms=1.5, color="0.55")
-    low, high = _reach(geometry)
-    offset = np.linspace(low, high, 600)
+    profile_height = geometry.profile.elevation(station)
+    axes.plot(profiles.offsets, (height - profile_height[:, None]).T, ".", ms=1.5, color="0.55")
+    right_limit, left_limit = _reach(geometry)
+    offset = np.linspace(right_limit, left_limit, 600)
     model = geometry.elevation(np.full_like(offset, profiles.stations[row]), offset) - geometry.profile.elevation(
         profiles.stations[row]
     )
     axes.plot(offset, model, color=AXIS, lw=1.2)
-    seen = model[np.isfinite(model)]
+    finite_heights = model[np.isfinite(model)]
     axes.set(
-        xlim=(low, high),
-        ylim=(seen.min() - 0.6, seen.max() + 0.6),
+        xlim=(right_limit, left_limit),
+        ylim=(finite_heights.min() - 0.6, finite_heights.max() + 0.6),
         xlabel="offset, m",
         ylabel="height above the profile, m",
         title=f"cross-section at {profiles.stations[row]:.0f} m",
@@ -99,19 +99,19 @@ def across(axes: Any, reconstruction: Reconstruction, geometry: RoadGeometry) ->
 def heights(axes: Any, reconstruction: Reconstruction, geometry: RoadGeometry) -> None:
     """Draw the measured heights of the carriageways, cm, less the reconstructed profile's."""
     stations = reconstruction.measured.stations
-    level = geometry.profile.elevation(stations)
+    profile_height = geometry.profile.elevation(stations)
     for name, surface in reconstruction.carriageways.surfaces.items():
-        axes.plot(stations, 100.0 * (surface.height - level), ".", ms=3, label=f"{name} carriageway")
+        axes.plot(stations, 100.0 * (surface.height - profile_height), ".", ms=3, label=f"{name} carriageway")
     axes.axhline(0.0, color=AXIS, lw=1.0, label="profile")
     axes.set(xlabel="station, m", ylabel="height above the profile, cm", title="pavement at its pivot line")
     axes.legend(fontsize=7)
 
 
 def _brightness(profiles: Profiles) -> Float:
-    """Return brightness (S, U), 0 to 1, equalised by percentiles; NaN far from any point."""
-    known = np.isfinite(profiles.brightness)
-    weight = ndimage.gaussian_filter(known.astype(np.float64), (0.3, 1.0))
-    mean = ndimage.gaussian_filter(np.where(known, profiles.brightness, 0.0).astype(np.float64), (0.3, 1.0))
+    """Return the profiles' brightness (S, U) as grey, 0 to 1, equalised by percentiles; NaN far from any point."""
+    has_points = np.isfinite(profiles.brightness)
+    weight = ndimage.gaussian_filter(has_points.astype(np.float64), (0.3, 1.0))
+    mean = ndimage.gaussian_filter(np.where(has_points, profiles.brightness, 0.0).astype(np.float64), (0.3, 1.0))
     with np.errstate(invalid="ignore", divide="ignore"):
         blurred = np.where(weight > 0.02, mean / weight, np.nan)
     levels = np.nanpercentile(blurred, [1, 20, 40, 60, 80, 90, 95, 98, 99.5])
@@ -119,23 +119,26 @@ def _brightness(profiles: Profiles) -> Float:
 
 
 def _reach(geometry: RoadGeometry) -> tuple[float, float]:
+    """Return the rightmost and leftmost offset, m, to draw: the pavement's edges and `_BEYOND`."""
     offsets = geometry.offsets(np.linspace(0.0, geometry.length, 50))
     return float(offsets.min()) - _BEYOND, float(offsets.max()) + _BEYOND
 
 
 def _markings(axes: Any, geometry: RoadGeometry, span: tuple[float, float]) -> None:
+    """Draw the middles of the markings' dashes between two stations, m."""
     label: str | None = "markings"
     for line in geometry.parameters.of_type(LineMarking).values():
         for start, end in geometry.dashes(line):
             if end < span[0] or start > span[1]:
                 continue
             station = np.linspace(start, end, 2 if end - start < 20.0 else 100)
-            left, right = geometry.marking_edges(line, station)
-            axes.plot(station, 0.5 * (left + right), color=MARK, lw=1.2, label=label)
+            left_edge, right_edge = geometry.marking_edges(line, station)
+            axes.plot(station, 0.5 * (left_edge + right_edge), color=MARK, lw=1.2, label=label)
             label = None
 
 
 def _objects(axes: Any, geometry: RoadGeometry) -> None:
+    """Draw barriers as lines and delineators as symbols, by station and offset."""
     label: str | None = "barriers"
     for item in geometry.parameters.objects.values():
         if isinstance(item, LineObject):
@@ -143,5 +146,5 @@ def _objects(axes: Any, geometry: RoadGeometry) -> None:
             label = None
     posts = list(geometry.parameters.of_type(Delineator).values())
     if posts:
-        place = [post.station for post in posts], [post.offset for post in posts]
-        axes.plot(*place, "^", ms=5, color=POST, mec="white", mew=0.5, label="delineators")
+        stations_and_offsets = [post.station for post in posts], [post.offset for post in posts]
+        axes.plot(*stations_and_offsets, "^", ms=5, color=POST, mec="white", mew=0.5, label="delineators")

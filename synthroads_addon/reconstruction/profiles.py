@@ -64,7 +64,7 @@ class SurfacePoints:
     Attributes:
         begins: (K + 1,) index of each stretch's first point.
         station, offset: (N,) m.
-        paved, marked: (N,) by class.
+        paved, marked: (N,) masks of points on pavement (with its paint) and on paint, by class.
     """
 
     begins: Index
@@ -73,11 +73,11 @@ class SurfacePoints:
     paved: Bool
     marked: Bool
 
-    def near(self, stretch: int, low: float, high: float) -> slice:
+    def near(self, stretch: int, right_limit: float, left_limit: float) -> slice:
         """Return the slice of a stretch's points between two offsets, m."""
         begin, end = self.begins[stretch], self.begins[stretch + 1]
-        first, last = np.searchsorted(self.offset[begin:end], [low, high])
-        return slice(int(begin + first), int(begin + last))
+        first_index, end_index = np.searchsorted(self.offset[begin:end], [right_limit, left_limit])
+        return slice(int(begin + first_index), int(begin + end_index))
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Profiles:
     """Cross profiles of a cloud: values in S rows of a metre along a path and U bins across; NaN without points.
 
     Attributes:
-        path: what they are measured along.
+        path: path along which the profiles are measured.
         stations: (S,) middles along the path, m.
         offsets: (U,) middles across, m, ascending (from right to left).
         count: (S, U) points of the surface.
@@ -114,8 +114,8 @@ class Profiles:
     @property
     def middles(self) -> Float:
         """Return the stations (K,) of the middles of the stretches, m."""
-        first = self.stations[0] - 0.5 * SPACING
-        return first + STRETCH * SPACING * (np.arange(self.stretches) + 0.5)
+        first_border = self.stations[0] - 0.5 * SPACING
+        return first_border + STRETCH * SPACING * (np.arange(self.stretches) + 0.5)
 
     def column(self, offset: float) -> int:
         """Return the index of the bin at an offset, the nearest one if it lies outside."""
@@ -127,76 +127,84 @@ class Profiles:
         return SPACING * float((self.count.sum(axis=1) > 0).sum())
 
     def row_gaps(self, offsets: Float) -> Float:
-        """Return the distance (K,), m, of the rows of points about an offset in each stretch; 0 where they lie densely.
+        """Return half the distance (K,), m, of the two rows of points beside an offset (K,); 0 where points are dense.
 
-        A scanner that follows the road leaves bins empty between rows: what lies there is known no better than that.
+        A scanner that follows the road leaves bins empty between rows of points: offsets there are known no better.
         """
         gaps = np.zeros(self.stretches)
         for number in np.flatnonzero(np.isfinite(offsets)):
             rows = slice(number * STRETCH, (number + 1) * STRETCH)
             occupied = np.flatnonzero((self.count[rows] > 0).any(axis=0))
             column = self.column(float(offsets[number]))
-            before, beyond = occupied[occupied < column], occupied[occupied > column]
-            if len(before) and len(beyond):
+            right_bins, left_bins = occupied[occupied < column], occupied[occupied > column]
+            if len(right_bins) and len(left_bins):
                 # Half the way between the bins on either side of it, as it lies in the middle between two rows.
-                gaps[number] = 0.5 * ACROSS * float(beyond[0] - before[-1])
+                gaps[number] = 0.5 * ACROSS * float(left_bins[0] - right_bins[-1])
         return np.where(gaps > _DENSE * ACROSS, gaps, 0.0)
 
     def surface_height(self, station: Float, offset: Float) -> Float:
         """Return the surface's height (N,), m, at stations and offsets (N,): medians of 5 m by 0.5 m, interpolated."""
         rows, columns = self.height.shape
-        long, wide = -(-rows // _COARSE), -(-columns // _COARSE)
-        padded = np.full((long * _COARSE, wide * _COARSE), np.nan)
-        padded[:rows, :columns] = self.height
-        cells = padded.reshape(long, _COARSE, wide, _COARSE).swapaxes(1, 2).reshape(long, wide, -1)
-        known = np.isfinite(cells).any(axis=2)
-        coarse = np.full((long, wide), np.nan)
-        coarse[known] = np.nanmedian(cells[known], axis=1)
-        nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
-        filled = coarse[tuple(nearest)]
+        cell_rows, cell_columns = -(-rows // _COARSE), -(-columns // _COARSE)
+        padded_heights = np.full((cell_rows * _COARSE, cell_columns * _COARSE), np.nan)
+        padded_heights[:rows, :columns] = self.height
+        cells = (
+            padded_heights.reshape(cell_rows, _COARSE, cell_columns, _COARSE)
+            .swapaxes(1, 2)
+            .reshape(cell_rows, cell_columns, -1)
+        )
+        has_points = np.isfinite(cells).any(axis=2)
+        cell_heights = np.full((cell_rows, cell_columns), np.nan)
+        cell_heights[has_points] = np.nanmedian(cells[has_points], axis=1)
+        nearest_cells = ndimage.distance_transform_edt(~has_points, return_distances=False, return_indices=True)
+        filled_heights = cell_heights[tuple(nearest_cells)]
         # Of n bins each, the middle of coarse cell i is at the bins' middle n i + (n - 1) / 2.
         row = (station - self.stations[0]) / _COARSE + 0.5 / _COARSE - 0.5
         column = (offset - self.offsets[0]) / (ACROSS * _COARSE) + 0.5 / _COARSE - 0.5
-        return np.asarray(ndimage.map_coordinates(filled, np.stack([row, column]), order=1, mode="nearest"))
+        return np.asarray(ndimage.map_coordinates(filled_heights, np.stack([row, column]), order=1, mode="nearest"))
 
 
-def make_profiles(cloud: RoadCloud, path: CloudPath, half_width: float, exact: bool = False) -> Profiles:
+def make_profiles(cloud: RoadCloud, path: CloudPath, half_width: float, keep_points: bool = False) -> Profiles:
     """Return the cross profiles of a cloud's surface along a path, up to ``half_width`` (m) to either side.
 
     Args:
-        cloud: whose surface's points count.
-        path: along which.
-        half_width: m.
-        exact: keep the points, so that lines and edges can be found more exactly than by bins.
+        cloud: cloud whose surface points are binned.
+        path: path along which.
+        half_width: reach to either side of the path, m.
+        keep_points: whether all points are used, and kept if classes tell paint, to find lines more exactly than bins.
     """
-    surface = cloud.surface if exact else cloud.surface[:: max(1, len(cloud.surface) // _ENOUGH)]
+    surface = cloud.surface if keep_points else cloud.surface[:: max(1, len(cloud.surface) // _ENOUGH)]
     station, offset = path.project(cloud.xyz[surface, :2])
     rows, columns = len(path.points) - 1, 2 * int(np.ceil(half_width / ACROSS))
     row = np.floor((station - path.start) / SPACING).astype(np.int64)
     column = np.floor(offset / ACROSS).astype(np.int64) + columns // 2
-    inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-    cell = row[inside] * columns + column[inside]
-    kind = cloud.kind[surface][inside]
+    in_grid = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+    cell = row[in_grid] * columns + column[in_grid]
+    kind = cloud.kind[surface][in_grid]
 
     def total(values: NDArray[np.generic] | None) -> Grid:
+        """Return the sums by bin (S, U) of points' values; of None the number of points."""
         return np.bincount(cell, values, rows * columns).reshape(rows, columns).astype(np.float32)
 
     count = total(None)
     with np.errstate(invalid="ignore", divide="ignore"):
-        height = total(cloud.xyz[surface, 2][inside]) / count
-        brightness = total(cloud.intensity[surface][inside]) / count
-        paved = total(np.isin(kind, (PointKind.PAVEMENT, PointKind.MARKING))) / count if cloud.labelled else None
-        marked = total(kind == PointKind.MARKING) / count if cloud.marked else None
-    paint = paint_share(brightness, paved) if marked is None else marked
+        height = total(cloud.xyz[surface, 2][in_grid]) / count
+        brightness = total(cloud.intensity[surface][in_grid]) / count
+        pavement_share = (
+            total(np.isin(kind, (PointKind.PAVEMENT, PointKind.MARKING))) / count if cloud.labelled else None
+        )
+        marking_share = total(kind == PointKind.MARKING) / count if cloud.marked else None
+    paint = paint_share(brightness, pavement_share) if marking_share is None else marking_share
     stations = path.start + SPACING * (np.arange(rows) + 0.5)
     offsets = ACROSS * (np.arange(columns) - columns // 2 + 0.5)
     points = None
-    if exact and cloud.marked:
-        points = _by_stretch(row[inside], station[inside], offset[inside], kind, rows)
-    return Profiles(path, stations, offsets, count, paint, paved, height, brightness, points)
+    if keep_points and cloud.marked:
+        points = _by_stretch(row[in_grid], station[in_grid], offset[in_grid], kind, rows)
+    return Profiles(path, stations, offsets, count, paint, pavement_share, height, brightness, points)
 
 
 def _by_stretch(row: Int, station: Float, offset: Float, kind: NDArray[np.uint8], rows: int) -> SurfacePoints:
+    """Return N points grouped by stretch and sorted by offset, from their rows, stations, offsets (m) and kinds."""
     stretch = row // STRETCH
     order = np.argsort(stretch * 1000.0 + offset)  # offsets are less than 100 m
     begins = np.searchsorted(stretch[order], np.arange(-(-rows // STRETCH) + 1))
@@ -210,42 +218,45 @@ def _by_stretch(row: Int, station: Float, offset: Float, kind: NDArray[np.uint8]
 
 
 def paint_share(brightness: Grid, paved: Grid | None) -> Grid:
-    """Return how far between pavement (0) and paint (1) each bin's intensity (S, U) lies; NaN where unknown.
+    """Return each bin's share of paint (S, U), by its brightness between pavement (0) and paint (1); NaN where unknown.
 
     The pavement around is the median of 11 m by 2.5 m: lines are narrower than that, and verges wider. Where classes
     tell pavement from verge, only pavement counts.
     """
-    known = np.isfinite(brightness)
+    is_pavement = np.isfinite(brightness)
     if paved is not None:
-        known &= np.nan_to_num(paved) > 0.5
-    if not known.any():
+        is_pavement &= np.nan_to_num(paved) > 0.5
+    if not is_pavement.any():
         return np.full(brightness.shape, np.nan, dtype=np.float32)
-    filled = _fill_bins(brightness, known)
+    filled_brightness = _fill_bins(brightness, is_pavement)
     # The median of a window is the pavement as long as paint fills less than half of it.
-    above = np.where(known, filled - ndimage.median_filter(filled, size=_BACKGROUND), 0.0)
-    spread = robust_scale(above[known] - np.median(above[known]))
+    excess = np.where(is_pavement, filled_brightness - ndimage.median_filter(filled_brightness, size=_BACKGROUND), 0.0)
+    spread = robust_scale(excess[is_pavement] - np.median(excess[is_pavement]))
     # Without any paint the percentile is noise: four deviations of it are full paint at least, so that nothing passes
     # for a line.
-    full = max(float(np.percentile(above[known], _PAINT_PERCENTILE)), 4.0 * spread, 1e-12)
-    return np.where(known, np.clip(above / full, -0.5, 1.5), np.nan).astype(np.float32)
+    full_paint = max(float(np.percentile(excess[is_pavement], _PAINT_PERCENTILE)), 4.0 * spread, 1e-12)
+    return np.where(is_pavement, np.clip(excess / full_paint, -0.5, 1.5), np.nan).astype(np.float32)
 
 
-def _fill_bins(values: Grid, known: Bool) -> Grid:
+def _fill_bins(values: Grid, known_mask: Bool) -> Grid:
     """Return values (S, U) whose unknown bins hold the Gaussian-weighted mean of known ones around."""
-    result = np.where(known, values, 0.0).astype(np.float32)
-    done = known.copy()
+    result = np.where(known_mask, values, 0.0).astype(np.float32)
+    filled_mask = known_mask.copy()
+    # Chosen: ever wider blurs (in bins) fill what narrower ones leave, where float32 still tells their weight.
     for sigma in (_BLUR, 2.0, 6.0, 20.0):
-        weight = ndimage.gaussian_filter(known.astype(np.float32), sigma)
-        mean = ndimage.gaussian_filter(np.where(known, values, 0.0).astype(np.float32), sigma)
-        new = ~done & (weight > 1e-3)
-        result[new] = mean[new] / weight[new]
-        done |= new
-    result[~done] = float(np.median(values[known]))
+        weight = ndimage.gaussian_filter(known_mask.astype(np.float32), sigma)
+        mean = ndimage.gaussian_filter(np.where(known_mask, values, 0.0).astype(np.float32), sigma)
+        newly_filled = ~filled_mask & (weight > 1e-3)
+        result[newly_filled] = mean[newly_filled] / weight[newly_filled]
+        filled_mask |= newly_filled
+    result[~filled_mask] = float(np.median(values[known_mask]))
     return result
 
 
 @dataclass(frozen=True)
 class _Fit:
+    """Fit of a stretch to a template: shift (m) and shear (m/m), and their normalised correlation, 0 to 1."""
+
     shift: float
     shear: float
     score: float
@@ -263,24 +274,24 @@ def register_path(path: CloudPath, profiles: Profiles) -> CloudPath:
     energy = np.array([float((block**2).sum(axis=1).max()) for block in blocks])
     if energy.max() <= 0.0:
         return path
-    first = _reference_stretch(blocks)
+    reference = _reference_stretch(blocks)
     fits = [_Fit(0.0, 0.0, 0.0)] * len(blocks)
-    fits[first] = _self_fit(blocks[first])
-    _fit_in_order(blocks, fits, range(first + 1, len(blocks)), first)
-    _fit_in_order(blocks, fits, range(first - 1, -1, -1), first)
+    fits[reference] = _self_fit(blocks[reference])
+    _fit_in_order(blocks, fits, range(reference + 1, len(blocks)), reference)
+    _fit_in_order(blocks, fits, range(reference - 1, -1, -1), reference)
     middles = SPACING * (starts + 0.5 * min(WINDOW, len(signal)))
     weights = np.array([fit.score for fit in fits])
     if len(fits) < 5 or (weights > 0).sum() < 5:
         return path
     shifts = np.where(weights > 0, [fit.shift for fit in fits], np.nan)
-    shift = smooth(shifts, np.ones(len(shifts)), STEP * SPACING, _WAVELENGTH, usual=ACROSS).values
-    along = path.stations - path.start
+    shift = smooth(shifts, np.ones(len(shifts)), STEP * SPACING, _WAVELENGTH, usual_std=ACROSS).values
+    path_distance = path.stations - path.start
     # Beyond the outermost stretches the path goes on as straight as these lead.
     ends = np.gradient(shift, middles)
-    inside = np.interp(along, middles, shift)
-    inside += np.where(along < middles[0], (along - middles[0]) * ends[0], 0.0)
-    inside += np.where(along > middles[-1], (along - middles[-1]) * ends[-1], 0.0)
-    return path.shift_by(inside)
+    shift_along = np.interp(path_distance, middles, shift)
+    shift_along += np.where(path_distance < middles[0], (path_distance - middles[0]) * ends[0], 0.0)
+    shift_along += np.where(path_distance > middles[-1], (path_distance - middles[-1]) * ends[-1], 0.0)
+    return path.shift_by(shift_along)
 
 
 def _self_fit(block: Float) -> _Fit:
@@ -289,17 +300,18 @@ def _self_fit(block: Float) -> _Fit:
 
 
 def _reference_stretch(blocks: list[Float]) -> int:
-    """Return the index of the stretch that is most like its neighbours: no hatching, arrows or bridge."""
-    alike = np.zeros(len(blocks) + 1)
+    """Return the index of the stretch most like both its neighbours: it has no hatching, arrows or bridge."""
+    likeness = np.zeros(len(blocks) + 1)
     for number in range(len(blocks) - 1):
         fit = _fit_to(blocks[number + 1], _shift_profile(blocks[number], _self_fit(blocks[number])), 0.0, 2.0 * _REACH)
-        alike[number + 1] = fit.score if fit is not None else 0.0
-    return int(np.minimum(alike[:-1], alike[1:]).argmax())
+        likeness[number + 1] = fit.score if fit is not None else 0.0
+    return int(np.minimum(likeness[:-1], likeness[1:]).argmax())
 
 
 def registration_signal(profiles: Profiles) -> Grid:
     """Return the signal (S, U) by which profiles are registered: paint and the pavement's edges; 0 without points."""
     paint = np.clip(np.nan_to_num(profiles.paint), 0.0, 1.0)
+    # Chosen: blurs of one to two bins, so that lines a bin beside each other still match.
     signal = ndimage.gaussian_filter1d(paint, 1.5, axis=1)
     if profiles.paved is not None:
         paved = ndimage.gaussian_filter(np.nan_to_num(profiles.paved), (1.0, 2.0))
@@ -317,44 +329,59 @@ def _shear_profiles(block: Grid) -> Float:
     return result / len(block)
 
 
-def _fit_in_order(blocks: list[Float], fits: list[_Fit], order: range, first: int) -> None:
-    """Fit stretch after stretch to a template of those before, and write into ``fits``, in place."""
+def _fit_in_order(blocks: list[Float], fits: list[_Fit], order: range, reference: int) -> None:
+    """Fit stretch after stretch to a running template of those before, and write the fits into ``fits``, in place.
+
+    Args:
+        blocks: mean profiles (shears, U) of each stretch.
+        fits: fit of each stretch, filled here.
+        order: indices of the stretches, outwards from the reference.
+        reference: index of the stretch that the template begins with.
+    """
     if not len(order):
         return
     sign = order.step
-    template = _shift_profile(blocks[first], fits[first])
-    last, loose = fits[first], _REACH
+    template = _shift_profile(blocks[reference], fits[reference])
+    latest_fit, search_reach = fits[reference], _REACH
     distance = 0
     for index in order:
         distance += 1
-        expected = last.shift + sign * distance * STEP * SPACING * last.shear
-        fit = _fit_to(blocks[index], template, expected, loose)
+        expected_shift = latest_fit.shift + sign * distance * STEP * SPACING * latest_fit.shear
+        fit = _fit_to(blocks[index], template, expected_shift, search_reach)
         if fit is None:
-            loose = min(loose + _LOOSE, 3.0 * _REACH)
+            search_reach = min(search_reach + _LOOSE, 3.0 * _REACH)
             continue
         fits[index] = fit
         template = _MEMORY * template + (1.0 - _MEMORY) * _shift_profile(blocks[index], fit)
-        last, loose, distance = fit, _REACH, 0
+        latest_fit, search_reach, distance = fit, _REACH, 0
 
 
 def _shift_profile(block: Float, fit: _Fit) -> Float:
+    """Return a stretch's mean profile (U,) under a fit's shear, moved back by the fit's shift."""
     number = int(np.abs(_SHEARS - fit.shear).argmin())
     return np.roll(block[number], -round(fit.shift / ACROSS))
 
 
-def _fit_to(block: Float, template: Float, expected: float, reach: float) -> _Fit | None:
-    """Return the shift (m) and shear that fit a stretch to a template best; None where nothing is alike."""
+def _fit_to(block: Float, template: Float, expected_shift: float, reach: float) -> _Fit | None:
+    """Return the shift and shear that fit a stretch to a template best; None if both aren't alike.
+
+    Args:
+        block: (shears, U) mean profiles of the stretch.
+        template: (U,) profile to fit to.
+        expected_shift: m.
+        reach: distance from it within which shifts are tried, m.
+    """
     bins = int(np.ceil(reach / ACROSS))
-    middle = round(expected / ACROSS)
+    middle = round(expected_shift / ACROSS)
     shifts = np.arange(middle - bins, middle + bins + 1)
     # Cross-correlation of the profile under each shear with the template, at each shift.
     scores = np.array([np.roll(block, -shift, axis=1) @ template for shift in shifts])
-    away = (shifts * ACROSS - expected) / reach
+    relative_distance = (shifts * ACROSS - expected_shift) / reach
     # A parabola in the distance from what was expected: of places as good the nearest is taken.
-    judged = scores - _PRIOR * float(scores.max()) * away[:, None] ** 2
-    at, shear = np.unravel_index(int(judged.argmax()), judged.shape)
-    # The normalised cross-correlation, scores / (|block| |template|), says how alike both are.
+    penalised_scores = scores - _PRIOR * float(scores.max()) * relative_distance[:, None] ** 2
+    best_shift, shear = np.unravel_index(int(penalised_scores.argmax()), penalised_scores.shape)
+    # Normalised cross-correlation: scores / (|block| |template|). Below 0.3 (chosen) both aren't alike.
     size = float(np.sqrt((block[shear] ** 2).sum() * (template**2).sum()))
-    if size <= 0.0 or scores[at, shear] < 0.3 * size:
+    if size <= 0.0 or scores[best_shift, shear] < 0.3 * size:
         return None
-    return _Fit(float(shifts[at] * ACROSS), float(_SHEARS[shear]), float(scores[at, shear] / size))
+    return _Fit(float(shifts[best_shift] * ACROSS), float(_SHEARS[shear]), float(scores[best_shift, shear] / size))

@@ -55,10 +55,10 @@ class Course:
     """Alignment and profile fitted to the road in a cloud.
 
     Attributes:
-        road: that they were fitted to.
+        road: the road in the cloud that both were fitted to.
         fit: alignment and profile.
-        rotation: line about which the crossfall turns, whose height is the profile.
-        path: the alignment, each metre.
+        rotation: name of the line about which the crossfall turns; the profile is this line's height.
+        path: the alignment as a path with a point each metre.
     """
 
     road: FoundRoad
@@ -72,12 +72,12 @@ class Carriageways:
     """Cross-section and surfaces of a road, in K stretches along its alignment.
 
     Attributes:
-        course: of the road.
-        layout: that profiles along the alignment show.
+        course: alignment and profile, along which all was measured.
+        layout: carriageways and lines that profiles along the alignment show.
         section: widths of lanes, strips and shoulders.
         surfaces: height and crossfall by side.
         bays: emergency bays.
-        unlike: stretches whose pavement isn't as wide as the cross-section.
+        unlike: stretches whose pavement is wider or narrower than the cross-section, emergency bays apart.
     """
 
     course: Course
@@ -95,14 +95,14 @@ class Carriageways:
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """A reconstructed road with all that it was made from.
+    """A reconstructed road with the measurements that it was made from.
 
     Attributes:
         parameters: the parameter set.
-        measured: the same in numbers with standard deviations.
-        carriageways: what was found along the alignment, and before it was fitted.
-        judgement: where its axis isn't to be trusted.
-        notes: what a reader must know.
+        measured: the measurements behind the parameter set, with standard deviations.
+        carriageways: cross-section and surfaces along the alignment, and the course that they were measured along.
+        judgement: stretches where the reconstructed axis isn't to be trusted, with reasons.
+        notes: assumptions and gaps that a reader of the parameter set must know.
     """
 
     parameters: RoadParameters
@@ -116,20 +116,20 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     """Return the reconstruction of the road that a cloud shows: parameter set, measurements and assessment.
 
     Raises:
-        InputError: no road can be made out in it.
+        InputError: no road can be made out in the cloud.
     """
     options = options or Options()
-    path, half = straighten_path(cloud, options, part_of(progress, 0.0, 0.3))
-    road = find_axis(cloud.near(path, half + _AROUND), path, half, options, part_of(progress, 0.3, 0.5))
+    path, half_width = straighten_path(cloud, options, part_of(progress, 0.0, 0.3))
+    road = find_axis(cloud.near(path, half_width + _AROUND), path, half_width, options, part_of(progress, 0.3, 0.5))
     progress("alignment", 0.5)
     course = fit_course(road, options.tolerance)
     progress("section", 0.6)
     carriageways = measure_carriageways(course, options.snap)
-    measured = measure_surroundings(carriageways, cloud, options.title, progress)
-    parameters = assemble_parameters(measured)
+    measurements = measure_surroundings(carriageways, cloud, options.title, progress)
+    parameters = assemble_parameters(measurements)
     judgement = judge_carriageways(carriageways)
-    notes = [*carriageways.layout.notes, *_notes(measured)]
-    return Reconstruction(parameters, measured, carriageways, judgement, notes)
+    notes = [*carriageways.layout.notes, *_notes(measurements)]
+    return Reconstruction(parameters, measurements, carriageways, judgement, notes)
 
 
 def fit_course(road: FoundRoad, tolerance: float) -> Course:
@@ -139,26 +139,32 @@ def fit_course(road: FoundRoad, tolerance: float) -> Course:
     name, the one at which the carriageways' heights differ less.
 
     Args:
-        road: found in a cloud.
-        tolerance: of the alignment's fit to the axis, m (`fit_axis`).
+        road: the road found in the cloud, with its measured axis.
+        tolerance: root mean square distance that the alignment may keep from the axis, m (`fit_axis`).
 
     Raises:
         InputError: the surface's height isn't known, or no alignment fits.
     """
     rotation, heights = _rotation_and_heights(road)
-    right, left = heights
-    height = np.where(np.isfinite(left) & np.isfinite(right), 0.5 * (left + right), np.fmin(left, right))
+    right_heights, left_heights = heights
+    height = np.where(
+        np.isfinite(left_heights) & np.isfinite(right_heights),
+        0.5 * (left_heights + right_heights),
+        np.fmin(left_heights, right_heights),
+    )
     if not np.isfinite(height).any():
         height = _ground_heights(road)
-    known = np.isfinite(road.axis.raw)
-    first, last = np.flatnonzero(known)[[0, -1]]
-    seen = slice(int(first), int(last) + 1)
-    if not np.isfinite(height[seen]).any():
+    is_measured = np.isfinite(road.axis.raw)
+    first_stretch, last_stretch = np.flatnonzero(is_measured)[[0, -1]]
+    seen_stretches = slice(int(first_stretch), int(last_stretch) + 1)
+    if not np.isfinite(height[seen_stretches]).any():
         raise InputError("road", None, "too few points of the road's surface to tell its height")
-    smoothed = smooth(height, np.isfinite(height).astype(np.float64), STRETCH * SPACING, _HEIGHT_WAVELENGTH)
-    offset = _replace_faults(road.axis.raw, road.axis.offsets)[seen]
-    plan = road.path.place(road.axis.stations[seen], offset)
-    fit = fit_axis(np.column_stack([plan, _replace_faults(height, smoothed.values)[seen]]), tolerance, True)
+    smooth_height = smooth(height, np.isfinite(height).astype(np.float64), STRETCH * SPACING, _HEIGHT_WAVELENGTH)
+    axis_offsets = _replace_faults(road.axis.raw, road.axis.offsets)[seen_stretches]
+    axis_points = road.path.place(road.axis.stations[seen_stretches], axis_offsets)
+    fit = fit_axis(
+        np.column_stack([axis_points, _replace_faults(height, smooth_height.values)[seen_stretches]]), tolerance, True
+    )
     return Course(road, fit, rotation, alignment_path(fit.alignment))
 
 
@@ -168,12 +174,14 @@ def _rotation_and_heights(road: FoundRoad) -> tuple[RotationAxis, tuple[Float, F
     by_rotation: dict[RotationAxis, tuple[Float, Float]] = {}
     names: tuple[RotationAxis, ...] = ("carriageway_axis", "inner_edge")
     for rotation in names:
-        right, left = (_fit_between(road.layout.profiles, sign, pair, rotation).height for sign, pair in edges.items())
-        by_rotation[rotation] = right, left
+        right_heights, left_heights = (
+            _fit_between(road.layout.profiles, sign, pair, rotation).height for sign, pair in edges.items()
+        )
+        by_rotation[rotation] = right_heights, left_heights
     difference = {name: _height_difference(heights) for name, heights in by_rotation.items()}
-    turns_inside = difference["inner_edge"] < _INNER_SHARE * difference["carriageway_axis"] - _INNER_ADVANTAGE
-    chosen: RotationAxis = "inner_edge" if turns_inside else "carriageway_axis"
-    return chosen, by_rotation[chosen]
+    turns_about_edges = difference["inner_edge"] < _INNER_SHARE * difference["carriageway_axis"] - _INNER_ADVANTAGE
+    rotation_line: RotationAxis = "inner_edge" if turns_about_edges else "carriageway_axis"
+    return rotation_line, by_rotation[rotation_line]
 
 
 def _carriageway_edges(road: FoundRoad, sign: int) -> tuple[Float, Float]:
@@ -186,30 +194,32 @@ def _carriageway_edges(road: FoundRoad, sign: int) -> tuple[Float, Float]:
     band = layout.bands[0 if sign < 0 else -1]
     outermost = sign * (band.guide(sign).offset - float(np.median(axis)))
     # Outwards from the outermost line, or from 1 m beside the axis where that lies nearer: paved for sure.
-    begin = axis + sign * max(outermost, 1.0)
-    outer = layout.pavement.edge(begin, sign).offsets
-    outer = axis + float(np.nanmedian(begin - axis if np.isnan(outer).all() else outer - axis))
+    search_start = axis + sign * max(outermost, 1.0)
+    outer_offsets = layout.pavement.edge(search_start, sign).offsets
+    outer_offsets = axis + float(
+        np.nanmedian(search_start - axis if np.isnan(outer_offsets).all() else outer_offsets - axis)
+    )
     if layout.kind == "single":
-        return axis.copy(), outer
+        return axis.copy(), outer_offsets
     innermost = sign * (band.guide(-sign).offset - float(np.median(axis)))
-    inner = layout.pavement.edge(axis + sign * innermost, -sign, innermost).offsets
-    distance = float(np.nanmedian(inner - axis)) if np.isfinite(inner).any() else sign * innermost
-    return axis + distance, outer
+    inner_offsets = layout.pavement.edge(axis + sign * innermost, -sign, innermost).offsets
+    distance = float(np.nanmedian(inner_offsets - axis)) if np.isfinite(inner_offsets).any() else sign * innermost
+    return axis + distance, outer_offsets
 
 
 def _fit_between(profiles: Profiles, sign: int, edges: tuple[Float, Float], rotation: RotationAxis) -> Surface:
     """Return the surface of the right (-1) or left (+1) carriageway between its edges, and its height at the rotation.
 
     Args:
-        profiles: along a path or the alignment.
-        sign: of the side.
-        edges: (K,) offsets of the inner and the outer one, m.
-        rotation: the line at which the height is taken.
+        profiles: cross profiles along a path or the alignment, in K stretches.
+        sign: -1 for the right carriageway, +1 for the left one.
+        edges: offsets of the carriageway's inner and outer edge, (K,) each, m.
+        rotation: line about which the crossfall turns, and at which the height is taken.
     """
-    inner, outer = edges
-    pivot = inner if rotation == "inner_edge" else 0.5 * (inner + outer)
-    low, high = (inner, outer) if sign > 0 else (outer, inner)
-    return fit_surface(profiles, low, high, pivot)
+    inner_offsets, outer_offsets = edges
+    pivot = inner_offsets if rotation == "inner_edge" else 0.5 * (inner_offsets + outer_offsets)
+    right_edge, left_edge = (inner_offsets, outer_offsets) if sign > 0 else (outer_offsets, inner_offsets)
+    return fit_surface(profiles, right_edge, left_edge, pivot)
 
 
 def _height_difference(heights: tuple[Float, Float]) -> float:
@@ -219,7 +229,7 @@ def _height_difference(heights: tuple[Float, Float]) -> float:
 
 
 def _ground_heights(road: FoundRoad) -> Float:
-    """Return the median heights (K,), m, of the ground within a metre of the axis, for want of a pavement's."""
+    """Return the median heights (K,), m, of the ground within a metre of the axis, to use where no pavement is seen."""
     profiles = road.layout.profiles
     result = np.full(profiles.stretches, np.nan)
     for number, offset in enumerate(road.axis.offsets):
@@ -230,25 +240,25 @@ def _ground_heights(road: FoundRoad) -> Float:
     return result
 
 
-def _replace_faults(raw: Float, smoothed: Float) -> Float:
+def _replace_faults(measured_values: Float, smooth_values: Float) -> Float:
     """Return measured values (K,) with missing and outlying ones replaced by the smoothed ones.
 
     The fit smooths by itself: values that are smooth already would pass for exact and get an element for every bend.
     """
-    residual = np.abs(raw - smoothed)
+    residual = np.abs(measured_values - smooth_values)
     deviation = max(robust_scale(residual[np.isfinite(residual)]), _LEAST_DEVIATION)
-    return np.where(np.isfinite(raw) & (residual <= _OUTLIER * deviation), raw, smoothed)
+    return np.where(np.isfinite(measured_values) & (residual <= _OUTLIER * deviation), measured_values, smooth_values)
 
 
 def measure_carriageways(course: Course, snap: bool = False) -> Carriageways:
     """Return the cross-section and surfaces that the cloud shows along the alignment.
 
     Args:
-        course: with the road that it was fitted to.
-        snap: take the standard cross-section's widths where the measured ones are near enough.
+        course: alignment and profile, with the road that they were fitted to.
+        snap: whether measured widths near a standard cross-section's are replaced by the standard ones.
 
     Raises:
-        InputError: no carriageway can be made out along it.
+        InputError: no carriageway can be made out along the alignment.
     """
     road = course.road
     layout = road.layout_along(course.path, road.layout.kind)
@@ -260,16 +270,16 @@ def measure_carriageways(course: Course, snap: bool = False) -> Carriageways:
 
 
 def _axis_std(axis: FusedAxis) -> float:
-    """Return the standard deviation, m, of where the axis lies along the whole road."""
+    """Return the standard deviation, m, of the axis' offset: the median over the stretches in which it is seen."""
     return float(np.median(axis.std[np.isfinite(axis.raw)]))
 
 
 def _surface(profiles: Profiles, side: SideSection, rotation: RotationAxis) -> Surface:
     """Return height and crossfall of one carriageway's surface in each stretch along the alignment."""
-    inner = np.full(len(side.usual), side.inner_offset.value)
-    outer = inner + side.paved_width.value
-    left = float(side.sign)  # distances from the axis become offsets to the left
-    return _fit_between(profiles, side.sign, (left * inner, left * outer), rotation)
+    inner_distance = np.full(len(side.usual), side.inner_offset.value)
+    outer_distance = inner_distance + side.paved_width.value
+    side_sign = float(side.sign)  # distances from the axis become offsets to the left
+    return _fit_between(profiles, side.sign, (side_sign * inner_distance, side_sign * outer_distance), rotation)
 
 
 def measure_surroundings(
@@ -278,17 +288,17 @@ def measure_surroundings(
     """Return all measurements of a road: its carriageways, what stands beside them, and the ground.
 
     Args:
-        carriageways: measured.
-        cloud: the whole one: the ground reaches farther than the road's own points.
-        title: of the parameter set.
-        progress: is told of both stages, as of a reconstruction's.
+        carriageways: cross-section and surfaces, as measured along the alignment.
+        cloud: all points read: the ground reaches farther than the points near the road.
+        title: title of the parameter set.
+        progress: called with the name of each stage and its share of the whole reconstruction.
     """
     course, section, profiles = carriageways.course, carriageways.section, carriageways.profiles
     progress("ground", 0.75)
     ground = measure_ground(cloud, course.path, section, course.fit.profile.elevation(course.path.stations))
     progress("objects", 0.85)
-    standing = standing_points(course.road.cloud, profiles, section)
-    barriers, barrier_points = find_barriers(standing)
+    points_above_ground = standing_points(course.road.cloud, profiles, section)
+    barriers, barrier_points = find_barriers(points_above_ground)
     return RoadMeasurements(
         fit=course.fit,
         cloud=course.road.cloud,
@@ -297,7 +307,7 @@ def measure_surroundings(
         crossfall={side: _smooth_fall(surface) for side, surface in carriageways.surfaces.items()},
         rotation=course.rotation,
         barriers=face_guardrails(barriers, section),
-        posts=find_posts(standing, barrier_points),
+        posts=find_posts(points_above_ground, barrier_points),
         ground=ground,
         title=title,
         bays=carriageways.bays,
@@ -305,16 +315,16 @@ def measure_surroundings(
 
 
 def _smooth_fall(surface: Surface) -> Float:
-    """Return the crossfall (K,), m/m, smoothed along the road; as measured where too few are known."""
-    known = np.isfinite(surface.fall)
-    if known.sum() < _FEWEST_FALLS:
+    """Return a surface's crossfall (K,), m/m, smoothed along the road; unsmoothed if too few stretches have one."""
+    is_measured = np.isfinite(surface.fall)
+    if is_measured.sum() < _FEWEST_FALLS:
         return surface.fall
-    weights, spacing = known.astype(np.float64), STRETCH * SPACING
-    return smooth(surface.fall, weights, spacing, _FALL_WAVELENGTH, order=2, usual=_FALL_STD).values
+    weights, spacing = is_measured.astype(np.float64), STRETCH * SPACING
+    return smooth(surface.fall, weights, spacing, _FALL_WAVELENGTH, order=2, usual_std=_FALL_STD).values
 
 
 def judge_carriageways(carriageways: Carriageways) -> Judgement:
-    """Return where a road's axis, and its cross-section, aren't to be trusted, and why."""
+    """Return the judgement of a reconstruction: where its axis and its cross-section aren't to be trusted, and why."""
     course, stations = carriageways.course, carriageways.profiles.middles
     rivals = course.road.open_along(course.path, stations)
     parted = course.road.parted_line(course.path, stations)
@@ -323,30 +333,32 @@ def judge_carriageways(carriageways: Carriageways) -> Judgement:
 
 
 def _section_doubt(stretch: Unlike) -> Doubt:
-    """Return what is said of a stretch whose pavement is unlike the cross-section."""
+    """Return the doubt about a stretch whose pavement is wider or narrower than the cross-section."""
     difference = f"{abs(stretch.wider_by):.1f} m {'wider' if stretch.wider_by > 0.0 else 'narrower'}"
     text = f"{stretch.side}: the pavement is {difference} than the cross-section"
     return Doubt(stretch.start, stretch.end, (text,))
 
 
-def _notes(measured: RoadMeasurements) -> list[str]:
+def _notes(measurements: RoadMeasurements) -> list[str]:
     """Return remarks on assumptions and gaps that a reader of the parameter set must know."""
-    cloud, section = measured.cloud, measured.section
-    single = "a single carriageway: written as two carriageways that meet in the middle line, one per direction"
+    cloud, section = measurements.cloud, measurements.section
+    single_carriageway = (
+        "a single carriageway: written as two carriageways that meet in the middle line, one per direction"
+    )
     remarks = [
         (cloud.strays > 0, f"{cloud.strays:,} points lie far from all others and weren't used"),
         (cloud.epsg is None, _assumed_system(cloud)),
         (not cloud.labelled, "pavement was told from ground by brightness, as the cloud has no such classes"),
         (not cloud.marked, "paint was told from pavement by brightness: lines have the usual widths"),
-        (section.kind == "single", single),
-        (not measured.ground.verge_seen, "the verge's width is the usual one, as the cloud has no such class"),
+        (section.kind == "single", single_carriageway),
+        (not measurements.ground.verge_seen, "the verge's width is the usual one, as the cloud has no such class"),
         *(remark for side in section.sides.values() for remark in _remarks_on(side)),
     ]
     return [text for applies, text in remarks if applies]
 
 
 def _assumed_system(cloud: RoadCloud) -> str:
-    """Return what is said of the map system that was written for want of the cloud's own."""
+    """Return the note on the map system that is written to the parameter set where the cloud names none."""
     text = f"the cloud doesn't say its map system: EPSG:{UNKNOWN_EPSG} was written"
     if cloud.epsg is None and MapSystem.of(UNKNOWN_EPSG).outside(cloud.origin[None, :2]).max() > 0.0:
         text += ", for whose area its coordinates are none: the road's place on the map isn't known"
@@ -354,8 +366,8 @@ def _assumed_system(cloud: RoadCloud) -> str:
 
 
 def _remarks_on(side: SideSection) -> Iterator[tuple[bool, str]]:
-    """Yield for one side (whether it applies, remark) of each possible remark."""
-    hidden, name = any(line is None for line in side.lines[1:-1]), side.side
+    """Yield (whether it applies, text) for each possible remark on the measurement of one side of the road."""
+    lacks_line, name = any(line is None for line in side.lines[1:-1]), side.side
     yield not side.edge_seen, f"{name}: the pavement's outer edge isn't in the cloud: 0.5 m beyond the outermost line"
     yield not side.closed, f"{name}: the outermost line is dashed: there may be further lanes beyond the cloud"
     if side.assumed:
@@ -363,4 +375,4 @@ def _remarks_on(side: SideSection) -> Iterator[tuple[bool, str]]:
     elif side.mirrored:
         yield True, f"{name}: the edge line was seen on the other side only and is taken to be as far away"
     else:
-        yield hidden, f"{name}: a lane line isn't seen where it must be"
+        yield lacks_line, f"{name}: a lane line isn't seen where it must be"

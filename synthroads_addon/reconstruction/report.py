@@ -44,12 +44,13 @@ class ReconstructionJob:
     """Request for a reconstruction.
 
     Attributes:
-        cloud: file to read.
-        road: dual or single carriageway, where it is known.
-        course: file with the road's rough course (CSV, GeoJSON), in the cloud's coordinates, where it isn't found.
+        cloud: cloud file to read.
+        road: dual or single carriageway; None if the cloud must tell.
+        course: file with the road's rough course (CSV, GeoJSON) in the cloud's coordinates; None if the cloud must show
+            it.
         tolerance: root mean square that the alignment may keep from the measured axis, m.
-        snap: take the widths of the standard cross-section that all measured ones are near to.
-        predictor: one more view of the axis, beside those that learn nothing.
+        snap: whether measured widths near a standard cross-section's are replaced by the standard ones.
+        predictor: trained network that gives one more view of the axis; None for rule-based views alone.
     """
 
     cloud: Path
@@ -76,22 +77,22 @@ class ReconstructedRoad:
     """Outcome of a reconstruction.
 
     Attributes:
-        found: the road, and all that it was made from.
-        cloud: that it was found in.
+        reconstruction: the road, with the measurements that it was made from.
+        cloud: the points that it was made from.
         report: as JSON data, see `report`.
     """
 
-    found: Reconstruction
+    reconstruction: Reconstruction
     cloud: RoadCloud
     report: dict[str, Any]
 
 
 @linear_algebra_on_one_thread(scipy=True)
 def run_reconstruction(job: ReconstructionJob, progress: Progress = silent) -> ReconstructedRoad:
-    """Read a cloud, reconstruct the road in it, and report how far both are apart.
+    """Read a cloud and reconstruct the road in it; return the road with the report of its deviations from the cloud.
 
     Raises:
-        MissingFileError: a file isn't there.
+        MissingFileError: the cloud's or the course's file isn't there.
         InputError: a file can't be read, or no road can be made out in the cloud.
     """
     cloud = read_road_cloud(job.cloud, part_of(progress, 0.0, 0.2))
@@ -124,6 +125,7 @@ def report(reconstruction: Reconstruction, cloud: RoadCloud) -> dict[str, Any]:
 
 
 def _cloud(cloud: RoadCloud) -> dict[str, Any]:
+    """Return the cloud's points and classes, and what told pavement and markings, as JSON data."""
     return {
         "points": cloud.read,
         "classes": cloud.classes,
@@ -133,16 +135,16 @@ def _cloud(cloud: RoadCloud) -> dict[str, Any]:
 
 
 def _centreline(reconstruction: Reconstruction) -> dict[str, Any]:
-    """Return as JSON data the residuals, m, of the measured axis from the alignment, and its deviations."""
+    """Return the residuals of the measured axis from the alignment, and its standard deviations, m, as JSON data."""
     fit, axis = reconstruction.measured.fit, reconstruction.carriageways.course.road.axis
-    seen = np.isfinite(axis.raw)
-    std = axis.std[seen]
+    seen_mask = np.isfinite(axis.raw)
+    std = axis.std[seen_mask]
     return {
         "elements": len(fit.alignment.elements),
         "from_alignment": fit.horizontal.to_dict("largest", 1),
         "height_from_profile": fit.height.to_dict("largest", 1),
         "std": {"mean": round(float(std.mean()), 4), "largest": round(float(std.max()), 4)},
-        "seen": round(float(seen.mean()), 4),
+        "seen": round(float(seen_mask.mean()), 4),
     }
 
 
@@ -157,6 +159,7 @@ def section_report(section: MeasuredSection) -> dict[str, Any]:
 
 
 def _side(side: SideSection) -> dict[str, Any]:
+    """Return one side's widths, m, with standard deviations, and whether its outer edge was seen, as JSON data."""
     widths = {
         "inner_offset": side.inner_offset,
         "inner_edge_strip": side.inner_strip,
@@ -166,40 +169,42 @@ def _side(side: SideSection) -> dict[str, Any]:
         "paved_width": side.paved_width,
     }
     lanes = [lane.to_dict() for lane in reversed(side.lanes)]
-    seen = {"outer_edge_seen": side.edge_seen, "outermost_line_is_edge": side.closed}
-    return {"lanes": lanes, **{name: width.to_dict() for name, width in widths.items()}, **seen}
+    flags = {"outer_edge_seen": side.edge_seen, "outermost_line_is_edge": side.closed}
+    return {"lanes": lanes, **{name: width.to_dict() for name, width in widths.items()}, **flags}
 
 
 def _surface(reconstruction: Reconstruction, cloud: RoadCloud, geometry: RoadGeometry) -> dict[str, Any]:
-    """Return by side, as JSON data, how far, m, the pavement's points lie above the reconstructed surface."""
-    chosen = np.flatnonzero(cloud.of(PointKind.PAVEMENT, PointKind.MARKING)) if cloud.labelled else cloud.surface
-    chosen = chosen[:: max(1, len(chosen) // _MOST_POINTS)]
-    station, offset = geometry.alignment.project(cloud.xyz[chosen, :2])
+    """Return figures of the pavement points' heights above the reconstructed surface, m, by side, as JSON data."""
+    pavement_points = (
+        np.flatnonzero(cloud.of(PointKind.PAVEMENT, PointKind.MARKING)) if cloud.labelled else cloud.surface
+    )
+    pavement_points = pavement_points[:: max(1, len(pavement_points) // _MOST_POINTS)]
+    station, offset = geometry.alignment.project(cloud.xyz[pavement_points, :2])
     result: dict[str, Any] = {}
     for name, section in geometry.sections.items():
-        inside = (station > 0.0) & (station < geometry.length) & (offset * section.carriageway.sign > 0.0)
-        on_side = np.flatnonzero(inside)
+        on_side_mask = (station > 0.0) & (station < geometry.length) & (offset * section.carriageway.sign > 0.0)
+        on_side = np.flatnonzero(on_side_mask)
         distance, bounds = np.abs(offset[on_side]), section.distances(station[on_side])
         on_side = on_side[(distance > bounds[:, 0] + _FROM_EDGES) & (distance < bounds[:, -2] - _FROM_EDGES)]
-        above = cloud.xyz[chosen[on_side], 2] - geometry.elevation(station[on_side], offset[on_side])
-        result[name] = {"points": len(on_side), **_figures(above[np.abs(above) < _FAULT])}
+        height_error = cloud.xyz[pavement_points[on_side], 2] - geometry.elevation(station[on_side], offset[on_side])
+        result[name] = {"points": len(on_side), **_figures(height_error[np.abs(height_error) < _FAULT])}
     return result
 
 
 def _edges(side: SideSection, reconstruction: Reconstruction, geometry: RoadGeometry) -> dict[str, Any]:
-    """Return as JSON data how far, m, the edges seen in the stretches lie outside of the reconstructed ones."""
+    """Return figures of the measured edges' distances outside of the reconstructed ones, m, as JSON data."""
     stations = reconstruction.measured.stations
     section = geometry.sections[side.side]
-    outer = np.where(side.usual, side.outer_edge.offsets - section.main_edge(stations), np.nan)
-    inner = side.inner_edge.offsets - section.distances(stations)[:, 0]
+    outer_difference = np.where(side.usual, side.outer_edge.offsets - section.main_edge(stations), np.nan)
+    inner_difference = side.inner_edge.offsets - section.distances(stations)[:, 0]
     return {
-        "outer": _figures(outer),
-        "inner": _figures(inner) if reconstruction.measured.section.kind == "dual" else {},
+        "outer": _figures(outer_difference),
+        "inner": _figures(inner_difference) if reconstruction.measured.section.kind == "dual" else {},
     }
 
 
 def _lines(reconstruction: Reconstruction, geometry: RoadGeometry) -> dict[str, Any]:
-    """Return by marking, as JSON data, how far, m, it lies to the left of the reconstructed one, and its deviations."""
+    """Return figures of each measured marking's offset from the reconstructed one, m, left positive, as JSON data."""
     stations = reconstruction.measured.stations
     result: dict[str, Any] = {}
     section = reconstruction.measured.section
@@ -208,9 +213,9 @@ def _lines(reconstruction: Reconstruction, geometry: RoadGeometry) -> dict[str, 
         line = section.middle if marking.kind == "free" else side.lines[len(side.lines) - 1 - marking.boundary]
         if line is None:
             continue
-        left, right = geometry.marking_edges(marking, stations)
+        left_edge, right_edge = geometry.marking_edges(marking, stations)
         result[name] = {
-            **_figures(line.measured - 0.5 * (left + right)),
+            **_figures(line.measured - 0.5 * (left_edge + right_edge)),
             "std": round(float(np.nanmean(line.std)), 4),
             "width": {"value": round(line.width, 3), "std": round(line.width_std, 4)},
             "painted": round(line.painted, 3),
@@ -219,17 +224,19 @@ def _lines(reconstruction: Reconstruction, geometry: RoadGeometry) -> dict[str, 
 
 
 def _excess_fall(reconstruction: Reconstruction, geometry: RoadGeometry, side: Side) -> Float:
-    """Return the measured less the reconstructed crossfall (K,), m/m, in each stretch."""
+    """Return the measured minus the reconstructed crossfall (K,), m/m, in each stretch."""
     modelled = geometry.crossfall(geometry.sections[side].carriageway, reconstruction.measured.stations)
     return reconstruction.carriageways.surfaces[side].fall - modelled
 
 
 def _bay(bay: Bay) -> dict[str, Any]:
+    """Return an emergency bay's measures, m, rounded, as JSON data; without its covariance."""
     values = {name: value for name, value in asdict(bay).items() if name != "covariance"}
     return {name: round(value, 3) if isinstance(value, float) else value for name, value in values.items()}
 
 
 def _objects(reconstruction: Reconstruction) -> dict[str, Any]:
+    """Return the reconstructed barriers and delineators, lengths in m, as JSON data."""
     barriers = [
         {
             "kind": item.kind,
@@ -254,6 +261,7 @@ def _objects(reconstruction: Reconstruction) -> dict[str, Any]:
 
 
 def _figures(difference: Float) -> dict[str, float]:
+    """Return mean, root mean square and 95th percentile of differences (NaN left out), rounded."""
     return difference_figures(difference, "mean", "rms", "p95")
 
 
@@ -261,9 +269,9 @@ def measure_lines(report: dict[str, Any]) -> Iterator[str]:
     """Yield a reconstruction's alignment, widths with their deviations, and number of objects, a line each."""
     section, line = report["section"], report["centreline"]
     elements = "1 element" if line["elements"] == 1 else f"{line['elements']} elements"
-    off, std = 100.0 * line["from_alignment"]["rms"], 100.0 * line["std"]["mean"]
+    rms_error, mean_std = 100.0 * line["from_alignment"]["rms"], 100.0 * line["std"]["mean"]
     yield f"{report['road']} carriageway of {report['length']:.0f} m, alignment of {elements}"
-    yield f"{off:.1f} cm rms from the measured axis (std {std:.1f} cm)"
+    yield f"{rms_error:.1f} cm rms from the measured axis (std {mean_std:.1f} cm)"
     for name, side in section["sides"].items():
         widths = " + ".join(f"{lane['value']:.2f}" for lane in side["lanes"])
         paved = side["paved_width"]
@@ -279,10 +287,10 @@ def measure_lines(report: dict[str, Any]) -> Iterator[str]:
 
 def doubt_lines(judgement: dict[str, Any]) -> Iterator[tuple[float, str]]:
     """Yield (station where it begins, m; text) of each stretch that isn't to be trusted, with the reasons."""
-    for kind, what in (("doubtful", "doubtful"), ("other_sections", "another section")):
+    for kind, kind_text in (("doubtful", "doubtful"), ("other_sections", "another section")):
         for doubt in judgement.get(kind, ()):
-            place = f"{what} from {doubt['start']:.0f} to {doubt['end']:.0f} m"
-            yield doubt["start"], f"{place}: {'; '.join(doubt['why'])}"
+            stretch_text = f"{kind_text} from {doubt['start']:.0f} to {doubt['end']:.0f} m"
+            yield doubt["start"], f"{stretch_text}: {'; '.join(doubt['why'])}"
 
 
 def reservation_lines(report: dict[str, Any]) -> Iterator[str]:
@@ -290,6 +298,10 @@ def reservation_lines(report: dict[str, Any]) -> Iterator[str]:
     yield from (f"note: {note}" for note in report["notes"])
     yield from (text for _, text in doubt_lines(report["judgement"]))
     if "comparison" in report:
-        off = report["comparison"]["centreline"]
-        difference = f"{off['mae']:.3f} m on average, {off['largest']:.3f} m at most" if off else "nothing in common"
+        deviation = report["comparison"]["centreline"]
+        difference = (
+            f"{deviation['mae']:.3f} m on average, {deviation['largest']:.3f} m at most"
+            if deviation
+            else "nothing in common"
+        )
         yield f"from the truth: centreline {difference}"

@@ -68,21 +68,21 @@ class Estimate:
 
     @classmethod
     def of(cls, values: Float, spacing: Float | None = None, axis_std: float = 0.0) -> Self:
-        """Return the robust mean of values (K,), in order along the road, with its standard deviation.
+        """Return the robust mean of values (K,), in order along the road, as an estimate with its standard deviation.
 
-        Of values midway between rows of points, ``spacing`` (K,) from each other, m, it is that of `interval_mean`,
-        which asks for the deviation of the axis that they are measured from, m.
+        Values that lie midway between rows of points, ``spacing`` (K,), m, apart, are averaged by `interval_mean`,
+        which needs the standard deviation ``axis_std``, m, of the axis that they are measured from.
         """
         if spacing is None or not (spacing[np.isfinite(values)] > 0.0).any():
             return cls(*mean_with_std(values))
         return cls(*interval_mean(values, spacing, axis_std))
 
-    def __sub__(self, other: Self) -> Self:
+    def __sub__(self, subtrahend: Self) -> Self:
         """Return the difference of two numbers whose errors are independent: Var(a - b) = Var(a) + Var(b)."""
-        return type(self)(self.value - other.value, float(np.hypot(self.std, other.std)))
+        return type(self)(self.value - subtrahend.value, float(np.hypot(self.std, subtrahend.std)))
 
     def widened(self, std: float) -> Self:
-        """Return the number with one more independent error of a standard deviation."""
+        """Return the estimate with one more independent error added, of standard deviation ``std``."""
         return type(self)(self.value, float(np.hypot(self.std, std)))
 
     def to_dict(self, digits: int = 4) -> dict[str, float | None]:
@@ -96,10 +96,10 @@ class SideSection:
 
     Attributes:
         side: of the axis.
-        lines: its lines from inside to outside; those of a single carriageway without the middle one. None where a
-            line must be but wasn't seen.
-        inner_edge, outer_edge: of the pavement, as distances from the axis; NaN where not seen.
-        usual: (K,) where the outer edge is that of the road and not of a turnout.
+        lines: the carriageway's lines from inside to outside, the middle line of a single carriageway first; None where
+            a line must be but wasn't seen.
+        inner_edge, outer_edge: the pavement's edges as distances from the axis; NaN where not seen.
+        usual: (K,) mask of the stretches where the outer edge is the road's and not a turnout's.
         inner_offset, inner_strip, outer_width, strip, shoulder: widths, m; ``outer_width`` is that of all pavement
             outside of the lanes, which ``strip`` and ``shoulder`` share.
         lanes: widths from inside to outside, m.
@@ -108,7 +108,7 @@ class SideSection:
         assumed: name of the standard cross-section that the lanes were taken from, as their lines weren't seen.
         mirrored: whether the edge line was only seen on the other side of a single carriageway.
         axis_std: standard deviation of where the axis lies, m, from which all is measured.
-        edge_stds: of the inner and the outer edge, m, what they share all along the road.
+        edge_stds: standard deviations of the inner and the outer edge's error that is the same all along the road, m.
     """
 
     side: Side
@@ -139,9 +139,16 @@ class SideSection:
         """Return the width of the pavement from edge to edge, m; from its parts where an edge isn't seen."""
         width = np.where(self.usual, self.outer_edge.offsets - self.inner_edge.offsets, np.nan)
         if self.edge_seen and np.isfinite(width).any():
-            inner, outer = (np.where(self.usual, edge.offsets, np.nan) for edge in (self.inner_edge, self.outer_edge))
-            low = Estimate.of(inner, self.inner_edge.spacing, self.axis_std).widened(self.edge_stds[0])
-            return Estimate.of(outer, self.outer_edge.spacing, self.axis_std).widened(self.edge_stds[1]) - low
+            inner_offsets, outer_offsets = (
+                np.where(self.usual, edge.offsets, np.nan) for edge in (self.inner_edge, self.outer_edge)
+            )
+            inner_estimate = Estimate.of(inner_offsets, self.inner_edge.spacing, self.axis_std).widened(
+                self.edge_stds[0]
+            )
+            return (
+                Estimate.of(outer_offsets, self.outer_edge.spacing, self.axis_std).widened(self.edge_stds[1])
+                - inner_estimate
+            )
         parts = [self.inner_strip, *self.lanes, self.outer_width]
         return Estimate(sum(p.value for p in parts), float(np.sqrt(sum(p.std**2 for p in parts))))
 
@@ -152,8 +159,8 @@ class MeasuredSection:
 
     Attributes:
         kind: dual or single carriageway.
-        sides: by name.
-        middle: the middle line of a single carriageway.
+        sides: measured carriageway, or half of a single one, by side.
+        middle: the middle line of a single carriageway; None if unseen or of a dual one.
         nearest: name of the nearest standard cross-section; empty for a single carriageway.
         distance: largest difference from it, m.
     """
@@ -174,20 +181,21 @@ class MeasuredSection:
         """Return the width between the carriageways' inner edges, m; None for a single carriageway."""
         if self.kind == "single":
             return None
-        left, right = self.sides["left"].inner_offset, self.sides["right"].inner_offset
-        return Estimate(left.value + right.value, float(np.hypot(left.std, right.std)))
+        left_offset, right_offset = self.sides["left"].inner_offset, self.sides["right"].inner_offset
+        return Estimate(left_offset.value + right_offset.value, float(np.hypot(left_offset.std, right_offset.std)))
 
 
-def measure_section(layout: RoadLayout, marked: bool, axis_std: float = 0.0) -> MeasuredSection:
+def measure_section(layout: RoadLayout, has_paint_class: bool, axis_std: float = 0.0) -> MeasuredSection:
     """Return the cross-section, with standard deviations, that profiles along the alignment show.
 
     Args:
-        layout: of profiles along the alignment, so that offset 0 is the axis.
-        marked: whether paint is known by class; if not, lines look wider than they are and get the usual widths.
+        layout: carriageways and lines in profiles along the alignment, where offset 0 is the axis.
+        has_paint_class: whether paint is known by class; if not, lines look wider than they are and get the usual
+            widths.
         axis_std: standard deviation of where the axis lies, m, from which all is measured.
     """
     bands = zip(SIDES, layout.bands * (2 if layout.kind == "single" else 1), strict=True)
-    parts = [_SidePart(layout, band, side, marked, axis_std) for side, band in bands]
+    parts = [_SidePart(layout, band, side, has_paint_class, axis_std) for side, band in bands]
     if layout.kind == "single":
         return MeasuredSection("single", {part.side: _half_section(part) for part in parts}, layout.bands[0].middle)
     sides = {part.side: _carriageway(part) if len(part.band.lines) > 1 else _assumed_section(part) for part in parts}
@@ -195,7 +203,7 @@ def measure_section(layout: RoadLayout, marked: bool, axis_std: float = 0.0) -> 
 
 
 def carriageway_middles(section: MeasuredSection) -> list[float]:
-    """Return the offsets, m, of the carriageways' middles, about which is pavement for sure."""
+    """Return the offsets, m, of the carriageways' middles, around which is surely pavement."""
     if section.kind != "dual":
         return [0.0]
     sides = section.sides.values()
@@ -208,7 +216,7 @@ class _SidePart:
 
     Attributes:
         layout, marked, axis_std: as in `measure_section`.
-        band: the pavement that is its own, or that it has a half of.
+        band: the side's carriageway, or the single carriageway that it is a half of.
         side: of the axis.
     """
 
@@ -227,41 +235,53 @@ class _SidePart:
         """Return an array (K,) with the same value for each stretch."""
         return np.full(self.layout.profiles.stretches, value)
 
-    def outer_edge(self, first: Float, last: Float) -> Edge:
-        """Return the pavement's outer edge, m from the axis, beyond a last line, or before it where it is narrower.
+    def outer_edge(self, innermost_line: Float, outermost_line: Float) -> Edge:
+        """Return the pavement's outer edge as distances from the axis: beyond the outermost line, else within it.
 
         Args:
             first, last: (K,) distances of the innermost and the outermost line, m.
         """
-        edge = self.edge(last)
-        nearer = self.edge(first, reach=last - first + FARTHEST)
+        edge = self.edge(outermost_line)
+        inside_edge = self.edge(innermost_line, reach=outermost_line - innermost_line + FARTHEST)
         unseen = ~np.isfinite(edge.offsets)
-        return Edge(np.where(unseen, nearer.offsets, edge.offsets), np.where(unseen, nearer.spacing, edge.spacing))
+        return Edge(
+            np.where(unseen, inside_edge.offsets, edge.offsets), np.where(unseen, inside_edge.spacing, edge.spacing)
+        )
 
     def edge(self, begin: Float, outwards: bool = True, reach: float | Float = FARTHEST) -> Edge:
-        """Return the pavement's edge beyond distances (K,), m, from the axis, as distances from the axis."""
+        """Return the pavement's edge as distances from the axis, m.
+
+        Args:
+            begin: (K,) distances from the axis that are surely paved, m.
+            outwards: whether the edge away from the axis is looked for, else the one towards it.
+            reach: distance from ``begin`` in which it is looked for, m; a number, or (K,).
+        """
         sign = self.sign if outwards else -self.sign
         edge = self.layout.pavement.edge(self.sign * begin, sign, reach)
         return Edge(self.sign * edge.offsets, edge.spacing)
 
 
-def line_width(line: Line | None, kind: LineKind, road: RoadKind, marked: bool) -> float:
+def line_width(line: Line | None, kind: LineKind, road: RoadKind, has_paint_class: bool) -> float:
     """Return the width, m, to write for a line: the usual one if the measured one is near it or unreliable."""
-    edge, narrow = (_RURAL_EDGE_LINE, _RURAL_LINE) if road == "single" else (EDGE_LINE, NARROW_LINE)
-    usual = edge if kind == "outer_edge" else narrow
-    if line is None or not marked:
-        return usual
-    known = (_RURAL_LINE, NARROW_LINE, _RURAL_EDGE_LINE, EDGE_LINE)
-    near = min(known, key=lambda width: abs(width - line.width))
-    if abs(usual - line.width) <= _LINE_TOLERANCE:
-        return usual
-    return near if abs(near - line.width) <= _LINE_TOLERANCE else float(np.clip(round(line.width, 2), 0.05, 1.0))
+    edge_width, narrow_width = (_RURAL_EDGE_LINE, _RURAL_LINE) if road == "single" else (EDGE_LINE, NARROW_LINE)
+    usual_width = edge_width if kind == "outer_edge" else narrow_width
+    if line is None or not has_paint_class:
+        return usual_width
+    usual_widths = (_RURAL_LINE, NARROW_LINE, _RURAL_EDGE_LINE, EDGE_LINE)
+    nearest_width = min(usual_widths, key=lambda width: abs(width - line.width))
+    if abs(usual_width - line.width) <= _LINE_TOLERANCE:
+        return usual_width
+    return (
+        nearest_width
+        if abs(nearest_width - line.width) <= _LINE_TOLERANCE
+        else float(np.clip(round(line.width, 2), 0.05, 1.0))
+    )
 
 
-def half_width(line: Line | None, kind: LineKind, road: RoadKind, marked: bool) -> tuple[float, float]:
-    """Return half of the width, m, to write for a line, and its standard deviation as far as the line was measured."""
-    std = 0.5 * line.width_std if line is not None and marked else 0.0
-    return 0.5 * line_width(line, kind, road, marked), std
+def half_width(line: Line | None, kind: LineKind, road: RoadKind, has_paint_class: bool) -> tuple[float, float]:
+    """Return half of the width to write for a line, and the standard deviation of that, m; 0 if it wasn't measured."""
+    std = 0.5 * line.width_std if line is not None and has_paint_class else 0.0
+    return 0.5 * line_width(line, kind, road, has_paint_class), std
 
 
 @dataclass(frozen=True)
@@ -269,11 +289,11 @@ class _Boundary:
     """A boundary of a lane as distances from the axis, m.
 
     Attributes:
-        smoothed: (K,) along the road; NaN where it isn't there.
-        measured: (K,) in single stretches; NaN where nothing was seen.
-        spacing: (K,) distance of the rows of points that each lies midway between, 0 where it is a mean.
-        seen: whether it was: else it is put evenly between its neighbours.
-        std: of what all places share, m.
+        smoothed: (K,) smoothed distances; NaN where the boundary isn't there.
+        measured: (K,) distances measured in single stretches; NaN where nothing was seen.
+        spacing: (K,) distance of the two rows of points that a measured one lies midway between; 0 where it is a mean.
+        seen: whether the boundary was seen; if not, it is placed evenly between its neighbours.
+        std: standard deviation of the error that is the same all along the road, m.
     """
 
     smoothed: Float
@@ -284,17 +304,22 @@ class _Boundary:
 
     @classmethod
     def of(cls, line: Line, sign: int) -> Self:
-        """Return a line's middle as a boundary on the side of a sign."""
+        """Return a line's middle as a boundary of the left (1) or right (-1) side."""
         return cls(sign * line.offsets, sign * line.measured, line.spacing)
 
-    def shift(self, by: float, std: float) -> Self:
-        """Return the boundary so much (m) farther outside, known no better than by a standard deviation, m."""
+    def shift(self, distance: float, std: float) -> Self:
+        """Return the boundary moved outwards by a distance, m, that has a standard deviation of its own, m."""
         std = float(np.hypot(self.std, std))
-        return replace(self, smoothed=self.smoothed + by, measured=self.measured + by, std=std)
+        return replace(self, smoothed=self.smoothed + distance, measured=self.measured + distance, std=std)
 
-    def place(self, where: Bool, axis_std: float) -> Estimate:
-        """Return the mean distance from the axis, of a standard deviation (m), in the stretches of a mask (K,), m."""
-        values = np.where(where, self.measured, np.nan)
+    def place(self, mask: Bool, axis_std: float) -> Estimate:
+        """Return the boundary's mean distance from the axis, m, in some stretches, or in all if it is seen in none.
+
+        Args:
+            mask: (K,) stretches that count.
+            axis_std: standard deviation of the axis' offset, m.
+        """
+        values = np.where(mask, self.measured, np.nan)
         estimate = Estimate.of(values if np.isfinite(values).any() else self.measured, self.spacing, axis_std)
         estimate = estimate.widened(self.std)
         return estimate if self.seen else replace(estimate, std=np.inf)
@@ -304,79 +329,80 @@ def _carriageway(part: _SidePart) -> SideSection:
     """Return the measured cross-section of one carriageway of a dual one."""
     lines, boundaries = _order_lines(part.band, part.sign)
     boundaries[0] = boundaries[0].shift(*half_width(lines[0], "inner_edge", "dual", part.marked))
-    first, last = boundaries[0].smoothed, boundaries[-1].smoothed
-    outer = part.outer_edge(_fill_with_median(first), _fill_with_median(last))
-    if not _lacks_outer_lane(lines[-1], outer):
-        half, std = half_width(lines[-1], "outer_edge", "dual", part.marked)
-        boundaries[-1] = boundaries[-1].shift(-half, std)
-    first = _fill_with_median(first)
-    return _summarise_side(part, lines, boundaries, part.edge(first, False, first), outer)
+    innermost_line, outermost_line = boundaries[0].smoothed, boundaries[-1].smoothed
+    outer_edge = part.outer_edge(_fill_with_median(innermost_line), _fill_with_median(outermost_line))
+    if not _lacks_outer_lane(lines[-1], outer_edge):
+        half_line, std = half_width(lines[-1], "outer_edge", "dual", part.marked)
+        boundaries[-1] = boundaries[-1].shift(-half_line, std)
+    innermost_line = _fill_with_median(innermost_line)
+    return _summarise_side(part, lines, boundaries, part.edge(innermost_line, False, innermost_line), outer_edge)
 
 
 def _half_section(part: _SidePart) -> SideSection:
     """Return the measured cross-section of one direction of a single carriageway, from the axis outwards."""
-    nowhere = part.everywhere(0.0)
-    beside = {s: _half_lines(part.band, s, part.marked) for s in (1, -1)}
-    lines: list[Line | None] = [part.band.middle, *beside[part.sign]]
-    columns = [_Boundary(nowhere, nowhere, nowhere), *(_Boundary.of(line, part.sign) for line in beside[part.sign])]
-    outer = part.edge(part.everywhere(_NARROWEST), reach=_WIDEST_HALF)
-    mirrored = len(lines) == 1 and bool(beside[-part.sign])
+    zeros = part.everywhere(0.0)
+    side_lines = {s: _half_lines(part.band, s, part.marked) for s in (1, -1)}
+    lines: list[Line | None] = [part.band.middle, *side_lines[part.sign]]
+    columns = [_Boundary(zeros, zeros, zeros), *(_Boundary.of(line, part.sign) for line in side_lines[part.sign])]
+    outer_edge = part.edge(part.everywhere(_NARROWEST), reach=_WIDEST_HALF)
+    is_mirrored = len(lines) == 1 and bool(side_lines[-part.sign])
     if len(lines) > 1:
         half_line, std = half_width(lines[-1], "outer_edge", "single", part.marked)
         columns[-1] = columns[-1].shift(-half_line, std)
-    elif mirrored:
-        other = min(abs(line.offset) for line in beside[-part.sign])
-        place = part.everywhere(other - 0.5 * line_width(None, "outer_edge", "single", part.marked))
-        columns.append(_Boundary(place, place, nowhere, False))
+    elif is_mirrored:
+        opposite_distance = min(abs(line.offset) for line in side_lines[-part.sign])
+        lane_edge = part.everywhere(opposite_distance - 0.5 * line_width(None, "outer_edge", "single", part.marked))
+        columns.append(_Boundary(lane_edge, lane_edge, zeros, False))
     else:  # no edge line at all: the lane reaches to the pavement's edge
-        visible = bool(np.isfinite(outer.offsets).any())
-        place = outer.offsets if visible else part.everywhere(0.5 * part.band.width)
-        columns.append(_Boundary(place, place, outer.spacing, visible))
+        edge_visible = bool(np.isfinite(outer_edge.offsets).any())
+        lane_edge = outer_edge.offsets if edge_visible else part.everywhere(0.5 * part.band.width)
+        columns.append(_Boundary(lane_edge, lane_edge, outer_edge.spacing, edge_visible))
     lines += [None] * (len(columns) - len(lines))
-    inner = Edge(nowhere, nowhere)
-    half = _summarise_side(part, lines, columns, inner, outer)
-    nothing = Estimate(0.0, 0.0)
-    return replace(half, inner_offset=nothing, inner_strip=nothing, mirrored=mirrored)
+    inner_edge = Edge(zeros, zeros)
+    half_section = _summarise_side(part, lines, columns, inner_edge, outer_edge)
+    zero = Estimate(0.0, 0.0)
+    return replace(half_section, inner_offset=zero, inner_strip=zero, mirrored=is_mirrored)
 
 
-def _half_lines(band: Band, sign: int, marked: bool) -> list[Line]:
-    """Return the lines on one half of a single carriageway, outwards; if not ``marked`` just the most painted one.
+def _half_lines(band: Band, sign: int, has_paint_class: bool) -> list[Line]:
+    """Return the lines on one half of a single carriageway, outwards; without a class of paint just the best one.
 
     Where brightness tells paint, seams and verges pass for lines too: only the best in a lane's distance counts.
     """
     lines = sorted(
         (line for line in band.lines if sign * line.offset > _NARROWEST), key=lambda line: sign * line.offset
     )
-    if marked:
+    if has_paint_class:
         return lines
-    near = [line for line in lines if sign * line.offset < _WIDEST_LANE]
-    return [max(near, key=lambda line: line.length * line.width)] if near else []
+    lane_lines = [line for line in lines if sign * line.offset < _WIDEST_LANE]
+    return [max(lane_lines, key=lambda line: line.length * line.width)] if lane_lines else []
 
 
 def _assumed_section(part: _SidePart) -> SideSection:
     """Return a carriageway whose lines aren't seen, with the lanes of the standard section nearest in width."""
     middle = part.everywhere(part.sign * 0.5 * (part.band.low + part.band.high))
-    outer = part.edge(middle, reach=0.5 * part.band.width + _WIDEST)
-    inner = part.edge(middle, False, np.abs(middle))
-    width = mean_with_std(outer.offsets - inner.offsets)[0]
+    outer_edge = part.edge(middle, reach=0.5 * part.band.width + _WIDEST)
+    inner_edge = part.edge(middle, False, np.abs(middle))
+    width = mean_with_std(outer_edge.offsets - inner_edge.offsets)[0]
     width = width if np.isfinite(width) else part.band.width
     name = min(STANDARD_CROSS_SECTIONS, key=lambda key: abs(STANDARD_CROSS_SECTIONS[key].paved_width - width))
     row = STANDARD_CROSS_SECTIONS[name]
-    first = inner.offsets + row.inner_edge_strip
-    places = [first + sum(row.lanes[::-1][:i]) for i in range(len(row.lanes) + 1)]
-    columns = [_Boundary(place, place, inner.spacing, False) for place in places]
+    innermost_line = inner_edge.offsets + row.inner_edge_strip
+    lane_edges = [innermost_line + sum(row.lanes[::-1][:i]) for i in range(len(row.lanes) + 1)]
+    columns = [_Boundary(lane_edge, lane_edge, inner_edge.spacing, False) for lane_edge in lane_edges]
     lines: list[Line | None] = [None] * len(columns)
-    measured_side = _summarise_side(part, lines, columns, inner, outer)
+    measured_side = _summarise_side(part, lines, columns, inner_edge, outer_edge)
     lanes = [Estimate(lane, np.inf) for lane in reversed(row.lanes)]
     return replace(measured_side, lanes=lanes, inner_strip=Estimate(row.inner_edge_strip, np.inf), assumed=name)
 
 
-def _lacks_outer_lane(line: Line | None, outer: Edge) -> bool:
-    """Return whether the outermost line is dashed with no edge seen, so that the cloud lacks the outer lane."""
-    return line is not None and not line.solid and not _is_visible(outer)
+def _lacks_outer_lane(line: Line | None, outer_edge: Edge) -> bool:
+    """Return whether the outermost line is dashed and no edge is seen beyond: the cloud then lacks the outer lane."""
+    return line is not None and not line.solid and not _is_visible(outer_edge)
 
 
 def _is_visible(edge: Edge) -> bool:
+    """Return whether an edge is seen in more than `_FEWEST_EDGES` of the stretches."""
     return bool(np.isfinite(edge.offsets).mean() > _FEWEST_EDGES)
 
 
@@ -386,62 +412,65 @@ def _fill_with_median(distance: Float) -> Float:
 
 
 def _summarise_side(
-    part: _SidePart, lines: list[Line | None], boundaries: list[_Boundary], inner: Edge, outer: Edge
+    part: _SidePart, lines: list[Line | None], boundaries: list[_Boundary], inner_edge: Edge, outer_edge: Edge
 ) -> SideSection:
     """Return a side's widths, with standard deviations, from lines and edges measured in each stretch."""
-    edge_seen = _is_visible(outer)
-    outer_width = outer.offsets - _fill_with_median(boundaries[-1].smoothed)
+    # Widths count in the usual stretches only, in all where these are few.
+    edge_seen = _is_visible(outer_edge)
+    outer_width = outer_edge.offsets - _fill_with_median(boundaries[-1].smoothed)
     if part.band.usual is not None:
         outer_width = np.where(part.band.usual, outer_width, np.nan)
-    usual = _usual_stretches(outer_width, lines[-1])
-    mask = usual if usual.sum() >= _FEWEST_STRETCHES else np.ones(len(usual), dtype=bool)
+    usual_mask = _usual_stretches(outer_width, lines[-1])
+    mask = usual_mask if usual_mask.sum() >= _FEWEST_STRETCHES else np.ones(len(usual_mask), dtype=bool)
+    # The lanes' boundaries, in the order of their distance from the axis.
     paint_std = 0.0 if part.marked else _PAINT_STD
     offsets = [boundary.place(mask, part.axis_std).widened(paint_std) for boundary in boundaries]
     edge_std = 0.0 if part.layout.profiles.paved is not None else _EDGE_STD
     if part.layout.kind == "single":  # its lanes begin at the axis
         offsets[0] = replace(offsets[0], std=part.axis_std)
-    outside = Estimate(_USUAL_STRIP, np.inf)
+    # The pavement outside of the lanes: edge strip and shoulder.
+    outer_estimate = Estimate(_USUAL_STRIP, np.inf)
     if edge_seen:
-        # Over the same stretches as the lines, so that what all of them share goes out of the difference.
-        edge = Estimate.of(np.where(mask, outer.offsets, np.nan), outer.spacing, part.axis_std)
-        outside = edge.widened(edge_std) - offsets[-1]
-    outside = Estimate(float(np.clip(outside.value, 0.0, 2.0 + _WIDEST)), outside.std)
-    strip, shoulder = _share_pavement(outside)
-    inner_offset, inner_strip = _inner_widths(offsets[0], inner, mask, edge_std, part.axis_std)
-    # The axis' own error is in no difference of two lines, but in the distance from it.
+        # Over the same stretches as the lines, so that errors that edge and lines share cancel in the difference.
+        edge = Estimate.of(np.where(mask, outer_edge.offsets, np.nan), outer_edge.spacing, part.axis_std)
+        outer_estimate = edge.widened(edge_std) - offsets[-1]
+    outer_estimate = Estimate(float(np.clip(outer_estimate.value, 0.0, 2.0 + _WIDEST)), outer_estimate.std)
+    strip, shoulder = _share_pavement(outer_estimate)
+    inner_offset, inner_strip = _inner_widths(offsets[0], inner_edge, mask, edge_std, part.axis_std)
+    # The axis' error cancels in differences of two lines, but not in the distance from the axis.
     inner_offset = inner_offset.widened(part.axis_std)
     return SideSection(
         side=part.side,
         lines=lines,
-        inner_edge=inner,
-        outer_edge=outer,
-        usual=usual,
+        inner_edge=inner_edge,
+        outer_edge=outer_edge,
+        usual=usual_mask,
         inner_offset=inner_offset,
         inner_strip=inner_strip,
-        lanes=[after - before for before, after in pairwise(offsets)],
-        outer_width=outside,
+        lanes=[outer_boundary - inner_boundary for inner_boundary, outer_boundary in pairwise(offsets)],
+        outer_width=outer_estimate,
         strip=strip,
         shoulder=shoulder,
         edge_seen=edge_seen,
-        closed=not _lacks_outer_lane(lines[-1], outer),
+        closed=not _lacks_outer_lane(lines[-1], outer_edge),
         axis_std=part.axis_std,
         edge_stds=(edge_std if part.layout.kind == "dual" else part.axis_std, edge_std),
     )
 
 
 def _inner_widths(
-    lane_boundary: Estimate, inner: Edge, mask: Bool, edge_std: float, axis_std: float
+    lane_boundary: Estimate, inner_edge: Edge, mask: Bool, edge_std: float, axis_std: float
 ) -> tuple[Estimate, Estimate]:
     """Return the distance of the pavement's inner edge from the axis, and the inner edge strip's width, m.
 
     Args:
         lane_boundary: distance of the innermost lane's inner boundary from the axis.
-        inner: the pavement's inner edge.
+        inner_edge: the pavement's inner edge.
         mask: (K,) the stretches that count.
         edge_std, axis_std: standard deviations of any edge and of the axis, m.
     """
-    if _is_visible(inner):
-        edge = Estimate.of(np.where(mask, inner.offsets, np.nan), inner.spacing, axis_std).widened(edge_std)
+    if _is_visible(inner_edge):
+        edge = Estimate.of(np.where(mask, inner_edge.offsets, np.nan), inner_edge.spacing, axis_std).widened(edge_std)
         strip = lane_boundary - edge
     else:
         # Assumed, not measured: an infinite standard deviation says so.
@@ -452,56 +481,61 @@ def _inner_widths(
 
 
 def _usual_stretches(width: Float, line: Line | None) -> Bool:
-    """Return a mask (K,) of the stretches where the pavement outside of the lanes is the road's own, not a turnout's.
+    """Return a mask (K,) of the stretches in which the pavement outside of the lanes is the road's, not a turnout's.
 
     Beside exits and entries the edge line is a dashed one; beside an emergency bay the pavement is wider.
     """
-    usual = np.isfinite(width)
+    usual_mask = np.isfinite(width)
     if line is not None and line.solid:
         cover = np.where(np.isfinite(line.cover), line.cover, 0.0)
-        solid = ndimage.uniform_filter1d(cover, _AROUND, mode="nearest") > _SOLID
-        usual &= solid if (solid & usual).sum() >= _FEWEST_STRETCHES else usual
-    if not usual.any():
-        return usual
-    count, edges = np.histogram(width[usual], np.arange(-1.0, 10.0, 0.1))
+        solid_mask = ndimage.uniform_filter1d(cover, _AROUND, mode="nearest") > _SOLID
+        usual_mask &= solid_mask if (solid_mask & usual_mask).sum() >= _FEWEST_STRETCHES else usual_mask
+    if not usual_mask.any():
+        return usual_mask
+    # Chosen: bins of 0.1 m up to 10 m; from -1 m on, as a measured edge may lie within the lane's line.
+    count, edges = np.histogram(width[usual_mask], np.arange(-1.0, 10.0, 0.1))
     density = ndimage.uniform_filter1d(count.astype(np.float64), 3)
     # Turnouts make the pavement wider, and on a short road may be longer than what lies between them: of the common
     # widths the smallest is the road's own.
     peak = int(find_peaks(np.pad(density, 1), height=_COMMON * density.max())[0][0]) - 1
-    return usual & (np.abs(width - edges[peak] - 0.05) < _MODE)
+    return usual_mask & (np.abs(width - edges[peak] - 0.05) < _MODE)
 
 
 def _order_lines(band: Band, sign: int) -> tuple[list[Line | None], list[_Boundary]]:
-    """Return lines outwards (None: unseen), and where they lie; unseen ones evenly between their neighbours."""
+    """Return a band's lines from inside to outside (None: unseen), and each as a boundary of a lane.
+
+    Unseen lines are placed evenly between their neighbours.
+    """
     pairs: list[tuple[float, Line | None]] = [(sign * band.place(line), line) for line in band.lines]
     pairs += [(sign * offset, None) for offset in band.missing]
     pairs.sort(key=lambda pair: pair[0])
     lines = [line for _, line in pairs]
-    measured = {number: _Boundary.of(line, sign) for number, line in enumerate(lines) if line is not None}
+    seen_boundaries = {number: _Boundary.of(line, sign) for number, line in enumerate(lines) if line is not None}
     boundaries = []
     for number in range(len(lines)):
-        if number in measured:
-            boundaries.append(measured[number])
+        if number in seen_boundaries:
+            boundaries.append(seen_boundaries[number])
             continue
         # Missing lines lie between measured ones only (`layout`), so that there is one on either side.
-        before, after = max(i for i in measured if i < number), min(i for i in measured if i > number)
-        share = (number - before) / (after - before)
-        offset = (1.0 - share) * measured[before].smoothed + share * measured[after].smoothed
-        boundaries.append(_Boundary(offset, offset, measured[before].spacing, False))
+        inner_number = max(i for i in seen_boundaries if i < number)
+        outer_number = min(i for i in seen_boundaries if i > number)
+        share = (number - inner_number) / (outer_number - inner_number)
+        offset = (1.0 - share) * seen_boundaries[inner_number].smoothed + share * seen_boundaries[outer_number].smoothed
+        boundaries.append(_Boundary(offset, offset, seen_boundaries[inner_number].spacing, False))
     return lines, boundaries
 
 
-def _share_pavement(outside: Estimate) -> tuple[Estimate, Estimate]:
+def _share_pavement(outer_width: Estimate) -> tuple[Estimate, Estimate]:
     """Return the widths, m, of edge strip and hard shoulder that share the pavement outside of the lanes.
 
-    Nothing on the road parts them: the strip is as wide as that of the standard cross-section which fits best.
+    Nothing on the road separates both: the strip gets the width that it has in the nearest standard cross-section.
     """
-    if outside.value <= _WIDEST_STRIP:
-        return outside, Estimate(0.0, 0.0)
+    if outer_width.value <= _WIDEST_STRIP:
+        return outer_width, Estimate(0.0, 0.0)
     rows = STANDARD_CROSS_SECTIONS.values()
-    best = min(rows, key=lambda row: abs(row.hard_shoulder + row.outer_edge_strip - outside.value))
-    strip = best.outer_edge_strip
-    return Estimate(strip, 0.0), Estimate(min(outside.value - strip, _WIDEST), outside.std)
+    best_section = min(rows, key=lambda row: abs(row.hard_shoulder + row.outer_edge_strip - outer_width.value))
+    strip = best_section.outer_edge_strip
+    return Estimate(strip, 0.0), Estimate(min(outer_width.value - strip, _WIDEST), outer_width.std)
 
 
 def nearest_standard(sides: dict[Side, SideSection]) -> tuple[str, float]:
@@ -509,12 +543,15 @@ def nearest_standard(sides: dict[Side, SideSection]) -> tuple[str, float]:
     distances = {
         name: max(_misfit(side, row) for side in sides.values()) for name, row in STANDARD_CROSS_SECTIONS.items()
     }
-    best = min(distances, key=lambda name: distances[name])
-    return best, distances[best]
+    nearest_name = min(distances, key=lambda name: distances[name])
+    return nearest_name, distances[nearest_name]
 
 
 def _misfit(side: SideSection, row: StandardCrossSection) -> float:
-    """Return the largest difference of a width, m, a lane's counting twice; inf if the numbers of lanes differ."""
+    """Return the largest difference, m, of a side's widths from a standard one's; inf if the numbers of lanes differ.
+
+    Differences of lanes count twice.
+    """
     if len(side.lanes) != len(row.lanes):
         return float("inf")
     differences = [2.0 * abs(lane.value - width) for lane, width in zip(side.lanes, reversed(row.lanes), strict=True)]
@@ -526,7 +563,7 @@ def _misfit(side: SideSection, row: StandardCrossSection) -> float:
 
 
 def snap_to_standard(section: MeasuredSection) -> MeasuredSection:
-    """Return the cross-section with the widths of the standard one it passes for; unchanged if it passes for none."""
+    """Return the cross-section with the widths of the standard one within tolerance; unchanged if there is none."""
     if section.standard is None:
         return section
     row = STANDARD_CROSS_SECTIONS[section.standard]
@@ -540,8 +577,8 @@ def snap_to_standard(section: MeasuredSection) -> MeasuredSection:
     sides: dict[Side, SideSection] = {}
     for name, side in section.sides.items():
         lanes = [replace(lane, value=width) for width, lane in zip(reversed(row.lanes), side.lanes, strict=True)]
-        exact = {field: replace(getattr(side, field), value=width) for field, width in widths.items()}
-        sides[name] = replace(side, lanes=lanes, **exact)
+        snapped_widths = {field: replace(getattr(side, field), value=width) for field, width in widths.items()}
+        sides[name] = replace(side, lanes=lanes, **snapped_widths)
     return replace(section, sides=sides)
 
 
@@ -554,4 +591,5 @@ def standard_section(section: MeasuredSection) -> dict[str, Any] | None:
 
 
 def _finite(value: float, digits: int) -> float | None:
+    """Return a number rounded to some digits; None if it isn't finite."""
     return round(float(value), digits) if np.isfinite(value) else None

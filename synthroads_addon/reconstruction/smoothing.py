@@ -50,59 +50,59 @@ class SmoothedValues:
 
 
 def smooth(
-    values: Float, weights: Float, spacing: float, wavelength: float, order: int = ORDER, usual: float = 0.0
+    values: Float, weights: Float, spacing: float, wavelength: float, order: int = ORDER, usual_std: float = 0.0
 ) -> SmoothedValues:
     """Smooth values (N,) at equal spacing by Whittaker's method with bisquare weights; return standard deviations too.
 
     Args:
         values: (N,); NaN where nothing was measured.
-        weights: (N,) >= 0, how much each counts, e.g. by its number of points.
+        weights: (N,) >= 0, weight of each value, e.g. by its number of points.
         spacing: distance of neighbours, m.
         wavelength: a wave of this length (m) keeps half of its amplitude; shorter ones vanish.
         order: of the differences that are held small.
-        usual: standard deviation of single values that is nothing unusual: no fault is seen in it.
+        usual_std: standard deviation of single values up to which none counts as an outlier.
 
     The residuals of neighbours may go together (markings are painted with a slow sway): the standard deviations are
     widened by the factor that their lag-1 correlation asks for.
     """
-    known = np.isfinite(values) & (weights > 0.0)
+    is_measured = np.isfinite(values) & (weights > 0.0)
     count = len(values)
-    if known.sum() <= order:
-        level = float(np.median(values[known])) if known.any() else 0.0
-        return SmoothedValues(np.full(count, level), np.full(count, np.inf), np.inf)
-    y = np.where(known, values, 0.0)
-    w = np.where(known, weights, 0.0)
-    w = w / w[known].mean()
+    if is_measured.sum() <= order:
+        median = float(np.median(values[is_measured])) if is_measured.any() else 0.0
+        return SmoothedValues(np.full(count, median), np.full(count, np.inf), np.inf)
+    observations = np.where(is_measured, values, 0.0)
+    weight = np.where(is_measured, weights, 0.0)
+    weight = weight / weight[is_measured].mean()
     order = min(order, count - 1)
     # Whittaker 1923, Eilers 2003: (W + lambda D'D) z = W y. Of a wave of the angular frequency omega per step the share
     # 1 / (1 + lambda omega^(2 order)) stays, half of it for lambda = (wavelength / (2 pi spacing))^(2 order).
     penalty = (wavelength / (2.0 * np.pi * spacing)) ** (2 * order) * _difference_bands(count, order)
-    robustness = known.astype(np.float64)
-    z, scatter = y, 0.0
+    robustness = is_measured.astype(np.float64)
+    smooth_values, scatter = observations, 0.0
     for _ in range(_ROUNDS):
-        cholesky, z = _solve(penalty, w * robustness, y)
-        residual = y - z
-        scatter = robust_scale(residual[known] * np.sqrt(w[known]))
-        robustness = np.where(known, bisquare(residual * np.sqrt(w), max(scatter, usual, 1e-9)), 0.0)
-    cholesky, z = _solve(penalty, w * robustness, y)
-    inliers = known & (robustness > 0.0)
-    residual = (y - z)[inliers] * np.sqrt(w[inliers])
+        cholesky, smooth_values = _solve(penalty, weight * robustness, observations)
+        residual = observations - smooth_values
+        scatter = robust_scale(residual[is_measured] * np.sqrt(weight[is_measured]))
+        robustness = np.where(is_measured, bisquare(residual * np.sqrt(weight), max(scatter, usual_std, 1e-9)), 0.0)
+    cholesky, smooth_values = _solve(penalty, weight * robustness, observations)
+    inliers = is_measured & (robustness > 0.0)
+    residual = (observations - smooth_values)[inliers] * np.sqrt(weight[inliers])
     scatter = float(np.sqrt(np.mean(residual**2))) if len(residual) else 0.0
     # Var(z_i) = scatter^2 [(W + lambda D'D)^-1]_ii, times what correlated residuals are worth less.
     widening = np.sqrt(correlation_factor(residual))
     std = scatter * widening * np.sqrt(np.maximum(_inverse_diagonal(cholesky), 0.0))
-    return SmoothedValues(z, std, scatter)
+    return SmoothedValues(smooth_values, std, scatter)
 
 
 def correlation_factor(residual: Float) -> float:
-    """Return how many values, correlated (lag 1) as residuals (N,) are, tell as much as one independent value."""
+    """Return how many values with the lag-1 correlation of residuals (N,) are worth one independent value."""
     if len(residual) < _FEWEST_LAGS:
         return 1.0
     centred = residual - residual.mean()
     variance = float(centred @ centred)
     rho = float(centred[1:] @ centred[:-1]) / variance if variance > 0.0 else 0.0
     rho = min(max(rho, 0.0), _LARGEST_LAG)
-    # Of a first-order autoregression n values are worth n (1 - rho) / (1 + rho).
+    # Effective sample size of a first-order autoregression: n (1 - rho) / (1 + rho).
     return (1.0 + rho) / (1.0 - rho)
 
 
@@ -129,7 +129,7 @@ def mean_with_std(values: Float) -> tuple[float, float]:
 
 
 def interval_mean(values: Float, spacing: Float, axis_std: float = 0.0) -> tuple[float, float]:
-    """Return the mean of values (K,) along the road that each lie midway between two rows of points, and its deviation.
+    """Return the mean, and its standard deviation, of values (K,) that each lie midway between two rows of points.
 
     A value is evenly likely everywhere between its rows, ``spacing`` (K,) from each other, m, and so are all of them at
     once where the rows run beside the road: however many there are, they say no more than one. Where the rows wander
@@ -137,21 +137,22 @@ def interval_mean(values: Float, spacing: Float, axis_std: float = 0.0) -> tuple
     them, and weigh as `correlation_factor` says. Values that are means of many points have no interval. Where the axis
     that all is measured from wanders by its deviation ``axis_std``, m, the rows only seem to.
     """
-    known = np.isfinite(values) & np.isfinite(spacing)
-    x, half = values[known], 0.5 * spacing[known]
-    if not len(x):
+    is_measured = np.isfinite(values) & np.isfinite(spacing)
+    middles, half_length = values[is_measured], 0.5 * spacing[is_measured]
+    if not len(middles):
         return float("nan"), float("inf")
-    centre = mean_with_std(x)[0]
-    sigma = _end_scatter(x, half, centre, axis_std)
-    low, high = x - np.maximum(half, 0.5 * _LEAST_SCATTER), x + np.maximum(half, 0.5 * _LEAST_SCATTER)
-    mu = np.arange(np.percentile(low, 1) - sigma, np.percentile(high, 99) + sigma + _GRID, _GRID)
+    centre = mean_with_std(middles)[0]
+    sigma = _end_scatter(middles, half_length, centre, axis_std)
+    lower_ends = middles - np.maximum(half_length, 0.5 * _LEAST_SCATTER)
+    upper_ends = middles + np.maximum(half_length, 0.5 * _LEAST_SCATTER)
+    mu = np.arange(np.percentile(lower_ends, 1) - sigma, np.percentile(upper_ends, 99) + sigma + _GRID, _GRID)
     # A uniform distribution from low to high, convolved with a normal one of sigma:
     # L_i(mu) = Phi((mu - low_i) / sigma) - Phi((mu - high_i) / sigma), over its largest, but no less than an outlier's.
-    likelihood = ndtr((mu - low[:, None]) / sigma) - ndtr((mu - high[:, None]) / sigma)
+    likelihood = ndtr((mu - lower_ends[:, None]) / sigma) - ndtr((mu - upper_ends[:, None]) / sigma)
     likelihood = np.maximum(likelihood / np.maximum(likelihood.max(axis=1, keepdims=True), 1e-12), _OUTLIER)
     # The sum of logarithms counts K values; it is tempered (a power of the likelihood) to those that are independent.
     log_likelihood = np.log(likelihood).sum(axis=0)
-    log_likelihood *= min(1.0 / correlation_factor(x - centre), _MOST_INDEPENDENT / len(x))
+    log_likelihood *= min(1.0 / correlation_factor(middles - centre), _MOST_INDEPENDENT / len(middles))
     # Posterior over the grid under a flat prior: its mean, and its deviation with the grid's own.
     posterior = np.exp(log_likelihood - log_likelihood.max())
     posterior /= posterior.sum()
@@ -159,19 +160,21 @@ def interval_mean(values: Float, spacing: Float, axis_std: float = 0.0) -> tuple
     return mean, float(np.hypot(np.sqrt(posterior @ (mu - mean) ** 2), _GRID))
 
 
-def _end_scatter(x: Float, half: Float, centre: float, axis_std: float) -> float:
+def _end_scatter(middles: Float, half_lengths: Float, centre: float, axis_std: float) -> float:
     """Return the standard deviation, m, of the ends of intervals (K,) about their true places.
 
     Args:
-        x: middles of the intervals, m.
-        half: half of their lengths, m.
+        middles: (K,) middles of the intervals, m.
+        half_lengths: (K,) halves of their lengths, m.
         centre: robust mean of the middles, m.
         axis_std: deviation of the axis that all is measured from, m.
     """
-    excess = np.maximum(np.abs(x - centre) - half, 0.0)  # by how much an interval misses the mean
+    excess = np.maximum(np.abs(middles - centre) - half_lengths, 0.0)  # by how much an interval misses the mean
     # Differences of neighbours have sqrt(2) of the scatter; what the intervals explain of it isn't the ends'.
-    step = robust_scale(np.diff(x)) / np.sqrt(2.0) if len(x) > 1 else 0.0
-    return max(_LEAST_SCATTER, axis_std, robust_scale(excess), min(step, float(np.median(half)) + _LEAST_SCATTER))
+    step = robust_scale(np.diff(middles)) / np.sqrt(2.0) if len(middles) > 1 else 0.0
+    return max(
+        _LEAST_SCATTER, axis_std, robust_scale(excess), min(step, float(np.median(half_lengths)) + _LEAST_SCATTER)
+    )
 
 
 def hidden_std(spacing: Float, scatter: float) -> float:
@@ -205,8 +208,8 @@ def bisquare(residual: Float, scale: float) -> Float:
 
 def fill_gaps(values: Float) -> Float:
     """Return values (N,) with NaN interpolated linearly, held at the ends; at least one must not be NaN."""
-    rows, known = np.arange(len(values)), np.isfinite(values)
-    return np.interp(rows, rows[known], values[known])
+    rows, is_known = np.arange(len(values)), np.isfinite(values)
+    return np.interp(rows, rows[is_known], values[is_known])
 
 
 def _difference_bands(count: int, order: int) -> Float:
@@ -233,17 +236,17 @@ def _solve(penalty: Float, weights: Float, values: Float) -> tuple[Float, Float]
 def _inverse_diagonal(cholesky: Float) -> Float:
     """Return the diagonal (N,) of a banded matrix's inverse from its lower Cholesky factor (Takahashi's recursion)."""
     bandwidth, count = cholesky.shape[0] - 1, cholesky.shape[1]
-    z = np.zeros((bandwidth + 1, count + bandwidth))  # bands of the inverse, from the diagonal downwards
+    inverse_bands = np.zeros((bandwidth + 1, count + bandwidth))  # bands of the inverse, from the diagonal downwards
     # Takahashi et al. 1973, of A = L D L' with a unit lower L: Z = D^-1 L^-1 + (I - L') Z. Column i needs the columns
     # behind it only, so that they are worked out from the last to the first.
-    lower = cholesky / cholesky[0]
+    unit_lower = cholesky / cholesky[0]
     inverse_d = 1.0 / cholesky[0] ** 2
     for i in range(count - 1, -1, -1):
-        column = lower[1:, i]
-        z_column = -_block(z, i + 1, bandwidth) @ column
-        z[1:, i] = z_column
-        z[0, i] = inverse_d[i] - column @ z_column
-    return z[0, :count]
+        column = unit_lower[1:, i]
+        inverse_column = -_block(inverse_bands, i + 1, bandwidth) @ column
+        inverse_bands[1:, i] = inverse_column
+        inverse_bands[0, i] = inverse_d[i] - column @ inverse_column
+    return inverse_bands[0, :count]
 
 
 def _block(bands: Float, start: int, width: int) -> Float:
@@ -260,10 +263,10 @@ def difference_figures(difference: Float, *names: str) -> dict[str, float]:
 
     Without any number there are no figures.
     """
-    known = difference[np.isfinite(difference)]
-    if not len(known):
+    finite_values = difference[np.isfinite(difference)]
+    if not len(finite_values):
         return {}
-    size = np.abs(known)
-    figures = {"mean": known.mean(), "mae": size.mean(), "rms": np.sqrt((size**2).mean())}
+    size = np.abs(finite_values)
+    figures = {"mean": finite_values.mean(), "mae": size.mean(), "rms": np.sqrt((size**2).mean())}
     figures |= {"p95": np.percentile(size, 95), "largest": size.max()}
     return {name: round(float(figures[name]), 4) for name in names}

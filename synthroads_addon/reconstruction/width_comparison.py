@@ -25,14 +25,15 @@ _LANE_THERE = 1.0
 
 @dataclass(frozen=True)
 class WidthErrors:
-    """How far one width of one side is from the true one in K stretches along the reconstructed road.
+    """Errors of one width of one side in K stretches along the reconstructed ("found") road.
 
     Attributes:
-        side: of the reconstructed road.
+        side: side of the reconstructed road.
         name: median (half of it), inner strip, lanes from inside ("lane 1"), outside (all pavement beyond the lanes).
-        error: (K,) found less true, m; infinite where the numbers of lanes differ, NaN beyond the true road's ends.
-        std: (K,) its own standard deviation, m; infinite where the width is said to be a guess.
-        marked: (K,) whether the reconstruction says that it isn't to be trusted there.
+        error: (K,) found minus true width, m; infinite where the numbers of lanes differ, NaN beyond the true road's
+            ends.
+        std: (K,) standard deviation that the reconstruction states, m; infinite where the width is a guess.
+        marked: (K,) mask of the stretches that the reconstruction calls doubtful.
     """
 
     side: Side
@@ -43,72 +44,93 @@ class WidthErrors:
 
     @property
     def off(self) -> Float:
-        """Return by how many of its deviations (K,) the width is off; 0 for a guess, NaN beyond the true road.
+        """Return the error over the stated standard deviation (K,); 0 for a guess, NaN beyond the true road.
 
-        Where the numbers of lanes differ it is infinite.
+        It is infinite where the numbers of lanes differ.
         """
-        off = np.full(len(self.error), np.inf)
-        finite = ~np.isinf(self.error)
-        off[finite] = np.abs(self.error[finite]) / self.std[finite]
-        return off
+        ratio = np.full(len(self.error), np.inf)
+        has_error = ~np.isinf(self.error)
+        ratio[has_error] = np.abs(self.error[has_error]) / self.std[has_error]
+        return ratio
 
 
 def compare_widths(reconstruction: Reconstruction, truth: RoadParameters) -> list[WidthErrors]:
-    """Return the errors of all widths of a reconstruction's cross-section, beside its deviations."""
-    there, here = RoadGeometry(truth), RoadGeometry(reconstruction.parameters)
-    at = reconstruction.measured.stations
+    """Return the errors and stated standard deviations of all widths of a reconstruction's cross-section."""
+    true_road, found_road = RoadGeometry(truth), RoadGeometry(reconstruction.parameters)
+    found_stations = reconstruction.measured.stations
     shift = np.array(reconstruction.parameters.transform.translate[:2]) - np.array(truth.transform.translate[:2])
-    position, heading, _ = here.alignment.frame(at)
-    station, _ = there.alignment.project(position + shift)
-    inside = (at > 0.0) & (at < here.length) & (station > 0.0) & (station < there.length)
-    same = bool(np.median(np.cos(heading - there.alignment.heading(station))) > 0.0)
-    doubted = np.zeros(len(at), dtype=bool)
+    position, heading, _ = found_road.alignment.frame(found_stations)
+    true_stations, _ = true_road.alignment.project(position + shift)
+    # Stations at which a foot lies on the end of either road have none across it.
+    on_both_roads = (
+        (found_stations > 0.0)
+        & (found_stations < found_road.length)
+        & (true_stations > 0.0)
+        & (true_stations < true_road.length)
+    )
+    same_direction = bool(np.median(np.cos(heading - true_road.alignment.heading(true_stations))) > 0.0)
+    doubtful = np.zeros(len(found_stations), dtype=bool)
     for doubt in reconstruction.judgement.doubts:
-        doubted |= (at >= doubt.start) & (at <= doubt.end)
+        doubtful |= (found_stations >= doubt.start) & (found_stations <= doubt.end)
     result = []
-    for name, measured in reconstruction.measured.section.sides.items():
-        other: Side = name if same else ("left" if name == "right" else "right")
-        marked = doubted | unlike_mask([one for one in reconstruction.carriageways.unlike if one.side == name], at)
-        pairs = _pairs(measured, here.sections[name], there.sections[other], at, station)
+    for name, side_section in reconstruction.measured.section.sides.items():
+        true_side: Side = name if same_direction else ("left" if name == "right" else "right")
+        distrusted = doubtful | unlike_mask(
+            [stretch for stretch in reconstruction.carriageways.unlike if stretch.side == name], found_stations
+        )
+        pairs = _pairs(
+            side_section, found_road.sections[name], true_road.sections[true_side], found_stations, true_stations
+        )
         bays = [bay for bay in reconstruction.measured.bays if bay.side == name]
-        for what, error, std in pairs:
-            if what in ("median", "inner strip") and reconstruction.measured.section.kind == "single":
+        for width_name, error, std in pairs:
+            if width_name in ("median", "inner strip") and reconstruction.measured.section.kind == "single":
                 continue  # they have none
-            deviation = _with_bays(at, std, bays) if what == "outside" else np.full(len(at), std)
-            result.append(WidthErrors(name, what, np.where(inside, error, np.nan), deviation, marked))
+            deviation = (
+                _with_bays(found_stations, std, bays) if width_name == "outside" else np.full(len(found_stations), std)
+            )
+            result.append(WidthErrors(name, width_name, np.where(on_both_roads, error, np.nan), deviation, distrusted))
     return result
 
 
 def _pairs(
-    measured: SideSection, reconstructed: CarriagewaySection, true: CarriagewaySection, at: Float, station: Float
+    side_section: SideSection,
+    found_section: CarriagewaySection,
+    true_section: CarriagewaySection,
+    found_stations: Float,
+    true_stations: Float,
 ) -> Iterator[tuple[str, Float, float]]:
-    """Yield (name, found less true (K,), deviation), m, of the widths of one side."""
-    widths = [_widths(section, where) for section, where in ((reconstructed, at), (true, station))]
-    yield "median", widths[0][0] - widths[1][0], measured.inner_offset.std
-    yield "inner strip", widths[0][1] - widths[1][1], measured.inner_strip.std
-    there, lanes = widths[1][2], measured.lanes
-    number = (there >= _LANE_THERE).sum(axis=1)
+    """Yield (name, found minus true width (K,), stated standard deviation), m, of each width of one side."""
+    widths = [
+        _widths(section, stations)
+        for section, stations in ((found_section, found_stations), (true_section, true_stations))
+    ]
+    yield "median", widths[0][0] - widths[1][0], side_section.inner_offset.std
+    yield "inner strip", widths[0][1] - widths[1][1], side_section.inner_strip.std
+    true_lanes, lanes = widths[1][2], side_section.lanes
+    number = (true_lanes >= _LANE_THERE).sum(axis=1)
     for nth, lane in enumerate(lanes):
-        beside = np.take_along_axis(there, np.argsort(there < _LANE_THERE, axis=1, kind="stable"), axis=1)
-        known = np.where(number > nth, beside[:, min(nth, there.shape[1] - 1)], np.nan)
-        error = widths[0][2][:, nth] - known
+        existing_lanes = np.take_along_axis(
+            true_lanes, np.argsort(true_lanes < _LANE_THERE, axis=1, kind="stable"), axis=1
+        )
+        true_width = np.where(number > nth, existing_lanes[:, min(nth, true_lanes.shape[1] - 1)], np.nan)
+        error = widths[0][2][:, nth] - true_width
         yield f"lane {nth + 1}", np.where(number == len(lanes), error, np.inf), lane.std
-    yield "outside", widths[0][3] - widths[1][3], measured.outer_width.std
+    yield "outside", widths[0][3] - widths[1][3], side_section.outer_width.std
 
 
 def _widths(section: CarriagewaySection, station: Float) -> tuple[Float, Float, Float, Float]:
-    """Return half of the median, inner strip, lanes from inside (K, lanes), and all pavement outside of these, m."""
+    """Return inner offset, inner strip, lanes from inside (K, lanes), and the pavement outside of these, m."""
     distances, lanes = section.distances(station), section.lane_boundaries(station)[:, ::-1]
-    inner, outer = distances[:, 0], section.paved_edge(station)
+    inner_edge, outer_edge = distances[:, 0], section.paved_edge(station)
     if "island" in section.kinds:  # beyond it lies a ramp, which is a road of its own
-        island, behind = section.boundaries_of("island", station)
-        outer = np.where(behind - island > _ISLAND, island, outer)
-    return inner, lanes[:, 0] - inner, np.diff(lanes, axis=1), outer - lanes[:, -1]
+        island, island_end = section.boundaries_of("island", station)
+        outer_edge = np.where(island_end - island > _ISLAND, island, outer_edge)
+    return inner_edge, lanes[:, 0] - inner_edge, np.diff(lanes, axis=1), outer_edge - lanes[:, -1]
 
 
-def _with_bays(at: Float, std: float, bays: list[Bay]) -> Float:
-    """Return the deviation (K,), m, of the width outside of the lanes, within bays that of the bay's shape as well."""
-    result = np.full(len(at), std)
+def _with_bays(stations: Float, std: float, bays: list[Bay]) -> Float:
+    """Return the standard deviation (K,), m, of the width outside of the lanes, in bays with the bay's own."""
+    result = np.full(len(stations), std)
     for bay in bays:
-        result = np.hypot(result, bay.std_at(at))
+        result = np.hypot(result, bay.std_at(stations))
     return result

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.remarks import collected_remarks
-from synthroads_addon.fitting.between import swings, without_swings
+from synthroads_addon.fitting.between import calm_swings, excess_swings
 from synthroads_addon.fitting.chain import EQUAL
 from synthroads_addon.fitting.design import Model
 from synthroads_addon.fitting.fit import axis_of_points, fit_axis
-from synthroads_addon.fitting.follow import followed, heights_followed
-from synthroads_addon.fitting.pieces import cut_into_pieces, noise_of, unrolled
+from synthroads_addon.fitting.follow import follow_heights, follow_points
+from synthroads_addon.fitting.pieces import cut_into_pieces, noise_std, unroll_points
 from synthroads_addon.road.alignment import Alignment, Element
 from synthroads_addon.road.geometry import alignment_of
 from synthroads_addon.road.profile import IntersectionPoint, Profile
@@ -50,7 +50,7 @@ def test_a_kink_becomes_a_short_arc_within_the_tolerance() -> None:
 
 def test_heights_of_grades_and_a_parabola_come_back() -> None:
     station = np.arange(0.0, 301.0, 2.0)
-    found = heights_followed(station, np.round(PROFILE.elevation(station), 6), 300.0)
+    found = follow_heights(station, np.round(PROFILE.elevation(station), 6), 300.0)
     assert found is not None
     assert len(found.points) == 3
     assert found.points[1].station == pytest.approx(120.0, abs=0.05)
@@ -78,11 +78,11 @@ def test_a_swing_between_points_is_calmed_and_the_rest_stays() -> None:
     model = Model(np.zeros(1), knots, np.column_stack([grades, grades]), np.full(5, EQUAL), np.zeros(4, dtype=bool))
     station = np.arange(0.0, 91.0, 10.0)
     heights = model.evaluate(station)
-    assert swings(model, station, heights)[3] == pytest.approx(0.08)
-    calm = without_swings(model, station, heights, 0.03)
+    assert excess_swings(model, station, heights)[3] == pytest.approx(0.08)
+    calm = calm_swings(model, station, heights, 0.03)
     assert calm.evaluate(station) == pytest.approx(heights)
     assert np.abs(calm.evaluate(np.linspace(0.0, 90.0, 181))).max() < 1e-9
-    assert without_swings(model, station, heights, 0.09) is model
+    assert calm_swings(model, station, heights, 0.09) is model
 
 
 def test_a_road_of_two_points_has_no_swings() -> None:
@@ -90,21 +90,21 @@ def test_a_road_of_two_points_has_no_swings() -> None:
         np.zeros(1), np.array([0.0, 10.0]), np.array([[0.1, 0.1]]), np.array([EQUAL]), np.zeros(0, dtype=bool)
     )
     station = np.array([0.0, 10.0])
-    assert without_swings(model, station, model.evaluate(station), 0.03) is model
+    assert calm_swings(model, station, model.evaluate(station), 0.03) is model
 
 
 def test_points_with_noise_are_fitted_as_without_it() -> None:
     _, points = sampled(EGG, 1.0)
     noisy = points + np.random.default_rng(4).normal(0.0, 0.02, points.shape)
-    assert followed(noisy, 0.05) is None
+    assert follow_points(noisy, 0.05) is None
     assert fit_axis(noisy, follow=True).alignment.elements == fit_axis(noisy).alignment.elements
 
 
 def test_the_noise_is_told_from_the_points() -> None:
     _, points = sampled(EGG, 1.0)
     noisy = points + np.random.default_rng(5).normal(0.0, 0.005, points.shape)
-    assert noise_of(*unrolled(points), 3) < 1e-5
-    assert noise_of(*unrolled(noisy), 3) == pytest.approx(0.005, rel=0.25)
+    assert noise_std(*unroll_points(points), 3) < 1e-5
+    assert noise_std(*unroll_points(noisy), 3) == pytest.approx(0.005, rel=0.25)
 
 
 def test_pieces_are_as_few_as_the_polynomials() -> None:

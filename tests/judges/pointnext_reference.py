@@ -17,7 +17,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from ml.networks.segmentation.neighbours import _about_middle, build_neighbours, geometric_order
+from ml.networks.segmentation.neighbours import _centre_cloud, build_neighbours, geometric_order
 from ml.networks.segmentation.pointnext import PointNeXt, PointNeXtOptions
 
 RADIUS, NEIGHBOURS, CLASSES, INPUTS = 0.3, 32, 13, 4
@@ -178,7 +178,7 @@ def compared(
     its.train(training)
     clouds = 2
     coord = torch.rand(clouds, points, 3, dtype=torch.float64) * torch.tensor([2.5, 2.5, 0.6])
-    coord = torch.stack([cloud[geometric_order(_about_middle(cloud.numpy()))] for cloud in coord])
+    coord = torch.stack([cloud[geometric_order(_centre_cloud(cloud.numpy()))] for cloud in coord])
     feat = torch.randn(clouds, points, INPUTS, dtype=torch.float64)
     target = torch.randn(clouds, points, CLASSES, dtype=torch.float64)
     packed = build_neighbours(coord.reshape(-1, 3), torch.arange(1, clouds + 1) * points, options.neighbourhood)

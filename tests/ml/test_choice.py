@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ml.cards import Domain, Figure, ModelCard
-from ml.choice import CloudTraits, cloud_traits, domain_distance, nearest
+from ml.choice import CloudTraits, cloud_traits, domain_distance, nearest_model
 from synthroads_addon.base.errors import InputError
 from tests.helpers.clouds.road_clouds import block_of, write
 
@@ -49,7 +49,7 @@ INTENSE = frozenset(["intensity"])
     ],
 )
 def test_the_nearest_model_is_chosen(density: float, platform: Any, chosen: str, doubtful: bool) -> None:
-    choice = nearest([AIR, CAR], CloudTraits(density, 3.0, platform, INTENSE))
+    choice = nearest_model([AIR, CAR], CloudTraits(density, 3.0, platform, INTENSE))
     assert choice.card.name == chosen
     assert choice.doubtful == doubtful
     assert chosen in choice.why()
@@ -59,9 +59,9 @@ def test_the_nearest_model_is_chosen(density: float, platform: Any, chosen: str,
 def test_a_cloud_without_what_a_model_needs_is_not_for_it() -> None:
     plain = CloudTraits(300.0, 30.0, "mobile", frozenset())
     assert domain_distance(CAR, plain) == inf
-    assert nearest([AIR, CAR], plain).card.name == "air"
+    assert nearest_model([AIR, CAR], plain).card.name == "air"
     with pytest.raises(InputError, match="need intensity"):
-        nearest([CAR], plain)
+        nearest_model([CAR], plain)
 
 
 def test_traits_are_measured_on_the_cloud(tmp_path: Path) -> None:

@@ -36,6 +36,7 @@ class CropEffects(PointEffects):
 
     @model_validator(mode="after")
     def _check_limit(self) -> Self:
+        """Refuse a limit of the jitter below its standard deviation."""
         if self.jitter_limit < self.jitter:
             raise ValueError(f"jitter_limit must not be less than jitter, {self.jitter:g}")
         return self
@@ -57,13 +58,13 @@ def transform_crop(crop: Crop, effects: CropEffects, random: Generator) -> None:
     if effects.mirror and random.random() < effects.mirror:
         turn[:, 0] *= -1.0
     middle = crop.coord.mean(axis=0, dtype=np.float64)
-    moved = crop.coord - middle
-    moved[:, :2] = moved[:, :2] @ turn
-    moved *= scale
+    centred_points = crop.coord - middle
+    centred_points[:, :2] = centred_points[:, :2] @ turn
+    centred_points *= scale
     if effects.jitter:
-        noise = random.normal(0.0, effects.jitter, moved.shape)
-        moved += np.clip(noise, -effects.jitter_limit, effects.jitter_limit)
-    crop.coord = (moved + middle).astype(np.float32)
+        noise = random.normal(0.0, effects.jitter, centred_points.shape)
+        centred_points += np.clip(noise, -effects.jitter_limit, effects.jitter_limit)
+    crop.coord = (centred_points + middle).astype(np.float32)
 
 
 @effect("segmentation", order=30)

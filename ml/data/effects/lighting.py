@@ -11,18 +11,18 @@ from .slices import SequenceEffects
 Generator = np.random.Generator
 
 _DARKEST = 1e-5
-"""Intensities below this share of the brightest count as it."""
+"""Share of the brightest intensity to which smaller ones are raised."""
 _NARROWEST = 0.02
-"""A footprint narrower than this is a point, m."""
+"""Width of a footprint below which it has no effect, m."""
 _LINE_REACH = 0.5
-"""Paint within so far of a line's place is the line's, m."""
+"""Distance from a line's place within which paint belongs to the line, m."""
 _LINE_WIDTHS = (0.12, 0.6)
-"""Of a solid lane line: one narrow line to a double one with what lies between, m."""
+"""Least and largest width of a solid lane line, m: one narrow line, and a double one with the gap."""
 _VERGE_TONE = 0.3
 """Logarithm of the largest factor by which a verge of crushed stone is brighter or darker than asphalt."""
 _SCANNER_HEIGHTS = (1.5, 60.0)
 _SCANNER_ASIDE = 15.0
-"""Of the scanners from whose range intensities fall off: lowest and highest, and farthest from the path, m."""
+"""Largest distance of a scanner from the path, m; the heights are the lowest and the highest of scanners."""
 
 
 @effect("centerline", order=40)
@@ -31,14 +31,14 @@ def change_intensities(stretch: Stretch, effects: SequenceEffects, rng: Generato
     if rng.random() < effects.plain or not stretch.strength.any():
         return
     share = rng.random(7)
-    value, marked = _repaint_lines(np.maximum(stretch.strength, 0.0), stretch, effects.repaint, rng)
-    value = _wear_markings(value, stretch.paved, marked, effects.paint * share[0])
-    value, like_pavement = _verges(value, stretch, marked, effects.verge, rng)
+    value, is_marking = _repaint_lines(np.maximum(stretch.strength, 0.0), stretch, effects.repaint, rng)
+    value = _wear_markings(value, stretch.paved, is_marking, effects.paint * share[0])
+    value, like_pavement = _verges(value, stretch, is_marking, effects.verge, rng)
     value = np.where(like_pavement, value, value * np.exp(effects.contrast * rng.uniform(-1.0, 1.0)))
     value = _blur_footprint(value, stretch, effects.footprint * share[5])
     value *= _falloff(stretch.coord[:, 1], effects.falloff * share[1], rng)
-    low, high = np.log(effects.gamma)
-    log = np.exp(low + share[4] * (high - low)) * np.log(np.maximum(value / np.max(value), _DARKEST))
+    log_least, log_largest = np.log(effects.gamma)
+    log = np.exp(log_least + share[4] * (log_largest - log_least)) * np.log(np.maximum(value / np.max(value), _DARKEST))
     # Noise by the spread, so that a scanner that compresses its intensities isn't drowned in it.
     spread = float(np.subtract(*np.percentile(log, (90.0, 10.0))))
     noise = effects.speckle * share[2] * rng.standard_normal(len(value))
@@ -57,55 +57,61 @@ def tint_colors(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> N
 def _repaint_lines(value: Float, stretch: Stretch, probability: float, rng: Generator) -> tuple[Float, Bool]:
     """Return intensities and marking mask (K,) with lane and edge lines of a rural carriageway repainted or worn off.
 
-    Two lanes are parted by dashes on motorways; on rural roads as well by a solid or a double line, or by none; and
-    many of them have no edge lines. On a motorway that would lead astray: beside a ramp it is by its dashes that the
+    Two lanes are separated by dashes on motorways; on rural roads also by a solid or a double line, or by none; and
+    many of them have no edge lines. Motorways stay as they are: beside a ramp it is by its dashes that the
     line between the lanes is known.
     """
     lane, edge, side, width = rng.random(4)
-    marked, bare = stretch.marked, stretch.paved & ~stretch.marked
-    if not stretch.without_shoulders() or not marked.any() or not bare.any():
-        return value, marked
-    paint, pavement = float(np.median(value[marked])), float(np.median(value[bare]))
+    is_marking, is_bare = stretch.marked, stretch.paved & ~stretch.marked
+    if not stretch.without_shoulders() or not is_marking.any() or not is_bare.any():
+        return value, is_marking
+    paint, pavement = float(np.median(value[is_marking])), float(np.median(value[is_bare]))
     y = stretch.coord[:, 1] - stretch.center[stretch.number]
     edges = stretch.lines[stretch.number] * [1.0, -1.0]
-    gone = np.zeros(len(value), dtype=bool)
-    both, one = edge < probability, probability <= edge < 2.0 * probability
-    worn = (both or (one and side < 0.5), both or (one and side >= 0.5), lane >= 1.0 - probability)
-    for happens, offset in zip(worn, (edges[:, 0], edges[:, 1], 0.0), strict=True):
+    is_worn = np.zeros(len(value), dtype=bool)
+    both_worn, one_worn = edge < probability, probability <= edge < 2.0 * probability
+    line_is_worn = (
+        both_worn or (one_worn and side < 0.5),
+        both_worn or (one_worn and side >= 0.5),
+        lane >= 1.0 - probability,
+    )
+    for happens, offset in zip(line_is_worn, (edges[:, 0], edges[:, 1], 0.0), strict=True):
         if happens:
-            gone |= marked & (np.abs(y - offset) < _LINE_REACH)
+            is_worn |= is_marking & (np.abs(y - offset) < _LINE_REACH)
     if lane < probability:
-        low, high = _LINE_WIDTHS
-        painted = stretch.paved & (np.abs(y) < 0.5 * (low + (high - low) * width))
-        value, marked = np.where(painted, paint, value), marked | painted
-    return np.where(gone, pavement, value), marked & ~gone
+        narrowest, widest = _LINE_WIDTHS
+        in_line = stretch.paved & (np.abs(y) < 0.5 * (narrowest + (widest - narrowest) * width))
+        value, is_marking = np.where(in_line, paint, value), is_marking | in_line
+    return np.where(is_worn, pavement, value), is_marking & ~is_worn
 
 
-def _verges(value: Float, stretch: Stretch, marked: Bool, widest: float, rng: Generator) -> tuple[Float, Bool]:
-    """Return intensities (K,) with crushed-stone verges added to a rural road, and the mask of what looks paved (K,).
+def _verges(value: Float, stretch: Stretch, is_marking: Bool, widest: float, rng: Generator) -> tuple[Float, Bool]:
+    """Return intensities (K,) with crushed-stone verges added to a rural road, and a mask (K,) of what looks paved.
 
-    These are hardly brighter or darker than asphalt: the pavement seems wider than it is.
+    The verges are hardly brighter or darker than asphalt, so that the pavement seems wider than it is.
     """
     widths, tone = rng.uniform(0.0, widest, 2), np.exp(_VERGE_TONE * rng.uniform(-1.0, 1.0))
-    bare = stretch.paved & ~marked
-    if not stretch.without_shoulders() or not bare.any():
+    is_bare = stretch.paved & ~is_marking
+    if not stretch.without_shoulders() or not is_bare.any():
         return value, stretch.paved
     y = stretch.coord[:, 1] - stretch.center[stretch.number]
-    beyond = np.column_stack([y, -y]) - stretch.paved_sides()[stretch.number]
-    verge = ~stretch.paved & ((beyond > 0.0) & (beyond < widths)).any(axis=1)
-    usual = float(np.median(value[verge])) if verge.any() else 0.0
-    if usual <= 0.0:
+    excess = np.column_stack([y, -y]) - stretch.paved_sides()[stretch.number]
+    verge = ~stretch.paved & ((excess > 0.0) & (excess < widths)).any(axis=1)
+    verge_level = float(np.median(value[verge])) if verge.any() else 0.0
+    if verge_level <= 0.0:
         return value, stretch.paved
-    return np.where(verge, value * (tone * float(np.median(value[bare])) / usual), value), stretch.paved | verge
+    return np.where(
+        verge, value * (tone * float(np.median(value[is_bare])) / verge_level), value
+    ), stretch.paved | verge
 
 
-def _wear_markings(value: Float, paved: Bool, marked: Bool, share: float) -> Float:
+def _wear_markings(value: Float, is_paved: Bool, is_marking: Bool, share: float) -> Float:
     """Return intensities (K,) with the markings' excess over the pavement's median reduced by a share."""
-    bare = paved & ~marked
-    if not marked.any() or not bare.any():
+    is_bare = is_paved & ~is_marking
+    if not is_marking.any() or not is_bare.any():
         return value
-    pavement = float(np.median(value[bare]))
-    return np.where(marked, value + share * np.minimum(pavement - value, 0.0), value)
+    pavement = float(np.median(value[is_bare]))
+    return np.where(is_marking, value + share * np.minimum(pavement - value, 0.0), value)
 
 
 def _blur_footprint(value: Float, stretch: Stretch, width: float) -> Float:
@@ -117,14 +123,14 @@ def _blur_footprint(value: Float, stretch: Stretch, width: float) -> Float:
         return value
     y = stretch.coord[:, 1] - stretch.coord[:, 1].min()
     # Slices far apart from each other on one axis, so that one search finds all windows.
-    place = stretch.number * (2.0 * (float(y.max()) + width)) + y
-    order = np.argsort(place)
-    place = place[order]
+    position = stretch.number * (2.0 * (float(y.max()) + width)) + y
+    order = np.argsort(position)
+    position = position[order]
     total = np.concatenate([[0.0], np.cumsum(value[order])])
-    first = np.searchsorted(place, place - 0.5 * width, side="left")
-    last = np.searchsorted(place, place + 0.5 * width, side="right")
+    begin = np.searchsorted(position, position - 0.5 * width, side="left")
+    end = np.searchsorted(position, position + 0.5 * width, side="right")
     result = np.empty_like(value)
-    result[order] = (total[last] - total[first]) / (last - first)
+    result[order] = (total[end] - total[begin]) / (end - begin)
     return result
 
 
@@ -138,13 +144,14 @@ def _falloff(y: Float, power: float, rng: Generator) -> Float:
     height = np.exp(rng.uniform(*np.log(_SCANNER_HEIGHTS)))
     square = height**2 + (y[:, None] - rng.uniform(-_SCANNER_ASIDE, _SCANNER_ASIDE, passes)) ** 2
     nearness = np.cumsum(1.0 / square, axis=1)
-    chosen = (rng.random(len(y))[:, None] * nearness[:, -1:] > nearness).sum(axis=1)
-    result: Float = (square[np.arange(len(y)), chosen] / height**2) ** (-power / 2.0)
+    scanner = (rng.random(len(y))[:, None] * nearness[:, -1:] > nearness).sum(axis=1)
+    result: Float = (square[np.arange(len(y)), scanner] / height**2) ** (-power / 2.0)
     return result
 
 
 def _tracks(stretch: Stretch, rng: Generator) -> Float:
     """Return random values (K,) of about unit deviation that vary across the road only: waves of 1.5 to 6 m."""
+    # Chosen: five waves look irregular.
     count = 5
     rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(1.5), np.log(6.0), count))
     y = stretch.coord[:, 1] - np.nan_to_num(stretch.center)[stretch.number]
@@ -155,10 +162,11 @@ def _tracks(stretch: Stretch, rng: Generator) -> Float:
 
 def _waves(stretch: Stretch, rng: Generator) -> Float:
     """Return random values (K,) of about unit deviation, smooth over the ground: waves of 2 to 20 m any way."""
+    # Chosen: six waves look irregular.
     count = 6
     rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(2.0), np.log(20.0), count))
-    way, phase = rng.uniform(0.0, 2.0 * np.pi, (2, count))
+    wave_direction, phase = rng.uniform(0.0, 2.0 * np.pi, (2, count))
     x, y = stretch.points_along(), stretch.coord[:, 1]
-    angle = x[:, None] * (rate * np.cos(way)) + y[:, None] * (rate * np.sin(way)) + phase
+    angle = x[:, None] * (rate * np.cos(wave_direction)) + y[:, None] * (rate * np.sin(wave_direction)) + phase
     result: Float = np.cos(angle).sum(axis=1) * np.sqrt(2.0 / count)
     return result

@@ -17,7 +17,7 @@ from .base import PointEffects, point_effect_field
 Generator = np.random.Generator
 
 _RIM = 0.7
-"""Width of the pavement's edge whose height is taken, m."""
+"""Width of the pavement's rim over which its edge's height is taken, m."""
 
 
 class SequenceCrop(Part):
@@ -38,10 +38,13 @@ class SequenceCrop(Part):
 
     @model_validator(mode="after")
     def _check_sides(self) -> Self:
-        for name, least in (("reach", 0.5), ("beyond", 0.0)):
-            low, high = getattr(self, name)
-            if not least <= low <= high <= 1000.0:
-                raise ValueError(f"{name} is {low:g}, {high:g}: must be two ascending numbers from {least:g} to 1000")
+        """Refuse limits of the crop that don't ascend or are out of bounds."""
+        for name, lower_limit in (("reach", 0.5), ("beyond", 0.0)):
+            smallest, largest = getattr(self, name)
+            if not lower_limit <= smallest <= largest <= 1000.0:
+                raise ValueError(
+                    f"{name} is {smallest:g}, {largest:g}: must be two ascending numbers from {lower_limit:g} to 1000"
+                )
         return self
 
 
@@ -92,9 +95,10 @@ class SequenceEffects(PointEffects):
 
     @model_validator(mode="after")
     def _check_gamma(self) -> Self:
+        """Refuse powers of the intensities that don't ascend or are out of bounds."""
         if not 0.01 <= self.gamma[0] <= self.gamma[1] <= 10.0:
-            low, high = self.gamma
-            raise ValueError(f"gamma is {low:g}, {high:g}: must be two ascending numbers from 0.01 to 10")
+            smallest, largest = self.gamma
+            raise ValueError(f"gamma is {smallest:g}, {largest:g}: must be two ascending numbers from 0.01 to 10")
         return self
 
 
@@ -102,7 +106,7 @@ class SequenceEffects(PointEffects):
 def mirror_side(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Replace the median's side of a carriageway by its mirrored outer side, in place, with probability `alone`.
 
-    So a motorway's carriageway becomes a rural road. Heights go on from the pavement's own edge.
+    So a motorway's carriageway becomes a rural road. Mirrored heights continue the height of the inner edge.
     """
     if rng.random() >= effects.alone or not stretch.without_shoulders():
         return
@@ -110,23 +114,24 @@ def mirror_side(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> N
     inwards, outwards = (0, 1) if np.isfinite(stretch.room[:, 0]).any() else (1, 0)
     sign = 1.0 if outwards == 0 else -1.0
     # How far beyond the pavement's outer and inner edge each point lies.
-    away = sign * (stretch.coord[:, 1] - stretch.center[stretch.number])
-    beyond_outer, beyond_inner = away - edges[stretch.number, outwards], -away - edges[stretch.number, inwards]
+    outward_distance = sign * (stretch.coord[:, 1] - stretch.center[stretch.number])
+    beyond_outer = outward_distance - edges[stretch.number, outwards]
+    beyond_inner = -outward_distance - edges[stretch.number, inwards]
     rise = stretch.coord[:, 2] - stretch.corridor[stretch.number, HEIGHT]
-    rims = [rise[(beyond <= 0.0) & (beyond >= -_RIM)] for beyond in (beyond_inner, beyond_outer)]
+    rims = [rise[(excess <= 0.0) & (excess >= -_RIM)] for excess in (beyond_inner, beyond_outer)]
     if not len(rims[0]) or not len(rims[1]):
         return
-    copied = np.flatnonzero((beyond_outer > 0.0) & np.isfinite(edges[stretch.number, inwards]))
-    kept = np.flatnonzero(~(beyond_inner > 0.0))
-    number = stretch.number[copied]
-    place = stretch.center[number] - sign * (edges[number, inwards] + beyond_outer[copied])
-    mirrored = stretch.coord[copied].copy()
-    mirrored[:, 1] = place
-    mirrored[:, 2] += float(np.median(rims[0]) - np.median(rims[1]))
-    both = np.concatenate([kept, copied])
-    xyz = np.concatenate([stretch.coord[kept], mirrored])
-    order = np.argsort(stretch.number[both], kind="stable")
-    stretch.keep(both[order])
+    outer_points = np.flatnonzero((beyond_outer > 0.0) & np.isfinite(edges[stretch.number, inwards]))
+    points_kept = np.flatnonzero(~(beyond_inner > 0.0))
+    number = stretch.number[outer_points]
+    mirrored_y = stretch.center[number] - sign * (edges[number, inwards] + beyond_outer[outer_points])
+    mirrored_points = stretch.coord[outer_points].copy()
+    mirrored_points[:, 1] = mirrored_y
+    mirrored_points[:, 2] += float(np.median(rims[0]) - np.median(rims[1]))
+    source_rows = np.concatenate([points_kept, outer_points])
+    xyz = np.concatenate([stretch.coord[points_kept], mirrored_points])
+    order = np.argsort(stretch.number[source_rows], kind="stable")
+    stretch.keep(source_rows[order])
     stretch.coord = xyz[order]
     stretch.room = np.full_like(stretch.room, np.inf)
 
@@ -144,8 +149,8 @@ def crop_sides(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> No
         strip = np.minimum(strip, np.nan_to_num(stretch.room, nan=np.inf))
     else:
         # Uniform logarithms: narrow strips differ more from each other than wide ones.
-        low, high = np.log(crop.reach)
-        strip = np.tile(np.exp(rng.uniform(low, high, 2)), (count, 1))
+        log_least, log_largest = np.log(crop.reach)
+        strip = np.tile(np.exp(rng.uniform(log_least, log_largest, 2)), (count, 1))
     reach = strip * (1.0 - rng.uniform(0.0, crop.share, (1 if rng.random() < crop.steady else count, 2)))
     y = stretch.coord[:, 1] - center[stretch.number]
     stretch.keep((y <= reach[stretch.number, 0]) & (-y <= reach[stretch.number, 1]))
@@ -158,9 +163,10 @@ def drop_parts(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> No
     keep = effects.kept_points(points, rng)
     keep &= (rng.random(slices) >= effects.empty)[stretch.number]
     if rng.random() < effects.hidden and points:
-        at, length, width = rng.integers(points), rng.uniform(2.0, 12.0), rng.uniform(1.5, 3.0)
+        # Chosen: a hole as large as a vehicle, from a car to a lorry.
+        hole_point, length, width = rng.integers(points), rng.uniform(2.0, 12.0), rng.uniform(1.5, 3.0)
         x, y = stretch.points_along(), stretch.coord[:, 1]
-        keep &= ~((np.abs(x - x[at]) <= length / 2.0) & (np.abs(y - y[at]) <= width / 2.0))
+        keep &= ~((np.abs(x - x[hole_point]) <= length / 2.0) & (np.abs(y - y[hole_point]) <= width / 2.0))
     stretch.keep(keep)
 
 
@@ -185,10 +191,10 @@ def turn_round(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> No
     """Reverse the sequence's direction of travel with probability `turn_round`, in place, the last slice first."""
     if rng.random() >= effects.turn_round:
         return
-    last = len(stretch.center) - 1
-    order = np.argsort(last - stretch.number, kind="stable")
+    last_slice = len(stretch.center) - 1
+    order = np.argsort(last_slice - stretch.number, kind="stable")
     stretch.keep(order)
-    stretch.number = last - stretch.number
+    stretch.number = last_slice - stretch.number
     stretch.coord = stretch.coord * np.array([-1.0, -1.0, 1.0])
     stretch.center = -stretch.center[::-1]
     corridor = stretch.corridor[::-1].copy()
@@ -202,11 +208,11 @@ def turn_round(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> No
 def tilt_and_jitter(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Tilt the ground (truth included) and jitter the points at random, in place; each stays in its slice."""
     grade, cross = rng.uniform(-effects.tilt, effects.tilt, 2)
-    along = stretch.along()
-    middle = 0.5 * along[-1]
+    distances = stretch.along()
+    middle = 0.5 * distances[-1]
     x, y = stretch.points_along() - middle, stretch.coord[:, 1]
     noise = rng.uniform(0.0, effects.jitter) * rng.standard_normal(stretch.coord.shape)
     stretch.coord = stretch.coord + noise
     stretch.coord[:, 2] += grade * x + cross * y
     stretch.corridor = stretch.corridor.copy()
-    stretch.corridor[:, HEIGHT] += grade * (along - middle) + cross * stretch.center
+    stretch.corridor[:, HEIGHT] += grade * (distances - middle) + cross * stretch.center

@@ -42,8 +42,8 @@ class PointFeatures(nn.Module):
     """A small per-point MLP of x, height and attributes; not of y, so that it is the same across the road.
 
     Args:
-        columns: the columns of a batch's ``feat`` that are used.
-        width: features made from them.
+        columns: indices of the columns of a batch's ``feat`` that are used.
+        width: number of features per point.
     """
 
     def __init__(self, columns: tuple[int, ...], width: int) -> None:
@@ -68,18 +68,20 @@ def cell_sums(coord: Tensor, mask: Tensor, features: Tensor, reach: float, numbe
         mask: (N, P) which of them exist.
         features: (N, P, C).
         reach: the cells divide -reach to reach, m.
-        number: of cells.
+        number: number of cells.
     """
     slices, _, channels = features.shape
     values = torch.cat([features, coord[..., 2:], torch.ones_like(coord[..., :1])], dim=-1).flatten(0, 1)
-    at = (coord[..., 1] + reach) * (number / (2.0 * reach)) - 0.5
-    low = at.floor()
-    first = number * torch.arange(slices, device=coord.device)[:, None]
+    cell_place = (coord[..., 1] + reach) * (number / (2.0 * reach)) - 0.5
+    lower_cell = cell_place.floor()
+    first_cell = number * torch.arange(slices, device=coord.device)[:, None]
     sums = values.new_zeros(slices * number, channels + 2)
-    for cell, weight in ((low, 1.0 - (at - low)), (low + 1.0, at - low)):
-        inside = mask & (cell >= 0) & (cell < number)
-        index = first + torch.where(inside, cell, 0.0).long()  # NaN, of weights beyond reason, is no number of a cell
-        sums = sums.index_add(0, index.flatten(), values * (weight * inside).flatten()[:, None])
+    # Each point adds to the cell below its position and to the one above.
+    for cell, weight in ((lower_cell, 1.0 - (cell_place - lower_cell)), (lower_cell + 1.0, cell_place - lower_cell)):
+        in_grid = mask & (cell >= 0) & (cell < number)
+        # A NaN of diverged weights can't be an index: cell 0 stands in, with a weight of 0.
+        index = first_cell + torch.where(in_grid, cell, 0.0).long()
+        sums = sums.index_add(0, index.flatten(), values * (weight * in_grid).flatten()[:, None])
     return sums.view(slices, number, channels + 2)
 
 
@@ -95,7 +97,7 @@ class FixedKernelPoints(nn.Module):
     Args:
         count: kernel points of a slice.
         half_width: the outermost ones' distance from the frame's origin, m.
-        cells: per spacing.
+        cells: cells per spacing of the kernel points.
         inputs: features of a point.
         width: features of a token.
     """
@@ -123,7 +125,7 @@ class FixedKernelPoints(nn.Module):
 class DeformableKernelPoints(nn.Module):
     """Layer that gathers points' features at kernel points which first move across the road by learned shifts.
 
-    What fixed kernel points see there says how far each moves, as in a deformable KPConv; here at most one spacing.
+    The shift of each is computed from the fixed kernel point's token, as in a deformable KPConv; at most one spacing.
 
     Args:
         count: kernel points of a slice.
@@ -143,27 +145,27 @@ class DeformableKernelPoints(nn.Module):
         self.norm = nn.LayerNorm(width)
 
     @full_precision
-    def forward(self, coord: Tensor, mask: Tensor, features: Tensor, seen: Tensor) -> Tokens:
+    def forward(self, coord: Tensor, mask: Tensor, features: Tensor, fixed_tokens: Tensor) -> Tokens:
         """Return the tokens of N slices gathered at the moved kernel points, from points and features.
 
         Args:
-            coord: the points.
+            coord: (N, P, 3) points, m.
             mask: (N, P) which of them exist.
-            features: theirs.
-            seen: (N, K, width) tokens of the fixed kernel points at the same places.
+            features: (N, P, inputs) features of the points.
+            fixed_tokens: (N, K, width) tokens of the fixed kernel points at the same places.
         """
-        places = self.places + self.spacing * torch.tanh(self.shift(seen)[..., 0])
+        kernel_offsets = self.places + self.spacing * torch.tanh(self.shift(fixed_tokens)[..., 0])
         # Linear weights h = max(0, 1 - |y - place| / spacing), as the influence of a KPConv's kernel points.
-        away = (coord[:, None, :, 1] - places[..., None]) / self.spacing
-        weight = (1.0 - away.abs()).clamp_min(0.0) * mask[:, None, :]
+        relative_distance = (coord[:, None, :, 1] - kernel_offsets[..., None]) / self.spacing
+        weight = (1.0 - relative_distance.abs()).clamp_min(0.0) * mask[:, None, :]
         mass = weight.sum(-1, keepdim=True)
         values = torch.cat([features, coord[..., 2:]], dim=-1)
-        zeroth, first = (torch.cat([weight, weight * away], dim=1) @ values).chunk(2, dim=1)
-        level, tilt = zeroth / (mass + _FEW), first[..., :-1] / (mass + _FEW)
+        zeroth, first_moment = (torch.cat([weight, weight * relative_distance], dim=1) @ values).chunk(2, dim=1)
+        mean_values, tilt = zeroth / (mass + _FEW), first_moment[..., :-1] / (mass + _FEW)
         # Where in the kernel point's reach a feature has its centre: the line's place if the feature is brightness.
-        centre = first[..., :-1] / (zeroth[..., :-1] + 0.2 * _FEW)
-        tokens = self.norm(self.mix(torch.cat([level, tilt, centre, torch.log1p(mass)], dim=-1)))
-        return Tokens(tokens, places, level[..., -1])
+        centre = first_moment[..., :-1] / (zeroth[..., :-1] + 0.2 * _FEW)
+        tokens = self.norm(self.mix(torch.cat([mean_values, tilt, centre, torch.log1p(mass)], dim=-1)))
+        return Tokens(tokens, kernel_offsets, mean_values[..., -1])
 
 
 class GridConvolution(nn.Module):
@@ -173,21 +175,21 @@ class GridConvolution(nn.Module):
         width: features.
         along: slices that it spans, odd.
         across: kernel points that it looks at, odd.
-        apart: how far these lie apart; 1: next to each other.
+        dilation: distance of these from one to the next, kernel points; 1 for neighbours.
     """
 
-    def __init__(self, width: int, along: int, across: int, apart: int = 1) -> None:
+    def __init__(self, width: int, slices: int, kernel_points: int, dilation: int = 1) -> None:
         super().__init__()
         self.norm = nn.LayerNorm(width)
-        padding = (along // 2, apart * (across // 2))
-        self.convolution = nn.Conv2d(width, width, (along, across), padding=padding, dilation=(1, apart))
+        padding = (slices // 2, dilation * (kernel_points // 2))
+        self.convolution = nn.Conv2d(width, width, (slices, kernel_points), padding=padding, dilation=(1, dilation))
         self.mix = nn.Linear(width, width)
 
     def forward(self, grid: Tensor) -> Tensor:
         """Return the grid (B, S, K, C) plus its convolution; the shape stays."""
-        inner = self.convolution(self.norm(grid).permute(0, 3, 1, 2)).permute(0, 2, 3, 1)
-        mixed: Tensor = self.mix(functional.gelu(inner))
-        return grid + mixed
+        convolved = self.convolution(self.norm(grid).permute(0, 3, 1, 2)).permute(0, 2, 3, 1)
+        change: Tensor = self.mix(functional.gelu(convolved))
+        return grid + change
 
 
 class RelativeAttention(nn.Module):
@@ -200,14 +202,14 @@ class RelativeAttention(nn.Module):
         dropout: share of what is added that is left out in training.
     """
 
-    apart: Tensor
+    relative_index: Tensor
 
     def __init__(self, count: int, width: int, heads: int, dropout: float) -> None:
         super().__init__()
         self.heads = heads
         self.bias = nn.Parameter(torch.zeros(heads, 2 * count - 1))
         steps = torch.arange(count)
-        self.register_buffer("apart", steps[:, None] - steps[None, :] + count - 1, persistent=False)
+        self.register_buffer("relative_index", steps[:, None] - steps[None, :] + count - 1, persistent=False)
         self.before = nn.LayerNorm(width)
         self.project = nn.Linear(width, 3 * width)
         self.out = nn.Linear(width, width)
@@ -219,12 +221,12 @@ class RelativeAttention(nn.Module):
     def forward(self, sequence: Tensor) -> Tensor:
         """Return the sequence (N, L, C) after self-attention and the feed-forward network; the shape stays."""
         number, length, width = sequence.shape
-        each = width // self.heads
-        parts = self.project(self.before(sequence)).view(number, length, 3, self.heads, each)
+        head_width = width // self.heads
+        parts = self.project(self.before(sequence)).view(number, length, 3, self.heads, head_width)
         query, key, value = parts.permute(2, 0, 3, 1, 4)
-        score = query @ key.transpose(-1, -2) / each**0.5 + self.bias[:, self.apart[:length, :length]]
-        mixed = (score.softmax(-1) @ value).transpose(1, 2).reshape(number, length, width)
-        sequence = sequence + self.dropout(self.out(mixed))
+        score = query @ key.transpose(-1, -2) / head_width**0.5 + self.bias[:, self.relative_index[:length, :length]]
+        attended = (score.softmax(-1) @ value).transpose(1, 2).reshape(number, length, width)
+        sequence = sequence + self.dropout(self.out(attended))
         return sequence + self.dropout(self.network(sequence))
 
 

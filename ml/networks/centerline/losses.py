@@ -41,77 +41,85 @@ OUTLIER = 3.0
 """Deviations beyond which the likelihood's tails are exponential: one wrong slice may not outweigh all others."""
 
 
-def likelihood(error: Tensor, log_std: Tensor, known: Tensor, beta: float) -> Tensor:
+def likelihood(error: Tensor, log_std: Tensor, mask: Tensor, beta: float) -> Tensor:
     """Return the mean negative log-likelihood (T,) of each target, Gaussian with linear tails, up to a constant.
 
     It is a Gaussian's up to `OUTLIER` deviations, and beyond goes on as a straight line (Huber).
 
     Args:
-        error: (B, S, T) in units of the target; anything where it isn't known.
-        log_std: (B, S, T) of the predicted deviation in the same unit.
-        known: (B, S, T) which of them count; a target that is known nowhere has the loss 0.
-        beta: each term is multiplied by its variance to this power, which counts as a constant.
+        error: (B, S, T) errors in units of the target; any number where unknown.
+        log_std: (B, S, T) logarithm of the predicted deviation in the same unit.
+        mask: (B, S, T) targets that are known; one that is known nowhere has the loss 0.
+        beta: power of the variance by which each term is multiplied, as a constant without gradient.
     """
-    error = torch.where(known, error, torch.zeros_like(error))
+    error = torch.where(mask, error, torch.zeros_like(error))
     # -ln N(error; 0, sigma) = (error / sigma)^2 / 2 + ln sigma + constant, times sigma^(2 beta) (Seitzer et al. 2022).
     ratio = error * torch.exp(-log_std)
     cost = functional.huber_loss(ratio, torch.zeros_like(ratio), reduction="none", delta=OUTLIER)
     terms = (cost + log_std) * torch.exp(2.0 * beta * log_std.detach())
-    count = known.sum((0, 1)).clamp_min(1)
-    return (terms * known).sum((0, 1)) / count
+    count = mask.sum((0, 1)).clamp_min(1)
+    return (terms * mask).sum((0, 1)) / count
 
 
-def cross_entropy(logits: Tensor, places: Tensor, lines: Tensor, known: Tensor) -> Tensor:
+def cross_entropy(logits: Tensor, kernel_offsets: Tensor, lines: Tensor, mask: Tensor) -> Tensor:
     """Return the mean cross-entropy (L,) of softmax(logits) over kernel points against the lines' true places.
 
     The truth is shared linearly by the two kernel points around a line; one beyond the outermost belongs to that.
 
     Args:
         logits: (B, S, K, L).
-        places: (B, S, K) where the kernel points are (or began), at equal spacing, m.
+        kernel_offsets: (B, S, K) y of the kernel points (before they move), at equal spacing, m.
         lines: (B, S, L) y of the lines, m.
-        known: (B, S, L) which count.
+        mask: (B, S, L) lines that are known.
     """
-    low, high = places[..., :1], places[..., -1:]
-    spacing = (high - low) / (places.shape[-1] - 1)
-    inside = torch.where(known, lines, low).clamp(low, high)
-    share = 1.0 - (inside[:, :, None] - places[..., None]).abs() / spacing[..., None]
+    first_offset, last_offset = kernel_offsets[..., :1], kernel_offsets[..., -1:]
+    spacing = (last_offset - first_offset) / (kernel_offsets.shape[-1] - 1)
+    line_offsets = torch.where(mask, lines, first_offset).clamp(first_offset, last_offset)
+    share = 1.0 - (line_offsets[:, :, None] - kernel_offsets[..., None]).abs() / spacing[..., None]
     entropy = -(share.clamp_min(0.0) * logits.log_softmax(2)).sum(2)
-    return (entropy * known).sum((0, 1)) / known.sum((0, 1)).clamp_min(1)
+    return (entropy * mask).sum((0, 1)) / mask.sum((0, 1)).clamp_min(1)
 
 
 def centerline_loss(options: LossOptions, half_width: float) -> Callable[[nn.Module, Batch], tuple[Tensor, Figures]]:
     """Return a function (model, batch) -> (loss, {"center_mae": m}) that adds up the terms by their weights.
 
     Args:
-        options: what counts how much.
-        half_width: where the outermost kernel points are, m.
+        options: weights of the terms.
+        half_width: distance of the outermost kernel points from the frame's origin, m.
     """
 
     def loss(model: nn.Module, batch: Batch) -> tuple[Tensor, Figures]:
+        """Return the loss of a batch's predictions, and the centre's mean absolute error, m."""
         output: Output = model(batch)
-        true, estimate = all_targets(batch), all_targets(output)
-        known = ~torch.isnan(true)
-        error = (estimate - torch.where(known, true, estimate.detach())) / estimate.new_tensor(SCALE)
+        truth, estimate = all_targets(batch), all_targets(output)
+        known_mask = ~torch.isnan(truth)
+        error = (estimate - torch.where(known_mask, truth, estimate.detach())) / estimate.new_tensor(SCALE)
         weight = estimate.new_tensor([1.0] + [options.corridor] * (len(TARGETS) - 1))
-        value = (weight * likelihood(error, output["log_std"], known, options.beta)).sum()
-        rough = output["rough"] - torch.where(known[..., 0], true[..., 0], output["rough"].detach())
-        far = functional.huber_loss(rough, torch.zeros_like(rough), reduction="none", delta=_ROUGH)
-        value = value + options.rough * far.sum() / known[..., 0].sum().clamp_min(1)
+        value = (weight * likelihood(error, output["log_std"], known_mask, options.beta)).sum()
+        # The centre's first look: Huber's loss of the offsets before refinement.
+        first_look_error = output["rough"] - torch.where(known_mask[..., 0], truth[..., 0], output["rough"].detach())
+        first_look_cost = functional.huber_loss(
+            first_look_error, torch.zeros_like(first_look_error), reduction="none", delta=_ROUGH
+        )
+        value = value + options.rough * first_look_cost.sum() / known_mask[..., 0].sum().clamp_min(1)
+        # The lines' places by the logits of the kernel points.
         if options.places:
             number = output["logits"].shape[2]
-            places = torch.linspace(-half_width, half_width, number, device=estimate.device).expand(
+            kernel_offsets = torch.linspace(-half_width, half_width, number, device=estimate.device).expand(
                 *estimate.shape[:2], -1
             )
             lines = [TARGETS.index(name) for name in LINES]
-            entropy = cross_entropy(output["logits"], places, true[..., lines], known[..., lines])
+            entropy = cross_entropy(output["logits"], kernel_offsets, truth[..., lines], known_mask[..., lines])
             share = estimate.new_tensor([1.0] + [options.edges] * (len(LINES) - 1))
             value = value + options.places * (share * entropy).sum()
+        # The centre's place by the logits of the second look, around the first one's centre.
         if options.fine:
-            logits, places = output["fine_logits"][..., None], output["fine_places"]
-            value = value + options.fine * cross_entropy(logits, places, true[..., :1], known[..., :1]).sum()
-        seen = known[..., 0]
-        mae = float((error[..., 0].detach().abs() * seen).sum() / seen.sum().clamp_min(1))
+            logits, kernel_offsets = output["fine_logits"][..., None], output["fine_places"]
+            value = (
+                value + options.fine * cross_entropy(logits, kernel_offsets, truth[..., :1], known_mask[..., :1]).sum()
+            )
+        center_mask = known_mask[..., 0]
+        mae = float((error[..., 0].detach().abs() * center_mask).sum() / center_mask.sum().clamp_min(1))
         return value, {"center_mae": mae}
 
     return loss

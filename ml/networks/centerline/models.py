@@ -71,13 +71,14 @@ class ModelOptions(Part):
         """Return the centreline model with random weights from PyTorch's global generator.
 
         Args:
-            half_width: what a slice sees to either side, m.
-            slices: of a sequence.
+            half_width: reach of a slice to either side, m.
+            slices: number of slices of a sequence.
         """
         raise NotImplementedError
 
     @model_validator(mode="after")
     def _check_widths(self) -> ModelOptions:
+        """Refuse widths that the attention's heads don't divide evenly, or odd ones."""
         for name in ("width", "context"):
             if getattr(self, name) % self.heads or getattr(self, name) % 2:
                 raise ValueError(f"{name} must be even and a multiple of heads, {self.heads}")
@@ -125,8 +126,10 @@ class CenterlineModel(nn.Module):
         self.kernel_points = FixedKernelPoints(count, half_width, options.cells, options.point_width, width)
         self.pool = AttentionPool(width, options.heads, options.context)
         self.heads = Heads(width, options.context, self.kernel_points.spacing)
-        fine = (options.fine_reach, options.fine_cells)
-        self.again = Refinement(options.point_width, options.fine_width, options.context, slices, *fine, options.heads)
+        refinement_size = (options.fine_reach, options.fine_cells)
+        self.again = Refinement(
+            options.point_width, options.fine_width, options.context, slices, *refinement_size, options.heads
+        )
 
     def forward(self, batch: Batch) -> Output:
         """Return centreline, corridor, deviations and logits of a batch's slices, see the module."""
@@ -136,7 +139,7 @@ class CenterlineModel(nn.Module):
         tokens, context = self.encode(self.kernel_points(coord, mask, features), coord, mask, features, shape[1])
         outputs = {name: values.unflatten(0, shape) for name, values in self.heads(tokens, context).items()}
         context = context.unflatten(0, shape)
-        # Where to look again is no way for the second look's errors to reach the first.
+        # Detached: gradients of the second look must not reach the first one through the place of the second look.
         guess, heading = self.line(outputs["center"].detach(), outputs, context, batch["frame"])
         guess, heading = guess.detach(), heading.detach()
         step, log_std, outputs["fine_logits"] = self.again(
@@ -146,9 +149,14 @@ class CenterlineModel(nn.Module):
         outputs["fine_places"] = guess[..., None] + self.again.places
         outputs["log_std"] = _bound_values(torch.cat([log_std[..., None], outputs["log_std"]], dim=-1))
         _, heading = self.line(outputs["center"].detach(), outputs, context, batch["frame"])
-        place = CORRIDOR.index("heading")
+        heading_column = CORRIDOR.index("heading")
         outputs["corridor"] = torch.cat(
-            [outputs["corridor"][..., :place], heading[..., None], outputs["corridor"][..., place + 1 :]], dim=-1
+            [
+                outputs["corridor"][..., :heading_column],
+                heading[..., None],
+                outputs["corridor"][..., heading_column + 1 :],
+            ],
+            dim=-1,
         )
         std = torch.exp(outputs["log_std"]) * outputs["log_std"].new_tensor(SCALE)
         return outputs | {"center_std": std[..., 0], "corridor_std": std[..., 1:]}
@@ -161,10 +169,10 @@ class CenterlineModel(nn.Module):
         """Return y (m) and direction (rad), both (B, S) in the slices' frames, of a line through regressed centres.
 
         Args:
-            center: y of the centres, m; a constant.
+            center: (B, S) y of the centres, m, without gradient.
             outputs: the heads' other outputs.
-            context: (B, S, D).
-            frame: (B, S, 4).
+            context: (B, S, D) context of the slices.
+            frame: (B, S, 4) x, y, direction and z origin of the slices' frames.
         """
         raise NotImplementedError
 
@@ -189,22 +197,23 @@ def all_targets(values: Mapping[str, Tensor], kind: str = "") -> Tensor:
     return torch.cat([values[f"center{kind}"][..., None], values[f"corridor{kind}"]], dim=-1)
 
 
-def both_ways(model: nn.Module, batch: Batch) -> Output:
+def predict_both_ways(model: nn.Module, batch: Batch) -> Output:
     """Return centre, corridor and deviations averaged over a batch and its mirror image, mirrored back.
 
-    Mirroring the batch mirrors the result exactly. Variances are averaged; what the two disagree on is left out, as the
-    calibration sees it.
+    Mirroring the batch mirrors the result exactly. Variances are averaged; the difference of the two results isn't
+    added, as the calibration accounts for it.
     """
-    one, other = model(batch), model(mirror_batch(batch))
-    back = mirrored_corridor(other["corridor"])
-    variance = with_sides_swapped(other["corridor_std"]) ** 2
+    output, mirrored_output = model(batch), model(mirror_batch(batch))
+    corridor_back = mirrored_corridor(mirrored_output["corridor"])
+    variance = with_sides_swapped(mirrored_output["corridor_std"]) ** 2
     return {
-        "center": 0.5 * (one["center"] - other["center"]),
-        "center_std": (0.5 * (one["center_std"] ** 2 + other["center_std"] ** 2)).sqrt(),
-        "corridor": 0.5 * (one["corridor"] + back),
-        "corridor_std": (0.5 * (one["corridor_std"] ** 2 + variance)).sqrt(),
+        "center": 0.5 * (output["center"] - mirrored_output["center"]),
+        "center_std": (0.5 * (output["center_std"] ** 2 + mirrored_output["center_std"] ** 2)).sqrt(),
+        "corridor": 0.5 * (output["corridor"] + corridor_back),
+        "corridor_std": (0.5 * (output["corridor_std"] ** 2 + variance)).sqrt(),
     }
 
 
 def _bound_values(logarithm: Tensor) -> Tensor:
+    """Return logarithms softly limited to `_LARGEST_LOG`, nearly unchanged when small."""
     return _LARGEST_LOG * torch.tanh(logarithm / _LARGEST_LOG)

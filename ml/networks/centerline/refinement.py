@@ -29,10 +29,10 @@ class Refinement(nn.Module):
         inputs: features of a point.
         width: features of a cell.
         context: features of a slice.
-        slices: of a sequence, which see each other; 1: each by itself.
-        reach: the cells divide -reach to reach beside the first guess, m.
-        cells: their number.
-        heads: of the attention.
+        slices: number of slices of a sequence, which see each other; with 1 each is alone.
+        reach: distance to either side of the first estimate that the cells divide, m.
+        cells: number of cells.
+        heads: number of heads of the attention.
     """
 
     places: Tensor
@@ -44,8 +44,8 @@ class Refinement(nn.Module):
         self.reach, self.cells, self.spacing = reach, cells, 2.0 * reach / cells
         self.register_buffer("places", self.spacing * (torch.arange(cells) + 0.5) - reach, persistent=False)
         self.first = nn.Linear(inputs + 2, width)
-        along = 5 if slices > 1 else 1
-        self.grid = nn.ModuleList(GridConvolution(width, along, 5, dilation) for dilation in _APART)
+        slice_span = 5 if slices > 1 else 1
+        self.grid = nn.ModuleList(GridConvolution(width, slice_span, 5, dilation) for dilation in _APART)
         self.local = nn.Linear(width, width)
         self.context = nn.Linear(context, width)
         self.where = nn.Sequential(nn.GELU(), nn.Linear(width, 2))
@@ -60,29 +60,29 @@ class Refinement(nn.Module):
 
         Args:
             coord: (B, S, P, 3) points, m.
-            mask: (B, S, P) which of them exist.
+            mask: (B, S, P) mask of the points that exist.
             features: (B, S, P, C).
-            guess: (B, S) y at which the road was found first, m.
-            heading: (B, S) its direction in the slices' frames, rad.
+            guess: (B, S) first estimate of the centre's y, m.
+            heading: (B, S) first estimate of the direction in the slices' frames, rad.
             context: (B, S, D) of the slices.
 
         Returns:
-            (B, S) how much farther to the left the centre lies, m, the logarithm of that's deviation, and (B, S, cells)
-            what the soft-argmax is taken of.
+            (B, S) offset of the centre to the left of the estimate, m, the logarithm of its deviation, and (B, S,
+            cells) logits of the soft-argmax.
         """
-        aside = guess[..., None] + coord[..., 0] * torch.tan(heading)[..., None]
-        straight = coord - torch.stack([torch.zeros_like(aside), aside, torch.zeros_like(aside)], dim=-1)
-        sums = cell_sums(straight.flatten(0, 1), mask.flatten(0, 1), features.flatten(0, 1), self.reach, self.cells)
+        line_y = guess[..., None] + coord[..., 0] * torch.tan(heading)[..., None]
+        straightened = coord - torch.stack([torch.zeros_like(line_y), line_y, torch.zeros_like(line_y)], dim=-1)
+        sums = cell_sums(straightened.flatten(0, 1), mask.flatten(0, 1), features.flatten(0, 1), self.reach, self.cells)
         grid = self.first(cell_features(sums)).unflatten(0, guess.shape)
         for layer in self.grid:
             grid = layer(grid)
         logits, residual = self.where(self.local(grid) + self.context(context)[..., None, :]).unbind(-1)
         share = logits.softmax(-1)
         step = (share * (self.places + self.spacing * residual)).sum(-1)
-        seen = self.seen((share[..., None] * grid).sum(-2)) + context
+        summary = self.seen((share[..., None] * grid).sum(-2)) + context
         if self.along is not None:
-            seen = self.along(nn.functional.gelu(seen))
-        return step, self.spread(nn.functional.gelu(seen))[..., 0] + _FIRST_LOG_STD, logits
+            summary = self.along(nn.functional.gelu(summary))
+        return step, self.spread(nn.functional.gelu(summary))[..., 0] + _FIRST_LOG_STD, logits
 
 
 @full_precision
@@ -98,40 +98,43 @@ def parabola(frame: Tensor, center: Tensor, weight: Tensor, stiffness: Tensor) -
     Returns:
         y (B, S) at which the parabola crosses the slices' orthogonals, m, and its direction (B, S) in them, rad.
     """
-    place, turn = _in_the_middle(frame, center.dtype)
-    left = torch.stack([-torch.sin(turn), torch.cos(turn)], dim=-1)
-    points = place + center[..., None] * left
+    origins, turn = _in_the_middle(frame, center.dtype)
+    left_normals = torch.stack([-torch.sin(turn), torch.cos(turn)], dim=-1)
+    points = origins + center[..., None] * left_normals
     # The middle's own offset costs nothing: a road far from the path is as good as one near it.
     middle = points.mean(1, keepdim=True)[..., 1]
-    along = points[..., 0] / _PARABOLA_UNIT
-    powers = torch.stack([torch.ones_like(along), along, along * along], dim=-1)
-    weighted = powers * weight[..., None]
+    distance = points[..., 0] / _PARABOLA_UNIT
+    powers = torch.stack([torch.ones_like(distance), distance, distance * distance], dim=-1)
+    weighted_powers = powers * weight[..., None]
     # Ridge regression: (X'WX + diag(stiffness)) beta = X'Wy.
-    normal = weighted.transpose(1, 2) @ powers + torch.diag(stiffness)
-    factors = _solve(normal, (weighted * (points[..., 1] - middle)[..., None]).sum(1))
+    normal = weighted_powers.transpose(1, 2) @ powers + torch.diag(stiffness)
+    factors = _solve(normal, (weighted_powers * (points[..., 1] - middle)[..., None]).sum(1))
     value = (powers @ factors[..., None])[..., 0] + middle
-    slope = (factors[:, 1:2] + 2.0 * factors[:, 2:] * along) / _PARABOLA_UNIT
+    slope = (factors[:, 1:2] + 2.0 * factors[:, 2:] * distance) / _PARABOLA_UNIT
     # One step of Newton's method along the orthogonal: the parabola is nearly straight from here to there.
-    away = (points[..., 1] - value) / (left[..., 1] - slope * left[..., 0])
-    return center - away, torch.atan(slope) - turn
+    step = (points[..., 1] - value) / (left_normals[..., 1] - slope * left_normals[..., 0])
+    return center - step, torch.atan(slope) - turn
 
 
-def _solve(matrix: Tensor, right: Tensor) -> Tensor:
-    """Return x (B, 3) of symmetric positive definite systems matrix (B, 3, 3) x = right (B, 3), by elimination.
+def _solve(matrix: Tensor, rhs: Tensor) -> Tensor:
+    """Return x (B, 3) of symmetric positive definite systems matrix (B, 3, 3) x = rhs (B, 3), by Gaussian elimination.
 
     Written out, as neither ONNX nor batches of small systems on a GPU have a fast solver.
     """
-    (first, b, c), (second, e), third = matrix[:, 0].unbind(-1), matrix[:, 1, 1:].unbind(-1), matrix[:, 2, 2]
-    y0, y1, y2 = right.unbind(-1)
-    to_second, to_third = b / first, c / first
-    second, e = second - to_second * b, e - to_second * c
-    further = e / second
-    third = third - to_third * c - further * e
-    y1 = y1 - to_second * y0
-    y2 = y2 - to_third * y0 - further * y1
-    z2 = y2 / third
-    z1 = y1 / second - further * z2
-    return torch.stack([y0 / first - to_second * z1 - to_third * z2, z1, z2], dim=-1)
+    # The upper triangle of the matrix: rows (a, b, c), (d, e) and (f,).
+    (a, b, c), (d, e), f = matrix[:, 0].unbind(-1), matrix[:, 1, 1:].unbind(-1), matrix[:, 2, 2]
+    y0, y1, y2 = rhs.unbind(-1)
+    # Forward elimination of the first column, then of the second.
+    factor_1, factor_2 = b / a, c / a
+    d, e = d - factor_1 * b, e - factor_1 * c
+    factor_21 = e / d
+    f = f - factor_2 * c - factor_21 * e
+    y1 = y1 - factor_1 * y0
+    y2 = y2 - factor_2 * y0 - factor_21 * y1
+    # Back substitution.
+    x2 = y2 / f
+    x1 = y1 / d - factor_21 * x2
+    return torch.stack([y0 / a - factor_1 * x1 - factor_2 * x2, x1, x2], dim=-1)
 
 
 def _in_the_middle(frame: Tensor, dtype: torch.dtype) -> tuple[Tensor, Tensor]:
@@ -140,7 +143,7 @@ def _in_the_middle(frame: Tensor, dtype: torch.dtype) -> tuple[Tensor, Tensor]:
     delta = frame[..., :2] - middle[:, None, :2]
     cos, sin = torch.cos(middle[:, 2:3]), torch.sin(middle[:, 2:3])
     x, y = delta.unbind(-1)
-    place = torch.stack([cos * x + sin * y, cos * y - sin * x], dim=-1)
+    origins = torch.stack([cos * x + sin * y, cos * y - sin * x], dim=-1)
     # Directions of a path towards the west jump by a whole turn.
     turn = torch.remainder(frame[..., 2] - middle[:, 2:3] + torch.pi, 2.0 * torch.pi) - torch.pi
-    return place.to(dtype), turn.to(dtype)
+    return origins.to(dtype), turn.to(dtype)

@@ -42,7 +42,7 @@ class Sequence(SequenceModel):
         grid = grid + memory.view(sequences, count, slices, width).transpose(1, 2)
         for layer in self.after:
             grid = layer(grid)
-        mixed = grid.flatten(0, 1)
-        context = self.pool(mixed)
+        slice_tokens = grid.flatten(0, 1)
+        context = self.pool(slice_tokens)
         context = context + self.summary(context.unflatten(0, (-1, slices)))[0].flatten(0, 1)
-        return Tokens(mixed, tokens.places, tokens.heights), context
+        return Tokens(slice_tokens, tokens.places, tokens.heights), context

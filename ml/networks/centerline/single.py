@@ -35,11 +35,11 @@ class Single(CenterlineModel):
 
     def encode(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> Encoding:
         """Return tokens of moved kernel points after self-attention, and the context (N, D) of the N slices."""
-        moved = self.deformable(coord, mask, features, tokens.features)
-        mixed = tokens.features + moved.features
+        moved_tokens = self.deformable(coord, mask, features, tokens.features)
+        features_after = tokens.features + moved_tokens.features
         for layer in self.attention:
-            mixed = layer(mixed)
-        return Tokens(mixed, moved.places, moved.heights), self.pool(mixed)
+            features_after = layer(features_after)
+        return Tokens(features_after, moved_tokens.places, moved_tokens.heights), self.pool(features_after)
 
     def line(self, center: Tensor, outputs: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
         """Return each slice's own centre y (m) and regressed heading (rad), both (B, S): no line joins slices."""

@@ -47,10 +47,10 @@ class Transformer(SequenceModel):
         for number, layer in enumerate(self.grid):
             grid = layer(grid)
             if number < len(self.along):
-                at_each = grid.transpose(1, 2)
-                grid = self.along[number](at_each.flatten(0, 1)).view(at_each.shape).transpose(1, 2)
-        mixed = grid.flatten(0, 1)
-        context = self.pool(mixed).unflatten(0, (-1, slices))
+                columns = grid.transpose(1, 2)
+                grid = self.along[number](columns.flatten(0, 1)).view(columns.shape).transpose(1, 2)
+        slice_tokens = grid.flatten(0, 1)
+        context = self.pool(slice_tokens).unflatten(0, (-1, slices))
         for layer in self.summary:
             context = layer(context)
-        return Tokens(mixed, tokens.places, tokens.heights), context.flatten(0, 1)
+        return Tokens(slice_tokens, tokens.places, tokens.heights), context.flatten(0, 1)

@@ -32,16 +32,16 @@ Cells = dict[str, Tensor]
 - ``near{s}`` (M_s, 27 or 7) int32, early stages: the cells around each, by rising place; M_s where there is none
 - ``parent{s}`` (M_{s-1},) int64, s > 0: the cell of this stage that each one of the stage before lies in
 - ``children{s}`` (M_s, 8) int64, s > 0: the cells of the stage before in each; empty octants have another one's
-- ``grid{s}`` (M_s, 3), late stages: the cells' places, in units of their edge
+- ``grid{s}`` (M_s, 3), late stages: the cells' coordinates, in units of their edge
 - ``patch{s}`` (C, P, K) int64, late stages: the cells of each patch along each of C curves
 - ``place{s}`` (C, M_s) int64, late stages: where in all patches (P x K) each cell is asked for what it sees
-- ``filled{s}`` (P, K) bool, late stages: which places of the patches count; left out where all do
+- ``filled{s}`` (P, K) bool, late stages: which slots of the patches count; left out where all do
 """
 
 LARGEST = (1 << BITS) - 2
 """Cells along an axis of a cloud, one to either side being left free."""
 _MOST_CLOUDS = 1 << 14
-"""Clouds of a batch at most. Chosen: with three places of 16 bits each their numbers fill 62 bits of 64."""
+"""Clouds of a batch at most. Chosen: with three coordinates of 16 bits each their numbers fill 62 bits of 64."""
 _AXES = 3
 """Of space: x, y, z."""
 _CROSS = [4, 10, 12, 13, 14, 16, 22]
@@ -56,11 +56,11 @@ class Grid:
 
     Attributes:
         cell: edge of the cells of stage 0, m; it doubles with each stage.
-        stages: number of them.
-        attention_from: the first stage whose cells look along curves, and not around themselves.
-        cross: look at the 6 cells that share a face, not at all 26.
-        curves: that late stages are sorted along.
-        patch: cells that look at each other along a curve; a multiple of 8.
+        stages: number of stages.
+        attention_from: first stage whose cells attend along curves; earlier ones convolve over cells around.
+        cross: whether only the 6 cells that share a face count as neighbours, not all 26.
+        curves: curves along which late stages are sorted.
+        patch: number of cells that attend to each other along a curve; a multiple of 8.
     """
 
     cell: float
@@ -77,8 +77,8 @@ def build_cells(coord: Tensor, offset: Tensor, grid: Grid, *, always_masked: boo
     Args:
         coord: (N, 3) floating-point numbers, m.
         offset: (B,) integers: where each cloud ends. Clouds may be empty or of one point.
-        grid: what to make.
-        always_masked: give ``filled{s}`` also where all places count.
+        grid: options of the cells.
+        always_masked: whether ``filled{s}`` is returned even where all slots count.
 
     Raises:
         InputError: the offsets don't fit the points, a coordinate is not finite, there are more than 16,384 clouds, or
@@ -87,28 +87,28 @@ def build_cells(coord: Tensor, offset: Tensor, grid: Grid, *, always_masked: boo
     counts = _points_of_clouds(coord, offset)
     clouds = len(counts)
     cloud = torch.repeat_interleave(torch.arange(clouds, device=coord.device), counts, output_size=len(coord))
-    places, inside = _places(coord, cloud, clouds, grid.cell)
-    keys, cell = torch.unique(_keys(cloud, places), return_inverse=True)
+    cell_coords, place_in_cell = _cell_coords(coord, cloud, clouds, grid.cell)
+    keys, cell = torch.unique(_keys(cloud, cell_coords), return_inverse=True)
     points = torch.bincount(cell, minlength=len(keys)).to(coord.dtype)
-    cells: Cells = {"cell0": cell, "share0": points.reciprocal()[cell], "inside0": inside}
+    cells: Cells = {"cell0": cell, "share0": points.reciprocal()[cell], "inside0": place_in_cell}
     for stage in range(grid.stages):
         if stage:
-            cloud, places = _apart(keys)
-            coarse, parent = torch.unique(_keys(cloud, places >> 1), return_inverse=True)
-            cells |= {f"parent{stage}": parent, f"children{stage}": _children(places, parent, len(coarse))}
-            keys = coarse
-        cloud, places = _apart(keys)
+            cloud, cell_coords = _split_keys(keys)
+            coarse_keys, parent = torch.unique(_keys(cloud, cell_coords >> 1), return_inverse=True)
+            cells |= {f"parent{stage}": parent, f"children{stage}": _children(cell_coords, parent, len(coarse_keys))}
+            keys = coarse_keys
+        cloud, cell_coords = _split_keys(keys)
         counts = torch.bincount(cloud, minlength=clouds)
         cells[f"ends{stage}"] = counts.cumsum(0)
         if stage < grid.attention_from:
-            near = _cells_around(keys)
-            cells[f"near{stage}"] = near[:, _CROSS].contiguous() if grid.cross else near
+            neighbour_table = _cells_around(keys)
+            cells[f"near{stage}"] = neighbour_table[:, _CROSS].contiguous() if grid.cross else neighbour_table
             continue
-        patch, place, filled = _patches(places, cloud, counts, grid)
-        cells |= {f"grid{stage}": places.to(coord.dtype), f"patch{stage}": patch, f"place{stage}": place}
-        if filled is not None or always_masked:
-            full = torch.ones(patch.shape[1:], dtype=torch.bool, device=coord.device)
-            cells[f"filled{stage}"] = full if filled is None else filled
+        patch, slot_of_cell, slot_mask = _patches(cell_coords, cloud, counts, grid)
+        cells |= {f"grid{stage}": cell_coords.to(coord.dtype), f"patch{stage}": patch, f"place{stage}": slot_of_cell}
+        if slot_mask is not None or always_masked:
+            all_slots = torch.ones(patch.shape[1:], dtype=torch.bool, device=coord.device)
+            cells[f"filled{stage}"] = all_slots if slot_mask is None else slot_mask
     return cells
 
 
@@ -120,10 +120,10 @@ def _points_of_clouds(coord: Tensor, offset: Tensor) -> Tensor:
     return torch.from_numpy(np.diff(ends, prepend=0)).to(coord.device)
 
 
-def _places(coord: Tensor, cloud: Tensor, clouds: int, edge: float) -> tuple[Tensor, Tensor]:
-    """Return the points' cells (N, 3), counted from each cloud's lowest, and their places in them (N, 3)."""
-    scaled = coord / edge
-    floor = scaled.floor()
+def _cell_coords(coord: Tensor, cloud: Tensor, clouds: int, edge: float) -> tuple[Tensor, Tensor]:
+    """Return the points' cells (N, 3), counted from each cloud's lowest, and places in these (N, 3), -0.5 to 0.5."""
+    cell_coordinates = coord / edge
+    floor = cell_coordinates.floor()
     lowest = floor.new_zeros(clouds, _AXES)
     lowest.scatter_reduce_(0, cloud[:, None].expand(-1, _AXES), floor, "amin", include_self=False)
     cells = floor - lowest[cloud]
@@ -133,28 +133,31 @@ def _places(coord: Tensor, cloud: Tensor, clouds: int, edge: float) -> tuple[Ten
             edge,
             f"must be so large that no cloud is wider than {LARGEST} cells: one is {widest + 1:.0f} wide",
         )
-    return cells.long(), scaled - floor - 0.5
+    return cells.long(), cell_coordinates - floor - 0.5
 
 
-def _keys(cloud: Tensor, places: Tensor) -> Tensor:
-    """Return a number (M,) for each cell: by cloud, x, y, z, each counted from 1, so that cells around have one too."""
-    x, y, z = (places + 1).unbind(1)
+def _keys(cloud: Tensor, cell_coords: Tensor) -> Tensor:
+    """Return the key (M,) of each cell: cloud, x, y, z in the bits from high to low, coordinates counted from 1.
+
+    Counted from 1, cells around have keys too.
+    """
+    x, y, z = (cell_coords + 1).unbind(1)
     return (((cloud << BITS | x) << BITS | y) << BITS) | z
 
 
-def _apart(keys: Tensor) -> tuple[Tensor, Tensor]:
-    """Return clouds (M,) and places (M, 3) of cells' numbers."""
-    last = (1 << BITS) - 1
-    places = torch.stack([(keys >> 2 * BITS) & last, (keys >> BITS) & last, keys & last], dim=1) - 1
-    return keys >> 3 * BITS, places
+def _split_keys(keys: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the clouds (M,) and integer coordinates (M, 3) of cells' keys (M,), the inverse of `_keys`."""
+    mask = (1 << BITS) - 1
+    cell_coords = torch.stack([(keys >> 2 * BITS) & mask, (keys >> BITS) & mask, keys & mask], dim=1) - 1
+    return keys >> 3 * BITS, cell_coords
 
 
-def _children(places: Tensor, parent: Tensor, count: int) -> Tensor:
-    """Return for each of `count` cells the cells (8,) of the stage before in it; for empty octants another of them."""
-    odd = places & 1
-    octant = odd[:, 0] << 2 | odd[:, 1] << 1 | odd[:, 2]
-    table = torch.full((count * 8,), -1, dtype=torch.int64, device=places.device)
-    table[parent * 8 + octant] = torch.arange(len(places), device=places.device)
+def _children(cell_coords: Tensor, parent: Tensor, count: int) -> Tensor:
+    """Return the cells (count, 8) of the stage before in each cell's octants; empty ones repeat another's cell."""
+    parity = cell_coords & 1
+    octant = parity[:, 0] << 2 | parity[:, 1] << 1 | parity[:, 2]
+    table = torch.full((count * 8,), -1, dtype=torch.int64, device=cell_coords.device)
+    table[parent * 8 + octant] = torch.arange(len(cell_coords), device=cell_coords.device)
     table = table.view(count, 8)
     return torch.where(table < 0, table.amax(dim=1, keepdim=True), table)
 
@@ -168,43 +171,48 @@ def _cells_around(keys: Tensor) -> Tensor:
     sides = torch.arange(-1, 2, device=keys.device)
     columns = ((sides[:, None] << BITS) + sides).flatten() << BITS
     targets = keys[:, None] + columns - 1
-    first = torch.searchsorted(keys, targets)
-    ended = torch.cat([keys, keys.new_full((1,), -1)])
-    near = torch.empty(count, 9, 3, dtype=torch.int32, device=keys.device)
-    for up in range(3):
-        there = ended[first] == targets + up
-        near[:, :, up] = torch.where(there, first, count)
-        first += there
-    return near.flatten(1)
+    position = torch.searchsorted(keys, targets)
+    ended_keys = torch.cat([keys, keys.new_full((1,), -1)])
+    neighbour_table = torch.empty(count, 9, 3, dtype=torch.int32, device=keys.device)
+    for step in range(3):
+        exists = ended_keys[position] == targets + step
+        neighbour_table[:, :, step] = torch.where(exists, position, count)
+        position += exists
+    return neighbour_table.flatten(1)
 
 
-def _patches(places: Tensor, cloud: Tensor, counts: Tensor, grid: Grid) -> tuple[Tensor, Tensor, Tensor | None]:
-    """Return cells of the patches (C, P, K), each cell's place in them (C, M), and which places count (P, K) or None.
+def _patches(cell_coords: Tensor, cloud: Tensor, counts: Tensor, grid: Grid) -> tuple[Tensor, Tensor, Tensor | None]:
+    """Return the patches' cells (C, P, K), each cell's slot in them (C, M), and the mask of used slots (P, K) or None.
 
     Each cloud's curve is cut into stretches as equal as can be, as few as have room in patches. A patch has its stretch
-    in the middle and the cells before and after it; where a cloud is too small to fill one, places stay empty.
+    in the middle and the cells before and after it; where a cloud is too small to fill one, slots stay empty.
     """
-    device = places.device
+    device = cell_coords.device
     sizes: list[int] = counts.tolist()
     width = min(grid.patch, -(-max(sizes, default=0) // _MULTIPLE) * _MULTIPLE)
     numbers = [-(-size // width) if size else 0 for size in sizes]
     number = torch.tensor(numbers, dtype=torch.int64, device=device)
-    begin, first = counts.cumsum(0) - counts, number.cumsum(0) - number
+    begin, first_patch = counts.cumsum(0) - counts, number.cumsum(0) - number
 
+    # By patch: its cloud, its stretch of the cloud's curve, and the slots around that stretch.
     owner = torch.repeat_interleave(torch.arange(len(sizes), device=device), number, output_size=sum(numbers))
     size, parts = counts[owner], number[owner]
-    nth = torch.arange(sum(numbers), device=device) - first[owner]
-    low, high = ((one * size + parts - 1).div(parts, rounding_mode="floor") for one in (nth, nth + 1))
-    start = (low - (width - (high - low)).div(2, rounding_mode="floor")).clamp(min=0)
+    patch_number = torch.arange(sum(numbers), device=device) - first_patch[owner]
+    stretch_begin, stretch_end = (
+        (number_in_cloud * size + parts - 1).div(parts, rounding_mode="floor")
+        for number_in_cloud in (patch_number, patch_number + 1)
+    )
+    start = (stretch_begin - (width - (stretch_end - stretch_begin)).div(2, rounding_mode="floor")).clamp(min=0)
     start = torch.minimum(start, (size - width).clamp(min=0))
     slots = start[:, None] + torch.arange(width, device=device)
-    filled = slots < size[:, None]
+    slot_mask = slots < size[:, None]
     slots = begin[owner][:, None] + torch.minimum(slots, size[:, None] - 1)
 
-    rank = torch.arange(len(places), device=device) - begin[cloud]
-    patch = first[cloud] + (rank * number[cloud]).div(counts[cloud], rounding_mode="floor")
-    asked = patch * width + rank - start[patch]
-    orders = [torch.argsort(cloud << 3 * BITS | curve_codes(places, curve)) for curve in grid.curves]
+    # By cell: its patch and slot, in the order of each curve.
+    rank = torch.arange(len(cell_coords), device=device) - begin[cloud]
+    patch = first_patch[cloud] + (rank * number[cloud]).div(counts[cloud], rounding_mode="floor")
+    slot = patch * width + rank - start[patch]
+    orders = [torch.argsort(cloud << 3 * BITS | curve_codes(cell_coords, curve)) for curve in grid.curves]
     order = torch.stack(orders)
-    place = torch.empty_like(order).scatter_(1, order, asked.expand_as(order))
-    return order[:, slots], place, None if all(size >= width for size in sizes if size) else filled
+    slot_of_cell = torch.empty_like(order).scatter_(1, order, slot.expand_as(order))
+    return order[:, slots], slot_of_cell, None if all(size >= width for size in sizes if size) else slot_mask

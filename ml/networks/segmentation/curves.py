@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 BITS = 16
-"""Of a cell's number along an axis; the code of a cell takes three times as many."""
+"""Bits of a cell's number along an axis; the code of a cell takes three times as many."""
 Curve = Literal["hilbert", "z-order", "hilbert-transposed", "z-order-transposed"]
 CURVES: tuple[Curve, ...] = get_args(Curve)
 """All of them."""
@@ -22,7 +22,7 @@ _AXES = 3
 _OCTANTS = 1 << _AXES
 """Of a cell: two halves along each axis."""
 _SPREAD = ((16, 0x00FF0000FF), (8, 0x00F00F00F00F), (4, 0x0C30C30C30C3), (2, 0x249249249249))
-"""Steps that part the bits of a number so that two free ones lie between: shift, and what is kept."""
+"""Steps (shift, mask) that spread the bits of a number so that two zeros lie between each two."""
 
 
 def curve_codes(cells: Tensor, curve: Curve) -> Tensor:
@@ -38,10 +38,10 @@ def curve_codes(cells: Tensor, curve: Curve) -> Tensor:
 
 def z_order_codes(cells: Tensor) -> Tensor:
     """Return the places (M,) along the z-order curve of cells (M, 3): the axes' bits in turn, x first."""
-    parted = cells.long()
-    for shift, kept in _SPREAD:
-        parted = (parted | (parted << shift)) & kept
-    return (parted[:, 0] << 2) | (parted[:, 1] << 1) | parted[:, 2]
+    bits = cells.long()
+    for shift, bit_mask in _SPREAD:
+        bits = (bits | (bits << shift)) & bit_mask
+    return (bits[:, 0] << 2) | (bits[:, 1] << 1) | bits[:, 2]
 
 
 def hilbert_codes(cells: Tensor) -> Tensor:
@@ -51,17 +51,17 @@ def hilbert_codes(cells: Tensor) -> Tensor:
     code = torch.zeros_like(octants)
     state = torch.zeros_like(octants)
     for bit in range(BITS - 1, -1, -1):
-        at = state + ((octants >> (_AXES * bit)) & (_OCTANTS - 1))
-        code = (code << _AXES) | digits[at]
-        state = states[at]
+        table_index = state + ((octants >> (_AXES * bit)) & (_OCTANTS - 1))
+        code = (code << _AXES) | digits[table_index]
+        state = states[table_index]
     return code
 
 
 @cache
 def _hilbert_tables() -> tuple[list[int], list[int]]:
-    """Return for each state and octant, at 8 state + octant, the octant's place in its cube, and 8 its own state.
+    """Return two tables at index 8 state + octant: the octant's place along the curve, and 8 times the state within it.
 
-    A state is where the curve enters a cube (a corner, 0 to 7) and the axis along which it leaves it from there:
+    A state combines the corner (0 to 7) at which the curve enters a cube and the axis along which it leaves:
     3 corner + axis.
     """
     digits, states = [], []
@@ -70,21 +70,21 @@ def _hilbert_tables() -> tuple[list[int], list[int]]:
             for octant in range(_OCTANTS):
                 # Hamilton and Rau-Chaplin 2008: an octant b of a cube that the curve enters at e, along axis d, is the
                 # inverse Gray code of (b xor e) rotated right by d + 1.
-                digit = _from_gray(_turned(octant ^ corner, -(axis + 1)))
-                entry = corner ^ _turned(_entry(digit), axis + 1)
+                digit = _from_gray(_rotate_bits(octant ^ corner, -(axis + 1)))
+                entry = corner ^ _rotate_bits(_entry(digit), axis + 1)
                 digits.append(digit)
                 states.append(_OCTANTS * (_AXES * entry + (axis + _direction(digit) + 1) % _AXES))
     return digits, states
 
 
-def _turned(bits: int, by: int) -> int:
-    """Return three bits turned to the left, the last one coming in on the right again."""
-    by %= _AXES
-    return ((bits << by) | (bits >> (_AXES - by))) & (_OCTANTS - 1)
+def _rotate_bits(bits: int, steps: int) -> int:
+    """Return three bits rotated to the left by some steps."""
+    steps %= _AXES
+    return ((bits << steps) | (bits >> (_AXES - steps))) & (_OCTANTS - 1)
 
 
 def _from_gray(gray: int) -> int:
-    """Return the number of three bits whose reflected Gray code is given."""
+    """Return the three-bit number whose reflected Gray code is given (inverse Gray code)."""
     return gray ^ (gray >> 1) ^ (gray >> 2)
 
 
@@ -92,8 +92,8 @@ def _entry(digit: int) -> int:
     """Return the corner at which the curve enters the octant that is visited as number `digit`."""
     if digit == 0:
         return 0
-    even = 2 * ((digit - 1) // 2)
-    return even ^ (even >> 1)
+    even_number = 2 * ((digit - 1) // 2)
+    return even_number ^ (even_number >> 1)
 
 
 def _direction(digit: int) -> int:

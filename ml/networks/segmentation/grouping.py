@@ -46,7 +46,7 @@ class Norm(nn.BatchNorm1d):
             self.running_var.lerp_(variance.detach() * (count / (count - 1)), share)
 
     def scale_sign(self) -> Tensor:
-        """Return the sign of the norm's scale per channel (C,), +1 or -1, detached: does output rise with input."""
+        """Return the sign of the norm's scale per channel (C,), +1 or -1, without gradient."""
         return torch.where(self.weight.detach() < 0, -1.0, 1.0).to(self.weight.dtype)
 
 
@@ -65,7 +65,7 @@ class Grouping:
 
     @property
     def pairs(self) -> int:
-        """Number of pairs, M x K."""
+        """Return the number of pairs, M x K."""
         return self.index.numel()
 
     def relative(self) -> Tensor:
@@ -76,16 +76,17 @@ class Grouping:
     def pair_statistics(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Return pair shares (N,), centred sums (N, 3), mean (3,) and covariance (3, 3) of relative positions; cached.
 
-        The share of all pairs that each is in (N,); the sum of its relative positions less their overall mean, over the
-        number of pairs (N, 3); that mean (3,); the relative positions' covariance (3, 3).
+        Per support point the share of all pairs that it is in (N,), and the sum of its relative positions less their
+        overall mean, over the number of pairs (N, 3); then that mean (3,), and the relative positions' covariance (3,
+        3).
         """
         if self._statistics is None:
-            flat = self.index.reshape(-1).long()  # adding at 32-bit indices is slow
+            flat_index = self.index.reshape(-1).long()  # adding at 32-bit indices is slow
             relative = self.relative().reshape(-1, 3)
             mean = relative.mean(dim=0)
             centred = relative - mean
-            share = torch.bincount(flat, minlength=len(self.support)).to(relative.dtype) / self.pairs
-            sums = torch.zeros_like(self.support).index_add_(0, flat, centred) / self.pairs
+            share = torch.bincount(flat_index, minlength=len(self.support)).to(relative.dtype) / self.pairs
+            sums = torch.zeros_like(self.support).index_add_(0, flat_index, centred) / self.pairs
             self._statistics = share, sums, mean, centred.T @ centred / self.pairs
         return self._statistics
 
@@ -93,8 +94,8 @@ class Grouping:
         """Return mean and population variance (C,) over all pairs of ``features_j + directions (p_j - p_i) / r``.
 
         Args:
-            features: of the support points (N, C).
-            directions: (C, 3).
+            features: (N, C) features of the support points.
+            directions: (C, 3) weights of the relative positions.
         """
         share, sums, mean, covariance = self.pair_statistics()
         feature_mean = share @ features
@@ -112,15 +113,17 @@ class Grouping:
 class _GatherMax(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, values: Tensor, index: Tensor) -> Tensor:
-        largest, place = _largest(values, index, with_place=ctx.needs_input_grad[0])
-        ctx.save_for_backward(place)
+        """Return the maxima (M, C) over the rows of values (N, C) that index (M, K) names."""
+        largest, largest_row = _largest(values, index, with_place=ctx.needs_input_grad[0])
+        ctx.save_for_backward(largest_row)
         ctx.shape = values.shape
         return largest
 
     @staticmethod
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, None]:
-        (place,) = ctx.saved_tensors
-        return gradients[0].new_zeros(ctx.shape).scatter_add_(0, place.long(), gradients[0]), None
+        """Return the gradient of the values (N, C): each maximum's goes to its row."""
+        (largest_row,) = ctx.saved_tensors
+        return gradients[0].new_zeros(ctx.shape).scatter_add_(0, largest_row.long(), gradients[0]), None
 
 
 def gather_max(values: Tensor, index: Tensor) -> Tensor:
@@ -138,13 +141,13 @@ def _largest(values: Tensor, index: Tensor, *, with_place: bool) -> tuple[Tensor
     """Return maxima (M, C) over the rows of each neighbourhood, and their rows (M, C), or (0,) unless `with_place`."""
     (queries, limit), channels = index.shape, values.shape[1]
     largest = values.new_empty(queries, channels)
-    place = index.new_empty((queries, channels) if with_place else 0)
+    largest_row = index.new_empty((queries, channels) if with_place else 0)
     for rows in _chunks(queries, limit * channels, values.device):
         gathered = values.index_select(0, index[rows].reshape(-1)).view(-1, limit, channels)
         largest[rows] = gathered.amax(dim=1)
         if with_place:
-            place[rows] = index[rows].gather(1, _first_column(gathered, largest[rows]))
-    return largest, place
+            largest_row[rows] = index[rows].gather(1, _first_column(gathered, largest[rows]))
+    return largest, largest_row
 
 
 def _chunks(queries: int, size: int, device: torch.device) -> Iterator[slice]:
@@ -159,8 +162,8 @@ def _first_column(values: Tensor, largest: Tensor) -> Tensor:
     limit = values.shape[1]
     # The first of equal ones gets the largest number. Not integers: comparing into floats is far quicker.
     countdown = torch.arange(limit, 0, -1, dtype=values.dtype, device=values.device)[:, None]
-    first = values.eq_(largest[:, None]).mul_(countdown).amax(dim=1)
-    return (limit - first.long()).clamp_(max=limit - 1)  # NaN equals nothing: any will do then
+    countdown_of_largest = values.eq_(largest[:, None]).mul_(countdown).amax(dim=1)
+    return (limit - countdown_of_largest.long()).clamp_(max=limit - 1)  # NaN equals nothing: any will do then
 
 
 @full_precision
@@ -169,13 +172,13 @@ def normalised_max(features: Tensor, weight: Tensor, norm: Norm, grouping: Group
 
     Args:
         features: of the support points (N, C0).
-        weight: of the convolution (C, 3 + C0), relative positions first.
-        norm: over the C channels; in training its statistics are those of all pairs.
+        weight: (C, 3 + C0) weights of the convolution, relative positions first.
+        norm: batch norm over the C channels; in training its statistics are those of all pairs.
         grouping: who looks at whom.
     """
     sign = norm.scale_sign()
-    turned = weight * sign[:, None]
-    directions, weights = turned[:, :3], turned[:, 3:]
+    signed_weight = weight * sign[:, None]
+    directions, weights = signed_weight[:, :3], signed_weight[:, 3:]
     values = features @ weights.T
     mean, variance = _statistics(norm, sign, grouping, values, directions)
     scale = norm.weight * sign * torch.rsqrt(variance + norm.eps)
@@ -192,35 +195,35 @@ def normalised_max_of_two(
 
     Args:
         features: of the support points (N, C0).
-        weights: of the convolution (C1, 3 + C0), and of the layer that follows it on each pair (C2, C1).
-        norms: of both; between them is a ReLU.
+        weights: those of the convolution (C1, 3 + C0), and of the layer that follows it on each pair (C2, C1).
+        norms: batch norms of both layers; between them is a ReLU.
         grouping: who looks at whom.
     """
-    first, second = norms
+    inner_norm, outer_norm = norms
     directions, linear = weights[0][:, :3], weights[0][:, 3:]
     values = features @ linear.T
-    mean, variance = _statistics(first, torch.ones_like(first.weight), grouping, values, directions)
-    scale = first.weight * torch.rsqrt(variance + first.eps)
+    mean, variance = _statistics(inner_norm, torch.ones_like(inner_norm.weight), grouping, values, directions)
+    scale = inner_norm.weight * torch.rsqrt(variance + inner_norm.eps)
     support = torch.addmm(values, grouping.support, directions.T) * scale
-    offset = torch.addmm(first.bias - mean * scale, grouping.queries, -(directions * scale[:, None]).T)
-    sign = second.scale_sign()
-    turned = weights[1] * sign[:, None]
-    top, total, product = pairs_max(support, offset, grouping.index, turned, moments=second.training)
-    mean, variance = _running_moments(second, sign)
-    if second.training and grouping.pairs:
-        between = total / grouping.pairs
-        mean = turned @ between
-        covariance = product / grouping.pairs - torch.outer(between, between)
-        variance = ((turned @ covariance) * turned).sum(dim=1).clamp(min=0.0)
-        second.observe(mean * sign, variance, grouping.pairs)
-    scale = second.weight * sign * torch.rsqrt(variance + second.eps)
-    return torch.addcmul(second.bias - mean * scale, top, scale)
+    offset = torch.addmm(inner_norm.bias - mean * scale, grouping.queries, -(directions * scale[:, None]).T)
+    sign = outer_norm.scale_sign()
+    signed_weight = weights[1] * sign[:, None]
+    top, total, product = pairs_max(support, offset, grouping.index, signed_weight, moments=outer_norm.training)
+    mean, variance = _running_moments(outer_norm, sign)
+    if outer_norm.training and grouping.pairs:
+        mean_inner = total / grouping.pairs
+        mean = signed_weight @ mean_inner
+        covariance = product / grouping.pairs - torch.outer(mean_inner, mean_inner)
+        variance = ((signed_weight @ covariance) * signed_weight).sum(dim=1).clamp(min=0.0)
+        outer_norm.observe(mean * sign, variance, grouping.pairs)
+    scale = outer_norm.weight * sign * torch.rsqrt(variance + outer_norm.eps)
+    return torch.addcmul(outer_norm.bias - mean * scale, top, scale)
 
 
 def _statistics(
     norm: Norm, sign: Tensor, grouping: Grouping, values: Tensor, directions: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Return mean and variance (C,) for a norm: of all pairs in training (updates it), else its running ones."""
+    """Return mean and variance (C,) for a norm: of all pairs in training, which updates it, else its running ones."""
     if not norm.training or not grouping.pairs:
         return _running_moments(norm, sign)
     mean, variance = grouping.moments(values, directions)
@@ -229,6 +232,7 @@ def _statistics(
 
 
 def _running_moments(norm: Norm, sign: Tensor) -> tuple[Tensor, Tensor]:
+    """Return a norm's running mean and variance (C,), the mean times a sign per channel."""
     assert norm.running_mean is not None
     assert norm.running_var is not None
     return norm.running_mean * sign, norm.running_var
@@ -239,17 +243,16 @@ class _PairsMax(torch.autograd.Function):
     def forward(
         ctx: Any, support: Tensor, offset: Tensor, index: Tensor, weight: Tensor, moments: bool
     ) -> tuple[Tensor, Tensor, Tensor]:
+        """Return maxima, sums and sums of products as `pairs_max` does, chunk by chunk."""
         (queries, limit), (out_channels, in_channels) = index.shape, weight.shape
-        top, column = (
-            offset.new_empty(queries, out_channels),
-            torch.empty(queries, out_channels, dtype=torch.uint8, device=offset.device),
-        )
+        top = offset.new_empty(queries, out_channels)
+        column = torch.empty(queries, out_channels, dtype=torch.uint8, device=offset.device)
         total, product = offset.new_zeros(in_channels), offset.new_zeros(in_channels, in_channels)
         for rows in _chunks(queries, limit * out_channels, offset.device):
             pairs = _pairs(support, offset[rows], index[rows])
-            after = (pairs @ weight.T).view(-1, limit, out_channels)
-            top[rows] = after.amax(dim=1)
-            column[rows] = _first_column(after, top[rows]).to(torch.uint8)
+            outputs = (pairs @ weight.T).view(-1, limit, out_channels)
+            top[rows] = outputs.amax(dim=1)
+            column[rows] = _first_column(outputs, top[rows]).to(torch.uint8)
             if moments:
                 total += pairs.sum(dim=0)
                 product.addmm_(pairs.T, pairs)
@@ -259,11 +262,12 @@ class _PairsMax(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, Tensor, None, Tensor, None]:
+        """Return the gradients of support, offset and weight; the pairs are made again chunk by chunk."""
         support, offset, index, weight, column = ctx.saved_tensors
         of_top, of_total, of_product = gradients
         limit, out_channels = index.shape[1], weight.shape[0]
-        of_support, of_offset, of_weight = (torch.zeros_like(each) for each in (support, offset, weight))
-        both = of_product + of_product.T
+        of_support, of_offset, of_weight = (torch.zeros_like(tensor) for tensor in (support, offset, weight))
+        symmetric_product = of_product + of_product.T
         for rows in _chunks(len(index), limit * out_channels, offset.device):
             pairs = _pairs(support, offset[rows], index[rows])
             of_after = pairs.new_zeros(len(of_top[rows]), limit, out_channels)
@@ -271,7 +275,7 @@ class _PairsMax(torch.autograd.Function):
             of_weight.addmm_(of_after.view(-1, out_channels).T, pairs)
             of_pairs = of_after.view(-1, out_channels) @ weight
             if ctx.moments:
-                of_pairs.addmm_(pairs, both).add_(of_total)
+                of_pairs.addmm_(pairs, symmetric_product).add_(of_total)
             of_pairs.mul_(pairs.sign())  # through the ReLU
             of_support.index_add_(0, index[rows].reshape(-1).long(), of_pairs)
             of_offset[rows] = of_pairs.view(-1, limit, pairs.shape[1]).sum(dim=1)
@@ -289,8 +293,8 @@ def pairs_max(
         support: (N, C1).
         offset: (M, C1).
         index: (M, K) rows of `support`, K up to 255.
-        weight: of the layer (C2, C1).
-        moments: whether those are wanted; they are 0 otherwise.
+        weight: (C2, C1) weights of the layer.
+        moments: whether the sums are computed; they are 0 otherwise.
 
     Returns:
         Maxima (M, C2), the sum of ``y`` over all pairs (C1,), and the sum of its products ``y y^T`` (C1, C1).
@@ -298,21 +302,22 @@ def pairs_max(
     if torch.compiler.is_exporting():
         pairs = support.index_select(0, index.reshape(-1)).unflatten(0, index.shape)
         in_channels = weight.shape[1]
-        after = torch.relu(pairs + offset[:, None]) @ weight.T
-        return after.amax(dim=1), offset.new_zeros(in_channels), offset.new_zeros(in_channels, in_channels)
+        outputs = torch.relu(pairs + offset[:, None]) @ weight.T
+        return outputs.amax(dim=1), offset.new_zeros(in_channels), offset.new_zeros(in_channels, in_channels)
     result: tuple[Tensor, Tensor, Tensor] = _PairsMax.apply(support, offset, index, weight, moments)
     return result
 
 
 def _pairs(support: Tensor, offset: Tensor, index: Tensor) -> Tensor:
+    """Return the values y_ij = relu(support_j + offset_i) of all pairs, (M K, C)."""
     gathered = support.index_select(0, index.reshape(-1)).view(*index.shape, support.shape[1])
     return F.relu_(gathered.add_(offset[:, None])).view(-1, support.shape[1])
 
 
 @full_precision
-def interpolate(values: Tensor, nearest: Tensor, weight: Tensor) -> Tensor:
-    """Return weighted sums (N, C) of the rows of `values` (M, C) that `nearest` (N, 3) names."""
+def interpolate(values: Tensor, index: Tensor, weight: Tensor) -> Tensor:
+    """Return weighted sums (N, C) of the rows of `values` (M, C) that `index` (N, 3) names."""
     if torch.compiler.is_exporting():
-        chosen = values.index_select(0, nearest.reshape(-1)).unflatten(0, nearest.shape)
-        return (chosen * weight.to(values.dtype)[..., None]).sum(dim=1)
-    return F.embedding_bag(nearest, values, mode="sum", per_sample_weights=weight.to(values.dtype))
+        rows = values.index_select(0, index.reshape(-1)).unflatten(0, index.shape)
+        return (rows * weight.to(values.dtype)[..., None]).sum(dim=1)
+    return F.embedding_bag(index, values, mode="sum", per_sample_weights=weight.to(values.dtype))

@@ -46,10 +46,10 @@ _POINTS_INTO = {
     "inner": (0, torch.int32),
     "nearest": (0, torch.int32),
 }
-"""Arrays of indices: into which stage, counted from their own, and their dtype."""
+"""Arrays of indices: stage that they point into, relative to their own, and their dtype."""
 Sampling = Literal["grid", "farthest"]
 _STRIDE = 4
-"""One in so many points stays. As PointNet++ and PointNeXt do."""
+"""One in four points stays in each stage, as in PointNet++ and PointNeXt."""
 _CHUNK = 1 << 15
 """Queries whose pairs are held at once. Chosen: bounds memory."""
 TINY = 1e-8
@@ -61,9 +61,9 @@ class Neighbourhood:
     """Options for thinning a cloud stage by stage, and for its points' neighbourhoods.
 
     Attributes:
-        radius: of the balls around the first stage's points, m; it doubles with each stage.
-        neighbours: points of a ball; fewer are filled up with the first one again.
-        inner: of each stage: whether its points also look at each other, within twice the stage's radius.
+        radius: radius of the balls around the first stage's points, m; it doubles with each stage.
+        neighbours: number of points of a ball; missing ones repeat the first.
+        inner: for each stage whether neighbours within the stage are looked for, within twice its radius.
         sampling: ``grid`` keeps of each cell the point nearest to its middle; cells of the first stage are two thirds
             of the radius wide, and double with each stage (a fourth of a surface's points then stays), and
             ``farthest`` keeps exactly one in four, each the farthest from those already kept.
@@ -85,7 +85,7 @@ def build_neighbours(coord: torch.Tensor, offset: torch.Tensor, neighbourhood: N
     Args:
         coord: (N, 3) float32 or float64, m; on the CPU.
         offset: (B,) integers: where each cloud ends. Clouds may be empty or of one point.
-        neighbourhood: what to look for.
+        neighbourhood: options of the search.
 
     Raises:
         InputError: the offsets don't fit the points, a coordinate is not finite, or a cloud spans more cells of
@@ -93,19 +93,19 @@ def build_neighbours(coord: torch.Tensor, offset: torch.Tensor, neighbourhood: N
     """
     ends = check_ends(coord, offset)
     bounds = list(itertools.pairwise([0, *ends.tolist()])) or [(0, 0)]
-    clouds = [_stages_of(coord[begin:end].numpy(), neighbourhood) for begin, end in bounds]
+    clouds = [_cloud_stages(coord[begin:end].numpy(), neighbourhood) for begin, end in bounds]
     stages = range(len(neighbourhood.inner) + 1)
     sizes = np.array([[len(cloud[f"positions{stage}"]) for stage in stages] for cloud in clouds], dtype=np.int64)
     begins = np.cumsum(sizes, axis=0) - sizes
-    packed: Neighbours = {}
+    batch_arrays: Neighbours = {}
     for name in clouds[0]:
-        into, dtype = _POINTS_INTO.get(name[:-1], (None, coord.dtype))
-        shift = [0] * len(clouds) if into is None else begins[:, int(name[-1]) + into].tolist()
+        stage_step, dtype = _POINTS_INTO.get(name[:-1], (None, coord.dtype))
+        shift = [0] * len(clouds) if stage_step is None else begins[:, int(name[-1]) + stage_step].tolist()
         parts = [cloud[name] + step if step else cloud[name] for cloud, step in zip(clouds, shift, strict=True)]
-        packed[name] = torch.from_numpy(np.ascontiguousarray(np.concatenate(parts))).to(dtype)
+        batch_arrays[name] = torch.from_numpy(np.ascontiguousarray(np.concatenate(parts))).to(dtype)
     for stage in stages:
-        packed[f"offset{stage}"] = torch.from_numpy(np.cumsum(sizes[:, stage])[: len(ends)])
-    return packed
+        batch_arrays[f"offset{stage}"] = torch.from_numpy(np.cumsum(sizes[:, stage])[: len(ends)])
+    return batch_arrays
 
 
 def check_ends(coord: torch.Tensor, offset: torch.Tensor) -> Int:
@@ -120,43 +120,43 @@ def check_ends(coord: torch.Tensor, offset: torch.Tensor) -> Int:
     return ends
 
 
-def _stages_of(coord: NDArray[np.floating], neighbourhood: Neighbourhood) -> dict[str, NDArray[np.generic]]:
+def _cloud_stages(coord: NDArray[np.floating], neighbourhood: Neighbourhood) -> dict[str, NDArray[np.generic]]:
     """Return positions, samples and neighbours of one cloud's stages, indices counted from its own first point."""
-    local = _about_middle(coord)
+    local = _centre_cloud(coord)
     order = geometric_order(local)
     # What the network sees is rounded to the coordinates' dtype, so neighbours are those of the rounded positions.
     points = local[order].astype(np.float64)
     arrays: dict[str, NDArray[np.generic]] = {"positions0": local}
     tree = cKDTree(points) if len(points) else None
-    for stage, inner in enumerate(neighbourhood.inner, start=1):
+    for stage, has_inner in enumerate(neighbourhood.inner, start=1):
         radius = neighbourhood.stage_radius(stage)
         sample = _sample(points, radius, neighbourhood.sampling)
-        kept = points[sample]
-        kept_tree = cKDTree(kept) if len(kept) else None
-        arrays[f"positions{stage}"] = kept.astype(local.dtype)
+        sampled_points = points[sample]
+        kept_tree = cKDTree(sampled_points) if len(sampled_points) else None
+        arrays[f"positions{stage}"] = sampled_points.astype(local.dtype)
         arrays[f"sample{stage}"] = sample
         arrays[f"group{stage}"] = _first_in_ball(kept_tree, tree, radius, neighbourhood.neighbours)
-        if inner:
+        if has_inner:
             arrays[f"inner{stage}"] = _first_in_ball(kept_tree, kept_tree, 2 * radius, neighbourhood.neighbours)
         arrays[f"nearest{stage}"], arrays[f"weight{stage}"] = nearest_three(points, kept_tree)
-        points, tree = kept, kept_tree
+        points, tree = sampled_points, kept_tree
     return _in_given_order(arrays, order)
 
 
-def _about_middle(coord: NDArray[np.floating]) -> NDArray[np.floating]:
+def _centre_cloud(coord: NDArray[np.floating]) -> NDArray[np.floating]:
     """Return coordinates (N, 3) centred on the middle of their bounding box, which doesn't depend on their order."""
     if not len(coord):
         return coord
-    exact = coord.astype(np.float64)
-    return (exact - 0.5 * (exact.min(axis=0) + exact.max(axis=0))).astype(coord.dtype)
+    coordinates = coord.astype(np.float64)
+    return (coordinates - 0.5 * (coordinates.min(axis=0) + coordinates.max(axis=0))).astype(coord.dtype)
 
 
 def _in_given_order(arrays: dict[str, NDArray[np.generic]], order: Int) -> dict[str, NDArray[np.generic]]:
     """Return arrays whose indices into the cloud, found for points in `order`, are mapped back to the given order."""
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    turned = {name: order[arrays[name]] if len(order) else arrays[name] for name in ("sample1", "group1")}
-    return arrays | turned | {name: arrays[name][place] for name in ("nearest1", "weight1")}
+    inverse_order = np.empty_like(order)
+    inverse_order[order] = np.arange(len(order))
+    mapped = {name: order[arrays[name]] if len(order) else arrays[name] for name in ("sample1", "group1")}
+    return arrays | mapped | {name: arrays[name][inverse_order] for name in ("nearest1", "weight1")}
 
 
 def geometric_order(points: NDArray[np.floating]) -> Int:
@@ -177,6 +177,7 @@ def _mix_bits(key: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 
 def _sample(points: Float, radius: float, sampling: Sampling) -> Int:
+    """Return the indices of the points that a stage keeps, by grid or by farthest points."""
     if not len(points):
         return np.zeros(0, dtype=np.int64)
     if sampling == "grid":
@@ -191,12 +192,12 @@ def farthest_sample(points: Float, count: int) -> Int:
     """
     columns = np.ascontiguousarray(points.T)
     distance = np.full(len(points), np.inf)
-    chosen = np.zeros(count, dtype=np.int64)
+    sample = np.zeros(count, dtype=np.int64)
     for step in range(1, count):
-        difference = columns - columns[:, chosen[step - 1], None]
+        difference = columns - columns[:, sample[step - 1], None]
         np.minimum(distance, np.square(difference, out=difference).sum(axis=0), out=distance)
-        chosen[step] = distance.argmax()
-    return chosen
+        sample[step] = distance.argmax()
+    return sample
 
 
 def _first_in_ball(queries: cKDTree | None, support: cKDTree | None, radius: float, limit: int) -> Int:
@@ -213,10 +214,10 @@ def _first_in_ball(queries: cKDTree | None, support: cKDTree | None, radius: flo
         pairs = pairs[pairs["v"] < radius]
         key = np.sort(pairs["i"].astype(np.int64) * support.n + pairs["j"])
         query, neighbour = key // support.n, key % support.n
-        first = np.searchsorted(query, np.arange(part.n))
-        rank = np.arange(len(key)) - first[query]
-        inside = rank < limit
-        indices[begin + query[inside], rank[inside]] = neighbour[inside]
+        run_start = np.searchsorted(query, np.arange(part.n))
+        rank = np.arange(len(key)) - run_start[query]
+        has_room = rank < limit
+        indices[begin + query[has_room], rank[has_room]] = neighbour[has_room]
     return np.where(indices < 0, indices[:, :1], indices)
 
 
@@ -225,11 +226,11 @@ def nearest_three(points: Float, tree: cKDTree | None) -> tuple[Int, Float]:
 
     Where the tree has fewer, index and weight of the others are 0.
     """
-    nearest = np.zeros((len(points), 3), dtype=np.int64)
+    nearest_index = np.zeros((len(points), 3), dtype=np.int64)
     weight = np.zeros((len(points), 3))
     if tree is not None:
         count = min(tree.n, 3)
         distance, index = tree.query(points, k=[*range(1, count + 1)])
-        nearest[:, :count], weight[:, :count] = index, 1.0 / (distance + TINY)
+        nearest_index[:, :count], weight[:, :count] = index, 1.0 / (distance + TINY)
         weight /= weight.sum(axis=1, keepdims=True)
-    return nearest, weight
+    return nearest_index, weight

@@ -68,13 +68,15 @@ class PointTransformerOptions(SegmentationNetwork):
     @field_validator("curves")
     @classmethod
     def _refuse_repetitions(cls, curves: tuple[Curve, ...]) -> tuple[Curve, ...]:
+        """Refuse a curve that is named twice."""
         if len(set(curves)) < len(curves):
-            raise ValueError("curves must differ")
+            raise ValueError("curves must not name a curve twice")
         return curves
 
     @field_validator("patch", "head_width")
     @classmethod
     def _require_multiples(cls, number: int, field: ValidationInfo) -> int:
+        """Refuse patches that aren't multiples of 8, and heads that aren't multiples of 6 channels."""
         step = 8 if field.field_name == "patch" else 6
         if number % step:
             raise ValueError(f"must be a multiple of {step}, not {number}")
@@ -82,6 +84,7 @@ class PointTransformerOptions(SegmentationNetwork):
 
     @model_validator(mode="after")
     def _check_stages(self) -> PointTransformerOptions:
+        """Refuse stages whose numbers of channels and blocks don't fit each other or the heads."""
         if len(self.channels) != len(self.blocks):
             raise ValueError(f"blocks must be as many as channels, {len(self.channels)}")
         if min(self.blocks) < 0 or max(self.blocks) > 64:
@@ -106,14 +109,14 @@ class PointTransformerOptions(SegmentationNetwork):
         return PointTransformer(self, features, classes)
 
     def onnx_inputs(self, batch: Batch) -> OnnxInputs:
-        """Return what is found of a batch's cells, and their lengths' names."""
+        """Return the tensors of a batch's cells, and the names of their lengths."""
         cells = build_cells(batch["coord"], batch["offset"], self.grid, always_masked=True)
         inputs = {name: value for name, value in cells.items() if not name.startswith("ends")}
         return OnnxInputs(inputs, {name: _lengths(name) for name in inputs})
 
 
 def _lengths(name: str) -> dict[int, str]:
-    """Return which axes of one of `Cells` may have any length, and what the lengths are called."""
+    """Return the axes of any length of one of the tensors `Cells`, with the lengths' names."""
     kind, stage = name[:-1], int(name[-1])
     if kind in ("cell", "share", "inside"):
         return {0: "points0"}
@@ -138,9 +141,9 @@ class PointTransformer(nn.Module):
     """Convolutions and attention on the cells of packed clouds, and a class for every point.
 
     Args:
-        options: its stages.
-        features: of a point.
-        classes: of the output.
+        options: options of the network.
+        features: number of features of a point.
+        classes: number of classes.
     """
 
     def __init__(self, options: PointTransformerOptions, features: int, classes: int) -> None:
@@ -168,7 +171,7 @@ class PointTransformer(nn.Module):
 
         Args:
             feat: (N, features).
-            batch: with ``coord`` (N, 3) and ``offset`` (B,), or with what `build_cells` finds of them.
+            batch: batch with ``coord`` (N, 3) and ``offset`` (B,), or with the tensors of `build_cells`.
 
         Raises:
             InputError: features and coordinates don't fit each other or the network, or there is no grid for them.
@@ -178,11 +181,11 @@ class PointTransformer(nn.Module):
         if tuple(feat.shape) != shape:
             raise InputError("feat", tuple(feat.shape), f"must have the shape {shape}")
         views = [self._views(cells, stage) for stage in range(len(self.stages))]
-        first = cells["near0"] if "near0" in cells else cells["grid0"]
+        stage_table = cells["near0"] if "near0" in cells else cells["grid0"]
         points = self.stem(torch.cat([feat, cells["inside0"].to(feat.dtype)], dim=1))
         # In single precision at least: cells of many points sum many small shares.
         share = cells["share0"].to(torch.promote_types(feat.dtype, torch.float32))
-        values = points.new_zeros(first.shape[0], points.shape[1], dtype=share.dtype)
+        values = points.new_zeros(stage_table.shape[0], points.shape[1], dtype=share.dtype)
         values = values.index_add(0, cells["cell0"], points * share[:, None])
         levels = [points]
         for stage, blocks in enumerate(self.stages):
@@ -199,7 +202,7 @@ class PointTransformer(nn.Module):
         return scores
 
     def _views(self, cells: Cells, stage: int) -> Iterator[View]:
-        """Yield for each further block of a stage what its cells look at, without end."""
+        """Yield the view of each further block of a stage, without end: its neighbours or the patches of a curve."""
         ends = cells.get(f"ends{stage}")
         if stage < self.options.attention_from:
             yield from repeat(View(ends, around=Around(cells[f"near{stage}"])))
@@ -219,8 +222,8 @@ class View:
     Attributes:
         ends: where each cloud's cells end (B,); None where nothing is dropped.
         around: the cells around each, for convolutions.
-        patch, place, filled: of one curve, see `Cells`; for attention.
-        turns: of `rotations`, for attention.
+        patch, place, filled: tensors of one curve (`Cells`), for attention.
+        turns: cosines and sines of `rotations`, for attention.
     """
 
     ends: Tensor | None
@@ -231,42 +234,42 @@ class View:
     turns: tuple[Tensor, Tensor] | None = None
 
 
-def rotations(places: Tensor, width: int) -> tuple[Tensor, Tensor]:
-    """Return cosines and sines (M, 1, width / 2) of the angles by which places (M, 3) turn a head's pairs of channels.
+def rotations(positions: Tensor, width: int) -> tuple[Tensor, Tensor]:
+    """Return cosines and sines (M, 1, width / 2) of the angles by which positions (M, 3) turn pairs of channels.
 
     A third of the pairs turns with each axis: pair k of K by the frequency ``_LONGEST_WAVE ** (-k / K)``.
     """
     # Su et al. 2021 (RoPE), in three dimensions: the product of a turned query and a turned key depends on the
-    # difference of their places alone.
+    # difference of their positions alone.
     pairs = width // 6
-    frequency = _LONGEST_WAVE ** -(torch.arange(pairs, dtype=places.dtype, device=places.device) / pairs)
-    angle = (places[:, :, None] * frequency).flatten(1)[:, None]
+    frequency = _LONGEST_WAVE ** -(torch.arange(pairs, dtype=positions.dtype, device=positions.device) / pairs)
+    angle = (positions[:, :, None] * frequency).flatten(1)[:, None]
     return angle.cos(), angle.sin()
 
 
 @full_precision
-def turned(values: Tensor, cosine: Tensor, sine: Tensor) -> Tensor:
-    """Return values (M, heads, width) with their pairs of channels, half the width apart, turned by angles."""
-    first, second = values.chunk(2, dim=-1)
-    return torch.cat([first * cosine - second * sine, first * sine + second * cosine], dim=-1)
+def rotate_pairs(values: Tensor, cosine: Tensor, sine: Tensor) -> Tensor:
+    """Return values (M, heads, width) with pairs of channels, half the width apart, rotated by angles (RoPE)."""
+    first_half, second_half = values.chunk(2, dim=-1)
+    return torch.cat([first_half * cosine - second_half * sine, first_half * sine + second_half * cosine], dim=-1)
 
 
-def skipped(change: Tensor, ends: Tensor | None, share: float, training: bool) -> Tensor:
-    """Return the change (M, C) that a block makes, in training without that of a random share of the clouds.
+def drop_clouds(change: Tensor, ends: Tensor | None, share: float, training: bool) -> Tensor:
+    """Return a block's change of features (M, C), in training 0 for a random share of the clouds (stochastic depth).
 
-    What stays is scaled up, so that the mean is as it is without.
+    The other clouds' change is scaled up, so that the expected value stays.
 
     Args:
-        change: of the cells.
+        change: (M, C) change of the cells' features.
         ends: where each cloud's cells end (B,).
-        share: of the clouds.
-        training: whether any are left out.
+        share: probability of dropping a cloud's change.
+        training: whether the network is in training; nothing is dropped otherwise.
     """
     if not training or not share or ends is None:
         return change
-    kept = (torch.rand(len(ends), device=change.device) >= share).to(change.dtype) / (1.0 - share)
+    cloud_factor = (torch.rand(len(ends), device=change.device) >= share).to(change.dtype) / (1.0 - share)
     counts = torch.diff(ends, prepend=ends.new_zeros(1))
-    return change * torch.repeat_interleave(kept, counts, output_size=len(change))[:, None]
+    return change * torch.repeat_interleave(cloud_factor, counts, output_size=len(change))[:, None]
 
 
 def _block(options: PointTransformerOptions, stage: int, drop: float) -> nn.Module:
@@ -280,10 +283,10 @@ def _block(options: PointTransformerOptions, stage: int, drop: float) -> nn.Modu
 class ConvolutionBlock(nn.Module):
     """Convolution over the cells around each, a pointwise layer, and what there was."""
 
-    def __init__(self, width: int, places: int, drop: float) -> None:
+    def __init__(self, width: int, kernel_cells: int, drop: float) -> None:
         super().__init__()
         self.norm = Norm(width)
-        self.look = CellConvolution(places, width, width)
+        self.look = CellConvolution(kernel_cells, width, width)
         self.look_norm = Norm(width)
         self.mix = nn.Linear(width, width)
         self.drop = drop
@@ -291,8 +294,8 @@ class ConvolutionBlock(nn.Module):
     def forward(self, values: Tensor, view: View) -> Tensor:
         """Return the cells' features (M, width) after the block; the shape stays."""
         assert view.around is not None
-        seen = F.relu_(self.look_norm(self.look(self.norm(values), view.around)))
-        return values + skipped(self.mix(seen), view.ends, self.drop, self.training)
+        convolved = F.relu_(self.look_norm(self.look(self.norm(values), view.around)))
+        return values + drop_clouds(self.mix(convolved), view.ends, self.drop, self.training)
 
 
 class AttentionBlock(nn.Module):
@@ -311,19 +314,19 @@ class AttentionBlock(nn.Module):
 
     def forward(self, values: Tensor, view: View) -> Tensor:
         """Return the cells' features (M, width) after the block; the shape stays."""
-        values = values + skipped(self._attention(self.norm(values), view), view.ends, self.drop, self.training)
-        wide = F.gelu(self.widen(self.wide_norm(values)))
-        return values + skipped(self.narrow(wide), view.ends, self.drop, self.training)
+        values = values + drop_clouds(self._attention(self.norm(values), view), view.ends, self.drop, self.training)
+        expanded = F.gelu(self.widen(self.wide_norm(values)))
+        return values + drop_clouds(self.narrow(expanded), view.ends, self.drop, self.training)
 
     def _attention(self, values: Tensor, view: View) -> Tensor:
-        """Return what each cell (M, width) takes from the cells of its patch."""
+        """Return the attention's output (M, width) for each cell from the cells of its patch."""
         assert view.patch is not None
         assert view.place is not None
         assert view.turns is not None
         # Vaswani et al. 2017: softmax(Q K^T / sqrt(d)) V. Queries and keys are turned before cells are gathered, once
         # for each cell and not once for each of the patches that it is in.
         q, k, v = self.look(values).unflatten(1, (3, -1, self.head_width)).unbind(1)
-        q, k = (turned(each, *view.turns).to(v.dtype) for each in (q, k))
+        q, k = (rotate_pairs(tensor, *view.turns).to(v.dtype) for tensor in (q, k))
         qkv = torch.stack([q, k, v], dim=1)
         patches = qkv.index_select(0, view.patch.reshape(-1)).unflatten(0, view.patch.shape)
         q, k, v = patches.transpose(1, 3).unbind(2)  # (P, heads, K, width of a head)
@@ -331,8 +334,8 @@ class AttentionBlock(nn.Module):
         attention = F.scaled_dot_product_attention(q, k, v, attn_mask=mask)
         # Of the patches that a cell is in only one is asked for it: that in whose middle it lies.
         by_cell = attention.transpose(1, 2).flatten(2).flatten(0, 1).index_select(0, view.place)
-        joined: Tensor = self.join(by_cell)
-        return joined
+        result: Tensor = self.join(by_cell)
+        return result
 
 
 class Pool(nn.Module):
@@ -356,13 +359,13 @@ class Unpool(nn.Module):
         self.own = Pointwise(skip_channels, skip_channels)
         self.wide = Pointwise(in_channels, skip_channels)
 
-    def forward(self, skip: Tensor, wide: Tensor, parent: Tensor) -> Tensor:
+    def forward(self, skip: Tensor, coarse: Tensor, parent: Tensor) -> Tensor:
         """Return features (N, skip channels) of cells from theirs before and those of the wider cells around them.
 
         Args:
-            skip: of the stage before (N, skip channels).
-            wide: of the wider cells (M, in channels).
-            parent: (N,) the wider cell of each.
+            skip: (N, skip channels) features of the stage before.
+            coarse: (M, in channels) features of the wider cells.
+            parent: (N,) index of the wider cell that each cell lies in.
         """
-        joined: Tensor = self.own(skip) + self.wide(wide).index_select(0, parent)
-        return joined
+        result: Tensor = self.own(skip) + self.wide(coarse).index_select(0, parent)
+        return result

@@ -80,14 +80,14 @@ class PointNeXtOptions(SegmentationNetwork):
         return self.sampling == "grid"
 
     def onnx_inputs(self, batch: Batch) -> OnnxInputs:
-        """Return the stages' points and who looks at whom, and their lengths' names."""
+        """Return the tensors of the stages' points and neighbours, and the names of their lengths."""
         neighbours = build_neighbours(batch["coord"], batch["offset"], self.neighbourhood)
         inputs = {name: value for name, value in neighbours.items() if not name.startswith("offset")}
         return OnnxInputs(inputs, {name: {0: f"points{_rows_of(name)}"} for name in inputs})
 
 
 def _rows_of(name: str) -> int:
-    """Return the stage whose points an array of `Neighbours` has rows for."""
+    """Return the stage whose points are the rows of an array of `Neighbours`, by the array's name."""
     stage = int(name[-1])
     return stage - 1 if name[:-1] in ("nearest", "weight") else stage
 
@@ -96,19 +96,19 @@ class PointNeXt(nn.Module):
     """PointNeXt (Qian et al. 2022) for semantic segmentation of packed clouds.
 
     Args:
-        options: its size and neighbourhoods.
-        features: of a point.
-        classes: of the output.
+        options: size and neighbourhoods.
+        features: number of features of a point.
+        classes: number of classes.
     """
 
     def __init__(self, options: PointNeXtOptions, features: int, classes: int) -> None:
         super().__init__()
         self.options = options
-        channels, small = options.channels, options.preset == "S"
+        channels, is_small = options.channels, options.preset == "S"
         pairs = list(pairwise(channels))
         self.stem = nn.Linear(features, channels[0])
         self.stages = nn.ModuleList(
-            Stage(*pair, count, small) for pair, count in zip(pairs, options.blocks, strict=True)
+            Stage(*pair, count, is_small) for pair, count in zip(pairs, options.blocks, strict=True)
         )
         self.propagations = nn.ModuleList(FeaturePropagation(*pair) for pair in pairs)
         self.head = nn.Sequential(
@@ -130,20 +130,20 @@ class PointNeXt(nn.Module):
             raise InputError("feat", tuple(feat.shape), f"must have the shape {shape}")
         levels = [self.stem(feat)]
         for number, stage in enumerate(self.stages, start=1):
-            group, inner = self._groupings(neighbours, number, feat.dtype)
-            levels.append(stage(levels[-1], neighbours[f"sample{number}"], group, inner))
+            group, inner_group = self._groupings(neighbours, number, feat.dtype)
+            levels.append(stage(levels[-1], neighbours[f"sample{number}"], group, inner_group))
         values = levels[-1]
         for number in range(len(levels) - 1, 0, -1):
-            nearest, weight = neighbours[f"nearest{number}"], neighbours[f"weight{number}"]
-            values = self.propagations[number - 1](levels[number - 1], values, nearest, weight)
+            nearest_index, weight = neighbours[f"nearest{number}"], neighbours[f"weight{number}"]
+            values = self.propagations[number - 1](levels[number - 1], values, nearest_index, weight)
         scores: Tensor = self.head(values)
         return scores
 
     def _groupings(self, neighbours: Neighbours, number: int, dtype: torch.dtype) -> tuple[Grouping, Grouping | None]:
         """Return the neighbourhoods of a stage's points in the stage before, and in their own (None without blocks)."""
         radius = self.options.neighbourhood.stage_radius(number)
-        before, points = (neighbours[f"positions{each}"].to(dtype) / radius for each in (number - 1, number))
-        group = Grouping(neighbours[f"group{number}"], before, points)
+        previous_points, points = (neighbours[f"positions{stage}"].to(dtype) / radius for stage in (number - 1, number))
+        group = Grouping(neighbours[f"group{number}"], previous_points, points)
         if self.options.blocks[number - 1] == 1:
             return group, None
         return group, Grouping(neighbours[f"inner{number}"], points / 2, points / 2)
@@ -152,17 +152,17 @@ class PointNeXt(nn.Module):
 class Stage(nn.Module):
     """One encoder stage: a set abstraction that thins the points out, and the residual blocks that follow it."""
 
-    def __init__(self, in_channels: int, out_channels: int, count: int, small: bool) -> None:
+    def __init__(self, in_channels: int, out_channels: int, count: int, is_small: bool) -> None:
         super().__init__()
-        self.abstraction = SetAbstraction(in_channels, out_channels, small)
+        self.abstraction = SetAbstraction(in_channels, out_channels, is_small)
         self.blocks = nn.ModuleList(InvertedResidual(out_channels) for _ in range(count - 1))
 
-    def forward(self, values: Tensor, sample: Tensor, group: Grouping, inner: Grouping | None) -> Tensor:
+    def forward(self, values: Tensor, sample: Tensor, group: Grouping, inner_group: Grouping | None) -> Tensor:
         """Return features (M, out_channels) of the stage's points from those of the stage before, (N, in_channels)."""
-        thinned: Tensor = self.abstraction(values, sample, group)
+        stage_values: Tensor = self.abstraction(values, sample, group)
         for block in self.blocks:
-            thinned = block(thinned, inner)
-        return thinned
+            stage_values = block(stage_values, inner_group)
+        return stage_values
 
 
 class Pointwise(nn.Module):
@@ -186,22 +186,22 @@ class SetAbstraction(nn.Module):
     In a small network there are two layers, and what each remaining point had is added.
     """
 
-    def __init__(self, in_channels: int, out_channels: int, small: bool) -> None:
+    def __init__(self, in_channels: int, out_channels: int, is_small: bool) -> None:
         super().__init__()
-        between = out_channels // 2 if small else out_channels
-        self.first = nn.Linear(3 + in_channels, between, bias=False)
-        self.first_norm = Norm(between)
-        self.second = nn.Linear(between, out_channels, bias=False) if small else None
-        self.second_norm = Norm(out_channels) if small else None
-        self.skip = nn.Linear(in_channels, out_channels) if small else None
+        inner_channels = out_channels // 2 if is_small else out_channels
+        self.first = nn.Linear(3 + in_channels, inner_channels, bias=False)
+        self.first_norm = Norm(inner_channels)
+        self.second = nn.Linear(inner_channels, out_channels, bias=False) if is_small else None
+        self.second_norm = Norm(out_channels) if is_small else None
+        self.skip = nn.Linear(in_channels, out_channels) if is_small else None
 
     def forward(self, values: Tensor, sample: Tensor, grouping: Grouping) -> Tensor:
         """Return features (M, out_channels) of the remaining points.
 
         Args:
-            values: of all points (N, in_channels).
-            sample: the remaining ones among them (M,).
-            grouping: whom the remaining look at.
+            values: (N, in_channels) features of all points.
+            sample: (M,) indices of the remaining points.
+            grouping: neighbours of the remaining points.
         """
         if self.second is None or self.second_norm is None:
             pooled = normalised_max(values, self.first.weight, self.first_norm, grouping)
@@ -225,8 +225,8 @@ class InvertedResidual(nn.Module):
 
     def forward(self, values: Tensor, grouping: Grouping) -> Tensor:
         """Return the points' features (N, channels) after the block; the shape stays."""
-        seen = F.relu_(normalised_max(values, self.look.weight, self.look_norm, grouping))
-        return F.relu_(self.narrow(self.widen(seen)) + values)
+        pooled = F.relu_(normalised_max(values, self.look.weight, self.look_norm, grouping))
+        return F.relu_(self.narrow(self.widen(pooled)) + values)
 
 
 class FeaturePropagation(nn.Module):
@@ -238,16 +238,16 @@ class FeaturePropagation(nn.Module):
         self.join_norm = Norm(skip_channels)
         self.second = Pointwise(skip_channels, skip_channels)
 
-    def forward(self, skip: Tensor, thin: Tensor, nearest: Tensor, weight: Tensor) -> Tensor:
+    def forward(self, skip: Tensor, coarse: Tensor, nearest_index: Tensor, weight: Tensor) -> Tensor:
         """Return decoded features (N, skip_channels) of the points of the stage before.
 
         Args:
             skip: features of the stage before (N, skip_channels).
-            thin: of the thin stage (M, in_channels).
-            nearest: (N, 3) three points of the thin stage.
-            weight: (N, 3) their weights.
+            coarse: (M, in_channels) features of the coarser stage.
+            nearest_index: (N, 3) indices of the three nearest points of the coarser stage.
+            weight: (N, 3) weights of these points.
         """
-        here, there = self.join.weight.split([skip.shape[1], thin.shape[1]], dim=1)
-        joined = torch.addmm(interpolate(thin @ there.T, nearest, weight), skip, here.T)
-        refined: Tensor = self.second(F.relu_(self.join_norm(joined)))
+        skip_weight, coarse_weight = self.join.weight.split([skip.shape[1], coarse.shape[1]], dim=1)
+        fused = torch.addmm(interpolate(coarse @ coarse_weight.T, nearest_index, weight), skip, skip_weight.T)
+        refined: Tensor = self.second(F.relu_(self.join_norm(fused)))
         return refined

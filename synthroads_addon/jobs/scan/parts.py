@@ -213,7 +213,7 @@ def make_layers(
         means=surfaces_of(materials.means),
         request=LayerRequest(
             settings=scenario.colour.settings(scenario.fidelity, path.typical_range),
-            wanted=coloured_layers | (OF_INTENSITY if gives_intensities else set()),
+            names=coloured_layers | (OF_INTENSITY if gives_intensities else set()),
             mesh=scene.static,
             environment=survey.conditions.environment,
             path=path,

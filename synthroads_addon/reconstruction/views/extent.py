@@ -20,14 +20,16 @@ more."""
 def view_extent(profiles: Profiles) -> View:
     """Return the view of the middle between the outermost points on either side."""
     stretches = profiles.stretches
-    padded = np.zeros((stretches * STRETCH, len(profiles.offsets)))
-    padded[: len(profiles.stations)] = profiles.count
-    filled = padded.reshape(stretches, STRETCH, -1).sum(axis=1) > 0
-    there = filled.any(axis=1)
-    if not there.any():
+    full_rows = np.zeros((stretches * STRETCH, len(profiles.offsets)))
+    full_rows[: len(profiles.stations)] = profiles.count
+    occupied = full_rows.reshape(stretches, STRETCH, -1).sum(axis=1) > 0
+    has_points = occupied.any(axis=1)
+    if not has_points.any():
         return View("extent", np.full(stretches, np.nan), np.full(stretches, np.inf))
     # The first filled bin from either side.
-    ends = [profiles.offsets[filled.argmax(axis=1)], profiles.offsets[::-1][filled[:, ::-1].argmax(axis=1)]]
-    low, high = (ndimage.median_filter(fill_gaps(np.where(there, end, np.nan)), 2 * _ALONG + 1) for end in ends)
-    std = np.maximum(_LEAST, _SHARE * (high - low))
-    return View("extent", np.where(there, 0.5 * (low + high), np.nan), np.where(there, std, np.inf))
+    ends = [profiles.offsets[occupied.argmax(axis=1)], profiles.offsets[::-1][occupied[:, ::-1].argmax(axis=1)]]
+    right_end, left_end = (
+        ndimage.median_filter(fill_gaps(np.where(has_points, end, np.nan)), 2 * _ALONG + 1) for end in ends
+    )
+    std = np.maximum(_LEAST, _SHARE * (left_end - right_end))
+    return View("extent", np.where(has_points, 0.5 * (right_end + left_end), np.nan), np.where(has_points, std, np.inf))

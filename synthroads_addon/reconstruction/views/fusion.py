@@ -47,9 +47,9 @@ class FusedAxis:
         offsets: (K,) m; smoothed, bridged where no view sees anything.
         std: (K,) standard deviation, m.
         raw: (K,) m before smoothing; NaN where no view sees anything.
-        open: (K,) whether other views, as trustworthy together, lie more than `APART` elsewhere.
-        members: by view's name (K,) whether it is one of those that agree.
-        views: what was fused.
+        open: (K,) whether rival views, about as trustworthy together, lie more than `APART` from the axis.
+        members: by view's name a mask (K,) of the stretches in which it is averaged into the axis.
+        views: the views that were fused.
     """
 
     stations: Float
@@ -69,61 +69,65 @@ def fuse(stations: Float, views: Sequence[View]) -> FusedAxis:
     """
     offsets = np.array([view.offsets for view in views])
     std = np.array([view.std for view in views])
-    seen = np.isfinite(offsets)
-    # A view leads by the trust of all that agree with it: one that is alone leads nowhere, however sure it says it is.
-    together = _agreement(offsets, std, seen)
-    trust = np.where(seen, 1.0 / (_TRUST + np.where(seen, std, 1.0)), 0.0)
-    mass = np.einsum("vwk,wk->vk", together.astype(np.float64), trust)
-    mass *= np.minimum(1.0, _VAGUE / np.where(seen, std, 1.0))  # what agrees with everything leads nowhere
-    steady = np.where(seen, ndimage.uniform_filter1d(mass, _STEADY, axis=1, mode="nearest"), -1.0)
-    leader = steady.argmax(axis=0)
+    seen_mask = np.isfinite(offsets)
+    # The view leads that those agreeing with it trust most in sum: one alone leads nowhere, however small its
+    # deviation.
+    agreement = _agreement(offsets, std, seen_mask)
+    trust = np.where(seen_mask, 1.0 / (_TRUST + np.where(seen_mask, std, 1.0)), 0.0)
+    mass = np.einsum("vwk,wk->vk", agreement.astype(np.float64), trust)
+    mass *= np.minimum(1.0, _VAGUE / np.where(seen_mask, std, 1.0))  # what agrees with everything leads nowhere
+    smooth_mass = np.where(seen_mask, ndimage.uniform_filter1d(mass, _STEADY, axis=1, mode="nearest"), -1.0)
+    leader = smooth_mass.argmax(axis=0)
     columns = np.arange(len(stations))
-    member = together[leader, :, columns].T & seen
-    raw, deviation = _weighted_mean(offsets, std, member)
-    # Rivals are what the others say together, not one by one: several views may slip to the same place.
-    against = seen & ~member & (np.abs(offsets - raw) > APART)
-    lead, rival = (trust * member).sum(axis=0), (trust * against).sum(axis=0)
-    opened = ndimage.binary_opening(rival > _RIVAL * lead, np.ones(3))
-    smoothed, wide = _along(stations, raw, deviation)
+    member = agreement[leader, :, columns].T & seen_mask
+    mean_offsets, deviation = _weighted_mean(offsets, std, member)
+    # Rivals weigh by their sum, not one by one: several views may slip to the same place.
+    rival_mask = seen_mask & ~member & (np.abs(offsets - mean_offsets) > APART)
+    lead, rival = (trust * member).sum(axis=0), (trust * rival_mask).sum(axis=0)
+    open_mask = ndimage.binary_opening(rival > _RIVAL * lead, np.ones(3))
+    smooth_offsets, smooth_std = _along(stations, mean_offsets, deviation)
     names = {view.name: member[number] for number, view in enumerate(views)}
-    return FusedAxis(stations, smoothed, wide, raw, opened, names, tuple(views))
+    return FusedAxis(stations, smooth_offsets, smooth_std, mean_offsets, open_mask, names, tuple(views))
 
 
-def mean_axis(first: FusedAxis, others: Sequence[FusedAxis]) -> FusedAxis:
+def mean_axis(main_axis: FusedAxis, other_axes: Sequence[FusedAxis]) -> FusedAxis:
     """Return the mean of axes at the same stations that several grids of bins over the same points show.
 
     Where a line moves by a fraction of a bin, or some points are missing, bins hold other points and the axis in one
     grid jumps. The others count where they lie near the first, whose views, rivals and members stay: where one of them
     slips it has no say. The grids share their points: the mean is as sure as they are on average.
     """
-    axes = [first, *others]
-    near = np.array([np.abs(axis.offsets - first.offsets) <= _SAME for axis in axes])
-    raw = np.array([axis.raw for axis in axes])
+    axes = [main_axis, *other_axes]
+    agrees = np.array([np.abs(axis.offsets - main_axis.offsets) <= _SAME for axis in axes])
+    raw_offsets = np.array([axis.raw for axis in axes])
     return replace(
-        first,
-        offsets=_mean_where(near, np.array([axis.offsets for axis in axes])),
-        std=_mean_where(near, np.array([axis.std for axis in axes])),
-        raw=np.where(np.isfinite(first.raw), _mean_where(near & np.isfinite(raw), raw), np.nan),
+        main_axis,
+        offsets=_mean_where(agrees, np.array([axis.offsets for axis in axes])),
+        std=_mean_where(agrees, np.array([axis.std for axis in axes])),
+        raw=np.where(np.isfinite(main_axis.raw), _mean_where(agrees & np.isfinite(raw_offsets), raw_offsets), np.nan),
     )
 
 
-def _mean_where(counted: Bool, values: Float) -> Float:
-    """Return the mean (K,) of those of values (A, K) that count; NaN where none does."""
-    count = counted.sum(axis=0)
-    total = np.where(counted, values, 0.0).sum(axis=0)
+def _mean_where(mask: Bool, values: Float) -> Float:
+    """Return the mean (K,) over the first axis of the values (A, K) in a mask; NaN where there are none."""
+    count = mask.sum(axis=0)
+    total = np.where(mask, values, 0.0).sum(axis=0)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
-def _agreement(offsets: Float, std: Float, seen: Bool) -> Bool:
-    """Return (V, V, K) whether two views agree in a stretch; each seen one agrees with itself."""
+def _agreement(offsets: Float, std: Float, seen_mask: Bool) -> Bool:
+    """Return a mask (V, V, K) of the pairs of views that agree in each stretch; each seen one agrees with itself."""
     with np.errstate(invalid="ignore"):
         distance = np.abs(offsets[:, None] - offsets[None])
-        allowed = AGREEING * np.hypot(std[:, None], std[None])
-        return np.asarray(seen[:, None] & seen[None] & (distance <= allowed))
+        largest_distance = AGREEING * np.hypot(std[:, None], std[None])
+        return np.asarray(seen_mask[:, None] & seen_mask[None] & (distance <= largest_distance))
 
 
 def _weighted_mean(offsets: Float, std: Float, member: Bool) -> tuple[Float, Float]:
-    """Return the mean (K,) of the members by inverse variances, and its deviation, m; NaN and infinity without any."""
+    """Return the mean of member views (mask (V, K)) by inverse variances, and its standard deviation, (K,) each, m.
+
+    NaN and infinity in stretches without members.
+    """
     weight = np.where(member, 1.0 / np.square(np.where(member, std, 1.0)), 0.0)
     total = weight.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -134,16 +138,17 @@ def _weighted_mean(offsets: Float, std: Float, member: Bool) -> tuple[Float, Flo
         return mean, np.sqrt(np.maximum(1.0, scatter) / total)
 
 
-def _along(stations: Float, raw: Float, deviation: Float) -> tuple[Float, Float]:
-    """Return the axis (K,), m, smoothed along the road, and its deviation, which grows in gaps."""
-    known = np.isfinite(raw)
-    if not known.any():
-        return np.zeros(len(raw)), np.full(len(raw), np.inf)
-    weights = np.where(known, 1.0 / np.square(np.where(known, deviation, 1.0)), 0.0)
-    smoothed = smooth(raw, weights, STRETCH * SPACING, _WAVELENGTH, usual=0.03)
-    values = np.interp(stations, stations[known], smoothed.values[known])  # no curve is guessed where nothing was seen
+def _along(stations: Float, offsets: Float, deviation: Float) -> tuple[Float, Float]:
+    """Return the smoothed axis (K,), m, and its standard deviation (K,), m, which grows in gaps."""
+    seen_mask = np.isfinite(offsets)
+    if not seen_mask.any():
+        return np.zeros(len(offsets)), np.full(len(offsets), np.inf)
+    weights = np.where(seen_mask, 1.0 / np.square(np.where(seen_mask, deviation, 1.0)), 0.0)
+    smooth_axis = smooth(offsets, weights, STRETCH * SPACING, _WAVELENGTH, usual_std=0.03)
+    # No curve is guessed where nothing was seen.
+    values = np.interp(stations, stations[seen_mask], smooth_axis.values[seen_mask])
     # Nothing is known of the course within a gap but its ends: the deviation grows with the distance from these.
-    gap = STRETCH * SPACING * ndimage.distance_transform_edt(~known)
-    std = np.interp(stations, stations[known], deviation[known])
-    residual = np.where(known, np.abs(np.where(known, raw, 0.0) - values), 0.0)
+    gap = STRETCH * SPACING * ndimage.distance_transform_edt(~seen_mask)
+    std = np.interp(stations, stations[seen_mask], deviation[seen_mask])
+    residual = np.where(seen_mask, np.abs(np.where(seen_mask, offsets, 0.0) - values), 0.0)
     return values, np.sqrt(std**2 + ndimage.uniform_filter1d(residual, 5) ** 2 + np.square(_DRIFT * gap))

@@ -22,58 +22,68 @@ _REACH, _STEP = 8.0, 0.05
 `fusion.DEFINITION`."""
 
 
-def half_width(axis: FusedAxis, share: float, factor: float, more: float = 0.0) -> Float:
+def half_width(axis: FusedAxis, share: float, factor: float, extra_std: float = 0.0) -> Float:
     """Return half-widths (K,), m, about the fused axis of the intervals that hold the true one with a probability.
 
     They are never narrower than the axis' own deviation says, and only that where nothing is seen.
 
     Args:
-        axis: with its views.
-        share: the probability.
-        factor: standard deviations that hold it of a normal distribution.
-        more: standard deviation, m, of one more error that all of the axis has.
+        axis: the fused axis with its views.
+        share: probability that the interval holds the true axis.
+        factor: standard deviations to either side that hold this probability of a normal distribution.
+        extra_std: standard deviation of one more error that the whole axis has, m.
     """
-    minimum = factor * np.hypot(axis.std, more)
-    seen = np.any([np.isfinite(view.offsets) for view in axis.views], axis=0)
-    if not seen.any():
+    minimum = factor * np.hypot(axis.std, extra_std)
+    seen_mask = np.any([np.isfinite(view.offsets) for view in axis.views], axis=0)
+    if not seen_mask.any():
         return minimum
     # One more independent error: densities convolve.
-    density = ndimage.gaussian_filter1d(_density(axis), max(more, 1e-3) / _STEP, axis=1, mode="constant")
+    density = ndimage.gaussian_filter1d(_density(axis), max(extra_std, 1e-3) / _STEP, axis=1, mode="constant")
     density /= density.sum(axis=1, keepdims=True)
-    return np.where(seen, np.maximum(minimum, _quantile(density, share)), minimum)
+    return np.where(seen_mask, np.maximum(minimum, _quantile(density, share)), minimum)
 
 
 def _quantile(density: Float, share: float) -> Float:
-    """Return how far (K,), m, to both sides of the middle a share of densities (K, P) lies."""
+    """Return the half-width (K,), m, of the central interval that holds a share of each density (K, P)."""
     middle = density.shape[1] // 2
     # The interval is the same to both sides: shares are added up from the middle outwards.
     pairs = density[:, middle + 1 :] + density[:, middle - 1 :: -1]
-    within = np.cumsum(np.column_stack([np.zeros(len(density)), density[:, middle], pairs]), axis=1)
-    behind = np.maximum((within < share).argmin(axis=1), 1)[:, None]  # the first place by which it is reached
-    low, high = (np.take_along_axis(within, behind - step, axis=1)[:, 0] for step in (1, 0))
-    return np.maximum(_STEP * (behind[:, 0] - 1.5 + (share - low) / (high - low)), 0.0)
+    cumulative_share = np.cumsum(np.column_stack([np.zeros(len(density)), density[:, middle], pairs]), axis=1)
+    # Index of the first cumulative share that reaches the wanted one; 1 at least.
+    end_index = np.maximum((cumulative_share < share).argmin(axis=1), 1)[:, None]
+    share_before, share_after = (
+        np.take_along_axis(cumulative_share, end_index - step, axis=1)[:, 0] for step in (1, 0)
+    )
+    return np.maximum(_STEP * (end_index[:, 0] - 1.5 + (share - share_before) / (share_after - share_before)), 0.0)
 
 
 def _density(axis: FusedAxis) -> Float:
-    """Return how likely (K, P) the axis lies at places beside the fused one, up to a factor by stretch."""
-    place = np.arange(-round(_REACH / _STEP), round(_REACH / _STEP) + 1) * _STEP
-    result = np.zeros((len(axis.offsets), len(place)))
+    """Return the density (K, P) of the axis' place beside the fused axis, up to a factor by stretch."""
+    distance = np.arange(-round(_REACH / _STEP), round(_REACH / _STEP) + 1) * _STEP
+    result = np.zeros((len(axis.offsets), len(distance)))
     kinds = [_EVIDENCE.get(view.name, view.name) for view in axis.views]
     for kind in dict.fromkeys(kinds):
-        same = [view for view, other in zip(axis.views, kinds, strict=True) if other == kind]
+        kind_views = [view for view, view_kind in zip(axis.views, kinds, strict=True) if view_kind == kind]
         # Views of one kind of evidence slip together: the mean of their logarithms counts as one view.
-        known = np.sum([np.isfinite(view.offsets) for view in same], axis=0)
+        view_count = np.sum([np.isfinite(view.offsets) for view in kind_views], axis=0)
         result += (
-            np.sum([_likelihood(view, axis.offsets, place) for view in same], axis=0) / np.maximum(known, 1)[:, None]
+            np.sum([_likelihood(view, axis.offsets, distance) for view in kind_views], axis=0)
+            / np.maximum(view_count, 1)[:, None]
         )
     return np.exp(result - result.max(axis=1, keepdims=True))
 
 
-def _likelihood(view: View, at: Float, place: Float) -> Float:
-    """Return the logarithm of a view's likelihood (K, P) of places, m, about an axis (K,); 0 where it sees nothing."""
-    seen = np.isfinite(view.offsets)
-    std = np.where(seen, view.std, 1.0)[:, None]
-    z = (place - np.where(seen, view.offsets - at, 0.0)[:, None]) / std
+def _likelihood(view: View, axis_offsets: Float, distance: Float) -> Float:
+    """Return the logarithm of a view's likelihood (K, P) of the axis at each place; 0 where the view sees nothing.
+
+    Args:
+        view: offsets with standard deviations.
+        axis_offsets: (K,) of the fused axis, m.
+        distance: (P,) distances from the fused axis, m.
+    """
+    seen_mask = np.isfinite(view.offsets)
+    std = np.where(seen_mask, view.std, 1.0)[:, None]
+    z = (distance - np.where(seen_mask, view.offsets - axis_offsets, 0.0)[:, None]) / std
     # p = (1 - slips) N(place; offset, std) + slips / (2 reach): the tail keeps a single view from ruling a place out.
-    right = np.exp(-0.5 * z**2) / (np.sqrt(2.0 * np.pi) * std)
-    return np.where(seen[:, None], np.log((1.0 - SLIPS) * right + SLIPS / (2.0 * _REACH)), 0.0)
+    normal_density = np.exp(-0.5 * z**2) / (np.sqrt(2.0 * np.pi) * std)
+    return np.where(seen_mask[:, None], np.log((1.0 - SLIPS) * normal_density + SLIPS / (2.0 * _REACH)), 0.0)

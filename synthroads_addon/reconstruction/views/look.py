@@ -17,41 +17,45 @@ from .symmetry import view_symmetry
 from .view import View
 
 
-def find_fused_axis(layout: RoadLayout, others: Sequence[View] = ()) -> FusedAxis:
-    """Return the axis that all views of profiles, and others given (a network's), agree on.
+def find_fused_axis(layout: RoadLayout, extra_views: Sequence[View] = ()) -> FusedAxis:
+    """Return the axis that all rule-based views of a layout's profiles, and further ones (a network's), agree on.
 
     Args:
-        layout: that profiles along a path parallel to the road show.
-        others: further views in the profiles' stretches.
+        layout: carriageways and lines in profiles along a path parallel to the road.
+        extra_views: further views in the profiles' stretches.
     """
     lines = axis_from_lines(layout)
-    return fuse(layout.profiles.middles, [*rule_views(layout, lines), *others])
+    return fuse(layout.profiles.middles, [*rule_views(layout, lines), *extra_views])
 
 
 def rule_views(layout: RoadLayout, lines: FoundAxis) -> list[View]:
-    """Return the views that learn nothing: lines, marking period, brightness, dark skeleton, cross-profile, extent."""
+    """Return the rule-based views: lines, marking period, brightness, dark skeleton, cross-profile, extent."""
     profiles, dual = layout.profiles, layout.kind == "dual"
     cores = [0.5 * (band.low + band.high) for band in layout.bands]
-    level = float(np.median(lines.offsets))
-    uneven = _unevenness(layout)
+    axis_offset = float(np.median(lines.offsets))
+    unevenness = _unevenness(layout)
     return [
         view_lines(layout, lines),
-        view_period(profiles, dual, level),
+        view_period(profiles, dual, axis_offset),
         view_brightness(profiles, cores, dual),
-        view_skeleton(profiles, cores).less_sure(0.5 * uneven),
-        view_symmetry(profiles).less_sure(uneven),
+        view_skeleton(profiles, cores).less_sure(0.5 * unevenness),
+        view_symmetry(profiles).less_sure(unevenness),
         view_extent(profiles),
     ]
 
 
 def _unevenness(layout: RoadLayout) -> Float:
-    """Return how far (K,), m, the middle of all pavement lies beside the middle between two carriageways.
+    """Return the distance (K,), m, of the middle of all pavement from the middle between two carriageways.
 
-    Where one has more lanes than the other, what is the same to both sides is not the road's axis. 0 where not all
+    Where one carriageway has more lanes than the other the axis of symmetry is not the road's axis. 0 where not all
     edges are seen, and of a single carriageway.
     """
     if layout.kind == "single":
         return np.zeros(len(layout.bands[0].edges[0].measured))
-    right, left = (edges[1].measured - edges[0].measured for edges in (band.edges for band in layout.bands))
-    known = np.isfinite(right) & np.isfinite(left)
-    return np.asarray(np.abs(0.5 * (fill_gaps(left) - fill_gaps(right)))) if known.any() else np.zeros(len(known))
+    right_width, left_width = (edges[1].measured - edges[0].measured for edges in (band.edges for band in layout.bands))
+    both_seen = np.isfinite(right_width) & np.isfinite(left_width)
+    return (
+        np.asarray(np.abs(0.5 * (fill_gaps(left_width) - fill_gaps(right_width))))
+        if both_seen.any()
+        else np.zeros(len(both_seen))
+    )

@@ -23,16 +23,20 @@ def view_lines(layout: RoadLayout, axis: FoundAxis) -> View:
     """Return the view of the axis by lines (`axis_from_lines`), or by the pavement's edges in their place.
 
     Args:
-        layout: that profiles along a path parallel to the road show.
-        axis: that its lines agree on.
+        layout: carriageways and lines in profiles along a path parallel to the road.
+        axis: the axis that the layout's lines agree on.
     """
-    painted = all(guide.width > 0.0 for guide in axis_guides(layout))
-    exact = layout.profiles.points is not None
-    floor = (_CLASSED if exact else _PAINTED) if painted else (_CLASSED if exact else _EDGES)
-    known = np.isfinite(axis.raw)
-    framed = np.all([np.isfinite(guide.measured) for guide in axis_guides(layout)], axis=0)
-    away = STRETCH * SPACING * ndimage.distance_transform_edt(~framed) if framed.any() else np.full(len(known), np.inf)
-    carried = _CARRIED * np.clip(away / _FAR, 0.0, 1.0)
-    std = np.where(known & np.isfinite(axis.std), np.hypot(axis.std, axis.raw - axis.offsets), 0.0)
-    deviation = np.where(known, np.sqrt(floor**2 + std**2 + carried**2), np.inf)
-    return View("lines" if painted else "edges", axis.raw, deviation)
+    by_paint = all(guide.width > 0.0 for guide in axis_guides(layout))
+    by_class = layout.profiles.points is not None
+    floor = (_CLASSED if by_class else _PAINTED) if by_paint else (_CLASSED if by_class else _EDGES)
+    seen_mask = np.isfinite(axis.raw)
+    guides_seen = np.all([np.isfinite(guide.measured) for guide in axis_guides(layout)], axis=0)
+    guide_distance = (
+        STRETCH * SPACING * ndimage.distance_transform_edt(~guides_seen)
+        if guides_seen.any()
+        else np.full(len(seen_mask), np.inf)
+    )
+    carried_std = _CARRIED * np.clip(guide_distance / _FAR, 0.0, 1.0)
+    std = np.where(seen_mask & np.isfinite(axis.std), np.hypot(axis.std, axis.raw - axis.offsets), 0.0)
+    deviation = np.where(seen_mask, np.sqrt(floor**2 + std**2 + carried_std**2), np.inf)
+    return View("lines" if by_paint else "edges", axis.raw, deviation)

@@ -43,36 +43,43 @@ as much."""
 
 def view_brightness(profiles: Profiles, cores: Sequence[float], dual: bool) -> View:
     """Return the view of the pavement's middle, or of the middle between two carriageways, by brightness and height."""
-    right, left = pavement_edges(profiles, cores, dual, float(np.mean(cores)))
-    return View.of("brightness", 0.5 * (right + left), _FLOOR)
+    right_edge, left_edge = pavement_edges(profiles, cores, dual, float(np.mean(cores)))
+    return View.of("brightness", 0.5 * (right_edge + left_edge), _FLOOR)
 
 
-def pavement_edges(profiles: Profiles, cores: Sequence[float], dual: bool, at: float = 0.0) -> Float:
-    """Return the right and left edge (2, K), m, of the pavement or median at a place, found without lines or classes.
+def pavement_edges(profiles: Profiles, cores: Sequence[float], dual: bool, offset: float = 0.0) -> Float:
+    """Return the right and left edge (2, K), m, of the pavement or median at an offset, without lines or classes.
 
-    They are found by brightness and height alone; NaN where an edge isn't seen.
+    Edges are found by brightness and height alone; NaN where an edge isn't seen.
 
     Args:
         profiles: along a path parallel to the road.
-        cores: offsets of the carriageways' middles, m, about which is pavement if anywhere.
-        dual: whether what lies between two carriageways is wanted, in place of the pavement itself.
-        at: offset that the pavement or median lies about, m.
+        cores: offsets of the carriageways' middles, m, around which is surely pavement.
+        dual: whether the median's edges are returned, in place of the pavement's.
+        offset: offset that the pavement or median lies around, m.
     """
     stretches, height = range(profiles.stretches), remove_grade(profiles.height)
     brightness = np.array([median_profile(profiles.brightness, number) for number in stretches])
     steps = np.array([_is_kerb(median_profile(height, number)) for number in stretches])
-    known = np.isfinite(brightness)
+    has_points = np.isfinite(brightness)
     core = np.any([np.abs(profiles.offsets - middle) < _CORE for middle in cores], axis=0)
-    filled = np.array([fill_gaps(row) if np.isfinite(row).any() else row for row in brightness])
-    smooth = ndimage.median_filter(filled, (1, _PAINT))
+    filled_brightness = np.array([fill_gaps(row) if np.isfinite(row).any() else row for row in brightness])
+    paintless_brightness = ndimage.median_filter(filled_brightness, (1, _PAINT))
     # Paint and wear are brighter than the pavement: a low percentile of the core is its own brightness.
-    levels = np.array([np.percentile(row[core], 30) if np.isfinite(row).all() else np.nan for row in smooth])
-    difference = np.abs(smooth - levels[:, None])
-    alike = known & ~(difference > _brightness_threshold(difference[known], difference[:, core]))
-    inside = _without_patches(_close_cracks(alike) & ~steps)
+    levels = np.array(
+        [np.percentile(row[core], 30) if np.isfinite(row).all() else np.nan for row in paintless_brightness]
+    )
+    difference = np.abs(paintless_brightness - levels[:, None])
+    is_pavement = has_points & ~(difference > _brightness_threshold(difference[has_points], difference[:, core]))
+    band_mask = _without_patches(_close_cracks(is_pavement) & ~steps)
     if dual:
-        inside = _close_cracks(known & ~inside)
-    return np.array([_run_at(profiles, row, seen, at) for row, seen in zip(inside, known, strict=True)]).T
+        band_mask = _close_cracks(has_points & ~band_mask)
+    return np.array(
+        [
+            _run_at(profiles, row, row_has_points, offset)
+            for row, row_has_points in zip(band_mask, has_points, strict=True)
+        ]
+    ).T
 
 
 def median_profile(values: Grid | Float, stretch: int) -> Float:
@@ -96,9 +103,9 @@ def _is_kerb(height: Float) -> Bool:
     """Return a mask (U,) of a profile's bins at which the ground steps up or down by more than a crossfall would."""
     if not np.isfinite(height).any():
         return np.zeros(len(height), dtype=bool)
-    filled = ndimage.median_filter(fill_gaps(height), 3)
+    smooth_height = ndimage.median_filter(fill_gaps(height), 3)
     # The rise over several bins: a kerb's face may be hidden, and its two levels lie some bins apart.
-    rise = np.roll(filled, -_KERB_REACH) - np.roll(filled, _KERB_REACH)
+    rise = np.roll(smooth_height, -_KERB_REACH) - np.roll(smooth_height, _KERB_REACH)
     rise[:_KERB_REACH], rise[-_KERB_REACH:] = 0.0, 0.0
     return np.asarray(np.abs(rise) > _KERB)
 
@@ -108,37 +115,44 @@ def _brightness_threshold(difference: Float, core: Float) -> float:
     difference, core = difference[np.isfinite(difference)], core[np.isfinite(core)]
     if not len(difference) or not len(core):
         return np.inf
-    reach = otsu_threshold(difference)
-    other = difference[difference > reach]
-    clear = len(other) > 0 and float(np.median(other)) > _LIKE * robust_scale(core)
-    return reach if clear else np.inf
+    threshold = otsu_threshold(difference)
+    other_ground = difference[difference > threshold]
+    is_distinct = len(other_ground) > 0 and float(np.median(other_ground)) > _LIKE * robust_scale(core)
+    return threshold if is_distinct else np.inf
 
 
-def _close_cracks(inside: Bool) -> Bool:
+def _close_cracks(mask: Bool) -> Bool:
     """Return a mask (K, U) with gaps that are narrow across the road closed."""
-    across = np.ones((1, _CRACK))
-    return ndimage.binary_erosion(ndimage.binary_dilation(inside, across), across, border_value=1)
+    window = np.ones((1, _CRACK))
+    return ndimage.binary_erosion(ndimage.binary_dilation(mask, window), window, border_value=1)
 
 
-def _without_patches(inside: Bool) -> Bool:
+def _without_patches(mask: Bool) -> Bool:
     """Return a mask (K, U) without gaps and spots that are shorter along the road than any change of its width.
 
     Repairs and oil make pavement look like a verge, and entrances a verge like pavement, but for a few metres.
     """
-    along, ends = np.ones((_PATCH, 1)), ((_PATCH, _PATCH), (0, 0))
-    closed = ndimage.binary_closing(np.pad(inside, ends, mode="edge"), along)
-    return np.asarray(ndimage.binary_opening(closed, along)[_PATCH:-_PATCH])
+    window, ends = np.ones((_PATCH, 1)), ((_PATCH, _PATCH), (0, 0))
+    filled_mask = ndimage.binary_closing(np.pad(mask, ends, mode="edge"), window)
+    return np.asarray(ndimage.binary_opening(filled_mask, window)[_PATCH:-_PATCH])
 
 
-def _run_at(profiles: Profiles, inside: Bool, known: Bool, at: float) -> tuple[float, float]:
-    """Return right and left end, m, of the run of bins (U,) nearest to an offset (m); NaN where the cloud ends it."""
-    label, _ = ndimage.label(inside)
-    near = label[(np.abs(profiles.offsets - at) < _CORE) & inside]
-    if not len(near):
+def _run_at(profiles: Profiles, mask: Bool, has_points: Bool, offset: float) -> tuple[float, float]:
+    """Return right and left end, m, of the run of bins around an offset, m; NaN where the cloud ends, not the run.
+
+    Args:
+        profiles: U bins across.
+        mask: (U,) bins of the pavement or median.
+        has_points: (U,) bins with points.
+        offset: m.
+    """
+    label, _ = ndimage.label(mask)
+    central_labels = label[(np.abs(profiles.offsets - offset) < _CORE) & mask]
+    if not len(central_labels):
         return np.nan, np.nan
-    run = np.flatnonzero(label == np.bincount(near).argmax())
-    first, last = int(run[0]), int(run[-1])
-    right, left = profiles.offsets[first] - 0.5 * ACROSS, profiles.offsets[last] + 0.5 * ACROSS
-    right_seen = 2 * known[max(0, first - _BEYOND) : first].sum() >= _BEYOND
-    left_seen = 2 * known[last + 1 : last + 1 + _BEYOND].sum() >= _BEYOND
-    return float(right) if right_seen else np.nan, float(left) if left_seen else np.nan
+    run = np.flatnonzero(label == np.bincount(central_labels).argmax())
+    first_bin, last_bin = int(run[0]), int(run[-1])
+    right_end, left_end = profiles.offsets[first_bin] - 0.5 * ACROSS, profiles.offsets[last_bin] + 0.5 * ACROSS
+    right_seen = 2 * has_points[max(0, first_bin - _BEYOND) : first_bin].sum() >= _BEYOND
+    left_seen = 2 * has_points[last_bin + 1 : last_bin + 1 + _BEYOND].sum() >= _BEYOND
+    return float(right_end) if right_seen else np.nan, float(left_end) if left_seen else np.nan

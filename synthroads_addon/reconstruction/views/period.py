@@ -38,62 +38,69 @@ hide."""
 
 
 def view_period(profiles: Profiles, dual: bool, middle: float) -> View:
-    """Return the view of the axis by dashed lines.
+    """Return the view of the axis by the dashed lines' period in windows of `_WINDOW` rows.
 
-    Near the ends the windows don't reach as far as the stretches: their line is that of a place farther on, and says
+    Near the road's ends a window isn't centred on its stretch: its line is that of a place farther on, and says
     little of where a path turns off.
 
     Args:
         profiles: along a path parallel to the road.
         dual: whether the road has two carriageways.
-        middle: offset between the carriageways, or of a single one's middle, m: roughly.
+        middle: rough offset of the median, or of a single carriageway's middle, m.
     """
     rows, paint = len(profiles.stations), _widened(profiles.paint)
-    offsets, beside = np.full(profiles.stretches, np.nan), np.zeros(profiles.stretches)
+    offsets, window_distance = np.full(profiles.stretches, np.nan), np.zeros(profiles.stretches)
     for number in range(profiles.stretches):
         centre = number * STRETCH + STRETCH // 2
-        first = int(np.clip(centre - _WINDOW // 2, 0, max(0, rows - _WINDOW)))
-        window = slice(first, min(rows, first + _WINDOW))
+        first_row = int(np.clip(centre - _WINDOW // 2, 0, max(0, rows - _WINDOW)))
+        window = slice(first_row, min(rows, first_row + _WINDOW))
         power = dash_power(paint[window], profiles.stations[window])
         offsets[number] = _axis_of(power, profiles.offsets, dual, middle)
-        beside[number] = SPACING * abs(centre - 0.5 * (window.start + window.stop - 1))
-    return View.of("marking period", offsets, _FLOOR, _TURN * beside)
+        window_distance[number] = SPACING * abs(centre - 0.5 * (window.start + window.stop - 1))
+    return View.of("marking period", offsets, _FLOOR, _TURN * window_distance)
 
 
 def _widened(paint: Grid) -> Float:
-    """Return the paint (S, U), clipped, as the mean of the known ones of three bins across; NaN without any."""
-    known = np.isfinite(paint)
+    """Return the paint (S, U) clipped to 0 to 1 and averaged over the known of `_WIDTH` bins across; NaN if none."""
+    has_points = np.isfinite(paint)
     size = (1, _WIDTH)
-    total = ndimage.uniform_filter(np.where(known, np.clip(paint, 0.0, 1.0), 0.0).astype(np.float64), size)
-    share = ndimage.uniform_filter(known.astype(np.float64), size)
+    total = ndimage.uniform_filter(np.where(has_points, np.clip(paint, 0.0, 1.0), 0.0).astype(np.float64), size)
+    share = ndimage.uniform_filter(has_points.astype(np.float64), size)
     return np.where(share > 0.5 / _WIDTH, total / np.maximum(share, 1e-9), np.nan)
 
 
 def dash_power(paint: Float, stations: Float) -> Float:
-    """Return by offset (U,) the power of the paint's wave at the best of the usual periods, in units of noise's mean.
+    """Return the power (U,) of the paint's wave at the best of the usual periods, by offset; of noise its mean is 1.
 
     Args:
         paint: (R, U) share of paint; NaN where unknown.
         stations: (R,) m.
     """
-    known = np.isfinite(paint)
-    count = known.sum(axis=0)
+    has_points = np.isfinite(paint)
+    count = has_points.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.where(known, paint, 0.0).sum(axis=0) / count
-        level = np.where(known, paint - mean, 0.0)
-        variance = np.maximum((level**2).sum(axis=0) / count, 1e-4)
+        mean = np.where(has_points, paint, 0.0).sum(axis=0) / count
+        centred_paint = np.where(has_points, paint - mean, 0.0)
+        variance = np.maximum((centred_paint**2).sum(axis=0) / count, 1e-4)
         # Schuster 1898: the periodogram |sum of (x - mean) exp(-2 pi i s / T)|^2 over n times the variance, which of
         # noise is exponentially distributed with the mean 1.
         waves = np.exp(-2j * np.pi * stations[None, :] / np.array(PERIODS)[:, None])
-        power = np.abs(waves @ level) ** 2 / (count * variance)
+        power = np.abs(waves @ centred_paint) ** 2 / (count * variance)
     return np.where(count >= _FEWEST_ROWS, power.max(axis=0), 0.0)
 
 
 def _axis_of(power: Float, offsets: Float, dual: bool, middle: float) -> float:
-    """Return the axis' offset, m, that dashed lines at the peaks of a power (U,) show; NaN where they don't."""
+    """Return the axis' offset, m, by the dashed lines at the peaks of a power (U,); NaN where they show none.
+
+    Args:
+        power: (U,) by offset, see `dash_power`.
+        offsets: (U,) m.
+        dual: whether the road has two carriageways.
+        middle: rough offset of the axis, m.
+    """
     blurred = ndimage.gaussian_filter1d(power, 1.0)
     peaks = find_peaks(blurred, height=_CLEAR, distance=round(_LANE / ACROSS))[0]
-    places = [_centre_of_peak(blurred, at, offsets) for at in peaks]
+    line_offsets = [_centre_of_peak(blurred, line_offset, offsets) for line_offset in peaks]
     if not dual:
         if not len(peaks):
             return np.nan
@@ -101,14 +108,15 @@ def _axis_of(power: Float, offsets: Float, dual: bool, middle: float) -> float:
         order = np.argsort(-blurred[peaks])
         if len(order) > 1 and blurred[peaks[order[1]]] > _RIVAL * blurred[peaks[order[0]]]:
             return np.nan
-        return places[int(order[0])]
-    right, left = [at for at in places if at < middle], [at for at in places if at > middle]
-    if not right or len(right) != len(left):
+        return line_offsets[int(order[0])]
+    right_lines = [line_offset for line_offset in line_offsets if line_offset < middle]
+    left_lines = [line_offset for line_offset in line_offsets if line_offset > middle]
+    if not right_lines or len(right_lines) != len(left_lines):
         return np.nan
-    return 0.5 * (max(right) + min(left))
+    return 0.5 * (max(right_lines) + min(left_lines))
 
 
-def _centre_of_peak(values: Float, at: int, offsets: Float) -> float:
+def _centre_of_peak(values: Float, peak_bin: int, offsets: Float) -> float:
     """Return the centre of gravity, m, of a peak's bins."""
-    near = slice(max(0, at - 3), at + 4)
-    return float(np.average(offsets[near], weights=np.maximum(values[near], 1e-9)))
+    bins = slice(max(0, peak_bin - 3), peak_bin + 4)
+    return float(np.average(offsets[bins], weights=np.maximum(values[bins], 1e-9)))

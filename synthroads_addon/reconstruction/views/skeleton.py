@@ -38,49 +38,56 @@ def view_skeleton(profiles: Profiles, cores: Sequence[float]) -> View:
         profiles: along a path parallel to the road.
         cores: offsets of the carriageways' middles, m: one or two.
     """
-    dark, known, offsets = _dark_cells(profiles)
-    if not dark.any():
+    dark_mask, known_mask, offsets = _dark_cells(profiles)
+    if not dark_mask.any():
         return View.of("skeleton", np.full(profiles.stretches, np.nan), _FLOOR)
     # Where the cloud ends nothing is known of what lies beyond: distances across count in metres as those along do.
-    distance = ndimage.distance_transform_edt(dark, sampling=(1.0, _CELL * ACROSS))
-    ridges = [_ridge(distance, dark, known, offsets, core) for core in cores]
+    distance = ndimage.distance_transform_edt(dark_mask, sampling=(1.0, _CELL * ACROSS))
+    ridges = [_ridge(distance, dark_mask, known_mask, offsets, core) for core in cores]
     rows = np.mean(ridges, axis=0)
     return View.of("skeleton", _by_stretch(rows, profiles.stretches), _FLOOR)
 
 
 def _dark_cells(profiles: Profiles) -> tuple[Bool, Bool, Float]:
-    """Return masks (S, C) of the dark and of the known cells, and the cells' middles across (C,), m."""
+    """Return masks (S, C) of the dark cells and of those with points, and the cells' middles across (C,), m."""
     count = len(profiles.offsets) // _CELL
     cells = profiles.brightness[:, : count * _CELL].reshape(len(profiles.stations), count, _CELL)
-    filled = np.isfinite(cells)
-    total = np.where(filled, cells, 0.0).sum(axis=2)
-    number = filled.sum(axis=2)
-    known = ndimage.binary_closing(number > 0, np.ones((5, 3)))
+    has_points = np.isfinite(cells)
+    total = np.where(has_points, cells, 0.0).sum(axis=2)
+    number = has_points.sum(axis=2)
+    known_mask = ndimage.binary_closing(number > 0, np.ones((5, 3)))
     if not (number > 0).any():
-        return known & False, known, profiles.offsets[1::_CELL][:count]
+        return known_mask & False, known_mask, profiles.offsets[1::_CELL][:count]
     mean = np.where(number > 0, total / np.maximum(number, 1), np.nan)
     # Empty cells take the median brightness: they pull the threshold to neither side.
-    usual = float(np.nanmedian(mean))
-    median = ndimage.median_filter(np.where(np.isfinite(mean), mean, usual), _MEDIAN)
-    dark = known & (median <= otsu_threshold(np.asarray(median[known], dtype=np.float64)))
-    dark = ndimage.binary_closing(dark, np.ones((1, _PAINT))) & known
+    median_brightness = float(np.nanmedian(mean))
+    median = ndimage.median_filter(np.where(np.isfinite(mean), mean, median_brightness), _MEDIAN)
+    dark_mask = known_mask & (median <= otsu_threshold(np.asarray(median[known_mask], dtype=np.float64)))
+    dark_mask = ndimage.binary_closing(dark_mask, np.ones((1, _PAINT))) & known_mask
     offsets = profiles.offsets[: count * _CELL].reshape(count, _CELL).mean(axis=1)
-    return np.asarray(dark), np.asarray(known), offsets
+    return np.asarray(dark_mask), np.asarray(known_mask), offsets
 
 
-def _ridge(distance: Float, dark: Bool, known: Bool, offsets: Float, core: float) -> Float:
-    """Return the ridge's offset (S,), m, in the dark run nearest to a core; NaN without one, or at the border."""
+def _ridge(distance: Float, dark_mask: Bool, known_mask: Bool, offsets: Float, core: float) -> Float:
+    """Return the ridge's offset (S,), m, in the dark run nearest to a core; NaN without one, or at the cloud's border.
+
+    Args:
+        distance: (S, C) distance of each cell from the nearest light one, m.
+        dark_mask, known_mask: (S, C) dark cells, and cells with points.
+        offsets: (C,) of the cells' middles, m.
+        core: offset of a carriageway's middle, m.
+    """
     result = np.full(len(distance), np.nan)
     border = round(1.0 / (_CELL * ACROSS))
-    for number, (row, on, seen) in enumerate(zip(distance, dark, known, strict=True)):
-        label, count = ndimage.label(on)
+    for number, (row, row_dark, row_known) in enumerate(zip(distance, dark_mask, known_mask, strict=True)):
+        label, count = ndimage.label(row_dark)
         if not count:
             continue
         middles = np.asarray(ndimage.mean(offsets, label, np.arange(1, count + 1)))
         run = np.flatnonzero(label == int(np.abs(middles - core).argmin()) + 1)
         widest = float(row[run].max())
-        first, last = int(run[0]), int(run[-1])
-        ends = seen[max(0, first - border) : first], seen[last + 1 : last + 1 + border]
+        first_cell, last_cell = int(run[0]), int(run[-1])
+        ends = row_known[max(0, first_cell - border) : first_cell], row_known[last_cell + 1 : last_cell + 1 + border]
         if not _NARROWEST <= widest <= _WIDEST or min(end.mean() if len(end) else 0.0 for end in ends) < _FEWEST:
             continue
         ridge = run[row[run] >= _RIDGE * widest]
@@ -90,10 +97,10 @@ def _ridge(distance: Float, dark: Bool, known: Bool, offsets: Float, core: float
 
 def _by_stretch(rows: Float, stretches: int) -> Float:
     """Return the medians (K,) of the rows' values (S,) by stretch; NaN where most rows have none."""
-    padded = np.full(stretches * STRETCH, np.nan)
-    padded[: len(rows)] = rows
-    blocks = padded.reshape(stretches, STRETCH)
+    full_rows = np.full(stretches * STRETCH, np.nan)
+    full_rows[: len(rows)] = rows
+    blocks = full_rows.reshape(stretches, STRETCH)
     result = np.full(stretches, np.nan)
-    enough = 2 * np.isfinite(blocks).sum(axis=1) > STRETCH
-    result[enough] = np.nanmedian(blocks[enough], axis=1)
+    mostly_known = 2 * np.isfinite(blocks).sum(axis=1) > STRETCH
+    result[mostly_known] = np.nanmedian(blocks[mostly_known], axis=1)
     return result

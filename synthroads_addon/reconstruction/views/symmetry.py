@@ -44,12 +44,12 @@ def view_symmetry(profiles: Profiles) -> View:
     offsets, width = np.full(profiles.stretches, np.nan), np.full(profiles.stretches, np.inf)
     for number in range(profiles.stretches):
         offsets[number], width[number] = _axis_of(_signals(profiles, height, number), profiles.offsets)
-    known = np.isfinite(offsets)
-    return View.of("cross-profile", offsets, _FLOOR, np.where(known, width, 0.0))
+    seen_mask = np.isfinite(offsets)
+    return View.of("cross-profile", offsets, _FLOOR, np.where(seen_mask, width, 0.0))
 
 
 def _signals(profiles: Profiles, height: Float, stretch: int) -> Float:
-    """Return brightness, paint and bend of the ground (3, U) about a stretch, in spreads; NaN where unknown."""
+    """Return brightness, paint and the ground's bend (3, U) around a stretch, each in spreads; NaN where unknown."""
     rows = [
         median_profile(profiles.brightness, stretch),
         median_profile(profiles.paint, stretch),
@@ -60,44 +60,51 @@ def _signals(profiles: Profiles, height: Float, stretch: int) -> Float:
 
 def _bend(height: Float) -> Float:
     """Return the second difference (U,) of a height profile over half a metre: kerbs and verges, not the crossfall."""
+    # Chosen: of fewer than 20 bins (1 m) no shape is told.
     if np.isfinite(height).sum() < 20:
         return np.full(len(height), np.nan)
     # A second difference sees nothing of slopes, and the blur keeps range noise out of it.
-    filled = ndimage.gaussian_filter1d(fill_gaps(height), 2.5)
-    bend = np.gradient(np.gradient(filled))
+    smooth_height = ndimage.gaussian_filter1d(fill_gaps(height), 2.5)
+    bend = np.gradient(np.gradient(smooth_height))
     return np.where(np.isfinite(height), bend, np.nan)
 
 
 def _in_spreads(values: Float) -> Float:
-    known = values[np.isfinite(values)]
-    if len(known) < 20:
+    """Return a profile (U,) less its median, over its robust spread, clipped to `_LIMIT`; NaN if hardly known."""
+    finite_values = values[np.isfinite(values)]
+    if len(finite_values) < 20:
         return np.full(len(values), np.nan)
-    middle = float(np.median(known))
+    middle = float(np.median(finite_values))
     # Of a profile that is even but for a few bins the robust scale is nearly 0, and would blow up its noise.
-    spread = max(robust_scale(known - middle), 0.3 * float(known.std()), 1e-9)
+    spread = max(robust_scale(finite_values - middle), 0.3 * float(finite_values.std()), 1e-9)
     return np.clip((values - middle) / spread, -_LIMIT, _LIMIT)
 
 
 def _axis_of(signals: Float, offsets: Float) -> tuple[float, float]:
-    """Return offset and half-width of the peak, m, of the best axis of symmetry; NaN where there is none or two."""
+    """Return the best axis of symmetry's offset and half the width of its peak, m; NaN if there is none, or a rival.
+
+    Args:
+        signals: (3, U) see `_signals`.
+        offsets: (U,) m.
+    """
     score, pairs = _symmetry(signals)
     if not np.isfinite(score).any():
         return np.nan, np.inf
-    place = offsets[0] + 0.5 * ACROSS * np.arange(len(score))
-    allowed = (np.abs(place) <= _REACH) & (pairs * ACROSS >= _FEWEST)
-    judged = np.where(allowed, score, -np.inf)
-    best = int(judged.argmax())
-    if not judged[best] >= _CLEAR:
+    axis_offsets = offsets[0] + 0.5 * ACROSS * np.arange(len(score))
+    candidate_mask = (np.abs(axis_offsets) <= _REACH) & (pairs * ACROSS >= _FEWEST)
+    candidate_score = np.where(candidate_mask, score, -np.inf)
+    best_place = int(candidate_score.argmax())
+    if not candidate_score[best_place] >= _CLEAR:
         return np.nan, np.inf
-    near = np.abs(place - place[best]) < _OTHER
-    if float(np.where(near, -np.inf, judged).max()) > _RIVAL * judged[best]:
+    around_best = np.abs(axis_offsets - axis_offsets[best_place]) < _OTHER
+    if float(np.where(around_best, -np.inf, candidate_score).max()) > _RIVAL * candidate_score[best_place]:
         return np.nan, np.inf
-    peak = near & (judged >= _NEAR_BEST * judged[best])
-    return float(np.average(place[peak], weights=judged[peak])), 0.5 * float(np.ptp(place[peak]))
+    peak = around_best & (candidate_score >= _NEAR_BEST * candidate_score[best_place])
+    return float(np.average(axis_offsets[peak], weights=candidate_score[peak])), 0.5 * float(np.ptp(axis_offsets[peak]))
 
 
 def _symmetry(values: Float) -> tuple[Float, Float]:
-    """Return by place of the axis, each half bin, how much more alike mirror images are than chance, and their pairs.
+    """Return the score of symmetry about each place, half a bin apart, and the number of pairs of mirror images.
 
     Args:
         values: (C, U) signals in spreads; NaN where unknown.
@@ -110,14 +117,16 @@ def _symmetry(values: Float) -> tuple[Float, Float]:
     # pairs and the variance it is their correlation, whose deviation for unrelated values is 1 / sqrt(pairs).
     total, pairs = np.zeros(2 * bins - 1), np.zeros(2 * bins - 1)
     for row in values:
-        known = np.isfinite(row)
-        variance = float(row[known].var()) if known.any() else 0.0
+        has_value = np.isfinite(row)
+        variance = float(row[has_value].var()) if has_value.any() else 0.0
         if variance <= 0.0:
             continue
         # Unknown bins are 0 and counted nowhere: they pull the correlation to neither side.
-        level = np.where(known, row - row[known].mean(), 0.0)
-        product = 0.5 * (fftconvolve(level, level) - _too_near(level * known, bins))
-        count = 0.5 * (fftconvolve(known.astype(float), known.astype(float)) - _too_near(known.astype(float), bins))
+        centred_values = np.where(has_value, row - row[has_value].mean(), 0.0)
+        product = 0.5 * (fftconvolve(centred_values, centred_values) - _too_near(centred_values * has_value, bins))
+        count = 0.5 * (
+            fftconvolve(has_value.astype(float), has_value.astype(float)) - _too_near(has_value.astype(float), bins)
+        )
         count = np.maximum(np.rint(count), 0.0)
         independent = np.maximum(count * ACROSS / _INDEPENDENT, 1.0)
         total += np.where(count > 0.0, product / np.maximum(count, 1.0) / variance * np.sqrt(independent), 0.0)
@@ -127,7 +136,7 @@ def _symmetry(values: Float) -> tuple[Float, Float]:
 
 
 def _too_near(values: Float, bins: int) -> Float:
-    """Return by place of the axis the sum of products of pairs that lie within `_APART` of it, counted both ways."""
+    """Return by place of the axis (2 U - 1,) the sum of products of pairs within `_APART` of it, counted both ways."""
     reach = round(_APART / ACROSS)
     result = np.zeros(2 * bins - 1)
     for step in range(reach + 1):  # pairs (i, i + step) have their axis at 2 i + step half bins

@@ -32,23 +32,25 @@ class View:
 
     @classmethod
     def of(cls, name: str, offsets: Float, floor: float, std: Float | float = 0.0) -> Self:
-        """Return a view of offsets as they are, their deviation made of scatter, a floor and each stretch's own.
+        """Return a view of offsets whose variance is the sum of their scatter's, a floor's and each stretch's own.
 
-        An offset beside the others of its neighbourhood has what it is beside them as its deviation.
+        An offset that lies off the smoothed course has that distance added to its deviation.
 
         Args:
             name: of the evidence.
             offsets: (K,) m; NaN where nothing is seen.
-            floor: what the evidence is off by even where it doesn't scatter, standard deviation, m.
-            std: of single stretches, m.
+            floor: standard deviation of the evidence's error even where it doesn't scatter, m.
+            std: (K,) standard deviation of each stretch's own error, m; or a number.
         """
-        known = np.isfinite(offsets)
-        if known.sum() < 3:
+        seen_mask = np.isfinite(offsets)
+        if seen_mask.sum() < 3:
             return cls(name, np.full(len(offsets), np.nan), np.full(len(offsets), np.inf))
-        smoothed = smooth(offsets, known.astype(np.float64), STRETCH * SPACING, _WAVELENGTH, usual=_RELIABLE)
-        residual = np.where(known, np.abs(offsets - smoothed.values), 0.0)
-        sized = np.sqrt(floor**2 + smoothed.std**2 + np.square(residual) + np.square(std))
-        return cls(name, np.where(known, offsets, np.nan), np.where(known, sized, np.inf))
+        smooth_offsets = smooth(
+            offsets, seen_mask.astype(np.float64), STRETCH * SPACING, _WAVELENGTH, usual_std=_RELIABLE
+        )
+        residual = np.where(seen_mask, np.abs(offsets - smooth_offsets.values), 0.0)
+        total_std = np.sqrt(floor**2 + smooth_offsets.std**2 + np.square(residual) + np.square(std))
+        return cls(name, np.where(seen_mask, offsets, np.nan), np.where(seen_mask, total_std, np.inf))
 
     def less_sure(self, std: Float) -> Self:
         """Return the view with one more independent error (K,), m, in each stretch."""

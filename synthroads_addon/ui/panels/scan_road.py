@@ -201,7 +201,7 @@ def find_and_build(job: ReconstructionJob, scenario: Scenario, place: BuildTarge
         "measures": [*measure_lines(road.report), *_surface_lines(road.report["surface"])],
         "notes": road.report["notes"],
     }
-    parameters = road.found.parameters
+    parameters = road.reconstruction.parameters
     build = road_work(parameters, scenario, from_file(job.cloud), place, json.dumps(record))
     yield from part_of_work(build, _FINDING, 1.0)
     length, sentence = parameters.alignment.length, verdict(road.report["judgement"])

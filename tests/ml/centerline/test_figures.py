@@ -33,13 +33,13 @@ def test_the_grid_search_takes_the_best_that_finds_enough() -> None:
 
 def test_what_was_found_is_remembered_by_points_and_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[int] = []
-    sequences = CenterlinePredictor._sequences
+    sequences = CenterlinePredictor._predict_sequences
 
     def counted(self: CenterlinePredictor, road: LearningRoad, frames: Frames) -> Any:
         seen.append(len(frames))
         return sequences(self, road, frames)
 
-    monkeypatch.setattr(CenterlinePredictor, "_sequences", counted)
+    monkeypatch.setattr(CenterlinePredictor, "_predict_sequences", counted)
     known = roads()[0]
     places = frames_along(known.known_truth.axis).select(slice(20, 43))
     plain = CenterlinePredictor(small("single").eval(), SETTINGS, UseOptions(step=10))

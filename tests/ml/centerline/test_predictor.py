@@ -81,7 +81,7 @@ def test_frames_in_several_sequences_have_the_mean_by_inverse_variances(monkeypa
                 *(np.broadcast_to(one[:, None], shape).copy() for one in (value, std)),
             )
 
-    monkeypatch.setattr(ready, "_sequences", told)
+    monkeypatch.setattr(ready, "_predict_sequences", told)
     monkeypatch.setattr("ml.centerline.predictor.smooth_line", lambda frames, y, std, reach: y)
     found = ready.regress(road(), places)
     # 1 / 0.1^2 = 100 and 1 / 0.2^2 = 25: (100 x 2 + 25 x 5) / 125; the mean of the inverse variances is 62.5.

@@ -33,7 +33,7 @@ from ml.segmentation.recipes import (
     SegmentationConfiguration,
     class_shares,
     class_weights,
-    mapped_intensities,
+    map_intensities,
     plan,
 )
 from synthroads_addon.base.errors import InputError
@@ -202,7 +202,7 @@ def test_class_weights_are_the_recipes() -> None:
 def test_mapping_gives_synthetic_intensities_the_real_distribution() -> None:
     synthetic = [road_tile(seed=seed, scene=f"s{seed}", gain=0.2) for seed in (1, 2)]
     real = [road_tile(seed=3, scene="r")]
-    mapped = mapped_intensities(synthetic, real)
+    mapped = map_intensities(synthetic, real)
     want = np.quantile(real[0].strength, np.linspace(0.05, 0.95, 10))
     have = np.quantile(np.concatenate([tile.strength for tile in mapped]), np.linspace(0.05, 0.95, 10))
     before = np.quantile(np.concatenate([tile.strength for tile in synthetic]), np.linspace(0.05, 0.95, 10))
@@ -214,7 +214,7 @@ def test_mapping_gives_synthetic_intensities_the_real_distribution() -> None:
     values = mapped[0].strength[order]
     assert (np.maximum.reduceat(values, starts)[:-1] <= np.minimum.reduceat(values, starts)[1:] + 1e-6).all()
     with pytest.raises(InputError, match="intensities"):
-        mapped_intensities([replace(synthetic[0], strength=None)], real)
+        map_intensities([replace(synthetic[0], strength=None)], real)
 
 
 def test_plan_has_as_many_crops_of_each_domain_as_asked() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ml.data.classes import IGNORED
-from ml.data.exchange import exchanged
+from ml.data.exchange import exchange_classes
 from ml.data.samples import Crop
 
 
@@ -26,7 +26,7 @@ def test_each_crop_has_its_own_points_and_half_of_the_others_classes() -> None:
     one, other = crop([0, 0, 1, 2, 3], 0.25, at=100.0), crop([IGNORED, 1, 1, 2, IGNORED], 0.75, at=-300.0)
     chosen: list[set[int]] = []
     for seed in range(20):
-        first, second = exchanged(one, other, np.random.default_rng(seed))
+        first, second = exchange_classes(one, other, np.random.default_rng(seed))
         for mixed, own, guest in ((first, one, other), (second, other, one)):
             assert np.array_equal(mixed.segment[:5], own.segment)
             assert mixed.strength is not None
@@ -45,13 +45,15 @@ def test_each_crop_has_its_own_points_and_half_of_the_others_classes() -> None:
 
 def test_without_labels_nothing_is_laid_in() -> None:
     one, nothing = crop([0, 1], 0.25, at=0.0), crop([IGNORED, IGNORED], 0.5, at=0.0)
-    first, second = exchanged(one, nothing, np.random.default_rng(1))
+    first, second = exchange_classes(one, nothing, np.random.default_rng(1))
     assert len(first) == 2
     assert len(second) == 3
 
 
 def test_what_one_lacks_is_missing_in_both() -> None:
-    first, second = exchanged(crop([0], 0.1, at=0.0, color=True), crop([1], 0.2, at=0.0), np.random.default_rng(1))
+    first, second = exchange_classes(
+        crop([0], 0.1, at=0.0, color=True), crop([1], 0.2, at=0.0), np.random.default_rng(1)
+    )
     assert first.color is None
     assert second.color is None
     assert first.strength is not None

@@ -19,7 +19,7 @@ from ml.segmentation import task
 from ml.segmentation.experiment import Experiment
 from ml.segmentation.loading import ExchangedBatches, read_domains
 from ml.segmentation.recipes import SegmentationConfiguration
-from ml.segmentation.self_training import believed_labels, target_tiles
+from ml.segmentation.self_training import label_confident_points, target_tiles
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.files import write_file
@@ -87,7 +87,7 @@ def test_of_each_class_the_surest_are_believed(data: Path) -> None:
     def classifier(batch: Any) -> torch.Tensor:
         return torch.from_numpy(logits)[(batch["strength"][:, 0] * 65535.0).round().long()]
 
-    (found,) = believed_labels(tiles, classifier, configuration)
+    (found,) = label_confident_points(tiles, classifier, configuration)
     for place in range(3):
         believed = found.segment == place
         assert believed.sum() == pytest.approx(0.25 * (label == place).sum(), abs=1)

@@ -56,7 +56,7 @@ def lines(panel: type) -> list[str]:
 def test_it_is_the_road_that_the_command_finds(settings: Any, cloud: Path) -> None:
     assert bpy.ops.synthroads.road_from_scan(filepath=str(cloud)) == {"FINISHED"}
     root = find_road(bpy.context.scene)
-    found = run_reconstruction(ReconstructionJob(cloud)).found
+    found = run_reconstruction(ReconstructionJob(cloud)).reconstruction
     assert recall(root) == (found.parameters, settings.scenario())
     assert source_file_name(root) == "scan.laz"
     assert np.allclose(np.array(root[FRAME]) - np.array(root[ORIGIN]), root.location)
@@ -73,8 +73,8 @@ def test_its_options_are_the_commands(settings: Any, cloud: Path, tmp_path: Path
     bpy.ops.synthroads.road_from_scan(filepath=str(cloud), **options)
     job = ReconstructionJob(cloud, "dual", tmp_path / "course.csv", 0.1, True)
     given, plain = (
-        run_reconstruction(job).found.parameters,
-        run_reconstruction(ReconstructionJob(cloud)).found.parameters,
+        run_reconstruction(job).reconstruction.parameters,
+        run_reconstruction(ReconstructionJob(cloud)).reconstruction.parameters,
     )
     assert recall(find_road(bpy.context.scene))[0] == given != plain
 
@@ -104,7 +104,7 @@ def test_doubts_stand_in_the_panel_by_station_with_their_reasons(
 ) -> None:
     monkeypatch.setattr(room, "sidebar_width", lambda: 900.0)
     bpy.ops.synthroads.road_from_scan(filepath=str(rough_cloud))
-    judgement = run_reconstruction(ReconstructionJob(rough_cloud)).found.judgement
+    judgement = run_reconstruction(ReconstructionJob(rough_cloud)).reconstruction.judgement
     (doubt,) = judgement.doubts
     assert doubt.start < ROUGH[1]
     assert doubt.end > ROUGH[0]

@@ -11,7 +11,7 @@ from ml.data.corridor import CORRIDOR
 from ml.data.frames import displace_frames, frames_along
 from ml.data.slices import mirror_batch
 from ml.networks.centerline.layers import DeformableKernelPoints, PointFeatures, cell_features, cell_sums
-from ml.networks.centerline.models import TARGETS, both_ways
+from ml.networks.centerline.models import TARGETS, predict_both_ways
 from ml.networks.centerline.refinement import parabola
 from ml.registry import networks
 from synthroads_addon.base.errors import InputError
@@ -89,7 +89,7 @@ def test_only_single_sees_one_slice_alone(model):
 @torch.no_grad()
 def test_mirror_carries_over_exactly(model):
     one = batch(3)
-    here, there = both_ways(model, one), both_ways(model, mirror_batch(one))
+    here, there = predict_both_ways(model, one), predict_both_ways(model, mirror_batch(one))
     assert torch.equal(there["center"], -here["center"])
     assert torch.equal(there["center_std"], here["center_std"])
     left, right, heading = (CORRIDOR.index(name) for name in ("left_edge", "right_edge", "heading"))

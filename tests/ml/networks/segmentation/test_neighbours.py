@@ -34,7 +34,7 @@ def cloud(count: int, seed: int = 0) -> Tensor:
 
 def in_order(points: Tensor) -> Tensor:
     """Return points in the order of which the first ones in a ball are taken."""
-    return points[torch.from_numpy(geometric_order(neighbours._about_middle(points.numpy())))]
+    return points[torch.from_numpy(geometric_order(neighbours._centre_cloud(points.numpy())))]
 
 
 def lattice() -> Tensor:

@@ -14,9 +14,9 @@ from ml.networks.segmentation.point_transformer import (
     AttentionBlock,
     PointTransformer,
     PointTransformerOptions,
+    drop_clouds,
+    rotate_pairs,
     rotations,
-    skipped,
-    turned,
 )
 from ml.segmentation.network import adapt_norms, overlay_clouds
 from synthroads_addon.base.errors import InputError
@@ -168,14 +168,14 @@ def test_turned_queries_and_keys_tell_how_far_apart_they_are() -> None:
     query, key = torch.randn(2, 1, 1, 24, dtype=torch.float64).expand(2, 50, 1, 24)
     places = torch.randint(0, 200, (50, 3)).double()
     step = torch.tensor([3.0, -7.0, 2.0], dtype=torch.float64)
-    turned_query = turned(query, *rotations(places, 24))
-    same = (turned_query * turned(key, *rotations(places + step, 24))).sum(dim=-1)
+    turned_query = rotate_pairs(query, *rotations(places, 24))
+    same = (turned_query * rotate_pairs(key, *rotations(places + step, 24))).sum(dim=-1)
     assert torch.allclose(same, same[:1].expand_as(same))
     assert torch.allclose(turned_query.norm(dim=-1), query.norm(dim=-1))
     for axis in range(3):
         other = step.clone()
         other[axis] += 1
-        assert not torch.allclose((turned_query * turned(key, *rotations(places + other, 24))).sum(dim=-1), same)
+        assert not torch.allclose((turned_query * rotate_pairs(key, *rotations(places + other, 24))).sum(dim=-1), same)
 
 
 @pytest.mark.parametrize("kernel", ["cube", "cross"])
@@ -265,13 +265,13 @@ def test_a_skipped_block_is_skipped_by_whole_clouds_and_the_mean_stays() -> None
     torch.manual_seed(2)
     ends = torch.arange(0, 3 * 4000 + 1, 3)[1:]
     change = torch.ones(3 * 4000, 2)
-    kept = skipped(change, ends, 0.25, True)
+    kept = drop_clouds(change, ends, 0.25, True)
     assert {round(value, 4) for value in kept.unique().tolist()} == {0.0, 1.3333}
     by_cloud = kept.view(4000, 6)
     assert torch.equal(by_cloud, by_cloud[:, :1].expand_as(by_cloud))
     assert float(kept.mean()) == pytest.approx(1.0, abs=0.03)
-    assert skipped(change, ends, 0.25, False) is change
-    assert skipped(change, ends, 0.0, True) is change
+    assert drop_clouds(change, ends, 0.25, False) is change
+    assert drop_clouds(change, ends, 0.0, True) is change
 
 
 def test_the_last_block_is_skipped_most_often_and_the_first_never() -> None:
@@ -332,7 +332,7 @@ def test_the_shipped_configuration_is_as_large_as_the_others() -> None:
         ({"patch": 0}, "patch is 0"),
         ({"head_width": 20}, "head_width: must be a multiple of 6, not 20"),
         ({"curves": []}, "curves"),
-        ({"curves": ["hilbert", "hilbert"]}, "curves must differ"),
+        ({"curves": ["hilbert", "hilbert"]}, "curves must not name a curve twice"),
         ({"curves": ["peano"]}, "curves"),
         ({"kernel": "ball"}, "kernel is 'ball'"),
         ({"drop_path": 1.0}, "drop_path is 1"),

@@ -12,7 +12,7 @@ from torch.utils.flop_counter import FlopCounterMode
 
 from ml.networks.segmentation import grouping
 from ml.networks.segmentation.grouping import Norm, gather_max, pairs_max
-from ml.networks.segmentation.neighbours import Neighbours, _about_middle, build_neighbours, geometric_order
+from ml.networks.segmentation.neighbours import Neighbours, _centre_cloud, build_neighbours, geometric_order
 from ml.networks.segmentation.pointnext import PointNeXt, PointNeXtOptions, SetAbstraction
 from synthroads_addon.base.errors import InputError
 
@@ -48,7 +48,7 @@ def random_cloud(count: int, seed: int = 1) -> tuple[Tensor, Tensor]:
 
 def in_order(cloud: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
     """Return a cloud in the order of which the first neighbours are taken."""
-    order = torch.from_numpy(geometric_order(_about_middle(cloud[0].numpy())))
+    order = torch.from_numpy(geometric_order(_centre_cloud(cloud[0].numpy())))
     return cloud[0][order], cloud[1][order]
 
 
