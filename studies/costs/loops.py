@@ -50,7 +50,9 @@ def times(plan: ScanPlan) -> tuple[float, float]:
     for strip, number in list(plan.blocks())[:BLOCKS]:
         first, count = plan.cut.pulse_span(strip, number)
         count, scan = min(count, PULSES), BlockScan(plan)
-        poses = scan.emitter.poses_between(strip, *(plan.cut.time(strip, pulse) for pulse in (first, first + count - 1)))
+        poses = scan.emitter.poses_between(
+            strip, *(plan.cut.time(strip, pulse) for pulse in (first, first + count - 1))
+        )
         pulses = scan.emitter.emit(strip, poses, None, first, count)
         times_by_plan: tuple[list[float], list[float]] = ([], [])
         for _ in range(RUNS):

@@ -120,7 +120,8 @@ class SectionScan:
 
     def _build(self, section: RoadSection) -> tuple[ScannedScene, Float]:
         """Build a section; return its scene with passing vehicles, and its frame's origin (3,) in the road's, m."""
-        settings, parameters, stretch = self._scenario.settings(), self._road.parameters, (section.build_start, section.build_end)
+        settings, parameters = self._scenario.settings(), self._road.parameters
+        stretch = (section.build_start, section.build_end)
         tolerance, detail = settings.tolerance, settings.vegetation_detail
         request = BuildRequest(
             self._parameters_of_fixed, tolerance, detail, None, stretch, self._road, self._own_materials
