@@ -29,7 +29,7 @@ _MEETING = timedelta(minutes=10)
 """How long one waits for the others to begin."""
 _GRACE = 60.0
 """Seconds in which this process has to notice by itself that another one was lost; over NCCL it waits on instead."""
-_LOST = "one was lost: is memory short? --resume goes on"
+_LOST = "one of the processes ended unexpectedly, perhaps because memory is short; --resume continues"
 _PATIENCE = timedelta(days=2)
 """How long for each later step: the first scores the validation data alone."""
 
@@ -134,7 +134,7 @@ def _check_devices(count: int, device: str) -> None:
     if count > torch.cuda.device_count():
         raise InputError("processes", count, f"must not exceed the CUDA devices, {torch.cuda.device_count()}")
     if device not in ("auto", "cuda"):
-        raise InputError("device", device, "must be cuda or auto for several processes: one GPU each")
+        raise InputError("device", device, "must be cuda or auto if there are several processes, as each needs a GPU")
 
 
 def _join(meeting: Path, number: int, count: int, device: str) -> None:

@@ -67,7 +67,7 @@ def read_metadata(path: Path) -> dict[str, str]:
     """
     told = _header(path)[0].get(METADATA, {})
     if not isinstance(told, dict) or not all(isinstance(text, str) for text in told.values()):
-        raise InputError(f"{path}: {METADATA}", None, "must be texts by name")
+        raise InputError(f"{path}: {METADATA}", None, "must be an object of names and texts")
     return told
 
 
@@ -85,7 +85,7 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
 def _header(path: Path) -> tuple[dict[str, Any], int]:
     """Return a file's header and the offset of its data."""
     if not path.is_file():
-        raise MissingFileError(str(path), None, "no such file of weights")
+        raise MissingFileError(str(path), None, "there is no such file of weights")
     with path.open("rb") as file:
         length = int.from_bytes(file.read(_LENGTH), "little")
         text = file.read(length) if 0 < length <= _LARGEST_HEADER else b""
@@ -94,12 +94,12 @@ def _header(path: Path) -> tuple[dict[str, Any], int]:
     except ValueError:
         header = None
     if len(text) != length or not isinstance(header, dict):
-        raise InputError(str(path), None, "is no file of weights (safetensors), or damaged")
+        raise InputError(str(path), None, "must be an undamaged file of weights (safetensors)")
     return header, _LENGTH + length
 
 
 def _tensor(path: Path, name: str, told: Any, content: np.ndarray[Any, np.dtype[np.uint8]]) -> Tensor:
-    damaged = InputError(f"{path}: {name}", None, "lies outside of the file, or isn't as long as its shape says")
+    damaged = InputError(f"{path}: {name}", None, "its data must lie inside the file and be as long as the shape says")
     try:
         dtype, shape, (first, last) = _TYPES[told["dtype"]], list(told["shape"]), told["data_offsets"]
     except (KeyError, TypeError, ValueError):

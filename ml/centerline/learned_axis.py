@@ -34,7 +34,7 @@ def learned_axis(folder: FilePath, cloud_file: FilePath) -> Predictor:
     trained = open_run(folder)
     name = trained.configuration.task
     if name != "centerline":
-        raise InputError("--run", str(folder), f"is a model for {name}, a centreline model is needed")
+        raise InputError("--run", str(folder), f"is a model for {name}; name a centreline model")
 
     def predict(cloud: RoadCloud, path: CloudPath) -> tuple[Float, Float]:
         with scratch_folder() as place:

@@ -91,7 +91,9 @@ def shorten_sockets() -> None:
             finally:
                 tempfile.tempdir = before
             return
-    raise OutputError("temporary folder", place, "has too long a name for data workers; TMPDIR names another")
+    raise OutputError(
+        "temporary folder", place, "must have a shorter name, as data workers use it; set TMPDIR to another folder"
+    )
 
 
 def _fits(folder: str) -> bool:
@@ -125,7 +127,7 @@ def report_lost_workers(workers: int) -> Iterator[None]:
         if not str(error).startswith("DataLoader worker (pid"):
             raise
         said = " ".join(str(error).partition(". ")[0].split())
-        allowed = f"one of these processes was lost ({said}): is memory short? --resume goes on, with fewer too"
+        allowed = f"one of these processes ended unexpectedly ({said}), perhaps because memory is short; --resume continues, also with fewer workers"
         raise InputError("workers", workers, allowed) from None
 
 

@@ -127,7 +127,7 @@ def measure(
         shown = cases(seed)
         names = [one.road.name for one in shown]
         if twice := {name for name in names if names.count(name) > 1}:
-            raise InputError("road", sorted(twice)[0], "is the name of several roads; give data sets of other names")
+            raise InputError("road", sorted(twice)[0], "is the name of several roads; rename one of the data sets")
         metrics_by_road: dict[str, dict[str, dict[str, float]]] = {name: {} for name in predictors}
         for one in shown:  # road by road: predictors share what they cut out of it
             for name, versions in predictors.items():

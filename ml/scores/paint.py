@@ -52,7 +52,7 @@ def with_painted_line(road: LearningRoad) -> LearningRoad:
     aside = np.array([_ridge(offset[a:b], logs[a:b]) for a, b in zip(first, last, strict=True)])
     there = np.isfinite(aside)
     if there.sum() < 2:
-        raise InputError("road", road.name, "has no painted line beside its axis")
+        raise InputError("road", road.name, "must have a painted line beside its axis")
     direction = axis.direction(places[there])
     left = np.column_stack([-np.sin(direction), np.cos(direction)])
     points = axis.position(places[there]) + aside[there, None] * left

@@ -138,7 +138,7 @@ def _names(evaluation: Evaluation) -> list[str]:
     ]
     given = zip(evaluation.data, places, strict=True)
     if twice := sorted(str(path) for path, place in given if places.count(place) > 1):
-        raise InputError("data", twice[0], "is given twice, or with two endings")
+        raise InputError("data", twice[0], "must be given once; it is given twice, perhaps with two endings")
     longest = max(len(place.parts) for place in places)
     tried = (["-".join(place.parts[-parts:]) for place in places] for parts in range(1, longest + 1))
     return next(names for names in tried if len(set(names)) == len(names))

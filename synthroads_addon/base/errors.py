@@ -5,7 +5,7 @@ command line turns them into one line and exit code 2, the panel into a message.
 """
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 
 class SynthRoadsError(Exception):
@@ -65,10 +65,42 @@ def _plain(value: object) -> object:
     return item() if type(value).__module__ == "numpy" and item and not hasattr(value, "__len__") else value
 
 
+MOST_NAMES = 3
+"""Names that a hint suggests at most. Chosen."""
+_SLIP, _LIKENESS = 0.8, 0.6
+"""Likeness (0 to 1, Ratcliff and Obershelp 1988) of a name with a slip of the keys, and of one worth a hint. Chosen."""
+
+
 def nearest_name(name: str, known: Iterable[str]) -> str:
-    """Return `` (did you mean 'x'?)`` for the known name most like `name`, or an empty string."""
-    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
-    return f" (did you mean '{close[0]}'?)" if close else ""
+    """Return `` (did you mean 'x'?)`` for the known names most like `name`, or an empty string; see `similar_names`."""
+    return suggestion(similar_names(name, known))
+
+
+def similar_names(name: str, known: Iterable[str]) -> list[str]:
+    """Return the known name most like `name`, or up to three that contain it; empty if none is like it.
+
+    Capitals, spaces, dashes and dots make no difference: ``VLP 16`` is found in ``velodyne-vlp-16``.
+    """
+    letters = {one: _letters(one) for one in dict.fromkeys(known)}
+    text = _letters(name)
+    closest = difflib.get_close_matches(text, letters.values(), n=1, cutoff=_LIKENESS)
+    same = [one for one, word in letters.items() if word == (closest[0] if closest else None)][:1]
+    if same and difflib.SequenceMatcher(None, letters[same[0]], text).ratio() >= _SLIP:
+        return same
+    containing = [one for one, word in letters.items() if len(text) > 2 and text in word]
+    return containing[:MOST_NAMES] or same
+
+
+def suggestion(names: Sequence[str]) -> str:
+    """Return `` (did you mean 'x', 'y' or 'z'?)`` for some names, or an empty string for none."""
+    quoted = [f"'{name}'" for name in names]
+    listed = " or ".join(filter(None, [", ".join(quoted[:-1]), *quoted[-1:]]))
+    return f" (did you mean {listed}?)" if listed else ""
+
+
+def _letters(name: str) -> str:
+    """Return the letters and digits of a name in lower case."""
+    return "".join(sign for sign in name.lower() if sign.isalnum())
 
 
 _LONGEST_FIELD, _LONGEST_VALUE, _LONGEST_ALLOWED = 300, 160, 1000

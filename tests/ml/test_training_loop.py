@@ -94,7 +94,7 @@ def test_two_processes_have_the_gradients_of_one_with_batches_twice_as_large(tmp
 @pytest.mark.slow
 def test_a_lost_process_is_said_in_one_line(tmp_path: Path) -> None:
     run = Run.start(tmp_path / "run", configuration(epochs=2).model_copy(update={"processes": 2}))
-    lost = pytest.raises(InputError, match="processes is 2: one was lost")
+    lost = pytest.raises(InputError, match="processes is 2: one of the processes ended")
     with lost, helper_processes(run, lose, torch.device("cpu")):
         learn(run)
 

@@ -178,7 +178,7 @@ def test_a_broken_road_leaves_the_others_usable(tmp_path: Path) -> None:
     path = opendrive(tmp_path / "a.xodr", [broken, whole])
     lines = read_lines(path)
     assert choose_line(lines, None, path.name).name == "main"
-    with pytest.raises(InputError, match=r"a\.xodr: broken: arc curvature is 'x': a finite number is needed"):
+    with pytest.raises(InputError, match=r"a\.xodr: broken: arc curvature is 'x': must be a finite number"):
         choose_line(lines, "broken", path.name)
 
 

@@ -133,7 +133,7 @@ def test_a_shapefile_needs_its_parts(tmp_path: Path) -> None:
     path = vector_file(tmp_path / "a.shp", "ESRI Shapefile", {"axis": well_known_binary(line())})
     (tmp_path / "alone").mkdir()
     shutil.copy(path, tmp_path / "alone" / "a.shp")
-    with pytest.raises(InputError, match=r"a shapefile has this part beside it, which is missing"):
+    with pytest.raises(InputError, match=r"is missing: this part of the shapefile must be in the same folder"):
         axis_from_file(tmp_path / "alone" / "a.shp", RoadScenario(), 1)
     shutil.copy(path, tmp_path / "a.bin")
     with pytest.raises(InputError, match=r"must end in \.shp"):

@@ -1,6 +1,5 @@
 """Values of texts that somebody typed for a field, by the type that the field is declared with."""
 
-import difflib
 import json
 from collections.abc import Iterator, Sequence
 from types import NoneType, UnionType
@@ -8,7 +7,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from ..errors import SynthRoadsError
+from ..errors import MOST_NAMES, SynthRoadsError, similar_names
 
 
 def typed_value(model: type[BaseModel], path: str, text: str) -> Any:
@@ -52,14 +51,15 @@ def declared_kinds(kind: Any, path: Sequence[str]) -> list[Any]:
     return kinds
 
 
-def nearest_path(model: type[BaseModel], name: str) -> str:
-    """Return `` (did you mean 'road.length'?)`` for the field of a class, or within its groups, most like a name.
+def similar_paths(model: type[BaseModel], name: str) -> list[str]:
+    """Return the paths, such as ``road.length``, of the fields of a class, or within its groups, most like a name.
 
-    Of several fields of that name the outermost is meant; an empty string if none is like it.
+    Of several fields of the same name only the outermost are returned; the list is empty if no field is like it.
     """
-    paths: dict[str, str] = {}
+    paths: dict[str, list[str]] = {}
     level: list[tuple[str, Any]] = [("", model)]
     while level:
+        outer_names = set(paths)
         below: list[tuple[str, Any]] = []
         for above, kind in level:
             for one in alternatives(kind):
@@ -67,12 +67,12 @@ def nearest_path(model: type[BaseModel], name: str) -> str:
                     continue
                 for key, field in one.model_fields.items():
                     called = field.alias or key
-                    if called not in paths:
-                        paths[called] = f"{above}{called}"
+                    if called not in outer_names and f"{above}{called}" not in paths.get(called, ()):
+                        paths.setdefault(called, []).append(f"{above}{called}")
                         below.append((f"{above}{called}.", field.annotation))
         level = below
-    close = difflib.get_close_matches(name, paths, n=1, cutoff=0.6)
-    return f" (did you mean '{paths[close[0]]}'?)" if close else ""
+    names = similar_names(name, paths)
+    return [path for similar in names for path in paths[similar]][:MOST_NAMES]
 
 
 def alternatives(kind: Any) -> Iterator[Any]:
