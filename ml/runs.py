@@ -266,7 +266,7 @@ def load_state(module: nn.Module | torch.optim.Optimizer, state: Any, source: st
     if isinstance(module, nn.Module):
         wrong = [name for name, value in module.state_dict().items() if not torch.isfinite(value).all()]
         if wrong:
-            told = f"all weights in the checkpoint must be finite, but some of {wrong[0]} aren't: the checkpoint is damaged; train again"
+            told = f"all weights in the checkpoint must be finite, but some of {wrong[0]} aren't: train again"
             raise InputError(source, None, told)
 
 

@@ -49,7 +49,7 @@ class Data(Part):
     synthetic: tuple[str, ...] = Field((), description="Folders that `synthroads dataset` made.")
     left_out: tuple[tuple[str, ...], ...] = Field(
         (),
-        description="Groups of real roads that are left out together, one group after the other; if empty, each road alone.",
+        description="Groups of real roads that are left out together, in turn; if empty, each road alone.",
     )
 
 

@@ -38,7 +38,7 @@ class MeasuredRoad(Part):
     )
     axis: str = Field(
         "",
-        description="CSV or GeoJSON file with the axis of the cloud, in its map coordinates; if empty, the one in the cloud's folder.",
+        description="CSV or GeoJSON file with the axis, in the cloud's map coordinates; if empty, the one beside it.",
     )
     roads: tuple[str, ...] = Field(
         (), description="Names of the folder's clouds, without endings; if empty, all clouds."
@@ -102,14 +102,14 @@ class DataOptions(Part):
         ge=0,
         le=0.5,
         unit="1",
-        description="Share of each real training road, at its end, that is used for the validation if no real roads are "
-        "named for it.",
+        description="Share of each real training road, at its end, that is used for the validation if no real roads "
+        "are named for it.",
     )
     measured_share: float = quantity(
         0.5, ge=0, le=1, unit="1", description="Share of real roads in the samples, if there are both kinds."
     )
     cache: str = Field(
-        "", description="Folder for sorted points, so that the next run starts sooner; if empty, they aren't kept."
+        "", description="Folder for sorted points, to speed up the next start; if empty they aren't kept."
     )
 
     @model_validator(mode="after")

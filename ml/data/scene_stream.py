@@ -66,7 +66,7 @@ class StreamOptions(Part):
         ge=2,
         le=100_000,
         unit="1",
-        description="Largest number of scenes in the folder: those that an epoch draws from, and the new scenes for the next epoch.",
+        description="Largest number of scenes in the folder: those of an epoch, and the new ones of the next.",
     )
     producers: int = quantity(1, ge=1, le=256, unit="1", description="Number of scenes that are made at the same time.")
     folder: str = Field(
@@ -230,7 +230,8 @@ class SceneStream:
         elif code is not None:
             lines = (self.folder / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
             named = f"scene {missing[0]}"
-            told = f"can't be made: the process that makes scenes has ended with code {code} ({lines[-1] if lines else 'no message'}); "
+            last_line = lines[-1] if lines else "no message"
+            told = f"can't be made: the process that makes scenes has ended with code {code} ({last_line}); "
             told += "--resume tries again"
         else:
             return

@@ -50,8 +50,8 @@ class SliceSettings(Part):
 
     truth: Learned = Field(
         "road",
-        description="Line that is learned. road: the middle of the whole road; carriageway: the line between the two lanes "
-        "of a carriageway; either: the middle of whole roads, and of carriageways without shoulders, as roads of their own.",
+        description="Line that is learned. road: the middle of the whole road; carriageway: the line between its two "
+        "lanes; either: the middle of whole roads, and of carriageways without shoulders, as roads of their own.",
     )
     slices: int = quantity(10, ge=1, le=1000, unit="1", description="Number of slices in a sequence.")
     spacing: float = quantity(

@@ -127,7 +127,10 @@ def report_lost_workers(workers: int) -> Iterator[None]:
         if not str(error).startswith("DataLoader worker (pid"):
             raise
         said = " ".join(str(error).partition(". ")[0].split())
-        allowed = f"one of these processes ended unexpectedly ({said}), perhaps because memory is short; --resume continues, also with fewer workers"
+        allowed = (
+            f"one of these processes ended unexpectedly ({said}), perhaps because memory is short; "
+            "--resume continues, also with fewer workers"
+        )
         raise InputError("workers", workers, allowed) from None
 
 

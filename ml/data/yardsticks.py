@@ -39,7 +39,7 @@ class Yardstick(Part):
     title: str = Field(min_length=1, description="Title of the data set.")
     source: str = Field(min_length=1, description="Address, licence and authors of the data set.")
     form: Form = Field(
-        description="Format of the files. sweeps: SemanticKITTI's .bin and .label; ply; las; any: by the ending of the file."
+        description="Format of the files; sweeps: SemanticKITTI's .bin and .label; any: by the file's ending."
     )
     splits: dict[str, tuple[str, ...]] = Field(min_length=1, description="Patterns of the file paths of each split.")
     mapping: LabelMapping = Field(description="Attribute of the labels, and the class of each label.")

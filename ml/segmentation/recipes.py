@@ -39,7 +39,7 @@ class Adaptation(Part):
 
     adabn: bool = Field(
         False,
-        description="Before a test, compute the statistics of the norms from the points of the test, without their labels.",
+        description="Before a test, compute the norms' statistics from the test's points, without labels.",
     )
     adabn_crops: int = quantity(40, ge=1, le=100_000, unit="1", description="Number of crops for these statistics.")
     mix3d: float = quantity(
@@ -143,7 +143,7 @@ class SegmentationConfiguration(Configuration):
     )
     start: str = Field(
         "",
-        description="Folder of a run, or built-in model, whose weights are the initial weights; if empty, the weights are random.",
+        description="Folder of a run, or built-in model, with the initial weights; if empty, they are random.",
     )
     start_share: float = quantity(
         0.0, ge=0, lt=1, unit="1", description="Share of the initial weights in the final weights."

@@ -42,9 +42,9 @@ _RANGE = 1.5
 """Statistics of a cloud count as real within this many times the range of the real clouds' ones, about its middle."""
 _BY_PATCHES, _BY_FIGURES = "Certificate", "SweepCertificate"
 WITHOUT = {
-    "centerline-mobile": "no real cloud of a road, recorded by line scanners on a vehicle or from a tripod, was available",
+    "centerline-mobile": "no real cloud of a road by line scanners on a vehicle or from a tripod was available",
     "centerline-uav": "no real cloud of a road, recorded by a UAV, was available",
-    "package-models": "it has several sensors, and real clouds of one kind of sensor don't show how real the whole set is",
+    "package-models": "it has several sensors, and real clouds of one sensor can't judge the whole set",
     "reference": "no real cloud of a road, recorded by a UAV, was available",
     "small-gantries": "no real cloud of a road, recorded by a UAV, was available",
     "small-roads": "no real cloud of a road, recorded by a UAV, was available",
@@ -144,13 +144,13 @@ def sweep_table(rows: list[dict[str, Any]], folder: str) -> str:
         "",
         "## Single sweeps",
         "",
-        "A single sweep has too few points to be cut into patches, and one real sweep alone doesn't show how much real",
-        "sweeps differ from each other. Therefore the real sweep is divided by azimuth into a front and a back half, with",
-        "gaps of 20 deg between them, and the two halves count as two real sweeps. The certificate uses those figures of",
-        "[the table of sweeps](devices.md#a-heads-sweeps-beside-a-real-one) that every sweep has. A figure counts as within",
-        f"range if it lies within {_RANGE:g} times the range of the two halves, about the middle of this range. If both halves",
-        "have nearly the same value, this range is so narrow that hardly any sweep lies within it. This command makes the",
-        "certificate:",
+        "A single sweep has too few points to be cut into patches, and one real sweep alone doesn't show how",
+        "much real sweeps differ from each other. Therefore the real sweep is divided by azimuth into a front",
+        "and a back half, with gaps of 20 deg between them, and the two halves count as two real sweeps. The",
+        "certificate uses those figures of [the table of sweeps](devices.md#a-heads-sweeps-beside-a-real-one)",
+        f"that every sweep has. A figure counts as within range if it lies within {_RANGE:g} times the range",
+        "of the two halves, about the middle of this range. If both halves have nearly the same value, this",
+        "range is so narrow that hardly any sweep lies within it. This command makes the certificate:",
         "",
         "    python studies/realism/certificates.py --sweeps --real HALVES --output docs/certificates DATASET ...",
         "",
@@ -173,19 +173,21 @@ def sweep_table(rows: list[dict[str, Any]], folder: str) -> str:
 def table(rows: list[dict[str, Any]], folder: str) -> str:
     """Return certificates as a Markdown page beside the folder that their files are in."""
     groups = list(rows[0]["realism"])
+    last_columns = "statistics within range | most distinctive statistics (AUC) | compared with"
     lines = [
         "# How real are the recipes' clouds?",
         "",
-        "The table shows how well a classifier tells the clouds of each recipe from real clouds",
-        "([how this is measured](compare.md)): the AUC, as the mean over all clouds of the recipe, and in brackets the",
-        "realism, which is 1 - AUC divided by the 1 - AUC of the real clouds among each other. A statistic of a cloud counts",
-        f"as within range if its median lies within {_RANGE:g} times the range of the real clouds' medians, about the middle of",
-        "this range. The clouds are the test scenes of the recipes with 200 m of road; that of `centerline-airborne-even` is",
-        "the cloud of [compare.md](compare.md#what-it-says-of-ours). This command makes the certificates:",
+        "The table shows how well a classifier tells the clouds of each recipe from real clouds ([how this is",
+        "measured](compare.md)): the AUC, as the mean over all clouds of the recipe, and in brackets the",
+        "realism, which is 1 - AUC divided by the 1 - AUC of the real clouds among each other. A statistic of",
+        f"a cloud counts as within range if its median lies within {_RANGE:g} times the range of the real",
+        "clouds' medians, about the middle of this range. The clouds are the test scenes of the recipes with",
+        "200 m of road; that of `centerline-airborne-even` is the cloud of",
+        "[compare.md](compare.md#what-it-says-of-ours). This command makes the certificates:",
         "",
         "    python studies/realism/certificates.py --real LIST --output docs/certificates DATASET ...",
         "",
-        f"| recipe | clouds | {' | '.join(groups)} | statistics within range | most distinctive statistics (AUC) | compared with |",
+        f"| recipe | clouds | {' | '.join(groups)} | {last_columns} |",
         "|---|--:|" + "--:|" * len(groups) + "--:|---|---|",
     ]
     for row in rows:

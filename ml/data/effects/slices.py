@@ -66,7 +66,7 @@ class SequenceEffects(PointEffects):
         ge=0,
         le=1,
         unit="1",
-        description="Probability that a carriageway without shoulders has ground on both sides instead of a second carriageway.",
+        description="Probability that a carriageway without shoulders has ground on both sides, and no second one.",
     )
     hidden: float = quantity(
         0.2, ge=0, le=1, unit="1", description="Probability of a hole like the one behind a vehicle."

@@ -129,7 +129,7 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
             ("BESIDE", "Beside the Axis", "The axis lies at an offset from the file's points"),
             ("LANE", "In a Lane", "The file's points lie in the middle of a lane"),
         ],
-        description="Place on the road where a line of points or a vehicle's path runs; designed roads contain their own axis",
+        description="Where on the road a line of points or a vehicle's path runs; designed roads have their own axis",
         options={"SKIP_SAVE"},
     )
     offset: bpy.props.FloatProperty(
