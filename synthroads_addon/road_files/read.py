@@ -86,7 +86,7 @@ def read_lines(path: Path) -> list[RoadLine]:
     """
     name = format_of(path)
     if name not in READERS:
-        raise InputError(path.name, name, f"must end in one of {', '.join(READERS)}")
+        raise InputError(path.name, name, f"must be one of {', '.join(READERS)}")
     lines = READERS[name](path)
     if not lines:
         raise InputError(path.name, None, _NO_LINE)

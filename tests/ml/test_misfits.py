@@ -62,7 +62,7 @@ def told(folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
         ({"model": [1, 2]}, "model is 'list': a dictionary of tensors is needed"),
         ({"model": {"weight": "text"}}, "model is 'dict': a dictionary of tensors is needed"),
         ({"model": None}, "model is 'NoneType': a dictionary"),
-        ({"model": {"weight": torch.zeros(2)}}, "is of another network than its configuration"),
+        ({"model": {"weight": torch.zeros(2)}}, "the checkpoint must belong to the network of the configuration"),
         ({"epoch": "one"}, "epoch is"),
         ({"epoch": None}, "epoch is 'NoneType': a whole number from 0 is needed"),
         ({"epoch": [1]}, "epoch is 'list': a whole number"),

@@ -50,7 +50,7 @@ def test_a_damaged_file_is_one_line(tmp_path: Path) -> None:
     write_tensors(path, {"x": torch.arange(10.0)}, {})
     whole = path.read_bytes()
     for content, said in (
-        (whole[:-4], "lies outside of the file"),
+        (whole[:-4], "must lie inside the file"),
         (whole[:20], "is no file of weights"),
         (b"", "is no"),
     ):

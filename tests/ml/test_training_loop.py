@@ -136,7 +136,7 @@ def test_interrupted_training_ends_with_the_same_weights(tmp_path: Path) -> None
 
 def test_a_run_is_not_lost_by_mistake(tmp_path: Path) -> None:
     train(tmp_path)
-    with pytest.raises(OutputError, match="holds a run already"):
+    with pytest.raises(OutputError, match="already holds a run"):
         Run.start(tmp_path, configuration())
     with pytest.raises(InputError, match="seed"):
         Run.start(tmp_path, configuration(seed=9), resume=True)
@@ -151,7 +151,7 @@ def test_a_finished_run_opens(tmp_path: Path) -> None:
     run = Run.open(tmp_path)
     assert run.configuration == configuration()
     assert len(run.history) == 6
-    with pytest.raises(MissingFileError, match="holds no trained run"):
+    with pytest.raises(MissingFileError, match="must be the folder of a trained run"):
         Run.open(tmp_path / "nowhere")
     (tmp_path / CHECKPOINT).write_bytes(b"PK\x03\x04 torn")
     with pytest.raises(InputError, match="damaged"):

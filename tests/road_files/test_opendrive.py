@@ -228,10 +228,10 @@ def test_what_is_left_out_is_counted(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("<OpenDRIVE><road>", "valid XML is needed"),
+        ("<OpenDRIVE><road>", "must be valid XML"),
         ('<!DOCTYPE a [<!ENTITY b "c">]><OpenDRIVE><header name="&b;"/></OpenDRIVE>', "document type is 'a'"),
         ("<OpenDRIVE><header/></OpenDRIVE>", "no road or alignment with elements"),
-        ("<svg/>", "one of OpenDRIVE, LandXML, IFC is needed"),
+        ("<svg/>", "must be one of OpenDRIVE, LandXML, IFC"),
     ],
 )
 def test_what_is_no_road_is_one_line(tmp_path: Path, text: str, message: str) -> None:

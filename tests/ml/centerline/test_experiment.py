@@ -164,9 +164,9 @@ def test_folders_of_real_roads_that_do_not_fit_are_refused(data: Path, tmp_path:
     real, cases = str(data / "real"), []
     cases += [
         ({"roads": ("south",)}, "roads is 'south': must be one of the roads of"),
-        ({"left_out": ROADS}, "leaves no road"),
+        ({"left_out": ROADS}, "must leave at least one road"),
     ]
-    cases += [({"axis": "a.csv"}, "is a folder, whose clouds have their axes beside them")]
+    cases += [({"axis": "a.csv"}, "is a folder: each of its clouds has its axis in the same folder")]
     for fields, told in cases:
         with pytest.raises(InputError, match=told):
             MeasuredRoad(cloud=real, **fields).files()

@@ -275,7 +275,7 @@ def test_measured_roads_by_stations(data: Path, tmp_path: Path):
     lengths = [road.truth.axis.length for road in (*roads.measured, *roads.measured_validation) if road.truth]
     assert lengths == pytest.approx([100.0, 50.0], abs=1.1)
     beyond = options.model_copy(update={"measured": (MeasuredRoad(cloud=cloud, axis=axis, first=500.0),)})
-    with pytest.raises(InputError, match="leaves nothing of an axis"):
+    with pytest.raises(InputError, match="first and last must select a part of the axis"):
         read_roads(beyond, "road")
 
 

@@ -140,7 +140,7 @@ def test_widths_that_jump_do_so_over_five_centimetres(tmp_path: Path) -> None:
     ("rest", "rule", "text"),
     [
         (section(0.0, "", lane(-1, width(0.0, 3.5))), "LHT", r"rule is 'LHT': must be RHT"),
-        (section(0.0, "", lane(-1, width(0.0, 3.5), "sidewalk")), "RHT", "no lane that traffic drives on"),
+        (section(0.0, "", lane(-1, width(0.0, 3.5), "sidewalk")), "RHT", "no lane for traffic"),
         (
             section(0.0, "", "".join(lane(-n, width(0.0, 3.0)) for n in range(1, 10))),
             "RHT",
