@@ -169,8 +169,8 @@ def test_profiles_that_cover_a_part_go_on_with_their_grades(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("profile", "message"),
     [
-        ("<PVI>0 50</PVI><ParaCurve length='300'>100 54</ParaCurve><PVI>520 50</PVI>", "curves overlap"),
-        ("<PVI>0 50</PVI><PVI>0 54</PVI>", "stations must grow"),
+        ("<PVI>0 50</PVI><ParaCurve length='300'>100 54</ParaCurve><PVI>520 50</PVI>", "curves must not overlap"),
+        ("<PVI>0 50</PVI><PVI>0 54</PVI>", "stations must increase"),
         ("<PVI>0</PVI>", "must be a station and an elevation"),
         (
             "<PVI>0 1</PVI><UnsymParaCurve lengthIn='0' lengthOut='9'>99 2</UnsymParaCurve><PVI>300 4</PVI>",
