@@ -664,7 +664,7 @@ def _(folder: Path) -> None:
     """Read without running what they hold."""
     torch.save({"model": {}, "epoch": 1, "more": _Marks(folder / "ran")}, folder / "checkpoint.pt")
     run: Run[Any] = Run(folder, None)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="is no checkpoint, or damaged"):
+    with pytest.raises(InputError, match="must be an undamaged checkpoint"):
         run.last_checkpoint()
     assert not (folder / "ran").exists()
 

@@ -107,7 +107,7 @@ def test_weights_that_are_no_real_numbers_are_refused(
     state = finished(kind, tmp_path / "run")
     complex_ones = {name: value.to(torch.complex64) for name, value in state["model"].items()}
     torch.save(state | {"model": complex_ones}, tmp_path / "run" / CHECKPOINT)
-    assert "holds complex numbers" in told(tmp_path / "run", capsys)
+    assert "must not hold complex numbers" in told(tmp_path / "run", capsys)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -187,7 +187,7 @@ def weights_file(path: Path, change: dict[str, Any], metadata: Any = None) -> Pa
     ],
 )
 def test_what_is_no_number_in_a_file_of_weights_is_refused(change: dict[str, Any], tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"weight: (its shape and data_offsets must be whole numbers|lies outside)"):
+    with pytest.raises(InputError, match=r"weight: (its shape and data_offsets must be whole numbers|its data must lie inside)"):
         read_tensors(weights_file(tmp_path / "a.safetensors", change))
 
 

@@ -183,7 +183,7 @@ def test_beginning_with_another_run(trained: Trained, data: Path, tmp_path: Path
     on = configuration(data, begin_with=str(first.folder), seed=9)
     begun = task._first_model(on).state_dict()
     assert same(begun, weights(first))
-    with pytest.raises(InputError, match="another model"):
+    with pytest.raises(InputError, match="must hold a model with the same settings"):
         task._first_model(configuration(data, "single", begin_with=str(first.folder)))
     with pytest.raises(MissingFileError):
         task._first_model(configuration(data, begin_with=str(tmp_path / "none")))

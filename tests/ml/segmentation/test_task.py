@@ -349,7 +349,7 @@ def test_a_checkpoint_of_another_network_is_refused(data: Path, tmp_path: Path) 
     run = Run.start(tmp_path / "run", toy(data))
     other = build(toy(data, features=["x", "y", "z"]))
     run.save({"model": other.state_dict(), "epoch": 1})
-    with pytest.raises(InputError, match="another network"):
+    with pytest.raises(InputError, match="must belong to the network"):
         task.trained_model(run)
 
 
