@@ -14,7 +14,7 @@ ROW_TITLES = {
     "position_mm": "hit position, 95 % (mm)",
     "intensity_percent": "intensity, 95 % (%)",
     "labels_percent": "points of another class (%)",
-    "density_percent": "points too few (%)",
+    "density_percent": "missing points (%)",
     "relief_mm": "micro-relief, 95 % (mm)",
     "colour_median": "colour, CIEDE2000 median",
     "colour_95": "colour, CIEDE2000 95 %",
@@ -24,8 +24,8 @@ ROW_TITLES = {
 
 _COSTS = {
     "seconds": ("processor time (s)", ".1f"),
-    "model_seconds": ("of it model (s)", ".1f"),
-    "image_seconds": ("of it images (s)", ".1f"),
+    "model_seconds": ("of which model (s)", ".1f"),
+    "image_seconds": ("of which images (s)", ".1f"),
     "peak_memory_mb": ("memory (MB)", ".0f"),
     "triangles": ("triangles", ",d"),
     "rays_per_second": ("rays/s", ",d"),
@@ -118,11 +118,15 @@ def front_lines(results: Sequence[Mapping[str, Any]]) -> list[str]:
         faster_row = "-" if other is None else f"{other['value']}: {other['seconds']:.1f} s for {row['seconds']:.1f} s"
         rows.append([str(row["value"]), "yes" if other is None else "no", faster_row])
     lines = markdown_table(["preset", "on the front", "faster, and as accurate in all errors"], rows)
-    text = "times weren't measured twice, so every difference of time counts"
+    text = "No settings were measured twice, so every difference of time counts."
     if noise is not None:
-        text = f"times of the same settings differ by up to {100.0 * noise:.0f} %: only what is faster by more counts"
-    alike_text = f"errors that are larger by less than {100.0 * ALIKE:.0f} % count as equal"
-    return [*lines, "", f"Each is compared with {len(job_rows) - 1} others of the same job; {alike_text}; {text}."]
+        text = (
+            f"Two runs with the same settings differ in time by up to {100.0 * noise:.0f} %; "
+            "only rows that are faster by more than this count as faster."
+        )
+    alike_text = f"Errors that are larger by less than {100.0 * ALIKE:.0f} % count as equal."
+    others = f"Each preset is compared with {len(job_rows) - 1} other rows of the same job."
+    return [*lines, "", f"{others} {alike_text} {text}"]
 
 
 def markdown(results: Sequence[Mapping[str, Any]], scenario: str) -> str:

@@ -25,37 +25,37 @@ class Domain(Part):
     """Domain that a model was trained on, in properties that can be measured on any cloud."""
 
     density: tuple[float, float] = Field(description="Least and largest density of points on the ground, 1/m2.")
-    platforms: tuple[Platform, ...] = Field(min_length=1, description="What carried the scanner.")
-    needs: tuple[Attribute, ...] = Field((), description="Attributes of points without which it is no use.")
+    platforms: tuple[Platform, ...] = Field(min_length=1, description="Platforms that carried the scanner.")
+    needs: tuple[Attribute, ...] = Field((), description="Attributes that points must have for this model.")
 
 
 class Figure(Part):
     """One measured figure of a model, with that of the best untrained rule where there is one."""
 
-    name: str = Field(min_length=1, description="What was measured, on what.")
-    value: float = quantity(unit="1", description="Of the model, in `unit`.")
-    rule: float | None = quantity(None, unit="1", description="Of the best rule that learns nothing, in `unit`.")
-    unit: str = Field(description="m, %, ...")
-    inside: bool = Field(description="Whether it was measured on clouds like those trained on.")
+    name: str = Field(min_length=1, description="Figure that was measured, and the clouds it was measured on.")
+    value: float = quantity(unit="1", description="Value of the model, in `unit`.")
+    rule: float | None = quantity(None, unit="1", description="Value of the best rule without learning, in `unit`.")
+    unit: str = Field(description="Unit of the values: m, %, ...")
+    inside: bool = Field(description="Whether the test clouds are like the training clouds.")
 
 
 class ModelCard(Part):
     """Card of a shipped model."""
 
-    name: str = Field(pattern=r"^[a-z0-9-]+$", description="By which commands take it.")
-    title: str = Field(min_length=1, description="What it is, in one line.")
-    task: Literal["centerline", "segmentation"] = Field(description="What it was trained for.")
-    domain: Domain = Field(description="What it was trained on.")
-    recipe: tuple[str, ...] = Field(min_length=1, description="Commands that make it anew.")
-    commit: str = Field(min_length=7, description="Of the source that it was trained with.")
+    name: str = Field(pattern=r"^[a-z0-9-]+$", description="Name that commands accept.")
+    title: str = Field(min_length=1, description="Title of the model, in one line.")
+    task: Literal["centerline", "segmentation"] = Field(description="Task that the model was trained for.")
+    domain: Domain = Field(description="Clouds that the model was trained on.")
+    recipe: tuple[str, ...] = Field(min_length=1, description="Commands that train the model again.")
+    commit: str = Field(min_length=7, description="Commit of the source code used for the training.")
     seed: int = quantity(ge=0, unit="1", description="Of the training.")
-    scenes: int = quantity(ge=1, unit="1", description="Synthetic roads that it has seen.")
+    scenes: int = quantity(ge=1, unit="1", description="Number of synthetic roads in the training data.")
     epochs: int = quantity(ge=1, unit="1", description="Of the training.")
-    minutes: float = quantity(gt=0, unit="min", description="That the training took on `machine`.")
-    machine: str = Field("one core", min_length=1, description="That it was trained on.")
+    minutes: float = quantity(gt=0, unit="min", description="Duration of the training on `machine`.")
+    machine: str = Field("one core", min_length=1, description="Machine that the model was trained on.")
     parameters: int = quantity(ge=1, unit="1", description="Weights.")
-    figures: tuple[Figure, ...] = Field(min_length=1, description="What it reaches.")
-    limits: tuple[str, ...] = Field(min_length=1, description="Where it fails, one sentence each.")
+    figures: tuple[Figure, ...] = Field(min_length=1, description="Scores of the model.")
+    limits: tuple[str, ...] = Field(min_length=1, description="Cases in which the model fails, one sentence each.")
 
     @property
     def weights(self) -> Path:

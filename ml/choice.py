@@ -95,7 +95,9 @@ def choose_model(cloud: Path, task: str) -> Choice:
     """
     cards = [read_card(name) for name in model_names(task)]
     if not cards:
-        raise InputError("RUN", None, f"no model for {task} comes with the package; `synthroads train` makes one")
+        raise InputError(
+            "RUN", None, f"the package has no model for {task}; train one by `synthroads train`, and name its folder"
+        )
     traits = cloud_traits(cloud)
     return nearest_model(cards, traits)
 
@@ -112,7 +114,7 @@ def nearest_model(cards: Sequence[ModelCard], traits: CloudTraits) -> Choice:
         missing_attributes = " or ".join(
             sorted({name for card in cards for name in card.domain.needs} - traits.attributes)
         )
-        raise InputError("cloud", traits.to_text(), f"the models that come with the package need {missing_attributes}")
+        raise InputError("cloud", traits.to_text(), f"the models in the package need clouds with {missing_attributes}")
     return best_choice
 
 

@@ -44,11 +44,15 @@ class Schedule(Part):
     Loshchilov and Hutter, "Decoupled weight decay regularization" (2019) and "SGDR" (2017).
     """
 
-    epochs: int = quantity(50, ge=1, le=100_000, unit="1", description="Epochs.")
+    epochs: int = quantity(50, ge=1, le=100_000, unit="1", description="Number of epochs.")
     learning_rate: float = quantity(0.01, gt=0, le=10, unit="1", description="Largest learning rate.")
-    final_learning_rate: float = quantity(1e-5, ge=0, le=10, unit="1", description="Rate at the end of the last epoch.")
-    warmup: float = quantity(0.0, ge=0, lt=1, unit="1", description="Share of all steps in which the rate rises.")
-    weight_decay: float = quantity(1e-4, ge=0, le=1, unit="1", description="Decay of the weights, biases left out.")
+    final_learning_rate: float = quantity(
+        1e-5, ge=0, le=10, unit="1", description="Learning rate at the end of the last epoch."
+    )
+    warmup: float = quantity(
+        0.0, ge=0, lt=1, unit="1", description="Share of all steps in which the learning rate rises."
+    )
+    weight_decay: float = quantity(1e-4, ge=0, le=1, unit="1", description="Weight decay; biases don't decay.")
     clip: float = quantity(10.0, gt=0, unit="1", description="Largest norm of the gradient.")
 
     @model_validator(mode="after")
@@ -62,20 +66,34 @@ class Schedule(Part):
 class Configuration(Part):
     """Base of the configurations of all tasks."""
 
-    task: str = Field(description="What is learned: centerline or segmentation.")
-    title: str = Field("", description="Title for people.")
+    task: str = Field(description="Task: centerline or segmentation.")
+    title: str = Field("", description="Title of the configuration.")
     seed: int = quantity(1, ge=0, le=_LARGEST_SEED, unit="1", description="Seed of all random choices.")
-    threads: int = quantity(0, ge=0, le=1024, unit="1", description="Threads of PyTorch; 0: one per core.")
-    device: str = Field("auto", pattern=r"^(auto|cpu|cuda(:\d+)?)$", description="auto: CUDA where there is one.")
-    workers: int = quantity(0, ge=0, le=256, unit="1", description="Processes that prepare batches; 0: this one.")
+    threads: int = quantity(0, ge=0, le=1024, unit="1", description="Number of PyTorch's threads; 0: one per core.")
+    device: str = Field(
+        "auto", pattern=r"^(auto|cpu|cuda(:\d+)?)$", description="Device of the training; auto: CUDA if available."
+    )
+    workers: int = quantity(
+        0,
+        ge=0,
+        le=256,
+        unit="1",
+        description="Number of processes that prepare batches; 0: the main process prepares them.",
+    )
     precision: Literal["float32", "bfloat16"] = Field(
-        "float32", description="Of the training's steps; weights, gradients and geometry stay float32."
+        "float32", description="Number format of the training's steps; weights, gradients and geometry stay float32."
     )
-    processes: int = quantity(1, ge=1, le=1024, unit="1", description="Processes that train, each on other batches.")
+    processes: int = quantity(
+        1, ge=1, le=1024, unit="1", description="Number of processes that train, each on different batches."
+    )
     accumulation: int = quantity(
-        1, ge=1, le=1024, unit="1", description="Batches of a process whose gradients are averaged for one step."
+        1,
+        ge=1,
+        le=1024,
+        unit="1",
+        description="Number of batches of a process whose gradients are averaged for one step.",
     )
-    schedule: Schedule = Field(default=Schedule(), description="How the weights are learned.")
+    schedule: Schedule = Field(default=Schedule(), description="Epochs and learning rates.")
 
 
 def configuration_kind(task: str) -> type[Configuration]:

@@ -32,8 +32,10 @@ class Variant(Model):
 
     vendor_keys_allowed: ClassVar[bool] = False
 
-    set: dict[str, Any] = Field({}, description="Changes of the configuration, path: value.")
-    of: str | None = Field(None, description="Variant whose trained network is only tested anew, with the changes.")
+    set: dict[str, Any] = Field({}, description="Changes of the configuration, as path: value.")
+    of: str | None = Field(
+        None, description="Variant whose trained network is tested again with the changes, without a training."
+    )
 
 
 class Experiment(Model):
@@ -41,12 +43,12 @@ class Experiment(Model):
 
     vendor_keys_allowed: ClassVar[bool] = False
 
-    task: str = Field(_SEGMENTATION, description="What is learned: centerline or segmentation.")
+    task: str = Field(_SEGMENTATION, description="Task: centerline or segmentation.")
     title: str = Field(min_length=1, description="Title.")
-    configuration: str = Field(description="Configuration that all start from.")
-    set: dict[str, Any] = Field({}, description="Changes of it, path: value.")
+    configuration: str = Field(description="Configuration that all variants start from.")
+    set: dict[str, Any] = Field({}, description="Changes of this configuration, as path: value.")
     variants: dict[str, Variant] = Field(
-        min_length=1, description="What is compared, by name, which is that of a folder in the output."
+        min_length=1, description="Variants that are compared, by name; each has a folder of its name in the output."
     )
     seeds: tuple[int, ...] = Field((1, 2, 3, 4, 5), min_length=1, description="Seeds of each variant.")
 
@@ -83,7 +85,9 @@ def load_experiment(name_or_file: str) -> Any:
     experiment: Experiment = experiment_module(task).Experiment.from_dict(data, str(name_or_file))
     for name, variant in experiment.variants.items():
         if variant.of is not None and (variant.of not in experiment.variants or experiment.variants[variant.of].of):
-            raise InputError(f"variants.{name}.of", variant.of, "must be a variant that is trained")
+            raise InputError(
+                f"variants.{name}.of", variant.of, "must be a variant that is trained, not one that is only tested"
+            )
     return experiment
 
 

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 _MEETING = timedelta(minutes=10)
 """Time that a process waits for the others to begin."""
 _GRACE = 60.0
-"""Seconds in which this process should notice by itself that another one was lost, which over NCCL it doesn't."""
-_LOST = "one was lost: is memory short? --resume goes on"
+"""Seconds in which this process has to notice by itself that another one was lost; over NCCL it waits on instead."""
+_LOST = "one of the processes ended unexpectedly, perhaps because memory is short; --resume continues"
 _PATIENCE = timedelta(days=2)
 """Time that a process waits for another one in later steps: the first process scores the validation data alone."""
 
@@ -136,7 +136,7 @@ def _check_devices(count: int, device: str) -> None:
     if count > torch.cuda.device_count():
         raise InputError("processes", count, f"must not exceed the CUDA devices, {torch.cuda.device_count()}")
     if device not in ("auto", "cuda"):
-        raise InputError("device", device, "must be cuda or auto for several processes: one GPU each")
+        raise InputError("device", device, "must be cuda or auto if there are several processes, as each needs a GPU")
 
 
 def _join_group(meeting: Path, number: int, count: int, device: str) -> None:

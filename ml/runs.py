@@ -35,7 +35,9 @@ PRETRAINING = "pretraining"
 """Folder within a fine-tuned or self-trained run's that holds its pretraining, and its rounds but the last."""
 LOCK = ".lock"
 """File that the training at work in the folder holds locked; it is gone at the end."""
-NOT_FINITE = "not all that it says of the cloud is finite: its weights are beyond reason; train it anew"
+NOT_FINITE = (
+    "the output of the network must be finite for this cloud, but isn't: its weights are too large; train again"
+)
 """Fault of a network, as an error says it."""
 FREE_WHEN_RESUMING = ("threads", "device", "workers", "prepare_on")
 """Fields that may change between the parts of one training: they say where it runs, not what it learns."""
@@ -130,7 +132,7 @@ class Run(Generic[C]):
         if self.resume:
             self._resume(read_json(self.folder / CONFIGURATION))
         elif not self.overwrite:
-            fault = "holds a run already; --resume goes on, --overwrite begins anew"
+            fault = "already holds a run; --resume continues it, --overwrite starts again"
             raise OutputError("--output", str(self.folder), fault)
         return self.resume
 
@@ -169,7 +171,9 @@ class Run(Generic[C]):
             MissingFileError: the folder holds no run.
         """
         if not (folder / CONFIGURATION).is_file() or not (folder / CHECKPOINT).is_file():
-            raise MissingFileError(str(folder), None, "holds no trained run; `synthroads train` makes one")
+            raise MissingFileError(
+                str(folder), None, "must be the folder of a trained run, as `synthroads train` makes it"
+            )
         run: Run[Any] = cls(folder, from_data(read_json(folder / CONFIGURATION), str(folder / CONFIGURATION)))
         if (folder / HISTORY).is_file():
             run.history = _read_history(folder / HISTORY)
@@ -195,9 +199,9 @@ class Run(Generic[C]):
         try:
             state: dict[str, Any] = torch.load(path, map_location=device, weights_only=True)
         except Exception as problem:  # pickle, zip and torch each have errors of their own
-            raise InputError(str(path), None, f"is no checkpoint, or damaged ({type(problem).__name__})") from None
+            raise InputError(str(path), None, f"must be an undamaged checkpoint ({type(problem).__name__})") from None
         if not isinstance(state, dict) or not {"model", "epoch"} <= set(state):
-            raise InputError(str(path), None, "is no checkpoint of a training of ours")
+            raise InputError(str(path), None, "must be a checkpoint of SynthRoads")
         epoch, model = state["epoch"], state["model"]
         if isinstance(epoch, bool) or not isinstance(epoch, int) or epoch < 0:
             raise InputError(f"{path}: epoch", _value_text(epoch), "a whole number from 0 is needed")
@@ -237,7 +241,9 @@ class Run(Generic[C]):
         if changed_fields:
             name = changed_fields[0]
             raise InputError(
-                f"--resume: {name}", current_data.get(name), f"the run was begun with {previous_data.get(name)!r}"
+                f"--resume: {name}",
+                current_data.get(name),
+                f"must be {previous_data.get(name)!r}, as at the start of this run",
             )
         state = self.last_checkpoint()
         self.kept = epoch_count = 0 if state is None else state["epoch"]
@@ -257,15 +263,17 @@ def load_state(module: nn.Module | torch.optim.Optimizer, state: Any, source: st
         InputError: the state is another network's, or a weight isn't finite.
     """
     if isinstance(module, nn.Module) and any(value.is_complex() for value in state.values()):
-        raise InputError(source, None, "its checkpoint holds complex numbers, which no network of ours has")
+        raise InputError(
+            source, None, "the checkpoint must not hold complex numbers: it is no checkpoint of SynthRoads"
+        )
     try:
         module.load_state_dict(state)
     except (RuntimeError, ValueError, TypeError, LookupError, AttributeError):  # whatever doesn't fit
-        raise InputError(source, None, "its checkpoint is of another network than its configuration") from None
+        raise InputError(source, None, "the checkpoint must belong to the network of the configuration") from None
     if isinstance(module, nn.Module):
         damaged_names = [name for name, value in module.state_dict().items() if not torch.isfinite(value).all()]
         if damaged_names:
-            fault = f"not all of its checkpoint's numbers of {damaged_names[0]} are finite: it is damaged; train anew"
+            fault = f"all weights in the checkpoint must be finite, but some of {damaged_names[0]} aren't: train again"
             raise InputError(source, None, fault)
 
 
@@ -278,7 +286,7 @@ def _read_history(path: Path) -> list[dict[str, float]]:
     """Return the figures of each epoch of a history's file; InputError if it isn't a list of objects."""
     history = read_json(path)
     if not isinstance(history, list) or not all(isinstance(epoch, dict) for epoch in history):
-        raise InputError(str(path), None, "must be a list of an object for each epoch")
+        raise InputError(str(path), None, "must be a list with an object for each epoch")
     return history
 
 

@@ -67,7 +67,7 @@ def read_metadata(path: Path) -> dict[str, str]:
     """
     texts = _read_header(path)[0].get(METADATA, {})
     if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
-        raise InputError(f"{path}: {METADATA}", None, "must be texts by name")
+        raise InputError(f"{path}: {METADATA}", None, "must be an object of names and texts")
     return texts
 
 
@@ -85,7 +85,7 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
 def _read_header(path: Path) -> tuple[dict[str, Any], int]:
     """Return a file's header as a dictionary, and the offset of its data in bytes."""
     if not path.is_file():
-        raise MissingFileError(str(path), None, "no such file of weights")
+        raise MissingFileError(str(path), None, "there is no such file of weights")
     with path.open("rb") as file:
         length = int.from_bytes(file.read(_LENGTH), "little")
         text = file.read(length) if 0 < length <= _LARGEST_HEADER else b""
@@ -94,13 +94,15 @@ def _read_header(path: Path) -> tuple[dict[str, Any], int]:
     except ValueError:
         header = None
     if len(text) != length or not isinstance(header, dict):
-        raise InputError(str(path), None, "is no file of weights (safetensors), or damaged")
+        raise InputError(str(path), None, "must be an undamaged file of weights (safetensors)")
     return header, _LENGTH + length
 
 
 def _read_tensor(path: Path, name: str, entry: Any, content: np.ndarray[Any, np.dtype[np.uint8]]) -> Tensor:
     """Return one tensor by its entry in the header (dtype, shape, data_offsets), from the file's data bytes."""
-    damage_error = InputError(f"{path}: {name}", None, "lies outside of the file, or isn't as long as its shape says")
+    damage_error = InputError(
+        f"{path}: {name}", None, "its data must lie inside the file and be as long as the shape says"
+    )
     try:
         dtype, shape, (begin, end) = _TYPES[entry["dtype"]], list(entry["shape"]), entry["data_offsets"]
     except (KeyError, TypeError, ValueError):

@@ -41,7 +41,7 @@ class ShippedRun(Run[Any]):
         try:
             return json.loads(text) if text else None
         except ValueError:
-            raise InputError(str(self._weights()), None, "its calibration is no JSON") from None
+            raise InputError(str(self._weights()), None, "its calibration must be JSON: the file is damaged") from None
 
     def _weights(self) -> Path:
         """Return the file of the model's weights."""
@@ -60,7 +60,9 @@ def open_shipped(name: str) -> ShippedRun:
     try:
         data = json.loads(text)
     except ValueError:
-        raise InputError(str(card.weights), None, "says nothing of the network that its weights are of") from None
+        raise InputError(
+            str(card.weights), None, "must describe the network of its weights: the file is damaged"
+        ) from None
     return ShippedRun(card.weights.with_suffix(""), from_data(data, str(card.weights)), card=card)
 
 
@@ -72,7 +74,7 @@ def open_run(run: Path) -> Run[Any]:
     """
     if run.is_dir() or len(run.parts) > 1 or str(run) not in model_names():
         if not run.exists() and (hint := nearest_name(str(run), model_names())):
-            raise MissingFileError(str(run), None, f"is no folder of a trained run and no model's name{hint}")
+            raise MissingFileError(str(run), None, f"must be the folder of a trained run, or the name of a model{hint}")
         return Run.open(run)
     return open_shipped(str(run))
 
@@ -88,7 +90,9 @@ def ship(run: Run[Any], weights: Path, *, overwrite: bool = False) -> int:
     """
     state = run.last_checkpoint()
     if state is None or state["epoch"] < run.configuration.schedule.epochs:
-        raise InputError(str(run.folder), None, "its training isn't finished; `synthroads train --resume` goes on")
+        raise InputError(
+            str(run.folder), None, "the training of this run isn't finished; `synthroads train --resume` continues it"
+        )
     tensors = {name: _to_half_precision(value) for name, value in state["model"].items()}
     size = sum(value.numel() * value.element_size() for value in tensors.values())
     if size > LARGEST_MB * 1e6:

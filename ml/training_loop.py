@@ -39,7 +39,7 @@ def chosen_device(configuration: Configuration) -> torch.device:
     if configuration.device in ("auto", "cuda") and torch.cuda.is_available():
         return torch.device("cuda", process_number())
     if configuration.device.startswith("cuda") and not torch.cuda.is_available():
-        raise InputError("device", configuration.device, "this PyTorch sees no CUDA device; cpu and auto are possible")
+        raise InputError("device", configuration.device, "PyTorch finds no CUDA device; choose cpu or auto")
     return torch.device(configuration.device)
 
 
@@ -194,5 +194,5 @@ def _groups(batches: Iterable[Any], size: int) -> Iterator[list[Any]]:
 def _means(figures: list[Figures]) -> Figures:
     """Return the mean of each figure over steps; InputError without any."""
     if not figures:
-        raise InputError("training data", 0, "an epoch has no batch: more data or a smaller batch are needed")
+        raise InputError("training data", 0, "an epoch must have at least one batch: use more data or a smaller batch")
     return {name: math.fsum(step[name] for step in figures) / len(figures) for name in figures[0]}

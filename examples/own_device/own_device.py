@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from synthroads_addon import Job, generate, load_scenario, open_cloud
+from synthroads_addon.base.errors import SynthRoadsError
 
 DEVICE = Path(__file__).with_name("robot.json")
 SETTINGS = [
@@ -32,4 +33,7 @@ def main(output: Path) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("output", type=Path, help="folder for the files")
-    main(**vars(parser.parse_args()))
+    try:
+        main(**vars(parser.parse_args()))
+    except (SynthRoadsError, OSError) as error:
+        parser.exit(2, f"error: {error}\n")

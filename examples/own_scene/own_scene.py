@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from synthroads_addon import SceneScan, load_scenario, open_cloud, scan_scene
+from synthroads_addon.base.errors import SynthRoadsError
 
 SETTINGS = ["fidelity=draft", "scan.device=velodyne-vlp-16", "scan.lines_per_second=20", "scan.platform.turn_seconds=1"]
 """Changes to a scenario; its road isn't looked at."""
@@ -46,4 +47,7 @@ def main(output: Path) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("output", type=Path, help="folder for the files")
-    main(**vars(parser.parse_args()))
+    try:
+        main(**vars(parser.parse_args()))
+    except (SynthRoadsError, OSError) as error:
+        parser.exit(2, f"error: {error}\n")

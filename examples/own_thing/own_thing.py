@@ -12,6 +12,7 @@ import synthroads_addon as roads
 import synthroads_addon.blender.things
 import synthroads_addon.road.things
 import synthroads_addon.sampling.placing
+from synthroads_addon.base.errors import SynthRoadsError
 
 HERE = Path(__file__).resolve().parent
 FOLDERS = {
@@ -46,4 +47,7 @@ def main(output: Path) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("output", type=Path, help="folder for the files")
-    main(**vars(parser.parse_args()))
+    try:
+        main(**vars(parser.parse_args()))
+    except (SynthRoadsError, OSError) as error:
+        parser.exit(2, f"error: {error}\n")

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 from synthroads_addon import Job, generate, load_scenario, read_parameters
+from synthroads_addon.base.errors import SynthRoadsError
 from synthroads_addon.reconstruction.comparison import compare
 from synthroads_addon.reconstruction.report import ReconstructionJob, run_reconstruction
 from synthroads_addon.twin.formats import write_twin
@@ -37,4 +38,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("output", type=Path, help="folder for the files")
     parser.add_argument("cloud", type=Path, nargs="?", help="LAZ, LAS, PLY or NPZ; if left out, a small one is made")
-    main(**vars(parser.parse_args()))
+    try:
+        main(**vars(parser.parse_args()))
+    except (SynthRoadsError, OSError) as error:
+        parser.exit(2, f"error: {error}\n")

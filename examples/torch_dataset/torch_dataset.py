@@ -14,6 +14,7 @@ from ml.data.crops import CropDataset, CropSettings, Draw, Seeds, collate
 from ml.data.sources import Source, read_tiles
 from ml.data.tiles import scalings
 from synthroads_addon.base.classes import class_scheme
+from synthroads_addon.base.errors import SynthRoadsError
 
 RECIPE = Path(__file__).with_name("two-roads.yaml")
 SCHEME = class_scheme("5")
@@ -35,13 +36,12 @@ def main(output: Path, epochs: int = 10) -> None:
     torch.manual_seed(1)
     train, test = list(batches(folder, "train")), list(batches(folder, "test"))
     print({name: tuple(tensor.shape) for name, tensor in train[0].items()})
-    width = train[0]["feat"].shape[1]
-    network = torch.nn.Sequential(torch.nn.Linear(width, 32), torch.nn.ReLU(), torch.nn.Linear(32, len(SCHEME.rows)))
+    first, last = torch.nn.Linear(train[0]["feat"].shape[1], 32), torch.nn.Linear(32, len(SCHEME.rows))
+    network = torch.nn.Sequential(first, torch.nn.ReLU(), last)
     optimiser = torch.optim.Adam(network.parameters(), lr=0.02)
-    loss_of = torch.nn.CrossEntropyLoss(ignore_index=-1)
     for _ in range(epochs):
         for batch in train:
-            loss = loss_of(network(batch["feat"]), batch["segment"])
+            loss = torch.nn.functional.cross_entropy(network(batch["feat"]), batch["segment"], ignore_index=-1)
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
@@ -54,4 +54,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("output", type=Path, help="folder for the files")
     parser.add_argument("epochs", type=int, nargs="?", default=10, help="of the training (10)")
-    main(**vars(parser.parse_args()))
+    try:
+        main(**vars(parser.parse_args()))
+    except (SynthRoadsError, OSError, subprocess.CalledProcessError) as error:
+        parser.exit(2, f"error: {error}\n")

@@ -49,15 +49,16 @@ class Data(Part):
     real: tuple[MeasuredRoad, ...] = Field((), description="Real roads.")
     synthetic: tuple[str, ...] = Field((), description="Folders that `synthroads dataset` made.")
     left_out: tuple[tuple[str, ...], ...] = Field(
-        (), description="Names of the real roads that are left out together, turn by turn; each by itself if none."
+        (),
+        description="Groups of real roads that are left out together, in turn; if empty, each road alone.",
     )
 
 
 class Experiment(AnyExperiment):
     """Trainings to be compared, as read from YAML; paths of data may begin with {NAME}, filled in by --data."""
 
-    task: Literal["centerline"] = Field("centerline", description="What is learned.")
-    configuration: str = Field("centerline-transformer", description="Configuration that all start from.")
+    task: Literal["centerline"] = Field("centerline", description="Task: centerline.")
+    configuration: str = Field("centerline-transformer", description="Configuration that all variants start from.")
     data: Data = Field(description="Roads of all variants.")
 
     def filled_data(self, folders: Mapping[str, str]) -> dict[str, Any]:
@@ -131,9 +132,13 @@ def _real_roads(configurations: Mapping[str, CenterlineConfiguration]) -> dict[s
     for configuration in configurations.values():
         for cloud, axis in (files for road in configuration.data.measured for files in road.files()):
             if roads.setdefault(cloud.stem, (cloud, axis)) != (cloud, axis):
-                raise InputError("data.real", cloud.stem, "is the name of several roads, by which they are left out")
+                raise InputError(
+                    "data.real",
+                    cloud.stem,
+                    "is the name of several real roads: rename their files, as left_out selects roads by name",
+                )
     if not roads:
-        raise InputError("data.real", [], "must name real roads, which the variants are tested on")
+        raise InputError("data.real", [], "must name at least one real road, as the variants are tested on real roads")
     return roads
 
 
@@ -147,7 +152,7 @@ def _turns(left_out: Sequence[Sequence[str]], roads: Mapping[str, object]) -> li
     names = [name for turn in turns for name in turn]
     for name in names:
         if name not in roads:
-            raise InputError("left_out", name, f"must be of the real roads: {', '.join(roads)}")
+            raise InputError("left_out", name, f"must be one of the real roads: {', '.join(roads)}")
         if names.count(name) > 1:
             raise InputError("left_out", name, "is left out twice")
     return turns
@@ -170,7 +175,7 @@ def _leave_out_roads(
         elif Path(road.cloud).stem not in turn:
             remaining_roads.append(road)
     if configuration.data.measured and not remaining_roads:
-        raise InputError("left_out", list(turn), "leaves no real road to learn from")
+        raise InputError("left_out", list(turn), "must leave at least one real road for the training")
     data = configuration.data.model_copy(update={"measured": tuple(remaining_roads)})
     return configuration.model_copy(update={"data": data})
 

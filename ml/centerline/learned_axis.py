@@ -34,7 +34,7 @@ def learned_axis(folder: FilePath, cloud_file: FilePath) -> Predictor:
     trained_run = open_run(folder)
     name = trained_run.configuration.task
     if name != "centerline":
-        raise InputError("--run", str(folder), f"is a model for {name}, a centreline model is needed")
+        raise InputError("--run", str(folder), f"is a model for {name}; name a centreline model")
 
     def predict(cloud: RoadCloud, path: CloudPath) -> tuple[Float, Float]:
         """Return offset and standard deviation (M,), m, of the predicted axis along a path."""

@@ -34,9 +34,11 @@ _HEIGHT = TARGETS.index("height")
 class UseOptions(Part):
     """How a trained model is used."""
 
-    mirror: bool = Field(True, description="Average what the model says of the slices and of their mirror image.")
-    step: int = quantity(5, ge=1, le=1000, unit="1", description="Slices from one sequence's start to the next one's.")
-    batch: int = quantity(32, ge=1, le=10_000, unit="1", description="Sequences at a time.")
+    mirror: bool = Field(True, description="Average the predictions for the slices and for their mirror images.")
+    step: int = quantity(
+        5, ge=1, le=1000, unit="1", description="Number of slices between the starts of two sequences."
+    )
+    batch: int = quantity(32, ge=1, le=10_000, unit="1", description="Number of sequences that are processed at once.")
 
 
 @dataclass(frozen=True)

@@ -66,17 +66,17 @@ class CenterlineConfiguration(Configuration):
 
     renamed: ClassVar[Mapping[str, str]] = {"model": "network"}
 
-    task: Literal["centerline"] = Field("centerline", description="What is learned.")
-    data: DataOptions = Field(description="What is learned from.")
+    task: Literal["centerline"] = Field("centerline", description="Task: centerline.")
+    data: DataOptions = Field(description="Training data.")
     slices: SliceSettings = Field(default=SliceSettings(), description="How slices are cut.")
-    effects: SequenceEffects = Field(
-        default=SequenceEffects(), description="What is done to the samples of the training."
-    )
+    effects: SequenceEffects = Field(default=SequenceEffects(), description="Random changes of the training samples.")
     network: NetworkModel = Field(default=TransformerOptions(), description="The network.")
-    loss: LossOptions = Field(default=LossOptions(), description="What it is trained with.")
-    batches: BatchOptions = Field(default=BatchOptions(), description="How much an epoch sees.")
-    use: UseOptions = Field(default=UseOptions(), description="How the trained model is used.")
-    begin_with: str = Field("", description="Folder of a run whose weights this one begins with; random if empty.")
+    loss: LossOptions = Field(default=LossOptions(), description="Terms of the loss.")
+    batches: BatchOptions = Field(default=BatchOptions(), description="Amount of data in an epoch.")
+    use: UseOptions = Field(default=UseOptions(), description="Settings for the use of the trained model.")
+    begin_with: str = Field(
+        "", description="Folder of a run whose weights are the initial weights; if empty, the weights are random."
+    )
 
 
 CONFIGURATION = CenterlineConfiguration
@@ -214,7 +214,9 @@ def load_predictor(run: Run[CenterlineConfiguration]) -> CenterlinePredictor:
     calibration_data = run.calibration()
     state = run.last_checkpoint(device)
     if state is None or state["epoch"] < configuration.schedule.epochs or calibration_data is None:
-        raise InputError(str(run.folder), None, "its training isn't finished; `synthroads train --resume` goes on")
+        raise InputError(
+            str(run.folder), None, "the training of this run isn't finished; `synthroads train --resume` continues it"
+        )
     model = _empty_model(configuration).to(device)
     load_state(model, state["model"], str(run.folder))
     calibration = _calibration_of(calibration_data, run.folder)
@@ -228,8 +230,12 @@ def _calibration_of(data: Any, folder: Path) -> dict[str, IntervalCalibration]:
     except (TypeError, ValueError, LookupError, AttributeError, OverflowError):
         calibration = None
     if calibration is None or any(not 0.0 < target_data.factor < np.inf for target_data in calibration.values()):
-        remedy = "`synthroads train --resume` makes it anew"
-        raise InputError(str(folder), None, f"its calibration isn't that of a model's deviations; {remedy}")
+        remedy = "`synthroads train --resume` calibrates again"
+        raise InputError(
+            str(folder),
+            None,
+            f"the file calibration.json must hold a positive, finite factor for each target; {remedy}",
+        )
     return calibration
 
 
@@ -249,12 +255,16 @@ def _first_model(configuration: CenterlineConfiguration) -> CenterlineModel:
     if configuration.begin_with:
         state = Run.open(Path(configuration.begin_with)).last_checkpoint()
         if state is None:
-            raise MissingFileError("begin_with", configuration.begin_with, "holds no weights")
+            raise MissingFileError(
+                "begin_with",
+                configuration.begin_with,
+                "must be the folder of a run that has weights: at least one finished epoch",
+            )
         try:
             load_state(model, state["model"], configuration.begin_with)
         except InputError:
             raise InputError(
-                "begin_with", configuration.begin_with, "holds another model than `network` says"
+                "begin_with", configuration.begin_with, "must hold a model with the same settings as `network`"
             ) from None
     return model
 

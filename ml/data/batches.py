@@ -34,15 +34,18 @@ class MeasuredRoad(Part):
 
     cloud: str = Field(
         min_length=1,
-        description="Cloud, or a folder of clouds with axes beside them, NAME_axis.csv or the like.",
+        description="Cloud, or folder of clouds with their axes in the same folder, e.g. NAME_axis.csv.",
     )
     axis: str = Field(
-        "", description="CSV or GeoJSON with a cloud's axis, in its map coordinates; that beside it if empty."
+        "",
+        description="CSV or GeoJSON file with the axis, in the cloud's map coordinates; if empty, the one beside it.",
     )
-    roads: tuple[str, ...] = Field((), description="Names of the folder's clouds, without endings; all if none.")
-    left_out: tuple[str, ...] = Field((), description="Names of clouds of the folder that aren't taken.")
-    first: float = quantity(0.0, ge=0, unit="m", description="Station along the axis where the part begins.")
-    last: float = quantity(1e9, gt=0, unit="m", description="Station where it ends.")
+    roads: tuple[str, ...] = Field(
+        (), description="Names of the folder's clouds, without endings; if empty, all clouds."
+    )
+    left_out: tuple[str, ...] = Field((), description="Names of clouds in the folder that aren't used.")
+    first: float = quantity(0.0, ge=0, unit="m", description="Station along the axis where the used part begins.")
+    last: float = quantity(1e9, gt=0, unit="m", description="Station where the used part ends.")
 
     @model_validator(mode="after")
     def _check_stations(self) -> Self:
@@ -62,16 +65,22 @@ class MeasuredRoad(Part):
         if not path.is_dir():
             return [(path, Path(self.axis) if self.axis else axis_beside(path))]
         if self.axis:
-            raise InputError("axis", self.axis, f"{self.cloud} is a folder, whose clouds have their axes beside them")
+            raise InputError(
+                "axis",
+                self.axis,
+                f"must be empty, as {self.cloud} is a folder: each of its clouds has its axis in the same folder",
+            )
         clouds_by_name = {cloud.stem: cloud for cloud in clouds_with_axes(path)}
         for field_name, names in (("roads", self.roads), ("left_out", self.left_out)):
             if unknown := sorted(set(names) - set(clouds_by_name)):
-                raise InputError(field_name, unknown[0], f"must be of the roads of {path}: {', '.join(clouds_by_name)}")
+                raise InputError(
+                    field_name, unknown[0], f"must be one of the roads of {path}: {', '.join(clouds_by_name)}"
+                )
         names_kept = [
             name for name in clouds_by_name if name in (self.roads or clouds_by_name) and name not in self.left_out
         ]
         if not names_kept:
-            raise InputError("left_out", list(self.left_out), f"leaves no road of {path}")
+            raise InputError("left_out", list(self.left_out), f"must leave at least one road of {path}")
         return [(clouds_by_name[name], axis_beside(clouds_by_name[name])) for name in names_kept]
 
 
@@ -80,31 +89,33 @@ class DataOptions(Part):
 
     data_sets: tuple[str, ...] = Field((), description="Folders that `synthroads dataset` made.")
     stream: StreamOptions | None = Field(
-        None, description="Roads that are made while the training goes on, to learn from beside those of the data sets."
+        None, description="Training roads that are made during the training, in addition to those of the data sets."
     )
     train_split: str = Field(
-        "train", description="Split of the data sets that weights are learned from; none of them if empty."
+        "train", description="Split of the data sets that is used for the training; if empty, no split is used."
     )
-    validation_split: str = Field("validation", description="Split that curves and calibration are made with.")
+    validation_split: str = Field("validation", description="Split for the validation curves and the calibration.")
     calibration_split: str = Field(
         "",
-        description="Split whose roads, cut at random and whole, calibrate the deviations instead of the validation's: "
-        "roads unlike those learned from make them right elsewhere.",
+        description="Split whose roads, as a whole and cut at random, calibrate the deviations instead of those of the "
+        "validation: roads that differ from the training roads give deviations that are right elsewhere.",
     )
-    measured: tuple[MeasuredRoad, ...] = Field((), description="Real roads to learn from.")
-    measured_validation: tuple[MeasuredRoad, ...] = Field((), description="Real roads to validate with.")
+    measured: tuple[MeasuredRoad, ...] = Field((), description="Real roads for the training.")
+    measured_validation: tuple[MeasuredRoad, ...] = Field((), description="Real roads for the validation.")
     measured_validation_share: float = quantity(
         0.0,
         ge=0,
         le=0.5,
         unit="1",
-        description="Of each real road to learn from, at its end: validated with instead, where no real roads are "
-        "named for that.",
+        description="Share of each real training road, at its end, that is used for the validation if no real roads "
+        "are named for it.",
     )
     measured_share: float = quantity(
-        0.5, ge=0, le=1, unit="1", description="Of the samples, where there are both kinds."
+        0.5, ge=0, le=1, unit="1", description="Share of real roads in the samples, if there are both kinds."
     )
-    cache: str = Field("", description="Folder for sorted points, so that the next run starts sooner; none if empty.")
+    cache: str = Field(
+        "", description="Folder for sorted points, to speed up the next start; if empty they aren't kept."
+    )
 
     @model_validator(mode="after")
     def _check_roads(self) -> Self:
@@ -120,13 +131,17 @@ class DataOptions(Part):
 class BatchOptions(Part):
     """How many sequences make a batch and an epoch."""
 
-    size: int = quantity(16, ge=1, le=100_000, unit="1", description="Sequences of a batch.")
-    steps: int = quantity(100, ge=1, le=1_000_000, unit="1", description="Batches of an epoch.")
+    size: int = quantity(16, ge=1, le=100_000, unit="1", description="Number of sequences in a batch.")
+    steps: int = quantity(100, ge=1, le=1_000_000, unit="1", description="Number of batches in an epoch.")
     passes: int = quantity(
-        2, ge=1, le=100, unit="1", description="How often an epoch uses what it drew; every other time mirrored."
+        2,
+        ge=1,
+        le=100,
+        unit="1",
+        description="Number of times that an epoch uses its samples; every second time they are mirrored.",
     )
     validation: int = quantity(
-        128, ge=1, le=1_000_000, unit="1", description="Sequences that an epoch is validated on."
+        128, ge=1, le=1_000_000, unit="1", description="Number of sequences for the validation after an epoch."
     )
 
     @model_validator(mode="after")
@@ -167,9 +182,13 @@ def read_roads(data: DataOptions, truth: Learned, progress: Progress = silent) -
         measured_validation += validation_part
     measured_validation += _read_measured(data.measured_validation, truth, progress)
     if not train and not measured_roads and data.stream is None:
-        raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to learn from")
+        raise InputError(
+            "data", list(data.data_sets), f"must hold at least one road with a known {truth} for the training"
+        )
     if not validation and not measured_validation:
-        raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to validate with")
+        raise InputError(
+            "data", list(data.data_sets), f"must hold at least one road with a known {truth} for the validation"
+        )
     calibration = data.calibration_split
     held_out = _read_scenes(data.data_sets, calibration, truth, cache, progress) if calibration else []
     return Roads(train, measured_roads, validation, measured_validation, held_out)
@@ -272,9 +291,7 @@ class StreamedBatches:
         """
         train = [*self._roads.train, *self._scenes(epoch)]
         if not train:
-            raise InputError(
-                "data.stream", epoch, f"none of the scenes of this epoch has a {self._truth} to learn from"
-            )
+            raise InputError("data.stream", epoch, f"at least one scene of an epoch must have a known {self._truth}")
         yield from self._batches(replace(self._roads, train=train))(epoch, share)
 
 
@@ -360,7 +377,9 @@ def _clip(road: LearningRoad, first_station: float, last_station: float, field: 
     axis = road.known_truth.axis
     in_part = (axis.station >= first_station) & (axis.station <= last_station)
     if np.count_nonzero(in_part) < 2:
-        raise InputError(field, first_station, f"leaves nothing of an axis of {axis.length:.0f} m")
+        raise InputError(
+            field, first_station, f"first and last must select a part of the axis, which is {axis.length:.0f} m long"
+        )
     part = MeasuredAxis(axis.points[in_part], axis.joined[in_part[:-1] & in_part[1:]])
     return replace(road, truth=Truth.of_axis(part, road.known_truth.kind))
 

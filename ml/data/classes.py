@@ -24,13 +24,17 @@ class LabelMapping(Model):
 
     vendor_keys_allowed: ClassVar[bool] = False
 
-    title: str = Field("", description="What files it is for.")
-    field: str = Field("classification", min_length=1, description="Attribute of the file that holds the numbers.")
-    classes: dict[str, str] = Field(min_length=1, description="Number in the file -> class, or group of classes.")
-    groups: dict[str, tuple[str, ...]] = Field(
-        {}, description="Group -> classes that count as one where scores are made; for coarser truths."
+    title: str = Field("", description="Kind of files that the mapping is for.")
+    field: str = Field(
+        "classification", min_length=1, description="Attribute of the file that contains the class numbers."
     )
-    ignore_zero_intensity: bool = Field(False, description="Ignore points whose intensity is 0: none was measured.")
+    classes: dict[str, str] = Field(min_length=1, description="Class, or group of classes, of each number in the file.")
+    groups: dict[str, tuple[str, ...]] = Field(
+        {}, description="Classes of each group, which count as one class in scores; for data with coarser classes."
+    )
+    ignore_zero_intensity: bool = Field(
+        False, description="Ignore points with intensity 0, whose intensity wasn't measured."
+    )
 
     def targets(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """Return the names that the mapped truth distinguishes, in order: its groups if it has any, else `names`.
@@ -121,6 +125,6 @@ def table_between(source: Mapping[int, str], scheme: ClassScheme, where: str) ->
         index = names.index(name) if name in names else members.get(name)
         if index is None:
             class_list = ", ".join(names)
-            raise InputError(f"{where}: classes", name, f"has no place in the scheme {scheme.name} ({class_list})")
+            raise InputError(f"{where}: classes", name, f"is no class of the scheme {scheme.name} ({class_list})")
         table[number] = index
     return table

@@ -186,11 +186,11 @@ def make_item(crop: Crop, settings: CropSettings, random: np.random.Generator) -
     The crop is centred on the mean of x and y and the median of z. Missing colours and intensities are small noise.
 
     Raises:
-        InputError: the crop has no points.
+        InputError: the crop must have at least one point.
     """
     count = len(crop)
     if count == 0:
-        raise InputError("crop", 0, "has no points")
+        raise InputError("crop", 0, "must have at least one point")
     coord = centre_coordinates(crop.coord)
     color = _noise(random, (count, 3)) if crop.color is None else crop.color
     strength = _noise(random, (count, 1)) if crop.strength is None else crop.strength[:, None]

@@ -176,7 +176,7 @@ def read_path(
             keep.append(index)
             last_station = station
     if len(keep) < 2:
-        raise InputError(str(file), full_path.length, f"must be a path of at least {tolerance:g} m")
+        raise InputError(str(file), full_path.length, f"must be a path of at least {tolerance:g} m length")
     return MeasuredAxis(full_path.points[keep])
 
 
@@ -213,7 +213,7 @@ def _cells(plan: Float, cell: float) -> Float:
     cell_index = np.floor((plan - plan.min(axis=0)) / cell).astype(np.int64)
     _, owner, counts = np.unique(cell_index @ np.array([1 << 32, 1]), return_inverse=True, return_counts=True)
     if len(counts) < 2:
-        raise InputError("cloud", len(plan), f"must reach farther than {cell:g} m for its road to be found")
+        raise InputError("cloud", len(plan), f"must extend over more than {cell:g} m, so that its road can be found")
     return np.column_stack([np.bincount(owner, plan[:, column]) for column in (0, 1)]) / counts[:, None]
 
 

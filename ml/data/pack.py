@@ -49,7 +49,7 @@ def corridor_tiles(
     tree = cKDTree(line.position(line.stations(_SPACING)))
     clouds = sorted(scene.glob("cloud.*"))
     if not clouds:
-        raise InputError(str(scene), None, "holds no cloud")
+        raise InputError(str(scene), None, "must hold a cloud")
     with open_cloud(clouds[0]) as cloud, GridSubsampler(voxel, scene) as grid:
         scale = steps_per_unit(cloud)
         for block in labelled_blocks(cloud, scheme, Source(path=str(clouds[0]))):

@@ -179,7 +179,7 @@ class PackReader:
             self.notes: list[dict[str, Any]] = data["tiles"]
             self.scheme = stored_scheme(data["scheme"], str(path))
         except (*ARCHIVE_FAULTS, TypeError):
-            raise InputError(str(path), None, "is no file of packed training data, or damaged") from None
+            raise InputError(str(path), None, "must be an undamaged file of `synthroads pack`") from None
 
     def __len__(self) -> int:
         return len(self.notes)
@@ -189,4 +189,4 @@ class PackReader:
         try:
             return unpack_tile(Packed(self.notes[tile_index], self._archive.read(f"{tile_index:06d}")))
         except (*ARCHIVE_FAULTS, TypeError):
-            raise InputError(str(self.path), None, f"is damaged at tile {tile_index}") from None
+            raise InputError(str(self.path), None, f"the file is damaged at tile {tile_index}: pack it again") from None

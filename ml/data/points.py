@@ -85,7 +85,7 @@ def read_points(path: Path, classes: Collection[str] | None = None) -> Points:
     blocks = [block for block in blocks if len(block)]
     if not blocks:
         lack = "no point at all" if classes is None else f"no point of the classes {', '.join(sorted(classes))}"
-        raise InputError(str(path), None, f"holds {lack}")
+        raise InputError(str(path), None, f"must hold points; it has {lack}")
     return points_of(header, blocks)
 
 
@@ -102,7 +102,7 @@ def read_ground(path: Path) -> Points:
         return points.select(ground)
     if points.of_class(UNSORTED_CLASSES).all():
         return points
-    raise InputError(str(path), None, f"holds classes, but none of {', '.join(GROUND_CLASSES)}")
+    raise InputError(str(path), None, f"must have points of at least one of the classes {', '.join(GROUND_CLASSES)}")
 
 
 def points_of(header: CloudHeader, blocks: Sequence[PointBlock], colored: bool | None = None) -> Points:

@@ -166,7 +166,9 @@ def scene_folders(data_set: Path, split: str | None) -> list[Path]:
     folders = [data_set / "scenes" / scene.name for scene in finished_scenes if split in (None, scene.split)]
     if not folders:
         splits = ", ".join(sorted({scene.split for scene in finished_scenes}))
-        raise InputError(f"{data_set}: split", split, f"has no scene that is done; there is {splits or 'none at all'}")
+        raise InputError(
+            f"{data_set}: split", split, f"must be a split with finished scenes; the data set has {splits or 'none'}"
+        )
     return folders
 
 
@@ -186,7 +188,9 @@ def read_scene(folder: Path, kind: Learned, cache: Path | None = None, keep: boo
     """
     for name in (PARAMETERS, CLOUD):
         if not (folder / name).is_file():
-            raise MissingFileError(str(folder / name), None, "no such file; a scene of a data set has one")
+            raise MissingFileError(
+                str(folder / name), None, "there is no such file, but each scene of a data set needs one"
+            )
     parameters = read_parameters(folder / PARAMETERS)
     scene_road = _read_cache(folder, cache) if cache else None
     if scene_road is None:
@@ -211,12 +215,12 @@ def axis_beside(cloud: Path) -> Path:
         MissingFileError: there is no such cloud, or no axis beside it.
     """
     if not cloud.exists():
-        raise MissingFileError(str(cloud), None, "no such cloud, nor a data set's folder")
+        raise MissingFileError(str(cloud), None, "must be a cloud, or the folder of a data set; there is no such file")
     candidates = [cloud.with_name(cloud.stem + ending) for ending in AXIS_ENDINGS]
     axis_file = next((path for path in candidates if path.is_file()), None)
     if axis_file is None:
         names = " or ".join(path.name for path in candidates)
-        raise MissingFileError(str(cloud), None, f"has no axis beside it, {names}")
+        raise MissingFileError(str(cloud), None, f"needs its axis in the same folder, {names}")
     return axis_file
 
 
@@ -231,7 +235,7 @@ def clouds_with_axes(folder: Path) -> list[Path]:
         path for path in clouds if any(path.with_name(path.stem + end).is_file() for end in AXIS_ENDINGS)
     ]
     if not clouds_with_axis:
-        fault = f"holds no cloud with its axis beside it, NAME{' or NAME'.join(AXIS_ENDINGS)}"
+        fault = f"must hold a cloud and its axis, NAME{' or NAME'.join(AXIS_ENDINGS)}"
         raise MissingFileError(str(folder), None, fault)
     return clouds_with_axis
 
@@ -272,7 +276,7 @@ def crop_road(road: LearningRoad, share: float, seed: int, length: float = 1.0) 
         InputError: the road has no truth, or the share is out of its limits.
     """
     if road.truth is None or not 0.0 <= share < 1.0:
-        raise InputError("crop", share, "must be a share from 0 to below 1, of a road with a known centreline")
+        raise InputError("crop", share, "must be a share from 0 to below 1, and the road must have a known centreline")
     station, offset = road.truth.axis.project(road.xyz)
     number = np.floor((station - station.min()) / length).astype(np.intp)
     shares = share * stream(seed, "crop", road.name).random((int(number.max()) + 1, 2))

@@ -58,18 +58,20 @@ _END = 30.0
 class StreamOptions(Part):
     """New synthetic scenes in each epoch, made while the training goes on."""
 
-    recipe: str = Field(min_length=1, description="Recipe that they are of: a built-in one or a file.")
+    recipe: str = Field(min_length=1, description="Recipe of the scenes: a built-in one or a file.")
     split: str = Field("train", min_length=1, description="Split of the recipe whose scenes are made.")
-    scenes_per_epoch: int = quantity(4, ge=1, le=10_000, unit="1", description="Scenes that are new in each epoch.")
+    scenes_per_epoch: int = quantity(4, ge=1, le=10_000, unit="1", description="Number of new scenes in each epoch.")
     keep: int = quantity(
         16,
         ge=2,
         le=100_000,
         unit="1",
-        description="Scenes in the folder at most: those that an epoch draws from, and the next one's new ones.",
+        description="Largest number of scenes in the folder: those of an epoch, and the new ones of the next.",
     )
-    producers: int = quantity(1, ge=1, le=256, unit="1", description="Scenes that are made at once.")
-    folder: str = Field("", description="Folder for the scenes, removed in the end; one in the run's if empty.")
+    producers: int = quantity(1, ge=1, le=256, unit="1", description="Number of scenes that are made at the same time.")
+    folder: str = Field(
+        "", description="Folder for the scenes, which is removed at the end; if empty, a folder inside that of the run."
+    )
 
     @model_validator(mode="after")
     def _check_keep(self) -> Self:
@@ -172,7 +174,7 @@ class SceneStream:
             time.sleep(_TICK)
         entries = [read_entry(self.folder, number) for number in window]
         if all(entry.status == "failed" for entry in entries):
-            fault = f"can't be made ({entries[0].error}), like all others of the epoch"
+            fault = f"can't be made ({entries[0].error}), and neither can the other scenes of the epoch"
             raise InputError("data.stream", entries[0].name, fault)
         return {number: scene_folder(self.folder, number) for number in window}
 
@@ -201,7 +203,9 @@ class SceneStream:
                 for number in scene_numbers(self.folder):
                     remove_scene(self.folder, number)
         elif any(self.folder.iterdir()):
-            raise OutputError("data.stream", str(self.folder), "holds other files; name an empty folder")
+            raise OutputError(
+                "data.stream", str(self.folder), "must be an empty folder, or one of scenes: this one holds other files"
+            )
         (self.folder / FAILURE).unlink(missing_ok=True)
         (self.folder / WANTED).unlink(missing_ok=True)
         write_atomically(plan, text)
@@ -227,9 +231,8 @@ class SceneStream:
         elif code is not None:
             lines = (self.folder / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
             scene_name = f"scene {missing_numbers[0]}"
-            fault = (
-                f"isn't made: the producer has ended with code {code} ({lines[-1] if lines else 'without a word'}); "
-            )
+            last_line = lines[-1] if lines else "no message"
+            fault = f"can't be made: the process that makes scenes has ended with code {code} ({last_line}); "
             fault += "--resume tries again"
         else:
             return

@@ -50,19 +50,39 @@ class SliceSettings(Part):
 
     truth: Learned = Field(
         "road",
-        description="road: the middle of all; carriageway: between its two lanes; either: the middle of whole roads, "
-        "and of carriageways without shoulders as of roads by themselves.",
+        description="Line that is learned. road: the middle of the whole road; carriageway: the line between its two "
+        "lanes; either: the middle of whole roads, and of carriageways without shoulders, as roads of their own.",
     )
-    slices: int = quantity(10, ge=1, le=1000, unit="1", description="Slices of a sequence.")
-    spacing: float = quantity(1.0, gt=0, le=100, unit="m", description="Of a sequence's slices along the path.")
-    thickness: float = quantity(1.0, gt=0, le=100, unit="m", description="Of a slice, along the path.")
-    half_width: float = quantity(30.0, gt=0, le=45, unit="m", description="What a slice sees to either side.")
-    points_per_slice: int = quantity(256, ge=1, le=1_000_000, unit="1", description="At most; others are left out.")
-    window: float = quantity(12.0, ge=0, le=100, unit="m", description="The path strays up to half of it to each side.")
-    direction_deg: float = quantity(2.0, ge=0, le=45, unit="deg", description="Error of its direction, deviation.")
-    wander_length: float = quantity(100.0, ge=5, le=10_000, unit="m", description="Length over which it strays.")
+    slices: int = quantity(10, ge=1, le=1000, unit="1", description="Number of slices in a sequence.")
+    spacing: float = quantity(
+        1.0, gt=0, le=100, unit="m", description="Distance between the slices of a sequence, along the path."
+    )
+    thickness: float = quantity(1.0, gt=0, le=100, unit="m", description="Length of a slice, along the path.")
+    half_width: float = quantity(
+        30.0, gt=0, le=45, unit="m", description="Half-width of a slice, to each side of the path."
+    )
+    points_per_slice: int = quantity(
+        256,
+        ge=1,
+        le=1_000_000,
+        unit="1",
+        description="Largest number of points in a slice; further points are dropped.",
+    )
+    window: float = quantity(
+        12.0, ge=0, le=100, unit="m", description="Range of the path's random offset, half of it to each side."
+    )
+    direction_deg: float = quantity(
+        2.0, ge=0, le=45, unit="deg", description="Standard deviation of the path's direction."
+    )
+    wander_length: float = quantity(
+        100.0, ge=5, le=10_000, unit="m", description="Length over which the path's offset changes."
+    )
     median_error: float = quantity(
-        1.5, ge=0, le=20, unit="m", description="How far beside the median's middle a carriageway may be cut off."
+        1.5,
+        ge=0,
+        le=20,
+        unit="m",
+        description="Largest distance from the middle of the median at which a carriageway is cut off.",
     )
 
     @property
@@ -103,7 +123,9 @@ class SliceDataset(Dataset[Sample]):
         self._starts = [starts for starts in starts_by_road if starts]
         if not self._starts:
             length = self.settings.spacing * (self.settings.slices - 1)
-            raise InputError("roads", len(self.roads), f"none has a known {self.settings.truth} over {length:g} m")
+            raise InputError(
+                "roads", len(self.roads), f"at least one road must have a known {self.settings.truth} over {length:g} m"
+            )
 
     def __len__(self) -> int:
         return self.samples

@@ -39,10 +39,14 @@ class Source(Part):
     """Where labelled points are read from, with their class mapping and tiling."""
 
     path: str = Field(min_length=1, description="A packed file, a data set, a folder of tiles or clouds, or a cloud.")
-    split: str | None = Field(None, description="Split of a data set, or sub-folder; all points if not given.")
-    mapping: str | None = Field(None, description="Classes of clouds of others: a shipped mapping or a JSON file.")
+    split: str | None = Field(
+        None, description="Split of a data set, or sub-folder; if not given, all points are used."
+    )
+    mapping: str | None = Field(
+        None, description="Mapping of the classes of other people's clouds: a built-in mapping or a JSON file."
+    )
     yardstick: str | None = Field(
-        None, description="Public data set that the folder holds: a shipped yardstick or a JSON file."
+        None, description="Public data set in the folder: a built-in description or a JSON file."
     )
     tile: float = quantity(60.0, ge=5, le=1000, unit="m", description="Edge of the tiles that clouds are cut into.")
 
@@ -73,9 +77,9 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None, *, labe
     """
     path = Path(source.path)
     if source.yardstick and source.mapping:
-        raise InputError("mapping", source.mapping, "must be left out: a yardstick has its own mapping")
+        raise InputError("mapping", source.mapping, "must be left out, as a yardstick has its own mapping")
     if source.split and path.is_file():
-        raise InputError("split", source.split, f"{path.name} is a file, which has no splits")
+        raise InputError("split", source.split, f"must be left out, as {path.name} is a file and has no splits")
     if source.yardstick:
         tiles = yardstick_tiles(path, scheme, source)
     elif path.is_file() and path.suffix.lower() == ".npz" and _is_pack(path):
@@ -86,7 +90,7 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None, *, labe
         tiles = _folder_tiles(path, scheme, source, labels=labels)
     else:
         hint = "" if path.suffix else f"; synthroads dataset RECIPE --output {path} makes one"
-        raise MissingFileError(str(path), None, f"no such file or folder of labelled points{hint}")
+        raise MissingFileError(str(path), None, f"must be a file or folder of labelled points{hint}")
     for tile in tiles:
         try:
             sample = slice(None) if voxel is None else voxel_sample(tile.coord, voxel)
@@ -141,7 +145,7 @@ def clouds_below(folder: Path) -> list[Path]:
     """Return the clouds in a folder and those below it, sorted; raise `MissingFileError` if there are none."""
     clouds = sorted(file for file in files_below(folder) if file.suffix.lower() in ENDINGS and file.is_file())
     if not clouds:
-        raise MissingFileError(str(folder), None, "holds neither tiles of a data set nor clouds")
+        raise MissingFileError(str(folder), None, "must hold tiles of a data set, or clouds")
     return clouds
 
 
@@ -152,7 +156,9 @@ def pointcept_root(path: Path) -> Path | None:
     roots = sorted(file.parent for file in path.glob("pointcept/*/classes.json"))
     if len(roots) > 1:
         names = ", ".join(str(root.relative_to(path)) for root in roots)
-        raise InputError("path", str(path), f"holds several sets of classes: name one of {names}")
+        raise InputError(
+            "path", str(path), f"must have one set of classes, but has several: name one of the folders {names}"
+        )
     return roots[0] if roots else None
 
 
@@ -182,7 +188,7 @@ def pointcept_folders(root: Path, split: str | None) -> list[Path]:
     folders = sorted(file.parent for file in root.glob(f"{split or '*'}/*/coord.npy"))
     if not folders:
         splits = ", ".join(sorted(path.name for path in root.iterdir() if path.is_dir())) or "none"
-        raise MissingFileError(f"{root}: split", split, f"holds no tiles; there are the splits {splits}")
+        raise MissingFileError(f"{root}: split", split, f"must be a split with tiles; there are {splits}")
     return folders
 
 
@@ -219,7 +225,7 @@ def _array(folder: Path, name: str, entry: tuple[int, ...], kind: str) -> AnyArr
         with np.errstate(invalid="ignore", over="ignore"):
             array = np.load(path, mmap_mode="r", allow_pickle=False).reshape(-1, *entry).astype(kind)
     except (*ARCHIVE_FAULTS, TypeError):
-        raise InputError(str(path), None, "is missing, or no array") from None
+        raise InputError(str(path), None, "must be an array in NumPy's format (.npy)") from None
     if not np.isfinite(array).all():
         raise InputError(str(path), None, "must hold finite numbers")
     return np.asarray(array)
@@ -244,7 +250,7 @@ def cloud_tiles(
     """
     with open_cloud(path) as cloud, tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         if not cloud.header.count:
-            raise InputError(str(path), 0, "holds no points to learn from")
+            raise InputError(str(path), 0, "must hold points for the training")
         scale = steps_per_unit(cloud)
         lowest = np.min([block.xyz.min(axis=0) for block in cloud.blocks() if len(block)], axis=0)
         origin = np.floor(lowest)
@@ -272,7 +278,7 @@ def yardstick_tiles(folder: Path, scheme: ClassScheme, source: Source) -> Iterat
         MissingFileError, InputError: see `yardsticks.numbered_blocks`.
     """
     if not folder.is_dir():
-        raise MissingFileError(str(folder), None, "is no folder of a public data set")
+        raise MissingFileError(str(folder), None, "must be the folder of a public data set")
     yardstick, names = load_yardstick(str(source.yardstick)), class_names(scheme)
     mapping = yardstick.mapping_in(folder)
     edge = 1000.0 if yardstick.form == "sweeps" else source.tile
@@ -314,7 +320,7 @@ def labelled_blocks(cloud: CloudReader, scheme: ClassScheme, source: Source) -> 
     mapping, names = source.label_mapping(), class_names(scheme)
     if mapping is None:
         if not cloud.header.labelled:
-            fault = "has no labels of ours: `mapping` must say which of its numbers is which class"
+            fault = "has no SynthRoads classes: set `mapping`, which gives the class of each number in the file"
             raise InputError(str(cloud.header.path), None, fault)
         table = table_between({row.id: row.name for row in cloud.header.scheme.rows}, scheme, str(cloud.header.path))
         for block in cloud.usable_blocks():

@@ -73,7 +73,9 @@ def find_ground(cloud: Path, progress: Progress = silent) -> GroundReading:
         # Nobody has sorted the cloud: all of it counts as ground.
         classes, cells = np.ones(256, dtype=bool), other_cells
     else:
-        raise InputError(str(cloud), None, f"holds no point of the classes {', '.join(GROUND_CLASSES)}")
+        raise InputError(
+            str(cloud), None, f"must hold points of at least one of the classes {', '.join(GROUND_CLASSES)}"
+        )
     centres = _CELL * (np.array(list(cells), dtype=np.float64) + 0.5)
     return GroundReading(header, classes, colored, centres)
 

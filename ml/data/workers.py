@@ -91,7 +91,11 @@ def shorten_sockets() -> None:
             finally:
                 tempfile.tempdir = previous_folder
             return
-    raise OutputError("temporary folder", default_folder, "has too long a name for data workers; TMPDIR names another")
+    raise OutputError(
+        "temporary folder",
+        default_folder,
+        "must have a shorter name, as data workers use it; set TMPDIR to another folder",
+    )
 
 
 def _fits(folder: str) -> bool:
@@ -126,7 +130,10 @@ def report_lost_workers(workers: int) -> Iterator[None]:
         if not str(error).startswith("DataLoader worker (pid"):
             raise
         message = " ".join(str(error).partition(". ")[0].split())
-        fault = f"one of these processes was lost ({message}): is memory short? --resume goes on, with fewer too"
+        fault = (
+            f"one of these processes ended unexpectedly ({message}), perhaps because memory is short; "
+            "--resume continues, also with fewer workers"
+        )
         raise InputError("workers", workers, fault) from None
 
 

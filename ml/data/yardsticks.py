@@ -36,16 +36,22 @@ _FULL = 65535.0
 class Yardstick(Part):
     """A public data set: its files by split, and where they keep what."""
 
-    title: str = Field(min_length=1, description="What it is.")
-    source: str = Field(min_length=1, description="Where it is to be had, its licence, who made it.")
-    form: Form = Field(description="sweeps: SemanticKITTI's .bin and .label; ply, las; any: what a file's ending says.")
-    splits: dict[str, tuple[str, ...]] = Field(min_length=1, description="Split -> patterns of its files' paths.")
-    mapping: LabelMapping = Field(description="Attribute of the labels, and which of them is which class.")
-    intensity: str = Field(
-        "intensity", min_length=1, description="Attribute of the intensities; 0 where there is none."
+    title: str = Field(min_length=1, description="Title of the data set.")
+    source: str = Field(min_length=1, description="Address, licence and authors of the data set.")
+    form: Form = Field(
+        description="Format of the files; sweeps: SemanticKITTI's .bin and .label; any: by the file's ending."
     )
-    names: str = Field("", description="JSON file in the folder, number -> name, where classes are mapped by name.")
-    numbers: dict[str, str] = Field({}, description="Number -> name in arrays (.npy) of a folder without that file.")
+    splits: dict[str, tuple[str, ...]] = Field(min_length=1, description="Patterns of the file paths of each split.")
+    mapping: LabelMapping = Field(description="Attribute of the labels, and the class of each label.")
+    intensity: str = Field(
+        "intensity", min_length=1, description="Attribute of the intensities; points without it have the intensity 0."
+    )
+    names: str = Field(
+        "", description="JSON file in the folder with the name of each number, if classes are mapped by name."
+    )
+    numbers: dict[str, str] = Field(
+        {}, description="Name of each number in arrays (.npy), if the folder doesn't have this file."
+    )
 
     @model_validator(mode="after")
     def _check_paths(self) -> Self:
@@ -146,9 +152,13 @@ def _sweep(path: Path) -> tuple[PointBlock, NDArray[np.int64]]:
     """Return a sweep of SemanticKITTI: float32 x, y, z, remission; labels as uint32, the class in the lower 16 bits."""
     labels = path.parent.parent / "labels" / f"{path.stem}.label"
     if not labels.is_file():
-        raise MissingFileError(str(labels), None, f"no such file; {path.name} has no labels")
+        raise MissingFileError(str(labels), None, f"there is no such file, so {path.name} has no labels")
     if path.stat().st_size % _SWEEP.itemsize:
-        raise InputError(str(path), path.stat().st_size, f"must hold {_SWEEP.itemsize} bytes for each point")
+        raise InputError(
+            str(path),
+            path.stat().st_size,
+            f"must hold {_SWEEP.itemsize} bytes for each point, so its size must be a multiple of that",
+        )
     points, numbers = np.fromfile(path, dtype=_SWEEP), np.fromfile(labels, dtype="<u4")
     if len(points) != len(numbers):
         raise InputError(str(labels), len(numbers), f"must hold a label for each of the {len(points)} points")
@@ -165,7 +175,7 @@ def _array(path: Path) -> Iterator[tuple[PointBlock, NDArray[np.int64]]]:
     try:
         array = np.load(path, mmap_mode="r", allow_pickle=False)
     except (ValueError, OSError, EOFError):
-        raise InputError(str(path), None, "is no array that can be read") from None
+        raise InputError(str(path), None, "must be an array in NumPy's format (.npy)") from None
     if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] < 4 or array.dtype.kind not in "fiu":
         shape = getattr(array, "shape", None)
         raise InputError(str(path), shape, "must be numbers of shape (N, 4): x, y, z, class")

@@ -76,7 +76,11 @@ class SegmentationNetwork(Part):
         Raises:
             InputError: the network can't be written as ONNX.
         """
-        raise InputError("network.name", self.name, "can't be written as ONNX: it doesn't say what it needs of a cloud")
+        raise InputError(
+            "network.name",
+            self.name,
+            "must be a network that can be written as ONNX; this one doesn't define its inputs",
+        )
 
     def shift_scores(self, model: nn.Module, offsets: Tensor) -> None:
         """Add offsets (C,) to the class scores of a network, in place: to the bias of its last linear layer.

@@ -130,7 +130,7 @@ def measure(
         names = [case.road.name for case in seed_cases]
         if repeated_names := {name for name in names if names.count(name) > 1}:
             raise InputError(
-                "road", sorted(repeated_names)[0], "is the name of several roads; give data sets of other names"
+                "road", sorted(repeated_names)[0], "is the name of several roads; rename one of the data sets"
             )
         metrics_by_road: dict[str, dict[str, dict[str, float]]] = {name: {} for name in predictors}
         for case in seed_cases:  # road by road: predictors share what they cut out of it

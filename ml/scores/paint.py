@@ -52,7 +52,7 @@ def with_painted_line(road: LearningRoad) -> LearningRoad:
     line_offsets = np.array([_ridge(offset[a:b], logs[a:b]) for a, b in zip(begins, ends, strict=True)])
     has_line = np.isfinite(line_offsets)
     if has_line.sum() < 2:
-        raise InputError("road", road.name, "has no painted line beside its axis")
+        raise InputError("road", road.name, "must have a painted line beside its axis")
     direction = axis.direction(place_stations[has_line])
     left_normals = np.column_stack([-np.sin(direction), np.cos(direction)])
     points = axis.position(place_stations[has_line]) + line_offsets[has_line, None] * left_normals

@@ -24,8 +24,8 @@ from .task import train
 class Experiment(AnyExperiment):
     """Trainings to be compared, as read from YAML; paths of data may begin with {NAME}, filled in by --data."""
 
-    task: Literal["segmentation"] = Field("segmentation", description="What is learned.")
-    configuration: str = Field("segmentation", description="Configuration that all start from.")
+    task: Literal["segmentation"] = Field("segmentation", description="Task: segmentation.")
+    configuration: str = Field("segmentation", description="Configuration that all variants start from.")
     data: Data = Field(description="Training data and tests of all variants.")
 
     def filled_data(self, folders: Mapping[str, str]) -> dict[str, Any]:

@@ -39,9 +39,11 @@ def forecast(configuration: SegmentationConfiguration, steps: int) -> dict[str, 
             trainings, or scenes are made meanwhile.
     """
     if configuration.set_up in ("fine_tuned", "self_trained"):
-        raise InputError("set_up", configuration.set_up, "has several trainings: forecast each by itself")
+        raise InputError("set_up", configuration.set_up, "has several trainings: forecast each of them separately")
     if configuration.data.stream is not None:
-        remedy = "makes its scenes while it trains: forecast with data that are there, and data.stream=null"
+        remedy = (
+            "makes its scenes during the training, so it can't be forecast; set data.stream=null and name existing data"
+        )
         raise InputError("data.stream", configuration.data.stream.recipe, remedy)
     device = chosen_device(configuration)
     sources = [source for rows in configuration.needed_sources().values() for source in rows]

@@ -216,7 +216,7 @@ class StreamedCropBatches:
         """
         tiles = [*self._fixed["synthetic"], *self._scenes(epoch)]
         if not any(map(len, tiles)):
-            raise InputError("data.stream", epoch, "none of the scenes of this epoch has a tile with points")
+            raise InputError("data.stream", epoch, "at least one scene of an epoch must have a tile with points")
         return prepare_domains(self._fixed | {"synthetic": tiles}, self.configuration)
 
     def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Item]:

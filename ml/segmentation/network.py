@@ -89,7 +89,7 @@ def adapt_norms(model: nn.Module, batches: Iterable[B], scores: Callable[[B], Te
             norm.momentum = 1.0  # each batch leaves its own statistics
         points = sum(_pool_statistics(pools, scores, batch) for batch in batches)
         if not points:
-            raise InputError("adaptation", 0, "needs points of the domain to adapt to")
+            raise InputError("adaptation", 0, "needs points of the domain that the network is adapted to")
         has_succeeded = True
     finally:
         for norm, state, momentum in zip(norms, previous_states, momenta, strict=True):
@@ -159,7 +159,7 @@ def overlay_clouds(batch: Batch) -> Batch:
         InputError: neighbours are already there: they would be those of the single clouds.
     """
     if "positions0" in batch:
-        raise InputError("batch", "with neighbours", "must be mixed before neighbours are looked for")
+        raise InputError("batch", "with neighbours", "must be mixed before its neighbours are computed")
     offset = batch["offset"]
     last_of_pair = torch.arange(len(offset), device=offset.device) % 2 == 1
     last_of_pair[-1:] = True

@@ -101,7 +101,7 @@ def predict_file(
         store = TileStore(folder)
         count = store.fill(source, progress)
         if not store.count:
-            raise InputError(str(source), None, "has no points to be labelled: all are withheld or noise")
+            raise InputError(str(source), None, "has no points that can be labelled: all are withheld or noise")
         labels = np.memmap(folder / "labels", dtype=np.uint8, mode="w+", shape=(count,))
         labels[:] = UNLABELLED
         scaling = store.scaling(labelling.intensity, labelling.settings.voxel)

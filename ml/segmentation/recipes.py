@@ -37,85 +37,118 @@ SetUp = Literal["real", "synthetic", "mixed", "mixed_mapped", "fine_tuned", "sel
 class Adaptation(Part):
     """Options of domain adaptation: AdaBN and Mix3D."""
 
-    adabn: bool = Field(False, description="Before a test, take the norms' statistics from its points (no labels).")
-    adabn_crops: int = quantity(40, ge=1, le=100_000, unit="1", description="Crops that they are taken from.")
-    mix3d: float = quantity(0.0, ge=0, le=1, unit="1", description="Share of batches whose crops are laid over others.")
+    adabn: bool = Field(
+        False,
+        description="Before a test, compute the norms' statistics from the test's points, without labels.",
+    )
+    adabn_crops: int = quantity(40, ge=1, le=100_000, unit="1", description="Number of crops for these statistics.")
+    mix3d: float = quantity(
+        0.0, ge=0, le=1, unit="1", description="Share of batches whose crops are mixed with others."
+    )
 
 
 class SelfTraining(Part):
     """Options of self-training on unlabelled clouds, the set-up `self_trained`."""
 
-    rounds: int = quantity(2, ge=1, le=20, unit="1", description="How often labels are guessed and learned from.")
+    rounds: int = quantity(
+        2, ge=1, le=20, unit="1", description="Number of rounds in which labels are guessed and learned."
+    )
     believed: float = quantity(
-        0.5, gt=0, le=1, unit="1", description="Share of the points called each class whose label is learned."
+        0.5, gt=0, le=1, unit="1", description="Share of the points of each guessed class whose label is learned."
     )
 
 
 class Data(Part):
     """Sources of real and synthetic training, validation and test points."""
 
-    real: tuple[Source, ...] = Field((), description="Real training data, or what stands in for it.")
+    real: tuple[Source, ...] = Field((), description="Real training data, or data that replace them.")
     synthetic: tuple[Source, ...] = Field((), description="Synthetic training data.")
     target: tuple[Source, ...] = Field((), description="Clouds without labels that self-training adapts to.")
     stream: StreamOptions | None = Field(
         None,
-        description="Synthetic training data that are made while the training goes on, beside those of `synthetic`.",
+        description="Synthetic training data that are made during the training, in addition to those of `synthetic`.",
     )
-    validation: tuple[Source, ...] = Field((), description="Scored after each epoch; never trained on.")
-    tests: dict[str, tuple[Source, ...]] = Field({}, description="Scored at the end, each by itself.")
+    validation: tuple[Source, ...] = Field(
+        (), description="Data that are scored after each epoch; they are never used for the training."
+    )
+    tests: dict[str, tuple[Source, ...]] = Field(
+        {}, description="Data that are scored at the end, each test separately."
+    )
 
 
 class SegmentationConfiguration(Configuration):
     """Configuration of a segmentation training; the defaults are the full recipe."""
 
-    task: Literal["segmentation"] = Field("segmentation", description="What is learned.")
-    classes: str = Field("5", min_length=1, description="5, 17, or a JSON file of classes.")
+    task: Literal["segmentation"] = Field("segmentation", description="Task: segmentation.")
+    classes: str = Field("5", min_length=1, description="Scheme of classes: 5, 17, or a JSON file.")
     network: NetworkModel = Field(PointNeXtOptions(), description="The network.")
-    features: tuple[Feature, ...] = Field(FEATURES, min_length=1, description="What the network sees of each point.")
+    features: tuple[Feature, ...] = Field(
+        FEATURES, min_length=1, description="Features of each point that the network gets."
+    )
     intensity: Literal["share", "robust"] = Field(
-        "share", description="Share of 16 bits as it stands, or scaled scene by scene to median 0 and span 1."
+        "share", description="Intensity as a share of 16 bits, or scaled in each scene to median 0 and span 1."
     )
-    voxel: float = quantity(0.1, ge=0.02, le=5, unit="m", description="Grid of which one point per cell is kept.")
-    crop_points: int = quantity(24_000, ge=64, le=2_000_000, unit="1", description="Points of a crop.")
-    crops_per_tile: int = quantity(30, ge=1, le=100_000, unit="1", description="Crops of each tile and epoch.")
+    voxel: float = quantity(
+        0.1, ge=0.02, le=5, unit="m", description="Edge of the grid cells, each of which keeps one point."
+    )
+    crop_points: int = quantity(24_000, ge=64, le=2_000_000, unit="1", description="Number of points in a crop.")
+    crops_per_tile: int = quantity(
+        30, ge=1, le=100_000, unit="1", description="Number of crops of each tile in an epoch."
+    )
     crops_per_epoch: int | None = quantity(
-        None, ge=1, le=100_000_000, unit="1", description="Crops of an epoch in all, in the place of crops_per_tile."
+        None, ge=1, le=100_000_000, unit="1", description="Number of crops in an epoch; it replaces crops_per_tile."
     )
-    batch: int = quantity(16, ge=1, le=1024, unit="1", description="Crops of a batch.")
-    set_up: SetUp = Field("synthetic", description="Which data are trained on, and how.")
+    batch: int = quantity(16, ge=1, le=1024, unit="1", description="Number of crops in a batch.")
+    set_up: SetUp = Field("synthetic", description="Kind of the training data, and order in which they are used.")
     synthetic_share: float | None = quantity(
         None,
         gt=0,
         lt=1,
         unit="1",
-        description="Synthetic share of the crops when mixed; as the tiles are if not given.",
+        description="Synthetic share of the crops in a mixed set-up; if not given, the share of synthetic tiles.",
     )
-    balanced: bool = Field(False, description="Cut crops around points of each class as often.")
-    effects: CropEffects = Field(CropEffects(), description="What happens to crops.")
-    adaptation: Adaptation = Field(Adaptation(), description="What brings domains nearer.")
-    label_smoothing: float = quantity(0.2, ge=0, lt=1, unit="1", description="Share of the loss for all classes.")
+    balanced: bool = Field(False, description="Cut equally many crops around points of each class.")
+    effects: CropEffects = Field(CropEffects(), description="Random changes of the crops.")
+    adaptation: Adaptation = Field(
+        Adaptation(), description="Methods that make synthetic and real domains more similar."
+    )
+    label_smoothing: float = quantity(
+        0.2, ge=0, lt=1, unit="1", description="Share of the label that is spread over all classes."
+    )
     class_weights: float = quantity(
-        1.0, ge=0, le=1, unit="1", description="Power p of the weights (f + 0.02)^-p, f a class's share; 0: all alike."
+        1.0,
+        ge=0,
+        le=1,
+        unit="1",
+        description="Power p of the weights (f + 0.02)^-p, where f is the share of a class; 0: equal weights.",
     )
     fitted_offsets: bool = Field(
-        False, description="Add to each class's score what makes the mean IoU of the training tiles largest."
+        False, description="Add an offset to the score of each class that maximises the mean IoU of the training tiles."
     )
     votes: int = quantity(
-        1, ge=1, le=64, unit="1", description="Views, turned and mirrored, whose mean probability labels a point."
+        1,
+        ge=1,
+        le=64,
+        unit="1",
+        description="Number of turned and mirrored views whose mean probability labels a point.",
     )
     fine_tuning: Schedule = Field(
-        Schedule(epochs=30, learning_rate=0.001), description="Second part of fine_tuned; each round of self_trained."
+        Schedule(epochs=30, learning_rate=0.001),
+        description="Schedule of the second part of fine_tuned, and of each round of self_trained.",
     )
-    self_training: SelfTraining = Field(SelfTraining(), description="Learning from unlabelled clouds.")
+    self_training: SelfTraining = Field(SelfTraining(), description="Settings of the training on unlabelled clouds.")
     prepare_on: Literal["auto", "cpu"] = Field(
         "auto",
-        description="Where batches are prepared: by the GPU where there is one and the network can, or workers.",
+        description="Device that prepares batches: the GPU, if there is one and the network supports it, or workers.",
     )
-    start: str = Field("", description="Run's folder or shipped model whose weights are begun with; random if empty.")
+    start: str = Field(
+        "",
+        description="Folder of a run, or built-in model, with the initial weights; if empty, they are random.",
+    )
     start_share: float = quantity(
-        0.0, ge=0, lt=1, unit="1", description="Share of the start's weights in the mean that the training ends with."
+        0.0, ge=0, lt=1, unit="1", description="Share of the initial weights in the final weights."
     )
-    data: Data = Field(Data(), description="Where points come from.")
+    data: Data = Field(Data(), description="Source of the points.")
 
     @field_validator("class_weights", mode="before")
     @classmethod
@@ -165,7 +198,9 @@ class SegmentationConfiguration(Configuration):
             if not sources[domain] and not (domain == "synthetic" and self.data.stream is not None):
                 raise InputError(f"data.{domain}", [], f"must name training data, which the set-up {self.set_up} needs")
         if self.set_up == "self_trained" and not self.data.target:
-            raise InputError("data.target", [], "must name clouds to adapt to, which the set-up self_trained needs")
+            raise InputError(
+                "data.target", [], "must name the clouds without labels that the set-up self_trained adapts to"
+            )
         return {domain: sources[domain] for domain in domains}
 
 
@@ -177,7 +212,7 @@ def class_shares(tiles: Sequence[CloudTile], classes: int) -> Float:
     """
     counts = np.sum([tile.class_counts(classes) for tile in tiles], axis=0) if tiles else np.zeros(classes)
     if not counts.sum():
-        raise InputError("training data", 0, "hold no labelled point")
+        raise InputError("training data", 0, "must have labelled points")
     return np.asarray(counts / counts.sum(), dtype=np.float64)
 
 

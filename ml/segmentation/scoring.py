@@ -224,7 +224,9 @@ def load_weights(model: nn.Module, run: Run[SegmentationConfiguration]) -> None:
     """
     state = run.last_checkpoint(next(model.parameters()).device)
     if state is None:
-        raise InputError(str(run.folder), None, "holds no checkpoint")
+        raise InputError(
+            str(run.folder), None, "must hold a checkpoint; `synthroads train` writes one after each epoch"
+        )
     load_state(model, state["model"], str(run.folder))
 
 
@@ -255,7 +257,7 @@ def check_tests(configuration: SegmentationConfiguration) -> None:
         for source in sources:
             _groups(source, scheme)
             if next(read_tiles(source, scheme, None), None) is None:
-                raise InputError("data.tests", source.path, "holds no points")
+                raise InputError("data.tests", source.path, "must hold points")
 
 
 def score_all(
@@ -311,7 +313,7 @@ def target_names(sources: Sequence[Source], scheme: ClassScheme) -> tuple[str, .
     """
     names = {source.targets(scheme) for source in sources}
     if len(names) != 1:
-        raise InputError("data.tests", len(names), "sources of one test must tell the same classes apart")
+        raise InputError("data.tests", len(names), "all sources of one test must have the same classes")
     return names.pop()
 
 
@@ -320,5 +322,5 @@ def _groups(source: Source, scheme: ClassScheme) -> NDArray[np.int16]:
     mapping, names = source.label_mapping(), class_names(scheme)
     groups = mapping.group_of(names) if mapping else np.arange(len(names), dtype=np.int16)
     if (groups == IGNORED).any():
-        raise InputError("groups", mapping and mapping.title, "must have a place for every class of the scheme")
+        raise InputError("groups", mapping and mapping.title, "must assign every class of the scheme to a group")
     return groups

@@ -31,7 +31,7 @@ def target_tiles(configuration: SegmentationConfiguration) -> list[CloudTile]:
     thin_tiles_of_target = thin_tiles(configuration.data.target, configuration, "target", labels=False)
     tiles = drop_slivers(list(thin_tiles_of_target), configuration)
     if not tiles:
-        raise InputError("data.target", 0, "holds no points to learn from")
+        raise InputError("data.target", 0, "must hold points for the training")
     return tiles
 
 

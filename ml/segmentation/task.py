@@ -139,7 +139,7 @@ def _names(evaluation: Evaluation) -> list[str]:
     ]
     path_places = zip(evaluation.data, unique_paths, strict=True)
     if repeated_paths := sorted(str(path) for path, unique_path in path_places if unique_paths.count(unique_path) > 1):
-        raise InputError("data", repeated_paths[0], "is given twice, or with two endings")
+        raise InputError("data", repeated_paths[0], "must be given once; it is given twice, perhaps with two endings")
     longest = max(len(unique_path.parts) for unique_path in unique_paths)
     name_candidates = (
         ["-".join(unique_path.parts[-parts:]) for unique_path in unique_paths] for parts in range(1, longest + 1)

@@ -42,13 +42,13 @@ _RANGE = 1.5
 """Statistics of a cloud count as real within this many times the range of the real clouds' ones, about its middle."""
 _BY_PATCHES, _BY_FIGURES = "Certificate", "SweepCertificate"
 WITHOUT = {
-    "centerline-mobile": "no real cloud of a road by a vehicle's line scanners or from a tripod was at hand",
-    "centerline-uav": "no real cloud of a road by a UAV was at hand",
-    "package-models": "several sensors in one set: real clouds of one kind say nothing of the whole",
-    "reference": "no real cloud of a road by a UAV was at hand",
-    "small-gantries": "no real cloud of a road by a UAV was at hand",
-    "small-roads": "no real cloud of a road by a UAV was at hand",
-    "standin": "stands in for real clouds where there are none: no sensor in particular is meant",
+    "centerline-mobile": "no real cloud of a road by line scanners on a vehicle or from a tripod was available",
+    "centerline-uav": "no real cloud of a road, recorded by a UAV, was available",
+    "package-models": "it has several sensors, and real clouds of one sensor can't judge the whole set",
+    "reference": "no real cloud of a road, recorded by a UAV, was available",
+    "small-gantries": "no real cloud of a road, recorded by a UAV, was available",
+    "small-roads": "no real cloud of a road, recorded by a UAV, was available",
+    "standin": "it replaces real clouds where there are none, and simulates no particular sensor",
 }
 """Shipped recipes without a certificate, and why they have none."""
 
@@ -153,15 +153,17 @@ def sweep_table(rows: list[dict[str, Any]], folder: str) -> str:
         "",
         "## Single sweeps",
         "",
-        "A sweep has too few points for patches, and one real sweep alone gives no yardstick. So its front and its",
-        "back, parted by azimuths with gaps of 20 deg, stand for two. Figures are those of",
-        "[the table of sweeps](devices.md#a-heads-sweeps-beside-a-real-one) that all have; within range is what lies",
-        f"within {_RANGE:g} times the range of the two, about its middle. Where both halves have nearly the same",
-        "value, hardly any sweep is. Made by",
+        "A single sweep has too few points to be cut into patches, and one real sweep alone doesn't show how",
+        "much real sweeps differ from each other. Therefore the real sweep is divided by azimuth into a front",
+        "and a back half, with gaps of 20 deg between them, and the two halves count as two real sweeps. The",
+        "certificate uses those figures of [the table of sweeps](devices.md#a-heads-sweeps-beside-a-real-one)",
+        f"that every sweep has. A figure counts as within range if it lies within {_RANGE:g} times the range",
+        "of the two halves, about the middle of this range. If both halves have nearly the same value, this",
+        "range is so narrow that hardly any sweep lies within it. This command makes the certificate:",
         "",
         "    python studies/realism/certificates.py --sweeps --real HALVES --output docs/certificates DATASET ...",
         "",
-        "| recipe | sweeps | figures within range | never within range | against |",
+        "| recipe | sweeps | figures within range | figures that are never within range | compared with |",
         "|---|--:|--:|---|---|",
     ]
     for row in rows:
@@ -180,17 +182,21 @@ def sweep_table(rows: list[dict[str, Any]], folder: str) -> str:
 def table(rows: list[dict[str, Any]], folder: str) -> str:
     """Return certificates as a Markdown page beside the folder that their files are in."""
     groups = list(rows[0]["realism"])
+    last_columns = "statistics within range | most distinctive statistics (AUC) | compared with"
     lines = [
         "# How real are the recipes' clouds?",
         "",
-        "AUC of telling each cloud from real ones (mean of all clouds), and in brackets realism: 1 - AUC over that of",
-        "the real clouds among each other ([how it is measured](compare.md)). Statistics are within range where a",
-        f"cloud's median lies within {_RANGE:g} times the range of the real clouds' medians. Clouds are the recipes'",
-        "test scenes on 200 m of road, of the even one that of [compare.md](compare.md#what-it-says-of-ours). Made by",
+        "The table shows how well a classifier tells the clouds of each recipe from real clouds ([how this is",
+        "measured](compare.md)): the AUC, as the mean over all clouds of the recipe, and in brackets the",
+        "realism, which is 1 - AUC divided by the 1 - AUC of the real clouds among each other. A statistic of",
+        f"a cloud counts as within range if its median lies within {_RANGE:g} times the range of the real",
+        "clouds' medians, about the middle of this range. The clouds are the test scenes of the recipes with",
+        "200 m of road; that of `centerline-airborne-even` is the cloud of",
+        "[compare.md](compare.md#what-it-says-of-ours). This command makes the certificates:",
         "",
         "    python studies/realism/certificates.py --real LIST --output docs/certificates DATASET ...",
         "",
-        f"| recipe | clouds | {' | '.join(groups)} | statistics within range | tells most | against |",
+        f"| recipe | clouds | {' | '.join(groups)} | {last_columns} |",
         "|---|--:|" + "--:|" * len(groups) + "--:|---|---|",
     ]
     for row in rows:

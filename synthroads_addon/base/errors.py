@@ -5,7 +5,7 @@ command line turns them into one line and exit code 2, the panel into a message.
 """
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 
 class SynthRoadsError(Exception):
@@ -65,10 +65,42 @@ def _plain(value: object) -> object:
     return item() if type(value).__module__ == "numpy" and item and not hasattr(value, "__len__") else value
 
 
+MOST_NAMES = 3
+"""Most names that a hint suggests. Chosen."""
+_SLIP, _LIKENESS = 0.8, 0.6
+"""Likeness (0 to 1, Ratcliff and Obershelp 1988) of a name with a slip of the keys, and of one worth a hint. Chosen."""
+
+
 def nearest_name(name: str, known_names: Iterable[str]) -> str:
-    """Return `` (did you mean 'x'?)`` for the known name most like `name`, or an empty string."""
-    close_names = difflib.get_close_matches(name, list(known_names), n=1, cutoff=0.6)
-    return f" (did you mean '{close_names[0]}'?)" if close_names else ""
+    """Return `` (did you mean 'x'?)`` for the known names most like `name`, or an empty string; see `similar_names`."""
+    return suggestion(similar_names(name, known_names))
+
+
+def similar_names(name: str, known_names: Iterable[str]) -> list[str]:
+    """Return the known name most like `name`, or up to three that contain it; empty if none is like it.
+
+    Capitals, spaces, dashes and dots make no difference: ``VLP 16`` matches ``velodyne-vlp-16``.
+    """
+    words = {known_name: _letters(known_name) for known_name in dict.fromkeys(known_names)}
+    text = _letters(name)
+    closest_words = difflib.get_close_matches(text, words.values(), n=1, cutoff=_LIKENESS)
+    closest_names = [known_name for known_name, word in words.items() if word in closest_words][:1]
+    if closest_names and difflib.SequenceMatcher(None, words[closest_names[0]], text).ratio() >= _SLIP:
+        return closest_names
+    names_with_text = [known_name for known_name, word in words.items() if len(text) > 2 and text in word]
+    return names_with_text[:MOST_NAMES] or closest_names
+
+
+def suggestion(names: Sequence[str]) -> str:
+    """Return `` (did you mean 'x', 'y' or 'z'?)`` for some names, or an empty string for none."""
+    quoted_names = [f"'{name}'" for name in names]
+    name_list = " or ".join(filter(None, [", ".join(quoted_names[:-1]), *quoted_names[-1:]]))
+    return f" (did you mean {name_list}?)" if name_list else ""
+
+
+def _letters(name: str) -> str:
+    """Return the letters and digits of a name in lower case."""
+    return "".join(character for character in name.lower() if character.isalnum())
 
 
 _LONGEST_FIELD, _LONGEST_VALUE, _LONGEST_ALLOWED = 300, 160, 1000

@@ -16,9 +16,9 @@ from typing import Annotated, Any, ClassVar, TypeVar, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
-from .errors import InputError, nearest_name
+from .errors import InputError, nearest_name, suggestion
 from .files import read_text
-from .text.typed import nearest_path
+from .text.typed import similar_paths
 
 VENDOR_PREFIX = "+"
 """Keys that begin with this are a vendor's own: read, kept, written back, never interpreted (CityJSON's habit)."""
@@ -122,6 +122,30 @@ def _keys(model: type[Model]) -> tuple[frozenset[str], frozenset[str]]:
     return frozenset(fields), frozenset(whole_number_names)
 
 
+class UnknownKeyError(ValueError):
+    """A key of JSON data is none of its class.
+
+    Attributes:
+        key: the unknown key.
+        similar: paths of similar fields in the class, relative to the place of the key; empty if there are none.
+    """
+
+    def __init__(self, key: str, similar: list[str]) -> None:
+        self.key, self.similar = key, similar
+        super().__init__(f"unknown key {key!r}{suggestion(similar)}")
+
+    def hint(self, root: type[BaseModel], path: list[str]) -> str:
+        """Return the message with whole paths for fields that don't lie where the key stands.
+
+        Args:
+            root: class of all the data.
+            path: of the place where the key stands.
+        """
+        beside = [name for name in self.similar if "." not in name]
+        whole = [".".join([*path, name]) for name in self.similar] or similar_paths(root, self.key)
+        return f"unknown key {self.key!r}{suggestion(beside or whole)}"
+
+
 class Model(BaseModel):
     """Base of all parameter classes: immutable, no unknown keys but a vendor's, no NaN; numbers are strict.
 
@@ -149,7 +173,7 @@ class Model(BaseModel):
         for key in data:
             if key in known_keys or (cls.vendor_keys_allowed and str(key).startswith(VENDOR_PREFIX)):
                 continue
-            raise ValueError(f"unknown key {str(key)!r}{nearest_path(cls, str(key))}")
+            raise UnknownKeyError(str(key), similar_paths(cls, str(key)))
         data = {key: _unsigned_zeros(value) if key in known_keys else value for key, value in data.items()}
         whole_numbers = {
             key: int(data[key])
@@ -164,7 +188,7 @@ class Model(BaseModel):
         try:
             return cls.model_validate(data)
         except ValidationError as error:
-            raise _input_error(error, data, source, cls.__name__.lower()) from None
+            raise _input_error(error, data, source, cls) from None
         except (TypeError, ValueError, RecursionError) as error:
             raise InputError(source or cls.__name__, None, f"must be plain JSON data ({error})") from None
 
@@ -311,14 +335,14 @@ _WORDING = {
 """Type of complaint -> our words, where pydantic's speak of Python."""
 
 
-def _input_error(error: ValidationError, data: object, source: str, kind_of_data: str) -> InputError:
+def _input_error(error: ValidationError, data: object, source: str, root: type[BaseModel]) -> InputError:
     """Return pydantic's first complaint as the project's error of one line.
 
     Args:
         error: pydantic's.
         data: what was read.
         source: where it comes from; empty: from no file.
-        kind_of_data: what the whole of it is called where it comes from none.
+        root: class of the whole of it, whose name stands for the data if it comes from no file.
     """
     complaint = error.errors(include_url=False)[0]
     kind, value, context = complaint["type"], complaint.get("input"), complaint.get("ctx", {})
@@ -330,11 +354,13 @@ def _input_error(error: ValidationError, data: object, source: str, kind_of_data
         message = f"must be one of {', '.join(known_tags)}{nearest_name(str(value), known_tags)}"
     elif kind == "literal_error" and isinstance(value, str):
         message += nearest_name(value, re.findall(r"'([^']*)'", context["expected"]))
+    elif isinstance(fault := context.get("error"), UnknownKeyError):
+        message, value = fault.hint(root, path), None
     elif kind in ("missing", "value_error"):
         value = None
     field = ".".join(part if part.isprintable() else repr(part) for part in path)
     if not field:
-        field = kind_of_data if not source else "the file" if value is not None else ""
+        field = root.__name__.lower() if not source else "the file" if value is not None else ""
     return InputError(": ".join(filter(None, (source, field))), value, " ".join(message.split()))
 
 

@@ -68,7 +68,7 @@ def road_axis(
     middle = axis.alignment.position(0.5 * axis.alignment.length)
     height = axis.heights.points[0].elevation if axis.heights else 0.0
     if not np.abs(middle).max() <= FARTHEST:
-        allowed = f"at most {FARTHEST:g} are possible: is it in metres?"
+        allowed = f"must be at most {FARTHEST:g}: are the coordinates in metres?"
         raise InputError(f"{path.name}: coordinates, m", np.round(middle, 3).tolist(), allowed)
     origin = np.round([*middle, height])
     check_heights(path.name, np.array([[*middle, height]]))
@@ -165,7 +165,9 @@ def _placed(
         assume("%s names no coordinate system: its coordinates are read as %s%s", path.name, name, remedy)
         return None, axis, f"as the file has it, read as {name}"
     if declared.unit is None:
-        raise InputError(f"{path.name}: coordinate system", declared.label, "must have metres: these are degrees")
+        raise InputError(
+            f"{path.name}: coordinate system", declared.label, "must have metres as its unit; this one has degrees"
+        )
     if not declared.in_metres:
         declared = declared.metric()  # readers give metres, whatever the file's unit is
     middle = axis.alignment.position(np.array([0.5 * axis.alignment.length]))

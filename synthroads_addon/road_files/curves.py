@@ -126,13 +126,13 @@ def cubic_curve(u: Float, v: Float, last: float) -> tuple[Curve, float, Float]:
 
     rough = abs(last) * float(speed(np.linspace(0.0, last, 65)).max())
     if not (np.isfinite(rough) and rough > 0.0):
-        raise ValueError("it has no length")
+        raise ValueError("this one has no length")
     count = int(np.clip(np.ceil(rough / _SPACING), 16, _STEPS))
     knots = np.linspace(0.0, last, count + 1)
     half = 0.5 * np.diff(knots)
     inner = (knots[:-1] + half)[:, None] + half[:, None] * _NODES
     if not (speed(np.concatenate([knots, inner.ravel()])) > 1e-9 * rough / abs(last)).all():
-        raise ValueError("it stands still somewhere")
+        raise ValueError("this one doesn't move on everywhere")
     run = np.concatenate([[0.0], np.cumsum(half * (speed(inner) @ _WEIGHTS))])
     angle = np.unwrap(np.arctan2(d_across(knots), d_along(knots)))
 

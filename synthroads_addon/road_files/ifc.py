@@ -55,7 +55,7 @@ def read_ifc(path: Path) -> list[RoadLine]:
     try:
         return _lines(path, model)
     except _DAMAGES as error:
-        raise InputError(path.name, None, f"a whole IFC file is needed ({_first_line(error)})") from None
+        raise InputError(path.name, None, f"must be a complete IFC file ({_first_line(error)})") from None
 
 
 def _first_line(error: Exception) -> str:
@@ -96,7 +96,9 @@ def _open(path: Path) -> Any:
         raise MissingPackageError(path.name, "IFC", "ifcopenshell", "twin") from None
     try:
         if path.stat().st_size > _LARGEST:
-            raise InputError(path.name, f"{path.stat().st_size / 1e6:,.0f} MB", f"at most {_LARGEST / 1e6:,.0f} MB")
+            raise InputError(
+                path.name, f"{path.stat().st_size / 1e6:,.0f} MB", f"must be at most {_LARGEST / 1e6:,.0f} MB"
+            )
         data = path.read_bytes()
     except OSError as error:
         raise MissingFileError(str(path), None, f"cannot be read ({error.strerror})") from None
@@ -104,13 +106,13 @@ def _open(path: Path) -> Any:
     schema = match[1].decode("ascii", "replace").upper() if match else ""
     if not schema.startswith("IFC4X3"):
         raise InputError(
-            path.name, schema or None, "IFC 4.3 (IFC4X3 and its candidates) is needed: others have no roads"
+            path.name, schema or None, "must be IFC 4.3 (IFC4X3 or a candidate of it), as older versions have no roads"
         )
     if _END not in data[-4096:]:
-        raise InputError(path.name, None, "the file ends too early: END-ISO-10303-21 is needed at its end")
+        raise InputError(path.name, None, "must end with END-ISO-10303-21: this file is cut off")
     begin = _DATA.search(data)
     if begin is None:
-        raise InputError(path.name, None, "a section DATA behind the header is needed")
+        raise InputError(path.name, None, "must have a section DATA after the header")
     try:
         data = _HEADER + data[begin.start() :]
         with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
@@ -118,7 +120,7 @@ def _open(path: Path) -> Any:
             copy.write_bytes(data)
             return ifcopenshell.open(str(copy))
     except (RuntimeError, OSError, ValueError, ifcopenshell.Error) as error:
-        raise InputError(path.name, None, f"a readable IFC file is needed ({_first_line(error)})") from None
+        raise InputError(path.name, None, f"must be a readable IFC file ({_first_line(error)})") from None
 
 
 def _units(model: Any) -> tuple[float, float]:
@@ -175,7 +177,9 @@ def _placed(line: RoadLine, matrix: np.ndarray, system: MapSystem | None) -> Roa
     turn = math.atan2(matrix[1, 0], matrix[0, 0])
     scale = math.hypot(matrix[0, 0], matrix[1, 0])
     if abs(scale - 1.0) > 1e-2:
-        raise InputError("map conversion: scale", scale, "must be within 1 % of 1: lengths of a road are metres")
+        raise InputError(
+            "map conversion: scale", scale, "must be within 1 % of 1, as the lengths of a road are in metres"
+        )
     if abs(scale - 1.0) > 1e-9:
         warn("%s: the map's scale of %.9f moves places and leaves lengths as they are designed", line.name, scale)
     pieces = []
@@ -266,7 +270,9 @@ def _stated(referent: Any, name: str) -> float | None:
 def _plan_piece(row: Any, run: float, unit: float, angle: float) -> PlanPiece | None:
     """Return the piece of one horizontal segment that begins at a station (m); None for one without a length."""
     if row is None or not row.is_a("IfcAlignmentHorizontalSegment"):
-        raise InputError(f"segment at station {run:.3f} m", None, "DesignParameters of a horizontal segment are needed")
+        raise InputError(
+            f"segment at station {run:.3f} m", None, "must have the DesignParameters of a horizontal segment"
+        )
     length = float(row.SegmentLength) * unit
     if length <= SHORTEST:
         return None
@@ -286,7 +292,7 @@ def _plan_piece(row: Any, run: float, unit: float, angle: float) -> PlanPiece | 
     elif kind in _KINDS:
         shape = transition(_KINDS[kind], length, first, last)
     else:
-        allowance = f"one of LINE, CIRCULARARC, {', '.join(_KINDS)} is understood"
+        allowance = f"must be one of LINE, CIRCULARARC, {', '.join(_KINDS)}"
         raise InputError(f"segment at station {run:.3f} m: PredefinedType", kind, allowance)
     return PlanPiece(_KINDS.get(kind, kind.lower()), run, length, x, y, heading, shape)
 
@@ -310,6 +316,6 @@ def _heights(profile: Any, unit: float) -> list[HeightPiece]:
         elif kind == "CIRCULARARC":
             pieces += circle(start, start + length, height, first, last)
         else:
-            allowance = "one of CONSTANTGRADIENT, PARABOLICARC, CIRCULARARC is understood"
+            allowance = "must be one of CONSTANTGRADIENT, PARABOLICARC, CIRCULARARC"
             raise InputError(f"vertical segment at {start:.3f} m: PredefinedType", kind, allowance)
     return pieces

@@ -64,10 +64,10 @@ def _unit(root: Element) -> float:
     units = child(root, "Units")
     stated = None if units is None else next(iter(children(units, "Metric", "Imperial")), None)
     if stated is None:
-        raise InputError("Units", None, "is missing: Metric or Imperial is needed, coordinates could be metres or feet")
+        raise InputError("Units", None, "must contain Metric or Imperial, as coordinates could be metres or feet")
     name = stated.get("linearUnit", "")
     if name.lower() not in _UNITS:
-        raise InputError("Units linearUnit", name, f"one of {', '.join(_UNITS)} is needed")
+        raise InputError("Units linearUnit", name, f"must be one of {', '.join(_UNITS)}")
     return _UNITS[name.lower()]
 
 
@@ -99,7 +99,7 @@ def _alignment(alignment: Element, name: str, unit: float, system: MapSystem | N
         if kind in ("Feature", ""):
             continue
         if kind not in _ELEMENTS:
-            raise InputError(f"CoordGeom at station {run:.3f} m", kind, f"one of {', '.join(_ELEMENTS)} is needed")
+            raise InputError(f"CoordGeom at station {run:.3f} m", kind, f"must be one of {', '.join(_ELEMENTS)}")
         for piece in _ELEMENTS[kind](element, run, unit):
             if piece.length > SHORTEST:
                 pieces.append(piece)
@@ -130,9 +130,9 @@ def _point(element: Element, name: str, unit: float) -> complex:
     words = (point.text or "").split() if point is not None else []
     place = f"{local_name(element)} {name}"
     if point is not None and not words and point.get("pntRef"):
-        raise InputError(place, point.get("pntRef"), "a point of its own is needed, not a reference to another")
+        raise InputError(place, point.get("pntRef"), "must contain coordinates; references to other points aren't read")
     if len(words) < 2:
-        raise InputError(place, " ".join(words) or None, "northing and easting are needed")
+        raise InputError(place, " ".join(words) or None, "must be a northing and an easting")
     north, east = (finite(place, word) * unit for word in words[:2])
     return complex(east, north)
 
@@ -141,7 +141,7 @@ def _rotation(element: Element) -> float:
     """Return 1 for an element that turns left, -1 for one that turns right."""
     name = element.get("rot", "")
     if name not in ("cw", "ccw"):
-        raise InputError(f"{local_name(element)} rot", name or None, "cw or ccw is needed")
+        raise InputError(f"{local_name(element)} rot", name or None, "must be cw or ccw")
     return 1.0 if name == "ccw" else -1.0
 
 
@@ -205,7 +205,7 @@ def _spiral(element: Element, run: float, unit: float) -> list[PlanPiece]:
     ends = sense * _radius(element, "radiusStart", unit), sense * _radius(element, "radiusEnd", unit)
     place = f"Spiral at station {run:.3f} m"
     if name.lower() not in _SPIRALS:
-        raise InputError(f"{place}: spiType", name, f"one of {', '.join(_SPIRALS)} is understood")
+        raise InputError(f"{place}: spiType", name, f"must be one of {', '.join(_SPIRALS)}")
     if length <= SHORTEST:
         return []
     kind = _SPIRALS[name.lower()]
@@ -215,7 +215,7 @@ def _spiral(element: Element, run: float, unit: float) -> list[PlanPiece]:
     chord = complex(*curve.positions(np.array([length]))[0].tolist())
     away = abs(abs(end - start) - abs(chord))
     if away > max(2e-3, 1e-5 * length):
-        condition = f"its ends must lie {abs(chord):.6f} m apart as its length and radii have it"
+        condition = f"its ends must be {abs(chord):.6f} m apart, as its length and radii say"
         raise InputError(place, round(abs(end - start), 6), condition)
     heading = math.atan2((end - start).imag, (end - start).real) - math.atan2(chord.imag, chord.real)
     return [PlanPiece(name.lower(), run, length, start.real, start.imag, heading, shape)]
@@ -261,7 +261,7 @@ def _intersection(row: Element, unit: float) -> _Row:
     kind = local_name(row)
     words = (row.text or "").split()
     if len(words) < 2:
-        raise InputError(kind, " ".join(words) or None, "station and elevation are needed")
+        raise InputError(kind, " ".join(words) or None, "must be a station and an elevation")
     station, height = (finite(kind, word) * unit for word in words[:2])
     before = behind = radius = 0.0
     if kind == "ParaCurve":
@@ -272,7 +272,7 @@ def _intersection(row: Element, unit: float) -> _Row:
         before = behind = 0.5 * number(row, "length") * unit
         radius = abs(number(row, "radius", 0.0)) * unit
     if min(before, behind) < 0.0 or (min(before, behind) <= SHORTEST < max(before, behind)):
-        raise InputError(f"{kind} at station {station:.3f} m", min(before, behind), "two lengths above 0 m are needed")
+        raise InputError(f"{kind} at station {station:.3f} m", min(before, behind), "must have two lengths above 0 m")
     return station, height, before, behind, radius
 
 
@@ -313,7 +313,7 @@ def _height_pieces(rows: list[_Row]) -> list[HeightPiece]:
     station = [row[0] for row in rows]
     for before, after in itertools.pairwise(station):
         if after - before <= SHORTEST:
-            raise InputError("ProfAlign", after, f"stations must grow: more than {before:g} m is needed")
+            raise InputError("ProfAlign", after, f"must be more than {before:g} m, as stations must increase")
     if len(rows) == 1:
         return [HeightPiece(station[0], station[0] + 1.0, rows[0][1], 0.0)]
     grades = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in itertools.pairwise(rows)]
@@ -325,7 +325,9 @@ def _height_pieces(rows: list[_Row]) -> list[HeightPiece]:
         if n:
             reach = row[0] - before
             if reach < at - 1e-3:
-                allowed = f"curves overlap: this one needs {before:.3f} m before it and has {row[0] - at:.3f} m"
+                allowed = (
+                    f"curves must not overlap: this one needs {before:.3f} m before it, but has {row[0] - at:.3f} m"
+                )
                 raise InputError(f"ProfAlign at station {row[0]:.3f} m", before, allowed)
             if reach - at > SHORTEST:
                 pieces.append(HeightPiece(at, reach, height, grades[n - 1]))

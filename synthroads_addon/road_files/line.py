@@ -199,7 +199,7 @@ def exact_axis(line: RoadLine, round_kinks: float | None = None) -> ExactAxis:
         chain.elements += elements
         run += math.fsum(element.length for element in elements)
     if not chain.elements:
-        raise InputError(line.name, None, "has no element of any length")
+        raise InputError(line.name, None, "must have an element that is longer than 0 m")
     first = line.pieces[0]
     alignment = Alignment(chain.elements, first.x, first.y, first.heading)
     gaps, kinks = _joints(line.pieces)
@@ -224,11 +224,13 @@ def _refuse_unfit(line: RoadLine, piece: PlanPiece, run: float) -> None:
     length = curve.length if curve else piece.length
     place = f"{line.name}: {piece.kind} at station {piece.station:.3f} m"
     if run + length > LONGEST_ROAD:
-        raise InputError(f"{place}: its end, m", run + length, f"a road of at most {LONGEST_ROAD:g} m is needed")
+        raise InputError(f"{place}: its end, m", run + length, f"must be at most {LONGEST_ROAD:g} m")
     bends = curve.curvature(np.linspace(0.0, length, _SAMPLES)) if curve else np.array(piece.shape)
     sharpest = float(np.abs(bends).max())
     if not sharpest <= SHARPEST:
-        raise InputError(f"{place}: curvature, 1/m", sharpest, f"at most {SHARPEST:g} is needed: no road bends more")
+        raise InputError(
+            f"{place}: curvature, 1/m", sharpest, f"must be at most {SHARPEST:g}, as no road has sharper bends"
+        )
 
 
 def _joints(pieces: Sequence[PlanPiece]) -> tuple[list[float], list[float]]:
@@ -309,13 +311,13 @@ def _refuse_broken(line: RoadLine, axis: ExactAxis) -> None:
     name = f"{line.source} {line.name!r}"
     for kind, station, _, worst in axis.approximated:
         if worst > GAP:
-            allowed = f"clothoids must follow it within {1000 * GAP:g} mm, and don't: it bends too much"
+            allowed = f"clothoids must follow this curve within {1000 * GAP:g} mm, but can't, as it bends too much"
             raise InputError(f"{name}: {kind} at station {station:.3f} m: distance, m", round(worst, 6), allowed)
     if axis.gap > GAP:
-        allowed = f"elements must join within {1000 * GAP:g} mm, those at station {axis.gap_station:.3f} m don't"
+        allowed = f"elements must join within {1000 * GAP:g} mm, but those at station {axis.gap_station:.3f} m don't"
         raise InputError(f"{name}: gap, m", round(axis.gap, 6), allowed)
     if axis.kink > KINK:
-        allowed = f"elements must join within {KINK:g} rad, those at station {axis.kink_station:.3f} m are a kink"
+        allowed = f"elements must join within {KINK:g} rad, but those at station {axis.kink_station:.3f} m form a kink"
         allowed += ": --round-kinks rounds those that two clothoids can follow"
         raise InputError(f"{name}: change of direction, rad", round(axis.kink, 6), allowed)
 

@@ -115,14 +115,14 @@ def _piece(geometry: Element) -> PlanPiece:
     place = f"geometry at s = {station:g}"
     if len(shapes) != 1:
         names = ", ".join(sorted(_SHAPES))
-        raise InputError(place, [local_name(each) for each in geometry], f"needs one of {names}")
+        raise InputError(place, [local_name(each) for each in geometry], f"must contain one of {names}")
     kind = local_name(shapes[0])
     if length <= SHORTEST:
         return PlanPiece(kind, station, 0.0, x, y, heading, (0.0, 0.0))
     try:
         shape, turn, start = _SHAPES[kind](shapes[0], length)
     except ValueError as error:
-        raise InputError(place, kind, f"a curve is needed, and {error}") from None
+        raise InputError(place, kind, f"must be a curve, but {error}") from None
     cos, sin = math.cos(heading), math.sin(heading)
     x, y = x + start[0] * cos - start[1] * sin, y + start[0] * sin + start[1] * cos
     if isinstance(shape, Curve) and abs(shape.length - length) > _LENGTHS * length:

@@ -63,7 +63,7 @@ def read_pbf(path: Path) -> list[PointLine]:
         raise MissingFileError(str(path), None, f"cannot be read ({error.strerror})") from None
     except (RuntimeError, ValueError, MemoryError) as error:
         reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise InputError(path.name, None, f"valid PBF of OpenStreetMap is needed ({reason})") from None
+        raise InputError(path.name, None, f"must be a valid PBF file of OpenStreetMap ({reason})") from None
     return roads_of_ways(_placed(data))
 
 
@@ -118,7 +118,9 @@ class _Target:
     def start(self, tag: str, attributes: Mapping[str, str]) -> None:
         """Take an element's attributes."""
         if not self._root and tag != "osm":
-            raise InputError(self._name, tag[:80], "the element osm is needed: this is no map of OpenStreetMap")
+            raise InputError(
+                self._name, tag[:80], "must have osm as its root element: this file is no map of OpenStreetMap"
+            )
         self._root = True
         if tag == "node":
             self._node(attributes)
@@ -152,12 +154,12 @@ class _Target:
         place = f"{self._name}: node {number}"
         longitude, latitude = (finite(f"{place} {key}", attributes.get(key)) for key in ("lon", "lat"))
         if abs(longitude) > 180.0 or abs(latitude) > 90.0:
-            raise InputError(place, [longitude, latitude], "a longitude and a latitude in degrees are needed")
+            raise InputError(place, [longitude, latitude], "must be a longitude and a latitude in degrees")
         self._data.nodes[number] = longitude, latitude
 
     def _number(self, attributes: Mapping[str, str], what: str, key: str) -> int:
         text = attributes.get(key, "")
         digits = text.removeprefix("-")  # editors give what is new negative numbers
         if not (digits.isascii() and digits.isdecimal() and len(digits) < 20 and int(digits) < _LARGEST_ID):
-            raise InputError(f"{self._name}: {what}", text[:80] or None, "a whole number is needed")
+            raise InputError(f"{self._name}: {what}", text[:80] or None, "must be a whole number")
         return int(text)

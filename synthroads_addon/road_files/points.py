@@ -97,7 +97,7 @@ def read_point_lines(path: Path) -> list[PointLine]:
             continue
         if np.abs(points[:, 0]).max() > 360.0 or np.abs(points[:, 1]).max() > 90.0:
             at = int(np.argmax(np.maximum(np.abs(points[:, 0]) / 360.0, np.abs(points[:, 1]) / 90.0)))
-            need = "a longitude and a latitude in degrees are needed"
+            need = "must be a longitude and a latitude in degrees"
             raise InputError(f"{path.name}: {name}: point {at + 1}", points[at, :2].tolist(), need)
         source = "GPX line" if local_name(root) == "gpx" else "KML line"
         lines.append(PointLine(names.unique(name, "line"), points, bool(points[:, 2].any()), source))
@@ -129,14 +129,14 @@ def _text_of(element: Element | None) -> str:
 def _kml_point(word: str) -> tuple[float, ...]:
     numbers = word.split(",")
     if len(numbers) not in (2, 3):
-        raise InputError("coordinates", word[:80], "longitude,latitude,height are needed, joined by commas")
+        raise InputError("coordinates", word[:80], "must be longitude,latitude,height, separated by commas")
     return _point("coordinates", numbers)
 
 
 def _track_point(row: Element) -> tuple[float, ...]:
     numbers = _text_of(row).split()
     if len(numbers) not in (2, 3):
-        raise InputError("coord", _text_of(row)[:80], "longitude, latitude and height are needed")
+        raise InputError("coord", _text_of(row)[:80], "must be a longitude, a latitude and a height")
     return _point("coord", numbers)
 
 

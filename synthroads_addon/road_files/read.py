@@ -58,7 +58,7 @@ def format_of(path: Path) -> str | None:
             head = file.read(_HEAD)
             size = file.seek(0, SEEK_END)
     except OSError as error:
-        raise MissingFileError(str(path), None, f"an axis file is needed here ({error.strerror})") from None
+        raise MissingFileError(str(path), None, f"must be a readable axis file ({error.strerror})") from None
     if head[4:].startswith(PBF_MARK):
         return "OpenStreetMap PBF"
     if (vector := vector_format(head)) is not None:
@@ -86,7 +86,7 @@ def read_lines(path: Path) -> list[RoadLine]:
     """
     name = format_of(path)
     if name not in READERS:
-        raise InputError(path.name, name, f"one of {', '.join(READERS)} is needed")
+        raise InputError(path.name, name, f"must be one of {', '.join(READERS)}")
     lines = READERS[name](path)
     if not lines:
         raise InputError(path.name, None, _NO_LINE)
@@ -105,7 +105,7 @@ def named_line(lines: Sequence[Named], wanted: str, file: str) -> Named:
             return line
     names = ", ".join(repr(line.name) for line in lines[:20])
     more = f" and {len(lines) - 20} more" if len(lines) > 20 else ""
-    raise InputError(f"{file}: road", wanted, f"it has {names}{more}")
+    raise InputError(f"{file}: road", wanted, f"must be one of the roads in the file: {names}{more}")
 
 
 def choose_line(lines: Sequence[RoadLine], wanted: str | None, file: str) -> RoadLine:

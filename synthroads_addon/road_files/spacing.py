@@ -54,7 +54,7 @@ def cleaned(name: str, points: Float, apart: float = 0.0) -> Float:
         points, number = points[kept], number[kept]
     points, number = _without_backward(name, points, number)
     if len(points) < 2:
-        raise InputError(name, None, f"at least two distinct points are needed, {len(points)} is left of its line")
+        raise InputError(name, None, f"must have at least two distinct points; the file has {len(points)}")
     return points
 
 
@@ -63,10 +63,11 @@ def _refuse_far(name: str, points: Float, number: Int, most: float) -> None:
     step = _steps(points)
     if len(step) and step.max() > most:
         at = int(step.argmax())
-        allowed = f"the next one is {step[at] / 1000.0:,.1f} km away, at most {most / 1000.0:g} km: is a part missing?"
+        gap, limit = step[at] / 1000.0, most / 1000.0
+        allowed = f"the next one is {gap:,.1f} km away, but must lie within {limit:g} km: is a part missing?"
         raise InputError(f"{name}: {_place(points, number, at)}", None, allowed)
     if step.sum() > LONGEST_ROAD:
-        raise InputError(f"{name}: length, m", round(float(step.sum())), f"at most {LONGEST_ROAD:g} m are needed")
+        raise InputError(f"{name}: length, m", round(float(step.sum())), f"must be at most {LONGEST_ROAD:g} m")
 
 
 def _place(points: Float, number: Int, at: int) -> str:
@@ -237,6 +238,6 @@ def moved_aside(name: str, points: Float, offset: float, height: float) -> Float
     back = (np.diff(beside[:, :2], axis=0) * np.diff(points[:, :2], axis=0)).sum(axis=1) <= 0.0
     if back.any():
         at = int(back.argmax())
-        allowed = f"the path bends too sharply for that at {_place(points, np.arange(1, len(points) + 1), at)}"
+        allowed = f"must be smaller: the path bends too sharply at {_place(points, np.arange(1, len(points) + 1), at)}"
         raise InputError(f"{name}: --offset-from-path", offset, allowed)
     return beside

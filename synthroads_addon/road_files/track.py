@@ -37,7 +37,7 @@ def read_sbet(path: Path) -> list[PointLine]:
 
 def has_times(path: Path) -> bool:
     """Return whether a file is CSV whose header names a column ``time``: the path of a vehicle, and no axis."""
-    text = read_text(str(path), "CSV or GeoJSON is needed", "an axis file is needed here", encoding="utf-8-sig")
+    text = read_text(str(path), "must be CSV or GeoJSON", "must be a readable axis file", encoding="utf-8-sig")
     lines = (line for line in text[: 1 << 16].splitlines() if line.strip() and not line.lstrip().startswith("#"))
     head = next(lines, "").lower()
     for mark in ";,\t":

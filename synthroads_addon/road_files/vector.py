@@ -77,7 +77,11 @@ def read_vector(path: Path, kind: str) -> list[PointLine]:
             for name, line in _lines_of(path, source, layer, kind):
                 lines.append(replace(line, name=names.unique(name and before + name, before + "line")))
                 if len(lines) > _MOST_LINES:
-                    raise InputError(path.name, None, f"at most {_MOST_LINES:,} lines are read: take those you need")
+                    raise InputError(
+                        path.name,
+                        None,
+                        f"must have at most {_MOST_LINES:,} lines: save those that you need in a file of their own",
+                    )
     return lines
 
 
@@ -99,7 +103,7 @@ def _told_in_one_line(path: Path, kind: str) -> Iterator[None]:
     except (DataLayerError, DataSourceError, FeatureError, FieldError, GeometryError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(path.name, None, f"a valid {kind} is needed ({_one_line(error)})") from None
+        raise InputError(path.name, None, f"must be a valid {kind} ({_one_line(error)})") from None
 
 
 def _one_line(said: object) -> str:
@@ -117,7 +121,7 @@ def _check_beside(path: Path, kind: str) -> None:
         )
     for ending in (".shx", ".dbf"):
         if not any(path.with_suffix(form).is_file() for form in (ending, ending.upper())):
-            raise InputError(path.name, ending, "a shapefile has this part beside it, which is missing")
+            raise InputError(path.name, ending, "is missing: this part of the shapefile must be in the same folder")
 
 
 def _may_hold_lines(geometry: object) -> bool:
@@ -130,7 +134,7 @@ def _lines_of(path: Path, source: Any, layer: str, kind: str) -> Iterator[tuple[
 
     info = pyogrio.read_info(source, layer=layer)
     if info["driver"] != DRIVERS[kind]:
-        raise InputError(path.name, info["driver"], f"{DRIVERS[kind]} is needed")
+        raise InputError(path.name, info["driver"], f"must be {DRIVERS[kind]}")
     by_case = {str(field).lower(): str(field) for field in info["fields"]}
     field = next((by_case[name] for name in _NAMES if name in by_case), None)
     meta, numbers, shapes, values = pyogrio.raw.read(
@@ -158,9 +162,7 @@ def _line_of(place: str, shape: bytes | None) -> Iterator[tuple[Float, InputErro
     joined = [parts[0]]
     for part in parts[1:]:
         if np.abs(part[0, :2] - joined[-1][-1, :2]).max() > _JOINED:
-            fault = InputError(
-                "parts", len(parts), "a line of one part is needed, or of parts that begin where another ends"
-            )
+            fault = InputError("parts", len(parts), "must be one line, or parts that begin where another part ends")
             yield parts[0], fault
             return
         joined.append(part[1:])
@@ -183,7 +185,7 @@ def _parts(place: str, data: bytes) -> list[Float]:
             parts.append(points)
         return parts
     except (struct.error, ValueError, IndexError):
-        raise InputError(place, None, "a line in well-known binary is needed") from None
+        raise InputError(place, None, "must be a line in well-known binary") from None
 
 
 def _head(data: bytes, at: int) -> tuple[int, bool, bool, int, str]:
@@ -204,6 +206,6 @@ def _points(place: str, data: bytes, at: int, order: str, has_z: bool, has_m: bo
     if not (np.abs(points) <= _LARGEST).all():
         row = int((~(np.abs(points) <= _LARGEST)).any(axis=1).argmax())
         raise InputError(
-            f"{place}: point {row + 1}", points[row].tolist(), f"finite numbers up to {_LARGEST:g} are needed"
+            f"{place}: point {row + 1}", points[row].tolist(), f"must be finite numbers up to {_LARGEST:g}"
         )
     return points, at + 4 + 8 * count * width

@@ -15,7 +15,7 @@ LARGEST = 512 << 20
 
 def refuse_doctype(name: str) -> None:
     """Raise `InputError` for a document type: it may define entities, and no format of roads has one."""
-    raise InputError("document type", name, "must not be there: entities aren't read")
+    raise InputError("document type", name, "must be removed, as entities aren't read")
 
 
 class _Builder(TreeBuilder):
@@ -51,14 +51,14 @@ def parse_xml(path: Path, target: Any) -> Any:
     except OSError as error:
         raise MissingFileError(str(path), None, f"cannot be read ({error.strerror})") from None
     except (ParseError, ValueError, LookupError) as error:
-        raise InputError(str(path), None, f"valid XML is needed ({error})") from None
+        raise InputError(str(path), None, f"must be valid XML ({error})") from None
 
 
 def check_size(path: Path) -> None:
     """Raise `InputError` for a file larger than `LARGEST`, OSError for none."""
     size = path.stat().st_size
     if size > LARGEST:
-        raise InputError(str(path), f"{size / 1e6:,.0f} MB", f"at most {LARGEST / 1e6:,.0f} MB are read")
+        raise InputError(str(path), f"{size / 1e6:,.0f} MB", f"must be at most {LARGEST / 1e6:,.0f} MB")
 
 
 def on_one_line(text: str) -> str:
@@ -91,7 +91,7 @@ def number(element: Element, name: str, default: float | None = None) -> float:
     if text is None:
         if default is not None:
             return default
-        raise InputError(f"{local_name(element)} {name}", None, "is missing: a number is needed")
+        raise InputError(f"{local_name(element)} {name}", None, "is missing, but must be a number")
     return finite(f"{local_name(element)} {name}", text)
 
 
@@ -102,5 +102,5 @@ def finite(place: str, text: Any) -> float:
     except (TypeError, ValueError, OverflowError):
         value = math.nan
     if not abs(value) <= 1e12:
-        raise InputError(place, text, "a finite number is needed")
+        raise InputError(place, text, "must be a finite number")
     return value

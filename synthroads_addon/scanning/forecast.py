@@ -11,14 +11,22 @@ from .blocks import Blocks
 
 MOST_PULSES = 5_000_000_000
 """Pulses of a scan that isn't said to be a large one: 200 times the demo job's, hours of the fastest scanner."""
-_PULSE, _RAY = 4e-6, 0.4e-6
-"""Seconds of one core for a pulse and for each of its rays, with rendered colours and LAZ, as the demo job takes them.
+_PULSE, _RAY = 1.2e-6, 0.1e-6
+"""Seconds of one core for a pulse and for each of its rays, with colours by the materials' nodes, and LAZ.
 
-Of seven scans of 60 to 150 m (mobile mapping, airborne and tripod, 1 and 7 rays per pulse) six took 0.7 to 1.3 times as
-much; one with the materials' own colours took 0.4 times as much.
+From docs/benchmark.md: the demo job with 7 rays takes 1.9 us of one core a pulse, of which casting and radiometry take
+0.2 us with 1 ray, 0.9 us with 7 and 5.6 us with 61. Pulses into the sky, which have no points, take less.
 """
-_BASE, _TRIANGLE, _THREAD = 4e8, 350.0, 5e8
-"""Bytes of memory: of the program, of a triangle with the tree above it, of a block that is being worked on."""
+_RENDERED = 3e-6
+"""Seconds of one core that a pulse takes longer if colours are rendered, as images or as a pixel for each return.
+
+From docs/tradeoff.md: 27 to 34 s more than by nodes for the 10 million pulses of a motorway by UAV.
+"""
+_BASE, _TRIANGLE, _THREAD = 4e8, 350.0, 2.5e8
+"""Bytes of memory: of the program, of a triangle with the tree above it, of a block that is being worked on.
+
+Chosen so that the demo job's 1.2 GB on two cores (docs/benchmark.md) are told as 1.7 GB.
+"""
 _POINT = 13.0
 """Bytes of a point in LAZ with the usual attributes: 10 to 15 in all scenes that were measured."""
 
@@ -71,17 +79,19 @@ class ScanForecast:
         )
 
 
-def forecast_scan(division: Blocks, triangles: int, threads: int = 0) -> ScanForecast:
+def forecast_scan(division: Blocks, triangles: int, threads: int = 0, rendered: bool = False) -> ScanForecast:
     """Return the expected pulses, computing time (s) and memory (bytes) of a scan on this machine.
 
     Args:
         division: its pulses.
         triangles: of the scene.
         threads: blocks that are worked on at once; 0 for every core.
+        rendered: whether the points' colours are rendered.
     """
     pulses = sum(division.pulse_count(strip) for strip in division.path.strips)
     workers = threads or available_cores()
-    seconds = pulses * (_PULSE + _RAY * division.rays_per_pulse) / free_cores(workers, 1.0)
+    seconds_per_pulse = _PULSE + _RAY * division.rays_per_pulse + (_RENDERED if rendered else 0.0)
+    seconds = pulses * seconds_per_pulse / free_cores(workers, 1.0)
     scene_memory = _TRIANGLE * triangles
     blocks_at_once = min(workers + 1, division.count())
     return ScanForecast(pulses, seconds, _BASE + scene_memory + _THREAD * blocks_at_once, scene_memory, workers)

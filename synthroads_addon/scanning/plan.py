@@ -193,7 +193,9 @@ class ScanPlan:
 
     def forecast(self) -> ScanForecast:
         """Return the expected pulses, computing time and memory of scanning the whole path."""
-        return forecast_scan(self.cut, self.target.triangles, self.run.threads)
+        request = self.layers.request
+        rendered = request is not None and request.settings.source != "material" and not takes_nodes(request.settings)
+        return forecast_scan(self.cut, self.target.triangles, self.run.threads, rendered)
 
     def block_count(self) -> int:
         """Return the number of blocks that are scanned."""

@@ -66,7 +66,7 @@ def test_sweeps_are_certified_by_the_figures_that_all_have() -> None:
     text = pages([made(25.0), data | {"recipe": "centerline-airborne"}], "certificates")
     total = 4 * len(data["statistics"])
     assert f"| [`centerline-airborne`](certificates/centerline-airborne.json) | 4 | {total - 2} of {total} |  |" in text
-    assert "- `reference`: no real cloud of a road by a UAV was at hand.\n" in text
+    assert "- `reference`: no real cloud of a road, recorded by a UAV, was available.\n" in text
 
 
 def test_every_shipped_recipe_has_a_certificate_or_a_reason() -> None:

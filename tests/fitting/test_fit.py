@@ -560,7 +560,7 @@ def test_bad_files_are_refused_with_one_line(tmp_path: Path, text: str, message:
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
-    with pytest.raises(MissingFileError, match=r"none\.csv: an axis file is needed"):
+    with pytest.raises(MissingFileError, match=r"none\.csv: must be a readable axis file"):
         read_axis(tmp_path / "none.csv")
     with pytest.raises(MissingFileError):
         read_axis(tmp_path)

@@ -78,8 +78,8 @@ def test_the_front_is_in_the_table_with_the_noise_of_time() -> None:
     text = markdown(found, "rq31-600m")
     assert "| draft | yes | - |" in text
     assert f"| standard | no | {between}: 75.0 s for 100.0 s |" in text
-    assert "compared with 3 others of the same job; errors that are larger by less than 5 % count as equal" in text
-    assert "times of the same settings differ by up to 20 %: only what is faster by more counts" in text
+    assert "compared with 3 other rows of the same job. Errors that are larger by less than 5 % count as equal" in text
+    assert "Two runs with the same settings differ in time by up to 20 %; only rows that are faster by more" in text
     assert "| standard | yes | - |" in markdown([*found[:3], found[4]], "rq31-600m")
 
 

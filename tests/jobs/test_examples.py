@@ -34,9 +34,16 @@ pytestmark = pytest.mark.any_blender
 
 def run(name: str, *words: str | Path, cwd: Path) -> str:
     """Run an example with these words behind it, in a folder; return what it prints."""
+    done = process(name, *words, cwd=cwd)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return done.stdout
+
+
+def process(name: str, *words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """Run an example with these words behind it, in a folder; return the process, however it ended."""
     words = (sys.executable, "-c", RUN, EXAMPLES / name / f"{name}.py", *words)
     environment = os.environ | {"PYTHONPATH": str(EXAMPLES.parent)}
-    done = subprocess.run(
+    return subprocess.run(
         [*map(str, words)],
         cwd=cwd,
         env=environment,
@@ -45,8 +52,6 @@ def run(name: str, *words: str | Path, cwd: Path) -> str:
         check=False,
         stdin=subprocess.DEVNULL,
     )
-    assert done.returncode == 0, done.stderr[-2000:]
-    return done.stdout
 
 
 def points_of(file: Path) -> PointBlock:
@@ -131,6 +136,24 @@ def test_a_thing_of_ones_own_is_in_cloud_and_twin(tmp_path: Path) -> None:
 def test_help_says_what_to_give_and_makes_nothing(name: str, tmp_path: Path) -> None:
     assert re.search(rf"usage: {name}\.py \[-h\] output( \[\w+\])?\n", run(name, "--help", cwd=tmp_path))
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "torch_dataset"])
+def test_an_output_that_is_a_file_ends_in_one_line(name: str, tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("mine")
+    done = process(name, "out", cwd=tmp_path)
+    assert done.returncode == 2
+    assert re.fullmatch(r"error: .*out.*\n", done.stderr.splitlines(keepends=True)[-1])
+    assert "Traceback" not in done.stderr
+    assert (tmp_path / "out").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["cloud_to_numpy", "scan_to_twin"])
+def test_a_cloud_that_is_missing_ends_in_one_line(name: str, tmp_path: Path) -> None:
+    done = process(name, "out", "none.laz", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "none.laz" in done.stderr
+    assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -553,7 +553,7 @@ def _(folder: Path) -> None:
         assert "elsewhere" not in str(caught.value)
     entity = f'<!DOCTYPE osm [<!ENTITY a SYSTEM "{there}">]>'
     (folder / "a.osm").write_text(f'<?xml version="1.0"?>{entity}<osm version="0.6"><node id="&a;"/></osm>')
-    with pytest.raises(InputError, match="must not be there: entities aren't read"):
+    with pytest.raises(InputError, match="must be removed, as entities aren't read"):
         axis_from_file(folder / "a.osm", RoadScenario(), 1)
 
 
@@ -664,7 +664,7 @@ def _(folder: Path) -> None:
     """Read without running what they hold."""
     torch.save({"model": {}, "epoch": 1, "more": _Marks(folder / "ran")}, folder / "checkpoint.pt")
     run: Run[Any] = Run(folder, None)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="is no checkpoint, or damaged"):
+    with pytest.raises(InputError, match="must be an undamaged checkpoint"):
         run.last_checkpoint()
     assert not (folder / "ran").exists()
 

@@ -517,7 +517,7 @@ BROKEN |= {"flat.obj": b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "cut.stl": b"sol
         ("yard.obj", ["--height", "-3"], "scan.platform.height is -3"),
         ("yard.obj", ["--set", "scan.platfrom.height=3"], "scan: unknown key 'platfrom' (did you mean 'platform'?)"),
         ("yard.obj", ["--set", 'outputs=["scene"]'], "outputs is ['scene']: must name at least one of cloud, previews"),
-        ("yard.obj", ["--path", "nowhere.csv"], "nowhere.csv: an axis file is needed here"),
+        ("yard.obj", ["--path", "nowhere.csv"], "nowhere.csv: must be a readable axis file"),
         ("yard.obj", ["--trajectory", "nowhere.csv"], "nowhere.csv: a trajectory file is needed here"),
         (
             "yard.obj",

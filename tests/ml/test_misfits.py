@@ -62,7 +62,7 @@ def told(folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
         ({"model": [1, 2]}, "model is 'list': a dictionary of tensors is needed"),
         ({"model": {"weight": "text"}}, "model is 'dict': a dictionary of tensors is needed"),
         ({"model": None}, "model is 'NoneType': a dictionary"),
-        ({"model": {"weight": torch.zeros(2)}}, "is of another network than its configuration"),
+        ({"model": {"weight": torch.zeros(2)}}, "the checkpoint must belong to the network of the configuration"),
         ({"epoch": "one"}, "epoch is"),
         ({"epoch": None}, "epoch is 'NoneType': a whole number from 0 is needed"),
         ({"epoch": [1]}, "epoch is 'list': a whole number"),
@@ -94,7 +94,8 @@ def test_weights_that_are_not_finite_are_refused(
     state = finished(kind, tmp_path / "run")
     torch.save(with_weights(state, kind, number), tmp_path / "run" / CHECKPOINT)
     assert re.search(
-        r"not all of its checkpoint's numbers of [a-z.0]+weight are finite", told(tmp_path / "run", capsys)
+        r"all weights in the checkpoint must be finite, but some of [a-z.0]+weight aren't",
+        told(tmp_path / "run", capsys),
     )
 
 
@@ -106,7 +107,7 @@ def test_weights_that_are_no_real_numbers_are_refused(
     state = finished(kind, tmp_path / "run")
     complex_ones = {name: value.to(torch.complex64) for name, value in state["model"].items()}
     torch.save(state | {"model": complex_ones}, tmp_path / "run" / CHECKPOINT)
-    assert "holds complex numbers" in told(tmp_path / "run", capsys)
+    assert "must not hold complex numbers" in told(tmp_path / "run", capsys)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -116,7 +117,7 @@ def test_what_a_network_says_is_finite_or_refused(
     """Numbers beyond reason overflow in the network."""
     state = finished(kind, tmp_path / "run")
     torch.save(with_weights(state, kind, 3e38), tmp_path / "run" / CHECKPOINT)
-    assert "network: not all that it says of the cloud is finite" in told(tmp_path / "run", capsys)
+    assert "network: the output of the network must be finite" in told(tmp_path / "run", capsys)
 
 
 @pytest.mark.parametrize(
@@ -142,7 +143,7 @@ def test_a_calibration_that_is_none_is_one_line(
     finished("centerline", tmp_path / "run")
     (tmp_path / "run" / CALIBRATION).write_text(json.dumps(content))
     said = told(tmp_path / "run", capsys)
-    assert "its calibration isn't that of a model's deviations" in said
+    assert "the file calibration.json must hold a positive, finite factor for each target" in said
     assert "--resume" in said
 
 
@@ -150,7 +151,7 @@ def test_a_calibration_that_is_none_is_one_line(
 def test_a_history_that_is_none_is_one_line(content: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     finished("centerline", tmp_path / "run")
     (tmp_path / "run" / HISTORY).write_text(content)
-    assert "must be a list of an object for each epoch" in told(tmp_path / "run", capsys)
+    assert "must be a list with an object for each epoch" in told(tmp_path / "run", capsys)
 
 
 def weights_file(path: Path, change: dict[str, Any], metadata: Any = None) -> Path:
@@ -186,11 +187,13 @@ def weights_file(path: Path, change: dict[str, Any], metadata: Any = None) -> Pa
     ],
 )
 def test_what_is_no_number_in_a_file_of_weights_is_refused(change: dict[str, Any], tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"weight: (its shape and data_offsets must be whole numbers|lies outside)"):
+    with pytest.raises(
+        InputError, match=r"weight: (its shape and data_offsets must be whole numbers|its data must lie inside)"
+    ):
         read_tensors(weights_file(tmp_path / "a.safetensors", change))
 
 
 @pytest.mark.parametrize("metadata", [[], "text", 3, {"configuration": 3}, {"calibration": ["x"]}])
 def test_metadata_that_is_no_text_is_refused(metadata: Any, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="must be texts by name"):
+    with pytest.raises(InputError, match="must be an object of names and texts"):
         read_metadata(weights_file(tmp_path / "a.safetensors", {}, metadata))

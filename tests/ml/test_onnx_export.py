@@ -99,7 +99,7 @@ def test_a_network_that_says_nothing_of_its_clouds_is_refused() -> None:
         name: Literal["silent"] = Field("silent")
 
     configuration = transformer().model_copy(update={"network": Silent()})
-    with pytest.raises(InputError, match=r"network.name is 'silent': can't be written as ONNX"):
+    with pytest.raises(InputError, match=r"network.name is 'silent': must be a network that can be written as ONNX"):
         exportable_segmentation(torch.nn.Identity(), configuration)
 
 

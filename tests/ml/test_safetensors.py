@@ -50,15 +50,15 @@ def test_a_damaged_file_is_one_line(tmp_path: Path) -> None:
     write_tensors(path, {"x": torch.arange(10.0)}, {})
     whole = path.read_bytes()
     for content, said in (
-        (whole[:-4], "lies outside of the file"),
-        (whole[:20], "is no file of weights"),
+        (whole[:-4], "must lie inside the file"),
+        (whole[:20], "must be an undamaged file of weights"),
         (b"", "is no"),
     ):
         path.write_bytes(content)
         with pytest.raises(InputError, match=said):
             read_tensors(path)
     path.write_bytes(whole.replace(b'"shape":[10]', b'"shape":[11]'))
-    with pytest.raises(InputError, match="lies outside"):
+    with pytest.raises(InputError, match="must lie inside"):
         read_tensors(path)
     with pytest.raises(MissingFileError):
         read_tensors(tmp_path / "none.safetensors")

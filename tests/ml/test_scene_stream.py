@@ -209,7 +209,10 @@ def test_scores_are_shifted_by_the_last_epochs_scenes_and_real_data_may_follow(d
     ("fault", "told"),
     [
         ("2:error", r"scene 2, roads-\d+': couldn't be made: the disk is on fire; --resume tries again"),
-        ("2:exit", r"isn't made: the producer has ended with code 9 \(out of luck\); --resume tries again"),
+        (
+            "2:exit",
+            r"can't be made: the process that makes scenes has ended with code 9 \(out of luck\); --resume tries again",
+        ),
     ],
 )
 def test_a_failure_is_told_and_the_training_can_be_resumed(
@@ -232,7 +235,9 @@ def test_a_scenario_that_cannot_be_met_is_done_without(
     monkeypatch.setenv("QUICK_FAULT", "0:scenario")
     task.train(Run.start(tmp_path / "run", small(data, schedule={"epochs": 1})))
     none = small(data, schedule={"epochs": 1}, stream={"scenes_per_epoch": 1})
-    with pytest.raises(InputError, match=r"can't be made \(road.length is 1: must be more\), like all others"):
+    with pytest.raises(
+        InputError, match=r"can't be made \(road.length is 1: must be more\), and neither can the other scenes"
+    ):
         task.train(Run.start(tmp_path / "none", none))
 
 
@@ -245,7 +250,7 @@ def test_what_does_not_fit_is_refused(data: Path, tmp_path: Path) -> None:
         task.train(Run.start(tmp_path / "run", small(data, stream={"recipe": "small-rods"})))
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter.txt").write_text("dear")
-    with pytest.raises(OutputError, match="holds other files; name an empty folder"):
+    with pytest.raises(OutputError, match="must be an empty folder, or one of scenes: this one holds other files"):
         task.train(Run.start(tmp_path / "other", small(data, stream={"folder": str(tmp_path / "mine")})))
     assert [path.name for path in (tmp_path / "mine").iterdir()] == ["letter.txt"]
 

@@ -100,7 +100,7 @@ def test_models_are_listed_and_misnamed_ones_refused(
 
 def test_without_a_model_the_command_says_so(tmp_path: Path, weights: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["predict", str(tmp_path / "scan.laz")]) == 2
-    assert "no model for segmentation comes with the package" in capsys.readouterr().err
+    assert "the package has no model for segmentation" in capsys.readouterr().err
     assert main(["predict"]) == 2
     assert "one cloud is needed" in capsys.readouterr().err
 

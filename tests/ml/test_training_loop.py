@@ -94,7 +94,7 @@ def test_two_processes_have_the_gradients_of_one_with_batches_twice_as_large(tmp
 @pytest.mark.slow
 def test_a_lost_process_is_said_in_one_line(tmp_path: Path) -> None:
     run = Run.start(tmp_path / "run", configuration(epochs=2).model_copy(update={"processes": 2}))
-    lost = pytest.raises(InputError, match="processes is 2: one was lost")
+    lost = pytest.raises(InputError, match="processes is 2: one of the processes ended")
     with lost, helper_processes(run, lose, torch.device("cpu")):
         learn(run)
 
@@ -136,7 +136,7 @@ def test_interrupted_training_ends_with_the_same_weights(tmp_path: Path) -> None
 
 def test_a_run_is_not_lost_by_mistake(tmp_path: Path) -> None:
     train(tmp_path)
-    with pytest.raises(OutputError, match="holds a run already"):
+    with pytest.raises(OutputError, match="already holds a run"):
         Run.start(tmp_path, configuration())
     with pytest.raises(InputError, match="seed"):
         Run.start(tmp_path, configuration(seed=9), resume=True)
@@ -151,7 +151,7 @@ def test_a_finished_run_opens(tmp_path: Path) -> None:
     run = Run.open(tmp_path)
     assert run.configuration == configuration()
     assert len(run.history) == 6
-    with pytest.raises(MissingFileError, match="holds no trained run"):
+    with pytest.raises(MissingFileError, match="must be the folder of a trained run"):
         Run.open(tmp_path / "nowhere")
     (tmp_path / CHECKPOINT).write_bytes(b"PK\x03\x04 torn")
     with pytest.raises(InputError, match="damaged"):

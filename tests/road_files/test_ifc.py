@@ -185,5 +185,5 @@ def test_a_broken_header_never_reaches_the_library(tmp_path: Path, monkeypatch: 
 def test_a_file_without_data_is_refused(tmp_path: Path) -> None:
     written(path := tmp_path / "a.ifc")
     path.write_bytes(path.read_bytes().replace(b"DATA;", b"DATE;"))
-    with pytest.raises(InputError, match="a section DATA behind the header is needed"):
+    with pytest.raises(InputError, match="must have a section DATA after the header"):
         read_lines(path)

@@ -117,7 +117,7 @@ def test_a_transition_that_its_ends_contradict_is_refused(tmp_path: Path) -> Non
         only(tmp_path / "a.xml")
     text = text.replace("spiType='helmert'", "spiType='clothoid'")
     (tmp_path / "a.xml").write_text(text.replace("length='120.0'", "length='119.9'"))
-    with pytest.raises(InputError, match="its ends must lie"):
+    with pytest.raises(InputError, match="its ends must be"):
         only(tmp_path / "a.xml")
 
 
@@ -169,14 +169,14 @@ def test_profiles_that_cover_a_part_go_on_with_their_grades(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("profile", "message"),
     [
-        ("<PVI>0 50</PVI><ParaCurve length='300'>100 54</ParaCurve><PVI>520 50</PVI>", "curves overlap"),
-        ("<PVI>0 50</PVI><PVI>0 54</PVI>", "stations must grow"),
-        ("<PVI>0</PVI>", "station and elevation are needed"),
+        ("<PVI>0 50</PVI><ParaCurve length='300'>100 54</ParaCurve><PVI>520 50</PVI>", "curves must not overlap"),
+        ("<PVI>0 50</PVI><PVI>0 54</PVI>", "stations must increase"),
+        ("<PVI>0</PVI>", "must be a station and an elevation"),
         (
             "<PVI>0 1</PVI><UnsymParaCurve lengthIn='0' lengthOut='9'>99 2</UnsymParaCurve><PVI>300 4</PVI>",
             "two lengths",
         ),
-        ("<PVI>0 nan</PVI>", "a finite number is needed"),
+        ("<PVI>0 nan</PVI>", "must be a finite number"),
     ],
 )
 def test_profiles_that_no_road_follows_are_refused(tmp_path: Path, profile: str, message: str) -> None:
@@ -208,8 +208,8 @@ def test_a_circle_that_its_ends_contradict_is_refused(tmp_path: Path) -> None:
 
 def test_points_by_reference_and_other_elements_are_named(tmp_path: Path) -> None:
     for inner, message in (
-        ("<Line><Start pntRef='P1'/><End>1 2</End></Line>", "a point of its own is needed"),
-        ("<Chain>1 2 3</Chain>", "one of Line, Curve, Spiral, IrregularLine is needed"),
+        ("<Line><Start pntRef='P1'/><End>1 2</End></Line>", "must contain coordinates; references"),
+        ("<Chain>1 2 3</Chain>", "must be one of Line, Curve, Spiral, IrregularLine"),
     ):
         landxml(tmp_path / "a.xml", [xml_alignment(inner)])
         with pytest.raises(InputError, match=message):

@@ -178,7 +178,7 @@ def test_a_broken_road_leaves_the_others_usable(tmp_path: Path) -> None:
     path = opendrive(tmp_path / "a.xodr", [broken, whole])
     lines = read_lines(path)
     assert choose_line(lines, None, path.name).name == "main"
-    with pytest.raises(InputError, match=r"a\.xodr: broken: arc curvature is 'x': a finite number is needed"):
+    with pytest.raises(InputError, match=r"a\.xodr: broken: arc curvature is 'x': must be a finite number"):
         choose_line(lines, "broken", path.name)
 
 
@@ -228,10 +228,10 @@ def test_what_is_left_out_is_counted(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("<OpenDRIVE><road>", "valid XML is needed"),
+        ("<OpenDRIVE><road>", "must be valid XML"),
         ('<!DOCTYPE a [<!ENTITY b "c">]><OpenDRIVE><header name="&b;"/></OpenDRIVE>', "document type is 'a'"),
         ("<OpenDRIVE><header/></OpenDRIVE>", "no road or alignment with elements"),
-        ("<svg/>", "one of OpenDRIVE, LandXML, IFC is needed"),
+        ("<svg/>", "must be one of OpenDRIVE, LandXML, IFC"),
     ],
 )
 def test_what_is_no_road_is_one_line(tmp_path: Path, text: str, message: str) -> None:

@@ -327,7 +327,7 @@ def test_what_lies_beyond_an_extracts_edge_is_told(tmp_path: Path) -> None:
         ('<osm><node id="1e5" lon="1" lat="0"/></osm>', "whole number"),
         ("<osm><way id='1'><nd ref='1'/><nd ref='2'/><tag k='highway' v='primary'/></way></osm>", "no line of two"),
         ("<osm>", "valid XML"),
-        ("<a><osm/></a>", "the element osm is needed"),
+        ("<a><osm/></a>", "must have osm as its root element"),
     ],
 )
 def test_what_is_no_map_is_one_line_of_error(tmp_path: Path, text: str, message: str) -> None:

@@ -85,9 +85,9 @@ def test_a_line_that_turns_back_for_good_is_told_of_and_refused_by_the_fit(tmp_p
 @pytest.mark.parametrize(
     ("step", "apart", "message"),
     [
-        (21000.0, 0.0, r"point 1 \(0\.00, 0\.00\): the next one is 21\.0 km away, at most 20 km"),
-        (1500.0, 1.0, r"the next one is 1\.5 km away, at most 1 km"),
-        (19_900.0, 0.0, r"length, m is 1014900: at most 1e\+06 m are needed"),
+        (21000.0, 0.0, r"point 1 \(0\.00, 0\.00\): the next one is 21\.0 km away, but must lie within 20 km"),
+        (1500.0, 1.0, r"the next one is 1\.5 km away, but must lie within 1 km"),
+        (19_900.0, 0.0, r"length, m is 1014900: must be at most 1e\+06 m"),
     ],
 )
 def test_points_too_far_apart_for_one_road_are_refused(step: float, apart: float, message: str) -> None:
@@ -138,5 +138,5 @@ def test_a_line_beside_a_path_runs_at_its_distance() -> None:
         assert np.abs(radius[6:-6] - (100.0 - offset)).max() < 1e-3
         assert np.abs(radius - (100.0 - offset)).max() < 0.01
         assert np.abs(found[:, 2] + 1.85).max() < 1e-12
-    with pytest.raises(InputError, match="bends too sharply for that at point"):
+    with pytest.raises(InputError, match="bends too sharply at point"):
         moved_aside("a", circle(20.0, 1.0, 60.0), 25.0, 0.0)

@@ -112,7 +112,7 @@ def test_parts_that_meet_are_one_line_and_others_are_refused(tmp_path: Path) -> 
     found = axis_from_file(path, RoadScenario(), 1)
     assert found[2]["name"] == "meet"
     assert found[0].length == pytest.approx(bend().starts[-1], abs=5.1)
-    with pytest.raises(InputError, match="apart: parts is 2: a line of one part is needed"):
+    with pytest.raises(InputError, match="apart: parts is 2: must be one line, or parts"):
         axis_from_file(path, RoadScenario(), 1, "apart")
     assert [bool(row["fault"]) for row in listed_lines(path)] == [False, True]
 
@@ -133,7 +133,7 @@ def test_a_shapefile_needs_its_parts(tmp_path: Path) -> None:
     path = vector_file(tmp_path / "a.shp", "ESRI Shapefile", {"axis": well_known_binary(line())})
     (tmp_path / "alone").mkdir()
     shutil.copy(path, tmp_path / "alone" / "a.shp")
-    with pytest.raises(InputError, match=r"a shapefile has this part beside it, which is missing"):
+    with pytest.raises(InputError, match=r"is missing: this part of the shapefile must be in the same folder"):
         axis_from_file(tmp_path / "alone" / "a.shp", RoadScenario(), 1)
     shutil.copy(path, tmp_path / "a.bin")
     with pytest.raises(InputError, match=r"must end in \.shp"):

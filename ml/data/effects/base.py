@@ -16,9 +16,9 @@ from ..samples import Sample
 class PointEffects(Part):
     """Base of both tasks' augmentation options."""
 
-    mirror: float = quantity(0.0, ge=0, le=1, unit="1", description="Probability of left and right being swapped.")
-    dropout: float = quantity(0.0, ge=0, lt=1, unit="1", description="Largest share of the points that is left out.")
-    color_drop: float = quantity(0.0, ge=0, le=1, unit="1", description="Probability of the colours being left out.")
+    mirror: float = quantity(0.0, ge=0, le=1, unit="1", description="Probability that left and right are swapped.")
+    dropout: float = quantity(0.0, ge=0, lt=1, unit="1", description="Largest share of the points that is removed.")
+    color_drop: float = quantity(0.0, ge=0, le=1, unit="1", description="Probability that the colours are removed.")
 
     def kept_points(self, count: int, random: np.random.Generator) -> Bool:
         """Return a random mask (count,) of the points to keep: a share drawn up to `dropout` is False."""

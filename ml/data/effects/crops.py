@@ -17,15 +17,23 @@ Generator = np.random.Generator
 class CropEffects(PointEffects):
     """Options of the random augmentation of segmentation crops; the defaults are the recipe's."""
 
-    rotation: bool = Field(True, description="Turn about the vertical by any angle.")
+    rotation: bool = Field(True, description="Turn the crop about the vertical by a random angle.")
     smallest_scale: float = quantity(0.9, gt=0, le=1, unit="1", description="Smallest factor on the coordinates.")
     largest_scale: float = quantity(1.1, ge=1, le=10, unit="1", description="Largest factor on the coordinates.")
-    jitter: float = quantity(0.005, ge=0, le=1, unit="m", description="Noise of each coordinate, one sigma.")
+    jitter: float = quantity(
+        0.005, ge=0, le=1, unit="m", description="Standard deviation of the noise of each coordinate."
+    )
     jitter_limit: float = quantity(0.02, ge=0, le=5, unit="m", description="Largest noise of a coordinate.")
     color_drop: float = point_effect_field("color_drop", 0.2)
-    intensity_drop: float = quantity(0.0, ge=0, le=1, unit="1", description="Share that loses its intensities.")
+    intensity_drop: float = quantity(
+        0.0, ge=0, le=1, unit="1", description="Share of crops whose intensities are removed."
+    )
     intensity_gain: float = quantity(
-        0.0, ge=0, le=3, unit="1", description="Another intensity model: sigma of the logarithm of gain and exponent."
+        0.0,
+        ge=0,
+        le=3,
+        unit="1",
+        description="Standard deviation of the logarithms of a random gain and exponent of the intensities.",
     )
 
     @field_validator("mirror", mode="before")

@@ -30,11 +30,15 @@ class SequenceCrop(Part):
     isn't cut is seen as far as slices reach, as in scans of whole landscapes.
     """
 
-    probability: float = quantity(0.7, ge=0, le=1, unit="1", description="Of a sequence.")
+    probability: float = quantity(
+        0.7, ge=0, le=1, unit="1", description="Probability that a sequence is cut at the sides."
+    )
     reach: tuple[float, float] = Field((4.0, 30.0), description="Smallest and largest R of a road's strip, m.")
     beyond: tuple[float, float] = Field((0.0, 4.0), description="R of a carriageway's strip beyond its edge line, m.")
     share: float = quantity(0.75, ge=0, le=0.95, unit="1", description="Largest part of R that is cut off.")
-    steady: float = quantity(0.25, ge=0, le=1, unit="1", description="Probability of cuts that all slices share.")
+    steady: float = quantity(
+        0.25, ge=0, le=1, unit="1", description="Probability that all slices of a sequence have the same cut."
+    )
 
     @model_validator(mode="after")
     def _check_sides(self) -> Self:
@@ -56,26 +60,38 @@ class SequenceEffects(PointEffects):
     mirror: float = point_effect_field("mirror", 0.5)
     dropout: float = point_effect_field("dropout", 0.3)
     color_drop: float = point_effect_field("color_drop", 0.3)
-    turn_round: float = quantity(0.5, ge=0, le=1, unit="1", description="Probability of running against the path.")
-    crop: SequenceCrop = Field(default=SequenceCrop(), description="Sides cut off.")
+    turn_round: float = quantity(
+        0.5, ge=0, le=1, unit="1", description="Probability that a sequence runs against the path."
+    )
+    crop: SequenceCrop = Field(default=SequenceCrop(), description="Cuts at the sides.")
     alone: float = quantity(
         0.5,
         ge=0,
         le=1,
         unit="1",
-        description="Probability that a carriageway without shoulders has no other beside it: ground on both sides.",
+        description="Probability that a carriageway without shoulders has ground on both sides, and no second one.",
     )
-    hidden: float = quantity(0.2, ge=0, le=1, unit="1", description="Probability of a hole as behind a vehicle.")
+    hidden: float = quantity(
+        0.2, ge=0, le=1, unit="1", description="Probability of a hole like the one behind a vehicle."
+    )
     empty: float = quantity(0.02, ge=0, le=1, unit="1", description="Probability of a slice without any point.")
-    jitter: float = quantity(0.02, ge=0, le=1, unit="m", description="Standard deviation of the points' noise.")
-    footprint: float = quantity(1.2, ge=0, le=5, unit="m", description="Width across which intensities are means.")
+    jitter: float = quantity(0.02, ge=0, le=1, unit="m", description="Standard deviation of the noise of the points.")
+    footprint: float = quantity(1.2, ge=0, le=5, unit="m", description="Width over which intensities are averaged.")
     tilt: float = quantity(0.01, ge=0, le=0.2, unit="1", description="Cross slope and grade that are added.")
-    plain: float = quantity(0.25, ge=0, le=1, unit="1", description="Probability of intensities as they are.")
-    contrast: float = quantity(1.5, ge=0, le=3, unit="1", description="Log of the factor on what isn't pavement.")
-    verge: float = quantity(
-        2.5, ge=0, le=20, unit="m", description="Width of verges like asphalt beside a carriageway without shoulders."
+    plain: float = quantity(0.25, ge=0, le=1, unit="1", description="Probability that intensities stay unchanged.")
+    contrast: float = quantity(
+        1.5, ge=0, le=3, unit="1", description="Largest logarithm of the factor on everything but pavement."
     )
-    paint: float = quantity(0.95, ge=0, le=1, unit="1", description="Share of the markings' brightness worn off.")
+    verge: float = quantity(
+        2.5,
+        ge=0,
+        le=20,
+        unit="m",
+        description="Width of verges that look like asphalt beside a carriageway without shoulders.",
+    )
+    paint: float = quantity(
+        0.95, ge=0, le=1, unit="1", description="Share of the markings' brightness that is worn off."
+    )
     repaint: float = quantity(
         0.3,
         ge=0,
@@ -88,10 +104,30 @@ class SequenceEffects(PointEffects):
     falloff: float = quantity(
         4.0, ge=0, le=10, unit="1", description="Power of the range fall-off from scanners somewhere above the road."
     )
-    stripes: float = quantity(0.15, ge=0, le=2, unit="1", description="As speckle, of wheel tracks, joints and lanes.")
-    speckle: float = quantity(0.3, ge=0, le=2, unit="1", description="Noise of intensities by their own p90 - p10.")
-    patches: float = quantity(0.2, ge=0, le=2, unit="1", description="The same of patches some metres long and wide.")
-    tint: float = quantity(0.2, ge=0, le=1, unit="1", description="Log of the factor on each colour channel.")
+    stripes: float = quantity(
+        0.15,
+        ge=0,
+        le=2,
+        unit="1",
+        description="Pattern of wheel tracks, joints and lanes in the intensities, in the units of speckle.",
+    )
+    speckle: float = quantity(
+        0.3,
+        ge=0,
+        le=2,
+        unit="1",
+        description="Noise of intensities, in units of the difference between their 90th and 10th percentiles.",
+    )
+    patches: float = quantity(
+        0.2, ge=0, le=2, unit="1", description="The same noise for patches some metres long and wide."
+    )
+    tint: float = quantity(
+        0.2,
+        ge=0,
+        le=1,
+        unit="1",
+        description="Largest logarithm of the common factor on the colours, and of the factor on each channel.",
+    )
 
     @model_validator(mode="after")
     def _check_gamma(self) -> Self:

@@ -23,16 +23,18 @@ class LossOptions(Part):
         ge=0,
         le=1,
         unit="1",
-        description="Power of the variance that weighs the likelihood (Seitzer et al. 2022): 0 is the plain one, "
-        "which learns nothing more where it has given up; 1 has the gradients of squared errors.",
+        description="Power of the variance by which the likelihood is weighted (Seitzer et al. 2022): 0 is the plain "
+        "likelihood, which stops learning where the variance is large; 1 has the gradients of squared errors.",
     )
     corridor: float = quantity(
-        0.2, ge=0, le=100, unit="1", description="Weight of each corridor target; the centre: 1."
+        0.2, ge=0, le=100, unit="1", description="Weight of each corridor target, relative to the centre."
     )
-    rough: float = quantity(0.3, ge=0, le=100, unit="1", description="Weight of the first look's centre.")
+    rough: float = quantity(0.3, ge=0, le=100, unit="1", description="Weight of the centre by the first stage.")
     places: float = quantity(0.1, ge=0, le=100, unit="1", description="Weight of the soft-argmax's cross-entropy.")
-    fine: float = quantity(0.2, ge=0, le=100, unit="1", description="Weight of that of the second look.")
-    edges: float = quantity(0.3, ge=0, le=100, unit="1", description="Share of it that an edge counts for.")
+    fine: float = quantity(0.2, ge=0, le=100, unit="1", description="Weight of the cross-entropy of the second stage.")
+    edges: float = quantity(
+        0.3, ge=0, le=100, unit="1", description="Weight of an edge in this cross-entropy, relative to the centre."
+    )
 
 
 _ROUGH = 0.5

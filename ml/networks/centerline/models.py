@@ -53,19 +53,23 @@ class ModelOptions(Part):
 
     name: str
     features: tuple[Literal["intensity", "contrast", "red", "green", "blue", "has_color"], ...] = Field(
-        ("intensity", "contrast"), description="Attributes of a point beside its place."
+        ("intensity", "contrast"), description="Number of attributes of a point, without its position."
     )
-    kernel_points: int = quantity(25, ge=3, le=1000, unit="1", description="Kernel points across a slice.")
-    cells: int = quantity(4, ge=1, le=100, unit="1", description="Cells per spacing of the fixed kernel points.")
-    point_width: int = quantity(16, ge=1, le=1024, unit="1", description="Features of a point.")
-    width: int = quantity(48, ge=2, le=1024, unit="1", description="Features of a token.")
-    context: int = quantity(96, ge=2, le=4096, unit="1", description="Features of a slice.")
-    fine_cells: int = quantity(64, ge=2, le=1000, unit="1", description="Cells of the second look.")
-    fine_reach: float = quantity(6.4, gt=0, le=45, unit="m", description="How far it reaches to either side.")
-    fine_width: int = quantity(24, ge=1, le=1024, unit="1", description="Features of its cells.")
-    layers: int = quantity(3, ge=0, le=50, unit="1", description="Layers over the tokens.")
-    heads: int = quantity(4, ge=1, le=64, unit="1", description="Heads of each attention.")
-    dropout: float = quantity(0.0, ge=0, lt=1, unit="1", description="Share left out in the attention's layers.")
+    kernel_points: int = quantity(25, ge=3, le=1000, unit="1", description="Number of kernel points across a slice.")
+    cells: int = quantity(
+        4, ge=1, le=100, unit="1", description="Number of cells per spacing of the fixed kernel points."
+    )
+    point_width: int = quantity(16, ge=1, le=1024, unit="1", description="Number of features of a point.")
+    width: int = quantity(48, ge=2, le=1024, unit="1", description="Number of features of a token.")
+    context: int = quantity(96, ge=2, le=4096, unit="1", description="Number of features of a slice.")
+    fine_cells: int = quantity(64, ge=2, le=1000, unit="1", description="Number of cells of the second stage.")
+    fine_reach: float = quantity(6.4, gt=0, le=45, unit="m", description="Half-width of the second stage.")
+    fine_width: int = quantity(
+        24, ge=1, le=1024, unit="1", description="Number of features of a cell of the second stage."
+    )
+    layers: int = quantity(3, ge=0, le=50, unit="1", description="Number of layers over the tokens.")
+    heads: int = quantity(4, ge=1, le=64, unit="1", description="Number of heads of each attention layer.")
+    dropout: float = quantity(0.0, ge=0, lt=1, unit="1", description="Dropout of the attention layers.")
 
     def build(self, half_width: float, slices: int) -> CenterlineModel:
         """Return the centreline model with random weights from PyTorch's global generator.

@@ -14,7 +14,7 @@ from .models import Encoding, ModelOptions, SequenceModel
 class SequenceOptions(ModelOptions):
     """Options of the network `sequence`, with an LSTM along the slices of a sequence."""
 
-    name: Literal["sequence"] = Field("sequence", description="Network.")
+    name: Literal["sequence"] = Field("sequence", description="Name of the network.")
 
     def build(self, half_width: float, slices: int) -> SequenceModel:
         """Return the network for slices of +-`half_width`, m, with random weights of PyTorch's global generator."""

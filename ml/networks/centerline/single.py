@@ -15,7 +15,7 @@ from .models import CenterlineModel, Encoding, ModelOptions, Output
 class SingleOptions(ModelOptions):
     """Options of the network `single`, which sees each slice by itself."""
 
-    name: Literal["single"] = Field("single", description="Network.")
+    name: Literal["single"] = Field("single", description="Name of the network.")
 
     def build(self, half_width: float, slices: int) -> CenterlineModel:
         """Return the network for slices of +-`half_width`, m, with random weights; `slices` doesn't matter."""

@@ -18,7 +18,7 @@ from .models import Encoding, ModelOptions, SequenceModel
 class TransformerOptions(ModelOptions):
     """Options of the network `transformer`, with attention along the slices of a sequence."""
 
-    name: Literal["transformer"] = Field("transformer", description="Network.")
+    name: Literal["transformer"] = Field("transformer", description="Name of the network.")
 
     def build(self, half_width: float, slices: int) -> SequenceModel:
         """Return the network for slices of +-`half_width`, m, with random weights of PyTorch's global generator."""

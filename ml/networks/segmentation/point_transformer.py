@@ -44,25 +44,39 @@ some hundred cells long."""
 class PointTransformerOptions(SegmentationNetwork):
     """Options of the network `point-transformer`: its stages, what cells look at, and what is dropped in training."""
 
-    name: Literal["point-transformer"] = Field("point-transformer", description="Network.")
-    cell: float = quantity(0.2, gt=0, le=100, unit="m", description="Edge of the first stage's cells; it doubles.")
+    name: Literal["point-transformer"] = Field("point-transformer", description="Name of the network.")
+    cell: float = quantity(
+        0.2, gt=0, le=100, unit="m", description="Edge of the cells of the first stage; it doubles with each stage."
+    )
     channels: tuple[int, ...] = Field((24, 48, 96, 144), min_length=1, max_length=8, description="Of each stage.")
     blocks: tuple[int, ...] = Field((2, 2, 3, 1), min_length=1, max_length=8, description="Of each stage.")
     attention_from: int = quantity(
-        2, ge=0, le=8, unit="1", description="First stage, from 0, whose blocks are attention; before it, convolutions."
+        2,
+        ge=0,
+        le=8,
+        unit="1",
+        description="First stage, counted from 0, with blocks of attention; earlier stages have convolutions.",
     )
-    decoder_blocks: int = quantity(0, ge=0, le=8, unit="1", description="Blocks of each stage on the way back.")
-    kernel: Literal["cube", "cross"] = Field("cube", description="All 26 cells around one, or the 6 that share a face.")
+    decoder_blocks: int = quantity(0, ge=0, le=8, unit="1", description="Number of blocks of each decoder stage.")
+    kernel: Literal["cube", "cross"] = Field(
+        "cube", description="Neighbours of a cell: all 26 around it, or the 6 that share a face."
+    )
     curves: tuple[Curve, ...] = Field(
         CURVES, min_length=1, description="Curves that blocks of attention follow in turn."
     )
-    shuffle: bool = Field(True, description="In training, draw anew in each step which block follows which curve.")
-    patch: int = quantity(256, ge=8, le=4096, unit="1", description="Cells that attend to each other.")
-    head_width: int = quantity(24, ge=6, le=384, unit="1", description="Channels of a head of attention.")
+    shuffle: bool = Field(True, description="In the training, draw the curve of each block again in each step.")
+    patch: int = quantity(256, ge=8, le=4096, unit="1", description="Number of cells that attend to each other.")
+    head_width: int = quantity(24, ge=6, le=384, unit="1", description="Number of channels of an attention head.")
     expansion: int = quantity(
-        4, ge=1, le=16, unit="1", description="Width of a block's layers, in channels of its stage."
+        4,
+        ge=1,
+        le=16,
+        unit="1",
+        description="Width of the layers of a block, as a multiple of the channels of its stage.",
     )
-    drop_path: float = quantity(0.1, ge=0, lt=1, unit="1", description="Share of clouds that skip the last block.")
+    drop_path: float = quantity(
+        0.1, ge=0, lt=1, unit="1", description="Share of clouds that skip the last block in the training."
+    )
     dropout: float = quantity(0.5, ge=0, lt=1, unit="1", description="Dropout of the head.")
 
     @field_validator("curves")

@@ -42,13 +42,19 @@ _EXPANSION = 4
 class PointNeXtOptions(SegmentationNetwork):
     """Options of the network `pointnext`: its size, neighbourhoods and dropout."""
 
-    name: Literal["pointnext"] = Field("pointnext", description="Network.")
-    preset: Literal["S", "B", "L", "XL"] = Field("B", description="Size.")
-    width: int | None = quantity(None, ge=4, le=512, unit="1", description="Channels of the first stage; the size's.")
+    name: Literal["pointnext"] = Field("pointnext", description="Name of the network.")
+    preset: Literal["S", "B", "L", "XL"] = Field("B", description="Size of the network.")
+    width: int | None = quantity(
+        None,
+        ge=4,
+        le=512,
+        unit="1",
+        description="Number of channels of the first stage; if not given, that of the size.",
+    )
     radius: float = quantity(0.3, gt=0, le=100, unit="m", description="Radius of the first neighbourhoods.")
-    neighbours: int = quantity(32, ge=2, le=128, unit="1", description="Neighbours that are looked at.")
+    neighbours: int = quantity(32, ge=2, le=128, unit="1", description="Number of neighbours of a point.")
     dropout: float = quantity(0.5, ge=0, lt=1, unit="1", description="Dropout of the head.")
-    sampling: Sampling = Field("grid", description="How each stage's points are chosen.")
+    sampling: Sampling = Field("grid", description="Method that chooses the points of each stage.")
 
     @property
     def blocks(self) -> tuple[int, ...]:

@@ -1,6 +1,5 @@
 """Values of texts that somebody typed for a field, by the type that the field is declared with."""
 
-import difflib
 import json
 from collections.abc import Iterator, Sequence
 from types import NoneType, UnionType
@@ -8,7 +7,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from ..errors import SynthRoadsError
+from ..errors import MOST_NAMES, SynthRoadsError, similar_names
 
 
 def typed_value(model: type[BaseModel], path: str, text: str) -> Any:
@@ -56,14 +55,15 @@ def declared_kinds(kind: Any, path: Sequence[str]) -> list[Any]:
     return kinds
 
 
-def nearest_path(model: type[BaseModel], name: str) -> str:
-    """Return `` (did you mean 'road.length'?)`` for the field of a class, or within its groups, most like a name.
+def similar_paths(model: type[BaseModel], name: str) -> list[str]:
+    """Return the paths, such as ``road.length``, of the fields of a class, or within its groups, most like a name.
 
-    Of several fields of that name the outermost is meant; an empty string if none is like it.
+    Of several fields of the same name only the outermost are returned; the list is empty if no field is like it.
     """
-    paths: dict[str, str] = {}
+    paths: dict[str, list[str]] = {}
     level: list[tuple[str, Any]] = [("", model)]
     while level:
+        outer_names = set(paths)
         next_level: list[tuple[str, Any]] = []
         for prefix, kind in level:
             for alternative in alternatives(kind):
@@ -71,12 +71,12 @@ def nearest_path(model: type[BaseModel], name: str) -> str:
                     continue
                 for key, field in alternative.model_fields.items():
                     field_name = field.alias or key
-                    if field_name not in paths:
-                        paths[field_name] = f"{prefix}{field_name}"
-                        next_level.append((f"{prefix}{field_name}.", field.annotation))
+                    path = f"{prefix}{field_name}"
+                    if field_name not in outer_names and path not in paths.get(field_name, ()):
+                        paths.setdefault(field_name, []).append(path)
+                        next_level.append((f"{path}.", field.annotation))
         level = next_level
-    close_names = difflib.get_close_matches(name, paths, n=1, cutoff=0.6)
-    return f" (did you mean '{paths[close_names[0]]}'?)" if close_names else ""
+    return [path for field_name in similar_names(name, paths) for path in paths[field_name]][:MOST_NAMES]
 
 
 def alternatives(kind: Any) -> Iterator[Any]:

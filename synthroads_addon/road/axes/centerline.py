@@ -96,7 +96,7 @@ class AxisContent:
             MissingFileError, InputError: it is none, or has fewer than two distinct points.
         """
         name, kind = os.fspath(path), "this is no text: CSV with columns x, y, z or GeoJSON is needed"
-        text = read_text(name, kind, "an axis file is needed here", encoding="utf-8-sig")
+        text = read_text(name, kind, "must be a readable axis file", encoding="utf-8-sig")
         is_geojson = text.lstrip().startswith(("{", "["))
         rows, system = _read_json(name, text) if is_geojson else (_read_csv(name, text), csv_system(name, text))
         points = np.array(rows, dtype=np.float64).reshape(-1, 3)

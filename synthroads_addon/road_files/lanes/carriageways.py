@@ -186,7 +186,7 @@ def _carriageway(
     if np.abs(percent).max() > _STEEPEST:
         worst = int(np.abs(percent).argmax())
         off = (abs(percent[worst]) - _STEEPEST) / 100.0 * float(np.abs(line.values).max())
-        text = f"it is {abs(percent[worst]):.1f} %, at most {_STEEPEST:g} % is possible"
+        text = f"it is {abs(percent[worst]):.1f} %, but must be at most {_STEEPEST:g} %"
         loss.approximate("crossfall", text, off, float(rise.stations[worst]))
         loss.surface = True
     falls = corners(stations(rise.stations), np.clip(percent, -_STEEPEST, _STEEPEST), _STRAIGHT_PERCENT)

@@ -201,7 +201,9 @@ def read_road(road: Element, name: str, length: float, up: float = 0.0) -> FileR
     lanes = child(road, "lanes")
     sections = [] if lanes is None else children(lanes, "laneSection")
     if not sections or lanes is None:
-        raise InputError(f"road {name!r}: lanes", None, "has no lane section: --only-axis takes its line alone")
+        raise InputError(
+            f"road {name!r}: lanes", None, "has no lane section; --only-axis reads only the line of the road"
+        )
     profile, lateral = child(road, "elevationProfile"), child(road, "lateralProfile")
     rows = {} if lateral is None else {tag: children(lateral, tag) for tag in ("superelevation", "crossfall", "shape")}
     elevation = Cubics.read([] if profile is None else children(profile, "elevation"))

@@ -86,7 +86,7 @@ def whole_road(
     road = read_road(elements[line.name], line.name, line.length, up)
     if road.left_hand:
         raise InputError(
-            f"{path.name}: road {line.name!r}: rule", "LHT", "must be RHT: --only-axis takes its line alone"
+            f"{path.name}: road {line.name!r}: rule", "LHT", "must be RHT; --only-axis reads only the line of the road"
         )
     roads = [road, *_partner(lines, line, elements, road, up)]
     if len(roads) > 1:

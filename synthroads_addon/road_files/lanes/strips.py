@@ -108,7 +108,7 @@ def side_layouts(surface: FileSurface, with_median: bool = False) -> dict[int, S
     sides = driven_sides(sections)
     if not sides:
         place = f"road {surface.road.name!r}: lanes"
-        raise InputError(place, None, "has no lane that traffic drives on: --only-axis takes its line alone")
+        raise InputError(place, None, "has no lane for traffic; --only-axis reads only the line of the road")
     layouts = {sign: SideLayout(sign) for sign in sides}
     for number, section in enumerate(sections):
         for sign, layout in layouts.items():
@@ -121,7 +121,9 @@ def side_layouts(surface: FileSurface, with_median: bool = False) -> dict[int, S
             side = "left" if layout.sign > 0 else "right"
             place = f"road {surface.road.name!r}: lanes on the {side}"
             raise InputError(
-                place, len(layout.slots), f"at most {_MOST_LANES} are possible: --only-axis takes its line"
+                place,
+                len(layout.slots),
+                f"must be at most {_MOST_LANES} lanes; --only-axis reads only the line of the road",
             )
     return layouts
 

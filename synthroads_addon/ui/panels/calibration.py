@@ -110,7 +110,7 @@ class SYNTHROADS_OT_save_materials(bpy.types.Operator):
         """Write the fitted materials to the table's file; other materials in it stay."""
         result, path = fitted_result(), path_of(context.scene.synthroads_calibration.table)
         if path is None:
-            raise InputError("Table", None, "choose the table's file")
+            raise InputError("Table", None, "choose the file of the material table")
         save_fitted(cast(Calibration, result), path, overwrite=True)
         self.report({"INFO"}, f"Saved to {path}")
 

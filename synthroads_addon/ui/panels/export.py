@@ -224,7 +224,7 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         assert parameters  # poll() has seen the road
         formats = [name for name in TWIN_FORMATS if name in self.formats]
         if not formats:
-            raise InputError("Formats", None, "choose at least one")
+            raise InputError("Formats", None, "choose at least one format")
         if not self.directory.strip():
             raise InputError("Folder", None, "choose a folder for the files")
         check_formats(formats)

@@ -119,7 +119,7 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
     }
     axis_name: bpy.props.StringProperty(
         name="Name",
-        description="Road, alignment or line of the file; the longest that is a road by itself if it is empty",
+        description="Road, alignment or line of the file; if empty, the longest one that is a road by itself",
         options={"SKIP_SAVE"},
     )
     points_are: bpy.props.EnumProperty(
@@ -129,12 +129,12 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
             ("BESIDE", "Beside the Axis", "The axis lies at an offset from the file's points"),
             ("LANE", "In a Lane", "The file's points lie in the middle of a lane"),
         ],
-        description="Where a line of points or a vehicle's path runs; designed roads say themselves where they lie",
+        description="Where on the road a line of points or a vehicle's path runs; designed roads have their own axis",
         options={"SKIP_SAVE"},
     )
     offset: bpy.props.FloatProperty(
         name="Offset",
-        description="From the points to the axis, positive to the left in their direction",
+        description="Distance from the points to the axis, positive to the left in the direction of the points",
         min=-FARTHEST_ASIDE,
         max=FARTHEST_ASIDE,
         unit="LENGTH",
@@ -142,14 +142,14 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
     )
     lane: bpy.props.IntProperty(
         name="Lane",
-        description="Counted from outside, 0 the outermost; traffic keeps right",
+        description="Number of the lane, counted from outside, 0 for the outermost; traffic keeps right",
         min=0,
         max=7,
         options={"SKIP_SAVE"},
     )
     height: bpy.props.FloatProperty(
         name="Height",
-        description="Of the points above the road. 0 leaves their heights as they are",
+        description="Height of the points above the road; 0 keeps the heights of the points",
         min=-FARTHEST_ABOVE,
         max=FARTHEST_ABOVE,
         unit="LENGTH",

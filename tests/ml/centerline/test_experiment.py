@@ -126,16 +126,19 @@ def test_by_default_each_road_is_left_out_by_itself(words: list[str], data: Path
     )
     assert list(roads) == list(ROADS), "street.laz has no axis"
     assert experiment._turns((), roads) == [["east"], ["north"], ["west"]]
-    for wrong, told in (([["south"]], "must be of the real roads: east, north, west"), ([["east", "east"]], "twice")):
+    for wrong, told in (
+        ([["south"]], "must be one of the real roads: east, north, west"),
+        ([["east", "east"]], "twice"),
+    ):
         with pytest.raises(InputError, match=told):
             experiment._turns(wrong, roads)
 
 
 def test_what_cannot_be_compared_is_told(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main([*words, "--leave-out", ",".join(ROADS)]) == 2
-    assert "leaves no real road to learn from" in capsys.readouterr().err
+    assert "must leave at least one real road for the training" in capsys.readouterr().err
     assert cli.main([*words, "--leave-out", "south"]) == 2
-    assert "left_out is 'south': must be of the real roads: east, north, west" in capsys.readouterr().err
+    assert "left_out is 'south': must be one of the real roads: east, north, west" in capsys.readouterr().err
     folders = ["--data", "real=a", "--data", "synthetic=b", "--output", "out", "--leave-out", "a"]
     assert cli.main(["experiment", "gantries", *folders]) == 2
     assert "--leave-out is 'a': is for experiments with centrelines" in capsys.readouterr().err
@@ -160,16 +163,18 @@ def test_the_end_of_each_real_road_is_kept_to_validate_with(data: Path) -> None:
 def test_folders_of_real_roads_that_do_not_fit_are_refused(data: Path, tmp_path: Path) -> None:
     real, cases = str(data / "real"), []
     cases += [
-        ({"roads": ("south",)}, "roads is 'south': must be of the roads of"),
-        ({"left_out": ROADS}, "leaves no road"),
+        ({"roads": ("south",)}, "roads is 'south': must be one of the roads of"),
+        ({"left_out": ROADS}, "must leave at least one road"),
     ]
-    cases += [({"axis": "a.csv"}, "is a folder, whose clouds have their axes beside them")]
+    cases += [({"axis": "a.csv"}, "is a folder: each of its clouds has its axis in the same folder")]
     for fields, told in cases:
         with pytest.raises(InputError, match=told):
             MeasuredRoad(cloud=real, **fields).files()
-    with pytest.raises(MissingFileError, match="holds no cloud with its axis beside it"):
+    with pytest.raises(MissingFileError, match="must hold a cloud and its axis"):
         MeasuredRoad(cloud=str(tmp_path)).files()
-    with pytest.raises(MissingFileError, match=r"has no axis beside it, street_axis\.csv or street\.geojson"):
+    with pytest.raises(
+        MissingFileError, match=r"needs its axis in the same folder, street_axis\.csv or street\.geojson"
+    ):
         MeasuredRoad(cloud=f"{real}/street.laz").files()
 
 

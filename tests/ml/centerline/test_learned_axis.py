@@ -80,5 +80,5 @@ def test_only_a_finished_run_of_a_centreline_model_will_do(tmp_path: FilePath, m
     with pytest.raises(MissingFileError):
         learned_axis.learned_axis(tmp_path / "none", tmp_path / "cloud.laz")
     _run_of("segmentation", monkeypatch)
-    with pytest.raises(InputError, match="a centreline model is needed"):
+    with pytest.raises(InputError, match="name a centreline model"):
         learned_axis.learned_axis(tmp_path, tmp_path / "cloud.laz")

@@ -196,7 +196,7 @@ def test_road_is_found_without_a_path(tmp_path: Path):
 def test_clouds_without_ground_are_refused(tmp_path: Path):
     points = analytic_roads.points()
     leaves = replace(points, class_id=np.full(len(points), 3, dtype=np.uint8))
-    with pytest.raises(InputError, match="no point of the classes ground"):
+    with pytest.raises(InputError, match="at least one of the classes ground"):
         find_road(predictor(), write_cloud(tmp_path / "leaves.laz", leaves))
     with pytest.raises(MissingFileError):
         find_road(predictor(), tmp_path / "none.laz")

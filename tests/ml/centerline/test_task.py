@@ -183,7 +183,7 @@ def test_beginning_with_another_run(trained: Trained, data: Path, tmp_path: Path
     on = configuration(data, begin_with=str(first.folder), seed=9)
     begun = task._first_model(on).state_dict()
     assert same(begun, weights(first))
-    with pytest.raises(InputError, match="another model"):
+    with pytest.raises(InputError, match="must hold a model with the same settings"):
         task._first_model(configuration(data, "single", begin_with=str(first.folder)))
     with pytest.raises(MissingFileError):
         task._first_model(configuration(data, begin_with=str(tmp_path / "none")))
@@ -275,7 +275,7 @@ def test_measured_roads_by_stations(data: Path, tmp_path: Path):
     lengths = [road.truth.axis.length for road in (*roads.measured, *roads.measured_validation) if road.truth]
     assert lengths == pytest.approx([100.0, 50.0], abs=1.1)
     beyond = options.model_copy(update={"measured": (MeasuredRoad(cloud=cloud, axis=axis, first=500.0),)})
-    with pytest.raises(InputError, match="leaves nothing of an axis"):
+    with pytest.raises(InputError, match="first and last must select a part of the axis"):
         read_roads(beyond, "road")
 
 

@@ -205,7 +205,7 @@ def test_a_path_is_found_in_a_strip_of_points(radius: float, length: float) -> N
 
 
 def test_no_path_in_a_point() -> None:
-    with pytest.raises(InputError, match="its road to be found"):
+    with pytest.raises(InputError, match="its road can be found"):
         estimated_path(np.zeros((10, 3)))
 
 

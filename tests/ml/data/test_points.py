@@ -80,7 +80,7 @@ def test_ground_of_a_foreign_cloud(tmp_path: Path) -> None:
     unsorted = read_ground(foreign_cloud(tmp_path / "unsorted.las", [0, 1, 1]))
     assert len(unsorted) == 3
     assert unsorted.intensity.tolist() == [1.0, 1.0, 1.0]
-    with pytest.raises(InputError, match="none of ground"):
+    with pytest.raises(InputError, match="at least one of the classes ground"):
         read_ground(foreign_cloud(tmp_path / "trees.las", [1, 5, 5]))
 
 

@@ -326,7 +326,7 @@ def test_every_frame_of_a_path_is_in_a_sequence() -> None:
 def test_roads_that_are_too_short_are_refused() -> None:
     with pytest.raises(InputError, match="known road over 399 m"):
         dataset(slices=400)
-    with pytest.raises(InputError, match="none has a known road"):
+    with pytest.raises(InputError, match="at least one road must have a known road"):
         SliceDataset([replace(roads()[0], truth=None)], SliceSettings(), 1, 1)
 
 

@@ -158,5 +158,5 @@ def test_neighbours_are_found_across_what_was_laid_over() -> None:
 def test_mixing_comes_before_neighbours() -> None:
     coord, offset = torch.rand(8, 3), torch.tensor([4, 8])
     batch = {"coord": coord, "offset": offset}
-    with pytest.raises(InputError, match="before neighbours"):
+    with pytest.raises(InputError, match="before its neighbours"):
         overlay_clouds(batch | build_neighbours(coord, offset, OPTIONS.neighbourhood))

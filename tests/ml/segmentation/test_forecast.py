@@ -54,7 +54,7 @@ def test_crops_of_an_epoch_are_counted_as_stated_and_a_stream_is_refused(
     assert forecast.forecast(toy(folder, crops_per_epoch=21), 2)["steps_per_epoch"] == 6
     data = toy(folder).data.to_dict() | {"stream": {"recipe": "small-roads"}}
     streamed = SegmentationConfiguration.from_dict(toy(folder, crops_per_epoch=21).to_dict() | {"data": data})
-    with pytest.raises(InputError, match="forecast with data that are there"):
+    with pytest.raises(InputError, match="name existing data"):
         forecast.forecast(streamed, 2)
 
 

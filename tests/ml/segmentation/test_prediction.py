@@ -264,7 +264,7 @@ def test_withheld_points_and_noise_are_seen_by_no_network_and_stay_as_they_are(
     assert f"{(~seen).sum():,} of them withheld or noise" in labelled(told)
     las.withheld[:] = 1
     las.write(tmp_path / "all.las")
-    with pytest.raises(InputError, match="no points to be labelled: all are withheld or noise"):
+    with pytest.raises(InputError, match="no points that can be labelled: all are withheld or noise"):
         predict_file(tmp_path / "all.las", tmp_path / "none.las", labelling)
     assert not (tmp_path / "none.las").exists()
 

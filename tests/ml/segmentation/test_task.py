@@ -349,7 +349,7 @@ def test_a_checkpoint_of_another_network_is_refused(data: Path, tmp_path: Path) 
     run = Run.start(tmp_path / "run", toy(data))
     other = build(toy(data, features=["x", "y", "z"]))
     run.save({"model": other.state_dict(), "epoch": 1})
-    with pytest.raises(InputError, match="another network"):
+    with pytest.raises(InputError, match="must belong to the network"):
         task.trained_model(run)
 
 
@@ -529,7 +529,9 @@ def test_norms_are_adapted_by_points_and_not_by_tiles(data: Path) -> None:
 
 def test_files_have_no_splits(tmp_path: Path) -> None:
     cloud = write_cloud(tmp_path / "cloud.laz", road_block(100, 1))
-    with pytest.raises(InputError, match=r"split is 'train': cloud.laz is a file, which has no splits"):
+    with pytest.raises(
+        InputError, match=r"split is 'train': must be left out, as cloud.laz is a file and has no splits"
+    ):
         list(read_tiles(Source(path=str(cloud), split="train"), class_scheme("5"), 0.1))
 
 

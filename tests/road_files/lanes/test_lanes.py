@@ -140,7 +140,7 @@ def test_widths_that_jump_do_so_over_five_centimetres(tmp_path: Path) -> None:
     ("rest", "rule", "text"),
     [
         (section(0.0, "", lane(-1, width(0.0, 3.5))), "LHT", r"rule is 'LHT': must be RHT"),
-        (section(0.0, "", lane(-1, width(0.0, 3.5), "sidewalk")), "RHT", "no lane that traffic drives on"),
+        (section(0.0, "", lane(-1, width(0.0, 3.5), "sidewalk")), "RHT", "no lane for traffic"),
         (
             section(0.0, "", "".join(lane(-n, width(0.0, 3.0)) for n in range(1, 10))),
             "RHT",
@@ -233,7 +233,7 @@ def test_a_file_without_roads_is_refused(tmp_path: Path) -> None:
 def test_coordinates_beyond_all_maps_are_refused(tmp_path: Path) -> None:
     rest = lanes(section(0.0, "", lane(-1, width(0.0, 3.5))))
     road = xodr_road([(0.0, 200.0, (3e8, 0.0, 0.3), "<line/>")], rest)
-    with pytest.raises(InputError, match=r"coordinates, m is \[.*\]: at most 1e\+08 are possible"):
+    with pytest.raises(InputError, match=r"coordinates, m is \[.*\]: must be at most 1e\+08"):
         taken(opendrive(tmp_path / "a.xodr", [road]))
 
 

@@ -220,7 +220,7 @@ BAD = {
     "not text": (b"\xff\xfe\x00", "must be JSON in UTF-8"),
 }
 BAD_AXES = {
-    "missing": (None, "an axis file is needed here"),
+    "missing": (None, "must be a readable axis file"),
     "empty": ("", "the file is empty"),
     "one point": ("x,y,z\n1,2,3\n", "at least two distinct points"),
     "a word": ("x,y,z\n1,2,3\n4,five,6\n", "five"),

@@ -178,7 +178,7 @@ def test_what_is_no_road_is_refused_in_a_sentence(settings: Any, tmp_path: Path)
 
 
 def test_an_axis_file_that_is_none_is_refused(settings: Any, cloud: Path, tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError, match=r"none.csv: an axis file is needed here \(No such file"):
+    with pytest.raises(RuntimeError, match=r"none.csv: must be a readable axis file \(No such file"):
         bpy.ops.synthroads.road_from_scan(filepath=str(cloud), course=str(tmp_path / "none.csv"))
     (tmp_path / "far.csv").write_text("x,y\n0,0\n100,0\n200,0\n")
     with pytest.raises(RuntimeError, match="no point of the road lies within 45 m of it"):
