@@ -187,7 +187,9 @@ def weights_file(path: Path, change: dict[str, Any], metadata: Any = None) -> Pa
     ],
 )
 def test_what_is_no_number_in_a_file_of_weights_is_refused(change: dict[str, Any], tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"weight: (its shape and data_offsets must be whole numbers|its data must lie inside)"):
+    with pytest.raises(
+        InputError, match=r"weight: (its shape and data_offsets must be whole numbers|its data must lie inside)"
+    ):
         read_tensors(weights_file(tmp_path / "a.safetensors", change))
 
 

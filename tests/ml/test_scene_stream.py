@@ -235,7 +235,9 @@ def test_a_scenario_that_cannot_be_met_is_done_without(
     monkeypatch.setenv("QUICK_FAULT", "0:scenario")
     task.train(Run.start(tmp_path / "run", small(data, schedule={"epochs": 1})))
     none = small(data, schedule={"epochs": 1}, stream={"scenes_per_epoch": 1})
-    with pytest.raises(InputError, match=r"can't be made \(road.length is 1: must be more\), and neither can the other scenes"):
+    with pytest.raises(
+        InputError, match=r"can't be made \(road.length is 1: must be more\), and neither can the other scenes"
+    ):
         task.train(Run.start(tmp_path / "none", none))
 
 

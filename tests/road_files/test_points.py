@@ -91,7 +91,10 @@ def test_a_line_without_heights_says_so(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("<kml><Placemark><LineString><coordinates>1 2 3</coordinates></LineString></Placemark></kml>", "separated by commas"),
+        (
+            "<kml><Placemark><LineString><coordinates>1 2 3</coordinates></LineString></Placemark></kml>",
+            "separated by commas",
+        ),
         ("<kml><Placemark><LineString><coordinates>1,200 2,3</coordinates></LineString></Placemark></kml>", "point 1"),
         ("<kml><Placemark><Point><coordinates>1,2</coordinates></Point></Placemark></kml>", "no line of two points"),
         ('<gpx><trk><trkseg><trkpt lat="1"/><trkpt lat="2" lon="x"/></trkseg></trk></gpx>', "lon"),

@@ -529,7 +529,9 @@ def test_norms_are_adapted_by_points_and_not_by_tiles(data: Path) -> None:
 
 def test_files_have_no_splits(tmp_path: Path) -> None:
     cloud = write_cloud(tmp_path / "cloud.laz", road_block(100, 1))
-    with pytest.raises(InputError, match=r"split is 'train': must be left out, as cloud.laz is a file and has no splits"):
+    with pytest.raises(
+        InputError, match=r"split is 'train': must be left out, as cloud.laz is a file and has no splits"
+    ):
         list(read_tiles(Source(path=str(cloud), split="train"), class_scheme("5"), 0.1))
 
 
