@@ -37,7 +37,7 @@ def sample_road(
     seed: int,
     title: str = "",
     axis: AlignmentObject | None = None,
-    fixed_parts: GivenRoad | None = None,
+    given: GivenRoad | None = None,
 ) -> RoadParameters:
     """Return the parameter set of a road drawn from a seed within a scenario's limits.
 
@@ -47,7 +47,7 @@ def sample_road(
         title: title for people.
         axis: take this alignment (instance 1) instead of drawing one; its coordinates are local. It may break the
             rules of its design class.
-        fixed_parts: parts along that alignment that are taken as they are; the rest is drawn around them.
+        given: parts along that alignment that are taken as they are; the rest is drawn around them.
 
     Raises:
         InputError: limits contradict each other; the message names them all.
@@ -63,7 +63,7 @@ def sample_road(
     if axis:
         scenario = scenario.model_copy(update={"length": round_value(axis.length)})
     check_conflicts(scenario, with_axis=axis is not None)
-    site = _sample_site(scenario, seed, axis or sample_alignment(scenario, seed), fixed_parts)
+    site = _sample_site(scenario, seed, axis or sample_alignment(scenario, seed), given)
     objects: dict[str, Any] = {"alignment": site.alignment}
 
     def add(items: Iterable[tuple[str, RoadObject]]) -> None:
@@ -72,8 +72,8 @@ def sample_road(
             objects[_free_id(name, objects)] = item.model_copy(update={"instance": len(objects) + 1})
 
     add(_structure(site))
-    add(place_markings(site) if fixed_parts is None or fixed_parts.markings is None else fixed_parts.markings.items())
-    fixed_things = None if fixed_parts is None else fixed_parts.things
+    add(place_markings(site) if given is None or given.markings is None else given.markings.items())
+    fixed_things = None if given is None else given.things
     if fixed_things is not None:
         add(fixed_things.items())
     else:

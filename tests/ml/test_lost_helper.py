@@ -32,15 +32,16 @@ if __name__ == "__main__":
 """
 
 
+LOST = (
+    "error: processes is 2: one of the processes ended unexpectedly, perhaps because memory is short; "
+    "--resume continues\n"
+)
+
+
 @pytest.mark.parametrize(
     ("ends", "seconds", "code", "said"),
     [
-        (
-            9,
-            300,
-            2,
-            "error: processes is 2: one of the processes ended unexpectedly, perhaps because memory is short; --resume continues\n",
-        ),
+        (9, 300, 2, LOST),
         (0, 12, 0, ""),  # it has nothing left to do, and the first one scores alone
     ],
 )
