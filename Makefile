@@ -30,8 +30,8 @@ test: $(RUNNER)/made ## check the source and run the tests on both Blender LTS r
 quick: $(RUNNER)/made ## for two minutes, the tests nearest to what changed against the branch main
 	@$(NOX) -s quick
 
-test-slow: $(RUNNER)/made ## the tests that take long, and the documentation's own
-	@TEST_MARKERS=slow $(NOX) -s tests docs summary
+test-slow: $(RUNNER)/made ## the tests that take long, all doors, and the documentation's own
+	@TEST_MARKERS=slow EVERY_DOOR=yes $(NOX) -s tests doors docs summary
 
 fuzz: $(RUNNER)/made ## readers and commands on files made wrong by chance (SEED=N: others; CASES=N: of commands, 10,000)
 	@TEST_MARKERS=fuzz FUZZ_SEED=$(SEED) FUZZ_CASES=$(CASES) $(NOX) -s tests summary
@@ -39,8 +39,8 @@ fuzz: $(RUNNER)/made ## readers and commands on files made wrong by chance (SEED
 test-cluster: $(RUNNER)/made ## data sets made by a Slurm on this machine (as root; slurmctld, slurmd, munge)
 	@TEST_MARKERS=cluster PYTHON=here $(NOX) -s tests summary
 
-doors: $(RUNNER)/made ## run all that users are shown, in environments as they make them
-	@$(NOX) -s doors summary
+doors: $(RUNNER)/made ## run all that users are shown, in environments as they make them, on both releases
+	@EVERY_DOOR=yes $(NOX) -s doors summary
 
 lint docs judges: $(RUNNER)/made
 	@$(NOX) -s $@

@@ -1,7 +1,8 @@
 """Sessions of nox behind `make demo`, `make test` and the others: `nox -l` lists them.
 
 `nox -s tests-3.11 -- tests/road -k curve` hands arguments to pytest. In the environment TEST_WORKERS=N sets how many
-processes test side by side, TEST_MARKERS which tests, PYTHON that only the Python that runs nox is tested.
+processes test side by side, TEST_MARKERS which tests, PYTHON that only the Python that runs nox is tested, EVERY_DOOR
+that the doors are all run on both.
 """
 
 from __future__ import annotations
@@ -197,11 +198,16 @@ def tests(session: nox.Session) -> None:
 
 @nox.session(python=[HERE] if os.environ.get("PYTHON") else list(BLENDER))
 def doors(session: nox.Session) -> None:
-    """Run what users are shown, in environments as they make them; arguments are pytest's."""
+    """Run what users are shown, in environments as they make them; arguments are pytest's.
+
+    On a second Python only what Blender's release changes, unless the environment's EVERY_DOOR is set.
+    """
     version = str(session.python)
+    every, again = bool(os.environ.get("EVERY_DOOR")), any(name.endswith(" doors") for name in outcomes)
+    places: dict[str, str | bool | dict[str, str]] = {"every_door": every, "every_line": every or not again}
     outcomes[f"{version} doors"] = "FAILED, the environments could not be made"
     install(session, "demo")
-    places: dict[str, str | dict[str, str]] = {"demo": str(Path(session.bin, "python").absolute())}
+    places["demo"] = str(Path(session.bin, "python").absolute())
     (bpy,) = re.findall(r"^bpy==[\w.]+", Path(lock_of("demo", version)).read_text(encoding="utf-8"), re.MULTILINE)
     places["bare"] = _door(session, "bare", bpy)
     # The package is built apart from what is installed once, for the wheel: each time that brings a compiler anew.

@@ -18,7 +18,11 @@ VARIABLE = "SYNTHROADS_DOORS"
 
 @cache
 def places() -> dict[str, Any]:
-    """Return where the environments are: `demo`, `bare`, `wheel`, `extras` by name, and the folder `zips`."""
+    """Return where the environments are: `demo`, `bare`, `wheel`, `extras` by name, and the folder `zips`.
+
+    ``every_line`` says whether all lines are run in them, or those alone that Blender's release matters to;
+    ``every_door`` whether all is run that there is, as by `make doors`.
+    """
     if VARIABLE not in os.environ:
         pytest.fail(f"{VARIABLE} isn't set: `nox -s doors` makes the environments and runs these tests")
     found: dict[str, Any] = json.loads(os.environ[VARIABLE])

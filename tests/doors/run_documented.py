@@ -70,15 +70,15 @@ class Outcome:
 
 
 def run_documented(
-    python: Path, folder: Path, extras: Collection[str] = (), *, only_needing: bool = False
+    python: Path, folder: Path, extras: Collection[str] = (), chosen: Callable[[Small], object] = lambda row: True
 ) -> Iterator[Outcome]:
     """Run all documented lines in small sizes with an environment, and yield the outcome of each that is run.
 
     Args:
         python: the environment's interpreter; its other commands lie beside it.
-        folder: working folder of the lines: empty, or one in which all lines were run already.
+        folder: working folder of the lines: empty, or one in which lines were run already.
         extras: extras of pyproject.toml that the environment holds.
-        only_needing: run only lines that need one of these extras, in a folder where all were run before.
+        chosen: says of a row whether its line is run; what it reads must be there then, or be written by one that is.
 
     Raises:
         ValueError: an extra is unknown, or a line has no row in the table or a row no line.
@@ -86,12 +86,12 @@ def run_documented(
     if unknown := set(extras) - set(EXTRAS):
         raise ValueError(f"no such extras: {', '.join(sorted(unknown))}")
     folder.mkdir(parents=True, exist_ok=True)
-    chosen = [
+    lines = [
         (line, row)
         for line, row in rows_of(documented_lines())
-        if line.kind == "file" or (row and not row.reason and (not only_needing or row.needs & set(extras)))
+        if line.kind == "file" or (row and not row.reason and chosen(row))
     ]
-    steps = list(_steps(chosen, python, folder, extras))
+    steps = list(_steps(lines, python, folder, extras))
     before = [{n for n in range(number) if step.waits_for(steps[n])} for number, step in enumerate(steps)]
     done: set[int] = set()
     waiting, running = list(range(len(steps))), dict[Future[Outcome | None], int]()

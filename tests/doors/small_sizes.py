@@ -32,6 +32,8 @@ class Small:
         needs: extras without which the line is refused.
         code: exit code of a command that does its work: 3 for a result that is said to be doubtful.
         seconds: processor time after which it counts as too slow.
+        both: whether `make test` runs it with both of Blender's releases, as it shows what differs between them;
+            the others are run with one, and `make doors` runs all with both.
         reason: why the line isn't run here; empty if it is.
     """
 
@@ -42,6 +44,7 @@ class Small:
     needs: frozenset[str] = frozenset()
     code: int = 0
     seconds: float = 90.0
+    both: bool = False
     reason: str = ""
 
     def command(self, text: str) -> str:
@@ -76,7 +79,7 @@ ROWS = (
     Small("make demo", reason=_MAKE),
     Small("make test", reason="it runs the tests, of which this is one"),
     Small(". .venv/bin/activate", reason="the environment's own commands are called by their path"),
-    Small("synthroads generate --scenario rq31-600m --output out/mine --seed 7 --fidelity draft", _ROAD),
+    Small("synthroads generate --scenario rq31-600m --output out/mine --seed 7 --fidelity draft", _ROAD, both=True),
     Small(
         "synthroads generate --output out/wide --set road.cross_section=RQ43.5 --set road.length=1000",
         f"{_DRAFT} --set road.half_width=25 {_CLOUD}",
@@ -96,6 +99,7 @@ ROWS = (
         "--fidelity draft --speed 30",
         {},
         ("scene.glb",),
+        both=True,
     ),
     Small("synthroads cloud info out/mine/cloud.laz"),
     Small("python examples/cloud_to_numpy/cloud_to_numpy.py out/numpy out/mine/cloud.laz", "", _EXAMPLES),
@@ -129,7 +133,7 @@ ROWS = (
     Small("synthroads predict scan.laz", inputs=("scan.laz",), needs=_ML),
     Small("synthroads centerline scan.laz", inputs=("scan.laz",)),
     Small("synthroads reconstruct scan.laz --output out/road", inputs=("scan.laz",)),
-    Small("synthroads gallery --output out/gallery", "--only materials-roughness --width 64 --samples 1"),
+    Small("synthroads gallery --output out/gallery", "--only materials-roughness --width 64 --samples 1", both=True),
     Small("synthroads generate --tolerance height=5mm,intensity=5% --output out/exact", _ROAD),
     Small("synthroads tradeoff --output out/tradeoff", "--knobs caster --scenario small.json", {}, ("small.json",)),
     Small("synthroads benchmark --output out/benchmark", "--quick --cores 1", seconds=240.0),
@@ -164,7 +168,7 @@ ROWS = (
     ),
     Small("synthroads cloud info out/first/cloud.laz"),
     Small("synthroads check out/first/parameters.json"),
-    Small("synthroads dataset two-scanners.yaml --output out/two-scanners --jobs 2", _SCENES, seconds=60.0),
+    Small("synthroads dataset two-scanners.yaml --output out/two-scanners --jobs 2", _SCENES, seconds=60.0, both=True),
     Small("synthroads dataset two-scanners.yaml --output out/two-scanners --verify", _SCENES),
     Small(
         "synthroads twin out/two-scanners/scenes/flown-01/parameters.json --output out/flown-twin "
@@ -184,6 +188,7 @@ ROWS = (
         "import bpy",
         "import synthroads_addon; synthroads_addon.register()",
         {"length = 300": "length = 60", "/tmp/my_road": "out/my_road"},
+        both=True,
     ),
     # docs/tutorials/researcher.md
     Small(
@@ -212,7 +217,7 @@ ROWS = (
     Small("from torch.utils.data import DataLoader", needs=_ML),
     # docs/guide
     Small("python examples/own_device/own_device.py out/own-device", "", _EXAMPLES),
-    Small("python examples/own_scene/own_scene.py out/own-scene", "", _EXAMPLES),
+    Small("python examples/own_scene/own_scene.py out/own-scene", "", _EXAMPLES, both=True),
     Small("python examples/torch_dataset/torch_dataset.py out/torch", "1", _EXAMPLES, needs=_ML),
     Small("python examples/scan_to_twin/scan_to_twin.py out/scan-to-twin", "scan.laz", _EXAMPLES, ("scan.laz",)),
     Small("python docs/slurm_cluster.py reference /shared/reference --jobs 20 --queue batch", reason=_SLURM),

@@ -44,6 +44,8 @@ def test_list_finds_presets(folder: Path) -> None:
 
 
 def test_generate_scan_and_predict(folder: Path) -> None:
+    if not places()["every_line"]:
+        pytest.skip("a wheel holds the same for each Python: its commands are run on one; make doors: on both")
     python = places()["wheel"]
     answer = run(python, "synthroads", "generate", "--output", "out/road", *_SMALL, folder=folder)
     assert answer.returncode == 0, answer.stderr

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -23,6 +24,29 @@ WIDE = json.loads(json.dumps(SMALL_ROAD))
 WIDE["objects"]["road"]["lanes"].append({"width": 3.5})
 
 
+Built = tuple[dict[str, str], dict[str, bytes]]
+
+
+@dataclass(frozen=True)
+class FirstBuild:
+    """A road that was built where nothing was kept: folder of what it kept, what was built, number of groups made."""
+
+    folder: Path
+    built: Built
+    made: int
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> FirstBuild:
+    folder = tmp_path_factory.mktemp("first") / "groups"
+    request.getfixturevalue("kept_groups").on = False
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kept_groups, "kept_file", lambda: folder / "kept.blend")
+        names = noted(patch)
+        kept_groups._State.made = 0
+        return FirstBuild(folder, build(), len(names))
+
+
 @pytest.fixture
 def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     path = tmp_path / "groups" / "kept.blend"
@@ -32,7 +56,13 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def kept(file: Path, first: FirstBuild) -> Path:
+    """The file after a road was built."""
+    shutil.copytree(first.folder, file.parent)
+    return file
+
+
+def noted(patch: pytest.MonkeyPatch) -> list[str]:
     """Return the names of the groups that are made from here on."""
     names: list[str] = []
 
@@ -41,11 +71,17 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
             names.append(group.name)
             super().__init__(group)
 
-    monkeypatch.setattr(builder, "Tree", Noted)
+    patch.setattr(builder, "Tree", Noted)
     return names
 
 
-def build(data: dict = SMALL_ROAD) -> tuple[dict[str, str], dict[str, bytes]]:
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Return the names of the groups that are made from here on."""
+    return noted(monkeypatch)
+
+
+def build(data: dict = SMALL_ROAD) -> Built:
     """Build a road in an empty file; return its groups in words, by name and key, and its objects' vertices."""
     empty_file()
     model = build_road(BuildRequest(RoadParameters.from_dict(data), 0.02, 0.3, {"road", "guardrails"}))
@@ -59,22 +95,18 @@ def build(data: dict = SMALL_ROAD) -> tuple[dict[str, str], dict[str, bytes]]:
     return groups, vertices
 
 
-def test_what_is_read_is_what_would_be_made(file: Path, made: list[str]) -> None:
-    first = build()
-    assert made
-    made.clear()
-    assert build() == first
+def test_what_is_read_is_what_would_be_made(kept: Path, made: list[str], first: FirstBuild) -> None:
+    assert first.made > 0
+    assert build() == first.built
     assert not made
     assert not bpy.data.libraries
-    assert sorted(path.name for path in file.parent.iterdir()) == ["kept.blend", "kept.json"]
+    assert sorted(path.name for path in kept.parent.iterdir()) == ["kept.blend", "kept.json"]
 
 
-def test_groups_of_another_road_are_made_and_kept_beside(file: Path, made: list[str]) -> None:
-    build()
-    count = len(made)
-    made.clear()
+@pytest.mark.usefixtures("kept")
+def test_groups_of_another_road_are_made_and_kept_beside(made: list[str], first: FirstBuild) -> None:
     wide = build(WIDE)
-    assert 0 < len(made) < count
+    assert 0 < len(made) < first.made
     made.clear()
     assert build(WIDE) == wide
     build()
@@ -82,16 +114,15 @@ def test_groups_of_another_road_are_made_and_kept_beside(file: Path, made: list[
     assert not [group.name for group in bpy.data.node_groups if group.name[-1].isdigit() or "older" in group.name]
 
 
-def test_only_the_latest_roads_are_kept(file: Path, made: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_the_latest_roads_are_kept(kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kept_groups, "ROADS", 1)
     monkeypatch.setattr(kept_groups, "_NEW_SHARE", 0.0)
-    build()
     build(WIDE)
-    assert len(json.loads(file.with_suffix(".json").read_text())["roads"]) == 1
+    assert len(json.loads(kept.with_suffix(".json").read_text())["roads"]) == 1
     monkeypatch.setattr(kept_groups, "_NEW_SHARE", 1.0)
-    before = file.read_bytes()
+    before = kept.read_bytes()
     build()
-    assert file.read_bytes() == before
+    assert kept.read_bytes() == before
 
 
 def test_a_file_with_groups_that_the_user_may_have_edited_is_not_kept(file: Path) -> None:
@@ -101,15 +132,13 @@ def test_a_file_with_groups_that_the_user_may_have_edited_is_not_kept(file: Path
     assert not file.exists()
 
 
+@pytest.mark.usefixtures("kept")
 def test_groups_of_other_source_files_are_not_read(
-    file: Path, made: list[str], monkeypatch: pytest.MonkeyPatch
+    made: list[str], first: FirstBuild, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    build()
-    count = len(made)
-    made.clear()
     monkeypatch.setattr(kept_groups, "_stamp", lambda: "another")
     build()
-    assert len(made) == count
+    assert len(made) == first.made
 
 
 def _no_blend_file(file: Path) -> None:
@@ -129,21 +158,20 @@ def _no_file(file: Path) -> None:
 
 
 @pytest.mark.parametrize("spoil", [_no_blend_file, _no_list, _another_list, _no_file])
-def test_a_spoilt_file_is_made_anew(file: Path, made: list[str], spoil: Callable[[Path], None]) -> None:
-    first = build()
-    spoil(file)
-    made.clear()
-    assert build() == first
+def test_a_spoilt_file_is_made_anew(
+    kept: Path, made: list[str], first: FirstBuild, spoil: Callable[[Path], None]
+) -> None:
+    spoil(kept)
+    assert build() == first.built
     assert made
     made.clear()
     build()
     assert not made
 
 
-def test_a_folder_that_cannot_be_made_is_none(file: Path, made: list[str]) -> None:
+def test_a_folder_that_cannot_be_made_is_none(file: Path, first: FirstBuild) -> None:
     file.parent.write_text("a file", encoding="utf-8")
-    first = build()
-    assert build() == first
+    assert build() == first.built
 
 
 def test_the_place_of_the_file_and_how_to_have_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ import pytest
 from synthroads_addon.base.classes import classes, las_codes
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.cloud.formats.las import LasWriter
+from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.layers import ATTRIBUTES, LAYERS, columns
 from synthroads_addon.cloud.points import concatenate
 from tests.helpers.clouds.cloud_points import with_every_attribute
@@ -267,3 +268,19 @@ def test_attribute_that_the_points_lack_is_refused(tmp_path: Path, points) -> No
     ):
         writer.write(points)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_scale_may_be_negative(tmp_path: Path) -> None:
+    """Nothing in LAS 1.4 forbids it; none may be 0, which would put all points in one place."""
+    las = laspy.create(point_format=7, file_version="1.4")
+    las.header.scales, las.header.offsets = [-0.001, 0.001, 0.001], ORIGIN
+    las.xyz = ORIGIN + np.array([[1.5, 2.0, 3.0], [-4.25, 5.0, 6.0]])
+    las.write(tmp_path / "cloud.las")
+    with open_cloud(tmp_path / "cloud.las") as cloud:
+        (block,) = cloud.blocks()
+    assert np.abs(block.xyz - las.xyz).max() < 1e-9
+    data = bytearray((tmp_path / "cloud.las").read_bytes())
+    data[131:139] = struct.pack("<d", 0.0)
+    (tmp_path / "cloud.las").write_bytes(data)
+    with pytest.raises(InputError, match="the scales not 0"):
+        open_cloud(tmp_path / "cloud.las")

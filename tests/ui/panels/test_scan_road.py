@@ -13,7 +13,12 @@ from synthroads_addon.base.errors import Cancelled
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.model.roads import FRAME, ORIGIN
 from synthroads_addon.blender.model.store import FOUND, find_road, recall, roads
-from synthroads_addon.reconstruction.report import ReconstructionJob, measure_lines, run_reconstruction
+from synthroads_addon.reconstruction.report import (
+    ReconstructedRoad,
+    ReconstructionJob,
+    measure_lines,
+    run_reconstruction,
+)
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.ui.fields import room
 from synthroads_addon.ui.panels import panels, scan_road
@@ -49,37 +54,53 @@ def rough_cloud(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write(tmp_path_factory.mktemp("rough") / "rough.laz", block)
 
 
+@pytest.fixture(scope="module")
+def found(cloud: Path, rough_cloud: Path) -> dict[Path, ReconstructedRoad]:
+    """What the command finds in each cloud."""
+    return {file: run_reconstruction(ReconstructionJob(file)) for file in (cloud, rough_cloud)}
+
+
+@pytest.fixture
+def found_before(found: dict[Path, ReconstructedRoad], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have the button take what the command has found, as finding it again takes seconds."""
+    monkeypatch.setattr(scan_road, "run_reconstruction", lambda job, progress: found[job.cloud])
+
+
 def lines(panel: type) -> list[str]:
     return drawn(panel, bpy.context).lines
 
 
-def test_it_is_the_road_that_the_command_finds(settings: Any, cloud: Path) -> None:
+def test_it_is_the_road_that_the_command_finds(
+    settings: Any, cloud: Path, found: dict[Path, ReconstructedRoad]
+) -> None:
     assert bpy.ops.synthroads.road_from_scan(filepath=str(cloud)) == {"FINISHED"}
     root = find_road(bpy.context.scene)
-    found = run_reconstruction(ReconstructionJob(cloud)).reconstruction
-    assert recall(root) == (found.parameters, settings.scenario())
+    road = found[cloud].reconstruction
+    assert recall(root) == (road.parameters, settings.scenario())
     assert source_file_name(root) == "scan.laz"
     assert np.allclose(np.array(root[FRAME]) - np.array(root[ORIGIN]), root.location)
     kept = scan_road.found_road(root)
-    assert kept["judgement"] == {**found.judgement.to_dict(), "other_sections": []}
+    assert kept["judgement"] == {**road.judgement.to_dict(), "other_sections": []}
     assert kept["cloud"] == str(cloud)
 
 
-def test_its_options_are_the_commands(settings: Any, cloud: Path, tmp_path: Path) -> None:
+def test_its_options_are_the_commands(
+    settings: Any, cloud: Path, found: dict[Path, ReconstructedRoad], tmp_path: Path
+) -> None:
     truth = road("RQ31", "EKA1A", 100.0, 3)
     middle = RoadGeometry(truth).alignment.frame(np.linspace(0.0, 100.0, 21))[0] + truth.transform.translate[:2]
     np.savetxt(tmp_path / "course.csv", middle, delimiter=",", header="x,y", comments="")
     options = {"road": "dual", "course": str(tmp_path / "course.csv"), "snap": True, "tolerance": 0.1}
     bpy.ops.synthroads.road_from_scan(filepath=str(cloud), **options)
     job = ReconstructionJob(cloud, "dual", tmp_path / "course.csv", 0.1, True)
-    given, plain = (
-        run_reconstruction(job).reconstruction.parameters,
-        run_reconstruction(ReconstructionJob(cloud)).reconstruction.parameters,
-    )
-    assert recall(find_road(bpy.context.scene))[0] == given != plain
+    given = run_reconstruction(job).reconstruction.parameters
+    assert recall(find_road(bpy.context.scene))[0] == given != found[cloud].reconstruction.parameters
 
 
-def test_what_is_not_doubtful_is_said(settings: Any, cloud: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("found_before")
+def test_what_is_not_doubtful_is_said(
+    settings: Any, cloud: Path, found: dict[Path, ReconstructedRoad], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(room, "sidebar_width", lambda: 900.0)
     assert not scan_road.SYNTHROADS_PT_scan_road.poll(bpy.context)
     bpy.ops.synthroads.road_from_scan(filepath=str(cloud))
@@ -87,7 +108,7 @@ def test_what_is_not_doubtful_is_said(settings: Any, cloud: Path, monkeypatch: p
     shown = lines(scan_road.SYNTHROADS_PT_scan_road)
     assert shown[0] == "label 'No part of it is doubtful' <CHECKMARK>"
     text = "\n".join(shown)
-    report = run_reconstruction(ReconstructionJob(cloud)).report
+    report = found[cloud].report
     for line in ("dual carriageway of", "cm rms from the measured axis (std", *measure_lines(report)):
         assert line in text
     assert "right: points 1.0 cm rms from the surface" in text
@@ -96,15 +117,17 @@ def test_what_is_not_doubtful_is_said(settings: Any, cloud: Path, monkeypatch: p
     assert bpy.ops.synthroads.show_cloud(filepath=scan_road.found_road(find_road(bpy.context.scene))["cloud"])
 
 
+@pytest.mark.usefixtures("found_before")
 def test_doubts_stand_in_the_panel_by_station_with_their_reasons(
     settings: Any,
     rough_cloud: Path,
+    found: dict[Path, ReconstructedRoad],
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(room, "sidebar_width", lambda: 900.0)
     bpy.ops.synthroads.road_from_scan(filepath=str(rough_cloud))
-    judgement = run_reconstruction(ReconstructionJob(rough_cloud)).reconstruction.judgement
+    judgement = found[rough_cloud].reconstruction.judgement
     (doubt,) = judgement.doubts
     assert doubt.start < ROUGH[1]
     assert doubt.end > ROUGH[0]
@@ -119,6 +142,7 @@ def test_doubts_stand_in_the_panel_by_station_with_their_reasons(
     assert bpy.ops.synthroads.show_doubt(station=doubt.start) == {"FINISHED"}
 
 
+@pytest.mark.usefixtures("found_before")
 def test_a_road_that_was_built_otherwise_has_no_doubts(settings: Any, cloud: Path) -> None:
     bpy.ops.synthroads.road_from_scan(filepath=str(cloud))
     root = find_road(bpy.context.scene)
@@ -134,6 +158,7 @@ def test_a_road_that_was_built_otherwise_has_no_doubts(settings: Any, cloud: Pat
         bpy.ops.synthroads.show_doubt()
 
 
+@pytest.mark.usefixtures("found_before")
 def test_it_lies_where_its_cloud_lies(settings: Any, cloud: Path) -> None:
     settings.road.length, settings.road.half_width = 60.0, 20.0
     bpy.ops.synthroads.build()
