@@ -17,7 +17,8 @@ WEIGHTS = Path(__file__).parent / "weights"
 """Folder of the shipped models: of each a card, NAME.json, and weights, NAME.safetensors."""
 LARGEST_MB = 10.0
 """Weights of one model take less than this, MB."""
-Platform = Literal["airborne", "uav", "mobile", "tripod"]
+Platform = Literal["airborne", "uav", "mobile", "tripod", "sweep"]
+"""What carried the scanner; a sweep is one turn of a head on a car, whatever its extent."""
 Attribute = Literal["intensity", "color"]
 
 

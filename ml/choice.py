@@ -1,17 +1,19 @@
-"""The choice of a shipped model for a cloud: by what can be measured on any, density, evenness and attributes."""
+"""The choice of a shipped model for a cloud: by its density, evenness, rings and attributes."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from math import inf, log
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.cloud.formats.registry import open_cloud
 
 from .cards import ModelCard, Platform, model_names, read_card
+from .sweeps import MOST_POINTS, find_sweep
 
 FAR = log(3.0)
 """Distance from a model's domain beyond which its results are doubtful: density three times off, another platform."""
@@ -20,6 +22,10 @@ _UNEVEN = 12.0  # of the 90th to the 20th percentile of cells' points: scanners 
 _LONG = 3.0  # of a ground-based cloud's extent along to that across: the scanner drove
 _DENSE = 60.0  # points/m2 from which an even cloud is a UAV's
 _SAMPLE = 2_000_000
+CLEARLY = 0.05
+"""Difference of two models' agreement with themselves (Cohen's kappa) from which it decides between them. Chosen: on a
+labelled street and a labelled sweep, the model with the better classes is 0.01 behind; on a road from the air the model
+for sweeps is 0.35 behind."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +35,7 @@ class CloudTraits:
     Attributes:
         density: median of the points in occupied square metres.
         unevenness: ratio of the 90th to the 20th percentile of the same.
-        platform: that the scanner was on, judged by the two and the extent.
+        platform: that the scanner was on, judged by the two, the extent, and whether the points lie in a sweep's rings.
         attributes: of the points that tell something: ``intensity``, ``color``.
     """
 
@@ -53,11 +59,13 @@ class Choice:
         traits: of the cloud.
         distance: from what the model was trained on: 0 inside, the logarithm of how many times the density is off
             outside, and more on another platform.
+        agreements: by how much each model that was tried agrees with itself, by its name; none where none was tried.
     """
 
     card: ModelCard
     traits: CloudTraits
     distance: float
+    agreements: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def doubtful(self) -> bool:
@@ -72,7 +80,9 @@ class Choice:
             "platform": self.traits.platform,
             "attributes": sorted(self.traits.attributes),
         }
-        return {"model": self.card.name, "cloud": traits, "distance": round(self.distance, 3), "why": self.why()}
+        data = {"model": self.card.name, "cloud": traits, "distance": round(self.distance, 3), "why": self.why()}
+        tried = {name: round(value, 3) for name, value in self.agreements.items()}
+        return {**data, "agreements": tried} if tried else data
 
     def why(self) -> str:
         """Return in one line which model was chosen and why."""
@@ -81,7 +91,11 @@ class Choice:
         beside = (
             "" if not self.distance else "; the cloud is unlike that" if self.doubtful else "; the nearest there is"
         )
-        return f"{self.card.name} for {self.traits.to_text()}: {trained}{beside}"
+        text = f"{self.card.name} for {self.traits.to_text()}: {trained}{beside}"
+        if not self.agreements:
+            return text
+        figures = ", ".join(f"{name} {value:.2f}" for name, value in self.agreements.items())
+        return f"{text}; tried on a part seen from two directions, the models agree with themselves by {figures}"
 
 
 def choose_model(cloud: Path, task: str) -> Choice:
@@ -112,6 +126,27 @@ def nearest(cards: Sequence[ModelCard], traits: CloudTraits) -> Choice:
     return best
 
 
+def with_agreements(choice: Choice, cards: Sequence[ModelCard], agreements: Mapping[str, float]) -> Choice:
+    """Return the choice after models were tried: another model if it agrees with itself `CLEARLY` more.
+
+    Args:
+        choice: by the cloud's traits.
+        cards: of the models that were tried.
+        agreements: Cohen's kappa of each model's classes in two views, by its name.
+    """
+    best = max(cards, key=lambda card: agreements[card.name])
+    if agreements[best.name] < agreements[choice.card.name] + CLEARLY:
+        return replace(choice, agreements=agreements)
+    return Choice(best, choice.traits, domain_distance(best, choice.traits), agreements)
+
+
+def usable_cards(task: str, traits: CloudTraits) -> list[ModelCard]:
+    """Return the cards of the shipped models of a task whose attributes a cloud has, the nearest first."""
+    cards = [read_card(name) for name in model_names(task)]
+    distances = {card.name: domain_distance(card, traits) for card in cards}
+    return sorted((card for card in cards if distances[card.name] < inf), key=lambda card: distances[card.name])
+
+
 def domain_distance(card: ModelCard, traits: CloudTraits) -> float:
     """Return how far a cloud is from what a model was trained on; infinite if it lacks what the model needs."""
     if not set(card.domain.needs) <= traits.attributes:
@@ -132,10 +167,13 @@ def cloud_traits(path: Path) -> CloudTraits:
     cells: dict[tuple[int, int], int] = {}
     brightest, colorful = 0.0, False
     darkest = inf
+    head: list[Float] = []  # points, as long as there are few enough for a sweep
     with open_cloud(path) as cloud:
         for block in cloud.usable_blocks(_SAMPLE):
             if not len(block):
                 continue
+            if sum(map(len, head)) <= MOST_POINTS:
+                head.append(block.xyz)
             plan = np.floor(block.xyz[:, :2]).astype(np.int64)
             places, counts = np.unique(plan, axis=0, return_counts=True)
             for place, count in zip(map(tuple, places.tolist()), counts.tolist(), strict=True):
@@ -152,14 +190,23 @@ def cloud_traits(path: Path) -> CloudTraits:
     return CloudTraits(
         density=float(median),
         unevenness=unevenness,
-        platform=_platform(float(median), unevenness, places.astype(np.float64)),
+        platform=_platform(float(median), unevenness, places.astype(np.float64), head),
         attributes=frozenset(name for name, there in names if there),
     )
 
 
-def _platform(density: float, unevenness: float, places: np.ndarray[Any, np.dtype[np.float64]]) -> Platform:
-    """Return the likely platform: even clouds are seen from above, uneven ones from the road."""
+def _platform(density: float, unevenness: float, places: Float, head: Sequence[Float]) -> Platform:
+    """Return the likely platform: even clouds are seen from above, uneven ones from the road.
+
+    Args:
+        density: points/m2.
+        unevenness: see `CloudTraits`.
+        places: (N, 2) occupied square metres.
+        head: the cloud's points (N, 3) in blocks; of a cloud of over `MOST_POINTS`, which is no sweep, some of them.
+    """
     if unevenness < _UNEVEN:
         return "uav" if density >= _DENSE else "airborne"
+    if sum(map(len, head)) <= MOST_POINTS and find_sweep(np.concatenate(head)) is not None:
+        return "sweep"
     spread = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(places.T)), 1.0)) if len(places) > 2 else np.ones(2)
     return "mobile" if spread[1] > _LONG * spread[0] else "tripod"

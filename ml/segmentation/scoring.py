@@ -134,7 +134,7 @@ def piece_scores(
         return
     total: Tensor | None = None
     for view in range(settings.votes):
-        for inside, scores in _view_scores(_turned(tile, view), scaling, classifier, settings, own, seed):
+        for inside, scores in _view_scores(turned(tile, view), scaling, classifier, settings, own, seed):
             if total is None:
                 total = scores.new_zeros(len(tile), scores.shape[1], dtype=torch.float32)
             total[torch.from_numpy(inside)] += scores.float().softmax(dim=1)
@@ -155,7 +155,7 @@ def _view_scores(
         yield inside, scores[torch.from_numpy(np.searchsorted(seen, inside))]
 
 
-def _turned(tile: CloudTile, view: int) -> CloudTile:
+def turned(tile: CloudTile, view: int) -> CloudTile:
     """Return a tile as a view sees it: the first as it is, each further one turned on, every second one mirrored.
 
     Pieces are cut where it is turned to, so that each view has other borders.
