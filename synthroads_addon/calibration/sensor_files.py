@@ -205,7 +205,7 @@ def fit_sensor(result: Calibration, simulated: bool = True) -> FittedSensor:
     # The materials' brightness was fitted for this air.
     air = {"scan.attenuation": job.attenuation}
     scan = _FREE | spacing | _same_surface(first.target.material) | air
-    return FittedSensor(estimate, refined, device, scan, drawn, usual, "airborne-1000m", surfaces)
+    return FittedSensor(estimate, refined, device, scan, drawn, usual, "airborne-1000m-even", surfaces)
 
 
 def _same_surface(material: str) -> dict[str, Any]:
@@ -342,7 +342,7 @@ class _MovingSensor:
         middle = {path: float(np.sqrt(low * high)) for path, (low, high) in self.usual.items()}
         given = {path: value for path, value in values.items() if path.startswith("scan.")}
         changes = _FREE | spacing | middle | given | _POWER | {"scan.attenuation": self.attenuation}
-        data = apply_values(load_scenario("airborne-1000m").to_dict(), changes)
+        data = apply_values(load_scenario("airborne-1000m-even").to_dict(), changes)
         scan = ScanScenario.from_dict(data["scan"])
         below, above = self.spreads(values)
         pavement = LevelPavement(
