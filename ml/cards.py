@@ -17,7 +17,8 @@ WEIGHTS = Path(__file__).parent / "weights"
 """Folder of the shipped models: of each a card, NAME.json, and weights, NAME.safetensors."""
 LARGEST_MB = 10.0
 """Largest size of one model's weights, MB."""
-Platform = Literal["airborne", "uav", "mobile", "tripod"]
+Platform = Literal["airborne", "uav", "mobile", "tripod", "sweep"]
+"""Kind of survey: what carried the scanner, or one sweep, a turn of a head on a car."""
 Attribute = Literal["intensity", "color"]
 
 

@@ -1,17 +1,19 @@
-"""The choice of a shipped model for a cloud: by what can be measured on any, density, evenness and attributes."""
+"""The choice of a shipped model for a cloud: by its density, evenness, rings and attributes."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from math import inf, log
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.cloud.formats.registry import open_cloud
 
 from .cards import ModelCard, Platform, model_names, read_card
+from .sweeps import MOST_POINTS, find_sweep
 
 FAR = log(3.0)
 """Distance from a model's domain beyond which its results are doubtful: density three times off, another platform."""
@@ -20,6 +22,10 @@ _UNEVEN = 12.0  # of the 90th to the 20th percentile of cells' points: scanners 
 _LONG = 3.0  # of a ground-based cloud's extent along to that across: the scanner drove
 _DENSE = 60.0  # points/m2 from which an even cloud is a UAV's
 _SAMPLE = 2_000_000
+CLEARLY = 0.05
+"""Difference of two models' agreement with themselves (Cohen's kappa) from which it decides between them. Chosen: on a
+labelled street and a labelled sweep, the model with the better classes is 0.01 behind; on a road from the air the model
+for sweeps is 0.35 behind."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +35,8 @@ class CloudTraits:
     Attributes:
         density: median number of points in occupied square metres, 1/m2.
         unevenness: ratio of the 90th to the 20th percentile of these numbers.
-        platform: likely platform of the scanner, judged by density, unevenness and extent.
+        platform: likely platform of the scanner, judged by density, unevenness, extent, and whether the points
+            form the rings of a sweep.
         attributes: names of the points' attributes that vary: ``intensity``, ``color``.
     """
 
@@ -53,11 +60,13 @@ class Choice:
         traits: traits of the cloud.
         distance: distance from the model's domain: 0 inside, else the logarithm of the ratio by which the density is
             outside, plus `_OTHER_PLATFORM` on another platform.
+        agreements: Cohen's kappa of each tried model's classes in two views, by its name; empty if none was tried.
     """
 
     card: ModelCard
     traits: CloudTraits
     distance: float
+    agreements: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def doubtful(self) -> bool:
@@ -72,7 +81,9 @@ class Choice:
             "platform": self.traits.platform,
             "attributes": sorted(self.traits.attributes),
         }
-        return {"model": self.card.name, "cloud": traits, "distance": round(self.distance, 3), "why": self.why()}
+        data = {"model": self.card.name, "cloud": traits, "distance": round(self.distance, 3), "why": self.why()}
+        agreements = {name: round(kappa, 3) for name, kappa in self.agreements.items()}
+        return {**data, "agreements": agreements} if agreements else data
 
     def why(self) -> str:
         """Return one line of text with the chosen model and the reason."""
@@ -83,7 +94,11 @@ class Choice:
         reservation = (
             "" if not self.distance else "; the cloud is unlike that" if self.doubtful else "; the nearest there is"
         )
-        return f"{self.card.name} for {self.traits.to_text()}: {training_domain}{reservation}"
+        text = f"{self.card.name} for {self.traits.to_text()}: {training_domain}{reservation}"
+        if not self.agreements:
+            return text
+        figures = ", ".join(f"{name} {kappa:.2f}" for name, kappa in self.agreements.items())
+        return f"{text}; on a part labelled from two directions, the models agree with themselves by {figures}"
 
 
 def choose_model(cloud: Path, task: str) -> Choice:
@@ -118,6 +133,27 @@ def nearest_model(cards: Sequence[ModelCard], traits: CloudTraits) -> Choice:
     return best_choice
 
 
+def with_agreements(choice: Choice, cards: Sequence[ModelCard], agreements: Mapping[str, float]) -> Choice:
+    """Return the choice after models were tried: another model if it agrees with itself `CLEARLY` more.
+
+    Args:
+        choice: by the cloud's traits.
+        cards: of the models that were tried.
+        agreements: Cohen's kappa of each model's classes in two views, by its name.
+    """
+    best_card = max(cards, key=lambda card: agreements[card.name])
+    if agreements[best_card.name] < agreements[choice.card.name] + CLEARLY:
+        return replace(choice, agreements=agreements)
+    return Choice(best_card, choice.traits, domain_distance(best_card, choice.traits), agreements)
+
+
+def usable_cards(task: str, traits: CloudTraits) -> list[ModelCard]:
+    """Return the cards of the shipped models of a task whose attributes a cloud has, the nearest first."""
+    cards = [read_card(name) for name in model_names(task)]
+    distances = {card.name: domain_distance(card, traits) for card in cards}
+    return sorted((card for card in cards if distances[card.name] < inf), key=lambda card: distances[card.name])
+
+
 def domain_distance(card: ModelCard, traits: CloudTraits) -> float:
     """Return a cloud's distance from a model's domain (`Choice.distance`); infinite if it lacks needed attributes."""
     if not set(card.domain.needs) <= traits.attributes:
@@ -138,10 +174,13 @@ def cloud_traits(path: Path) -> CloudTraits:
     cells: dict[tuple[int, int], int] = {}
     brightest, colorful = 0.0, False
     darkest = inf
+    first_blocks: list[Float] = []  # for `find_sweep`, which only takes clouds that are small enough
     with open_cloud(path) as cloud:
         for block in cloud.usable_blocks(_SAMPLE):
             if not len(block):
                 continue
+            if sum(map(len, first_blocks)) <= MOST_POINTS:
+                first_blocks.append(block.xyz)
             plan = np.floor(block.xyz[:, :2]).astype(np.int64)
             cell_corners, counts = np.unique(plan, axis=0, return_counts=True)
             for cell_corner, count in zip(map(tuple, cell_corners.tolist()), counts.tolist(), strict=True):
@@ -158,15 +197,25 @@ def cloud_traits(path: Path) -> CloudTraits:
     return CloudTraits(
         density=float(median),
         unevenness=unevenness,
-        platform=_platform(float(median), unevenness, cell_corners.astype(np.float64)),
+        platform=_platform(float(median), unevenness, cell_corners.astype(np.float64), first_blocks),
         attributes=frozenset(name for name, is_present in names if is_present),
     )
 
 
-def _platform(density: float, unevenness: float, cell_corners: np.ndarray[Any, np.dtype[np.float64]]) -> Platform:
-    """Return the likely platform: even clouds are seen from above, uneven ones from the road."""
+def _platform(density: float, unevenness: float, cell_corners: Float, first_blocks: Sequence[Float]) -> Platform:
+    """Return the likely platform: even clouds are seen from above, uneven ones from the road.
+
+    Args:
+        density: points/m2.
+        unevenness: see `CloudTraits`.
+        cell_corners: (N, 2) corners of the occupied square metres.
+        first_blocks: the cloud's points (N, 3) in blocks, up to the one with which they exceed `MOST_POINTS`; a cloud
+            of more points is no sweep.
+    """
     if unevenness < _UNEVEN:
         return "uav" if density >= _DENSE else "airborne"
+    if sum(map(len, first_blocks)) <= MOST_POINTS and find_sweep(np.concatenate(first_blocks)) is not None:
+        return "sweep"
     spread = (
         np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(cell_corners.T)), 1.0)) if len(cell_corners) > 2 else np.ones(2)
     )

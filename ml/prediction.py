@@ -9,7 +9,7 @@ from typing import Any
 from synthroads_addon.base.files import path_beside
 from synthroads_addon.base.progress import Progress, silent
 
-from .choice import Choice, choose_model
+from .choice import Choice, choose_model, usable_cards, with_agreements
 from .shipped import open_run
 from .tasks import Prediction, task
 
@@ -63,12 +63,27 @@ def predict(
     choice = None
     if run is None:
         choice = choose_model(cloud, "segmentation")
+        if choice.doubtful:
+            choice = _try_models(choice, cloud)
         run = choice.card.name
     trained_run = open_run(Path(run))
     name = trained_run.configuration.task
     target = output or usual_output(cloud, name)
     prediction = Prediction(cloud, target, path, overwrite, classification, "--output" if output else "")
     return Predicted(name, target, task(name).predict(trained_run, prediction, progress), choice)
+
+
+def _try_models(choice: Choice, cloud: Path) -> Choice:
+    """Return the choice after the models that the cloud fits were tried on a part of it; as it is if only one does."""
+    cards = usable_cards("segmentation", choice.traits)
+    if len(cards) < 2:
+        return choice
+    # Imported here: networks take time to load, and most clouds are like what one of the models was trained on.
+    from .segmentation.self_agreement import sample_cloud, self_agreement
+
+    sample = sample_cloud(cloud)
+    agreements = {card.name: self_agreement(open_run(Path(card.name)), sample) for card in cards}
+    return with_agreements(choice, cards, agreements)
 
 
 def usual_output(cloud: Path, task_name: str) -> Path:

@@ -118,7 +118,7 @@ JOBS = {
     "pixel-per-return": GoldenJob(
         (generate("rq31-600m", *UAV, "colour.source=returns", "road.length=60"),), lacking="needs Blender 5.0"
     ),
-    "airborne": GoldenJob((generate("airborne-1000m", *DRAFT, *PLAIN, "scan.pulse_rate_khz=150"),)),
+    "airborne": GoldenJob((generate("airborne-1000m-even", *DRAFT, *PLAIN, "scan.pulse_rate_khz=150"),)),
     "vehicle": GoldenJob((generate("mobile-mapping-300m", *DRAFT, *PLAIN, "scan.pulse_rate_khz=150"),)),
     "tripod": GoldenJob((generate("tripod-200m", *DRAFT, *PLAIN, "scan.platform.turn_seconds=10"),)),
     "foreign-scene": GoldenJob(

@@ -42,7 +42,7 @@ SCENES: dict[str, tuple[str, Sequence[str]]] = {
     "uav": ("rq31-600m", ["road.length=300"]),
     "vehicle": ("mobile-mapping-300m", []),
     "tripod": ("tripod-200m", []),
-    "airborne": ("airborne-1000m", []),
+    "airborne": ("airborne-1000m-even", []),
 }
 """Platform -> scenario and changes."""
 CORES = 2

@@ -111,7 +111,7 @@ PLANS = {
             *("class_weights=0", "fitted_offsets=true", "threads=1", "workers=2", "prepare_on=cpu"),
         ),
         ("train_sweeps",),
-        Domain(density=(5.0, 15.0), platforms=("tripod",)),
+        Domain(density=(5.0, 15.0), platforms=("sweep",)),
         (
             "Three trainings that differ in their seed alone differ by up to nine points on one real sweep.",
             "Sidewalks and kerbs it has never seen: in towns road and ground are taken for one another.",

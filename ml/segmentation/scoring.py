@@ -142,7 +142,7 @@ def piece_scores(
         return
     total: Tensor | None = None
     for view in range(settings.votes):
-        for indices, scores in _view_scores(_rotate_tile(tile, view), scaling, classifier, settings, core_mask, seed):
+        for indices, scores in _view_scores(turn_tile(tile, view), scaling, classifier, settings, core_mask, seed):
             if total is None:
                 total = scores.new_zeros(len(tile), scores.shape[1], dtype=torch.float32)
             total[torch.from_numpy(indices)] += scores.float().softmax(dim=1)
@@ -165,7 +165,7 @@ def _view_scores(
         yield indices, scores[torch.from_numpy(np.searchsorted(visible_points, indices))]
 
 
-def _rotate_tile(tile: CloudTile, view: int) -> CloudTile:
+def turn_tile(tile: CloudTile, view: int) -> CloudTile:
     """Return a tile turned for a view: by the golden angle times its number, and mirrored for odd numbers.
 
     Pieces are cut after turning, so that each view has other borders.

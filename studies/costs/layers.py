@@ -39,7 +39,7 @@ from synthroads_addon.scanning.record import record_as_measured
 from synthroads_addon.scanning.scan import join_results
 from synthroads_addon.scenario.scenario import load_scenario
 
-SCENARIOS = ("rq31-600m", "mobile-mapping-300m", "tripod-200m", "airborne-1000m")
+SCENARIOS = ("rq31-600m", "mobile-mapping-300m", "tripod-200m", "airborne-1000m-even")
 LAYERS = frozenset({"rgb", *MATERIAL_LAYERS})
 KEPT = 0.999
 """Share of the points, those that differ least, whose RMSE is said."""

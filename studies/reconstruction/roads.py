@@ -203,7 +203,7 @@ def scan(parameters: Path, settings: dict[str, Any], folder: Path) -> Path:
         words = [word for path, value in settings.items() for word in ("--set", f"{path}={json.dumps(value)}")]
         words += [
             "--scenario",
-            "airborne-1000m",
+            "airborne-1000m-even",
             "--parameters",
             str(parameters),
             "--output",

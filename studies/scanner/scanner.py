@@ -34,7 +34,7 @@ PLATFORMS = {
     "UAV, rotating mirror": ("rq31-600m", ["road.length=200"]),
     "mobile mapping, two heads": ("mobile-mapping-300m", ["road.length=200"]),
     "tripod, panoramic": ("tripod-200m", []),
-    "aircraft": ("airborne-1000m", []),
+    "aircraft": ("airborne-1000m-even", []),
     "trajectory file": ("rq31-600m", ["road.length=200"]),
 }
 

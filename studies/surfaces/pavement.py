@@ -40,7 +40,7 @@ _SETTINGS = (
 
 def row(seed: int, rays: int) -> str:
     """Return a line of the table, of a road that is built in the open file and scanned."""
-    scenario = load_scenario("airborne-1000m", [*_SETTINGS, f"seed={seed}", f"scan.rays_per_pulse={rays}"])
+    scenario = load_scenario("airborne-1000m-even", [*_SETTINGS, f"seed={seed}", f"scan.rays_per_pulse={rays}"])
     parameters = sample_road(scenario.road, seed)
     geometry = RoadGeometry(parameters)
     scene, blocks = RoadScene.of(scenario, geometry), CollectedBlocks()

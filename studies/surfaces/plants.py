@@ -68,7 +68,7 @@ def measure_canopy(species: str, season: str, seed: int) -> CanopyFigures:
     """
     settings = [*_SETTINGS, f"road.trees_per_hectare={_TREES[species]}", f'road.vegetation.trees=["{species}"]']
     settings += [f"road.environment.winter={int(season == 'winter')}", f"seed={seed}"]
-    scenario = load_scenario("airborne-1000m", settings)
+    scenario = load_scenario("airborne-1000m-even", settings)
     parameters = sample_road(scenario.road, seed)
     geometry = RoadGeometry(parameters)
     scene, blocks = RoadScene.of(scenario, geometry), CollectedBlocks()

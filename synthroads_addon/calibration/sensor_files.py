@@ -225,7 +225,7 @@ def _fit_moving(moving: _MovingSensor, surfaces: dict[str, Material], road: Real
     air = {"scan.attenuation": moving.attenuation}
     scan = _FREE | spacing | _same_surface(moving.name) | air
     surfaces = surfaces | {moving.name: material}
-    return FittedSensor(estimate, refined, device, scan, drawn_values, usual, "airborne-1000m", surfaces)
+    return FittedSensor(estimate, refined, device, scan, drawn_values, usual, "airborne-1000m-even", surfaces)
 
 
 def _same_surface(material: str) -> dict[str, Any]:
@@ -373,7 +373,7 @@ class _MovingSensor:
         middle = {path: float(np.sqrt(minimum * maximum)) for path, (minimum, maximum) in self.usual.items()}
         scan_values = {path: value for path, value in values.items() if path.startswith("scan.")}
         changes = _FREE | spacing | middle | scan_values | _POWER | {"scan.attenuation": self.attenuation}
-        data = apply_values(load_scenario("airborne-1000m").to_dict(), changes)
+        data = apply_values(load_scenario("airborne-1000m-even").to_dict(), changes)
         scan = ScanScenario.from_dict(data["scan"])
         spread_below, spread_above = self.spreads(values)
         pavement = LevelPavement(

@@ -71,7 +71,7 @@ TOLERANCE = {
 def scan(values: Mapping[str, float], seed: int, length: float = 36.0) -> RealClass:
     """Return pavement as the scanner sees it with some settings."""
     given = {path: value for path, value in values.items() if path.startswith("scan.")}
-    data = apply_values(load_scenario("airborne-1000m").to_dict(), FIXED | given)
+    data = apply_values(load_scenario("airborne-1000m-even").to_dict(), FIXED | given)
     scenario = ScanScenario.from_dict(data["scan"])
     material = materials()["asphalt"].model_copy(
         update={"spread_below": values[SPREAD], "spread_above": values[SPREAD], "spread_wavelength": 1.0}
@@ -110,7 +110,7 @@ def test_settings_are_found_again(refined: Refined, path: str) -> None:
 def test_lines_tell_how_far_pulses_lie_apart(lines: float) -> None:
     """Within 5 %, of two swaying strips without times; points at random tell nothing."""
     found = scan(TRUTH | {"scan.lines_per_second": lines}, 3, 60.0)
-    data = apply_values(load_scenario("airborne-1000m").to_dict(), FIXED | {"scan.lines_per_second": lines})
+    data = apply_values(load_scenario("airborne-1000m-even").to_dict(), FIXED | {"scan.lines_per_second": lines})
     step = 750.0 * scanner_setting(ScanScenario.from_dict(data["scan"])).angle_step
     assert pulse_step(found.place, 20.0, 2) == pytest.approx(step, rel=0.05)
     random = np.random.default_rng(1).uniform(0.0, 60.0, (len(found.place), 2))
@@ -160,7 +160,7 @@ def test_a_settings_place_in_the_search_keeps_its_limits() -> None:
 def aircraft() -> _MovingSensor:
     """Return a scanner that flies 800 m above asphalt, of which 20 points/m2 are known and no more."""
     none = SensorEstimate(1, 0.02, 0.02, 0.003, 0.5, 0.15, 1.5, None, None, 0.0, 20.0, 2, 800.0, 0.0, None)
-    scenario = ScanScenario.from_dict(apply_values(load_scenario("airborne-1000m").to_dict(), FIXED)["scan"])
+    scenario = ScanScenario.from_dict(apply_values(load_scenario("airborne-1000m-even").to_dict(), FIXED)["scan"])
     setting = scanner_setting(scenario)
     return _MovingSensor(none, setting.device, setting, materials()["asphalt"], "asphalt", 0.0, True)
 
@@ -191,7 +191,7 @@ def test_an_aircrafts_lines_are_straight_and_parallel_at_uneven_distances() -> N
 
 
 def test_a_pavement_that_nobody_sees_is_refused() -> None:
-    data = apply_values(load_scenario("airborne-1000m").to_dict(), FIXED)
+    data = apply_values(load_scenario("airborne-1000m-even").to_dict(), FIXED)
     scenario = ScanScenario.from_dict(data["scan"])
     dark = materials()["asphalt"].model_copy(update={"base_color": (0.0, 0.0, 0.0), "specular": 0.0})
     with pytest.raises(InputError, match="no pavement that the fitted scanner would see"):

@@ -91,7 +91,7 @@ SWAYING = [
 @pytest.fixture(scope="module")
 def airborne(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ScanPlan]:
     """Write a cloud of two strips from the air, as linear numbers."""
-    points, plan = measured("airborne-1000m", AIRBORNE)
+    points, plan = measured("airborne-1000m-even", AIRBORNE)
     path = tmp_path_factory.mktemp("airborne") / "cloud.las"
     number = points.intensity / points.intensity.max() * 60_000.0
     return write_las(path, points.xyz, number, points.instance_id, points.gps_time), plan
@@ -131,7 +131,7 @@ def test_an_airborne_sensor_is_found_again(
 
 def test_without_times_pairs_of_points_tell_strips_and_what_parts_them() -> None:
     """How many overlap, the gain's step within 0.2 dB, what is left to single echoes, and how they are ranged by it."""
-    points, plan = measured("airborne-1000m", [*AIRBORNE, *SWAYING])
+    points, plan = measured("airborne-1000m-even", [*AIRBORNE, *SWAYING])
     asphalt = points.select(np.flatnonzero(points.instance_id == ASPHALT_LABEL))
     power, none = asphalt.intensity * 800.0**2, np.zeros(len(asphalt))
     road = RealClass("", asphalt.xyz, power, 0, none, none, none.astype(np.uint8))
@@ -201,7 +201,7 @@ def test_numbers_that_are_compensated_for_the_range_come_from_a_device_that_comp
     airborne: tuple[Path, ScanPlan], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A strip that is seen aslant is farther away: its numbers would else be lower than the search had them."""
-    points, _ = measured("airborne-1000m", AIRBORNE)
+    points, _ = measured("airborne-1000m-even", AIRBORNE)
     compensated = points.intensity * points.range.astype(np.float64) ** 2
     numbers = stored(compensated, 100.0, 30.0)
     cloud = write_las(tmp_path / "cloud.las", points.xyz, numbers, points.instance_id, points.gps_time)

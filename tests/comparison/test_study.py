@@ -38,7 +38,7 @@ def cloud(contrast_db: float, seed: int) -> ComparedCloud:
 
 
 def test_only_effects_that_a_scenario_has_are_left_out() -> None:
-    scenario = load_scenario("airborne-1000m", ["scan.noise.speckle=0.2", "scan.motion.position_sigma=0.1"])
+    scenario = load_scenario("airborne-1000m-even", ["scan.noise.speckle=0.2", "scan.motion.position_sigma=0.1"])
     found = dict(variants(scenario))
     assert found[NOTHING] == scenario
     assert {"speckle", "motion"} <= found.keys()

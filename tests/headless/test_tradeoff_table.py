@@ -85,14 +85,14 @@ def test_the_front_is_in_the_table_with_the_noise_of_time() -> None:
 
 def test_images_from_afar_are_coarser() -> None:
     assert row_scenario("rq31-600m", "image_spacing", 30).colour.image_spacing == 30.0
-    far = row_scenario("airborne-1000m", "ground_sampling_distance", 0.12, ["seed=9"])
+    far = row_scenario("airborne-1000m-even", "ground_sampling_distance", 0.12, ["seed=9"])
     assert (far.colour.ground_sampling_distance, far.seed) == (pytest.approx(1.4), 9)
     # What a knob doesn't change is that of the standard fidelity, whichever the scene's own is.
-    assert load_scenario("airborne-1000m").fidelity == "draft"
-    settings = row_scenario("airborne-1000m", "rays_per_pulse", 61).settings()
+    assert load_scenario("airborne-1000m-even").fidelity == "draft"
+    settings = row_scenario("airborne-1000m-even", "rays_per_pulse", 61).settings()
     assert (settings.tolerance, settings.vegetation_detail, settings.rays_per_pulse) == (0.005, 1.0, 61)
-    assert row_scenario("airborne-1000m", "fidelity", "high").fidelity == "high"
-    text = markdown([_row("image_spacing", 30)], "airborne-1000m")
+    assert row_scenario("airborne-1000m-even", "fidelity", "high").fidelity == "high"
+    text = markdown([_row("image_spacing", 30)], "airborne-1000m-even")
     assert text.endswith("here they are 11.7 times as large.\n")
 
 

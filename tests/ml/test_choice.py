@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ml.cards import Domain, Figure, ModelCard
-from ml.choice import CloudTraits, cloud_traits, domain_distance, nearest_model
+from ml.choice import CLEARLY, CloudTraits, cloud_traits, domain_distance, nearest_model, with_agreements
 from synthroads_addon.base.errors import InputError
 from tests.helpers.clouds.road_clouds import block_of, write
 
@@ -76,3 +76,18 @@ def test_traits_are_measured_on_the_cloud(tmp_path: Path) -> None:
     traits = cloud_traits(write(tmp_path / "sweep.laz", block_of(swept, np.full(16_000, 0.5), np.zeros(16_000))))
     assert traits.platform == "tripod"
     assert traits.attributes == frozenset()
+
+
+def test_a_model_that_clearly_agrees_more_with_itself_is_taken_and_said() -> None:
+    choice = nearest_model([AIR, CAR], CloudTraits(300.0, 3.0, "uav", INTENSE))
+    assert choice.card.name == "car"
+    close = with_agreements(choice, [AIR, CAR], {"air": 0.70 + 0.9 * CLEARLY, "car": 0.70})
+    assert close.card.name == "car"
+    clear = with_agreements(choice, [AIR, CAR], {"air": 0.70 + 1.1 * CLEARLY, "car": 0.70})
+    assert clear.card.name == "air"
+    assert clear.distance == domain_distance(AIR, choice.traits)
+    for tried in (close, clear):
+        assert "air 0.7" in tried.why()
+        assert "car 0.70" in tried.why()
+        assert set(tried.to_dict()["agreements"]) == {"air", "car"}
+    assert "agreements" not in choice.to_dict()

@@ -170,7 +170,7 @@ def scenes() -> dict[str, list[str]]:
         "rq31-600m": [*uav, "scan.platform.height=100", "road.trees_per_hectare=80", "road.grass_density=0.5"],
         "mobile-mapping-300m": ["road.length=150", "road.half_width=25"],
         "tripod-200m": ["road.length=100", "road.half_width=30", "road.grass_density=0.2"],
-        "airborne-1000m": ["road.length=300", "road.half_width=60"],
+        "airborne-1000m-even": ["road.length=300", "road.half_width=60"],
     }
 
 

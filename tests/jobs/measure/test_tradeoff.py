@@ -188,7 +188,7 @@ def test_relief_and_spacing_leave_their_errors(tmp_path: Path) -> None:
 
 @pytest.mark.any_blender
 def test_heights_are_within_the_tolerance_but_where_the_pavement_changes_at_once() -> None:
-    scenario = load_scenario("airborne-1000m", ["road.half_width=40"])
+    scenario = load_scenario("airborne-1000m-even", ["road.half_width=40"])
     parameters = sample_road(scenario.road, scenario.seed)
     geometry = RoadGeometry(parameters)
     steps = [step for section in geometry.sections.values() for step in section.steps()]

@@ -1,0 +1,68 @@
+"""A model's agreement with itself is Cohen's kappa of two views of a part of the cloud."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ml.prediction import predict
+from ml.segmentation.scoring import EDGE
+from ml.segmentation.self_agreement import ENOUGH_POINTS, SQUARES, _draw_squares, _kappa, sample_cloud, self_agreement
+from ml.shipped import open_run
+from synthroads_addon.base.random_streams import stream
+from tests.helpers.clouds.road_clouds import block_of, write
+
+
+def test_kappa_is_agreement_beyond_chance() -> None:
+    assert _kappa(np.diag([30, 50, 20])) == pytest.approx(1.0)
+    assert _kappa(np.diag([100, 0])) == 0.0
+    independent = np.outer([60, 40], [70, 30])
+    assert _kappa(independent) == pytest.approx(0.0, abs=1e-12)
+    # Cohen's own example of two raters: observed 0.70, by chance 0.41.
+    assert _kappa(np.array([[88, 14, 18], [10, 40, 10], [2, 6, 12]])) == pytest.approx(0.4915, abs=1e-4)
+
+
+def test_squares_are_drawn_until_there_are_enough_points() -> None:
+    dense = Counter({(0, place): ENOUGH_POINTS for place in range(20)})
+    assert len(_draw_squares(dense, stream(0, "self-agreement"))) == 1
+    thin = Counter({(0, place): 100 for place in range(20)})
+    assert len(_draw_squares(thin, stream(0, "self-agreement"))) == 6
+    assert len(_draw_squares(Counter({(0, 0): 1}), stream(0, "self-agreement"))) == 1
+
+
+@pytest.fixture
+def unlike(tmp_path: Path) -> Path:
+    """Return a cloud that no shipped model was trained on: dense, uneven, along a road of 60 m with posts."""
+    rng = np.random.default_rng(5)
+    along, across = rng.uniform(0.0, 60.0, 80_000), rng.normal(0.0, 2.0, 80_000)
+    ground = np.column_stack([along, across, rng.normal(0.0, 0.01, 80_000)])
+    posts = np.column_stack(
+        [np.repeat(np.arange(0.0, 60.0, 6.0), 300), np.full(3000, 4.0), np.tile(np.linspace(0.0, 1.2, 300), 10)]
+    )
+    xyz = np.concatenate([ground, posts]) + [1000.0, 2000.0, 50.0]
+    return write(tmp_path / "unlike.laz", block_of(xyz, rng.uniform(0.1, 0.5, len(xyz)), np.zeros(len(xyz))))
+
+
+def test_the_sample_holds_what_lies_in_its_squares(unlike: Path) -> None:
+    sample = sample_cloud(unlike)
+    squares = np.unique(np.floor((sample.coord[:, :2] + sample.origin[:2]) / EDGE), axis=0)
+    assert 1 <= len(squares) <= SQUARES
+    assert len(sample) > 80_000
+    assert sample.strength is not None
+    assert sample.color is None
+    again = sample_cloud(unlike)
+    assert (again.coord == sample.coord).all()
+
+
+def test_a_model_sees_a_cloud_that_none_was_trained_on_twice(unlike: Path, tmp_path: Path) -> None:
+    predicted = predict(unlike, tmp_path / "labelled.laz")
+    assert predicted.choice is not None
+    assert predicted.choice.doubtful
+    assert set(predicted.choice.agreements) == {"segmentation-overhead", "segmentation-sweeps"}
+    name = predicted.choice.card.name
+    expected = self_agreement(open_run(Path(name)), sample_cloud(unlike))
+    assert predicted.choice.agreements[name] == pytest.approx(expected, abs=1e-6)
+    assert "agree with themselves" in predicted.choice.why()
