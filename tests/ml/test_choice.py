@@ -60,7 +60,7 @@ def test_a_cloud_without_what_a_model_needs_is_not_for_it() -> None:
     plain = CloudTraits(300.0, 30.0, "mobile", frozenset())
     assert domain_distance(CAR, plain) == inf
     assert nearest_model([AIR, CAR], plain).card.name == "air"
-    with pytest.raises(InputError, match="need intensity"):
+    with pytest.raises(InputError, match="need clouds with intensity"):
         nearest_model([CAR], plain)
 
 
