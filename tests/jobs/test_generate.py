@@ -35,7 +35,6 @@ ROOT = Path(__file__).parents[2]
 REAL_AXIS = ROOT.parent / "shared" / "real" / "als_rural2lane_t211-278_axis.csv"
 SMALL = ["fidelity=draft", "road.length=120", "road.half_width=40", "scan.platform.lateral_offsets=[5]"]
 SMALL += ["scan.lines_per_second=50", "scan.platform.speed=24", "colour.source=material"]
-SCANNED = '["parameters","cloud","centerline"]'
 
 
 def job(output: Path, *changes: str, **options) -> Job:
@@ -274,17 +273,17 @@ def edge_distance(mesh, face: int, origin: np.ndarray, direction: np.ndarray) ->
     return min(distances)
 
 
+@pytest.mark.slow
 @pytest.mark.any_blender
 @pytest.mark.skipif(not REAL_AXIS.exists(), reason="needs the real axis beside the checkout")
-@pytest.mark.parametrize("outputs", ['["parameters"]', pytest.param(SCANNED, marks=pytest.mark.slow)])
-def test_a_real_axis_is_met_and_scanned(tmp_path: Path, outputs: str) -> None:
+def test_a_real_axis_is_met_and_scanned(tmp_path: Path) -> None:
+    """Made axes are met in tests/fitting."""
     fast = ("vegetation_detail=0", "scan.platform.speed=40", "scan.lines_per_second=20")
-    report = generate(job(tmp_path, *fast, f"outputs={outputs}", axis=REAL_AXIS))
+    report = generate(job(tmp_path, *fast, 'outputs=["parameters","cloud","centerline"]', axis=REAL_AXIS))
     fit = report["axis"]["horizontal"]
     assert fit["rms"] <= 0.05
     assert fit["p95"] <= 0.10
-    if outputs == SCANNED:
-        assert report["counts"]["points"] > 40_000
+    assert report["counts"]["points"] > 40_000
     parameters = read_parameters(tmp_path / "parameters.json")
     given = np.genfromtxt(REAL_AXIS, delimiter=",", names=True)
     geometry = RoadGeometry(parameters)
