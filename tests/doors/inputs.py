@@ -91,12 +91,13 @@ def _scenario(python: Path, folder: Path) -> None:
     (folder / "small.json").write_text(json.dumps(scenario), encoding="utf-8")
 
 
-def _recipe(name: str, scenes: dict[str, str]) -> Callable[[Path, Path], None]:
-    """Return what writes a shipped recipe with fewer scenes: NAME.yaml; groups that aren't named are left out.
+def _recipe(name: str, scenes: dict[str, str], file: str = "") -> Callable[[Path, Path], None]:
+    """Return what writes a shipped recipe with fewer scenes; groups that aren't named are left out.
 
     Args:
         name: of the recipe.
         scenes: name of a group -> its splits, as the recipe writes them, with one scene each.
+        file: that is written; NAME.yaml if empty.
     """
 
     def write(python: Path, folder: Path) -> None:
@@ -110,7 +111,7 @@ def _recipe(name: str, scenes: dict[str, str]) -> Callable[[Path, Path], None]:
                 kept.append(re.sub(r"(?m)^(    split:) .*$", rf"\1 {scenes[called]}", text, count=1))
         if len(kept) != len(scenes) + 1:
             raise ValueError(f"{name}: its groups are others than {', '.join(scenes)}")
-        (folder / f"{name}.yaml").write_text("  - name: ".join(kept), encoding="utf-8")
+        (folder / (file or f"{name}.yaml")).write_text("  - name: ".join(kept), encoding="utf-8")
 
     return write
 
@@ -125,6 +126,7 @@ INPUTS: dict[str, Callable[[Path, Path], None]] = {
     "road.json": _road,
     "small.json": _scenario,
     "reference.yaml": _recipe("reference", {"plain-600": "{train: 1, test: 1}", "gantries-600": "{train: 1}"}),
+    "one-scene.yaml": _recipe("reference", {"plain-600": "{train: 1}"}, "one-scene.yaml"),
     "standin.yaml": _recipe("standin", {"roads": "{train: 1}", "gantries": "{test_gantries: 1}"}),
     "small-roads.yaml": _recipe("small-roads", {"roads": "{train: 1, validation: 1, test: 1}"}),
 }

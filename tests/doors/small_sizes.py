@@ -63,7 +63,7 @@ class Small:
 
 
 _ROAD = "--set road.length=60 --set road.half_width=20 --set scan.platform.speed=30"
-_SMALL_ROAD = {'"fidelity=draft"': '"fidelity=draft", "road.length=60", "road.half_width=20"'}
+_SMALL_ROAD = {'"fidelity=draft"': '"fidelity=draft", "road.length=60", "road.half_width=20", "scan.platform.speed=30"'}
 _DRAFT = f"--fidelity draft {_ROAD}"
 _CLOUD = """--set 'outputs=["parameters", "cloud"]'"""
 _SCENES = f"--set fidelity=draft {_ROAD} --set road.half_width=25"
@@ -136,7 +136,7 @@ ROWS = (
     Small("synthroads gallery --output out/gallery", "--only materials-roughness --width 64 --samples 1", both=True),
     Small("synthroads generate --tolerance height=5mm,intensity=5% --output out/exact", _ROAD),
     Small("synthroads tradeoff --output out/tradeoff", "--knobs caster --scenario small.json", {}, ("small.json",)),
-    Small("synthroads benchmark --output out/benchmark", "--quick --cores 1", seconds=240.0),
+    Small("synthroads benchmark --output out/benchmark", "--quick --cores 1 --parts demo", seconds=120.0),
     Small("synthroads list devices"),
     Small("pip install -e '.[ml]'", reason=_PIP),
     Small("pip install -e '.[twin]'", reason=_PIP),
@@ -229,9 +229,8 @@ ROWS = (
     Small(
         "# A data set",
         "",
-        {'"reference"': '"reference.yaml"', **_SMALL_ROAD},
-        ("reference.yaml",),
-        seconds=180.0,
+        {'"reference"': '"one-scene.yaml"', **_SMALL_ROAD},
+        ("one-scene.yaml",),
     ),
     Small("# The geometric-semantic models of a road"),
     Small("# How surely a cloud is told from real ones", inputs=("real.yaml",)),

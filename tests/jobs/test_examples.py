@@ -132,9 +132,25 @@ def test_a_thing_of_ones_own_is_in_cloud_and_twin(tmp_path: Path) -> None:
         assert there == "in"
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name != "torch_dataset"])
-def test_help_says_what_to_give_and_makes_nothing(name: str, tmp_path: Path) -> None:
-    assert re.search(rf"usage: {name}\.py \[-h\] output( \[\w+\])?\n", run(name, "--help", cwd=tmp_path))
+HELP = """
+import contextlib, os, runpy, sys
+for script in sys.argv[1:]:
+    sys.argv = [script, "--help"]
+    with contextlib.suppress(SystemExit):
+        runpy.run_path(script, run_name="__main__")
+sys.stdout.flush()
+os._exit(0) # Blender's own teardown can hang
+"""
+
+
+def test_help_says_what_to_give_and_makes_nothing(tmp_path: Path) -> None:
+    """All in one process, as each takes seconds to load Blender."""
+    names = [name for name in NAMES if name != "torch_dataset"]
+    words = [sys.executable, "-c", HELP, *(str(EXAMPLES / name / f"{name}.py") for name in names)]
+    environment = os.environ | {"PYTHONPATH": str(EXAMPLES.parent)}
+    done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    told = re.findall(r"usage: (\w+)\.py \[-h\] output(?: \[\w+\])?\n", done.stdout)
+    assert told == names, done.stderr[-2000:]
     assert not list(tmp_path.iterdir())
 
 

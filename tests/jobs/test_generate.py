@@ -273,9 +273,11 @@ def edge_distance(mesh, face: int, origin: np.ndarray, direction: np.ndarray) ->
     return min(distances)
 
 
+@pytest.mark.slow
 @pytest.mark.any_blender
 @pytest.mark.skipif(not REAL_AXIS.exists(), reason="needs the real axis beside the checkout")
 def test_a_real_axis_is_met_and_scanned(tmp_path: Path) -> None:
+    """Made axes are met in tests/fitting."""
     fast = ("vegetation_detail=0", "scan.platform.speed=40", "scan.lines_per_second=20")
     report = generate(job(tmp_path, *fast, 'outputs=["parameters","cloud","centerline"]', axis=REAL_AXIS))
     fit = report["axis"]["horizontal"]

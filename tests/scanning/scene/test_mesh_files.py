@@ -1,4 +1,4 @@
-"""glTF files looked at before Blender reads them: addresses that leave the folder, and what isn't a regular file."""
+"""Files of meshes before Blender reads them: addresses that leave the folder, faces without vertices, pipes."""
 
 from __future__ import annotations
 
@@ -113,3 +113,19 @@ def test_nodes_below_themselves_and_text_nested_without_end_are_refused(folder: 
     (folder / "deep.gltf").write_text("[" * 100_000)
     with pytest.raises(InputError, match="nested too deeply"):
         check_mesh_file(folder / "deep.gltf")
+
+
+@pytest.mark.parametrize("order", ["little", "big"])
+@pytest.mark.parametrize(("count", "sign"), [("uchar", "B"), ("ushort", "H")])
+def test_faces_of_a_binary_ply_name_vertices_that_are_there(tmp_path: Path, order: str, count: str, sign: str) -> None:
+    """Faces of three and four corners, whose number is of another type than the corners are."""
+    path, end = tmp_path / "thing.ply", {"little": "<", "big": ">"}[order]
+    head = f"ply\nformat binary_{order}_endian 1.0\nelement vertex 5\nproperty float x\nelement face 2\n"
+    head += f"property list {count} int vertex_indices\nend_header\n"
+    for last in (4, 5):
+        faces = struct.pack(f"{end}{sign}3i{sign}4i", 3, 0, 1, 2, 4, 0, 1, 3, last)
+        path.write_bytes(head.encode() + struct.pack(f"{end}5f", *range(5)) + faces)
+        if last == 4:
+            check_mesh_file(path)
+    with pytest.raises(InputError, match="a face names a vertex that is none of its 5"):
+        check_mesh_file(path)

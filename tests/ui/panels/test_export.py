@@ -52,7 +52,7 @@ def road() -> Any:
 
 
 def build(settings: Any) -> None:
-    settings.road.length, settings.seed = 120.0, 3
+    settings.road.length, settings.road.half_width, settings.seed = 60.0, 20.0, 3
     bpy.ops.synthroads.build()
     set_modifier_input(bpy.data.objects["Road"].modifiers[0], "Right Lane 1 Width", 4.5)
 

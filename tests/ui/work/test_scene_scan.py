@@ -157,45 +157,44 @@ def test_a_scene_in_other_units_is_a_message(yard: Any) -> None:
     assert bpy.ops.synthroads.scan() == {"FINISHED"}
 
 
+FAR = 20_000.0
+"""How far east (m) of the origin a scene is moved, for coordinates that are held in steps of 2 mm."""
+
+
 @pytest.mark.parametrize(
     ("visible", "boxes", "source"), [("render", 2, "material"), ("viewport", 1, "material"), ("render", 2, "images")]
 )
 def test_the_panel_scans_and_says_what_the_command_does(yard: Any, visible: str, boxes: int, source: str) -> None:
-    """A box that the viewport hides, hair, and a card that is clear: seen, named and passed as by `synthroads scan`."""
+    """A box that the viewport hides, hair, and a card that is clear: seen, named and passed as by `synthroads scan`.
+
+    Remarks of either Blender are in the report: on coordinates far from the origin, and faces whose vertices are of
+    two classes.
+    """
     choose(yard, **CHEAP | {"colour.source": source})
     twin = bpy.data.objects.new("Twin", bpy.data.objects["Box"].data)
     twin.location = (-8.0, 3.0, 2.0)
     bpy.context.scene.collection.objects.link(twin)
-    bpy.context.view_layer.update()
-    twin.hide_viewport = True
     settings = bpy.data.objects["Box"].modifiers.new("Fur", "PARTICLE_SYSTEM").particle_system.settings
     settings.type, settings.render_type, settings.count = "HAIR", "PATH", 3
     nodes = Nodes()
     CASES["noise"].build(nodes)
     add_card(nodes.item, size=2.0, height=9.0)
+    layer = bpy.data.objects["Box"].data.attributes.new("class_id", "INT", "POINT")
+    layer.data.foreach_set("value", [4] * 4 + [5] * 4)
+    for item in bpy.data.objects:
+        item.location.x += FAR
+    bpy.context.view_layer.update()
+    twin.hide_viewport = True
     bpy.context.scene.synthroads_scene_scan.visible = visible
     bpy.context.view_layer.update()
     before = lines()
     points, _, report = scanned(yard)
     assert changes(before) == []
     high = points[(points[:, 2] > 0.5) & (points[:, 2] < 8.0)]
-    assert len(set((high[:, 0] > 0.0).tolist())) == boxes
+    assert len(set((high[:, 0] > FAR).tolist())) == boxes
     text = " ".join(report["warnings"])
     assert "Box: hair can't be scanned" in text
     assert "the transparency of the material 'Clear' can't be worked out (Noise Texture" in text
-
-
-@pytest.mark.parametrize("source", ["material", "images"])
-def test_remarks_of_either_blender_are_in_the_report(yard: Any, source: str) -> None:
-    """Steps of coordinates far from the origin, and faces whose vertices are of two classes."""
-    choose(yard, **CHEAP | {"colour.source": source})
-    box = bpy.data.objects["Box"]
-    layer = box.data.attributes.new("class_id", "INT", "POINT")
-    layer.data.foreach_set("value", [4] * 4 + [5] * 4)
-    for item in bpy.data.objects:
-        item.location.x += 20_000.0
-    bpy.context.view_layer.update()
-    _, _, report = scanned(yard)
-    (mixed,) = (text for text in report["remarks"] if "faces have vertices of several class_id" in text)
-    assert mixed.startswith("Box: 4 faces")
+    mixed = [text for text in report["remarks"] if "faces have vertices of several class_id" in text]
+    assert [text.partition(" faces")[0] for text in mixed] == ["Box: 4", "Twin: 4"][:boxes]
     assert len([text for text in report["remarks"] if "are held in steps of 2 mm" in text]) == 1
