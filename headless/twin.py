@@ -109,7 +109,7 @@ def _written(path: Path) -> str:
 
 def _line(report: Path, reasons: dict[str, int]) -> str:
     """Return a line of text on a format's report: its file name, and how many instances are missing and why."""
-    losses_text = "; ".join(f"{count} not: {reason}" for reason, count in reasons.items())
+    losses_text = "; ".join(f"{count} aren't in the file: {reason}" for reason, count in reasons.items())
     return f"        {report.name}: what became of each instance number{f'; {losses_text}' if losses_text else ''}"
 
 

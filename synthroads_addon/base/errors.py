@@ -67,7 +67,7 @@ def _plain(value: object) -> object:
 
 MOST_NAMES = 3
 """Most names that a hint suggests. Chosen."""
-_SLIP, _LIKENESS = 0.8, 0.6
+_SLIP, _LIKENESS = 0.8, 0.65
 """Likeness (0 to 1, Ratcliff and Obershelp 1988) of a name with a slip of the keys, and of one worth a hint. Chosen."""
 
 

@@ -309,7 +309,7 @@ def _say_unlabelled(job: SceneScan, inputs: SceneInputs, scene: ScannedScene) ->
     file = job.output / CLASSES
     if not file.exists():
         write_file(file, things.mapping().to_json().encode())
-    _logger.warning("warning: %s. Fill in %s and scan with --classes %s", things.text(), file, file)
+    _logger.warning("warning: %s. Fill in %s and scan with --classes %s --overwrite", things.text(), file, file)
     return str(file)
 
 
@@ -321,5 +321,5 @@ def warnings_of_counts(counts: dict[str, Any], classes: str = "") -> list[str]:
         classes: file of classes that can be filled in; empty if there is none.
     """
     unlabelled = int(counts["points_by_class"].get("unlabelled", 0))
-    remedy = f": fill in {classes} and scan with --classes {classes}" if classes else ""
+    remedy = f": fill in {classes} and scan with --classes {classes} --overwrite" if classes else ""
     return [*empty_scan_warnings(counts), *([f"{unlabelled:,} points have no class{remedy}"] if unlabelled else [])]

@@ -129,9 +129,10 @@ def test_scenes_of_others_are_scanned_with_their_classes(
     for kind in (floor, pillars, thing):
         assert len(kind) > 100
     assert len(np.unique(las.instance_id)) == 4
+    remedy = f"fill in {open_classes} and scan with --classes {open_classes} --overwrite"
     assert report(tmp_path / "out")["warnings"] == [
         f"{mapping}: nothing in the scene is named as in materials: Nothing*",
-        f"{len(thing):,} points have no class: fill in {open_classes} and scan with --classes {open_classes}",
+        f"{len(thing):,} points have no class: {remedy}",
     ]
 
 
@@ -150,7 +151,7 @@ def test_what_has_no_class_is_said_before_the_scan_with_a_file_to_fill_in(
     said = capsys.readouterr().err
     assert "warning: 4 of 4 objects have no class, and their points will have none: " in said
     assert "objects Floor, Pillar.*, Thing; materials Tar" in said
-    assert f"Fill in {output / 'classes.json'} and scan with --classes {output / 'classes.json'}" in said
+    assert f"Fill in {output / 'classes.json'} and scan with --classes {output / 'classes.json'} --overwrite" in said
     classes = json.loads((output / "classes.json").read_text())
     assert classes == {
         "objects": {"Floor": "", "Pillar.*": "", "Thing": ""},

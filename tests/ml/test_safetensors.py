@@ -52,7 +52,7 @@ def test_a_damaged_file_is_one_line(tmp_path: Path) -> None:
     for content, said in (
         (whole[:-4], "must lie inside the file"),
         (whole[:20], "must be an undamaged file of weights"),
-        (b"", "is no"),
+        (b"", "must be an undamaged file of weights"),
     ):
         path.write_bytes(content)
         with pytest.raises(InputError, match=said):

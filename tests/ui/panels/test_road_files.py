@@ -125,7 +125,7 @@ def test_the_panel_takes_the_road_of_a_name(cheap: Any, tmp_path: Path) -> None:
     assert built()[0].alignment.length == pytest.approx(150.0)
     assert bpy.ops.synthroads.load_axis(filepath=str(path)) == {"FINISHED"}
     assert built()[0].alignment.length == pytest.approx(200.0)
-    with pytest.raises(RuntimeError, match=r"'none': it has 'main', 'side'"):
+    with pytest.raises(RuntimeError, match=r"'none': must be one of the roads in the file: 'main', 'side'"):
         bpy.ops.synthroads.load_axis(filepath=str(path), axis_name="none")
 
 
