@@ -388,13 +388,15 @@ def simplified(fit: Match, station: Float, values: Float, allowed: float) -> Mat
 
 
 def _simpler(model: Model, element: int) -> Iterator[Model]:
-    """Yield models with less freedom about an element: without it, of a simpler kind, smooth at its end."""
+    """Yield models with less freedom about an element: without it, a clothoid, of a simpler kind, smooth at its end."""
     kinds = model.kinds
     if model.size > 1:
         yield _without(model, element)
     if 0 < element < model.size - 1:
         for kind in {int(kinds[element - 1]), int(kinds[element]), int(kinds[element + 1])}:
             yield _as_one(model, element, kind)
+        if model.order == 2 and kinds[element] == EQUAL and FREE not in kinds[[element - 1, element + 1]]:
+            yield _eased(model, element)
     for kind in (ZERO, EQUAL) if model.order == 2 else (EQUAL,):
         if kinds[element] < kind or (kinds[element] == EQUAL and kind == ZERO):
             yield _of_kind(model, element, kind)
@@ -411,6 +413,14 @@ def _of_kind(model: Model, element: int, kind: int) -> Model:
     for knot in (element - 1, element):
         if 0 <= knot < model.size - 1 and FREE not in kinds[knot : knot + 2]:
             smooth[knot] = False
+    return replace(model, kinds=kinds, smooth=smooth)
+
+
+def _eased(model: Model, element: int) -> Model:
+    """Return the model with a clothoid, continuous at both ends, in place of an arc between two lines or arcs."""
+    kinds, smooth = model.kinds.copy(), model.smooth.copy()
+    kinds[element] = FREE
+    smooth[[element - 1, element]] = True
     return replace(model, kinds=kinds, smooth=smooth)
 
 

@@ -56,8 +56,14 @@ _CUBIC = 0.02
 _NOISES = 6.0
 """Standard deviations of the points' noise that they may be off. Chosen: none of some hundred million normal points is
 farther off."""
+_UNITS = (1e-2, 1e-3, 1e-4)
+"""Units (m) that files round coordinates to."""
+_OF_ROUNDING = 0.5
+"""Units up to which the noise of rounded coordinates is that of rounding. Chosen: its standard deviation is 0.29."""
 _SHARE = 0.45
 """Freedom of the pieces over the points from which on there are too many. Chosen: then each follows its own points."""
+_DOUBTFUL = 0.5
+"""Share of the allowed swing that elements may have which miss their points. Chosen: they are hardly the design's."""
 _FLAT = 1e-10
 """Change of grade below which none is seen. Chosen: a nanometre over 10 m."""
 _MANY = 2.0
@@ -125,15 +131,29 @@ def bend_between(alignment: Alignment, points: Float, stations: Float) -> float:
     return float(np.maximum(np.maximum(low - sagitta, sagitta - high), 0.0).max(initial=0.0))
 
 
-def elements_of(station: Float, values: Float, order: int, unsure: float = 0.0) -> Model:
+def rounding_of(coordinates: Float) -> float:
+    """Return the unit (m) that all coordinates are rounded to: 1 cm, 1 mm or 0.1 mm; 0 if it is none of these."""
+    for unit in _UNITS:
+        in_units = coordinates / unit
+        if np.abs(in_units - np.round(in_units)).max(initial=0.0) < 1e-3:
+            return unit
+    return 0.0
+
+
+def elements_of(station: Float, values: Float, order: int, unsure: float = 0.0, rounding: float = 0.0) -> Model:
     """Return the model of values (N,) at stations (N,): the unrolled line (order 2) or heights (order 1), in m.
 
     Args:
         station, values: m.
         order: of the derivative that is linear on an element.
         unsure: what the values may be off, beside noise, m.
+        rounding: unit that the coordinates of a plan's points are rounded to, m; 0 if they aren't.
     """
-    fine = max(_NOISES * noise_of(station, values, order + 1), _FINE, unsure)
+    noise = noise_of(station, values, order + 1)
+    # Rounding moves a point by half a unit along both axes: no more, where normal noise has no bound.
+    farthest = 0.5 * rounding * np.sqrt(2.0)
+    spread = farthest if noise <= _OF_ROUNDING * rounding else _NOISES * noise
+    fine = max(spread, _FINE, unsure)
     parts: list[Model] = []
     first, width = 0, _WINDOW
     while True:
@@ -231,9 +251,10 @@ def _searched(points: Float, least: float, tolerance: float) -> Followed:
     """Return the elements found in points that may be off pieces by a least distance (m), the best of some passes."""
     station, values = unrolled(points)
     unsure = max(_unrolling_error(points), least)
+    rounding = rounding_of(points)
     best: Followed | None = None
     for _ in range(1 if least else _PASSES):
-        model = elements_of(station, values, 2, unsure)
+        model = elements_of(station, values, 2, unsure, rounding)
         trial = refined(points, Followed(model, _pose(points, model), station, np.zeros(len(station))))
         if best is None or trial.rank(points, tolerance) < best.rank(points, tolerance):
             best = trial
@@ -405,8 +426,9 @@ def heights_followed(station: Float, heights: Float, length: float, tolerance: f
     """
     if len(station) > 2 * _SPARSE and noise_of(station, heights, 2) > _NOISY:
         return None
-    model = match(elements_of(station, heights, 1), station, heights).model
-    return profile_of(without_swings(model, station, heights, tolerance), length)
+    fit = match(elements_of(station, heights, 1), station, heights)
+    limit = tolerance if fit.worst <= _ALLOWED else _DOUBTFUL * tolerance
+    return profile_of(without_swings(fit.model, station, heights, limit), length)
 
 
 def profile_of(model: Model, length: float) -> Profile:
