@@ -159,7 +159,7 @@ def test_following_takes_no_longer_than_the_usual_fit() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("step", "right"), [(2.0, 12), (10.0, 5)])
+@pytest.mark.parametrize(("step", "right"), [(2.0, 17), (10.0, 7)])
 def test_drawn_axes_come_back_from_points(step: float, right: int) -> None:
     """The figures of docs/roads.md: `-s` shows them."""
     worst, same = 0.0, 0
@@ -171,7 +171,7 @@ def test_drawn_axes_come_back_from_points(step: float, right: int) -> None:
         worst = max(worst, float(np.abs(off).max()))
         same += [e.kind for e in found.elements] == [e.kind for e in truth.elements]
     print(f"every {step:g} m: elements of {same} of 20 axes come back, all within {1000.0 * worst:.1f} mm")
-    assert worst < 0.05
+    assert worst < (0.002 if step < 5.0 else 0.02)
     assert same >= right
 
 
