@@ -21,13 +21,12 @@ from synthroads_addon.base.files import output_folder
 from synthroads_addon.base.remarks import remarks_so_far
 from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.base.text.table import text_table
+from synthroads_addon.road_files.kinks import FARTHEST_ROUNDING
 from synthroads_addon.scenario.scenario import load_scenario, scenario_names
 
 PARAMETERS, CENTRELINE, REPORT = "parameters.json", "centerline.geojson", "road.json"
 PICTURE = "deviation.png"
 _FIELDS = {"seed": "seed"}
-_LARGEST = 5.0
-"""Largest distance from a kink that a rounding may be asked for, m."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -130,8 +129,8 @@ def _distance(text: str) -> float:
         value = float(text)
     except ValueError:
         value = -1.0
-    if not 0.0 < value <= _LARGEST:
-        raise argparse.ArgumentTypeError(f"{text!r}: a distance above 0 and up to {_LARGEST:g} m is needed")
+    if not 0.0 < value <= FARTHEST_ROUNDING:
+        raise argparse.ArgumentTypeError(f"{text!r}: a distance above 0 and up to {FARTHEST_ROUNDING:g} m is needed")
     return value
 
 

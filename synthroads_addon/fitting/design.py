@@ -443,13 +443,15 @@ def simplify_match(fit: Match, station: Float, values: Float, tolerance: float) 
 
 
 def _simpler_models(model: Model, element: int) -> Iterator[Model]:
-    """Yield models with less freedom around an element: without it, merged, of a simpler kind, or smooth at its end."""
+    """Yield models with less freedom about an element: without it, a clothoid, of a simpler kind, smooth at its end."""
     kinds = model.kinds
     if model.size > 1:
         yield _remove_element(model, element)
     if 0 < element < model.size - 1:
         for kind in {int(kinds[element - 1]), int(kinds[element]), int(kinds[element + 1])}:
             yield _merge_with_neighbours(model, element, kind)
+        if model.order == 2 and kinds[element] == EQUAL and FREE not in kinds[[element - 1, element + 1]]:
+            yield _replace_by_clothoid(model, element)
     for kind in (ZERO, EQUAL) if model.order == 2 else (EQUAL,):
         if kinds[element] < kind or (kinds[element] == EQUAL and kind == ZERO):
             yield _set_kind(model, element, kind)
@@ -466,6 +468,14 @@ def _set_kind(model: Model, element: int, kind: int) -> Model:
     for knot in (element - 1, element):
         if 0 <= knot < model.size - 1 and FREE not in kinds[knot : knot + 2]:
             is_smooth[knot] = False
+    return replace(model, kinds=kinds, smooth=is_smooth)
+
+
+def _replace_by_clothoid(model: Model, element: int) -> Model:
+    """Return the model with a clothoid, continuous at both ends, in place of an arc between two lines or arcs."""
+    kinds, is_smooth = model.kinds.copy(), model.smooth.copy()
+    kinds[element] = FREE
+    is_smooth[[element - 1, element]] = True
     return replace(model, kinds=kinds, smooth=is_smooth)
 
 

@@ -56,8 +56,14 @@ _CUBIC = 0.02
 _NOISES = 6.0
 """Standard deviations of the points' noise that they may be off. Chosen: none of some hundred million normal points is
 farther off."""
+_UNITS = (1e-2, 1e-3, 1e-4)
+"""Units (m) that files round coordinates to."""
+_OF_ROUNDING = 0.5
+"""Units up to which the noise of rounded coordinates is that of rounding. Chosen: its standard deviation is 0.29."""
 _SHARE = 0.45
 """Freedom of the pieces over the points from which on there are too many. Chosen: then each follows its own points."""
+_DOUBTFUL = 0.5
+"""Share of the allowed swing that elements may have which miss their points. Chosen: they are hardly the design's."""
 _FLAT = 1e-10
 """Change of grade below which none is seen. Chosen: a nanometre over 10 m."""
 _MANY = 2.0
@@ -126,15 +132,29 @@ def excess_bend(alignment: Alignment, points: Float, stations: Float) -> float:
     return float(np.maximum(np.maximum(lower_limit - sagitta, sagitta - upper_limit), 0.0).max(initial=0.0))
 
 
-def find_elements(station: Float, values: Float, order: int, values_error: float = 0.0) -> Model:
+def rounding_unit(coordinates: Float) -> float:
+    """Return the unit (m) that all coordinates are rounded to: 1 cm, 1 mm or 0.1 mm; 0 if it is none of these."""
+    for unit in _UNITS:
+        in_units = coordinates / unit
+        if np.abs(in_units - np.round(in_units)).max(initial=0.0) < 1e-3:
+            return unit
+    return 0.0
+
+
+def find_elements(station: Float, values: Float, order: int, values_error: float = 0.0, rounding: float = 0.0) -> Model:
     """Return the model of values (N,) at stations (N,): the unrolled line (order 2) or heights (order 1), in m.
 
     Args:
         station, values: m.
         order: order of the derivative that is linear on an element.
         values_error: error of the values beside their noise, m.
+        rounding: unit that the coordinates of a plan's points are rounded to, m; 0 if they aren't.
     """
-    piece_tolerance = max(_NOISES * noise_std(station, values, order + 1), _FINE, values_error)
+    noise = noise_std(station, values, order + 1)
+    # Rounding moves a point by half a unit along both axes: no more, where normal noise has no bound.
+    largest_move = 0.5 * rounding * np.sqrt(2.0)
+    spread = largest_move if noise <= _OF_ROUNDING * rounding else _NOISES * noise
+    piece_tolerance = max(spread, _FINE, values_error)
     parts: list[Model] = []
     first_point, width = 0, _WINDOW
     while True:
@@ -255,9 +275,10 @@ def _search_elements(points: Float, values_error: float, tolerance: float) -> De
     """
     station, values = unroll_points(points)
     piece_error = max(_unrolling_error(points), values_error)
+    rounding = rounding_unit(points)
     best_fit: DesignFit | None = None
     for _ in range(1 if values_error else _PASSES):
-        model = find_elements(station, values, 2, piece_error)
+        model = find_elements(station, values, 2, piece_error, rounding)
         trial = refine_design(points, DesignFit(model, _pose(points, model), station, np.zeros(len(station))))
         if best_fit is None or trial.rank(points, tolerance) < best_fit.rank(points, tolerance):
             best_fit = trial
@@ -463,8 +484,9 @@ def follow_heights(station: Float, heights: Float, length: float, tolerance: flo
     """
     if len(station) > 2 * _SPARSE and noise_std(station, heights, 2) > _NOISY:
         return None
-    model = match(find_elements(station, heights, 1), station, heights).model
-    return profile_from_grades(calm_swings(model, station, heights, tolerance), length)
+    fit = match(find_elements(station, heights, 1), station, heights)
+    limit = tolerance if fit.worst <= _ALLOWED else _DOUBTFUL * tolerance
+    return profile_from_grades(calm_swings(fit.model, station, heights, limit), length)
 
 
 def profile_from_grades(model: Model, length: float) -> Profile:

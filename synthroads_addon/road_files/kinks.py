@@ -15,6 +15,8 @@ from ..road.alignment import Alignment, Element
 if TYPE_CHECKING:
     from .line import PlanPiece, RoadLine
 
+FARTHEST_ROUNDING = 5.0
+"""Largest distance (m) from a kink that may be asked for. Chosen: beyond it the road would be another one."""
 _SHARE = 0.45
 """Share of an element that the rounding at one of its ends may take."""
 _STEPS, _TRIALS = 20, 5

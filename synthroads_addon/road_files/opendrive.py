@@ -7,6 +7,7 @@ and `paramPoly3`, each from a start of its own, and cubics of the height.
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +26,8 @@ from .xml_text import child, children, local_name, number, read_xml
 
 _LENGTHS = 1e-3
 """Share by which a cubic's arc length may differ from the length that the file gives it before that is told."""
+_CODE = re.compile(r"[1-9][0-9]{3,5}")
+"""Text of an EPSG code."""
 _OBJECTS = {"objects": "objects", "signals": "signals"}
 
 
@@ -56,11 +59,30 @@ def _system(path: Path, header: Element | None) -> MapSystem | None:
     if not text:
         return None
     try:
-        return read_proj_string(text) if is_proj_string(text) else MapSystem.read(text)
+        system = read_proj_string(text) if is_proj_string(text) else MapSystem.read(text)
+        return _with_noted_codes(header, system)
     except InputError as error:
         reason = error.allowed if isinstance(error, UnknownSystemError) else str(error)
         warn("%s: its coordinate system %r isn't used: it %s", path.name, text, reason)
         return None
+
+
+def _with_noted_codes(header: Element | None, system: MapSystem) -> MapSystem:
+    """Return the system by the EPSG codes that a header of ours notes beside its PROJ string, if both are one system.
+
+    A PROJ string names neither the datum nor what heights are counted from.
+    """
+    notes = {} if header is None else {row.get("code"): row.get("value", "") for row in children(header, "userData")}
+    codes = [
+        int(text) if _CODE.fullmatch(text) else None for text in (notes.get("epsg", ""), notes.get("height_epsg", ""))
+    ]
+    if codes[0] is None:
+        return system
+    try:
+        noted_system = MapSystem.of(codes[0], codes[1])
+    except InputError:
+        return system
+    return noted_system if system.same_as(noted_system) else system
 
 
 def _shift(header: Element | None) -> tuple[float, float, float, float]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..base.schema import round_value
 from ..road.guidelines import LIMITS
-from ..road.objects import AnyWidth, Side, WidthPoint, nominal_width
+from ..road.objects import AnyWidth, Side, WidthPoint, nominal_width, width_at, width_kinks
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
 from ..road.turnout_geometry import TurnoutShape
 from .placing.ranges import Range, Reservations, free_ranges
@@ -154,14 +154,15 @@ class _Painter:
 
 
 def _meet(carriageways: Mapping[Side, Carriageway]) -> bool:
-    """Return whether the innermost lanes of both directions meet all along at one offset."""
-    edges: list[float] = []
-    for carriageway in carriageways.values():
-        inner_offset, edge_strip = carriageway.inner_offset, carriageway.inner_edge_strip_width
-        if isinstance(inner_offset, tuple) or nominal_width(edge_strip) > 0.0:
-            return False
-        edges.append(carriageway.sign * inner_offset)
-    return len(edges) == 2 and abs(edges[0] - edges[1]) < _MEETING
+    """Return whether the innermost lanes of both directions meet all along, at an offset that may change."""
+    if len(carriageways) != 2 or any(nominal_width(c.inner_edge_strip_width) > 0.0 for c in carriageways.values()):
+        return False
+    # Both edges are linear between these stations, so their distance is largest at one of them.
+    stations = [0.0, *(s for carriageway in carriageways.values() for s in width_kinks(carriageway.inner_offset))]
+    left_edge, right_edge = (
+        carriageway.sign * width_at(carriageway.inner_offset, stations) for carriageway in carriageways.values()
+    )
+    return bool(np.abs(left_edge - right_edge).max() < _MEETING)
 
 
 def _stations(shape: TurnoutShape, begin: float, end: float) -> Range:

@@ -62,6 +62,36 @@ def test_a_projection_of_its_own_becomes_a_zone_of_utm(tmp_path: Path) -> None:
     assert axis.length == pytest.approx(400.0)
 
 
+GK21 = "<geoReference>+proj=tmerc +lat_0=0 +lon_0=21 +k=1 +x_0=21500000 +y_0=0 +ellps=GRS80 +units=m</geoReference>"
+"""ETRS89 / GK21FIN (EPSG:3875), as a string that names no datum."""
+
+
+@pytest.mark.parametrize(
+    ("notes", "given", "codes"),
+    [
+        ('<userData code="epsg" value="3875"/><userData code="height_epsg" value="3900"/>', None, (3875, 3900)),
+        ('<userData code="epsg" value="3875"/>', None, (3875, None)),
+        ("", 3875, (3875, None)),
+        ('<userData code="epsg" value="25832"/>', None, (32634, None)),
+        ('<userData code="epsg" value="999999"/>', None, (32634, None)),
+        ('<userData code="epsg" value="x"/>', None, (32634, None)),
+    ],
+)
+def test_a_projection_that_names_no_datum_is_the_one_of_a_code_beside_it(
+    tmp_path: Path, notes: str, given: int | None, codes: tuple[int, int | None]
+) -> None:
+    road, walk = main_road(21_510_000.0, 6_700_000.0, HEIGHTS)
+    path = opendrive(tmp_path / "a.xodr", [road], GK21 + notes)
+    with collected_remarks() as remarks:
+        axis, scenario, _ = road_axis(path, RoadScenario(epsg=given) if given else RoadScenario())
+    assert (scenario.epsg, scenario.height_epsg) == codes
+    if codes[0] == 3875:
+        assert not any("moved" in remark for remark in remarks)
+        station, points = walk.points(5.0)
+        found = alignment_of(axis).position(station) + scenario.map_origin[:2]
+        assert np.hypot(*(found - points).T).max() < 1e-6
+
+
 def test_without_a_system_the_scenarios_is_assumed_and_told(tmp_path: Path) -> None:
     road, _ = main_road(rest=HEIGHTS)
     path = opendrive(tmp_path / "a.xodr", [road])

@@ -30,6 +30,10 @@ _SAME_UNIT = 1e-9
 """Units whose lengths differ by no more than this share are one."""
 _SAME_PLACE = 0.01
 """Systems that place a point no farther apart than this, m, are one, whatever their names and axes' order."""
+_NO_DATUM = "Unknown"
+"""How the name of the datum begins that PROJ gives systems which name none."""
+_NOTHING_TO_DO = "proj=noop"
+"""How PROJ's way between two systems begins whose coordinates are the same."""
 _URL = re.compile(r"https?://(?:www\.)?opengis\.net/(?:def/crs/EPSG/[0-9.]+/|gml/srs/epsg\.xml#)(\d+)")
 _COMPOUND_URL = re.compile(r"https?://(?:www\.)?opengis\.net/def/crs-compound\?")
 
@@ -117,10 +121,19 @@ class MapSystem:
         return self if self.in_metres else _metric(self)
 
     def same_as(self, other: MapSystem) -> bool:
-        """Return whether coordinates in plan mean the same in another system, heights ignored."""
+        """Return whether coordinates in plan mean the same in another system, heights ignored.
+
+        A system that names no datum, as most PROJ strings, has that of the other one if both have one ellipsoid.
+        """
         if self.epsg and self.epsg == other.epsg:
             return True
-        return bool(_plan(self.text).equals(_plan(other.text), ignore_axis_order=True))
+        plan, other_plan = _plan(self.text), _plan(other.text)
+        if plan.equals(other_plan, ignore_axis_order=True):
+            return True
+        names_no_datum = any(
+            each.datum is not None and each.datum.name.startswith(_NO_DATUM) for each in (plan, other_plan)
+        )
+        return names_no_datum and _way(self.text, other.text).definition.startswith(_NOTHING_TO_DO)
 
     def outside(self, points: Float) -> Float:
         """Return how far (N,), degrees, points (N, 2) lie outside the area that the system is meant for.
@@ -229,7 +242,9 @@ def moved(points: Float, source: MapSystem, target: MapSystem) -> tuple[Float, f
     try:
         transformer = _way(source.text, target.text)
         x, y = transformer.transform(points[:, 0], points[:, 1], errcheck=True)
-        accuracy = float(transformer.get_last_used_operation().accuracy)
+        # PROJ has no last operation where it has nothing to do.
+        nothing_to_do = transformer.definition.startswith(_NOTHING_TO_DO)
+        accuracy = float((transformer if nothing_to_do else transformer.get_last_used_operation()).accuracy)
     except ProjError as problem:
         reason = " ".join(str(problem).split())[:100]
         raise InputError(

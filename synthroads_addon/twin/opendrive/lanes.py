@@ -13,7 +13,8 @@ from .xml import Element, add_cubic, add_user_data, element
 
 HEIGHT_TOLERANCE = 1e-4
 """Largest distance (m) of a verge's edge from what is interpolated between two lane heights."""
-
+_BEFORE_JUMP = 5e-7
+"""Distance of two heights between which one jumps, m. Chosen: half of that up to which two stations are one."""
 
 _WITH_LIMIT = ("driving", "exit", "entry")
 """Types of the lanes to which the carriageway's speed limits apply."""
@@ -101,16 +102,23 @@ def _traffic(lane: Element, limits: SpeedLimits, section: LaneSection, strip: La
 def _heights(lane: Element, plan: LanePlan, section: LaneSection, strip: LaneStrip) -> None:
     """Add the `height` elements of a lane whose edges leave the carriageway's plane: verge, median, a ramp's."""
 
+    first_piece, end_piece = section.pieces
+    borders = plan.widths.borders[first_piece : end_piece + 1]
+    last_within = np.nextafter(borders[-1], borders[0])
+
     def heights(station: Float) -> Float:
         """Return the heights (N, 2) of the lane's inner and outer edge above the carriageway's plane, m."""
+        station = np.minimum(station, last_within)  # the next section has its own height at the border
         if strip.kind == "median":
             falls = np.column_stack([np.zeros(len(station)), plan.median_fall(station)])
         else:
             falls = plan.falls(station)[:, strip.index : strip.index + 2]
         return np.column_stack([plan.frame.h_coordinate(station, fall) for fall in falls.T])
 
-    first_piece, end_piece = section.pieces
-    stations = chord_stations(heights, plan.widths.borders[first_piece : end_piece + 1], HEIGHT_TOLERANCE)
+    # Where the line has a kink in height, what is normal to it jumps: a record just before it has the height up to it.
+    stations_before = borders[1:-1] - _BEFORE_JUMP
+    has_jump = np.abs(heights(stations_before) - heights(borders[1:-1])).max(axis=1, initial=0.0) > HEIGHT_TOLERANCE
+    stations = chord_stations(heights, np.sort(np.append(borders, stations_before[has_jump])), HEIGHT_TOLERANCE)
     values = heights(stations)
     if np.ptp(values, axis=0).max() <= HEIGHT_TOLERANCE / 10.0:
         stations, values = stations[:1], values[:1]

@@ -65,15 +65,17 @@ def merged_stations(stations: Iterable[float], start: float, end: float) -> Floa
 
 
 def fit_cubics(function: Function, borders: Float) -> Cubics:
-    """Fit piecewise cubics to continuous functions, halving pieces until they agree within 1e-8.
+    """Fit piecewise cubics to functions, halving pieces until they agree within 1e-8.
 
     Args:
-        function: the function.
+        function: the function; where it jumps it has the value of the piece that begins there.
         borders: (P + 1,) stations, increasing, between which it is expected to be smooth.
     """
     while True:
         lengths = np.diff(borders)
-        values = function((borders[:-1, None] + lengths[:, None] * _SHARES).ravel())
+        stations = borders[:-1, None] + lengths[:, None] * _SHARES
+        stations[:, _SHARES == 1.0] = np.nextafter(borders[1:, None], borders[:-1, None])  # within the piece
+        values = function(stations.ravel())
         values = values.reshape(len(lengths), len(_SHARES), -1)
         coefficients = _fit_lowest_degree(values, lengths)
         is_off = np.abs(_sample_cubics(coefficients, lengths) - values).max(axis=(1, 2)) > _EXACT

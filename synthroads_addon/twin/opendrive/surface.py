@@ -100,10 +100,9 @@ class RoadFrame:
         stations = [s for section in geometry.sections.values() for s in section.kinks()]
         for section in geometry.sections.values():
             stations += [point.station for point in section.carriageway.crossfall]
-        self.borders = merged_stations(stations, 0.0, geometry.length)
         stations += geometry.profile.breakpoints.tolist()
-        levels = merged_stations(stations, 0.0, geometry.length)
-        self.elevation: Cubics = fit_cubics(lambda s: self.plane_elevation(s, np.zeros(len(s)))[:, None], levels)
+        self.borders = merged_stations(stations, 0.0, geometry.length)
+        self.elevation: Cubics = fit_cubics(lambda s: self.plane_elevation(s, np.zeros(len(s)))[:, None], self.borders)
         self.superelevation: Cubics = self._fit_superelevation()
 
     def crossfall(self, station: Float) -> Float:
@@ -123,13 +122,17 @@ class RoadFrame:
         return np.asarray(geometry.profile.elevation(station) + rise * (offset - pivot))
 
     def t_coordinate(self, station: Float, offset: Float, depth: Float | float = 0.0) -> Float:
-        """Return the coordinate t (N,) of points at offsets (N,) that lie ``depth`` the plane vertically, m."""
-        rise = self.crossfall(station)
-        return np.asarray(offset * np.sqrt(1.0 + rise**2) - depth * rise / np.sqrt(1.0 + rise**2))
+        """Return the coordinate t (N,) of points at offsets (N,) that lie ``depth`` below the plane vertically, m."""
+        # In the section normal to a line that climbs, tan(tilt) = rise * cos(climb), and a metre down is cos(climb).
+        cosine = self._cosine(station)
+        slant = self.crossfall(station) * cosine
+        stretch = np.sqrt(1.0 + slant**2)
+        return np.asarray(offset * stretch - depth * cosine * slant / stretch)
 
     def h_coordinate(self, station: Float, depth: Float) -> Float:
-        """Return the coordinate h (N,), normal to the plane, of points that lie ``depth`` it vertically, m."""
-        return np.asarray(-depth * np.cos(np.arctan(self.crossfall(station))) * self._cosine(station))
+        """Return the coordinate h (N,), normal to the plane, of points that lie ``depth`` below it vertically, m."""
+        cosine = self._cosine(station)
+        return np.asarray(-depth * cosine / np.sqrt(1.0 + (self.crossfall(station) * cosine) ** 2))
 
     def road_coordinates(self, station: Float, offset: Float, height: Float) -> RoadCoordinates:
         """Convert stations, offsets and heights above the profile (N,) to OpenDRIVE road coordinates s, t, h, m."""

@@ -21,6 +21,7 @@ from ...jobs.axis_source import axis_summary
 from ...jobs.generate import RoadSource
 from ...jobs.whole_road import SURFACE, has_whole_road
 from ...road.parameters import RoadParameters
+from ...road_files.kinks import FARTHEST_ROUNDING
 from ...scenario.road import RoadScenario
 from ...scenario.scenario import Scenario
 from ..fields.numbers import exact
@@ -116,6 +117,7 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
         "--offset-from-path": "Offset",
         "--path-lane": "Lane",
         "--height-above-road": "Height",
+        "--round-kinks": "Round Kinks",
     }
     axis_name: bpy.props.StringProperty(
         name="Name",
@@ -155,14 +157,24 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
         unit="LENGTH",
         options={"SKIP_SAVE"},
     )
+    round_kinks: bpy.props.FloatProperty(
+        name="Round Kinks",
+        description="How far roundings may be from kinks of a designed line. At 0 a line with kinks is refused",
+        min=0.0,
+        max=FARTHEST_ROUNDING,
+        step=1,
+        precision=3,
+        unit="LENGTH",
+        options={"SKIP_SAVE"},
+    )
     # The fields as they are when the job begins: the file is read in a thread.
-    _name, _place = "", NOWHERE_ELSE
+    _name, _place, _round_kinks = "", NOWHERE_ELSE, None
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the settings beside the file browser."""
         layout = column(self)
         aside = {"AXIS": (), "BESIDE": ("offset",), "LANE": ("lane",)}[self.points_are]
-        for name in ("axis_name", "points_are", *aside, "height"):
+        for name in ("axis_name", "points_are", *aside, "height", "round_kinks"):
             layout.prop(self, name)
 
     def job(self, context: bpy.types.Context) -> PanelJob[str]:
@@ -173,6 +185,7 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
             self.lane if self.points_are == "LANE" else None,
             exact(self.height, None) or None,
         )
+        self._round_kinks = exact(self.round_kinks, None) or None
         return super().job(context)
 
     def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
@@ -188,6 +201,7 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
             road=path if whole else None,
             axis_name=self._name or None,
             axis_place=self._place,
+            round_kinks=self._round_kinks,
         )
         parameters, report = source.read()
         text = f"Built {parameters.alignment.length:,.0f} m of road {'of' if whole else 'along'} {path.name}"

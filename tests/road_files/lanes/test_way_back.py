@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.section import Carriageway, CrossfallPoint
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.twin.opendrive.writer import write_opendrive
 from tests.helpers.roads.sampled_parts import PAIRS, scenario
@@ -44,6 +45,22 @@ def check(road: RoadParameters, folder: Path) -> None:
 def test_a_drawn_road_comes_back(tmp_path: Path, seed: int) -> None:
     """The last two have turnouts all along one side."""
     check(drawn(seed), tmp_path)
+
+
+def test_a_crossfall_that_turns_over_within_two_metres_comes_back(tmp_path: Path) -> None:
+    """As where two bends follow each other closely: the reference line then climbs by tens of percent."""
+    road = drawn(0)
+    objects = dict(road.objects)
+    for name, carriageway in road.of_type(Carriageway).items():
+        rows = [(0.0, 2.5), (300.0, 2.5), (301.5, -6.0), (600.0, -6.0)]
+        points = tuple(CrossfallPoint(station=s, crossfall_percent=percent) for s, percent in rows)
+        objects[name] = carriageway.model_copy(update={"crossfall": points})
+    twisted = road.model_copy(update={"objects": objects})
+    _, found, report = there_and_back(twisted, tmp_path)
+    across, up = roads_apart(twisted, found)
+    assert across < MILLIMETRE
+    assert up < MILLIMETRE
+    assert not report["whole"]["surface_lost"], report["whole"]["approximated"]
 
 
 @pytest.mark.slow

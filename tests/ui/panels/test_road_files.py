@@ -139,15 +139,27 @@ def road_file_of(folder: Path) -> Path:
     return opendrive(folder / "two.xodr", roads, "<geoReference>EPSG:25832</geoReference>")
 
 
+def test_kinks_are_refused_or_rounded_as_the_panel_says(cheap: Any, tmp_path: Path) -> None:
+    rows = [(0.0, 100.0, (10.0, 20.0, 0.3), "<line/>")]
+    rows += [(100.0, 100.0, (10.0 + 100.0 * np.cos(0.3), 20.0 + 100.0 * np.sin(0.3), 0.31), "<line/>")]
+    path = opendrive(tmp_path / "kink.xodr", [xodr_road(rows)], "<geoReference>EPSG:25832</geoReference>")
+    with pytest.raises(RuntimeError, match=r"Round Kinks rounds those"):
+        bpy.ops.synthroads.load_axis(filepath=str(path))
+    assert bpy.ops.synthroads.load_axis(filepath=str(path), round_kinks=0.02) == {"FINISHED"}
+    wanted, _ = RoadSource(cheap.scenario(), road=path, round_kinks=0.02).read()
+    assert built()[0].alignment == wanted.alignment
+    assert [row.kind for row in wanted.alignment.horizontal] == ["line", "clothoid", "clothoid", "line"]
+
+
 @pytest.mark.parametrize(("points", "fields"), [("AXIS", ()), ("BESIDE", ("offset",)), ("LANE", ("lane",))])
 def test_the_file_browser_shows_where_points_lie(settings: Any, points: str, fields: tuple[str, ...]) -> None:
     layout, known = FakeLayout(), bpy.ops.synthroads.load_axis.get_rna_type()
-    values = {"axis_name": "", "points_are": points, "offset": 0.0, "lane": 0, "height": 0.0}
+    values = {"axis_name": "", "points_are": points, "offset": 0.0, "lane": 0, "height": 0.0, "round_kinks": 0.0}
     stand_in = SimpleNamespace(layout=layout, bl_rna=known, **values)
     SYNTHROADS_OT_load_axis.draw(stand_in, bpy.context)  # type: ignore[arg-type]
-    assert [name for _, name in layout.used] == ["axis_name", "points_are", *fields, "height"]
+    assert [name for _, name in layout.used] == ["axis_name", "points_are", *fields, "height", "round_kinks"]
     shown = known.properties
-    for name in ("axis_name", "points_are", "offset", "lane", "height"):
+    for name in ("axis_name", "points_are", "offset", "lane", "height", "round_kinks"):
         assert text_width(shown[name].name) <= 200.0
         assert len(shown[name].description) > 20
     assert all(text_width(item.name) <= 200.0 for item in shown["points_are"].enum_items)
