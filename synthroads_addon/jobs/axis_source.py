@@ -107,8 +107,8 @@ def _tell_heights(path: Path, heights: dict[str, Any]) -> None:
 def _tell_overlap(path: Path, axis: AlignmentObject, half_width: float) -> None:
     """Warn where an axis comes back so near to itself that the ground beside one stretch lies on another.
 
-    A drawn road never does. Places on the axis and at the ground's edges are looked at: they should be nearest to their own
-    station. Of a long road what is told is the worst place of the first stretch that has any.
+    A drawn road never does. Places on the axis and at the ground's edges are looked at, which should be nearest to
+    their own station. Of a long road the worst place of the first stretch that has any is told.
     """
     alignment = alignment_of(axis)
     station = np.linspace(0.0, axis.length, max(2, int(np.ceil(axis.length / _SPACING)) + 1))
