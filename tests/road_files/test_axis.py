@@ -16,6 +16,7 @@ from synthroads_addon.road.geometry import RoadGeometry, alignment_of
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.road_files.axis import road_axis
 from synthroads_addon.scenario.road import RoadScenario
+from tests.helpers.files.mutations import limited
 from tests.helpers.roads.written_lines import opendrive, xodr_road
 from tests.road_files.test_opendrive import ELEMENTS, main_road
 
@@ -224,3 +225,11 @@ def test_generate_takes_the_road_of_a_file(tmp_path: Path) -> None:
     (tmp_path / "axis.csv").write_text("x,y\n0,0\n100,0\n200,3\n")
     words[2] = str(tmp_path / "axis.csv")
     assert main([*words, "--output", str(tmp_path / "points")]) == 2
+
+
+def test_a_line_that_runs_round_a_circle_hundreds_of_times_is_told_at_once(tmp_path: Path) -> None:
+    road = xodr_road([(0.0, 1e6, (*PLACE, 0.3), '<arc curvature="0.004"/>')])
+    path = opendrive(tmp_path / "a.xodr", [road], UTM32)
+    with collected_remarks() as remarks, limited():
+        axis_from_file(path, RoadScenario(), 1)
+    assert any("comes back so near" in remark for remark in remarks)
