@@ -65,9 +65,9 @@ SLAB_JOINT = 0.010
 _PATCHY = 0.5
 """Amplitude of either variation of a film's wear along the road, as a share of it. Chosen."""
 _FILM_DARKER, _FILM_ROUGHER = 0.22, -0.06
-"""What a lost film takes off a marking's brightness, as a share, and adds to its roughness. Chosen."""
+"""Share that a lost film takes off a marking's brightness, and what it adds to its roughness. Chosen."""
 _FILM_MEAN = 0.05
-"""What a marking without wear is brighter than the mean. Chosen: about `_FILM_DARKER` times `_BESIDE`, so that the mean
+"""Share by which a marking without wear is brighter than the mean. Chosen: about `_FILM_DARKER` times `_BESIDE`, so that the mean
 over a road's film, mostly edge lines, is 1."""
 _GROUND = 1.22
 """Brightness of where a marking was ground off."""
