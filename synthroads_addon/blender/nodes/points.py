@@ -12,7 +12,8 @@ from .inputs import boolean, metres
 from .solids import row_of_points
 
 _ROUNDING = 1e-4
-"""Share of a step that may be missing to a whole number of steps. Chosen: far more than 32-bit stations round."""
+"""Share of a step that may be missing to a whole number of steps. Chosen: 5 mm of steps of 50 m, as 32-bit
+stations round up to 50 km."""
 
 
 class _Points(AxisInputs):

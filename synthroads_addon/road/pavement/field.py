@@ -67,8 +67,8 @@ _PATCHY = 0.5
 _FILM_DARKER, _FILM_ROUGHER = 0.22, -0.06
 """Share that a lost film takes off a marking's brightness, and what it adds to its roughness. Chosen."""
 _FILM_MEAN = 0.05
-"""Share by which a marking without wear is brighter than the mean. Chosen: about `_FILM_DARKER` times `_BESIDE`, so that the mean
-over a road's film, mostly edge lines, is 1."""
+"""Share by which a marking without wear is brighter than the mean. Chosen: about `_FILM_DARKER` times `_BESIDE`, so
+that the mean over a road's film, mostly edge lines, is 1."""
 _GROUND = 1.22
 """Brightness of where a marking was ground off."""
 _KNOTS = 64.0
