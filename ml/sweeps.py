@@ -42,6 +42,9 @@ _HEAD_HEIGHT = 1.8
 """Height of a head above the ground at which the search for the origin begins, m. Chosen: on a car's roof."""
 _BANDWIDTHS = (30.0, 20.0, 10.0, 5.0, 5.0, 5.0, 5.0)
 """Standard deviations of the kernel of the mean shift towards the densest place, m, from coarse to fine. Chosen."""
+_GROUND_RADIUS, _GROUND_PERCENT = 15.0, 10.0
+"""Radius about the densest place, m, and percentile of the heights in it, which is the ground's. Chosen: within it most
+points lie on the road, and a few below it are errors."""
 _STEPS = (2.0, 1.0, 0.5, 0.25)
 """Steps of the search for the origin, m. Chosen: from the error of the densest place to a tenth of a ring's spacing."""
 
@@ -95,7 +98,11 @@ def _search_origin(points: Float) -> tuple[Float, float]:
 
 
 def _densest_place(points: Float) -> Float:
-    """Return the place (3,) above the densest ground: a head's, as density falls with the square of the distance."""
+    """Return the place (3,), m, that a head would have above the densest part of points (N, 3) in plan.
+
+    The ground's points are densest about a head, as their density falls with the square of the distance from it.
+    """
+    # Points are counted in cells of 1 m in plan, so that the mean shift's cost is that of the cells.
     cells, counts = np.unique(np.floor(points[:, :2]).astype(np.int64), axis=0, return_counts=True)
     centres = cells + 0.5
     place = centres[np.argmax(counts)]
@@ -103,8 +110,8 @@ def _densest_place(points: Float) -> Float:
         # Mean shift with a Gaussian kernel (Comaniciu and Meer 2002, eq. 17).
         weights = counts * np.exp(-0.5 * np.sum((centres - place) ** 2, axis=1) / bandwidth**2)
         place = weights @ centres / weights.sum()
-    near = np.hypot(*(points[:, :2] - place).T) < 15.0
-    ground = np.percentile(points[near, 2], 10.0) if near.any() else points[:, 2].min()
+    is_near = np.hypot(*(points[:, :2] - place).T) < _GROUND_RADIUS
+    ground = np.percentile(points[is_near, 2], _GROUND_PERCENT) if is_near.any() else points[:, 2].min()
     return np.array([*place, ground + _HEAD_HEIGHT])
 
 

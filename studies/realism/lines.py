@@ -46,6 +46,8 @@ _NEAREST, _FARTHEST, _AWAY = 0.28, 0.48, 0.035
 _DIRECTIONS = 180
 _FEWEST_OF_BLOCK, _OVERLAP, _NEXT = 300, 3.0, 1.0
 """Points of a block; two lines lie side by side over so many metres, and so near to each other, m."""
+_OWN_FIGURES = slice(4, 7)
+"""Columns of a line in `_lines_of`: root mean squares off it and along it, m, and its step, m."""
 _NORMAL = 1.349
 """Interquartile range of the normal distribution over its standard deviation."""
 
@@ -74,16 +76,20 @@ class LineFigures:
 
 
 def line_figures(place: Float, name: str) -> LineFigures:
-    """Return the figures of the scan lines among points (N, 2), m.
+    """Return the figures of the scan lines among points, medians over the lines of all blocks.
+
+    Args:
+        place: (N, 2) of the points in plan, m.
+        name: of the cloud, for errors.
 
     Raises:
         InputError: they have no two lines side by side.
     """
     cell = np.floor(place / BLOCK).astype(np.int64)
-    _, owner, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
-    blocks = np.split(np.argsort(owner.ravel(), kind="stable"), np.cumsum(count)[:-1])
-    lines, gaps = [], []
-    for rows in blocks:
+    _, block_number, point_count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    rows_by_block = np.argsort(block_number.ravel(), kind="stable")
+    lines, gaps = [], []  # of each block: (M, 7) of `_lines_of`, (K, 2) of `_next_ones`
+    for rows in np.split(rows_by_block, np.cumsum(point_count)[:-1]):
         if len(rows) < _FEWEST_OF_BLOCK:
             continue
         block_lines = _lines_of(place[rows] - place[rows].mean(axis=0))
@@ -92,10 +98,21 @@ def line_figures(place: Float, name: str) -> LineFigures:
     if not lines or not sum(map(len, gaps)):
         raise InputError(name, len(place), f"has no two scan lines of {FEWEST} points side by side")
     all_lines, (distances, angles) = np.concatenate(lines), np.concatenate(gaps).T
-    spread = [float(np.subtract(*np.quantile(values, (0.75, 0.25)))) / _NORMAL for values in (distances, angles)]
-    off_line, along, step = np.median(all_lines[:, 4:], axis=0)
-    middle = float(np.median(distances))
-    return LineFigures(len(all_lines), 1e3 * off_line, 1e3 * along, step, middle, spread[0] / middle, spread[1])
+    # Standard deviations that normal distributions of the same interquartile ranges have.
+    distance_std, angle_std = (
+        float(np.subtract(*np.quantile(values, (0.75, 0.25)))) / _NORMAL for values in (distances, angles)
+    )
+    off_line, along, step = np.median(all_lines[:, _OWN_FIGURES], axis=0)
+    gap = float(np.median(distances))
+    return LineFigures(
+        lines=len(all_lines),
+        off_mm=1e3 * off_line,
+        along_mm=1e3 * along,
+        step=step,
+        gap=gap,
+        gap_variation=distance_std / gap,
+        turned_deg=angle_std,
+    )
 
 
 def _lines_of(place: Float) -> Float:

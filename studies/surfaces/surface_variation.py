@@ -59,21 +59,31 @@ def _variation(query: Index, shift: Float, count: int, fewest: int) -> Float:
 
 
 class _Grid:
-    """Spatial index of points by square columns one radius wide."""
+    """Spatial index of points by square columns one radius wide in plan.
+
+    Attributes:
+        stride: difference between the keys of columns that are neighbours in x; of neighbours in y it is 1.
+        key: (N,) key of each point's column.
+        order: (N,) rows of the points in the order of their keys.
+        sorted_keys: (N,) the keys in that order.
+    """
 
     def __init__(self, xyz: Float, radius: float) -> None:
+        """Sort the points (N, 3), m, by the keys of their columns."""
+        # Counting begins with 1, and the stride leaves a number free behind the last: beyond either end in y lies an
+        # empty column, so that no key beside a column is that of a column in the next row.
         column = np.floor((xyz[:, :2] - xyz[:, :2].min(axis=0)) / radius).astype(np.int64) + 1
         self.stride = int(column[:, 1].max()) + 2
         self.key = column[:, 0] * self.stride + column[:, 1]
         self.order = np.argsort(self.key, kind="stable")
-        self.sorted = self.key[self.order]
+        self.sorted_keys = self.key[self.order]
 
     def pairs(self, query_rows: Index) -> tuple[Index, Index]:
         """Return candidate pairs: positions in `query_rows`, and rows of all points in the nine columns around each."""
         steps = np.array([row * self.stride for row in (-1, 0, 1)])
         first_keys = (self.key[query_rows][:, None] + steps - 1).ravel()
-        start = np.searchsorted(self.sorted, first_keys, "left")
-        length = np.searchsorted(self.sorted, first_keys + 2, "right") - start
+        start = np.searchsorted(self.sorted_keys, first_keys, "left")
+        length = np.searchsorted(self.sorted_keys, first_keys + 2, "right") - start
         ends = np.cumsum(length)
         run = np.repeat(np.arange(len(length)), length)
         place = np.arange(int(ends[-1]) if len(ends) else 0) - (ends - length)[run] + start[run]

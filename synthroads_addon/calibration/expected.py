@@ -130,11 +130,17 @@ class ReceiverModel:
     pedestal: float = 0.0
 
     def at_range(self, brightness: Float, distance: Float) -> Float:
-        """Return linear intensities (N,) of surfaces' brightness at ranges (N,), m, as the device corrects them."""
-        if self.range_corrected:
-            return np.maximum(brightness - self.pedestal * distance**2, 0.0) if self.pedestal else brightness
-        power = received_intensity(brightness, distance, self.attenuation)
-        return np.maximum(power - self.pedestal, 0.0) if self.pedestal else power
+        """Return the linear intensities (N,) that the device gives for surfaces of a brightness (N,) at ranges (N,), m.
+
+        They are the power above the pedestal p: b / d^2 exp(-a d) - p for the brightness b, the range d and the air's
+        attenuation a. A device that corrects the range gives the squared range times that, of clear air: b - p d^2.
+        """
+        linear_values = brightness
+        if not self.range_corrected:
+            linear_values = received_intensity(brightness, distance, self.attenuation)
+        if not self.pedestal:
+            return linear_values
+        return np.maximum(linear_values - self.pedestal * (distance**2 if self.range_corrected else 1.0), 0.0)
 
     def to_stored(self, linear_values: Float) -> Float:
         """Return the unrounded intensities that the device stores for linear ones times its gain.

@@ -47,6 +47,8 @@ rounding, then a curve's approximation by others."""
 _SPARSE = 60
 """Points up to which nothing tells noise from elements too short for them: they are trusted. Chosen: a few points to
 each element."""
+_SPARSE_HEIGHTS = 2 * _SPARSE
+"""The same number for heights. Chosen: twice that of points in plan."""
 _NOISY = 2e-3
 """Standard deviation (m) of points that are no design's. Chosen: files of designs round to 1 mm."""
 _PASSES = 2
@@ -475,16 +477,19 @@ def _jacobian(model: Model, pose: Float, station: Float) -> Float:
 
 
 def follow_heights(station: Float, heights: Float, length: float, tolerance: float = np.inf) -> Profile | None:
-    """Return the profile that heights (N,) of a design lie on, over a road's length; None for heights with noise.
+    """Return the profile on which heights (N,) of a design lie, over a road's length; None for heights with noise.
 
     Args:
         station, heights: (N,) of the points, m.
         length: length of the road, m.
         tolerance: largest swing of the heights between two points, m (`fitting.between`).
     """
-    if len(station) > 2 * _SPARSE and noise_std(station, heights, 2) > _NOISY:
+    # On grades and vertical curves, which are parabolas, the grade (the first derivative) is linear and heights are
+    # polynomials of degree 2.
+    grade_order, heights_degree = 1, 2
+    if len(station) > _SPARSE_HEIGHTS and noise_std(station, heights, heights_degree) > _NOISY:
         return None
-    fit = match(find_elements(station, heights, 1), station, heights)
+    fit = match(find_elements(station, heights, grade_order), station, heights)
     limit = tolerance if fit.worst <= _ALLOWED else _DOUBTFUL * tolerance
     return profile_from_grades(calm_swings(fit.model, station, heights, limit), length)
 

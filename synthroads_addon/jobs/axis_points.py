@@ -159,16 +159,33 @@ def _axis_of_text(
     place: PathPlace,
     receive_fit: Callable[[AxisFit], None] | None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
-    """Return the axis fitted to the one line of a CSV or GeoJSON file, as `axis_of_line` does."""
+    """Return the axis fitted to the one line of a CSV or GeoJSON file, the scenario for it, and a report.
+
+    Args:
+        path: the file.
+        scenario: limits of the road.
+        name: of a line, which such a file can't have.
+        place: where the axis lies beside the line.
+        receive_fit: gets the fit, to draw it.
+
+    Returns:
+        the axis in local coordinates; the scenario with its length, origin and map system; how well it fits, m, and the
+        ``sagitta`` (m) of the widest gap between points, by which the road between them may lie beside the chord.
+
+    Raises:
+        AxisRefusedError, MissingFileError, InputError: see `axis_of_line`.
+    """
     if name is not None:
         raise InputError(
             "--axis-name", name, "is for files with several roads or lines; this file has one line of points"
         )
-    points, declared = read_declared_axis(path, Placement.of(MapSystem.of(scenario.epsg, scenario.height_epsg)))
-    points = _prepared(path.name, points, has_times(path), cross_section_of(scenario), place)
-    sagitta = tell_spacing(path.name, [points])
-    axis, limits, report = axis_of_points(path.name, points, declared, scenario, receive_fit)
-    return axis, limits, report | {"sagitta": round(sagitta, 4)}
+    scenario_system = Placement.of(MapSystem.of(scenario.epsg, scenario.height_epsg))
+    line_points, declared_system = read_declared_axis(path, scenario_system)
+    is_path = has_times(path)
+    axis_points = _prepared(path.name, line_points, is_path, cross_section_of(scenario), place)
+    sagitta = tell_spacing(path.name, [axis_points])
+    axis, fitted_scenario, report = axis_of_points(path.name, axis_points, declared_system, scenario, receive_fit)
+    return axis, fitted_scenario, report | {"sagitta": round(sagitta, 4)}
 
 
 def chosen_line(file: str, lines: Sequence[PointLine], name: str | None) -> PointLine:

@@ -537,7 +537,15 @@ def _seen_together(pair: tuple[Line, Line]) -> int:
 
 
 def _vote_axis(lines: list[Line], axis: Float) -> Float:
-    """Return the axis offsets (K,), m, by a weighted vote of all lines, each less its mean distance from ``axis``."""
+    """Return the axis on which all lines agree best: its offset (K,), m, in each stretch; NaN where none has a vote.
+
+    Each line votes for the place at its mean distance beside it; the result is the weighted mean of the votes.
+
+    Args:
+        lines: L lines.
+        axis: (K,) offsets, m, of the axis from which the lines' mean distances are measured.
+    """
+    # All arrays below are (L, K) but `mean` and `scatter` (L,) and `total` (K,); NaN where a line isn't seen.
     offsets = np.array([line.measured for line in lines])
     std = np.array([line.std for line in lines])
     distance = offsets - axis
@@ -546,7 +554,8 @@ def _vote_axis(lines: list[Line], axis: Float) -> Float:
     is_measured = np.isfinite(offsets) & np.isfinite(std)
     # Inverse variances: the scatter of a line's distance and the error of each offset add up; 1 mm^2 keeps them finite.
     weight = np.where(is_measured, 1.0 / (scatter[:, None] ** 2 + np.where(is_measured, std, 1.0) ** 2 + 1e-6), 0.0)
-    # A line whose distance changes, where a lane begins or ends, has no vote there.
+    # A line whose distance changes, where a lane begins or ends, has no vote there: Tukey's bisquare is 0 far from the
+    # mean, by the line's own scatter, or what is usual.
     residual = np.where(is_measured, distance - mean[:, None], 0.0)
     weight *= np.array([bisquare(row, max(sigma, USUAL)) for row, sigma in zip(residual, scatter, strict=True)])
     votes = np.where(is_measured, offsets - mean[:, None], 0.0)

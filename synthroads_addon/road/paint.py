@@ -111,10 +111,13 @@ def _clip_outline(outline: Float, station: float, direction: float) -> Float:
 
 
 def _hatched_range(section: CarriagewaySection, station: Float) -> tuple[Float, Float]:
-    """Return the inner and outer distances (N,) from the centreline between which a gore is hatched, m."""
-    inner = section.lane_boundaries(station)[:, 0] + _EDGE_LINE
-    lane_edge, _ = section.boundaries_of("turnout_lane", station)
-    return inner, lane_edge - _EDGE_LINE
+    """Return the inner and outer distances (N,) from the centreline, m, between which a gore is hatched.
+
+    The gore lies between the outermost lane of the main road and the turnout's lane.
+    """
+    outermost_lane_edge = section.lane_boundaries(station)[:, 0]
+    turnout_lane_inner_edge, _ = section.boundaries_of("turnout_lane", station)
+    return outermost_lane_edge + _EDGE_LINE, turnout_lane_inner_edge - _EDGE_LINE
 
 
 def _edge_crossings(

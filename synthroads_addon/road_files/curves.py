@@ -22,6 +22,8 @@ _SPACING = 0.5
 """Longest step (m) of an integration by Gauss and Legendre's rule with five points."""
 _STEPS = 4096
 """Most steps of such an integration along one curve."""
+_LENGTH_STEPS, _LENGTH_ERROR = 60, 1e-9
+"""Most steps of the search for a cubic's end, and the relative error of its arc length at which it ends. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -165,13 +167,15 @@ def cubic_up_to(v: Float, length: float) -> tuple[Curve, float, Float]:
 
     It is OpenDRIVE's `poly3`, whose u isn't the station: see `cubic_curve` for what is returned, and raised.
     """
-    most = length  # along the tangent it is no longer than along the curve
-    curve, heading, start = cubic_curve(np.array([0.0, 1.0, 0.0, 0.0]), v, most)
-    for _ in range(60):
-        if abs(curve.length - length) < 1e-9 * length:
+    u = np.array([0.0, 1.0, 0.0, 0.0])  # the parameter itself is the distance along the tangent
+    last_u = length  # a chord along the tangent is no longer than the curve, so that this is too far at first
+    curve, heading, start = cubic_curve(u, v, last_u)
+    # Fixed-point iteration: the end along the tangent is moved in proportion until the curve has the arc length.
+    for _ in range(_LENGTH_STEPS):
+        if abs(curve.length - length) < _LENGTH_ERROR * length:
             break
-        most *= 1.0 - (curve.length - length) / curve.length
-        curve, heading, start = cubic_curve(np.array([0.0, 1.0, 0.0, 0.0]), v, most)
+        last_u *= 1.0 - (curve.length - length) / curve.length
+        curve, heading, start = cubic_curve(u, v, last_u)
     return curve, heading, start
 
 

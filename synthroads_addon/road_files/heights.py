@@ -155,21 +155,32 @@ def _deviation(
 
 
 def _points(parabolas: Sequence[tuple[float, float, float, float, float]]) -> tuple[IntersectionPoint, ...]:
-    """Return the intersections: one in the middle of each rounding, one at each kink, one at either end."""
-    first, last = parabolas[0], parabolas[-1]
-    rows = [(first[0], first[2], 0.0)]  # station, height, tangent
-    for n, (start, end, height, rise, fall) in enumerate(parabolas):
-        if n and abs(rise - parabolas[n - 1][4]) > _FLAT:
+    """Return the intersections: one at either end, one at each kink, one in the middle of each rounding.
+
+    Args:
+        parabolas: in order, without gaps: start and end, m, height at the start, m, grades at the start and the end.
+    """
+    first_start, _, first_height, _, _ = parabolas[0]
+    rows = [(first_start, first_height, 0.0)]  # station, height and length of tangent, m, of each intersection
+    grade_before = parabolas[0][3]
+    for start, end, height, start_grade, end_grade in parabolas:
+        is_kink = abs(start_grade - grade_before) > _FLAT
+        if is_kink:
             rows.append((start, height, 0.0))
-        if abs(fall - rise) > _FLAT:
-            half = 0.5 * (end - start)
-            rows.append((start + half, height + rise * half, half))
-    rows.append((last[1], last[2] + 0.5 * (last[1] - last[0]) * (last[3] + last[4]), 0.0))
+        is_rounding = abs(end_grade - start_grade) > _FLAT
+        if is_rounding:
+            # The tangents at both ends of a parabola meet in its middle.
+            tangent_length = 0.5 * (end - start)
+            rows.append((start + tangent_length, height + start_grade * tangent_length, tangent_length))
+        grade_before = end_grade
+    start, end, height, start_grade, end_grade = parabolas[-1]
+    rows.append((end, height + 0.5 * (end - start) * (start_grade + end_grade), 0.0))
     station, height, tangent = np.array(rows).T
-    # Radii follow from the grades between the points, so that roundings which touch don't overlap: T = R |dg| / 2.
+    # A rounding's tangent is T = R |dg| / 2 with the change dg of the grade. It is taken from the grades between the
+    # intersections, so that roundings which touch don't overlap.
     grades = np.diff(height) / np.diff(station)
-    change = np.abs(np.concatenate([[0.0], np.diff(grades), [0.0]]))
-    radius = np.where(tangent > 0.0, 2.0 * tangent / np.where(change > 0.0, change, np.inf), 0.0)
+    grade_change = np.abs(np.concatenate([[0.0], np.diff(grades), [0.0]]))
+    radius = np.where(tangent > 0.0, 2.0 * tangent / np.where(grade_change > 0.0, grade_change, np.inf), 0.0)
     return tuple(
         IntersectionPoint(s, z, r) for s, z, r in zip(station.tolist(), height.tolist(), radius.tolist(), strict=True)
     )

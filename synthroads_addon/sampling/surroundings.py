@@ -58,18 +58,29 @@ def _seed(rng: np.random.Generator) -> int:
 
 
 def sample_terrain(scenario: RoadScenario, seed: int) -> Terrain:
-    """Return the drawn terrain of a seed; its instance number is 1."""
-    rng = stream(seed, "terrain")
-    names = ("embankment_height", "undulation", "wavelength", "batter_slope")
-    values = {name: draw(rng, getattr(scenario, name)) for name in names}
-    scenario_values = {"half_width": scenario.half_width, "elevation_model": scenario.elevation_model}
-    batter = stream(seed, "terrain", "batter")
-    shape = {name: draw(batter, getattr(scenario, name)) for name in ("crest_length", "rounding_length", "swale_width")}
-    shape["swale_depth"] = round_value(shape["swale_width"] * SWALE_DEPTH_SHARE)
-    ditch = draw(stream(seed, "terrain", "ditch"), scenario.ditch_width)
-    shape["ditch_width"] = ditch if ditch >= NARROWEST_DITCH else 0.0
-    shape["ditch_depth"] = round_value(shape["ditch_width"] * SWALE_DEPTH_SHARE)
-    return Terrain(instance=1, seed=_seed(rng), **values, **shape, **scenario_values)
+    """Return the terrain drawn from a seed within the scenario's intervals; its instance number is 1.
+
+    The ground, the batter and the ditch have streams of their own, so that what is drawn for one never depends on how
+    many numbers the others take. The order of the names is the order of the draws.
+    """
+    ground_stream, batter_stream = stream(seed, "terrain"), stream(seed, "terrain", "batter")
+    ground_names = ("embankment_height", "undulation", "wavelength", "batter_slope")
+    ground_fields = {name: draw(ground_stream, getattr(scenario, name)) for name in ground_names}
+    batter_names = ("crest_length", "rounding_length", "swale_width")
+    batter_fields = {name: draw(batter_stream, getattr(scenario, name)) for name in batter_names}
+    batter_fields["swale_depth"] = round_value(batter_fields["swale_width"] * SWALE_DEPTH_SHARE)
+    drawn_ditch_width = draw(stream(seed, "terrain", "ditch"), scenario.ditch_width)
+    ditch_width = drawn_ditch_width if drawn_ditch_width >= NARROWEST_DITCH else 0.0
+    return Terrain(
+        instance=1,
+        seed=_seed(ground_stream),
+        **ground_fields,
+        **batter_fields,
+        ditch_width=ditch_width,
+        ditch_depth=round_value(ditch_width * SWALE_DEPTH_SHARE),  # as steep as a swale
+        half_width=scenario.half_width,
+        elevation_model=scenario.elevation_model,
+    )
 
 
 def sample_environment(scenario: RoadScenario, seed: int) -> Environment:

@@ -18,6 +18,8 @@ Generator = np.random.Generator
 
 _RIM = 0.7
 """Width of the pavement's rim over which its edge's height is taken, m."""
+_USUAL_LINE = 3.5
+"""Distance (m) of a carriageway's edge line from its centre where it isn't known. Chosen: two lanes of common width."""
 
 
 class SequenceCrop(Part):
@@ -174,22 +176,29 @@ def mirror_side(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> N
 
 @effect("centerline", order=-20)
 def crop_sides(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
-    """Drop points on both sides of every slice at random, in place; an unknown centre counts as the frame's origin."""
-    count, crop = len(stretch.center), effects.crop
+    """Drop points on both sides of every slice at random, in place, as `SequenceCrop` says.
+
+    An unknown centre counts as the frame's origin.
+    """
+    slice_count, crop = len(stretch.center), effects.crop
     center = np.nan_to_num(stretch.center)
     if rng.random() >= crop.probability:
         return
+    # (S, 2) distances from each slice's centre to the strip's left and right end, m: R of `SequenceCrop`.
     if stretch.carriageway:
+        strip_ends = np.nan_to_num(stretch.lines, nan=_USUAL_LINE) + rng.uniform(*crop.beyond, 2)
         # Points beyond the middle of the median aren't there in the first place.
-        strip = np.nan_to_num(stretch.lines, nan=3.5) + rng.uniform(*crop.beyond, 2)
-        strip = np.minimum(strip, np.nan_to_num(stretch.room, nan=np.inf))
+        strip_ends = np.minimum(strip_ends, np.nan_to_num(stretch.room, nan=np.inf))
     else:
         # Uniform logarithms: narrow strips differ more from each other than wide ones.
         log_least, log_largest = np.log(crop.reach)
-        strip = np.tile(np.exp(rng.uniform(log_least, log_largest, 2)), (count, 1))
-    reach = strip * (1.0 - rng.uniform(0.0, crop.share, (1 if rng.random() < crop.steady else count, 2)))
-    y = stretch.coord[:, 1] - center[stretch.number]
-    stretch.keep((y <= reach[stretch.number, 0]) & (-y <= reach[stretch.number, 1]))
+        strip_ends = np.tile(np.exp(rng.uniform(log_least, log_largest, 2)), (slice_count, 1))
+    # Shares cut off the left and the right: one pair for all slices, or a pair for each.
+    pair_count = 1 if rng.random() < crop.steady else slice_count
+    cut_ends = strip_ends * (1.0 - rng.uniform(0.0, crop.share, (pair_count, 2)))
+    left_distance = stretch.coord[:, 1] - center[stretch.number]
+    left_end, right_end = cut_ends[stretch.number].T
+    stretch.keep((left_distance <= left_end) & (-left_distance <= right_end))
 
 
 @effect("centerline", order=-10)

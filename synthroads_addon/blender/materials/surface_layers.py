@@ -68,26 +68,28 @@ _ROUGH_REFLECTORS = (*_METALS, "BSDF_PRINCIPLED", "BSDF_GLASS", "BSDF_REFRACTION
 def layer_expressions(item: bpy.types.Material) -> dict[str, Expression]:
     """Return the expressions of those layers that a material's nodes define, by the layer's name.
 
-    A material of the table has outputs for its layers. Those of other materials come from their shaders: mixed as the
-    shaders are, without shaders that only let light through. Their specular isn't used, see
-    `blender.materials.constants`.
+    A material of the table, which has the custom property `PROPERTY`, has an AOV output node for each of its layers.
+    Layers for which another material has none come from its shaders: mixed as the shaders are, without shaders that
+    only let light through. Specular never comes from shaders, see `blender.materials.constants`.
     """
     if item.node_tree is None:
         return {}
-    outputs = {
-        node.aov_name: node.inputs["Color" if MATERIAL_LAYERS[node.aov_name] == 3 else "Value"]
+    aov_inputs = {
+        node.aov_name: node.inputs["Color" if MATERIAL_LAYERS[node.aov_name] == 3 else "Value"]  # 3 channels, or 1
         for node in item.node_tree.nodes
         if node.type == "OUTPUT_AOV" and node.aov_name in MATERIAL_LAYERS
     }
-    layers: dict[str, Expression] = {name: _of_input(socket, ()) for name, socket in outputs.items()}
-    if PROPERTY in item:
+    no_groups = ()  # path of group nodes around what lies in the material's own tree
+    layers: dict[str, Expression] = {name: _of_input(socket, no_groups) for name, socket in aov_inputs.items()}
+    is_of_table = PROPERTY in item
+    if is_of_table:
         return layers
     surface_input = surface_socket(item.node_tree)
     if surface_input is None or not surface_input.links:
         return layers
     closure = surface_input.links[0].from_socket
     for name in ("base_color", "roughness", "metallic"):
-        expression = _of_shader(closure, (), name)
+        expression = _of_shader(closure, no_groups, name)
         if expression is not None:
             layers.setdefault(name, expression)
     return layers

@@ -33,6 +33,9 @@ PLACED = "synthroads_placed"
 STILL = 2e-4
 """Length of a move, m, below which it counts as none: objects' places are 32-bit floats."""
 _TURNED = 1e-5
+"""Turn, rad, below which it counts as none: objects' rotations are 32-bit floats."""
+_SCALED = 1e-5
+"""Relative change of a scale below which it counts as none: objects' matrices are 32-bit floats."""
 _LANE = 1.9
 """Largest distance from the middle of a lane at which a vehicle still belongs to it, m; chosen."""
 
@@ -120,16 +123,24 @@ def standing_update(axes: RoadAxes, item: PointObject, place: Float) -> dict[str
 
 
 def asset_update(axes: RoadAxes, item: Asset, place: Float) -> dict[str, Any]:
-    """Return the changed fields of an asset by its object's place (4, 4): place, height, rotation, scale."""
-    built_place = on_plan(axes.before, [item])[0]
-    built_place[2] = _surface(axes.before, item.station, item.offset) + item.elevation
-    heading = float(axes.before.alignment.heading(item.station)) - np.pi / 2.0 + np.deg2rad(item.rotation_deg)
+    """Return the changed fields of an asset: station, offset, elevation and rotation if it was moved, scale if scaled.
+
+    Args:
+        axes: the road's axis as built and as edited.
+        item: the asset as built.
+        place: (4, 4) of its object now in the road's frame, m.
+    """
+    built_foot = on_plan(axes.before, [item])[0]
+    built_foot[2] = _surface(axes.before, item.station, item.offset) + item.elevation
+    # An object that isn't turned looks along +y, a quarter of a turn from the heading 0 along +x.
+    built_turn = float(axes.before.alignment.heading(item.station)) - np.pi / 2.0 + np.deg2rad(item.rotation_deg)
+    turn = _wrapped(turn_of(place) - built_turn)
+    # The determinant of a rotation scaled evenly by s is s^3.
     scale = float(np.cbrt(abs(np.linalg.det(place[:3, :3]))))
-    turn = _wrapped(turn_of(place) - heading)
     update: dict[str, Any] = {}
-    if abs(scale / item.scale - 1.0) > 1e-5:
+    if abs(scale / item.scale - 1.0) > _SCALED:
         update["scale"] = round(scale, 6)
-    if np.linalg.norm(place[:3, 3] - built_place) >= STILL or abs(turn) >= _TURNED:
+    if np.linalg.norm(place[:3, 3] - built_foot) >= STILL or abs(turn) >= _TURNED:
         station, offset = axes.located(place[:3, 3])
         elevation = float(place[2, 3]) - _surface(axes.now, station, offset)
         update |= {"station": station, "offset": offset, "elevation": round(elevation, 6)}

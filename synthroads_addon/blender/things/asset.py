@@ -109,11 +109,17 @@ def _collection(library: Path, asset: LibraryAsset) -> bpy.types.Collection:
 
 
 def _read_blend(path: Path, name: str | None) -> _Read:
-    """Return the named object of a .blend file, even if it is hidden; without a name all objects that renders show."""
+    """Read the named object of a .blend file, even if it is hidden; without a name all objects that renders show.
+
+    Objects in no scene of the file count as shown.
+    """
     is_rendered, unit = _shown_in(path)
     with being_opened(path), bpy.data.libraries.load(str(path), link=False) as (file_data, loaded_data):
+        # Blender replaces the names in this list by the objects, when the block ends; None for what it can't load.
         loaded_data.objects = [
-            item for item in file_data.objects if item == name or (name is None and is_rendered.get(item, True))
+            object_name
+            for object_name in file_data.objects
+            if object_name == name or (name is None and is_rendered.get(object_name, True))
         ]
     objects = [item for item in loaded_data.objects if item is not None]
     if name is not None:

@@ -198,9 +198,14 @@ def _radius_ratio(road: Road) -> Iterator[Finding]:
 
 
 def _arc_length(road: Road) -> Iterator[Finding]:
-    """Yield a finding for each arc that is passed in less than two seconds; cut ones aren't judged."""
+    """Yield a finding for each arc that is passed in less than two seconds.
+
+    Arcs that an end of the road cuts aren't judged: they go on beyond it. One of length 0 lies between two clothoids,
+    which an end of the road can't cut.
+    """
     for arc in _arcs(road):
-        if arc.length == 0.0 or not road.is_cut(arc):
+        is_between_clothoids = arc.length == 0.0
+        if is_between_clothoids or not road.is_cut(arc):
             text = f"The arc is {arc.length:.1f} m long; two seconds of travel are {road.two_seconds:.1f} m (RAA)."
             yield from at_least(road.axis, arc.start, arc.length, road.two_seconds, text)
 

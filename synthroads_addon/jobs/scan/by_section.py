@@ -26,7 +26,8 @@ from ...road.geometry import RoadGeometry
 from ...scanning.plan import ScanPlan
 from ...scanning.platforms.stretches import PathStretches
 from ...scanning.scene.motion import ScannedScene, ShiftedMotion, lane_motions
-from ...scanning.sections import RoadSection, sections, shadow_length, strip_parts, vehicles_through
+from ...scanning.sections import RoadSection, shadow_length, strip_parts, vehicles_through
+from ...scanning.sections import sections as sections_of_scan
 from .arrays import ArraySink
 from .plan import Site
 from .sink import record_cloud
@@ -77,10 +78,12 @@ class SectionScan:
         self._parameters_of_fixed = road.parameters.model_copy(update={"objects": fixed_objects})
 
     def sections(self) -> Iterator[RoadSection]:
-        """Yield the road's sections from its start to its end."""
+        """Yield the road's sections from its start to its end; the whole road as one where it isn't cut."""
+        road_length = self._road.length
+        section_length = self._scenario.section_length(road_length) or road_length
+        # Colours are rendered: what throws a shadow into a section must be built with it.
         shadows = shadow_length(self._road) if self._scenario.may_render else 0.0
-        length = self._road.length
-        return sections(self.cut, self._road, self._scenario.section_length(length) or length, shadows)
+        return sections_of_scan(self.cut, self._road, section_length, shadows)
 
     def plans(self, timer: StageTimer) -> Generator[ScanPlan, None, None]:
         """Build each section in turn and yield its plan; the section is removed when the next one is asked for."""

@@ -44,17 +44,24 @@ def half_width(axis: FusedAxis, share: float, factor: float, extra_std: float = 
 
 
 def _quantile(density: Float, share: float) -> Float:
-    """Return the half-width (K,), m, of the central interval that holds a share of each density (K, P)."""
+    """Return the half-width (K,), m, of the central interval that holds a share of each density (K, P).
+
+    P is odd: a density has cells of `_STEP` about 0, which lies in the middle of the middle one.
+    """
     middle = density.shape[1] // 2
     # The interval is the same to both sides: shares are added up from the middle outwards.
     pairs = density[:, middle + 1 :] + density[:, middle - 1 :: -1]
+    # Entry 1 is the share of the middle cell, half a step to either side; entry n that of n - 0.5 steps.
     cumulative_share = np.cumsum(np.column_stack([np.zeros(len(density)), density[:, middle], pairs]), axis=1)
     # Index of the first cumulative share that reaches the wanted one; 1 at least.
     end_index = np.maximum((cumulative_share < share).argmin(axis=1), 1)[:, None]
     share_before, share_after = (
         np.take_along_axis(cumulative_share, end_index - step, axis=1)[:, 0] for step in (1, 0)
     )
-    return np.maximum(_STEP * (end_index[:, 0] - 1.5 + (share - share_before) / (share_after - share_before)), 0.0)
+    # Linear between the entry before, of end_index - 1.5 steps, and this one; too narrow within the middle cell, where
+    # the axis' own deviation is wider anyway (`half_width`).
+    share_of_step = (share - share_before) / (share_after - share_before)
+    return np.maximum(_STEP * (end_index[:, 0] - 1.5 + share_of_step), 0.0)
 
 
 def _density(axis: FusedAxis) -> Float:

@@ -62,6 +62,13 @@ SEAM, SEAM_INWARDS, _RAMP = 0.02, 0.13, 0.004
 """Width of a paver's joint, its distance from the lane's boundary, and over which its edge fades, m."""
 SLAB_JOINT = 0.010
 """Width of a sealed joint between slabs, m."""
+_PATCHY = 0.5
+"""Amplitude of either variation of a film's wear along the road, as a share of it. Chosen."""
+_FILM_DARKER, _FILM_ROUGHER = 0.22, -0.06
+"""Share that a lost film takes off a marking's brightness, and what it adds to its roughness. Chosen."""
+_FILM_MEAN = 0.05
+"""Share by which a marking without wear is brighter than the mean. Chosen: about `_FILM_DARKER` times `_BESIDE`, so
+that the mean over a road's film, mostly edge lines, is 1."""
 _GROUND = 1.22
 """Brightness of where a marking was ground off."""
 _KNOTS = 64.0
@@ -314,24 +321,27 @@ def concrete_look(m: Calculus, place: PavementPlace, wear: Wear, slab_length: An
 def paint_look(m: Calculus, place: PavementPlace, wear: Wear) -> Look:
     """Return how a marking differs from its mean at places: its film goes where traffic crosses it.
 
+    Kinds of markings are told apart by masks of 0 or 1, since nodes of materials know no branches.
+
     Args:
         m: functions for the operands.
         place: N places, of which `across` matters in lanes only.
         wear: parameters, whose polish says nothing here.
     """
     strip = _decode(m, place)
-    is_beside_lanes = 1.0 - m.below(strip.kind, PAINT_BESIDE - 0.5)
-    is_area = 1.0 - m.below(strip.kind, PAINT_AREA - 0.5)
+    # Each mask is 1 from its kind on: the sums below go from the wear of one kind to that of the next.
+    from_beside_on = 1.0 - m.below(strip.kind, PAINT_BESIDE - 0.5)
+    from_area_on = 1.0 - m.below(strip.kind, PAINT_AREA - 0.5)
     is_in_lane = 1.0 - m.below(strip.kind, PAINT_IN_LANE - 0.5)
-    line_wear = _CROSSED + is_beside_lanes * (_BESIDE - _CROSSED) + is_area * (_AREA - _BESIDE)
-    traffic_wear = line_wear + is_in_lane * ((strip.track + _TRACKS_MEAN) * (1.0 - _IN_LANE) + _IN_LANE - _AREA)
+    line_wear = _CROSSED + from_beside_on * (_BESIDE - _CROSSED) + from_area_on * (_AREA - _BESIDE)
+    # In a lane the wear is _IN_LANE + (1 - _IN_LANE) times the tracks' profile: 1 in the middle of a track.
+    track_profile = strip.track + _TRACKS_MEAN
+    traffic_wear = line_wear + is_in_lane * (track_profile * (1.0 - _IN_LANE) + _IN_LANE - _AREA)
     long_variation = _slow(m, place, strip.owner, wear.seed)
     short_variation = _slow(m, place, strip.owner, wear.seed + 1.0, _CHANGES)
     is_known = 1.0 - m.below(strip.owner, 0.5)
-    film_loss = traffic_wear * (1.0 + 0.5 * long_variation + 0.5 * short_variation) * is_known
-    return Look(
-        1.0 + is_known * 0.05 - film_loss * 0.22, film_loss * -0.06
-    )  # 1 over all of a road's film, mostly edge lines
+    film_loss = traffic_wear * (1.0 + _PATCHY * long_variation + _PATCHY * short_variation) * is_known
+    return Look(brightness=1.0 + is_known * _FILM_MEAN - film_loss * _FILM_DARKER, roughness=film_loss * _FILM_ROUGHER)
 
 
 class ArrayCalculus:

@@ -67,9 +67,11 @@ class NoiseBarrier(LengthwiseThing):
         return TwinTypes("IfcWall.USERDEFINED", "barrier.noiseBarrier")
 
     def reach(self) -> tuple[float, float]:
-        """Return how far it reaches to the right and to the left of its axis, m: half of panels or posts."""
-        half_width = max(self.thickness / 2.0, self.post_width * FLANGE)
-        return half_width, half_width
+        """Return how far it reaches to the right and to the left of its axis, m: to the panels' or the posts' faces."""
+        panel_reach = self.thickness / 2.0
+        post_reach = FLANGE * self.post_width  # to the outer face of the profile's flanges
+        reach = max(panel_reach, post_reach)
+        return reach, reach
 
     def bodies(self, course: Course) -> list[Body]:
         """Return the closed solids of panels, plinths and posts in local coordinates; none off the road."""

@@ -314,17 +314,29 @@ def _goes_on(first: _Line, second: _Line) -> bool:
 
 
 def _marking(line: _Line, stations: Stations) -> LineMarking:
+    """Return the line marking of the parameter set for a file's line.
+
+    Args:
+        line: with stations of the file.
+        stations: function that gives the parameter set's stations for the file's.
+
+    Raises:
+        ValidationError: the line has values that no line marking may have.
+    """
     side = SIDE_OF[line.side.sign]
-    first = line.first if line.gap and line.first > line.start else line.start
-    start, end = (float(value) for value in stations(np.array([first, line.end])))
-    outwards = line.side.sign * line.shift / line.width
-    kind = _kind(line, outwards)
-    more: dict[str, Any] = {"boundary": _boundary(line) if line.border else 0}
+    # A line marking begins with a dash, where a file's line may begin with a gap.
+    first_paint = line.first if line.gap and line.first > line.start else line.start
+    start, end = (float(value) for value in stations(np.array([first_paint, line.end])))
+    outward_widths = line.side.sign * line.shift / line.width
+    kind = _kind(line, outward_widths)
     if kind == "free":
-        more = {"offset": _offset(line, stations)}
+        place_fields: dict[str, Any] = {"offset": _offset(line, stations)}
     elif kind in ("turnout_edge", "gore_edge"):
-        more = {"turnout": line.turnout}
+        place_fields = {"turnout": line.turnout}
+    else:
+        place_fields = {"boundary": _boundary(line) if line.border else 0}
     dash, gap = line.dash, line.gap
+    # A line with shorter dashes or gaps than a line marking may have becomes solid, as it looks.
     if dash and (dash < SHORTEST_DASH or gap < SHORTEST_DASH):
         dash = gap = 0.0
     return LineMarking(
@@ -338,7 +350,7 @@ def _marking(line: _Line, stations: Stations) -> LineMarking:
         gap_length=round_value(gap, 6),
         start_station=round_value(max(start, 0.0), 6),
         end_station=round_value(end, 6),
-        **more,
+        **place_fields,
     )
 
 

@@ -32,6 +32,7 @@ FAR_ZONE = 3.0
 _MARGIN = 1.0  # m along the road: barriers reach so much farther than they need to
 _CALM = OBSTACLE_LEAD + 2.0 * _MARGIN  # m along the road: nearer to a turnout, an obstacle's barrier might meet it
 _BESIDE_BARRIER = 0.5  # m along the road: what stands so near a barrier's end stands behind it
+_LEAST_HALF = 1.0  # m along the road: the front is taken over at least so much to either side of a thing
 _ISLAND_MARGIN = 0.6  # m: to a ramp's inner edge beyond what lies in the island
 
 
@@ -165,13 +166,19 @@ class Roadside:
             yield f"{request.name}-{self.side}-{counts[request.name]:03d}", item
 
     def _distance(self, request: PlacementRequest) -> float:
-        """Return the distance (m) of a request's axis from the centreline."""
+        """Return the distance (m) of a requested thing's axis from the centreline.
+
+        From the front outwards follow the zone of barriers and delineators, the shift, and the thing's width.
+        """
         if request.distance is not None:
             return request.distance
-        reach = max(request.half, 1.0)
-        start, end, depth = request.station - reach, request.station + reach, SMALL_ZONE + request.width + request.shift
-        obstacle, outer = request.obstacle, request.outer
-        front = self.front_of_obstacle(start, end, depth) if obstacle else self.front(start, end, depth, outer)
+        half_length = max(request.half, _LEAST_HALF)
+        start, end = request.station - half_length, request.station + half_length
+        depth = SMALL_ZONE + request.width + request.shift
+        if request.obstacle:
+            front = self.front_of_obstacle(start, end, depth)
+        else:
+            front = self.front(start, end, depth, request.outer)
         return front + SMALL_ZONE + request.width / 2.0 + request.shift
 
     def _barrier_stretch(self, start: float, end: float) -> Range:

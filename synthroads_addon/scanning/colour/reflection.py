@@ -201,9 +201,10 @@ class _AlbedoTables:
         return *self._rough[:2], *self._cosine[:2], *self._root[:2]
 
     def place(self, rough: Float32, view: Float32) -> _Place:
-        """Return where roughnesses and cosines of the view (N,) lie in the tables."""
-        steps = _grid_step(rough, self._rough), _grid_step(view, self._cosine)
-        return _Place(*steps, steps[0][0] * _COSINES + steps[1][0])
+        """Return where roughnesses (N,) and cosines of the view (N,) lie in the tables of R rows and V columns."""
+        rough_step, view_step = _grid_step(rough, self._rough), _grid_step(view, self._cosine)
+        (row, _), (column, _) = rough_step, view_step
+        return _Place(rough_step, view_step, entry=row * _COSINES + column)
 
     def single(self, place: _Place) -> Float32:
         """Return the directional albedo (N,) of GGX mirrors after one bounce, interpolated."""

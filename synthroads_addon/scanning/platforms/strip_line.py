@@ -249,21 +249,30 @@ class EasedFunction:
         return p1 + t * (m1 + t * (3.0 * d - 2.0 * m1 - m2 + t * (m1 + m2 - 2.0 * d)))
 
     def bends(self) -> tuple[Float, Float]:
-        """Return the largest absolute first and second derivatives (C,) by the distance."""
+        """Return upper bounds (C,) of the function's absolute first and second derivatives by the distance."""
         last_node = int(np.floor(self._length / self.step)) + 1
-        rate: Float = np.zeros(1)
-        bend: Float = np.zeros(1)
-        for start in range(-1, last_node + 1, _BLOCK):
-            numbers = np.arange(start - 1, min(start + _BLOCK, last_node + 1) + 3, dtype=np.float64)
-            values = self._at_nodes(numbers)
-            rises = self._without_turns(np.zeros(1), np.diff(values, axis=0)) / self.step
-            slopes, rise = (rises[1:] + rises[:-1]) / 2.0, rises[1:-1]
-            m0, m1 = slopes[:-1], slopes[1:]
-            # A cubic's second derivative is largest at an end; its first there or, at most 1.5 times the rise, within.
-            ends = np.maximum(np.abs(6.0 * rise - 4.0 * m0 - 2.0 * m1), np.abs(-6.0 * rise + 2.0 * m0 + 4.0 * m1))
-            bend = np.maximum(bend, ends.max(axis=0) / self.step)
-            rate = np.maximum(rate, np.maximum(np.abs(slopes).max(axis=0), 1.5 * np.abs(rise).max(axis=0)))
-        return rate, bend
+        first_bound: Float = np.zeros(1)
+        second_bound: Float = np.zeros(1)
+        # Cells -1 to last_node + 1 are looked at: the cubics also bend in the cells just beyond the ends. A node on
+        # either side is needed for the slopes.
+        for first_cell in range(-1, last_node + 1, _BLOCK):
+            last_cell = min(first_cell + _BLOCK, last_node + 1)
+            values = self._at_nodes(np.arange(first_cell - 1, last_cell + 3, dtype=np.float64))
+            all_rises = self._without_turns(np.zeros(1), np.diff(values, axis=0)) / self.step
+            slopes, rise = (all_rises[1:] + all_rises[:-1]) / 2.0, all_rises[1:-1]
+            m1, m2 = slopes[:-1], slopes[1:]  # at the ends of each cell, as in `__call__`
+            # The second derivative of a cubic is linear, so that it is largest at an end of its cell:
+            # (6 d - 4 m1 - 2 m2) / step at the first, (-6 d + 2 m1 + 4 m2) / step at the last, with the rise d.
+            second_steps = np.maximum(
+                np.abs(6.0 * rise - 4.0 * m1 - 2.0 * m2), np.abs(-6.0 * rise + 2.0 * m1 + 4.0 * m2)
+            )
+            second_bound = np.maximum(second_bound, second_steps.max(axis=0) / self.step)
+            # The first derivative is a sum of the rises of three cells, whose weights' absolute values add up to 1.5 at
+            # most, in the middle of a cell.
+            first_bound = np.maximum(
+                first_bound, np.maximum(np.abs(slopes).max(axis=0), 1.5 * np.abs(rise).max(axis=0))
+            )
+        return first_bound, second_bound
 
     def _without_turns(self, centre: Float, values: Float) -> Float:
         """Return values, angles less the whole turns by which they differ from a centre."""

@@ -132,13 +132,14 @@ def draw_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         draw_road_name(layout, context)
         _draw_other_objects(layout, context)
     if settings.needs_saved_file():
-        _ask_to_save(layout, settings)
+        _draw_request_to_save(layout, settings)
     large_button(layout).operator(SYNTHROADS_OT_scan.bl_idname, icon="LIGHT_AREA")
     if (written := last_written()) is not None:
         _draw_result(layout, settings, written)
 
 
-def _ask_to_save(layout: bpy.types.UILayout, settings: Any) -> None:
+def _draw_request_to_save(layout: bpy.types.UILayout, settings: Any) -> None:
+    """Draw what an unsaved file needs before it can be scanned: a note, a button to save it, or the output folder."""
     row = layout.row(align=True)
     row.alert = True
     draw_text(row, "Save the file, or choose a folder", "ERROR", beside=1)

@@ -53,13 +53,18 @@ class _Place:
         return [part.value for part in (*self.parts, *padding)]
 
     def moved(self, node: NodeReader, seed: int) -> _Place:
-        """Return the place moved by a hash of a seed, by 100 to 200 units, where the noise is independent (Cycles)."""
+        """Return the place moved along each axis by 100 to 200 units, to where the noise is independent.
+
+        The offsets are those of Cycles' `random_float_offset` to `random_float4_offset`: 100 + 100 hash(seed) in one
+        dimension, 100 + 100 hash(seed, axis) in several.
+        """
         offsets = []
         for axis in range(self.dimensions):
             key = [float(seed)] if self.dimensions == 1 else [float(seed), float(axis)]
-            share = hashed(node, [node.constant(part) for part in key])
-            is_fused = self.dimensions > 1 and not VECTORS_FUSED
-            offsets.append(multiply_add(share, 100.0, 100.0) if is_fused else 100.0 + share * 100.0)
+            hash_value = hashed(node, [node.constant(part) for part in key])
+            # Since Blender 5.0 product and sum are rounded at once in several dimensions, and only there.
+            is_rounded_once = self.dimensions > 1 and not VECTORS_FUSED
+            offsets.append(multiply_add(hash_value, 100.0, 100.0) if is_rounded_once else 100.0 + hash_value * 100.0)
         return _Place([part + offset for part, offset in zip(self.parts, offsets, strict=True)])
 
 

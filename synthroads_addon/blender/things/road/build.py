@@ -60,6 +60,8 @@ def _road_inputs(
 ) -> dict[str, float | int | bool]:
     """Return the road group's numeric inputs (widths, lines, turnouts, instances) by name, without objects, materials.
 
+    Lengths are in m, slopes in m/m; an instance is the number by which points tell one part of the road from another.
+
     Args:
         parameters: the road, with only the objects on the stretch that is built.
         geometry: the whole road's geometry.
@@ -72,8 +74,10 @@ def _road_inputs(
         """Add inputs given by their fields; `words_before` stand in front of each input's name."""
         inputs.update({input_name(field, words_before): value for field, value in values.items()})
 
-    for carriageway in parameters.of_type(Carriageway).values():
+    carriageways = parameters.of_type(Carriageway).values()
+    for carriageway in carriageways:
         side = carriageway.side.title()
+        # Widths that vary are shares of these inputs on the backbone (`varying_widths`).
         add_inputs(side, **{width_field(strip): nominal_width(width) for strip, width in strip_widths(carriageway)})
         add_inputs(
             side,
@@ -87,15 +91,18 @@ def _road_inputs(
             wheel_track_depth=carriageway.pavement.wheel_track_depth,
         )
         add_inputs(side, **_age_inputs(carriageway, parameters.materials.asphalt_age))
-    for median in parameters.of_type(Median).values():
-        if len(parameters.of_type(Carriageway)) == 2:
+    # The road group has a median's inputs only between two carriageways.
+    if len(carriageways) == 2:
+        for median in parameters.of_type(Median).values():
             add_inputs("Median", instance=median.instance)
     for section in sections_of(parameters).values():
         for shape in section.turnouts:
-            name = next(key for key, item in parameters.objects.items() if item is shape.turnout)
+            turnout_id = next(key for key, item in parameters.objects.items() if item is shape.turnout)
             start, end = shape.range()
-            line_words = f"{side_of(parameters, shape.turnout)} {words_by_id[name]}"
-            add_inputs(line_words, start_station=start - zero, end_station=end - zero, instance=shape.turnout.instance)
+            turnout_words = f"{side_of(parameters, shape.turnout)} {words_by_id[turnout_id]}"
+            add_inputs(
+                turnout_words, start_station=start - zero, end_station=end - zero, instance=shape.turnout.instance
+            )
     for name, line in parameters.of_type(LineMarking).items():
         line_words = f"{side_of(parameters, line)} {words_by_id[name]}"
         values = {field: getattr(line, field) for field in LINE_FIELDS}
