@@ -277,6 +277,8 @@ def change_thing(
     if not isinstance(before, Thing):
         raise InputError(item.name, None, "it was edited by hand, so that it has no fields: undo that edit first")
     thing = type(before).from_dict(before.to_dict() | values, item.name)
+    if thing.instance != before.instance:
+        _check_number(root, scene, thing.instance)
     modifier = own_modifier(item)
     if isinstance(before, PointObject) and set(values) <= _PLACE:
         set_place(root, item, before, thing)
@@ -295,3 +297,11 @@ def change_thing(
         assert axes is not None
         stand_at_beginning(root, item, axes, thing)
     return thing
+
+
+def _check_number(root: bpy.types.Object, scene: bpy.types.Scene, number: int) -> None:
+    """Raise `InputError` if a thing of the road has an instance number already."""
+    known = with_kept_things(recall_parameters(root), parts_and_copies(root, scene)[0])
+    owner = next((name for name, item in known.objects.items() if item.instance == number), None)
+    if owner is not None:
+        raise InputError("Instance Number", number, f"is that of {owner}: choose one that no other object has")

@@ -96,7 +96,7 @@ class PlaceByRule:
             "ParkedVehicle": first_building + _PARKED,
             "Building": first_building + float(np.hypot(fields.get("width", 0.0), fields.get("depth", 0.0))) / 2.0,
             "Gutter": nominal_width(self._section.carriageway.inner_offset) - GUTTER / 2.0,
-            "Asset": self._verge + self._behind_verge(fields),
+            "Asset": self._verge + (self._behind_verge(fields) if kind == "Asset" else 0.0),
         }
         distances |= dict.fromkeys(("Gantry", "Overpass", "PowerLine"), 0.0)
         return distances.get(kind, self._front + SMALL_ZONE + width / 2.0)

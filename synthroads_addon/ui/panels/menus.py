@@ -9,11 +9,22 @@ import bpy
 
 from ...blender.model.store import find_road
 from ..work.build import SYNTHROADS_OT_build, SYNTHROADS_OT_build_edited
+from ..work.long_operator import SYNTHROADS_OT_cancel
 from ..work.scan import SYNTHROADS_OT_scan
-from .calibration import SYNTHROADS_OT_compare_intensities, SYNTHROADS_OT_fit_materials
-from .cloud_view import SYNTHROADS_OT_add_cloud, SYNTHROADS_OT_hide_cloud, SYNTHROADS_OT_show_cloud
+from .calibration import (
+    SYNTHROADS_OT_compare_intensities,
+    SYNTHROADS_OT_fit_materials,
+    SYNTHROADS_OT_save_materials,
+    SYNTHROADS_OT_show_calibration,
+)
+from .cloud_view import (
+    SYNTHROADS_OT_add_cloud,
+    SYNTHROADS_OT_frame_cloud,
+    SYNTHROADS_OT_hide_cloud,
+    SYNTHROADS_OT_show_cloud,
+)
 from .edit import SYNTHROADS_OT_show_plants
-from .export import SYNTHROADS_OT_export_cloud, SYNTHROADS_OT_export_twin
+from .export import SYNTHROADS_OT_export_cloud, SYNTHROADS_OT_export_twin, SYNTHROADS_OT_install_ifc
 from .placing import (
     ICONS,
     SYNTHROADS_OT_add_thing,
@@ -28,8 +39,13 @@ from .presets import (
     SYNTHROADS_OT_random_road,
     SYNTHROADS_OT_save_scenario,
 )
-from .road_files import SYNTHROADS_OT_load_axis, SYNTHROADS_OT_load_road, SYNTHROADS_OT_save_road
-from .rules import SYNTHROADS_OT_check_rules
+from .road_files import (
+    SYNTHROADS_OT_load_axis,
+    SYNTHROADS_OT_load_road,
+    SYNTHROADS_OT_save_road,
+    SYNTHROADS_OT_show_fit,
+)
+from .rules import SYNTHROADS_OT_check_rules, SYNTHROADS_OT_clear_rules
 from .scan_road import SYNTHROADS_OT_road_from_scan
 from .scene_scan import SYNTHROADS_OT_set_class
 from .things import thing_of
@@ -49,6 +65,8 @@ _WORK: tuple[tuple[tuple[type[bpy.types.Operator], str, str], ...], ...] = (
         (SYNTHROADS_OT_delete_thing, "Delete from Road", "TRASH"),
         (SYNTHROADS_OT_show_plants, "Hide or Show Plants", "HIDE_OFF"),
         (SYNTHROADS_OT_check_rules, "Check Rules", "CHECKMARK"),
+        (SYNTHROADS_OT_clear_rules, "Clear List of Rules", "X"),
+        (SYNTHROADS_OT_show_fit, "Show Missed Axis", "IMAGE_DATA"),
         (SYNTHROADS_OT_set_class, "Set Class of Selected", "CHECKMARK"),
         (SYNTHROADS_OT_add_views, "Add Sun, Sky, Cameras", "LIGHT_SUN"),
     ),
@@ -56,9 +74,13 @@ _WORK: tuple[tuple[tuple[type[bpy.types.Operator], str, str], ...], ...] = (
         (SYNTHROADS_OT_scan, "Scan", "LIGHT_AREA"),
         (SYNTHROADS_OT_show_cloud, "Show Cloud...", "POINTCLOUD_DATA"),
         (SYNTHROADS_OT_hide_cloud, "Remove Cloud", "X"),
+        (SYNTHROADS_OT_frame_cloud, "Look at Cloud", "VIEWZOOM"),
         (SYNTHROADS_OT_add_cloud, "Add Cloud to Scene", "OUTLINER_OB_POINTCLOUD"),
         (SYNTHROADS_OT_compare_intensities, "Compare Intensities", "SEQ_HISTOGRAM"),
         (SYNTHROADS_OT_fit_materials, "Fit Materials", "MOD_DATA_TRANSFER"),
+        (SYNTHROADS_OT_show_calibration, "Show Calibration's Diagrams", "IMAGE_DATA"),
+        (SYNTHROADS_OT_save_materials, "Save Fitted Materials to Table", "FILE_TICK"),
+        (SYNTHROADS_OT_cancel, "Cancel Running Work", "X"),
     ),
     (
         (SYNTHROADS_OT_export_twin, "Export Twin (Model)...", "EXPORT"),
@@ -67,6 +89,7 @@ _WORK: tuple[tuple[tuple[type[bpy.types.Operator], str, str], ...], ...] = (
         (SYNTHROADS_OT_load_scenario, "Load Scenario...", "FILE_FOLDER"),
         (SYNTHROADS_OT_save_scenario, "Save Scenario...", "FILE_TICK"),
         (SYNTHROADS_OT_load_device, "Load Device...", "FILE_FOLDER"),
+        (SYNTHROADS_OT_install_ifc, "Install SynthRoads IFC...", "IMPORT"),
     ),
 )
 

@@ -6,6 +6,7 @@ stands for now, and changes it at once: its place, its modifier's input, or its 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any, Literal, get_args, get_origin
 
@@ -79,7 +80,15 @@ def _set_values(values: dict[str, Any]) -> None:
         change_thing(root, context.scene, item, values)
         _State.refused = ("", "")
     except InputError as error:
-        _State.refused = (item.name, panel_message(error))
+        _State.refused = (item.name, _with_labels(panel_message(error), _active_thing()))
+
+
+def _with_labels(message: str, thing: Thing | None) -> str:
+    """Return a message with the names of a thing's fields replaced by their labels."""
+    for name in type(thing).model_fields if thing is not None else ():
+        if "_" in name:
+            message = re.sub(rf"\b{name}\b", field_label(type(thing), name), message)
+    return message
 
 
 def _getter(name: str, read: Callable[[Any], Any], empty: Any) -> Callable[[Any], Any]:
