@@ -20,7 +20,6 @@ from ...road.geometry import RoadGeometry
 from ...road.objects import LineObject, PointObject, RoadObject
 from ...road.parameters import RoadParameters
 from ...road.things.gantry import Gantry
-from ...road.things.overpass import Overpass
 from ...road.things.registry import THINGS
 from ...road.things.sign import TrafficSign
 from ...road.things.thing import Thing
@@ -245,7 +244,7 @@ def frame_on_road(geometry: RoadGeometry, thing: RoadObject) -> ObjectFrame:
     if isinstance(thing, LineObject):
         return line_frame(geometry, thing, (0.0, geometry.length))
     assert isinstance(thing, PointObject)
-    return foot_frame(geometry, thing, 0.0 if isinstance(thing, Overpass) else thing.rotation_deg)
+    return foot_frame(geometry, thing)
 
 
 def _basis(item: bpy.types.Object, root: bpy.types.Object, place: np.ndarray) -> Matrix:

@@ -12,8 +12,8 @@ from .builder import Operand, Tree, Value, makes_group
 from .inputs import Inputs, socket
 
 _BESIDE = ((5e-4, 5e-4), (-5e-4, 5e-4), (5e-4, -5e-4), (-5e-4, -5e-4))
-"""Shifts in plan (m) of the rays that find the terrain at its very border. Chosen: above the rounding of 32 bits at some
-kilometres, and on slopes still below 1 mm of height."""
+"""Shifts in plan (m) of the rays that find the terrain at its very border. Chosen: above the rounding of 32 bits at
+some kilometres, and on slopes still below 1 mm of height."""
 FOLD_SHARE = 0.98
 """Share of the radius at which an offset curve is cut, as in `road.alignment.clip_offset`."""
 
@@ -70,8 +70,8 @@ class _Surfaces(Inputs):
 def surface_height_group(tree: Tree) -> None:
     """The z of the surface above or below a place: the road's, beside it the terrain's, the place's where is neither.
 
-    On the very border of the road a vertical ray may pass by: there the nearest point of the road counts. On that of the
-    terrain, as where the road begins, rays 0.5 mm beside it find it.
+    On the very border of the road a vertical ray may pass by: there the nearest point of the road counts. On that of
+    the terrain, as where the road begins, rays 0.5 mm beside it find it.
     """
     surfaces = _Surfaces(tree)
     place = surfaces.place

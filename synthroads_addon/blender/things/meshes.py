@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...road.geometry import RoadGeometry
 from ...road.objects import LineObject, PointObject
 from ...road.terrain import known_elevation
+from ...road.things.thing import StandingThing
 
 Float = NDArray[np.float64]
 
@@ -40,10 +41,11 @@ class ObjectFrame(NamedTuple):
         return (points - self.origin) @ self.matrix()[:3, :3]
 
 
-def foot_frame(geometry: RoadGeometry, item: PointObject, rotation_deg: float) -> ObjectFrame:
-    """Return the frame at a point object's foot on the surface, turned from the road's course by a rotation, deg."""
+def foot_frame(geometry: RoadGeometry, item: PointObject) -> ObjectFrame:
+    """Return the frame at a point object's foot on the surface, turned from the road's course as the object is."""
     heading = float(geometry.alignment.heading(np.array([item.station]))[0])
-    return ObjectFrame(feet(geometry, [item])[0], heading + float(np.deg2rad(rotation_deg)))
+    turn = item.turn if isinstance(item, StandingThing) else float(np.deg2rad(item.rotation_deg))
+    return ObjectFrame(feet(geometry, [item])[0], heading + turn)
 
 
 def line_frame(geometry: RoadGeometry, item: LineObject, stretch: tuple[float, float]) -> ObjectFrame:

@@ -140,21 +140,16 @@ class ModelBuilder:
         """
         return points_mesh(name, self.geometry, items, attributes or {}, self._local_frame(items[0]))
 
-    def frame(self, item: PointObject | LineObject, turned: bool = True) -> ObjectFrame:
-        """Return the frame of a thing's object in the scene: at its foot or its beginning, with x along the road.
-
-        Args:
-            item: the thing.
-            turned: a point object's frame has its rotation; else it has the road's course.
-        """
-        frame = self._local_frame(item, turned)
+    def frame(self, item: PointObject | LineObject) -> ObjectFrame:
+        """Return the frame of a thing's object in the scene: at its foot or its beginning, with x along the road."""
+        frame = self._local_frame(item)
         return ObjectFrame(frame.origin - self.origin, frame.turn)
 
-    def _local_frame(self, item: PointObject | LineObject, turned: bool = True) -> ObjectFrame:
+    def _local_frame(self, item: PointObject | LineObject) -> ObjectFrame:
         """Return a thing's frame as `frame` does, but in the whole road's local coordinates."""
         if isinstance(item, LineObject):
             return line_frame(self.geometry, item, self.stretch)
-        return foot_frame(self.geometry, item, item.rotation_deg if turned else 0.0)
+        return foot_frame(self.geometry, item)
 
     def add_thing(
         self,
@@ -162,7 +157,6 @@ class ModelBuilder:
         item: RoadObject,
         group: bpy.types.NodeTree,
         mesh: bpy.types.Mesh | None = None,
-        turned: bool = True,
         **inputs: Any,
     ) -> None:
         """Add a thing of the road as an object with its node group, inputs set from the fields of the same names.
@@ -174,7 +168,6 @@ class ModelBuilder:
             item: the thing.
             group: its node group.
             mesh: of the object, in its frame; if None, a vertex at a point object's foot, and nothing for other things.
-            turned: whether a point object's frame has its rotation.
             inputs: the group's other inputs, by their fields in its class of inputs, see `add`.
         """
         if mesh is None and isinstance(item, PointObject):
@@ -182,7 +175,7 @@ class ModelBuilder:
         values = {label: getattr(item, field) for label, field in named_fields(item, group).items()}
         values = {label: value - self.zero if label.endswith("Station") else value for label, value in values.items()}
         values |= {input_name(field): value for field, value in inputs.items()}
-        frame = self.frame(item, turned) if isinstance(item, PointObject | LineObject) else None
+        frame = self.frame(item) if isinstance(item, PointObject | LineObject) else None
         self.add(name, mesh, group, values, frame=frame)
 
     def add(

@@ -51,14 +51,16 @@ from .scene_scan import SYNTHROADS_OT_set_class
 from .things import thing_of
 from .views import SYNTHROADS_OT_add_views
 
-_ROADS = (
+Block = tuple[tuple[type[bpy.types.Operator], str, str], ...]
+"""Entries of a menu between two lines: operator, text, icon."""
+_ROADS: Block = (
     (SYNTHROADS_OT_build, "Build Road", "MOD_BUILD"),
     (SYNTHROADS_OT_random_road, "Random Road", "FILE_REFRESH"),
     (SYNTHROADS_OT_load_road, "Load Parameter Set...", "IMPORT"),
     (SYNTHROADS_OT_load_axis, "Build Along Centreline...", "CURVE_PATH"),
     (SYNTHROADS_OT_road_from_scan, "Build Road from a Scan...", "POINTCLOUD_DATA"),
 )
-_WORK: tuple[tuple[tuple[type[bpy.types.Operator], str, str], ...], ...] = (
+_WORK: tuple[Block, ...] = (
     (
         (SYNTHROADS_OT_build_edited, "Build Road as Edited", "FILE_REFRESH"),
         (SYNTHROADS_OT_repeat_thing, "Repeat Along Road", "MOD_ARRAY"),
@@ -94,7 +96,7 @@ _WORK: tuple[tuple[tuple[type[bpy.types.Operator], str, str], ...], ...] = (
 )
 
 
-def _draw_blocks(layout: bpy.types.UILayout, blocks: tuple[tuple[tuple[type, str, str], ...], ...]) -> None:
+def _draw_blocks(layout: bpy.types.UILayout, blocks: tuple[Block, ...]) -> None:
     layout.operator_context = "INVOKE_REGION_WIN"  # Blender's menu Add has operators run without being asked
     for number, block in enumerate(blocks):
         if number:

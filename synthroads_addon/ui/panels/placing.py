@@ -22,7 +22,7 @@ from ...road.guidelines import SHORTEST_BARRIER
 from ...road.objects import LineObject
 from ...road.parameters import RoadParameters
 from ...road.things.registry import THINGS
-from ...road.things.thing import Thing
+from ...road.things.thing import LengthwiseThing, StandingThing, Thing
 from ...sampling.placing.single import USUAL_SIGN, thing_by_rule
 from ...scenario.assets import library_names, read_asset_library
 from ..fields.numbers import exact
@@ -128,7 +128,7 @@ class _OnRoad:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the scene has a road and no other work is running."""
-        return is_free(cls, context) and has_road(cls, context)  # type: ignore[arg-type]
+        return is_free(cls, context) and has_road(cls, context)
 
 
 class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
@@ -209,11 +209,11 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
             self.side = cursor.side
         station = min(exact(self.station, None), geometry.length)
         thing = thing_by_rule(geometry, self.kind, self.side, station, self._fields(station, geometry.length))
-        assert isinstance(thing, Thing)
+        assert isinstance(thing, StandingThing | LengthwiseThing)
         if self.by_rule:
             self.offset = thing.offset
         update: dict[str, Any] = {"instance": _next_number(parameters)}
-        if self.turned and not isinstance(thing, LineObject):
+        if self.turned and isinstance(thing, StandingThing):
             update["rotation_deg"] = round_value(
                 (thing.rotation_deg + exact(self.turned, None) + 180.0) % 360.0 - 180.0
             )
@@ -242,7 +242,7 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the properties that the thing has."""
-        layout = column(self)  # type: ignore[arg-type]
+        layout = column(self)
         model = THINGS[self.kind]
         for name in ("kind", "station", "side", "by_rule"):
             layout.prop(self, name)

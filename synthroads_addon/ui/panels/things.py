@@ -85,7 +85,9 @@ def _set_values(values: dict[str, Any]) -> None:
 
 def _with_labels(message: str, thing: Thing | None) -> str:
     """Return a message with the names of a thing's fields replaced by their labels."""
-    for name in type(thing).model_fields if thing is not None else ():
+    if thing is None:
+        return message
+    for name in type(thing).model_fields:
         if "_" in name:
             message = re.sub(rf"\b{name}\b", field_label(type(thing), name), message)
     return message
@@ -124,13 +126,13 @@ def field_label(model: type[Thing], name: str) -> str:
 def _property(model: type[Thing], name: str, info: FieldInfo) -> Any:
     """Return the Blender property of a field; None for one of a kind that isn't edited here."""
     kind = info.annotation
-    about = {"name": field_label(model, name), "description": tooltip(info) or title_case(name)}
+    about: dict[str, Any] = {"name": field_label(model, name), "description": tooltip(info) or title_case(name)}
     if kind is float or kind is int:
         whole = kind is int
         write = int if whole else _number
         default = info.default if isinstance(info.default, int | float) else None
         read: Callable[[Any], Any] = (lambda value: min(int(value), 2**31 - 1)) if whole else float
-        access = {"get": _getter(name, read, 0 if whole else 0.0), "set": _setter(name, write)}
+        access: dict[str, Any] = {"get": _getter(name, read, 0 if whole else 0.0), "set": _setter(name, write)}
         return number_property(info, whole, default if default is not None or not whole else 1, **about, **access)
     if get_origin(kind) is Literal:
         values = list(get_args(kind))

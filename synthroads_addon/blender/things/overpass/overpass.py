@@ -195,7 +195,6 @@ def build_overpasses(builder: ModelBuilder) -> None:
             bridge,
             overpass_group(),
             mesh,
-            turned=False,
             **approaches,
             left_abutment=bridge.left_abutment - bridge.offset,
             right_abutment=bridge.right_abutment - bridge.offset,
