@@ -138,7 +138,7 @@ class SYNTHROADS_OT_remove_calibration_class(bpy.types.Operator):
     bl_idname = "synthroads.remove_calibration_class"
     bl_label = "Remove Material"
 
-    index: bpy.props.IntProperty()
+    index: bpy.props.IntProperty(name="Number", description="Place of the material in the list, from 0 on")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Remove the row `index` from the list of materials."""

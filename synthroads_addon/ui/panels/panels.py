@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any, ClassVar
 
 import bpy
@@ -32,6 +33,9 @@ from .scan_road import SYNTHROADS_OT_road_from_scan
 from .scene_scan import draw_scene_scan
 
 _BOX_SHARE = 0.92
+_OTHER_LENGTH = 0.5
+"""From so large a difference on, m, the road's length is another one than the settings'."""
+_LENGTH = re.compile(r"^[\d.,]+ k?m\b")
 _SOLID = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 
 
@@ -59,7 +63,10 @@ class MainPanel(SheetPanel):
         layout, settings = column(self), context.scene.synthroads
         if find_road(context.scene) is None:
             draw_first_steps(layout)
-        draw_menu(layout, SYNTHROADS_MT_scenarios.bl_idname, scenario_title(settings.preset), "Scenario")
+        parameters = open_parameters(context.scene)
+        length = settings.road.length if parameters is None else parameters.alignment.length
+        title = with_length(scenario_title(settings.preset), length)
+        draw_menu(layout, SYNTHROADS_MT_scenarios.bl_idname, title, "Scenario")
         self.draw_fields(layout, settings)
 
 
@@ -80,6 +87,11 @@ def draw_first_steps(layout: bpy.types.UILayout) -> None:
         draw_text(box, step, share=_BOX_SHARE)
 
 
+def with_length(title: str, length: float) -> str:
+    """Return a scenario's title with another road's length (m) where it begins with its own: ``600 m of motorway``."""
+    return _LENGTH.sub(f"{length:,.0f} m", title, count=1)
+
+
 class RoadPanel(SheetPanel):
     """Panel of the road with the buttons to build, load and save it."""
 
@@ -91,7 +103,8 @@ class RoadPanel(SheetPanel):
         if (seed := settings.exact_seed()) != settings.seed:
             draw_text(layout, f"Seed of the file: {seed}", "INFO")
         road = find_road(context.scene)
-        if (parameters := open_parameters(context.scene)) is not None:
+        parameters = open_parameters(context.scene)
+        if parameters is not None and abs(parameters.alignment.length - settings.road.length) >= _OTHER_LENGTH:
             draw_text(layout, f"Length of the road: {parameters.alignment.length:,.0f} m", "DRIVER_DISTANCE")
         if road and source_file_name(road):
             draw_text(layout, f"Built from {source_file_name(road)}", "FILE")

@@ -32,7 +32,7 @@ _BETWEEN_SIGNS = " | "
 """Between the texts of a gantry's signs."""
 _HIDDEN = frozenset({"type", "signs", "twin_types", "library", "name", "class_name", "pier_offsets"})
 """Fields that can't be edited here: nested ones, and what an asset is."""
-_LABELS = {"code": "Sign Number", "instance": "Instance Number", "elevation": "Height Above", "color": "Colour"}
+_LABELS = {"code": "Sign Number", "instance": "Instance Number", "elevation": "Above Surface", "color": "Colour"}
 """Fields whose names don't say enough."""
 _FIRST = (
     "station",

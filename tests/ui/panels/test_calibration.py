@@ -116,7 +116,6 @@ def test_results_name_their_percentiles(settings: Any, tmp_path: Path) -> None:
     assert lines[2] == "Intensity in units of the cloud, by percentile:"
     assert [line.partition(":")[0] for line in lines[3:]] == ["25 %", "50 %", "75 %", "90 %"]
     assert all(word in lines[3] for word in ("real ", "expected ", "error ", "of the interquartile range"))
-    assert all(len(line.partition(":")[2].split()) == 4 for line in lines[3:])
 
 
 @pytest.mark.parametrize(("width", "kind"), [(300.0, "column"), (600.0, "row")], ids=["as at first", "wide"])

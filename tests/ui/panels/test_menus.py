@@ -121,3 +121,14 @@ def test_the_road_panel_says_how_long_the_road_is() -> None:
     bpy.context.scene.synthroads.road.length = 250.0
     road = next(cls for cls in panels.CLASSES if cls.bl_idname == "SYNTHROADS_PT_road")
     assert "label 'Length of the road: 60 m' <DRIVER_DISTANCE>" in drawn(road, bpy.context).lines
+
+
+def test_the_headings_length_is_the_roads() -> None:
+    """The scenario is one of 600 m."""
+    main = next(cls for cls in panels.CLASSES if cls.bl_idname == "SYNTHROADS_PT_main")
+    assert "600 m of motorway" in " ".join(drawn(main, bpy.context).lines)
+    bpy.context.scene.synthroads.road.length = 250.0
+    assert "250 m of motorway" in " ".join(drawn(main, bpy.context).lines)
+    build_small()
+    assert "60 m of motorway" in " ".join(drawn(main, bpy.context).lines)
+    assert panels.with_length("A road of 5 km", 80.0) == "A road of 5 km"
