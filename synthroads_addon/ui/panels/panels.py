@@ -76,7 +76,7 @@ FIRST_STEPS = (
     "3. Click a part, and change it in Road > Edit",
     "4. Scanner: choose a device, and press Scan",
 )
-"""What a new user does, in order."""
+"""Steps of a new user, in order."""
 
 
 def draw_first_steps(layout: bpy.types.UILayout) -> None:

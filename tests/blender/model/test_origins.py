@@ -150,7 +150,7 @@ def world_axis(item: bpy.types.Object, number: int) -> Vector:
 def test_to_turn_a_thing_about_its_origin_is_to_turn_it(
     model: RoadModel, parameters: RoadParameters, name: str
 ) -> None:
-    """What the rotate gizmo does: the origin stays, and so do station and offset."""
+    """The rotate gizmo leaves the origin where it is, and so station and offset."""
     item, before = model.objects[name], parameters.objects[name]
     item.rotation_euler.z += np.deg2rad(10.0)
     now = truth(model).parameters.objects[name]
@@ -162,7 +162,7 @@ def test_to_turn_a_thing_about_its_origin_is_to_turn_it(
 def test_a_move_along_a_things_own_axes_is_one_along_and_across_the_road(
     model: RoadModel, parameters: RoadParameters, name: str
 ) -> None:
-    """What G X X and G Y Y do."""
+    """G X X and G Y Y move an object along its own axes."""
     item, before = model.objects[name], parameters.objects[name]
     item.location = item.location + world_axis(item, 0) * 1.5 + world_axis(item, 1) * 0.5
     edited = truth(model)
@@ -194,7 +194,7 @@ def test_a_snapped_thing_stands_where_it_was_snapped_to(
 def test_a_mirrored_thing_stands_on_the_other_side_and_looks_the_mirrored_way(
     model: RoadModel, parameters: RoadParameters, name: str
 ) -> None:
-    """What Mirror across the road's axis at the thing does, with the 3D cursor on the axis as pivot."""
+    """Mirror across the road's axis at the thing, with the 3D cursor on the axis as pivot."""
     item, before = model.objects[name], parameters.objects[name]
     geometry = RoadGeometry(parameters)
     at = np.array([before.station])

@@ -448,17 +448,17 @@ def test_structures_of_a_stretch_stand_where_they_do_on_the_whole_road(monkeypat
 
 
 @pytest.mark.parametrize(
-    ("make", "class_name", "y", "clearance"),
+    ("make", "class_name", "along", "clearance"),
     # Below a web of the bridge.
     [(gantry_group, "shield_gantry", 0.0, 5.2), (overpass_group, "bridge", 1.9, 4.9)],
 )
 def test_a_structure_can_be_put_onto_an_object_of_ones_own(
-    make: Callable[[], bpy.types.NodeTree], class_name: str, y: float, clearance: float
+    make: Callable[[], bpy.types.NodeTree], class_name: str, along: float, clearance: float
 ) -> None:
     item = bpy.data.objects.new("Own", bpy.data.meshes.new("Own"))
     bpy.context.scene.collection.objects.link(item)
     item.location = (5.0, 0.0, 2.0)
     item.modifiers.new("Nodes", "NODES").node_group = make()
-    hit = tree_of(scene_mesh(), class_name).ray_cast((5.5, y, 2.0), (0.0, 0.0, 1.0))[0]
+    hit = tree_of(scene_mesh(), class_name).ray_cast((5.0 + along, -0.5, 2.0), (0.0, 0.0, 1.0))[0]
     # Without a road the ground is the object's own z = 0.
     assert hit.z - 2.0 == pytest.approx(clearance, abs=MEASURE)
