@@ -20,6 +20,7 @@ from ...road.geometry import RoadGeometry
 from ...road.objects import LineObject, PointObject, RoadObject
 from ...road.parameters import RoadParameters
 from ...road.things.gantry import Gantry
+from ...road.things.overpass import Overpass
 from ...road.things.registry import THINGS
 from ...road.things.sign import TrafficSign
 from ...road.things.thing import Thing
@@ -279,7 +280,8 @@ def change_thing(
     if thing.instance != before.instance:
         _check_number(root, scene, thing.instance)
     modifier = own_modifier(item)
-    if isinstance(before, PointObject) and set(values) <= _PLACE:
+    is_skew = isinstance(before, Overpass) and "rotation_deg" in values  # which is in its shape, not in its frame
+    if isinstance(before, PointObject) and set(values) <= _PLACE and not is_skew:
         set_place(root, item, before, thing)
         moved = present_thing(root, item)
         if isinstance(moved, Gantry):  # whose faces are objects of their own

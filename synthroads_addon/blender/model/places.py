@@ -161,7 +161,8 @@ def standing_update(axes: RoadAxes, item: PointObject, part: bpy.types.Object, p
     else:
         ends = ("left_abutment", "right_abutment")
         update["pier_offsets"] = tuple(sorted(carried(pier) for pier in item.pier_offsets))
-        update["rotation_deg"] = round(mirror * item.rotation_deg + float(np.rad2deg(turn)), 9)
+        rotation = mirror * item.rotation_deg + float(np.rad2deg(turn)) + axes.turned(item.station, station)
+        update["rotation_deg"] = round(rotation, 9)
     places = [carried(getattr(item, name)) for name in ends]
     return update | dict(zip(ends, places[:: int(side)], strict=True))
 

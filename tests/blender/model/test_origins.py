@@ -175,6 +175,8 @@ def test_a_move_along_a_things_own_axes_is_one_along_and_across_the_road(
     there = there + 1.5 * way + 0.5 * np.array([-way[1], way[0]])
     station, offset = (float(value[0]) for value in geometry.alignment.project(there[None]))
     assert (now.station, now.offset) == pytest.approx((station, offset), abs=EXACT)
+    bend = float(np.rad2deg(np.diff(geometry.alignment.heading(np.array([before.station, station])))[0]))
+    assert angle(now.rotation_deg, before.rotation_deg - bend) < 0.01
     assert not [edit for edit in edited.by_hand if edit.part == name]
 
 
