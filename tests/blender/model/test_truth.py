@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.base.errors import InputError
@@ -204,7 +204,7 @@ class TestPlaces:
 
     def test_a_linked_road_is_read_and_left_alone(self, model: RoadModel, tmp_path: Path) -> None:
         file = tmp_path / "linked.blend"
-        model.objects["sign"].location = (1.0, 0.5, 0.0)
+        model.objects["sign"].location += Vector((1.0, 0.5, 0.0))
         bpy.context.view_layer.update()
         edited = truth(model)
         bpy.data.libraries.write(str(file), {model.collection})
