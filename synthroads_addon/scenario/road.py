@@ -47,7 +47,7 @@ class LaneChangeLimits(ClosedModel):
     share: float = share(
         0.25, "Probability that a carriageway of three lanes or more drops or gains one.", title="Lane Drops and Gains"
     )
-    taper_length: Interval = interval(80.0, 200.0, "m", "Length over which a lane begins or ends.", title="Their Taper")
+    taper_length: Interval = interval(80.0, 200.0, "m", "Length over which a lane begins or ends.")
 
 
 class TurnoutLimits(ClosedModel):
@@ -162,9 +162,9 @@ class VegetationLimits(ClosedModel):
     forest_edges_per_km: Interval = interval(
         0.0, 0.0, "1/km", "Forest edges per km of either side.", title="Forest Edges (per km)"
     )
-    forest_edge_length: Interval = interval(60.0, 200.0, "m", "Length of forest edges.", title="Their Length")
-    forest_depth: Interval = interval(12.0, 25.0, "m", "Depth of the modelled part of a forest.", title="Their Depth")
-    forest_height: Interval = interval(12.0, 22.0, "m", "Height of a forest's trees.", title="Their Height")
+    forest_edge_length: Interval = interval(60.0, 200.0, "m", "Length of forest edges.")
+    forest_depth: Interval = interval(12.0, 25.0, "m", "Depth of the modelled part of a forest.")
+    forest_height: Interval = interval(12.0, 22.0, "m", "Height of a forest's trees.")
 
 
 class LandscapeLimits(ClosedModel):

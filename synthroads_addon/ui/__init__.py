@@ -20,13 +20,16 @@ from .panels import (
     edit,
     export,
     file_menus,
+    menus,
     panels,
+    placing,
     presets,
     road_choice,
     road_files,
     rules,
     scan_road,
     scene_scan,
+    things,
     views,
 )
 from .work import build, edited, follow, long_operator, scan
@@ -46,12 +49,14 @@ MODULES = (
         panels,
         rules,
         scan_road,
+        things,
+        placing,
         edit,
         cloud_view,
         views,
         scene_scan,
     ),
-    *(export, file_menus, calibration_settings, calibration),
+    *(export, file_menus, calibration_settings, calibration, menus),
 )
 
 

@@ -8,6 +8,7 @@ import bpy
 import laspy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.model.build import BuildTarget
@@ -38,7 +39,7 @@ def test_a_scan_by_command_is_of_the_edited_road_that_is_named(tmp_path: Path) -
     model = build_small(place=BuildTarget(beside=True))
     model.root.name = "Ramp"
     rail = small_parameters().objects["rail-right"]
-    model.objects["rail-right"].location = (0.7, 1.2, 0.0)  # shows nothing until it is built again
+    model.objects["rail-right"].location += Vector((0.7, 1.2, 0.0))  # shows nothing until it is built again
     model.objects["sign"].scale = (1.0, 1.0, 1.3)
     bpy.data.objects.remove(model.objects["rail-left"])
     bpy.context.view_layer.objects.active = None

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from ...base.errors import InputError
 from ...base.turns.stepper import Stepper
-from ...road.objects import LineObject, PointObject
-from ...road.parameters import RoadParameters
+from ...road.objects import LineObject, PointObject, RoadObject
 from ...road.surroundings import Vehicle
 from ..compat import modifier_input, object_inputs, set_modifier_input
 from ..labels import CLASS_PROPERTY
@@ -24,6 +23,7 @@ from ..nodes.kept_groups import keep_groups, may_keep_groups, restore_names
 from ..things.model_builder import ROLE, BuildRequest, ModelBuilder
 from ..things.registry import model_parts, required_parts
 from .edits import POSTS, keep_built
+from .places import PLACED
 from .roads import (
     BUILT_PARTS,
     FRAME,
@@ -216,7 +216,7 @@ class _Build:
             old_parts = _parts_of(root, self._place)
             _repoint(old_parts, builder.objects)
             remove_with_meshes(list(old_parts))
-            collection = _road_collection(root, scene)
+            collection = road_collection(root, scene)
         else:
             collection = bpy.data.collections.new(COLLECTION)
             collection[MADE_COLLECTION] = True
@@ -232,7 +232,9 @@ class _Build:
             )
             item[OF_ROAD], item[NAME] = self._road, item.name
             keep_built(item)
-            _describe(item, role, parameters)
+            if isinstance(parameters.objects.get(role), LineObject):
+                item[PLACED] = list(item.location)[:2]
+            describe(item, role, parameters.objects)
         root[BUILT_PARTS] = json.dumps(list(builder.objects))
         origin = np.array(parameters.transform.translate) + builder.origin
         place_root(root, origin, scene, self._place.keep_moves)
@@ -251,12 +253,12 @@ _CLASSES = {"Road": "road", "Terrain": "ground", "Painted Areas": "road_marking"
 """Classes of the parts that aren't objects of the parameter set, by role."""
 
 
-def _describe(item: bpy.types.Object, role: str, parameters: RoadParameters) -> None:
+def describe(item: bpy.types.Object, role: str, objects: Mapping[str, RoadObject]) -> None:
     """Write a part's class to its object's properties; lock the transform of what lies along the whole road.
 
     The shape of such a part follows the road wherever its object is, so that a move would mislead.
     """
-    thing = parameters.objects.get(role.partition("/")[0])
+    thing = objects.get(role.partition("/")[0])
     kind = _CLASSES.get(role) or (thing.semantic_class if thing is not None else "")
     if kind:
         item[CLASS_PROPERTY] = kind
@@ -265,7 +267,7 @@ def _describe(item: bpy.types.Object, role: str, parameters: RoadParameters) -> 
     item.lock_location = item.lock_rotation = item.lock_scale = (True, True, True)
 
 
-def _road_collection(root: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collection:
+def road_collection(root: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collection:
     """Return the scene's collection that holds a road's root object."""
     scene_collections = {scene.collection, *scene.collection.children_recursive}
     return next(collection for collection in root.users_collection if collection in scene_collections)

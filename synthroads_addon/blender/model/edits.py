@@ -140,12 +140,13 @@ def shape_reason(item: bpy.types.Object, carried: Collection[str], keeps_mesh: b
     return f"its inputs {', '.join(changed_names)} are no fields of the parameter set" if changed_names else ""
 
 
-def place_reason(place: Float, scalable: bool = False) -> str:
+def place_reason(place: Float, scalable: bool = False, mirrorable: bool = False) -> str:
     """Return the reason, in words, why no parameters describe a part's transform (4, 4); empty if they do.
 
     Args:
         place: in its road's frame.
         scalable: it may be larger or smaller as a whole.
+        mirrorable: it may be mirrored in a vertical plane: parameters say where it stands then.
     """
     turn = place[:3, :3]
     size = np.linalg.norm(turn, axis=0)
@@ -157,8 +158,24 @@ def place_reason(place: Float, scalable: bool = False) -> str:
         shown = " × ".join(f"{value:.4g}" for value in np.linalg.norm(place[:3, :3], axis=0))
         return f"it is scaled ({shown})"
     if abs(turn[2, 2] - 1.0) > UPRIGHT or np.abs(turn[2, :2]).max() > UPRIGHT:
-        return "it is mirrored" if np.linalg.det(turn) < 0.0 else "it is tilted"
-    return "it is mirrored" if np.linalg.det(turn) < 0.0 else ""
+        return "it is mirrored" if is_mirrored(place) else "it is tilted"
+    return "it is mirrored" if is_mirrored(place) and not mirrorable else ""
+
+
+def is_mirrored(place: Float) -> bool:
+    """Return whether a matrix (4, 4) mirrors."""
+    return bool(np.linalg.det(place[:3, :3]) < 0.0)
+
+
+def course_of(place: Float, turn: float = 0.0) -> float:
+    """Return where a direction of an object's own frame points to in the road's frame, rad, even if it is mirrored.
+
+    Args:
+        place: (4, 4) of the object, upright.
+        turn: of the direction from the object's own x axis, rad.
+    """
+    x, y = place[:2, :2] @ [np.cos(turn), np.sin(turn)]
+    return float(np.arctan2(y, x))
 
 
 def turn_of(place: Float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -11,31 +11,34 @@ from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
 from ...road.lane_lines import LaneLine
-from ...road.objects import LineObject, PointObject
-from ...road.section import Carriageway
+from ...road.objects import LineObject, PointObject, RoadObject
+from ...road.section import Arrow, Carriageway
 from ...road.surroundings import Vehicle
 from ...road.terrain import surface_elevation
 from ...road.things.asset import Asset
 from ...road.things.building import Building
 from ...road.things.gantry import Gantry
+from ...road.things.guardrail import Guardrail
 from ...road.things.overpass import Overpass
 from ...road.things.power_line import PowerLine
 from ..things.meshes import on_plan
+from ..things.model_builder import AHEAD
 from ..things.vehicle.vehicle import vehicle_place
-from .edits import turn_of, vertices_of
+from .edits import attribute_of, course_of, is_mirrored, turn_of, vertices_of
 
 Float = NDArray[np.float64]
 
 IN_A_FRAME = (Gantry, Overpass, Building, PowerLine)
 """Things whose objects are placed and turned by their own matrices; other standing things are a vertex each."""
 PLACED = "synthroads_placed"
-"""Custom property of what runs along the road: how far (x, y) its object's move is in its inputs already, m."""
+"""Custom property of what runs along the road: its object's place (x, y), m, that its inputs belong to."""
 STILL = 2e-4
 """Length of a move, m, below which it counts as none: objects' places are 32-bit floats."""
 _TURNED = 1e-5
 """Turn, rad, below which it counts as none: objects' rotations are 32-bit floats."""
 _SCALED = 1e-5
 """Relative change of a scale below which it counts as none: objects' matrices are 32-bit floats."""
+_OTHER_SIDE = {"left": "right", "right": "left"}
 _LANE = 1.9
 """Largest distance from the middle of a lane at which a vehicle still belongs to it, m; chosen."""
 
@@ -71,7 +74,35 @@ class RoadAxes:
         return float(np.rad2deg(was - being))
 
 
-def point_update(axes: RoadAxes, item: PointObject, vertex: Float, place: Float) -> dict[str, Any]:
+class PointPlace(NamedTuple):
+    """Place of a thing that is a vertex of an object.
+
+    Attributes:
+        point: (3,) in the road's frame, m.
+        course: where the road's course at the thing, turned by its rotation, points to, rad.
+    """
+
+    point: Float
+    course: float
+
+
+def point_places(part: bpy.types.Object, place: Float) -> list[PointPlace]:
+    """Return the places of an object's vertices, each of which is a thing.
+
+    Their heading is that of the thing's own y axis, a quarter of a turn less than that of its course.
+
+    Args:
+        part: the object.
+        place: (4, 4) of it in the road's frame; upright.
+    """
+    headings = attribute_of(part.data, "heading")
+    return [
+        PointPlace(place[:3, :3] @ vertex + place[:3, 3], course_of(place, float(heading) + np.pi / 2.0))
+        for vertex, heading in zip(vertices_of(part.data), headings, strict=True)
+    ]
+
+
+def point_update(axes: RoadAxes, item: PointObject, there: PointPlace) -> dict[str, Any]:
     """Return the changed fields (station, offset, rotation) of a thing whose object is a vertex; empty if unmoved.
 
     It is on the surface wherever it is in plan: its height in the scene says nothing.
@@ -79,15 +110,13 @@ def point_update(axes: RoadAxes, item: PointObject, vertex: Float, place: Float)
     Args:
         axes: the road's.
         item: the thing.
-        vertex: (3,) of its mesh.
-        place: (4, 4) of its object in the road's frame; upright.
+        there: where its vertex is.
     """
     expected = on_plan(axes.before, [item])[0]
-    point = place[:3, :3] @ vertex + place[:3, 3]
-    turn = turn_of(place)
-    if np.hypot(*(point - expected)[:2]) < STILL and abs(turn) < _TURNED:
+    turn = _wrapped(there.course - _course(axes, item))
+    if np.hypot(*(there.point - expected)[:2]) < STILL and abs(turn) < _TURNED:
         return {}
-    station, offset = axes.located(point)
+    station, offset = axes.located(there.point)
     return {"station": station, "offset": offset, "rotation_deg": _turned(axes, item, station, turn)}
 
 
@@ -97,29 +126,49 @@ def _turned(axes: RoadAxes, item: PointObject, station: float, turn: float) -> f
     return round((rotation + 180.0) % 360.0 - 180.0, 9)
 
 
-def standing_update(axes: RoadAxes, item: PointObject, place: Float) -> dict[str, Any]:
-    """Return the changed fields of a thing of `IN_A_FRAME` by its object's place (4, 4); empty if unmoved."""
+def _course(axes: RoadAxes, item: PointObject, turned: bool = True) -> float:
+    """Return the course of the road at a thing as it was built, turned by the thing's rotation if `turned`, rad."""
+    rotation = np.deg2rad(item.rotation_deg) if turned else 0.0
+    return float(axes.before.alignment.heading(item.station)) + float(rotation)
+
+
+def standing_update(axes: RoadAxes, item: PointObject, part: bpy.types.Object, place: Float) -> dict[str, Any]:
+    """Return the changed fields of a thing of `IN_A_FRAME` by its object's place (4, 4); empty if unmoved.
+
+    What is mirrored has its right end where its left one was.
+    """
     expected = on_plan(axes.before, [item])[0]
-    rotation = 0.0 if isinstance(item, Overpass) else item.rotation_deg
-    heading = float(axes.before.alignment.heading(item.station)) - np.pi / 2.0 + np.deg2rad(rotation)
-    turn = _wrapped(turn_of(place) - heading)
-    if np.hypot(*(place[:3, 3] - expected)[:2]) < STILL and abs(turn) < _TURNED:
+    course = course_of(place, 0.0 if AHEAD in part else np.pi / 2.0)
+    turn = _wrapped(course - _course(axes, item, not isinstance(item, Overpass)))
+    mirror = -1.0 if is_mirrored(place) else 1.0
+    if np.hypot(*(place[:3, 3] - expected)[:2]) < STILL and abs(turn) < _TURNED and mirror > 0.0:
         return {}
+    side = mirror
+    if isinstance(item, Overpass) and abs(turn) > np.pi / 2.0:  # it crosses as before, with its ends swapped
+        turn, side = _wrapped(turn + np.pi), -mirror
     station, offset = axes.located(place[:3, 3])
-    shift = offset - item.offset
+
+    def carried(value: float) -> float:
+        """Return an offset that is placed relative to the thing."""
+        return round(offset + side * (value - item.offset), 6)
+
     update: dict[str, Any] = {"station": station, "offset": offset}
     update["rotation_deg"] = _turned(axes, item, station, turn)
     if isinstance(item, Gantry):
         ends = ("left_offset", "right_offset")
-        signs = [sign.model_copy(update={"offset": round(sign.offset + shift, 6)}) for sign in item.signs]
+        signs = [sign.model_copy(update={"offset": carried(sign.offset)}) for sign in item.signs]
         update["signs"] = tuple(signs)
+        if side < 0.0:
+            update["post_side"] = _OTHER_SIDE[item.post_side]
     elif not isinstance(item, Overpass):
         return update
     else:
         ends = ("left_abutment", "right_abutment")
-        update["pier_offsets"] = tuple(round(pier + shift, 6) for pier in item.pier_offsets)
-        update["rotation_deg"] = round(item.rotation_deg + float(np.rad2deg(turn)), 9)
-    return update | {name: round(getattr(item, name) + shift, 6) for name in ends}
+        update["pier_offsets"] = tuple(sorted(carried(pier) for pier in item.pier_offsets))
+        rotation = mirror * item.rotation_deg + float(np.rad2deg(turn)) + axes.turned(item.station, station)
+        update["rotation_deg"] = round(rotation, 9)
+    places = [carried(getattr(item, name)) for name in ends]
+    return update | dict(zip(ends, places[:: int(side)], strict=True))
 
 
 def asset_update(axes: RoadAxes, item: Asset, place: Float) -> dict[str, Any]:
@@ -156,7 +205,8 @@ def _surface(geometry: RoadGeometry, station: float, offset: float) -> float:
 def line_update(axes: RoadAxes, item: LineObject, part: bpy.types.Object, place: Float) -> dict[str, Any]:
     """Return the changed stations and offsets of a line-like thing by its middle's move, m; empty if unmoved.
 
-    Its shape follows the road whatever its object's place is. A move over an end of the road stops there.
+    Its shape follows the road whatever its object's place is. A move over an end of the road stops there. A mirrored
+    guardrail has its beam on the other side.
 
     Args:
         axes: the road's.
@@ -165,8 +215,11 @@ def line_update(axes: RoadAxes, item: LineObject, part: bpy.types.Object, place:
         place: (4, 4) of that in the road's frame; upright.
     """
     shift = place[:2, 3] - np.array(part.get(PLACED, (0.0, 0.0)))
+    faces: dict[str, Any] = {}
+    if is_mirrored(place) and isinstance(item, Guardrail):
+        faces["faces"] = _OTHER_SIDE.get(item.faces, item.faces)
     if np.hypot(*shift) < STILL:
-        return {}
+        return faces
     end = min(item.end_station, axes.now.length)
     middle, offset = (item.start_station + end) / 2.0, item.offset
     there = axes.now.alignment.place(np.array([middle]), np.array([offset]))[0]
@@ -178,18 +231,20 @@ def line_update(axes: RoadAxes, item: LineObject, part: bpy.types.Object, place:
     moved = {"start_station": item.start_station + along, "end_station": end + along, "offset": offset + across}
     if hasattr(item, "end_offset"):
         moved["end_offset"] = item.end_offset + across
-    return {name: round(value, 6) for name, value in moved.items()}
+    return {name: round(value, 6) for name, value in moved.items()} | faces
 
 
 def vehicle_update(axes: RoadAxes, item: Vehicle, part: bpy.types.Object, place: Float) -> dict[str, Any]:
     """Return the changed station, carriageway and lane of a vehicle, snapped to the nearest lane; empty if unmoved."""
     before = axes.before.parameters
     line = LaneLine(axes.before, before.carriageway_of(item), item.lane)
-    expected = on_plan(axes.before, [vehicle_place(line, item)])[0]
-    point = place[:3, :3] @ vertices_of(part.data)[0] + place[:3, 3]
-    if np.hypot(*(point - expected)[:2]) < STILL and abs(turn_of(place)) < _TURNED:
+    built = vehicle_place(line, item)
+    expected = on_plan(axes.before, [built])[0]
+    there = point_places(part, place)[0]
+    turn = _wrapped(there.course - _course(axes, built))
+    if np.hypot(*(there.point - expected)[:2]) < STILL and abs(turn) < _TURNED:
         return {}
-    station, offset = axes.located(point)
+    station, offset = axes.located(there.point)
     lanes = [
         (abs(offset - float(LaneLine(axes.now, carriageway, lane).offset(np.array(station)))), name, lane)
         for name, carriageway in axes.now.parameters.of_type(Carriageway).items()
@@ -199,6 +254,23 @@ def vehicle_update(axes: RoadAxes, item: Vehicle, part: bpy.types.Object, place:
     if beside > _LANE:
         raise Lost(f"it stands {beside:.1f} m beside the next lane's middle")
     return {"station": station, "carriageway": name, "lane": lane}
+
+
+def part_update(
+    item: RoadObject, before: RoadObject, part: bpy.types.Object, place: Float, axes: RoadAxes
+) -> tuple[dict[str, Any], bool]:
+    """Return an object's changed fields by its part's place, and whether showing them needs a rebuild."""
+    if isinstance(before, Asset):
+        return asset_update(axes, before, place), False
+    if isinstance(before, IN_A_FRAME):
+        return standing_update(axes, before, part, place), True
+    if isinstance(before, LineObject) and isinstance(item, LineObject):
+        return line_update(axes, item, part, place), True
+    if isinstance(before, Vehicle):
+        return vehicle_update(axes, before, part, place), True
+    if isinstance(before, PointObject) and not isinstance(before, Arrow):
+        return point_update(axes, before, point_places(part, place)[0]), False
+    return {}, False
 
 
 def _wrapped(angle: float) -> float:

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import json
 from collections.abc import Generator
-from functools import lru_cache
 
 import bpy
 import numpy as np
 
 from ...base.errors import InputError
-from ...road.geometry import RoadGeometry
-from ...road.objects import LineObject
+from ...road.objects import LineObject, RoadObject
 from ..compat import set_modifier_input
 from ..nodes.inputs import input_name
 from ..things.model_builder import ROLE, BuildRequest
+from .added import kept_thing, stand_at_beginning, stored_axes
 from .build import BuildTarget, RoadModel, build_steps
-from .edits import own_modifier, place_reason
+from .edits import is_mirrored, own_modifier, place_reason
 from .older_files import PARAMETERS
-from .places import PLACED, Lost, RoadAxes, line_update
+from .places import Lost, RoadAxes, line_update
 from .read_back import edited_object
 from .roads import NAME, OF_ROAD, parts_and_copies, road_of_id, root_of, world_matrix
-from .store import BUILT_FROM, FOUND, recall, recall_parameters, remember
+from .store import BUILT_FROM, FOUND, recall, remember
 from .truth import BY_HAND, EditedRoad
 
 
@@ -87,27 +86,30 @@ def move_line(item: bpy.types.Object, scene: bpy.types.Scene) -> bool:
     root, modifier = root_of(item, scene), own_modifier(item)
     if ROLE not in item or root is None or modifier is None or item.library is not None or PARAMETERS not in root:
         return False
-    axes = _stored_axes(str(root[PARAMETERS]))
-    thing = axes.before.parameters.objects.get(str(item[ROLE])) if axes else None
+    axes = stored_axes(str(root[PARAMETERS]))
+    thing = _thing_of(item, axes) if axes else None
     place = np.linalg.inv(world_matrix(root)) @ world_matrix(item)
-    if axes is None or not isinstance(thing, LineObject) or place_reason(place):
+    if axes is None or not isinstance(thing, LineObject) or place_reason(place, mirrorable=True):
         return False
     try:
         update = line_update(axes, edited_object(thing, modifier), item, place)  # type: ignore[arg-type]
     except Lost:
         return False
+    if not update and not is_mirrored(place):
+        return False
     for field, value in update.items():
-        set_modifier_input(modifier, input_name(field), value)
-    if update:
-        item[PLACED] = place[:2, 3].tolist()
-    return bool(update)
+        if field == "faces":
+            for side in ("left", "right"):
+                set_modifier_input(modifier, f"{side.title()} Beam", value in (side, "both"))
+        else:
+            set_modifier_input(modifier, input_name(field), value)
+    stand_at_beginning(root, item, axes, edited_object(thing, modifier))  # type: ignore[arg-type]
+    return True
 
 
-@lru_cache(maxsize=4)
-def _stored_axes(text: str) -> RoadAxes | None:
-    """Return a road's geometry from its stored parameter set (JSON text), cached; None if that is damaged."""
+def _thing_of(item: bpy.types.Object, axes: RoadAxes) -> RoadObject | None:
+    """Return what a part was built as: what it keeps itself, or what the road's parameter set says; None if nothing."""
     try:
-        geometry = RoadGeometry(recall_parameters({PARAMETERS: text}))  # it reads this key only
+        return kept_thing(item) or axes.before.parameters.objects.get(str(item[ROLE]))
     except InputError:
         return None
-    return RoadAxes(geometry, geometry)

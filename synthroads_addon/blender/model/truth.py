@@ -26,27 +26,26 @@ from ...road.section import Arrow, Hatching
 from ...road.surroundings import Terrain, Vegetation, Vehicle
 from ...road.things.asset import Asset
 from ..things.model_builder import ROLE
+from .added import with_kept_things
 from .axis_edits import EditedAxis, edited_axis, moved_alignment
 from .edits import (
     POSTS,
     HandEdit,
     attribute_of,
+    is_mirrored,
     mesh_edited,
     own_modifier,
     place_reason,
     shape_reason,
     turn_of,
-    vertices_of,
 )
 from .places import (
     IN_A_FRAME,
     Lost,
     RoadAxes,
-    asset_update,
-    line_update,
+    part_update,
+    point_places,
     point_update,
-    standing_update,
-    vehicle_update,
 )
 from .read_back import edited_object, edited_parameters, read_inputs
 from .roads import BUILT_PARTS, ROAD, displacement, origin_of, parts_and_copies, root_above, world_matrix
@@ -154,8 +153,9 @@ class _Reading:
     stale: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._base = recall_parameters(self.root)
+        self._built = recall_parameters(self.root)
         self._parts, self._copies = parts_and_copies(self.root, self.scene)
+        self._base = with_kept_things(self._built, self._parts)
         self._into = np.linalg.inv(world_matrix(self.root))
         self._ids = {"Terrain": next(iter(self._base.of_type(Terrain)), "")}
 
@@ -182,7 +182,7 @@ class _Reading:
         objects |= self._read_copies(parameters, objects, axes)
         data = parameters.to_dict() | {"objects": {name: item.to_dict() for name, item in objects.items()}}
         placed_parameters = self._placed(RoadParameters.from_dict(data))
-        if not self.stale and InstanceNumbers(placed_parameters).parts != _kept_numbers(self._base, placed_parameters):
+        if not self.stale and InstanceNumbers(placed_parameters).parts != _kept_numbers(self._built, placed_parameters):
             self.stale.append("numbers of dashes and plants depend on the objects that the road has")
         return EditedRoad(placed_parameters, tuple(self.by_hand), "", tuple(self.stale), axis.fit if axis else None)
 
@@ -238,7 +238,8 @@ class _Reading:
             reason = "its mesh was edited"
         if not reason and is_vertex and role not in POSTS and len(item.data.vertices) != 1:
             reason = "its mesh was edited"
-        return reason or place_reason(self._place(item), isinstance(thing, Asset))
+        placed = role in POSTS or isinstance(thing, PointObject | LineObject | Vehicle)
+        return reason or place_reason(self._place(item), isinstance(thing, Asset), placed)
 
     def _moved(
         self, parameters: RoadParameters, axes: RoadAxes, fine: dict[str, bpy.types.Object]
@@ -271,7 +272,8 @@ class _Reading:
             gone |= set(self._base.of_type(Hatching)) | set(self._base.of_type(Arrow))
         for role, kind in POSTS.items():
             if role in self._built_roles() or role in self._parts:
-                gone |= set(self._base.of_type(kind))  # those that are there come back with their vertices
+                # Those that are there come back with their vertices, or have an object of their own.
+                gone |= set(self._base.of_type(kind)) - set(self._parts)
         return gone | self._without_face(fine, gone)
 
     def _without_face(self, fine: dict[str, bpy.types.Object], gone: set[str]) -> set[str]:
@@ -291,11 +293,13 @@ class _Reading:
         """Return an object with its part's current place; None, added to `by_hand`, if no parameters describe it."""
         place = self._place(part)
         try:
-            update, stale = _update(item, before, part, place, axes)
+            update, needs_rebuild = part_update(item, before, part, place, axes)
         except Lost as lost:
             self.by_hand.append(HandEdit(role_of(part), part.name, str(lost)))
             return None
-        if update and stale:
+        if is_mirrored(place):
+            self.stale.append(f"{part.name} is mirrored")
+        elif update and needs_rebuild:
             self.stale.append(f"{part.name} was moved")
         return item.model_copy(update=update) if update else item
 
@@ -304,10 +308,12 @@ class _Reading:
     ) -> Iterator[tuple[str, RoadObject]]:
         """Yield (id, thing) of each vertex of one object that holds many things, with their present places."""
         known = {item.instance: name for name, item in self._base.of_type(kind).items()}
-        place, vertices = self._place(part), vertices_of(part.data)
+        place = self._place(part)
+        if is_mirrored(place):
+            self.stale.append(f"{part.name} is mirrored")
         numbers = attribute_of(part.data, "instance", -1).astype(np.int64) % 2**32
         seen: set[str] = set()
-        for vertex, number in zip(vertices, numbers.tolist(), strict=True):
+        for there, number in zip(point_places(part, place), numbers.tolist(), strict=True):
             name = known.get(number)
             if name is None or name in seen:
                 self.by_hand.append(HandEdit(name or role_of(part), part.name, "a vertex was added"))
@@ -316,7 +322,7 @@ class _Reading:
             item, before = parameters.objects[name], self._base.objects[name]
             assert isinstance(before, PointObject)
             try:
-                yield name, item.model_copy(update=point_update(axes, before, vertex, place))
+                yield name, item.model_copy(update=point_update(axes, before, there))
             except Lost as lost:
                 self.by_hand.append(HandEdit(name, part.name, str(lost)))
 
@@ -371,23 +377,6 @@ class _Reading:
 def role_of(part: bpy.types.Object) -> str:
     """Return a part's role in its road; empty if it has none."""
     return str(part.get(ROLE, ""))
-
-
-def _update(
-    item: RoadObject, before: RoadObject, part: bpy.types.Object, place: Float, axes: RoadAxes
-) -> tuple[dict[str, Any], bool]:
-    """Return an object's changed fields by its part's place, and whether showing them needs a rebuild."""
-    if isinstance(before, Asset):
-        return asset_update(axes, before, place), False
-    if isinstance(before, IN_A_FRAME):
-        return standing_update(axes, before, place), True
-    if isinstance(before, LineObject) and isinstance(item, LineObject):
-        return line_update(axes, item, part, place), True
-    if isinstance(before, Vehicle):
-        return vehicle_update(axes, before, part, place), True
-    if isinstance(before, PointObject) and not isinstance(before, Arrow):
-        return point_update(axes, before, vertices_of(part.data)[0], place), False
-    return {}, False
 
 
 def _on_a_vertex(item: RoadObject | None) -> bool:

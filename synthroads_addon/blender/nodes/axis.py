@@ -24,7 +24,11 @@ class AxisInputs(Inputs):
 
     def axis(self) -> Value:
         """Add nodes for the backbone's geometry, from the object or the curve; return their output."""
-        given = op.object_geometry(self.backbone)
+        # A transform of a geometry leaves its vectors: those to the left are turned like the object's own frame.
+        info = self.tree.node("GeometryNodeObjectInfo", self.backbone, transform_space="RELATIVE")
+        left = op.named_attribute(self.tree, "left", "FLOAT_VECTOR")
+        left = self.tree.node("FunctionNodeRotateVector", left, info["Rotation"]).value
+        given = op.store(info["Geometry"], "left", left)
         return self.tree.call(axis_group(), curve=self.curve, backbone=given).value
 
 

@@ -11,6 +11,9 @@ from . import operations as op
 from .builder import Operand, Tree, Value, makes_group
 from .inputs import Inputs, socket
 
+_BESIDE = ((5e-4, 5e-4), (-5e-4, 5e-4), (5e-4, -5e-4), (-5e-4, -5e-4))
+"""Shifts in plan (m) of the rays that find the terrain at its very border. Chosen: above the rounding of 32 bits at
+some kilometres, and on slopes still below 1 mm of height."""
 FOLD_SHARE = 0.98
 """Share of the radius at which an offset curve is cut, as in `road.alignment.clip_offset`."""
 
@@ -68,20 +71,25 @@ class _Surfaces(Inputs):
 def surface_height_group(tree: Tree) -> None:
     """The z of the surface above or below a place: the road's, beside it the terrain's, the place's where is neither.
 
-    On the very border of the road a vertical ray may pass by: there the nearest point of the road counts.
+    On the very border of the road a vertical ray may pass by: there the nearest point of the road counts. On that of
+    the terrain, as where the road begins, rays 0.5 mm beside it find it.
     """
     surfaces = _Surfaces(tree)
     place = surfaces.place
     with tree.frame("Rays from above"):
-        ray_start = place + (0.0, 0.0, 500.0)  # chosen: higher than any surface above a place
 
-        def ray_hit(target: Value) -> tuple[Value, Value]:
+        def ray_hit(target: Value, shift: tuple[float, float] = (0.0, 0.0)) -> tuple[Value, Value]:
             """Return whether the ray hits a mesh, and the height (m) there."""
+            ray_start = place + (*shift, 500.0)  # chosen: higher than any surface above a place
             ray = tree.node("GeometryNodeRaycast", target_geometry=target, source_position=ray_start, ray_length=1000.0)
             return ray["Is Hit"], op.component(ray["Hit Position"], "Z")
 
         on_road, road_z = ray_hit(surfaces.road)
         on_terrain, terrain_z = ray_hit(surfaces.terrain)
+        for shift in _BESIDE:
+            is_hit, height = ray_hit(surfaces.terrain, shift)
+            terrain_z = op.switch(on_terrain, height, terrain_z)
+            on_terrain = on_terrain | is_hit
     with tree.frame("Nearest point of the road, if there is one"):
         nearest_z = op.component(op.sample_surface(surfaces.road, op.position(tree), place), "Z")
         nearest_z = op.switch(op.face_count(surfaces.road) > 0, op.component(place, "Z"), nearest_z)

@@ -157,6 +157,28 @@ def object_geometry(item: Value) -> Value:
     return item.tree.node("GeometryNodeObjectInfo", item, transform_space="RELATIVE")["Geometry"]
 
 
+def object_geometry_across(item: Value) -> Value:
+    """Add nodes for an object's geometry as `object_geometry`, with x to the right and y along the road.
+
+    The modified object has x along the road; `along` turns what is made back into its frame.
+    """
+    return across(object_geometry(item))
+
+
+def across(geometry: Value) -> Value:
+    """Add nodes that turn a geometry from x along the road to y along it, exactly: (x, y) becomes (-y, x)."""
+    place = position(geometry.tree)
+    x, y, z = (component(place, axis) for axis in "XYZ")
+    return set_position(geometry, vector(geometry.tree, y * -1.0, x, z))
+
+
+def along(geometry: Value) -> Value:
+    """Add nodes that turn a geometry from y along the road to x along it, exactly: (x, y) becomes (y, -x)."""
+    place = position(geometry.tree)
+    x, y, z = (component(place, axis) for axis in "XYZ")
+    return set_position(geometry, vector(geometry.tree, y, x * -1.0, z))
+
+
 def grid(tree: Tree, columns: Operand, rows: Operand) -> tuple[Value, Value, Value]:
     """Add nodes for a mesh of columns x rows vertices, and the fields of their column and row numbers.
 

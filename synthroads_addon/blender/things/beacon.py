@@ -138,7 +138,8 @@ def build_beacons(builder: ModelBuilder) -> None:
         "height": np.array([beacon.height for beacon in beacons]),
         "pass_side": np.array([_passing_side(beacon) for beacon in beacons]),
     }
-    builder.add("Beacons", builder.points("Beacons", beacons, attributes), beacon_group())
+    mesh = builder.points("Beacons", beacons, attributes)
+    builder.add("Beacons", mesh, beacon_group(), frame=builder.frame(beacons[0]))
 
 
 def _passing_side(beacon: ConstructionBeacon) -> int:

@@ -3,16 +3,64 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
-from ...road.objects import PointObject
+from ...road.objects import LineObject, PointObject
+from ...road.terrain import known_elevation
+from ...road.things.thing import StandingThing
 
 Float = NDArray[np.float64]
+
+
+class ObjectFrame(NamedTuple):
+    """Frame of an object in the road's own: x along the road, y to the left, z up.
+
+    Attributes:
+        origin: (3,) the place of its origin, m.
+        turn: of its x axis from the road's own, about the vertical, rad.
+    """
+
+    origin: Float
+    turn: float
+
+    def matrix(self) -> Float:
+        """Return the frame as a matrix (4, 4) into the road's own."""
+        place = np.eye(4)
+        cosine, sine = np.cos(self.turn), np.sin(self.turn)
+        place[:2, :2] = [[cosine, -sine], [sine, cosine]]
+        place[:3, 3] = self.origin
+        return place
+
+    def local(self, points: Float) -> Float:
+        """Return points (N, 3) of the road's own frame in this one."""
+        return (points - self.origin) @ self.matrix()[:3, :3]
+
+
+def foot_frame(geometry: RoadGeometry, item: PointObject) -> ObjectFrame:
+    """Return the frame at a point object's foot on the surface, turned from the road's course as the object is."""
+    heading = float(geometry.alignment.heading(np.array([item.station]))[0])
+    turn = item.turn if isinstance(item, StandingThing) else float(np.deg2rad(item.rotation_deg))
+    return ObjectFrame(feet(geometry, [item])[0], heading + turn)
+
+
+def line_frame(geometry: RoadGeometry, item: LineObject, stretch: tuple[float, float]) -> ObjectFrame:
+    """Return the frame at the beginning of a line object on the surface, or of its piece in a stretch of the road.
+
+    Args:
+        geometry: of the whole road.
+        item: the line object.
+        stretch: stations (m) of the stretch that is built.
+    """
+    station = np.clip(np.array([item.start_station]), *stretch)
+    offset = item.offset_at(station)
+    plan = geometry.alignment.place(station, offset)[0]
+    origin = np.array([*plan, known_elevation(geometry, station, offset)[0]])
+    return ObjectFrame(origin, float(geometry.alignment.heading(station)[0]))
 
 
 def points_mesh(
@@ -20,17 +68,17 @@ def points_mesh(
     geometry: RoadGeometry,
     items: Sequence[PointObject],
     attributes: Mapping[str, NDArray[Any]],
-    origin: Float,
+    frame: ObjectFrame,
 ) -> bpy.types.Mesh:
-    """Create a mesh with one vertex per point object, at the axis's elevation, relative to `origin` (3,), m.
+    """Create a mesh with one vertex per point object, at its foot, in an object's frame.
 
     Attributes of its points: ``heading`` (rad, the turn about z of something that was made facing traffic along +y),
     ``elevation`` (m above the surface), ``instance``, and those given: whole numbers, numbers, or vectors (N, 3).
     """
     mesh = bpy.data.meshes.new(f"SR {name}")
-    fill(mesh, on_plan(geometry, items) - origin)
+    fill(mesh, frame.local(feet(geometry, items)))
     heading = geometry.alignment.heading(np.array([item.station for item in items]))
-    turn = heading - np.pi / 2.0 + np.deg2rad([item.rotation_deg for item in items])
+    turn = heading - np.pi / 2.0 + np.deg2rad([item.rotation_deg for item in items]) - frame.turn
     attribute(mesh, "heading", np.arctan2(np.sin(turn), np.cos(turn)))
     attribute(mesh, "elevation", np.array([item.elevation for item in items]))
     attribute(mesh, "instance", signed_instance([item.instance for item in items]))
@@ -46,6 +94,14 @@ def on_plan(geometry: RoadGeometry, items: Sequence[PointObject]) -> Float:
     position, heading, _ = geometry.alignment.frame(station)
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
     return np.column_stack([position + offset[:, None] * left, geometry.profile.elevation(station)])
+
+
+def feet(geometry: RoadGeometry, items: Sequence[PointObject]) -> Float:
+    """Return local places (N, 3), m, of point objects' feet: on the surface, and so high above it as they stand."""
+    places = on_plan(geometry, items)
+    station, offset = (np.array([getattr(item, name) for item in items]) for name in ("station", "offset"))
+    places[:, 2] = known_elevation(geometry, station, offset) + [item.elevation for item in items]
+    return places
 
 
 def signed_instance(instances: Sequence[int] | NDArray[np.integer]) -> NDArray[np.int32]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...base.turns.stepper import run_aside, yield_if_due, yield_now
 from ...materials.table import Material
 from ...road.geometry import RoadGeometry
-from ...road.objects import PointObject, RoadObject
+from ...road.objects import LineObject, PointObject, RoadObject
 from ...road.parameters import RoadParameters
 from ...road.stretches import cut_stretch, frame_of
 from ...road.tessellation import sample_stations
@@ -22,10 +22,12 @@ from ..compat import set_modifier_input
 from ..materials import RoadMaterials
 from ..nodes.builder import usual_materials
 from ..nodes.inputs import input_name
-from .meshes import on_plan, points_mesh, signed_instance
+from .meshes import ObjectFrame, foot_frame, line_frame, points_mesh, signed_instance
 
 ROLE = "synthroads_role"
 """Custom property of the objects that `build_road` makes: their role in the model."""
+AHEAD = "synthroads_ahead"
+"""Custom property of a part whose own x axis points along the road; of earlier versions' parts it is the y axis."""
 SUPPORT = "synthroads_support"
 """Custom property of objects that only other objects need: they are hidden and never scanned."""
 
@@ -134,8 +136,22 @@ class ModelBuilder:
     def points(
         self, name: str, items: Sequence[PointObject], attributes: Mapping[str, NDArray[Any]] | None = None
     ) -> bpy.types.Mesh:
-        """Create a mesh with one vertex per point object, its heading, elevation, instance and given attributes."""
-        return points_mesh(name, self.geometry, items, attributes or {}, self.origin)
+        """Create a mesh with one vertex per point object, its heading, elevation, instance and given attributes.
+
+        It is in the frame of the first one, see `frame`.
+        """
+        return points_mesh(name, self.geometry, items, attributes or {}, self._local_frame(items[0]))
+
+    def frame(self, item: PointObject | LineObject) -> ObjectFrame:
+        """Return the frame of a thing's object in the scene: at its foot or its beginning, with x along the road."""
+        frame = self._local_frame(item)
+        return ObjectFrame(frame.origin - self.origin, frame.turn)
+
+    def _local_frame(self, item: PointObject | LineObject) -> ObjectFrame:
+        """Return a thing's frame as `frame` does, but in the whole road's local coordinates."""
+        if isinstance(item, LineObject):
+            return line_frame(self.geometry, item, self.stretch)
+        return foot_frame(self.geometry, item)
 
     def add_thing(
         self,
@@ -147,11 +163,13 @@ class ModelBuilder:
     ) -> None:
         """Add a thing of the road as an object with its node group, inputs set from the fields of the same names.
 
+        Its origin is at its foot, or at the beginning of what runs along the road, see `frame`.
+
         Args:
             name: the thing's id.
             item: the thing.
             group: its node group.
-            mesh: of the object; if None, a vertex at a point object's place, and nothing for other things.
+            mesh: of the object, in its frame; if None, a vertex at a point object's foot, and nothing for other things.
             inputs: the group's other inputs, by their fields in its class of inputs, see `add`.
         """
         if mesh is None and isinstance(item, PointObject):
@@ -159,7 +177,8 @@ class ModelBuilder:
         values = {label: getattr(item, field) for label, field in named_fields(item, group).items()}
         values = {label: value - self.zero if label.endswith("Station") else value for label, value in values.items()}
         values |= {input_name(field): value for field, value in inputs.items()}
-        self.add(name, mesh, group, values)
+        frame = self.frame(item) if isinstance(item, PointObject | LineObject) else None
+        self.add(name, mesh, group, values, frame=frame)
 
     def add(
         self,
@@ -168,6 +187,7 @@ class ModelBuilder:
         group: bpy.types.NodeTree | None = None,
         inputs: Mapping[str, Any] | None = None,
         support: bool = False,
+        frame: ObjectFrame | None = None,
     ) -> None:
         """Add an object with a mesh to the model, and a Geometry Nodes modifier if a group is given.
 
@@ -178,11 +198,16 @@ class ModelBuilder:
             inputs: the modifier's inputs by name; materials by their names in the table. Inputs named like an object of
                 the model (``Road``, ``Terrain``) and materials with a default may be left out.
             support: whether only other objects need the object: it is hidden then.
+            frame: frame of the object; the road's own if None.
         """
         mesh = mesh or bpy.data.meshes.new("SR")
         item = bpy.data.objects.new(role, mesh)
         mesh.name = f"SR {role}"
         item[ROLE], item.parent = role, self._root
+        if frame is not None:
+            item[AHEAD] = True
+            item.location = frame.origin.tolist()
+            item.rotation_euler = (0.0, 0.0, frame.turn)
         if support or self.hidden:
             item[SUPPORT] = True
             item.hide_viewport = item.hide_render = True
@@ -199,16 +224,6 @@ class ModelBuilder:
             for name, value in {**usual_materials(group), **objects, **(inputs or {})}.items():
                 set_modifier_input(modifier, name, self._to_input(name, kinds.get(name, ""), value))
         self._added(role, item)
-
-    def stand(self, role: str, item: PointObject, rotation_deg: float = 0.0) -> None:
-        """Place an added object at a point object's station and offset, at the axis's elevation, facing along the road.
-
-        Its frame then has x to the right of traffic with the stations, y along it, and z up.
-        """
-        heading = self.geometry.alignment.heading(np.array([item.station]))[0]
-        added = self.objects[role]
-        added.location = tuple((on_plan(self.geometry, [item])[0] - self.origin).tolist())
-        added.rotation_euler = (0.0, 0.0, float(heading - np.pi / 2 + np.deg2rad(rotation_deg)))
 
     def add_instance(self, role: str, collection: bpy.types.Collection) -> bpy.types.Object:
         """Add an empty that instances a collection to the model; return it."""

@@ -18,4 +18,4 @@ def build_parked_vehicles(builder: ModelBuilder) -> None:
     for name, vehicle in builder.parameters.of_type(ParkedVehicle).items():
         attributes = {COLOR: np.array([vehicle.color]), "grade": np.zeros(1)}
         mesh = builder.points("Vehicle", [vehicle], attributes)
-        builder.add(name, mesh, vehicle_group(vehicle.model), {"Road": ground})
+        builder.add(name, mesh, vehicle_group(vehicle.model), {"Road": ground}, frame=builder.frame(vehicle))

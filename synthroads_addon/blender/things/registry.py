@@ -57,6 +57,15 @@ def model_parts() -> dict[str, ModelPart]:
     return {part.name: part for part in sorted(_PARTS.values(), key=lambda part: part[:2])}
 
 
+_NO_THINGS = frozenset({"road", "terrain", "painted_areas", "damaged_areas", "vegetation", "vehicles"})
+"""Parts that are no things of the registry: what all else stands on, and what belongs to the whole road."""
+
+
+def thing_parts() -> list[ModelPart]:
+    """Return the parts that build things of the registry, each by itself."""
+    return [part for name, part in model_parts().items() if name not in _NO_THINGS]
+
+
 def required_parts(names: set[str]) -> set[str]:
     """Return the parts' names with the names of the road and the terrain, if the parts stand on them."""
     needs_terrain = any(not model_parts()[name].on_the_road for name in names)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ...base.classes import class_id
 from ...road.things.body import Body
@@ -19,6 +20,9 @@ from ..nodes.inputs import Inputs, instance_number, integer, metres, socket
 from ..nodes.solids import move_geometry
 from .meshes import fill_polygons
 from .model_builder import ModelBuilder
+
+_ALONG = Matrix(((0.0, 1.0, 0.0, 0.0), (-1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
+"""Turn from the bodies' frame, with y along the road, to the object's, with x along it."""
 
 
 class _Solid(Inputs):
@@ -47,8 +51,8 @@ def add_solid(builder: ModelBuilder, name: str, item: StandingThing) -> None:
     """Add a thing that stands at one point to the model, with a mesh of its bodies."""
     frame = standing_frames(builder.geometry, [item])[0]
     mesh = bodies_mesh(item.bodies(frame.place()), builder.materials.material)
+    mesh.transform(_ALONG)
     builder.add_thing(name, item, solid_group(), mesh, class_=class_id(item.semantic_class))
-    builder.stand(name, item, item.rotation_deg)
 
 
 def bodies_mesh(bodies: Sequence[Body], material: Callable[[str], bpy.types.Material]) -> bpy.types.Mesh:

@@ -53,7 +53,7 @@ class ConstructionLimits(Limits):
     allowed: ClassVar = {"construction_length": (0.0, 1e6)}
 
     construction_zone: float = share(0.1, "Probability that a sufficiently long carriageway has a construction zone.")
-    construction_length: Interval = interval(120.0, 400.0, "m", "Length of a construction zone.", title="Its Length")
+    construction_length: Interval = interval(120.0, 400.0, "m", "Length of a construction zone.")
 
 
 class ConstructionBeacon(StandingThing):

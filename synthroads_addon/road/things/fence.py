@@ -46,7 +46,7 @@ class FenceLimits(Limits):
     allowed: ClassVar = {"fence_height": "height"}
 
     fences: float = share(0.5, "Probability that a fence runs along a side of the road.")
-    fence_height: Interval = interval(1.6, 2.2, "m", "Height of fences.", title="Their Height")
+    fence_height: Interval = interval(1.6, 2.2, "m", "Height of fences.")
 
 
 class Fence(LengthwiseThing):

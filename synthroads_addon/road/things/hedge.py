@@ -29,9 +29,9 @@ class HedgeLimits(Limits):
     }
 
     hedges_per_km: Interval = interval(0.0, 4.0, "1/km", "Hedges per km of either side.", title="Hedges (per km)")
-    hedge_length: Interval = interval(15.0, 70.0, "m", "Length of hedges.", title="Their Length")
-    hedge_height: Interval = interval(1.2, 3.0, "m", "Height of hedges.", title="Their Height")
-    hedge_width: Interval = interval(0.8, 1.6, "m", "Width of hedges.", title="Their Width")
+    hedge_length: Interval = interval(15.0, 70.0, "m", "Length of hedges.")
+    hedge_height: Interval = interval(1.2, 3.0, "m", "Height of hedges.")
+    hedge_width: Interval = interval(0.8, 1.6, "m", "Width of hedges.")
 
 
 class Hedge(LengthwiseThing):

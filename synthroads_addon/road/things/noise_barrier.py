@@ -45,8 +45,8 @@ class NoiseBarrierLimits(Limits):
     allowed: ClassVar = {"noise_barrier_height": "height", "noise_barrier_length": (0.0, 1e6)}
 
     noise_barrier: float = share(0.25, "Probability of a noise barrier beside a carriageway.", title="Noise Barriers")
-    noise_barrier_height: Interval = interval(2.5, 6.0, "m", "Height of noise barriers.", title="Their Height")
-    noise_barrier_length: Interval = interval(100.0, 800.0, "m", "Length of noise barriers.", title="Their Length")
+    noise_barrier_height: Interval = interval(2.5, 6.0, "m", "Height of noise barriers.")
+    noise_barrier_length: Interval = interval(100.0, 800.0, "m", "Length of noise barriers.")
 
 
 class NoiseBarrier(LengthwiseThing):

@@ -60,8 +60,8 @@ class OverpassLimits(Limits):
     allowed: ClassVar = {"overpass_width": "width", "overpass_clearance": (CLEARANCE, 20.0)}
 
     overpass: float = share(0.15, "Probability of an overpass.")
-    overpass_clearance: Interval = interval(4.7, 5.6, "m", "Clearance under an overpass.", title="Its Clearance")
-    overpass_width: Interval = interval(6.0, 14.0, "m", "Width of an overpass.", title="Its Width")
+    overpass_clearance: Interval = interval(4.7, 5.6, "m", "Clearance under an overpass.")
+    overpass_width: Interval = interval(6.0, 14.0, "m", "Width of an overpass.")
 
 
 class Overpass(StandingThing):

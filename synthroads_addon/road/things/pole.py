@@ -48,10 +48,10 @@ class PoleLimits(Limits):
     }
 
     lighting: float = share(0.15, "Probability of lighting poles.", title="Lighting Poles")
-    lighting_spacing: Interval = interval(35.0, 50.0, "m", "Spacing of lighting poles.", title="Their Spacing")
-    lighting_height: Interval = interval(10.0, 14.0, "m", "Height of lighting poles.", title="Their Height")
+    lighting_spacing: Interval = interval(35.0, 50.0, "m", "Spacing of lighting poles.")
+    lighting_height: Interval = interval(10.0, 14.0, "m", "Height of lighting poles.")
     surveillance: float = share(0.2, "Probability of a surveillance pole.", title="Surveillance Pole")
-    surveillance_height: Interval = interval(8.0, 15.0, "m", "Height of surveillance poles.", title="Its Height")
+    surveillance_height: Interval = interval(8.0, 15.0, "m", "Height of surveillance poles.")
 
 
 class Pole(StandingThing):

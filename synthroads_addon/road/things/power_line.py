@@ -39,7 +39,7 @@ class PowerLineLimits(Limits):
     allowed: ClassVar = {"pylon_height": "height"}
 
     power_line: float = share(0.25, "Probability that a power line crosses the road.")
-    pylon_height: Interval = interval(28.0, 48.0, "m", "Height of its pylons.", title="Its Pylons' Height")
+    pylon_height: Interval = interval(28.0, 48.0, "m", "Height of its pylons.")
 
 
 class PowerLine(StandingThing):

@@ -28,7 +28,7 @@ class ShaftLimits(Limits):
 
     shafts: bool = Field(True, description="Shafts of the drainage beside the road.")
     shaft_spacing: Interval = interval(50.0, 80.0, "m", "Distance from one shaft to the next.", title="Shafts (every)")
-    shaft_size: Interval = interval(0.5, 0.7, "m", "Width of inlets, diameter of manholes.", title="Their Width")
+    shaft_size: Interval = interval(0.5, 0.7, "m", "Width of inlets, diameter of manholes.")
 
 
 class Shaft(StandingThing):

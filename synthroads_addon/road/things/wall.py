@@ -25,7 +25,7 @@ class WallLimits(Limits):
     allowed: ClassVar = {"wall_height": "height"}
 
     walls: float = share(0.4, "Probability that a building's yard has a wall towards the road.")
-    wall_height: Interval = interval(1.0, 2.2, "m", "Height of walls.", title="Their Height")
+    wall_height: Interval = interval(1.0, 2.2, "m", "Height of walls.")
 
 
 class Wall(LengthwiseThing):

@@ -27,7 +27,7 @@ from .choices import ITEMS, is_offered
 from .inherited import SOURCES, Value
 from .numbers import clamp_32_bit, exact, is_share, list_as_text, number_property, numbers_in, push_along
 from .room import draw_flag, draw_text, fits, value_row, value_share
-from .wording import label, value_name, written_unit
+from .wording import label, tooltip, value_name, written_unit
 
 AUTOMATIC = "AUTOMATIC"
 """Item of a choice that stands for "not given"."""
@@ -61,8 +61,8 @@ class Field:
 
     @property
     def tooltip(self) -> str:
-        """Return the schema's description without its final full stop, as Blender adds one."""
-        return (self.info.description or "").removesuffix(".")
+        """Return the schema's description with unit, limits and example, without a final full stop."""
+        return tooltip(self.info)
 
     @property
     def checkbox_name(self) -> str:

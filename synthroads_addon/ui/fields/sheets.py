@@ -6,12 +6,17 @@ a new field of the schema appears by itself.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
 from .fields import Field
 from .properties import PATHS
+from .wording import title_case
+
+_PATH = re.compile(r"\b(?:road|scan|colour|cloud)(?:\.[a-z][a-z_0-9]*)+")
+"""A path of the scenario within a sentence."""
 
 
 @dataclass(frozen=True)
@@ -132,6 +137,36 @@ def _fields(row: str) -> Iterator[Field]:
     for path, field in PATHS.items():
         if path.startswith(part) and _place_of(path) == row:
             yield field
+
+
+_ENDS = {"minimum": ", smallest value", "maximum": ", largest value"}
+"""Ends of an interval as the panel says them, by their fields."""
+
+
+def with_panel_labels(message: str) -> str:
+    """Return a message with the paths of fields replaced by their labels and panels: ``road.lanes`` by Road's Lanes."""
+    return _PATH.sub(lambda path: panel_label(path[0]), message)
+
+
+def panel_label(path: str) -> str:
+    """Return what the panel calls a field, with the title of its panel; the path itself for one that it doesn't have.
+
+    A part of a field, such as an interval's end or an entry of a list, is named after the field.
+    """
+    parts = path.split(".")
+    for length in range(len(parts), 1, -1):
+        field = PATHS.get(".".join(parts[:length]))
+        if field is not None:
+            rest = [_ENDS.get(part, f", {title_case(part)}") for part in parts[length:]]
+            title = _title_of(field.path)
+            return f"{field.label}{''.join(rest)}" + (f" ({title})" if title else "")
+    return path
+
+
+@cache
+def _title_of(path: str) -> str:
+    """Return the title of the panel that shows a field; empty if none does."""
+    return next((sheet.title for sheet in SHEETS if any(field.path == path for field in fields_of(sheet))), "")
 
 
 @cache

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic.fields import FieldInfo
 
-from ...base.schema import note_of, unit_of
+from ...base.schema import LARGEST, note_of, unit_of
 
 UNITS = {
     "deg": "°",
@@ -38,6 +38,29 @@ def label(path: str, info: FieldInfo) -> str:
     name = path.rpartition(".")[2].removesuffix(_ENDINGS.get(unit, " "))
     text = title_case(name)
     return text if unit in _SILENT else f"{text} ({written_unit(unit)})"
+
+
+def tooltip(info: FieldInfo) -> str:
+    """Return a field's description with its unit, its limits and a usual value as an example, where it has them.
+
+    Without a full stop at the end, as Blender adds one.
+    """
+    text = (info.description or "").removesuffix(".")
+    unit = "" if unit_of(info) in ("", "1") else f" {written_unit(unit_of(info))}"
+    low, high = (_limit(info, names) for names in (("ge", "gt"), ("le", "lt")))
+    if low is not None and high is not None:
+        text += f". Allowed: {low:g} to {high:g}{unit}"
+    elif low is not None or high is not None:
+        text += f". Allowed: {f'from {low:g}' if low is not None else f'up to {high:g}'}{unit}"
+    if isinstance(info.default, int | float) and not isinstance(info.default, bool):
+        text += f", e.g. {info.default:g}{unit}"
+    return text
+
+
+def _limit(info: FieldInfo, names: tuple[str, ...]) -> float | None:
+    """Return a field's limit by the names of its constraint; None if it has none but the schema's own."""
+    values = (getattr(entry, name, None) for entry in info.metadata for name in names)
+    return next((float(value) for value in values if value is not None and abs(value) < LARGEST), None)
 
 
 def value_name(value: str, info: FieldInfo) -> str:

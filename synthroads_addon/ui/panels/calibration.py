@@ -15,6 +15,7 @@ from ...calibration.fit import FITTED
 from ...calibration.job import Calibration, CalibrationJob, ClassComparison, calibration_steps, save_fitted
 from ...calibration.plot import calibration_picture
 from ..fields.room import NAMES_SHARE, buttons_row, draw_text, fits
+from ..fields.wording import title_case
 from ..work.common import Sidebar, column, large_button, refusing
 from ..work.job import PanelJob
 from ..work.long_operator import LongOperator
@@ -137,7 +138,7 @@ class SYNTHROADS_OT_remove_calibration_class(bpy.types.Operator):
     bl_idname = "synthroads.remove_calibration_class"
     bl_label = "Remove Material"
 
-    index: bpy.props.IntProperty()
+    index: bpy.props.IntProperty(name="Number", description="Place of the material in the list, from 0 on")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Remove the row `index` from the list of materials."""
@@ -218,7 +219,7 @@ def _draw_view(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) ->
 def _draw_result(layout: bpy.types.UILayout, result: Calibration) -> None:
     """Draw a calibration's gain and figures by material, and the buttons to show diagrams and save the table."""
     if result.job.real is not None:
-        draw_text(layout, f"Gain {result.gain:.5g}, one for all")
+        draw_text(layout, f"Gain: {result.gain:.5g} units of the cloud per unit of the device, for all materials")
     for entry in result.compared:
         box = layout.box()
         for number, line in enumerate(result_lines(entry)):
@@ -234,24 +235,35 @@ def result_lines(entry: ClassComparison) -> list[str]:
     before, after = entry.before.reflectivity, entry.after.reflectivity
     changed = f"{before:.3f} → {after:.3f}" if before != after else f"{after:.3f}"
     data = entry.to_dict()
-    lines = [f"{entry.target.material}: reflectivity {changed}"]
+    lines = [f"{material_name(entry.target.material)}: reflectivity (share of the light) {changed}"]
     names = [f"{100 * share:g}" for share in FITTED]
     if entry.real is not None:
-        lines.append(f"{data['points']:,} points, {data['zeros_left_out']:,} zeros left out")
-    lines.append(f"Percentiles {', '.join(names)}:")
-    if entry.real is not None:
-        lines.append("Real: " + "  ".join(f"{data['real'][name]:.5g}" for name in names))
-    lines.append("Expected: " + "  ".join(f"{data['expected'][name]:.5g}" for name in names))
-    if entry.real is not None:
-        errors = data["error_of_interquartile_range"]
-        lines.append("Error / IQR: " + "  ".join(f"{errors[name]:+.0%}" for name in names))
+        lines.append(f"{data['points']:,} points, {data['zeros_left_out']:,} of intensity 0 left out")
+    unit = "of the cloud" if entry.real is not None else "of the device"
+    lines.append(f"Intensity in units {unit}, by percentile:")
+    errors = data["error_of_interquartile_range"] if entry.real is not None else {}
+    for name in names:
+        line = f"{name} %: "
+        if entry.real is not None:
+            line += f"real {data['real'][name]:.5g}, "
+        line += f"expected {data['expected'][name]:.5g}"
+        if entry.real is not None:
+            line += f", error {errors[name]:+.0%} of the interquartile range"
+        lines.append(line)
     return lines
+
+
+def material_name(entry: str) -> str:
+    """Return a material's name in the table as people say it: ``barrier_concrete`` becomes Barrier Concrete."""
+    return title_case(entry)
 
 
 def _sentence(result: Calibration) -> str:
     if result.job.real is None:
         return "Expected intensities computed"
-    shown = (f"{entry.target.material} {entry.to_dict()['largest_error']:.1%}" for entry in result.compared)
+    shown = (
+        f"{material_name(entry.target.material)} {entry.to_dict()['largest_error']:.1%}" for entry in result.compared
+    )
     return f"Largest error as a share of the interquartile range: {', '.join(shown)}"
 
 

@@ -13,6 +13,7 @@ from bpy.app.handlers import persistent
 
 from ...base.errors import InputError
 from ...blender.compat import shown_input
+from ...blender.model.added import with_kept_things
 from ...blender.model.older_files import PARAMETERS, adopt_older_roads, rename_inputs
 from ...blender.model.read_back import carried_inputs
 from ...blender.model.roads import renew_ids
@@ -21,9 +22,12 @@ from ...blender.things.model_builder import ROLE, SUPPORT
 from ...blender.things.road.road import MARKINGS
 from ...road.parameters import RoadParameters
 from ...road.surroundings import Vegetation
-from ..fields.room import value_row
+from ...road.things.thing import Thing
+from ..fields.room import buttons_row, value_row
 from ..fields.wording import title_case
 from ..work.common import Sidebar, column
+from .placing import SYNTHROADS_OT_delete_thing, SYNTHROADS_OT_repeat_thing
+from .things import draw_thing, thing_of
 
 _NOTHING = ("NOTHING", "Choose a Part", "Choose a part here, or click it in the view", "RESTRICT_SELECT_OFF", 0)
 Section = tuple[str, list[tuple[str, str]]]
@@ -35,12 +39,18 @@ def editable_parts(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
     road, parameters = find_road(scene), open_parameters(scene)
     if road is None or parameters is None:
         return {}
-    return {role: item for role, item in objects_of(road).items() if _editable(parameters, item)}
+    parts = objects_of(road)
+    known = with_kept_things(parameters, parts)
+    return {role: item for role, item in parts.items() if _editable(known, item)}
 
 
 def _editable(parameters: RoadParameters, item: bpy.types.Object) -> bool:
-    modifier = _modifier(item)
-    return modifier is not None and SUPPORT not in item and bool(carried_inputs(parameters, str(item[ROLE]), modifier))
+    modifier, role = _modifier(item), str(item[ROLE])
+    if SUPPORT in item:
+        return False
+    if isinstance(parameters.objects.get(role), Thing):
+        return True
+    return modifier is not None and bool(carried_inputs(parameters, role, modifier))
 
 
 def open_parameters(scene: bpy.types.Scene) -> RoadParameters | None:
@@ -181,8 +191,15 @@ class SYNTHROADS_PT_edit(Sidebar, bpy.types.Panel):
             text, icon = ("Show Plants", "RESTRICT_VIEW_ON") if hidden else ("Hide Plants", "RESTRICT_VIEW_OFF")
             layout.operator(SYNTHROADS_OT_show_plants.bl_idname, text=text, icon=icon)
         parameters, item = open_parameters(context.scene), context.view_layer.objects.active
-        if parameters and item and ROLE in item:
+        if parameters is None or item is None or ROLE not in item:
+            return
+        if (thing := thing_of(item, context.scene)) is None:
             _draw_part(layout, parameters, item)
+            return
+        row = buttons_row(layout, ("Repeat Along Road", "Delete"), align=True)
+        row.operator(SYNTHROADS_OT_repeat_thing.bl_idname, icon="MOD_ARRAY")
+        row.operator(SYNTHROADS_OT_delete_thing.bl_idname, text="Delete", icon="TRASH")
+        draw_thing(layout, context.scene, item, thing)
 
 
 def _draw_part(layout: bpy.types.UILayout, parameters: RoadParameters, item: bpy.types.Object) -> None:

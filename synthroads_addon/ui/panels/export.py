@@ -87,7 +87,9 @@ class SYNTHROADS_OT_export_cloud(FileOperator, bpy.types.Operator):
     bl_label = "Export Cloud"
     nothing_done = "nothing was written"
 
-    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filepath: bpy.props.StringProperty(
+        name="File", description="File that is read or written", subtype="FILE_PATH", options={"SKIP_SAVE"}
+    )
     check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
     filter_glob: bpy.props.StringProperty(default=ENDINGS_GLOB, options={"HIDDEN"})
     source: bpy.props.StringProperty(
@@ -245,7 +247,9 @@ class SYNTHROADS_OT_install_ifc(FileChooser, bpy.types.Operator):
     bl_idname = "synthroads.install_ifc"
     bl_label = "Install IFC"  # the button of Blender's file browser has no room for more
 
-    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filepath: bpy.props.StringProperty(
+        name="File", description="File that is read or written", subtype="FILE_PATH", options={"SKIP_SAVE"}
+    )
     filter_glob: bpy.props.StringProperty(default="*.zip", options={"HIDDEN"})
 
     @refusing

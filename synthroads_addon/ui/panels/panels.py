@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any, ClassVar
 
 import bpy
@@ -17,6 +18,7 @@ from ..work.edited import draw_edits
 from ..work.long_operator import draw_job
 from ..work.scan import SYNTHROADS_OT_scan, last_written
 from ..work.scan_steps import Written
+from .edit import open_parameters
 from .export import draw_missing_packages
 from .presets import (
     SYNTHROADS_MT_devices,
@@ -30,6 +32,10 @@ from .road_files import draw_road_files, source_file_name
 from .scan_road import SYNTHROADS_OT_road_from_scan
 from .scene_scan import draw_scene_scan
 
+_BOX_SHARE = 0.92
+_OTHER_LENGTH = 0.5
+"""From so large a difference on, m, the road's length is another one than the settings'."""
+_LENGTH = re.compile(r"^[\d.,]+ k?m\b")
 _SOLID = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 
 
@@ -53,10 +59,37 @@ class MainPanel(SheetPanel):
     """Panel with the scenario's menu and its fidelity."""
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the menu of scenarios and the sheet's fields."""
+        """Draw the first steps where there is no road yet, the menu of scenarios and the sheet's fields."""
         layout, settings = column(self), context.scene.synthroads
-        draw_menu(layout, SYNTHROADS_MT_scenarios.bl_idname, scenario_title(settings.preset), "Scenario")
+        if find_road(context.scene) is None:
+            draw_first_steps(layout)
+        parameters = open_parameters(context.scene)
+        length = settings.road.length if parameters is None else parameters.alignment.length
+        title = with_length(scenario_title(settings.preset), length)
+        draw_menu(layout, SYNTHROADS_MT_scenarios.bl_idname, title, "Scenario")
         self.draw_fields(layout, settings)
+
+
+FIRST_STEPS = (
+    "1. Choose a scenario below",
+    "2. Road: press Build Road",
+    "3. Click a part, and change it in Road > Edit",
+    "4. Scanner: choose a device, and press Scan",
+)
+"""Steps of a new user, in order."""
+
+
+def draw_first_steps(layout: bpy.types.UILayout) -> None:
+    """Draw the way from an empty scene to a cloud, in four steps."""
+    box = layout.box().column(align=True)
+    box.label(text="First Steps", icon="INFO")
+    for step in FIRST_STEPS:
+        draw_text(box, step, share=_BOX_SHARE)
+
+
+def with_length(title: str, length: float) -> str:
+    """Return a scenario's title with another road's length (m) where it begins with its own: ``600 m of motorway``."""
+    return _LENGTH.sub(f"{length:,.0f} m", title, count=1)
 
 
 class RoadPanel(SheetPanel):
@@ -70,6 +103,9 @@ class RoadPanel(SheetPanel):
         if (seed := settings.exact_seed()) != settings.seed:
             draw_text(layout, f"Seed of the file: {seed}", "INFO")
         road = find_road(context.scene)
+        parameters = open_parameters(context.scene)
+        if parameters is not None and abs(parameters.alignment.length - settings.road.length) >= _OTHER_LENGTH:
+            draw_text(layout, f"Length of the road: {parameters.alignment.length:,.0f} m", "DRIVER_DISTANCE")
         if road and source_file_name(road):
             draw_text(layout, f"Built from {source_file_name(road)}", "FILE")
         elif road and not road.get(BUILT_FROM):

@@ -80,7 +80,9 @@ class SYNTHROADS_OT_choose_device(_Undoable, bpy.types.Operator):
 class JsonFileChooser(FileChooser):
     """Base of operators that ask for a JSON file in a file browser."""
 
-    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filepath: bpy.props.StringProperty(
+        name="File", description="File that is read or written", subtype="FILE_PATH", options={"SKIP_SAVE"}
+    )
     filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
 
 

@@ -57,7 +57,9 @@ def source_file_name(road: bpy.types.Object) -> str | None:
 class RoadLoader(FileOperator):
     """Base of operators that build a road from a file, read in a thread."""
 
-    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filepath: bpy.props.StringProperty(
+        name="File", description="File that is read or written", subtype="FILE_PATH", options={"SKIP_SAVE"}
+    )
     bl_options = {"UNDO"}  # noqa: RUF012 (Blender reads a plain set)
 
     _first = False

@@ -18,14 +18,16 @@ from ...checking.checker import RULES, Violation, check
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...road.section import Carriageway, LineMarking
-from ..fields.room import draw_text, fits, is_narrow, text_width
+from ..fields.room import draw_text, fits, is_narrow, text_lines, text_width
 from ..work.common import Sidebar, has_road, redraw_sidebars, refusing, right_label
 from ..work.view import Marker, look_at_place, redraw_views, view_of
 from .road_choice import draw_road_name
 
 _STATION_SHARE, _NAME_SHARE = 0.25, 0.45
 """Shares of the list's width that station and rule have where all three columns fit."""
-_STATION, _FOUND = "Station", "Found / limit"
+_STATION, _FOUND = "Station", "Found, limit"
+_LIST_SHARE = 0.85
+"""Share of a row that is within the list, beside its scroll bar."""
 _BOX_SHARE, _TITLE_SHARE = 0.92, 0.36
 """Share of a row that is within a box, and that of a title in there."""
 _SURENESS = {
@@ -280,9 +282,9 @@ def _draw_columns(layout: bpy.types.UILayout, texts: tuple[str, str, str], names
     all_three = fits(widest, _NAME_SHARE) and fits(_FOUND, 1.0 - _STATION_SHARE - _NAME_SHARE)
     two = fits(_STATION, _STATION_SHARE) and fits(widest, 1.0 - _STATION_SHARE)
     if not all_three and not two:
-        layout.label(text=texts[0])
-        if fits(texts[2], 0.5):
-            right_label(layout, texts[2])
+        lines = layout.column(align=True)
+        for line in text_lines(", ".join(texts[:2]), _LIST_SHARE):
+            lines.label(text=line)
         return
     split = layout.split(factor=_STATION_SHARE)
     split.label(text=texts[0])
@@ -326,7 +328,7 @@ def _fill(rules: SYNTHROADS_PG_rules, parameters: RoadParameters, violations: li
         row.rule, row.object, row.text = violation.rule, violation.object, violation.text
         row.station, row.offset = violation.station, violation_offset(geometry, violation)
         row.value, row.limit = (_write_number(number, violation.unit) for number in (violation.value, violation.limit))
-        row.comparison = f"{_digits(violation.value)} / {_digits(violation.limit)} {violation.unit}".removesuffix(" 1")
+        row.comparison = _compare(violation)
     rules["index"] = -1  # past its update: nothing was clicked yet
 
 
@@ -343,12 +345,18 @@ def _write_number(value: float, unit: str) -> str:
     return f"{value:,.6g}" + (f" {unit}" if unit != "1" else "")
 
 
+def _compare(violation: Violation) -> str:
+    """Return the value that was found and its limit, short, with the unit: ``2.6 m, limit 3.5 m``."""
+    unit = "" if violation.unit == "1" else f" {violation.unit}"
+    return f"{_digits(violation.value)}{unit}, limit {_digits(violation.limit)}{unit}"
+
+
 def _digits(value: float) -> str:
     """Return a number as short text, with fewer decimals the larger it is."""
     size = abs(value)
     if size >= 1e6:
         return f"{value:.3g}"
-    text = f"{value:,.{1 if size >= 100 else 2 if size >= 1 else 4}f}"
+    text = f"{value:,.{1 if size >= 100 else 2 if size >= 0.1 or not size else 4}f}"
     return text.rstrip("0").rstrip(".")
 
 

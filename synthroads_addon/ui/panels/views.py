@@ -42,7 +42,7 @@ class SYNTHROADS_OT_look_through(bpy.types.Operator):
     bl_label = "Look Through Camera"
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads a plain set)
 
-    camera: bpy.props.StringProperty(name="Camera", options={"SKIP_SAVE"})
+    camera: bpy.props.StringProperty(name="Camera", description="Name of the camera", options={"SKIP_SAVE"})
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Make `camera` the scene's camera and show its view."""

@@ -12,6 +12,7 @@ import bpy
 
 from ...base.errors import InputError, MissingPackageError
 from ...blender.model.store import find_road
+from ..fields.sheets import with_panel_labels
 from .job import running_job
 
 RUNS_AS_EXTENSION = str(__package__).startswith("bl_ext.")
@@ -94,10 +95,20 @@ def refusing(execute: Callable[[Any, bpy.types.Context], None]) -> Execute:
 
 def refuse(operator: bpy.types.Operator, error: InputError) -> set[str]:
     """Report an error in the panel's words, see `panel_words`; return CANCELLED."""
+    operator.report({"ERROR"}, panel_message(error, getattr(operator, "option_labels", {})))
+    return {"CANCELLED"}
+
+
+def panel_message(error: InputError, labels: Mapping[str, str] = MappingProxyType({})) -> str:
+    """Return an input error's message in the panel's words: its labels instead of paths and the command's options.
+
+    Args:
+        error: the error.
+        labels: what an option is called where that isn't its own name with capitals.
+    """
     if isinstance(error, MissingPackageError) and RUNS_AS_EXTENSION:
         error = InputError(error.field, error.value, IN_BLENDER[error.extra])
-    operator.report({"ERROR"}, panel_words(str(error), getattr(operator, "option_labels", {})))
-    return {"CANCELLED"}
+    return with_panel_labels(panel_words(str(error), labels))
 
 
 def panel_words(message: str, labels: Mapping[str, str] = MappingProxyType({})) -> str:

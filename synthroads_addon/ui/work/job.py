@@ -36,8 +36,19 @@ _WORK_FOR_DRAWING, _LONGEST = 4.0, 2.0
 """So many times as long as the window was drawn a turn lasts, but no longer than this (s)."""
 _MOST_PATIENCE = 0.5
 """Longest time (s) that a turn waits for what is computed aside."""
+_TOLD_FROM = 0.05, 2.0
+"""Share that is done, and seconds, from which on the time left is told. Chosen: before, it jumps."""
 _LOOK_AGAIN = 0.001
 """Seconds between two looks whether there is something to do in the main thread again."""
+
+
+def duration(seconds: float) -> str:
+    """Return a time in s, min or h, rounded as people say it."""
+    if seconds < 90.0:
+        return f"{max(seconds, 1.0):.0f} s"
+    if seconds < 90.0 * 60.0:
+        return f"{seconds / 60.0:.0f} min"
+    return f"{seconds / 3600.0:.1f} h"
 
 
 class WorkPace:
@@ -130,6 +141,7 @@ class PanelJob(Generic[T]):
     Args:
         title: what is done, as a noun: "Scan".
         work: see `Work`; closed when the job is stopped, so that its ``finally`` can clean up.
+        clock: returns seconds.
 
     Attributes:
         title: what is done.
@@ -139,7 +151,7 @@ class PanelJob(Generic[T]):
         remarks: what users must know of the input, see `base.remarks`.
     """
 
-    def __init__(self, title: str, work: Work[T]) -> None:
+    def __init__(self, title: str, work: Work[T], clock: Callable[[], float] = time.perf_counter) -> None:
         self.title = title
         self.share = 0.0
         self.error: BaseException | None = None
@@ -147,6 +159,7 @@ class PanelJob(Generic[T]):
         self.remarks: list[str] = []
         self._work = work
         self._state = ""
+        self._clock, self._begin = clock, clock()
         self._stopping = Event()
         self._ended = self._idle = self._is_new = self._done_aside = False
         self._thread: _Thread | None = None
@@ -173,7 +186,15 @@ class PanelJob(Generic[T]):
         """Return the text of the current step with the share done, as shown in the window."""
         if self._stopping.is_set():
             return "Stopping"
-        return f"{self._state or self.title} {self.share:.0%}"
+        left = self._time_left()
+        return f"{self._state or self.title} {self.share:.0%}" + (f", {left} left" if left else "")
+
+    def _time_left(self) -> str:
+        """Return the time that the rest takes if it goes on as so far; empty while that can't be told yet."""
+        passed = self._clock() - self._begin
+        if self.share < _TOLD_FROM[0] or passed < _TOLD_FROM[1] or self.share >= 1.0:
+            return ""
+        return duration(passed * (1.0 - self.share) / self.share)
 
     @property
     def notes(self) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.base.errors import InputError
@@ -108,7 +108,8 @@ class TestPlaces:
         edited = truth(model)
         assert changed(model, edited) == {"post-1"}
         was, now = (RoadGeometry(p).alignment.place(*place(p, "post-1"))[0] for p in (before, edited.parameters))
-        assert np.allclose(now - was, (2.0, 0.0), atol=EXACT)
+        ahead = RoadGeometry(before).alignment.heading(np.array([10.0]))[0]  # the first post's own x axis
+        assert np.allclose(now - was, 2.0 * np.array([np.cos(ahead), np.sin(ahead)]), atol=EXACT)
         keep_vertices(mesh, [1])
         edited = truth(model)
         assert "post-1" not in edited.parameters.objects
@@ -203,7 +204,7 @@ class TestPlaces:
 
     def test_a_linked_road_is_read_and_left_alone(self, model: RoadModel, tmp_path: Path) -> None:
         file = tmp_path / "linked.blend"
-        model.objects["sign"].location = (1.0, 0.5, 0.0)
+        model.objects["sign"].location += Vector((1.0, 0.5, 0.0))
         bpy.context.view_layer.update()
         edited = truth(model)
         bpy.data.libraries.write(str(file), {model.collection})

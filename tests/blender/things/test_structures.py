@@ -107,15 +107,19 @@ def drawn(road: FurnishedRoad, tmp_path_factory: pytest.TempPathFactory) -> Road
     return Roads.read(path)
 
 
-def frame(road: FurnishedRoad, name: str, points: Float) -> Float:
-    """Return points (N, 3) in the object's own frame: x right, y along the road."""
+def axes(road: FurnishedRoad, name: str) -> Float:
+    """Return the object's axes as columns (3, 3): to the right, along the road, up; its own x is along the road."""
     matrix = np.array(road.model.objects[name].matrix_world)
-    return (points - matrix[:3, 3]) @ matrix[:3, :3]
+    return np.column_stack([-matrix[:3, 1], matrix[:3, 0], matrix[:3, 2]])
+
+
+def frame(road: FurnishedRoad, name: str, points: Float) -> Float:
+    """Return points (N, 3) from the object's origin: x right, y along the road."""
+    return (points - np.array(road.model.objects[name].matrix_world)[:3, 3]) @ axes(road, name)
 
 
 def world(road: FurnishedRoad, name: str, points: Float) -> Float:
-    matrix = np.array(road.model.objects[name].matrix_world)
-    return points @ matrix[:3, :3].T + matrix[:3, 3]
+    return points @ axes(road, name).T + np.array(road.model.objects[name].matrix_world)[:3, 3]
 
 
 def faces_of(road: FurnishedRoad, name: str) -> list[str]:
@@ -213,7 +217,7 @@ class TestGantry:
             assert middle[1] * towards > item.get("beam_depth", 0.6) / 2
 
     def _forwards(self, road: FurnishedRoad, name: str) -> Float:
-        return np.array(road.model.objects[name].matrix_world)[:2, 1]
+        return axes(road, name)[:2, 1]
 
     @pytest.mark.parametrize("name", ["boards", "against", "both", "cantilever"])
     def test_signals_hang_where_the_model_has_them(self, road: FurnishedRoad, drawn: Roads, name: str) -> None:
@@ -444,17 +448,17 @@ def test_structures_of_a_stretch_stand_where_they_do_on_the_whole_road(monkeypat
 
 
 @pytest.mark.parametrize(
-    ("make", "class_name", "y", "clearance"),
+    ("make", "class_name", "along", "clearance"),
     # Below a web of the bridge.
     [(gantry_group, "shield_gantry", 0.0, 5.2), (overpass_group, "bridge", 1.9, 4.9)],
 )
 def test_a_structure_can_be_put_onto_an_object_of_ones_own(
-    make: Callable[[], bpy.types.NodeTree], class_name: str, y: float, clearance: float
+    make: Callable[[], bpy.types.NodeTree], class_name: str, along: float, clearance: float
 ) -> None:
     item = bpy.data.objects.new("Own", bpy.data.meshes.new("Own"))
     bpy.context.scene.collection.objects.link(item)
     item.location = (5.0, 0.0, 2.0)
     item.modifiers.new("Nodes", "NODES").node_group = make()
-    hit = tree_of(scene_mesh(), class_name).ray_cast((5.5, y, 2.0), (0.0, 0.0, 1.0))[0]
+    hit = tree_of(scene_mesh(), class_name).ray_cast((5.0 + along, -0.5, 2.0), (0.0, 0.0, 1.0))[0]
     # Without a road the ground is the object's own z = 0.
     assert hit.z - 2.0 == pytest.approx(clearance, abs=MEASURE)

@@ -59,8 +59,8 @@ def test_buttons_fit_and_save_what_the_library_does(settings: Any, tmp_path: Pat
     result = calibration.latest
     assert result.to_dict() == wanted.to_dict()
     lines = calibration.result_lines(result.compared[0])
-    assert "50 zeros left out" in lines[1]
-    assert lines[-1].startswith("Error / IQR: ")
+    assert "50 of intensity 0 left out" in lines[1]
+    assert lines[-1].startswith("90 %: ")
     image = bpy.data.images[calibration.PICTURE]
     pixels = np.empty(len(image.pixels), dtype=np.float32)
     image.pixels.foreach_get(pixels)
@@ -113,9 +113,9 @@ def test_results_name_their_percentiles(settings: Any, tmp_path: Path) -> None:
     labels(settings, labelled(tmp_path / "real.laz", 30.0, 40.0))
     assert bpy.ops.synthroads.compare_intensities() == {"FINISHED"}
     lines = calibration.result_lines(calibration.latest.compared[0])
-    assert lines[2] == "Percentiles 25, 50, 75, 90:"
-    assert [line.partition(":")[0] for line in lines[3:]] == ["Real", "Expected", "Error / IQR"]
-    assert all(len(line.partition(":")[2].split()) == 4 for line in lines[3:])
+    assert lines[2] == "Intensity in units of the cloud, by percentile:"
+    assert [line.partition(":")[0] for line in lines[3:]] == ["25 %", "50 %", "75 %", "90 %"]
+    assert all(word in lines[3] for word in ("real ", "expected ", "error ", "of the interquartile range"))
 
 
 @pytest.mark.parametrize(("width", "kind"), [(300.0, "column"), (600.0, "row")], ids=["as at first", "wide"])

@@ -372,7 +372,7 @@ def test_a_random_road_that_cannot_be_leaves_the_seed(panel: Any) -> None:
     panel.road.own_radius = True
     panel.road.radius_minimum = panel.road.radius_maximum = 10.0
     panel.seed = 5
-    with pytest.raises(RuntimeError, match="radius"):
+    with pytest.raises(RuntimeError, match="Radius, smallest value"):
         bpy.ops.synthroads.random_road()
     assert panel.seed == 5
 

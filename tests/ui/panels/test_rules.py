@@ -77,7 +77,7 @@ def test_the_list_is_the_librarys_for_the_edited_road(found: Any) -> None:
     assert rows == [(v.rule, v.object, v.text, RULES[v.rule].title) for v in expected]
     assert [row.station for row in found.violations] == [np.float32(v.station) for v in expected]
     row = next(row for row in found.violations if row.rule == "lane-width")
-    assert (row.value, row.limit, row.comparison) == ("2.6 m", "3.5 m", "2.6 / 3.5 m")
+    assert (row.value, row.limit, row.comparison) == ("2.6 m", "3.5 m", "2.6 m, limit 3.5 m")
     assert found.index == -1
 
 

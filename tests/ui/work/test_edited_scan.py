@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.compat import modifier_input
@@ -31,13 +32,13 @@ pytestmark = pytest.mark.usefixtures("small_pictures")
 
 def test_edits_of_all_kinds_are_in_the_cloud_and_in_the_truth(tmp_path: Path) -> None:
     model = open_small()
-    model.objects["sign"].location = (2.0, 1.5, 0.3)
-    model.objects["rail-right"].location = (0.7, 1.2, 0.0)
+    model.objects["sign"].location += Vector((2.0, 1.5, 0.3))
+    model.objects["rail-right"].location += Vector((0.7, 1.2, 0.0))
     bpy.data.objects.remove(model.objects["Delineators"])
     copy = model.objects["sign"].copy()
     copy.data = copy.data.copy()
     model.collection.objects.link(copy)
-    copy.location = (-12.0, -6.0, 0.0)
+    copy.location += Vector((-12.0, -6.0, 0.0))
     model.objects["rail-left"].scale = (1.0, 1.0, 1.3)
     model.root.location = (3.0, -5.0, 2.0)
     bpy.context.view_layer.update()
@@ -139,7 +140,7 @@ def test_of_a_road_whose_surface_was_edited_only_the_cloud_is_written() -> None:
 def test_the_panel_names_what_was_edited_by_hand_and_offers_to_build() -> None:
     model = open_small()
     model.objects["sign"].scale = (1.0, 1.0, 1.2)
-    model.objects["car"].location = (2.0, 1.0, 0.0)
+    model.objects["car"].location += Vector((2.0, 1.0, 0.0))
     bpy.context.view_layer.update()
     edited.edits.read(bpy.context.scene)
     road = next(c for c in panels.CLASSES if c.bl_idname == "SYNTHROADS_PT_road")
@@ -158,7 +159,7 @@ def test_a_moved_guardrail_follows_the_road_at_once() -> None:
     model = open_small()
     rail = model.objects["rail-right"]
     before = modifier_input(rail.modifiers[0], "Offset")
-    rail.location = (0.7, 1.2, 0.0)
+    rail.location += Vector((0.7, 1.2, 0.0))
     bpy.context.view_layer.update()
     assert follow.follow(bpy.context.scene) == ["rail-right"]
     assert modifier_input(rail.modifiers[0], "Offset") > before + 0.5

@@ -24,6 +24,7 @@ from synthroads_addon.ui.work.job import (
     Step,
     Work,
     WorkPace,
+    duration,
     running_job,
     stop_job,
 )
@@ -76,7 +77,7 @@ def test_run_does_it_all_here() -> None:
 def test_in_the_window_the_long_part_has_a_thread() -> None:
     log: list[str] = []
     gate = threading.Event()
-    job = PanelJob("Test", work(log, gate))
+    job = PanelJob("Test", work(log, gate), lambda: 0.0)
     job.start()
     assert running_job() is job
     assert job.running
@@ -96,6 +97,32 @@ def test_in_the_window_the_long_part_has_a_thread() -> None:
     tick_to_the_end(job)
     assert log == ["begin", "read", "SynthRoads Test", "clean"]
     assert (job.result, job.running, running_job()) == ("done", False, None)
+
+
+def test_the_state_tells_the_time_left_once_it_can_be_told() -> None:
+    now = 100.0
+
+    def steps() -> Work[None]:
+        yield Step(0.01, "Building")
+        yield Step(0.25, "Building")
+        yield Step(0.5, "Building")
+
+    job = PanelJob("Test", steps(), lambda: now)
+    job.start()
+    now = 104.0
+    assert job.state == "Building 1%"
+    now = 130.0
+    job.tick(0.0)
+    assert job.state == "Building 25%, 2 min left"
+    now = 160.0
+    job.tick(0.0)
+    assert job.state == "Building 50%, 60 s left"
+    job.stop(wait=True)
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(0.2, "1 s"), (89.0, "89 s"), (600.0, "10 min"), (9000.0, "2.5 h")])
+def test_times_are_told_as_people_say_them(seconds: float, text: str) -> None:
+    assert duration(seconds) == text
 
 
 def test_a_tick_keeps_to_its_budget() -> None:

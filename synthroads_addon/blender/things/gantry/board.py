@@ -28,7 +28,7 @@ def gantry_sign_group(tree: Tree) -> None:
     instance = tree.integer("Instance", 0, INSTANCES, description="Instance number of the faces")
     with tree.frame("Middle of the sign"):
         points = op.separate(
-            op.object_geometry(sign.gantry), op.named_attribute(tree, "number", "INT").equals(sign.number)
+            op.object_geometry_across(sign.gantry), op.named_attribute(tree, "number", "INT").equals(sign.number)
         )
     with tree.frame("Face"):
         plate = tree.call(sign_face_group(), instance=instance, **face.values).value
@@ -36,5 +36,5 @@ def gantry_sign_group(tree: Tree) -> None:
         turned = op.turn(tree, z=op.switch(op.named_attribute(tree, "facing") > 0.0, math.pi, 0.0))
         mesh = op.realize(put_on_points(points, plate, op.position(tree), 1.0, turned))
     with tree.frame("Labels"):
-        mesh = op.label(mesh, class_id(Gantry.points_class), instance)
+        mesh = op.along(op.label(mesh, class_id(Gantry.points_class), instance))
     tree.output("Mesh", mesh, description="The face")

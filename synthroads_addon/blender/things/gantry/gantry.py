@@ -29,7 +29,7 @@ from .structure import gantry_beam_group, gantry_catwalk_group, gantry_post_grou
 
 
 class _Gantry(Inputs):
-    signs = socket("Geometry", "A point per sign: x; width, height, display, facing, number")
+    signs = socket("Geometry", "A point per sign: y; width, height, display, facing, number")
     road = socket("Object", "Surface with the pavement below")
     terrain = socket("Object", "Surface beside the road")
     left_end = metres(8.0, (-200.0, 200.0), "Left end of the beam, left of the origin")
@@ -55,15 +55,16 @@ class _Gantry(Inputs):
 
 @makes_group("SR Gantry", catalogue="Structures")
 def gantry_group(tree: Tree) -> None:
-    """A gantry around the origin, its beam along x (right), level, so high that its clearance is kept.
+    """A gantry around the origin, its beam along y (left), level, so high that its clearance is kept.
 
     Signs are points with ``width``, ``height``, ``display`` (1 or 0), ``number`` (from 1 on), and ``facing``: 1 towards
-    -y, -1 towards +y; of their places only x counts. The middles of their faces come out as points with ``number``.
+    -x, -1 towards +x; of their places only y counts. The middles of their faces come out as points with ``number``.
+    Within the group it is made with x to the right and y along the road, and turned at the end.
     """
     gantry = _Gantry(tree)
 
     with tree.frame("Surfaces"):
-        surfaces = op.object_geometry(gantry.road), op.object_geometry(gantry.terrain)
+        surfaces = op.object_geometry_across(gantry.road), op.object_geometry_across(gantry.terrain)
     with tree.frame("Height of the lowest part, above the pavement's highest point"):
         lowest_z, beam_bottom = _levels(tree, gantry, surfaces[0])
     with tree.frame("Beam"):
@@ -88,7 +89,8 @@ def gantry_group(tree: Tree) -> None:
         mesh = op.label(mesh, class_id(Gantry.points_class), gantry.instance)
         # Boards have their sign's attributes: only its point is to have its number.
         mesh = op.store(mesh, "number", 0)
-    tree.output("Mesh", op.join(mesh, signs), description="The gantry, and a point in the middle of every sign's face")
+    mesh = op.along(op.join(mesh, signs))
+    tree.output("Mesh", mesh, description="The gantry, and a point in the middle of every sign's face")
 
 
 def _thickness(signs: Value) -> Value:
@@ -174,7 +176,7 @@ def _place_signs(tree: Tree, gantry: _Gantry, lowest_z: Value, beam_bottom: Valu
     is_low = lowest_z + sign_height < beam_bottom + gantry.beam_height
     z = op.switch(is_low, lowest_z + sign_height * 0.5, beam_bottom + gantry.beam_height * 0.5)
     thickness = _thickness(gantry.signs)
-    signs = op.store(gantry.signs, "thickness", thickness)
+    signs = op.store(op.across(gantry.signs), "thickness", thickness)
     y = op.named_attribute(tree, "facing") * -1.0 * (gantry.beam_depth * 0.5 + sizes.HANGER + thickness)
     signs = op.set_position(signs, op.vector(tree, op.component(op.position(tree), "X"), y, z))
     return op.store(signs, "level", beam_bottom + gantry.beam_height * 0.5 - z)
@@ -232,7 +234,6 @@ def build_gantries(builder: ModelBuilder) -> None:
             beam=sizes.BEAMS.index(gantry.beam),
             catwalk=gantry.catwalk,
         )
-        builder.stand(name, gantry, gantry.rotation_deg)
         for place, sign in enumerate(gantry.signs, 1):
             _add_face(builder, name, gantry, place, sign)
 
@@ -249,8 +250,7 @@ def _add_face(builder: ModelBuilder, name: str, gantry: Gantry, number: int, sig
         **(_display_inputs(sign) if sign.kind == "display" else _board_inputs(sign)),
     }
     role = f"{name}/sign-{number}"
-    builder.add(role, None, gantry_sign_group(), inputs)
-    builder.stand(role, gantry, gantry.rotation_deg)
+    builder.add(role, None, gantry_sign_group(), inputs, frame=builder.frame(gantry))
 
 
 def _board_inputs(sign: GantrySign) -> dict[str, Any]:
@@ -276,8 +276,8 @@ def _display_inputs(sign: GantrySign) -> dict[str, Any]:
 def _signs_mesh(gantry: Gantry) -> bpy.types.Mesh:
     """Create a mesh with one vertex per sign in the gantry's frame, with the attributes that its node group reads."""
     mesh = bpy.data.meshes.new("SR Gantry")
-    x = np.array([gantry.offset - sign.offset for sign in gantry.signs])
-    fill(mesh, np.column_stack([x, np.zeros((len(x), 2))]))
+    across = np.array([gantry.offset - sign.offset for sign in gantry.signs])
+    fill(mesh, np.column_stack([np.zeros(len(across)), -across, np.zeros(len(across))]))
     # Traffic on the right carriageway comes from -y.
     facing = np.array([1.0 if sign.offset < 0.0 else -1.0 for sign in gantry.signs])
     values = {

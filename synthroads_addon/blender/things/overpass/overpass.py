@@ -52,14 +52,15 @@ class _Overpass(Inputs):
 
 @makes_group("SR Overpass", catalogue="Structures")
 def overpass_group(tree: Tree) -> None:
-    """A level bridge around the origin, which crosses along x; the road that it spans runs along y.
+    """A level bridge around the origin, which crosses along y; the road that it spans runs along x.
 
-    Piers are points, of which only x counts. The bridge is skewed by moving it along y: its faces stay parallel to y.
+    Piers are points, of which only y counts. The bridge is skewed by moving it along x: its faces stay parallel to x.
+    Within the group it is made with x to the right and y along the road, and turned at the end.
     """
     bridge = _Overpass(tree)
 
     with tree.frame("Surfaces and skew"):
-        surfaces = op.object_geometry(bridge.road), op.object_geometry(bridge.terrain)
+        surfaces = op.object_geometry_across(bridge.road), op.object_geometry_across(bridge.terrain)
         shear = op.unary("TANGENT", bridge.skew)
     with tree.frame("Underside, above the pavement's highest point"):
         reach = op.maximum(bridge.faces[1.0], -bridge.faces[-1.0]) * 1.5 + bridge.width
@@ -83,7 +84,7 @@ def overpass_group(tree: Tree) -> None:
         banks = [_embankment(bridge, ground, underside, wing_lengths[side], shear, side) for side in (-1.0, 1.0)]
     with tree.frame("Labels"):
         mesh = op.join(op.store(mesh, "class_id", class_id(Overpass.points_class), "FACE"), *banks)
-        mesh = op.store(mesh, "instance_id", bridge.instance, "FACE")
+        mesh = op.along(op.store(mesh, "instance_id", bridge.instance, "FACE"))
     tree.output("Mesh", mesh, description="The bridge; its embankments' slopes are ground")
 
 
@@ -150,9 +151,10 @@ def _piers(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, under
         concrete_material=bridge.concrete_material,
         steel_material=bridge.steel_material,
     )
+    piers = op.across(bridge.piers)
     x = op.component(op.position(tree), "X")
     plan = op.vector(tree, x, x * shear)
-    points = op.store(bridge.piers, "foot", height_on(*surfaces, plan) - sizes.BURIED)
+    points = op.store(piers, "foot", height_on(*surfaces, plan) - sizes.BURIED)
     pier_height = underside - sizes.BEARING - op.named_attribute(tree, "foot")
     top = plan + op.vector(tree, 0.0, 0.0, underside - sizes.BEARING)
     bodies = put_on_points(points, pier["Body"], top, op.vector(tree, 1.0, 1.0, pier_height))
@@ -201,7 +203,7 @@ def build_overpasses(builder: ModelBuilder) -> None:
             approaches[f"{side}_approach_length"] = float(np.clip(reach, 1.0, _LONGEST_APPROACH))
         mesh = bpy.data.meshes.new("SR Overpass")
         across = np.array([bridge.offset - offset for offset in bridge.pier_offsets])
-        fill(mesh, np.column_stack([across, np.zeros((len(across), 2))]))
+        fill(mesh, np.column_stack([np.zeros(len(across)), -across, np.zeros(len(across))]))
         builder.add_thing(
             name,
             bridge,
@@ -213,4 +215,3 @@ def build_overpasses(builder: ModelBuilder) -> None:
             skew=float(np.deg2rad(bridge.rotation_deg)),
             slope=terrain.batter_slope if terrain else 1.5,
         )
-        builder.stand(name, bridge)

@@ -143,7 +143,7 @@ def build_vehicles(builder: ModelBuilder) -> None:
         place = vehicle_place(lines[lane], vehicle)
         mesh = builder.points("Vehicle", [place], {COLOR: np.array([vehicle.color]), "grade": grade})
         inputs = {"Registration": registration(builder.parameters.metadata.seed, name, vehicle.model)}
-        builder.add(name, mesh, vehicle_group(vehicle.model), inputs)
+        builder.add(name, mesh, vehicle_group(vehicle.model), inputs, frame=builder.frame(place))
 
 
 def vehicle_place(line: LaneLine, vehicle: Vehicle) -> PointObject:

@@ -1,0 +1,193 @@
+"""One thing more beside a road that is there: where the rules of the placement put it, and what is usual for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...base.schema import round_value
+from ...road.geometry import RoadGeometry
+from ...road.guidelines import BARRIER_DISTANCE, SHORTEST_BARRIER
+from ...road.objects import LineObject, RoadObject, Side, nominal_width
+from ...road.section_geometry import CarriagewaySection
+from ...road.things.concrete_barrier import ConcreteBarrier
+from ...road.things.guardrail import Guardrail
+from ...road.things.registry import THINGS
+from ...road.things.sign_catalogue import sign_catalogue
+from ...road.things.thing import Thing
+from ...scenario.assets import library_names, read_asset_library
+from .construction import BARRIER_DISTANCE as FROM_CLOSED_LANE
+from .construction import BEACON_DISTANCE
+from .delineators import DELINEATOR_BEHIND_BARRIER, DELINEATOR_DISTANCE
+from .drainage import GUTTER
+from .edge import EdgeProfile
+from .layout import BARRIER_AXIS, FAR_ZONE, SMALL_ZONE
+from .roadside import BUILDING_DISTANCE, FENCE_ZONE, HEDGE_ZONE
+from .structures import ABUTMENT_DISTANCE
+
+USUAL_SIGN = "274-120"
+"""Code of the sign that is placed if none is named. Chosen: the shipped catalogue's first speed limit by hand."""
+_REACH = 1.0
+"""Distance along the road, m, within which the pavement's edge and barriers count for a thing's offset."""
+_SMALL_THINGS = 2.0
+"""Room across the road, m, between a barrier's line and a bridge's abutment, as for overpasses that are sampled."""
+_PARKED = 3.0
+"""From the nearest place of buildings to the middle of a parked vehicle, m. Chosen: half a vehicle, and a wall."""
+_WIDTHS = {"Cabinet": "width", "KilometreBoard": "width", "TrafficSign": "width", "Pole": "diameter", "Shaft": "size"}
+"""Things of the small zone, and the field that says what they take across the road."""
+_LIGHT = 0.4
+"""Room that a traffic light takes across the road, m."""
+
+
+class PlaceByRule:
+    """Places beside a road that the rules of the placement give, for one thing more.
+
+    Args:
+        geometry: of the road, with all that stands on it.
+        side: of the road.
+        station: m.
+    """
+
+    def __init__(self, geometry: RoadGeometry, side: Side, station: float) -> None:
+        self._geometry, self._station = geometry, station
+        known = geometry.sections
+        self.side: Side = side if side in known else next(iter(known))
+        self._section: CarriagewaySection = known[self.side]
+        carriageway = self._section.carriageway
+        self.sign, self.facing = carriageway.sign, 0.0 if carriageway.traffic > 0 else 180.0
+        edge = EdgeProfile(self._section, geometry.length)
+        self._paved = edge.largest_paved(station - _REACH, station + _REACH)
+        self._verge = self._paved + nominal_width(carriageway.verge_width)
+        self._front = max([self._paved, *self._barrier_lines()])
+
+    def _barrier_lines(self) -> list[float]:
+        """Return the distances (m) from the centreline from which the side's barriers at the station were placed."""
+        lines = []
+        for item in self._geometry.parameters.objects.values():
+            if not isinstance(item, Guardrail | ConcreteBarrier) or self.sign * item.offset < self._paved:
+                continue
+            if item.start_station - _REACH < self._station < item.end_station + _REACH:
+                half = item.base_width / 2.0 + BARRIER_DISTANCE if isinstance(item, ConcreteBarrier) else BARRIER_AXIS
+                lines.append(self.sign * item.offset - half)
+        return lines
+
+    @property
+    def _lane_edge(self) -> float:
+        """Return the distance (m) of the outer edge of the outermost lane from the centreline."""
+        return float(self._section.lane_boundaries(self._station)[0][0])
+
+    def distance(self, kind: str, fields: Mapping[str, Any]) -> float:
+        """Return the distance (m) of a thing's axis from the centreline, by its type and its fields."""
+        first_building = max(self._paved + BUILDING_DISTANCE, self._verge + FENCE_ZONE[1])
+        width = float(fields.get(_WIDTHS.get(kind, ""), _LIGHT))
+        behind_barriers = self._front + DELINEATOR_BEHIND_BARRIER
+        distances = {
+            "Delineator": behind_barriers if self._barrier_lines() else self._paved + DELINEATOR_DISTANCE,
+            "ConstructionBeacon": self._lane_edge + BEACON_DISTANCE,
+            "TemporaryBarrier": self._lane_edge + FROM_CLOSED_LANE,
+            "Guardrail": self._paved + BARRIER_AXIS,
+            "ConcreteBarrier": self._paved + BARRIER_DISTANCE + float(fields.get("base_width", 0.0)) / 2.0,
+            "NoiseBarrier": self._front + FAR_ZONE + float(fields.get("post_width", 0.0)) / 2.0,
+            "Hedge": self._verge + HEDGE_ZONE[0] + float(fields.get("width", 0.0)) / 2.0,
+            "Fence": self._verge + FENCE_ZONE[0],
+            "Wall": first_building,
+            "ParkedVehicle": first_building + _PARKED,
+            "Building": first_building + float(np.hypot(fields.get("width", 0.0), fields.get("depth", 0.0))) / 2.0,
+            "Gutter": nominal_width(self._section.carriageway.inner_offset) - GUTTER / 2.0,
+            "Asset": self._verge + (self._behind_verge(fields) if kind == "Asset" else 0.0),
+        }
+        distances |= dict.fromkeys(("Gantry", "Overpass", "PowerLine"), 0.0)
+        return distances.get(kind, self._front + SMALL_ZONE + width / 2.0)
+
+    @staticmethod
+    def _behind_verge(fields: Mapping[str, Any]) -> float:
+        """Return how far (m) behind the verge's edge an asset's library puts it at least."""
+        return read_asset_library(fields["library"]).assets[fields["name"]].placement.distance.minimum
+
+    def spans(self, kind: str) -> dict[str, float]:
+        """Return the offsets of a structure's ends by their fields, m; empty for other things."""
+        outer = self._front + SMALL_ZONE
+        if kind == "Gantry":
+            ends = sorted((0.0, self.sign * outer))
+            return {"right_offset": round_value(ends[0]), "left_offset": round_value(ends[1])}
+        if kind == "Overpass":
+            nearest = max(self._verge + ABUTMENT_DISTANCE, outer + _SMALL_THINGS)
+            return {"left_abutment": round_value(nearest), "right_abutment": round_value(-nearest)}
+        return {}
+
+
+def usual_fields(kind: str, side: Side, fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a new thing that its model requires beside its place, as usual, and those that are given.
+
+    Args:
+        kind: its type in the parameter set.
+        side: of the road that it stands on.
+        fields: what is given.
+    """
+    usual: dict[str, Any] = {}
+    towards_road = "right" if side == "left" else "left"
+    if kind == "TrafficSign":
+        code = str(fields.get("code", USUAL_SIGN))
+        known = sign_catalogue().signs.get(code) or sign_catalogue().signs[USUAL_SIGN]
+        usual = known.fields() | {"code": code, "text": known.text}
+    elif kind == "Gantry":
+        usual = {"kind": "one_sided", "post_side": side}
+    elif kind == "Cabinet":
+        usual = {"kind": "emergency_phone"}
+    elif kind == "KilometreBoard":
+        usual = {"text": "0,0"}
+    elif kind == "Guardrail":
+        usual = {"faces": towards_road}
+    elif kind == "Gutter":
+        usual = {"kerb_side": towards_road}
+    elif kind == "ConstructionBeacon":
+        usual = {"pass_side": towards_road}
+    elif kind == "Overpass":
+        usual = {"pier_offsets": ()}
+    elif kind == "Asset":
+        library = str(fields.get("library") or library_names()[0])
+        known_assets = read_asset_library(library).assets
+        name = str(fields.get("name") or next(iter(known_assets)))
+        asset = known_assets[name]
+        usual = {"library": library, "name": name, "class_name": asset.class_name, "scale": asset.scale}
+        usual["twin_types"] = asset.twin_types
+    return usual | {name: value for name, value in fields.items() if value not in (None, "")}
+
+
+def thing_by_rule(
+    geometry: RoadGeometry, kind: str, side: Side, station: float, fields: Mapping[str, Any]
+) -> RoadObject:
+    """Return one thing more for a road, at a station, where the rules put it, with the instance number 1.
+
+    Args:
+        geometry: of the road, with all that stands on it.
+        kind: type of the thing in the parameter set.
+        side: of the road; the other one if the road has no carriageway there.
+        station: m; of its beginning, if it runs along the road.
+        fields: of the thing where they are to differ from the usual ones and from the rule, such as ``offset``.
+
+    Raises:
+        InputError: a field is out of its limits.
+    """
+    model: type[Thing] = THINGS[kind]
+    station = round_value(min(max(station, 0.0), geometry.length))
+    place = PlaceByRule(geometry, side, station)
+    values = {name: info.default for name, info in model.model_fields.items() if not info.is_required()}
+    known = usual_fields(kind, place.side, fields)
+    offset = known.pop("offset", None)
+    known |= {name: value for name, value in place.spans(kind).items() if name not in known}
+    if offset is None:
+        offset = round_value(place.sign * place.distance(kind, values | known))
+    data: dict[str, Any] = {"type": kind, "instance": 1, "offset": offset}
+    if issubclass(model, LineObject):
+        end = min(station + SHORTEST_BARRIER, geometry.length)
+        data |= {"start_station": station, "end_station": round_value(end)}
+        if "end_offset" in model.model_fields:
+            data["end_offset"] = offset
+    else:
+        data["station"] = station
+        turned = {"Building": 90.0 * place.sign, "Overpass": 0.0, "PowerLine": 0.0, "Gantry": 0.0}
+        data["rotation_deg"] = turned.get(kind, place.facing)
+    return model.from_dict(data | known, kind)

@@ -1,0 +1,177 @@
+"""Blender's own menus: Add > SynthRoads, Object > SynthRoads, and the menu of the right mouse button.
+
+Blender's search (F3) finds what stands in a menu, by the menu's text: every operator stands in one, by its verb.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from ...blender.model.store import find_road
+from ..work.build import SYNTHROADS_OT_build, SYNTHROADS_OT_build_edited
+from ..work.long_operator import SYNTHROADS_OT_cancel
+from ..work.scan import SYNTHROADS_OT_scan
+from .calibration import (
+    SYNTHROADS_OT_compare_intensities,
+    SYNTHROADS_OT_fit_materials,
+    SYNTHROADS_OT_save_materials,
+    SYNTHROADS_OT_show_calibration,
+)
+from .cloud_view import (
+    SYNTHROADS_OT_add_cloud,
+    SYNTHROADS_OT_frame_cloud,
+    SYNTHROADS_OT_hide_cloud,
+    SYNTHROADS_OT_show_cloud,
+)
+from .edit import SYNTHROADS_OT_show_plants
+from .export import SYNTHROADS_OT_export_cloud, SYNTHROADS_OT_export_twin, SYNTHROADS_OT_install_ifc
+from .placing import (
+    ICONS,
+    SYNTHROADS_OT_add_thing,
+    SYNTHROADS_OT_delete_thing,
+    SYNTHROADS_OT_repeat_thing,
+    menu_groups,
+    thing_name,
+)
+from .presets import (
+    SYNTHROADS_OT_load_device,
+    SYNTHROADS_OT_load_scenario,
+    SYNTHROADS_OT_random_road,
+    SYNTHROADS_OT_save_scenario,
+)
+from .road_files import (
+    SYNTHROADS_OT_load_axis,
+    SYNTHROADS_OT_load_road,
+    SYNTHROADS_OT_save_road,
+    SYNTHROADS_OT_show_fit,
+)
+from .rules import SYNTHROADS_OT_check_rules, SYNTHROADS_OT_clear_rules
+from .scan_road import SYNTHROADS_OT_road_from_scan
+from .scene_scan import SYNTHROADS_OT_set_class
+from .things import thing_of
+from .views import SYNTHROADS_OT_add_views
+
+Block = tuple[tuple[type[bpy.types.Operator], str, str], ...]
+"""Entries of a menu between two lines: operator, text, icon."""
+_ROADS: Block = (
+    (SYNTHROADS_OT_build, "Build Road", "MOD_BUILD"),
+    (SYNTHROADS_OT_random_road, "Random Road", "FILE_REFRESH"),
+    (SYNTHROADS_OT_load_road, "Load Parameter Set...", "IMPORT"),
+    (SYNTHROADS_OT_load_axis, "Build Along Centreline...", "CURVE_PATH"),
+    (SYNTHROADS_OT_road_from_scan, "Build Road from a Scan...", "POINTCLOUD_DATA"),
+)
+_WORK: tuple[Block, ...] = (
+    (
+        (SYNTHROADS_OT_build_edited, "Build Road as Edited", "FILE_REFRESH"),
+        (SYNTHROADS_OT_repeat_thing, "Repeat Along Road", "MOD_ARRAY"),
+        (SYNTHROADS_OT_delete_thing, "Delete from Road", "TRASH"),
+        (SYNTHROADS_OT_show_plants, "Hide or Show Plants", "HIDE_OFF"),
+        (SYNTHROADS_OT_check_rules, "Check Rules", "CHECKMARK"),
+        (SYNTHROADS_OT_clear_rules, "Clear List of Rules", "X"),
+        (SYNTHROADS_OT_show_fit, "Show Missed Axis", "IMAGE_DATA"),
+        (SYNTHROADS_OT_set_class, "Set Class of Selected", "CHECKMARK"),
+        (SYNTHROADS_OT_add_views, "Add Sun, Sky, Cameras", "LIGHT_SUN"),
+    ),
+    (
+        (SYNTHROADS_OT_scan, "Scan", "LIGHT_AREA"),
+        (SYNTHROADS_OT_show_cloud, "Show Cloud...", "POINTCLOUD_DATA"),
+        (SYNTHROADS_OT_hide_cloud, "Remove Cloud", "X"),
+        (SYNTHROADS_OT_frame_cloud, "Look at Cloud", "VIEWZOOM"),
+        (SYNTHROADS_OT_add_cloud, "Add Cloud to Scene", "OUTLINER_OB_POINTCLOUD"),
+        (SYNTHROADS_OT_compare_intensities, "Compare Intensities", "SEQ_HISTOGRAM"),
+        (SYNTHROADS_OT_fit_materials, "Fit Materials", "MOD_DATA_TRANSFER"),
+        (SYNTHROADS_OT_show_calibration, "Show Calibration's Diagrams", "IMAGE_DATA"),
+        (SYNTHROADS_OT_save_materials, "Save Fitted Materials to Table", "FILE_TICK"),
+        (SYNTHROADS_OT_cancel, "Cancel Running Work", "X"),
+    ),
+    (
+        (SYNTHROADS_OT_export_twin, "Export Twin (Model)...", "EXPORT"),
+        (SYNTHROADS_OT_export_cloud, "Export Cloud...", "EXPORT"),
+        (SYNTHROADS_OT_save_road, "Save Parameter Set...", "EXPORT"),
+        (SYNTHROADS_OT_load_scenario, "Load Scenario...", "FILE_FOLDER"),
+        (SYNTHROADS_OT_save_scenario, "Save Scenario...", "FILE_TICK"),
+        (SYNTHROADS_OT_load_device, "Load Device...", "FILE_FOLDER"),
+        (SYNTHROADS_OT_install_ifc, "Install SynthRoads IFC...", "IMPORT"),
+    ),
+)
+
+
+def _draw_blocks(layout: bpy.types.UILayout, blocks: tuple[Block, ...]) -> None:
+    layout.operator_context = "INVOKE_REGION_WIN"  # Blender's menu Add has operators run without being asked
+    for number, block in enumerate(blocks):
+        if number:
+            layout.separator()
+        for operator, text, icon in block:
+            layout.operator(operator.bl_idname, text=text, icon=icon)
+
+
+class SYNTHROADS_MT_add(bpy.types.Menu):
+    """Menu Add > SynthRoads: a road, and every thing that can stand on it."""
+
+    bl_idname = "SYNTHROADS_MT_add"
+    bl_label = "SynthRoads"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the ways to a road, then the things in blocks."""
+        layout = self.layout
+        _draw_blocks(layout, (_ROADS,))
+        for group in menu_groups():
+            layout.separator()
+            for kind in group:
+                entry = layout.operator(
+                    SYNTHROADS_OT_add_thing.bl_idname, text=thing_name(kind), icon=ICONS.get(kind, "DOT")
+                )
+                entry.kind = kind
+
+
+class SYNTHROADS_MT_object(bpy.types.Menu):
+    """Menu Object > SynthRoads: what is done with a road."""
+
+    bl_idname = "SYNTHROADS_MT_object"
+    bl_label = "SynthRoads"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the entries in blocks: the road, scans, files."""
+        _draw_blocks(self.layout, _WORK)
+
+
+def _draw_add(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
+    menu.layout.menu(SYNTHROADS_MT_add.bl_idname, icon="CURVE_PATH")
+
+
+def _draw_object(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
+    menu.layout.separator()
+    menu.layout.menu(SYNTHROADS_MT_object.bl_idname, icon="CURVE_PATH")
+
+
+def _draw_context(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
+    """Draw what is done with a thing of the road that is clicked with the right mouse button."""
+    if find_road(context.scene) is None:
+        return
+    layout = menu.layout
+    layout.separator()
+    layout.operator_context = "INVOKE_REGION_WIN"
+    if thing_of(context.view_layer.objects.active, context.scene) is not None:
+        layout.operator(SYNTHROADS_OT_repeat_thing.bl_idname, icon="MOD_ARRAY")
+        layout.operator(SYNTHROADS_OT_delete_thing.bl_idname, icon="TRASH")
+    layout.menu(SYNTHROADS_MT_object.bl_idname, icon="CURVE_PATH")
+    layout.menu(SYNTHROADS_MT_add.bl_idname, text="Add to Road", icon="ADD")
+
+
+_MENUS = (
+    ("VIEW3D_MT_add", _draw_add),
+    ("VIEW3D_MT_object", _draw_object),
+    ("VIEW3D_MT_object_context_menu", _draw_context),
+)
+
+
+def register() -> None:
+    """Add the entries to Blender's menus."""
+    for name, draw in _MENUS:
+        getattr(bpy.types, name).append(draw)
+
+
+def unregister() -> None:
+    """Remove the entries from Blender's menus."""
+    for name, draw in _MENUS:
+        getattr(bpy.types, name).remove(draw)
