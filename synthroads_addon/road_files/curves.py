@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ..base.arrays import Float
 from ..road.alignment import Alignment, Element
@@ -22,8 +23,8 @@ _SPACING = 0.5
 """Longest step (m) of an integration by Gauss and Legendre's rule with five points."""
 _STEPS = 4096
 """Most steps of such an integration along one curve."""
-_LENGTH_STEPS, _LENGTH_ERROR = 60, 1e-9
-"""Most steps of the search for a cubic's end, and the relative error of its arc length at which it ends. Chosen."""
+_LENGTH_ERROR = 1e-10
+"""Relative error of a cubic's end, by its arc length. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -168,15 +169,22 @@ def cubic_up_to(v: Float, length: float) -> tuple[Curve, float, Float]:
     It is OpenDRIVE's `poly3`, whose u isn't the station: see `cubic_curve` for what is returned, and raised.
     """
     u = np.array([0.0, 1.0, 0.0, 0.0])  # the parameter itself is the distance along the tangent
-    last_u = length  # a chord along the tangent is no longer than the curve, so that this is too far at first
-    curve, heading, start = cubic_curve(u, v, last_u)
-    # Fixed-point iteration: the end along the tangent is moved in proportion until the curve has the arc length.
-    for _ in range(_LENGTH_STEPS):
-        if abs(curve.length - length) < _LENGTH_ERROR * length:
-            break
-        last_u *= 1.0 - (curve.length - length) / curve.length
-        curve, heading, start = cubic_curve(u, v, last_u)
-    return curve, heading, start
+
+    def excess(last_u: float) -> float:
+        """Return how much longer than wanted the curve is that ends at this distance along the tangent, m."""
+        return cubic_curve(u, v, last_u)[0].length - length
+
+    # The arc length int sqrt(1 + v'(u)^2) du grows with its end. The end lies between that of a curve that is as steep
+    # everywhere as this one anywhere, and the length itself, which only a straight line reaches.
+    slope = np.polynomial.Polynomial(v).deriv()
+    extremes = slope.deriv().roots()
+    inner = extremes.real[(np.abs(extremes.imag) < 1e-12) & (extremes.real > 0.0) & (extremes.real < length)]
+    steepest = float(np.abs(slope(np.array([0.0, length, *inner]))).max())
+    least_u = length / np.hypot(1.0, steepest)
+    if steepest < 1e-9 or excess(length) <= 0.0:
+        return cubic_curve(u, v, length)
+    last_u = brentq(excess, least_u * (1.0 - 1e-6), length, xtol=_LENGTH_ERROR * length, rtol=1e-12)
+    return cubic_curve(u, v, float(last_u))
 
 
 def as_elements(curve: Curve, tolerance: float = TOLERANCE) -> tuple[list[Element], float]:

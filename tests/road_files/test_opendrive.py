@@ -103,16 +103,20 @@ def test_a_curve_that_clothoids_dont_follow_is_refused(tmp_path: Path, monkeypat
         exact_axis(line)
 
 
-def test_the_distance_of_a_cubic_isnt_its_station(tmp_path: Path) -> None:
-    """Taken for it, the curve would be 2 m too long here: OpenDRIVE's length is that of the arc."""
-    v = np.polynomial.Polynomial([0.0, 0.0, 4e-3, 2e-6])
-    u = np.linspace(0.0, 90.0, 200_001)
+@pytest.mark.parametrize(
+    ("c", "d", "end"),
+    [(4e-3, 2e-6, 90.0), (0.0, 2e-4, 60.0), (0.0, -5e-4, 50.0), (0.02, -2e-4, 70.0), (0.0, 0.0, 80.0)],
+)
+def test_the_distance_of_a_cubic_isnt_its_station(c: float, d: float, end: float, tmp_path: Path) -> None:
+    """Taken for it, the curve would be too long, by 2 to 60 m here: OpenDRIVE's length is that of the arc."""
+    v = np.polynomial.Polynomial([0.0, 0.0, c, d])
+    u = np.linspace(0.0, end, 200_001)
     run = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(u), np.diff(v(u))))])
-    assert run[-1] > 95.0
-    words = '<poly3 a="0" b="0" c="4e-3" d="2e-6"/>'
+    words = f'<poly3 a="0" b="0" c="{c}" d="{d}"/>'
     geometry = (0.0, float(run[-1]), (0.0, 0.0, 0.0), words)
     axis = exact_axis(only_line(opendrive(tmp_path / "a.xodr", [xodr_road([geometry])])))
-    assert axis.alignment.position(axis.alignment.length).tolist() == pytest.approx([90.0, v(90.0)], abs=1e-3)
+    assert axis.alignment.length == pytest.approx(run[-1], abs=1e-6)
+    assert axis.alignment.position(axis.alignment.length).tolist() == pytest.approx([end, v(end)], abs=1e-3)
 
 
 def test_cubic_elevations_are_within_a_millimetre_and_meet(tmp_path: Path) -> None:
