@@ -36,7 +36,7 @@ def test_a_scan_of_the_demo_s_size_is_told_within_a_factor_of_two() -> None:
 
 @pytest.mark.parametrize(("rays", "microseconds"), [(1, 0.2), (7, 0.9), (19, 2.0), (61, 5.6)])
 def test_rays_take_what_casting_them_was_measured_to_take(rays: int, microseconds: float) -> None:
-    """What a pulse takes besides its rays is as much for all; the times are those of docs/benchmark.md."""
+    """The time of a pulse without its rays is the same for all numbers of rays; the times are those of the page."""
     told = forecast_scan(blocks(180.0, rays), 1000, threads=1)
     seven = forecast_scan(blocks(180.0, 7), 1000, threads=1)
     assert 1e6 * (told.seconds - seven.seconds) / told.pulses == pytest.approx(microseconds - 0.9, abs=1.0)

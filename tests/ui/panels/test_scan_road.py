@@ -56,7 +56,7 @@ def rough_cloud(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def found(cloud: Path, rough_cloud: Path) -> dict[Path, ReconstructedRoad]:
-    """What the command finds in each cloud."""
+    """Return the road that the command finds in each cloud."""
     return {file: run_reconstruction(ReconstructionJob(file)) for file in (cloud, rough_cloud)}
 
 
