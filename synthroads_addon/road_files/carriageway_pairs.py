@@ -123,7 +123,8 @@ def paired(one: Chain, other: Chain) -> Pair | str:
     common = float(line.stations[end] - line.stations[begin])
     shorter_length = min(line.stations[-1], other_line.stations[-1])
     if common < _SAFE * shorter_length:
-        return f"the two run beside each other over {common:.0f} m, {100.0 * _SAFE:.0f} % of {shorter_length:.0f} m are needed"
+        needed = f"{100.0 * _SAFE:.0f} % of {shorter_length:.0f} m are needed"
+        return f"the two run beside each other over {common:.0f} m, {needed}"
     begin_station, end_station = float(line.stations[begin]), float(line.stations[end])
     points = _midway(line, other_line, nodes, other_nodes, (begin_station, end_station))
     spread = np.hypot(*(feet - line.points)[begin : end + 1].T)

@@ -155,6 +155,7 @@ def cubic_curve(u: Float, v: Float, end: float) -> tuple[Curve, float, Float]:
         return p
 
     def heading(station: Float) -> Float:
+        """Return the headings (N,), rad, less the one at the start, at stations (N,), m."""
         p = parameter(station)
         # Headings are known but for full turns: the table says which one.
         wrapped_heading = np.arctan2(dv(p), du(p))
@@ -166,6 +167,7 @@ def cubic_curve(u: Float, v: Float, end: float) -> tuple[Curve, float, Float]:
         )
 
     def curvature(station: Float) -> Float:
+        """Return the curvatures (N,), 1/m, at stations (N,), m."""
         p = parameter(station)
         # Curvature of a plane curve: (u' v'' - v' u'') / |(u', v')|^3.
         return (du(p) * ddv(p) - dv(p) * ddu(p)) / speed(p) ** 3

@@ -61,11 +61,11 @@ def format_of(path: Path) -> str | None:
         raise MissingFileError(str(path), None, f"must be a readable axis file ({error.strerror})") from None
     if head[4:].startswith(PBF_MARK):
         return "OpenStreetMap PBF"
-    if (vector := vector_format(head)) is not None:
-        return vector
-    text = head.replace(b"\0", b"")  # UTF-16
-    known = next((name for mark, name in _MARKS if mark in text), None)
-    return "SBET" if known is None and is_sbet(head, size) else known
+    if (gis_format := vector_format(head)) is not None:
+        return gis_format
+    text = head.replace(b"\0", b"")  # so that words of UTF-16 are found as well
+    text_format = next((name for mark, name in _MARKS if mark in text), None)
+    return "SBET" if text_format is None and is_sbet(head, size) else text_format
 
 
 def read_lines(path: Path) -> list[RoadLine]:

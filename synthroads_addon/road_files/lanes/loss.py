@@ -63,7 +63,7 @@ class Loss:
         self.surface |= surface
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as JSON data."""
+        """Return the list as JSON data."""
         return {
             "read": dict(sorted(self.read.items())),
             "approximated": self.approximated,
@@ -76,20 +76,22 @@ class Loss:
         }
 
     def lines(self) -> list[str]:
-        """Return it as lines for people."""
+        """Return the list as lines of text for people."""
         sentences = [f"read: {', '.join(f'{count} {kind}' for kind, count in sorted(self.read.items()))}"]
         for row in self.approximated:
-            off = f", within {1000.0 * row['deviation']:.2f} mm" if row["deviation"] else ""
-            where = f" (worst at station {row['station']:.1f} m)" if "station" in row else ""
-            sentences.append(f"approximated: {row['kind']}: {row['why']}{off}{where}")
+            deviation = f", within {1000.0 * row['deviation']:.2f} mm" if row["deviation"] else ""
+            place = f" (worst at station {row['station']:.1f} m)" if "station" in row else ""
+            sentences.append(f"approximated: {row['kind']}: {row['why']}{deviation}{place}")
         for (kind, why), count in sorted(self.left_out.items()):
             stretches = self.stretches.get((kind, why), [])
-            named = ", ".join(f"{low:.1f} to {high:.1f} m" for low, high in stretches[:_SHOWN])
+            named_stretches = ", ".join(f"{start:.1f} to {end:.1f} m" for start, end in stretches[:_SHOWN])
             more = f" and {len(stretches) - _SHOWN} more" if len(stretches) > _SHOWN else ""
-            sentences.append(f"left out: {count} {kind}: {why}" + (f" (stations {named}{more})" if named else ""))
+            sentences.append(
+                f"left out: {count} {kind}: {why}" + (f" (stations {named_stretches}{more})" if named_stretches else "")
+            )
         return sentences
 
 
 def _shown(text: str) -> str:
-    """Return a text of which a file may have written a part as one line."""
+    """Return a text, which may hold words of a file, on one line and at most 300 characters long."""
     return on_one_line(text)[:_LONGEST]

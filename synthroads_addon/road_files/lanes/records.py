@@ -29,7 +29,7 @@ class Cubics:
     Attributes:
         starts: (K,) increasing stations, m.
         rows: (K, 4) a, b, c, d.
-        begins: whether the first holds before its start as well; else the value there is 0.
+        begins: whether the first cubic holds before its start as well; else the value there is 0.
     """
 
     starts: Float
@@ -52,19 +52,20 @@ class Cubics:
         Args:
             station: where.
             inside: (N,) places that say which cubic holds, so that ends of a stretch are those of its own cubic.
-            slope: whether the change per metre is wanted.
+            slope: whether the change per metre is returned.
         """
         station = np.asarray(station, dtype=np.float64)
         if not len(self.starts):
             return np.zeros(station.shape)
-        there = station if inside is None else inside
-        piece = np.searchsorted(self.starts, there, side="right") - 1
-        before = piece < 0
-        piece = np.maximum(piece, 0)
-        a, b, c, d = self.rows[piece].T
-        u = station - self.starts[piece]
+        deciding_station = station if inside is None else inside
+        row = np.searchsorted(self.starts, deciding_station, side="right") - 1
+        is_before = row < 0
+        row = np.maximum(row, 0)
+        a, b, c, d = self.rows[row].T
+        # a + b u + c u^2 + d u^3, u the distance from the cubic's start.
+        u = station - self.starts[row]
         values = b + u * (2.0 * c + 3.0 * d * u) if slope else a + u * (b + u * (c + u * d))
-        return np.where(before, 0.0, values) if not self.begins else values
+        return np.where(is_before, 0.0, values) if not self.begins else values
 
 
 @dataclass(frozen=True)
@@ -121,14 +122,20 @@ class FileSection:
         return borders
 
     @staticmethod
-    def _edges(lanes: Sequence[FileLane], sign: int, where: tuple[Float, Float, Float], turn: float) -> list[Float]:
-        station, inside, offset = where
+    def _edges(
+        lanes: Sequence[FileLane], sign: int, along: tuple[Float, Float, Float], border_sign: float
+    ) -> list[Float]:
+        """Return t (N,), m, of the borders of one side's lanes, from the inside out, the line's lane offset first.
+
+        `border_sign` is -1 for files that write borders on the right as positive distances.
+        """
+        station, inside, offset = along
         edges = [offset]
         for lane in lanes:
             if lane.widths:
                 edges.append(edges[-1] + sign * lane.widths.at(station, inside))
             else:
-                edges.append(turn * lane.borders.at(station, inside) if lane.borders else edges[-1])
+                edges.append(border_sign * lane.borders.at(station, inside) if lane.borders else edges[-1])
         return edges
 
 
@@ -180,14 +187,14 @@ class FileRoad:
 
 def merged(stations: Float, length: float) -> Float:
     """Return the stations from 0 to a length (m) in order, those nearer than `SHORTEST` to the one before left out."""
-    inside = np.unique(np.clip(stations, 0.0, length))
-    kept = inside[np.concatenate([[True], np.diff(inside) > SHORTEST])]
-    kept[-1] = length
-    return kept
+    in_range = np.unique(np.clip(stations, 0.0, length))
+    distinct = in_range[np.concatenate([[True], np.diff(in_range) > SHORTEST])]
+    distinct[-1] = length
+    return distinct
 
 
 def read_road(road: Element, name: str, length: float, up: float = 0.0) -> FileRoad:
-    """Return what a road says beside its plan.
+    """Return the lanes, elevation and lateral profiles of a road.
 
     Args:
         road: its element.
@@ -228,6 +235,7 @@ def read_road(road: Element, name: str, length: float, up: float = 0.0) -> FileR
 
 
 def _shapes(rows: Sequence[Element]) -> tuple[ShapeProfile, ...]:
+    """Return the lateral profiles in order of their stations, each with the cubics of t of all rows at its station."""
     by_station: dict[float, list[Element]] = {}
     for row in rows:
         by_station.setdefault(number(row, "s"), []).append(row)
@@ -235,20 +243,20 @@ def _shapes(rows: Sequence[Element]) -> tuple[ShapeProfile, ...]:
 
 
 def _sections(items: Sequence[Element], length: float) -> tuple[FileSection, ...]:
-    """Return the lane sections in order; one that ends where it begins is none.
+    """Return the lane sections in order, without those that end where they begin.
 
     A section that is of one side only leaves the other side's lanes as the section before has them.
     """
     rows = sorted(((number(item, "s"), n) for n, item in enumerate(items)))
     sections: list[FileSection] = []
     last: dict[int, Element] = {}
-    edges = [*(s for s, _ in rows[1:]), length]
-    for (start, n), end in zip(rows, edges, strict=True):
+    ends = [*(s for s, _ in rows[1:]), length]
+    for (start, n), end in zip(rows, ends, strict=True):
         item = items[n]
         sides = {sign: child(item, name) for sign, name in zip(SIDES, ("left", "right"), strict=True)}
-        single = item.get("singleSide", "false").strip().lower() in ("true", "1")
+        is_single_sided = item.get("singleSide", "false").strip().lower() in ("true", "1")
         lanes = {sign: _lanes(side, sign, start) for sign, side in sides.items()}
-        if single and sections:
+        if is_single_sided and sections:
             lanes = {s: lanes[s] if sides[s] is not None else sections[-1].lanes[s] for s in SIDES}
         last = {sign: side for sign, side in sides.items() if side is not None} or last
         if min(end, length) - start <= SHORTEST:
@@ -257,18 +265,20 @@ def _sections(items: Sequence[Element], length: float) -> tuple[FileSection, ...
         sections.append(FileSection(start, min(end, length), lanes, None if centre is None else child(centre, "lane")))
     if not sections:
         raise InputError("laneSection", None, "must begin before the road's end")
-    first = sections[0]
-    if first.start > 0.0:
-        sections[0] = FileSection(0.0, first.end, first.lanes, first.centre)
+    first_section = sections[0]
+    if first_section.start > 0.0:
+        sections[0] = FileSection(0.0, first_section.end, first_section.lanes, first_section.centre)
     return tuple(sections)
 
 
 def _lanes(side: Element | None, sign: int, start: float) -> tuple[FileLane, ...]:
+    """Return the lanes of one side of a section, from the inside out; `start` is the section's station, m."""
     lanes = [] if side is None else [_lane(item, start) for item in children(side, "lane")]
     return tuple(sorted((lane for lane in lanes if lane.number * sign > 0), key=lambda lane: abs(lane.number)))
 
 
 def _lane(item: Element, start: float) -> FileLane:
+    """Return a lane; its records count stations from the section's start, m."""
     heights = sorted([number(row, "sOffset") + start, number(row, "inner"), number(row, "outer")]
                      for row in children(item, "height"))  # fmt: skip
     return FileLane(
