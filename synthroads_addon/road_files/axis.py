@@ -211,10 +211,12 @@ def _moved_rigidly(path: Path, axis: ExactAxis, source: MapSystem, target: MapSy
     cos, sin = math.cos(turn), math.sin(turn)
     rotation = np.array([[cos, -sin], [sin, cos]])
     start = moved_points[0] + rotation @ (np.array([alignment.x, alignment.y]) - middle)
-    placed = Alignment(alignment.elements, float(start[0]), float(start[1]), alignment.start_heading + turn)
-    end_error = float(np.hypot(*(placed.position(np.array([0.0, alignment.length])) - moved_points[5:]).T).max())
+    moved_alignment = Alignment(alignment.elements, float(start[0]), float(start[1]), alignment.start_heading + turn)
+    end_error = float(
+        np.hypot(*(moved_alignment.position(np.array([0.0, alignment.length])) - moved_points[5:]).T).max()
+    )
     name = source.label if source.epsg else "the file's own projection"
     text = f"moved from {name} to {target.label} about its middle, lengths as they are: its ends are off by"
     text += f" {end_error:.3f} m"
     warn("%s is %s", path.name, text)
-    return replace(axis, alignment=placed), text
+    return replace(axis, alignment=moved_alignment), text

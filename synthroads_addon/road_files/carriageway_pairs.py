@@ -79,10 +79,10 @@ class _Dense:
         return cls(points, direction / np.hypot(*direction.T)[:, None], station)
 
     def feet(self, points: Float, directions: Float) -> tuple[Float, Bool]:
-        """Return the feet (K, 2), m, of perpendiculars from points (K, 2), and which of them are on the other line.
+        """Return the feet (K, 2), m, of points (K, 2) on this line, and which are on the opposite carriageway (K,).
 
-        A foot does where the line runs against the points' directions (K, 2), beside them, at a distance that two
-        carriageways have (K booleans).
+        A foot is on the opposite carriageway where this line runs against the directions (K, 2) of the points, and lies
+        beside them at a distance that two carriageways have.
         """
         from scipy.spatial import cKDTree  # takes a tenth of a second, and few roads are of maps
 
@@ -165,9 +165,9 @@ def _midway(
     return places[gap_mask, 1:]
 
 
-def _cross(first: Float, second: Float) -> Float:
-    """Return the cross products (N,) of vectors (N, 2): positive where the second points to the left of the first."""
-    return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+def _cross(vectors: Float, other_vectors: Float) -> Float:
+    """Return the cross products (N,) of vectors (N, 2): positive where the other vector points to the left."""
+    return vectors[:, 0] * other_vectors[:, 1] - vectors[:, 1] * other_vectors[:, 0]
 
 
 def _longest(flags: Bool) -> tuple[int, int]:
@@ -194,20 +194,20 @@ def pairs_of(chains: Sequence[Chain]) -> tuple[list[Pair], dict[int, tuple[int, 
         np.column_stack([1.0 / np.maximum(np.cos(np.radians(south_west[:, 1])), 0.01), np.ones(len(south_west))])
         * _REACH
     )
-    pairs, used, reasons = list[Pair](), set[int](), dict[int, tuple[int, str]]()
+    pairs, paired_numbers, reasons = list[Pair](), set[int](), dict[int, tuple[int, str]]()
     # Only chains whose boxes (degrees), widened by the reach, overlap can lie beside each other.
-    for rank, first in enumerate(order):
+    for rank, number in enumerate(order):
         in_reach = (south_west[rank] - reach[rank] <= north_east[rank + 1 :]).all(axis=1) & (
             north_east[rank] + reach[rank] >= south_west[rank + 1 :]
         ).all(axis=1)
-        for second in (order[rank + 1 + int(n)] for n in np.flatnonzero(in_reach)):
-            if first in used or second in used:
+        for other_number in (order[rank + 1 + int(n)] for n in np.flatnonzero(in_reach)):
+            if number in paired_numbers or other_number in paired_numbers:
                 continue
-            pair = paired(chains[first], chains[second])
+            pair = paired(chains[number], chains[other_number])
             if isinstance(pair, Pair):
                 pairs.append(pair)
-                used |= {first, second}
+                paired_numbers |= {number, other_number}
             elif pair:
-                reasons.setdefault(first, (second, pair))
-                reasons.setdefault(second, (first, pair))
-    return pairs, {n: reason for n, reason in reasons.items() if n not in used}
+                reasons.setdefault(number, (other_number, pair))
+                reasons.setdefault(other_number, (number, pair))
+    return pairs, {n: reason for n, reason in reasons.items() if n not in paired_numbers}

@@ -77,10 +77,10 @@ def _sine(u: Float) -> tuple[Float, Float]:
 
 def _helmert(u: Float) -> tuple[Float, Float]:
     """Return curvature share and integral (`TRANSITIONS`) of a Helmert curve (Schramm): 2 u^2, then 1 - 2 (1 - u)^2."""
-    rest = 1.0 - u
+    remainder = 1.0 - u
     in_first_half = u <= 0.5
-    return np.where(in_first_half, 2.0 * u**2, 1.0 - 2.0 * rest**2), np.where(
-        in_first_half, 2.0 * u**3 / 3.0, u - 0.5 + 2.0 * rest**3 / 3.0
+    return np.where(in_first_half, 2.0 * u**2, 1.0 - 2.0 * remainder**2), np.where(
+        in_first_half, 2.0 * u**3 / 3.0, u - 0.5 + 2.0 * remainder**3 / 3.0
     )
 
 

@@ -12,6 +12,7 @@ import math
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree.ElementTree import Element  # nosec B405 (its type alone)
 
 import numpy as np
@@ -108,7 +109,7 @@ def _alignment(alignment: Element, name: str, unit: float, system: MapSystem | N
     if not pieces:
         return None
     equations = tuple(_equations(alignment, unit, start))
-    heights, left_out = _profile(alignment, unit, start, equations)
+    heights, left_out = _profile(alignment, unit, start)
     tilt = read_superelevation(alignment, pieces, unit, start)
     return RoadLine(
         name=name,
@@ -235,16 +236,14 @@ def _equations(alignment: Element, unit: float, start: float) -> list[Equation]:
     """Return an alignment's station equations in order, with places counted from its begin, m."""
     equations = []
     for row in children(alignment, "StaEquation"):
-        internal = number(row, "staInternal") * unit - start
-        ahead = number(row, "staAhead") * unit
-        back = number(row, "staBack", number(row, "staInternal")) * unit
-        equations.append(Equation(internal, back, ahead))
+        distance = number(row, "staInternal") * unit - start
+        ahead_station = number(row, "staAhead") * unit
+        back_station = number(row, "staBack", number(row, "staInternal")) * unit
+        equations.append(Equation(distance, back_station, ahead_station))
     return sorted(equations, key=lambda each: each.station)
 
 
-def _profile(
-    alignment: Element, unit: float, start: float, equations: tuple[Equation, ...]
-) -> tuple[list[HeightPiece], list[str]]:
+def _profile(alignment: Element, unit: float, start: float) -> tuple[list[HeightPiece], list[str]]:
     """Return the pieces of the first design profile of an alignment, and what is left out of the others."""
     designs = [each for profile in children(alignment, "Profile") for each in children(profile, "ProfAlign")]
     ground_profiles = [each for profile in children(alignment, "Profile") for each in children(profile, "ProfSurf")]
@@ -255,32 +254,49 @@ def _profile(
     rows = [_intersection(row, unit) for row in designs[0] if local_name(row) in _CURVES]
     if not rows:
         return [], left_out
-    shift = _profile_shift(rows, start, _plan_length(alignment, unit), equations)
-    rows = [(station - shift, *rest) for station, *rest in rows]  # type: ignore[misc]
+    shift = _profile_shift(rows, start, _plan_length(alignment, unit))
+    rows = [row._replace(station=row.station - shift) for row in rows]
     return _height_pieces(rows), left_out
 
 
-_Row = tuple[float, float, float, float, float]  # station, height, tangents before and behind, radius
+class _Intersection(NamedTuple):
+    """A point of vertical intersection with its curve, lengths in m.
+
+    Attributes:
+        station, height: of the point.
+        before, behind: lengths of the curve's tangents, in plan.
+        radius: of a circle; 0 for a parabola or no curve.
+    """
+
+    station: float
+    height: float
+    before: float
+    behind: float
+    radius: float
 
 
-def _intersection(row: Element, unit: float) -> _Row:
+def _intersection(row: Element, unit: float) -> _Intersection:
     """Return station and height (m), lengths of the tangents on both sides (m), and the radius of a circle or 0."""
     kind = local_name(row)
     words = (row.text or "").split()
     if len(words) < 2:
         raise InputError(kind, " ".join(words) or None, "must be a station and an elevation")
     station, height = (finite(kind, word) * unit for word in words[:2])
-    before = behind = radius = 0.0
+    tangent_before = tangent_behind = radius = 0.0
     if kind == "ParaCurve":
-        before = behind = 0.5 * number(row, "length") * unit
+        tangent_before = tangent_behind = 0.5 * number(row, "length") * unit
     elif kind == "UnsymParaCurve":
-        before, behind = number(row, "lengthIn") * unit, number(row, "lengthOut") * unit
+        tangent_before, tangent_behind = number(row, "lengthIn") * unit, number(row, "lengthOut") * unit
     elif kind == "CircCurve":
-        before = behind = 0.5 * number(row, "length") * unit
+        tangent_before = tangent_behind = 0.5 * number(row, "length") * unit
         radius = abs(number(row, "radius", 0.0)) * unit
-    if min(before, behind) < 0.0 or (min(before, behind) <= SHORTEST < max(before, behind)):
-        raise InputError(f"{kind} at station {station:.3f} m", min(before, behind), "must have two lengths above 0 m")
-    return station, height, before, behind, radius
+    if min(tangent_before, tangent_behind) < 0.0 or (
+        min(tangent_before, tangent_behind) <= SHORTEST < max(tangent_before, tangent_behind)
+    ):
+        raise InputError(
+            f"{kind} at station {station:.3f} m", min(tangent_before, tangent_behind), "must have two lengths above 0 m"
+        )
+    return _Intersection(station, height, tangent_before, tangent_behind, radius)
 
 
 _CURVES = ("PVI", "ParaCurve", "UnsymParaCurve", "CircCurve")
@@ -291,17 +307,18 @@ def _plan_length(alignment: Element, unit: float) -> float:
     return number(alignment, "length", 0.0) * unit
 
 
-def _profile_shift(rows: list[_Row], start: float, length: float, equations: tuple[Equation, ...]) -> float:
+def _profile_shift(rows: list[_Intersection], start: float, length: float) -> float:
     """Return the difference, m, between the profile's stations and the distances from the line's begin.
 
     A profile's stations may include the alignment's first station, or begin with 0. The difference is taken with which
     the profile covers more of the plan.
     """
-    begin, end = rows[0][0], rows[-1][0]
+    begin, end = rows[0].station, rows[-1].station
     if abs(start) < SHORTEST or length <= 0.0:
         return start
 
     def covered(shift: float) -> float:
+        """Return the length, m, of the plan that the profile covers when its stations are less by a shift (m)."""
         return max(0.0, min(end - shift, length) - max(begin - shift, 0.0))
 
     with_start, without_start = covered(start), covered(0.0)
@@ -312,61 +329,60 @@ def _profile_shift(rows: list[_Row], start: float, length: float, equations: tup
     return start
 
 
-def _height_pieces(rows: list[_Row]) -> list[HeightPiece]:
-    """Return grades and curves between intersections, in order of their stations.
+def _height_pieces(rows: list[_Intersection]) -> list[HeightPiece]:
+    """Return the pieces of the profile, grades and curves, between intersections in order of their stations.
 
     Raises:
         InputError: stations don't grow, or the curves of neighbours overlap.
     """
-    station = [row[0] for row in rows]
-    for before, after in itertools.pairwise(station):
-        if after - before <= SHORTEST:
-            raise InputError("ProfAlign", after, f"must be more than {before:g} m, as stations must increase")
-    if len(rows) == 1:
-        return [HeightPiece(station[0], station[0] + 1.0, rows[0][1], 0.0)]
-    grades = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in itertools.pairwise(rows)]
+    for row, next_row in itertools.pairwise(rows):
+        if next_row.station - row.station <= SHORTEST:
+            allowed = f"must be more than {row.station:g} m, as stations must increase"
+            raise InputError("ProfAlign", next_row.station, allowed)
+    if len(rows) == 1:  # one height says nothing of a grade: the profile is level
+        return [HeightPiece(rows[0].station, rows[0].station + 1.0, rows[0].height, 0.0)]
+    grades = [(b.height - a.height) / (b.station - a.station) for a, b in itertools.pairwise(rows)]
     pieces: list[HeightPiece] = []
-    at, height = station[0], rows[0][1]
+    reached, height = rows[0].station, rows[0].height  # where the pieces so far end
     for n, row in enumerate(rows):
-        inner = 0 < n < len(rows) - 1
-        before, behind = _tangents(row, grades[n - 1], grades[n]) if inner else (0.0, 0.0)
+        is_inner = 0 < n < len(rows) - 1
+        before, behind = _tangents(row, grades[n - 1], grades[n]) if is_inner else (0.0, 0.0)
         if n:
-            reach = row[0] - before
-            if reach < at - 1e-3:
-                allowed = (
-                    f"curves must not overlap: this one needs {before:.3f} m before it, but has {row[0] - at:.3f} m"
-                )
-                raise InputError(f"ProfAlign at station {row[0]:.3f} m", before, allowed)
-            if reach - at > SHORTEST:
-                pieces.append(HeightPiece(at, reach, height, grades[n - 1]))
-                height += grades[n - 1] * (reach - at)
-                at = reach
-        if inner and before + behind > SHORTEST:
+            curve_begin = row.station - before
+            if curve_begin < reached - 1e-3:
+                room = row.station - reached
+                allowed = f"curves must not overlap: this one needs {before:.3f} m before it, but has {room:.3f} m"
+                raise InputError(f"ProfAlign at station {row.station:.3f} m", before, allowed)
+            if curve_begin - reached > SHORTEST:
+                pieces.append(HeightPiece(reached, curve_begin, height, grades[n - 1]))
+                height += grades[n - 1] * (curve_begin - reached)
+                reached = curve_begin
+        if is_inner and before + behind > SHORTEST:
             pieces += _rounding(row, (before, behind), height, (grades[n - 1], grades[n]))
-            at = row[0] + behind
-            height = row[1] + grades[n] * behind
+            reached = row.station + behind
+            height = row.height + grades[n] * behind
     return pieces
 
 
-def _tangents(row: _Row, grade_before: float, grade_behind: float) -> tuple[float, float]:
+def _tangents(row: _Intersection, grade_before: float, grade_behind: float) -> tuple[float, float]:
     """Return how far (m) a curve reaches before and behind its intersection, between two grades.
 
     A circle's tangents are R tan(angle / 2) long along the slope, so that they differ in plan.
     """
-    if not row[4]:
-        return row[2], row[3]
+    if not row.radius:
+        return row.before, row.behind
     slope_before, slope_behind = math.atan(grade_before), math.atan(grade_behind)
-    tangent = row[4] * math.tan(0.5 * abs(slope_behind - slope_before))
+    tangent = row.radius * math.tan(0.5 * abs(slope_behind - slope_before))
     return tangent * math.cos(slope_before), tangent * math.cos(slope_behind)
 
 
 def _rounding(
-    row: _Row, tangents: tuple[float, float], height: float, grades: tuple[float, float]
+    row: _Intersection, tangents: tuple[float, float], height: float, grades: tuple[float, float]
 ) -> list[HeightPiece]:
     """Return the pieces of a curve at an intersection, from the height (m) at its begin."""
-    station, (tangent_before, tangent_behind), (grade_before, grade_behind) = row[0], tangents, grades
+    station, (tangent_before, tangent_behind), (grade_before, grade_behind) = row.station, tangents, grades
     start, end = station - tangent_before, station + tangent_behind
-    if row[4] and abs(grade_behind - grade_before) > 1e-12:
+    if row.radius and abs(grade_behind - grade_before) > 1e-12:
         return circle(start, end, height, grade_before, grade_behind)
     if abs(tangent_before - tangent_behind) < SHORTEST:
         return [HeightPiece(start, end, height, grade_before, 0.5 * (grade_behind - grade_before) / (end - start))]
@@ -384,10 +400,10 @@ def _rounding(
 def _others(alignment: Element) -> list[str]:
     """Return texts on those elements of an alignment that aren't read, with their numbers."""
     counts = Counter(local_name(row) for row in alignment)
-    known = ("CoordGeom", "Profile", "StaEquation", "Feature", "Superelevation", "CrossSects", "")
+    read_names = ("CoordGeom", "Profile", "StaEquation", "Feature", "Superelevation", "CrossSects", "")
     sections = sum(len(children(row, "CrossSect")) for row in children(alignment, "CrossSects"))
-    lost = [f"crossfall: {sections} cross-sections, which don't say what of them is paved"] if sections else []
-    return lost + [f"{count} {name}" for name, count in sorted(counts.items()) if name not in known]
+    texts = [f"crossfall: {sections} cross-sections, which don't say what of them is paved"] if sections else []
+    return texts + [f"{count} {name}" for name, count in sorted(counts.items()) if name not in read_names]
 
 
 def _roadways(root: Element) -> dict[str, list[str]]:

@@ -112,7 +112,7 @@ def _road(
         return None
     x, y, z, turn = shift
     cos, sin = math.cos(turn), math.sin(turn)
-    placed = tuple(
+    map_pieces = tuple(
         replace(
             piece,
             x=x + piece.x * cos - piece.y * sin,
@@ -121,11 +121,11 @@ def _road(
         )
         for piece in pieces
     )
-    end = placed[-1].station + placed[-1].length
+    end = map_pieces[-1].station + map_pieces[-1].length
     return RoadLine(
         name=name,
         source="OpenDRIVE road",
-        pieces=placed,
+        pieces=map_pieces,
         heights=tuple(_heights(road, end, z)),
         system=system,
         lanes=_lane_count(road, 0.5 * end),

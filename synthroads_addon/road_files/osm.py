@@ -92,18 +92,18 @@ def _placed(data: _Data) -> Iterable[OsmWay]:
     """
     for number, (tags, nodes) in sorted(data.ways.items()):
         runs: list[list[int]] = [[]]
-        missing = 0
+        missing_count = 0
         for node in nodes:
             if node in data.nodes:
                 if not runs[-1] or runs[-1][-1] != node:
                     runs[-1].append(node)
             else:
-                missing += 1
+                missing_count += 1
                 runs.append([])
         for run in runs:
             if len(run) > 1:
                 place: Float = np.array([data.nodes[node] for node in run], dtype=np.float64)
-                yield OsmWay(number, tags, tuple(run), place, missing)
+                yield OsmWay(number, tags, tuple(run), place, missing_count)
 
 
 class _Target:

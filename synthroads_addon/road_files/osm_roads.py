@@ -121,8 +121,11 @@ def _of_pair(pair: Pair) -> PointLine:
 
 def _cut(chain: Chain, pair: Pair) -> Float:
     """Return the nodes (N, 2) of a carriageway beside its pair's axis; all nodes where fewer than two are."""
-    axis_stations = np.array([_stations_on(pair)(s) for s in chain.stations.tolist()]) if chain is pair.other else None
-    station = chain.stations - pair.begin if axis_stations is None else axis_stations
+    if chain is pair.other:
+        axis_station = _stations_on(pair)
+        station = np.array([axis_station(s) for s in chain.stations.tolist()])
+    else:
+        station = chain.stations - pair.begin
     nodes = chain.points[(station >= 0.0) & (station <= pair.end - pair.begin)]
     return nodes if len(nodes) > 1 else chain.points
 
@@ -218,7 +221,7 @@ def _lane_width(spans: Sequence[_Span], lanes: int | None, one_way: bool) -> tup
 
 
 def _most(spans: Sequence[_Span], value: Callable[[Mapping[str, str]], T | None]) -> T | None:
-    """Return the value that most of the length has, None where none has any."""
+    """Return the value, other than None, that the spans have over the greatest length; None where none has any."""
     lengths: dict[T, float] = defaultdict(float)
     for begin, end, tags in spans:
         tag_value = value(tags)

@@ -222,6 +222,7 @@ def thinned(points: Float, spacing: float) -> Int:
         if (plan[row][0] - east) ** 2 + (plan[row][1] - north) ** 2 >= spacing * spacing:
             kept_rows.append(row)
             east, north = plan[row]
+    # The line's last point stays; it takes the place of the one kept before it, unless that is the first.
     if kept_rows[-1] != len(plan) - 1:
         kept_rows = [*(kept_rows if len(kept_rows) == 1 else kept_rows[:-1]), len(plan) - 1]
     return np.array(kept_rows)

@@ -160,14 +160,14 @@ def _line_of(place: str, shape: bytes | None) -> Iterator[tuple[Float, InputErro
     parts = [part for part in _parts(place, bytes(shape)) if len(part) > 1]
     if not parts:
         return
-    joined = [parts[0]]
+    joined_parts = [parts[0]]
     for part in parts[1:]:
-        if np.abs(part[0, :2] - joined[-1][-1, :2]).max() > _JOINED:
+        if np.abs(part[0, :2] - joined_parts[-1][-1, :2]).max() > _JOINED:
             fault = InputError("parts", len(parts), "must be one line, or parts that begin where another part ends")
             yield parts[0], fault
             return
-        joined.append(part[1:])
-    yield np.concatenate(joined), None
+        joined_parts.append(part[1:])
+    yield np.concatenate(joined_parts), None
 
 
 def _parts(place: str, data: bytes) -> list[Float]:

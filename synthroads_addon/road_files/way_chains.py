@@ -90,11 +90,11 @@ class Chain:
 
     def spans(self) -> Iterator[tuple[float, float, Mapping[str, str]]]:
         """Yield begin and end (m) and the tags of each way."""
-        first = 0
+        begin_row = 0
         for way in self.ways:
-            last = first + len(way.points) - 1
-            yield float(self.stations[first]), float(self.stations[last]), way.tags
-            first = last
+            end_row = begin_row + len(way.points) - 1
+            yield float(self.stations[begin_row]), float(self.stations[end_row]), way.tags
+            begin_row = end_row
 
 
 def steps(points: Float) -> Float:

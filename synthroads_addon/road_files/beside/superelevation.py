@@ -93,7 +93,7 @@ def read_superelevation(alignment: Element, pieces: Sequence[PlanPiece], unit: f
     separate = [curve for n, curve in enumerate(curves) if n not in overlapping]
     if overlapping:
         reasons["it overlaps that of another curve"] += len(overlapping)
-    left_out = [f"crossfall: {count} superelevations: {why}" for why, count in sorted(reasons.items())]
+    left_out = [f"crossfall: {count} superelevations: {reason}" for reason, count in sorted(reasons.items())]
     if not separate:
         return Superelevation(left_out=tuple(left_out))
     straight, remark = _usual(separate)

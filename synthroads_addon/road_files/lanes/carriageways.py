@@ -92,11 +92,11 @@ def pavements(sides: Sequence[SideShape], verge: Verge, stations: Stations, loss
         )
         turnouts |= {key: _placed(item, stations) for key, item in turnouts_by_sign[side.sign].items()}
     if len(sides) == 2 and _touch(*(main_lines[side.sign] for side in sides)):
-        inner = carriageways["right"].inner_offset
+        right_inner = carriageways["right"].inner_offset
         mirrored = (
-            tuple(point.model_copy(update={"width": -point.width}) for point in inner)
-            if isinstance(inner, tuple)
-            else -inner
+            tuple(point.model_copy(update={"width": -point.width}) for point in right_inner)
+            if isinstance(right_inner, tuple)
+            else -right_inner
         )
         carriageways["left"] = carriageways["left"].model_copy(update={"inner_offset": mirrored})
     return Pavements(
@@ -104,9 +104,9 @@ def pavements(sides: Sequence[SideShape], verge: Verge, stations: Stations, loss
     )
 
 
-def _touch(first: Polyline, second: Polyline) -> bool:
+def _touch(line: Polyline, other_line: Polyline) -> bool:
     """Return whether the inner edges of two carriageways, on either side of the line, are the same."""
-    gap = first.values[:, 0] + second.at(first.stations)[:, 0]
+    gap = line.values[:, 0] + other_line.at(line.stations)[:, 0]
     return float(np.abs(gap).max()) < 2.0 * WIDTH_TOLERANCE and float(np.abs(np.median(gap))) < _NONE
 
 
@@ -121,8 +121,8 @@ def _without_turnouts(side: SideShape, line: Polyline, turnouts: dict[str, Turno
         for column in (shoulder, verge):
             widths[:, column] = np.interp(line.stations, line.stations[is_free], widths[is_free, column])
     widths[:, shoulder + 1 : verge] = 0.0  # the turnouts' own strips
-    inner = line.values[:, :1]
-    return Polyline(line.stations, np.column_stack([inner, inner + np.cumsum(widths, axis=1)]), line.jumps)
+    inner_edge = line.values[:, :1]
+    return Polyline(line.stations, np.column_stack([inner_edge, inner_edge + np.cumsum(widths, axis=1)]), line.jumps)
 
 
 def _placed(turnout: Turnout, stations: Stations) -> Turnout:
@@ -138,8 +138,8 @@ def _boundary_lines(side: SideShape, loss: Loss) -> Polyline:
         loss.approximate("lane widths", "they jump, which takes 5 cm", jump, station)
     widths = np.diff(line.values, axis=1)
     if widths.min() < -TOLD:
-        at = float(line.stations[np.unravel_index(np.argmin(widths), widths.shape)[0]])
-        loss.approximate("lane widths", "they are negative, read as 0", float(-widths.min()), at)
+        worst_station = float(line.stations[np.unravel_index(np.argmin(widths), widths.shape)[0]])
+        loss.approximate("lane widths", "they are negative, read as 0", float(-widths.min()), worst_station)
         loss.surface = True
     values = np.column_stack([line.values[:, :1], line.values[:, :1] + np.cumsum(np.maximum(widths, 0.0), axis=1)])
     return Polyline(line.stations, values, line.jumps)

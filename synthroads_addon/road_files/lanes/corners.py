@@ -108,9 +108,9 @@ def rounded_points(points: Sequence[tuple[float, float]], digits: int = 9) -> li
     """Return (station, value) with rounded stations, without points whose station isn't larger than the one before."""
     rows: list[tuple[float, float]] = []
     for station, value in points:
-        at = round_value(station, digits)
-        if not rows or at > rows[-1][0]:
-            rows.append((at, value))
+        rounded_station = round_value(station, digits)
+        if not rows or rounded_station > rows[-1][0]:
+            rows.append((rounded_station, value))
     return rows
 
 
@@ -133,24 +133,24 @@ def height_pieces(function: Callable[[Float, int], Float], breaks: Float, tolera
             return smooth_fit if smooth_fit[1] <= tolerance else _fitted(samples, height, level, None, tolerance)
         return _fitted(samples, height, float(heights[0][0]), None, tolerance)
 
-    first = 0
-    while first < len(stations):
-        last = first + 1
-        piece, deviation = fitted(stations[first:last], heights[first:last])
-        if deviation > tolerance and breaks[last] - breaks[first] > 1.0:  # no cubic follows it: in parts
-            part_ends = np.linspace(breaks[first], breaks[last], 2 + int(breaks[last] - breaks[first]) // 5)
+    begin = 0
+    while begin < len(stations):
+        stop = begin + 1
+        piece, deviation = fitted(stations[begin:stop], heights[begin:stop])
+        if deviation > tolerance and breaks[stop] - breaks[begin] > 1.0:  # no cubic follows it: in parts
+            part_ends = np.linspace(breaks[begin], breaks[stop], 2 + int(breaks[stop] - breaks[begin]) // 5)
             for start, end in itertools.pairwise(part_ends.tolist()):
                 samples = np.linspace(start, end, _SAMPLES)
-                pieces.append(fitted([samples], [function(samples, first)])[0])
-            first = last
+                pieces.append(fitted([samples], [function(samples, begin)])[0])
+            begin = stop
             continue
-        while last < len(stations):
-            longer_piece, deviation = fitted(stations[first : last + 1], heights[first : last + 1])
+        while stop < len(stations):
+            longer_piece, deviation = fitted(stations[begin : stop + 1], heights[begin : stop + 1])
             if deviation > tolerance:
                 break
-            piece, last = longer_piece, last + 1
+            piece, stop = longer_piece, stop + 1
         pieces.append(piece)
-        first = last
+        begin = stop
     return pieces
 
 

@@ -96,8 +96,8 @@ def _guardrail(stretch: Stretch, size: Size) -> RoadObject:
 
 def _concrete_barrier(stretch: Stretch, size: Size) -> RoadObject:
     """Return a concrete barrier along a stretch."""
-    foot = size.within("width", 0.3, 1.2, 0.54)
-    return ConcreteBarrier(**_stretch(stretch), height=size.within("height", 0.4, 2.0, 0.9), base_width=foot)
+    foot_width = size.within("width", 0.3, 1.2, 0.54)
+    return ConcreteBarrier(**_stretch(stretch), height=size.within("height", 0.4, 2.0, 0.9), base_width=foot_width)
 
 
 def _noise_barrier(stretch: Stretch, size: Size) -> RoadObject:
@@ -112,14 +112,14 @@ def _fence(stretch: Stretch, size: Size) -> RoadObject:
 
 def _wall(stretch: Stretch, size: Size) -> RoadObject:
     """Return a wall along a stretch."""
-    thick = size.within("width", 0.08, 1.0, 0.24)
-    return Wall(**_stretch(stretch), height=size.within("height", 0.3, 6.0, 1.8), thickness=thick)
+    wall_thickness = size.within("width", 0.08, 1.0, 0.24)
+    return Wall(**_stretch(stretch), height=size.within("height", 0.3, 6.0, 1.8), thickness=wall_thickness)
 
 
 def _hedge(stretch: Stretch, size: Size) -> RoadObject:
     """Return a hedge along a stretch."""
-    wide = size.within("width", 0.3, 5.0, 1.2)
-    return Hedge(**_stretch(stretch), height=size.within("height", 0.3, 8.0, 1.8), width=wide)
+    hedge_width = size.within("width", 0.3, 5.0, 1.2)
+    return Hedge(**_stretch(stretch), height=size.within("height", 0.3, 8.0, 1.8), width=hedge_width)
 
 
 def _delineator(place: dict[str, Any], size: Size) -> RoadObject:
@@ -134,22 +134,26 @@ def _lamp(place: dict[str, Any], size: Size) -> RoadObject:
 
 def _pole(place: dict[str, Any], size: Size) -> RoadObject:
     """Return a pole without an arm at a place."""
-    thick = size.fit("width", 2.0 * size["radius"] or size["width"], 0.05, 0.6, 0.2)
-    return Pole(**place, height=size.within("height", 2.0, 30.0, 6.0), diameter=thick, arm_length=0.0)
+    pole_diameter = size.fit("width", 2.0 * size["radius"] or size["width"], 0.05, 0.6, 0.2)
+    return Pole(**place, height=size.within("height", 2.0, 30.0, 6.0), diameter=pole_diameter, arm_length=0.0)
 
 
 def _beacon(place: dict[str, Any], size: Size) -> RoadObject:
     """Return a construction beacon at a place, passed on the side of the line."""
-    wide = size.fit("width", size["width"] or 2.0 * size["radius"], 0.1, 0.6, 0.25)
-    high = size.within("height", 0.5, 2.0, 1.0)
-    return ConstructionBeacon(**place, pass_side="left" if place["offset"] < 0.0 else "right", width=wide, height=high)
+    beacon_width = size.fit("width", size["width"] or 2.0 * size["radius"], 0.1, 0.6, 0.25)
+    beacon_height = size.within("height", 0.5, 2.0, 1.0)
+    return ConstructionBeacon(
+        **place, pass_side="left" if place["offset"] < 0.0 else "right", width=beacon_width, height=beacon_height
+    )
 
 
 def _building(place: dict[str, Any], size: Size) -> RoadObject:
     """Return a building in the form of a box at a place."""
-    wide, deep = size.within("length", 2.0, 80.0, 11.0), size.within("width", 2.0, 60.0, 9.0)
-    tall = size.within("height", 2.0, 30.0, 5.6)
-    return Building(**place, kind="hall", width=wide, depth=deep, height=tall, roof_height=0.0)
+    building_width, building_depth = size.within("length", 2.0, 80.0, 11.0), size.within("width", 2.0, 60.0, 9.0)
+    building_height = size.within("height", 2.0, 30.0, 5.6)
+    return Building(
+        **place, kind="hall", width=building_width, depth=building_depth, height=building_height, roof_height=0.0
+    )
 
 
 def _gantry(place: dict[str, Any], size: Size) -> RoadObject:

@@ -82,12 +82,13 @@ class Loss:
             deviation = f", within {1000.0 * row['deviation']:.2f} mm" if row["deviation"] else ""
             place = f" (worst at station {row['station']:.1f} m)" if "station" in row else ""
             sentences.append(f"approximated: {row['kind']}: {row['why']}{deviation}{place}")
-        for (kind, why), count in sorted(self.left_out.items()):
-            stretches = self.stretches.get((kind, why), [])
+        for (kind, reason), count in sorted(self.left_out.items()):
+            stretches = self.stretches.get((kind, reason), [])
             named_stretches = ", ".join(f"{start:.1f} to {end:.1f} m" for start, end in stretches[:_SHOWN])
             more = f" and {len(stretches) - _SHOWN} more" if len(stretches) > _SHOWN else ""
             sentences.append(
-                f"left out: {count} {kind}: {why}" + (f" (stations {named_stretches}{more})" if named_stretches else "")
+                f"left out: {count} {kind}: {reason}"
+                + (f" (stations {named_stretches}{more})" if named_stretches else "")
             )
         return sentences
 

@@ -123,14 +123,14 @@ def _lane_border(side: SideShape, section: int, lane: FileLane | None) -> tuple[
     """Return the first and last lane boundary at a lane's outer border, several where lanes have no width; or None."""
     slots = side.layout.slots
     section_lanes = [(n, slot.lanes[section]) for n, slot in enumerate(slots) if section in slot.lanes]
-    for row, (n, other) in enumerate(section_lanes):
-        if other is lane:
-            outer = section_lanes[row + 1][0] if row + 1 < len(section_lanes) else len(slots)
-            return len(slots) - outer, len(slots) - 1 - n
+    for row, (n, slot_lane) in enumerate(section_lanes):
+        if slot_lane is lane:
+            next_slot = section_lanes[row + 1][0] if row + 1 < len(section_lanes) else len(slots)
+            return len(slots) - next_slot, len(slots) - 1 - n
     if not section_lanes:
         return None
     lanes = side.surface.road.sections[section].lanes[side.sign]
-    inner_lanes = [other for other in lanes if abs(other.number) < abs(section_lanes[0][1].number)]
+    inner_lanes = [slot_lane for slot_lane in lanes if abs(slot_lane.number) < abs(section_lanes[0][1].number)]
     if (inner_lanes[-1] if inner_lanes else None) is lane:
         return len(slots) - section_lanes[0][0], len(slots)
     return None
@@ -253,6 +253,7 @@ def _joined(lines: Sequence[_Line]) -> list[_Line]:
             parts_by_name.setdefault(line.name, []).append(line)
         else:
             others.append(line)
+    # Lines of our own files: parts of one id that follow each other, whatever their dashes.
     joined: list[_Line] = []
     for parts in parts_by_name.values():
         runs: list[list[_Line]] = []
@@ -276,6 +277,7 @@ def _joined(lines: Sequence[_Line]) -> list[_Line]:
                     first=run[0].first if run[0].gap else run[0].start,
                 )
             )
+    # Lines of other programs: a line goes on where paint, place and the phase of the dashes are the same.
     joined_others: list[_Line] = []
     for line in others:
         for n, other in enumerate(joined_others):
@@ -294,11 +296,11 @@ def _joined(lines: Sequence[_Line]) -> list[_Line]:
     return joined + joined_others
 
 
-def _common(first: tuple[int, int] | None, second: tuple[int, int] | None) -> tuple[int, int] | None:
+def _common(border: tuple[int, int] | None, other_border: tuple[int, int] | None) -> tuple[int, int] | None:
     """Return the lane boundaries that two lines may both lie on, None without any."""
-    if first is None or second is None:
+    if border is None or other_border is None:
         return None
-    start, end = max(first[0], second[0]), min(first[1], second[1])
+    start, end = max(border[0], other_border[0]), min(border[1], other_border[1])
     return (start, end) if start <= end else None
 
 
@@ -316,12 +318,12 @@ def _key(line: _Line) -> tuple[Any, ...]:
     return (line.side.sign, line.turnout, *shape, border, round(line.dash, 4), round(line.gap, 4))
 
 
-def _goes_on(first: _Line, second: _Line) -> bool:
+def _goes_on(line: _Line, next_line: _Line) -> bool:
     """Return whether the second line's dashes lie where the first line's pattern would go on."""
-    period = first.dash + first.gap
+    period = line.dash + line.gap
     if not period:
         return True
-    phase = (second.first - first.first) % period
+    phase = (next_line.first - line.first) % period
     return min(phase, period - phase) < _SAME
 
 

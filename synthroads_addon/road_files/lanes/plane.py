@@ -117,10 +117,10 @@ def joined(right: SideShape, left: SideShape, breaks: Float, pivots: dict[Rotati
 
     def heights(axis: RotationAxis, side: SideShape, station: Float, stretch: int) -> Float:
         """Return the heights (N,), m, of a side's plane at a rotation axis."""
-        inside = np.full(station.shape, middle[stretch])
-        level = side.surface.road.elevation.at(station, inside)
+        stretch_middle = np.full(station.shape, middle[stretch])
+        level = side.surface.road.elevation.at(station, stretch_middle)
         pivot = pivots[axis][side.sign].at(station)[:, 0]
-        return np.asarray(level + side.surface.rise(station, inside) * side.sign * pivot)
+        return np.asarray(level + side.surface.rise(station, stretch_middle) * side.sign * pivot)
 
     def largest_step(axis: RotationAxis) -> float:
         """Return the largest height, m, between both planes at a rotation axis."""

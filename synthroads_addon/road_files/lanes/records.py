@@ -46,18 +46,18 @@ class Cubics:
     def __bool__(self) -> bool:
         return len(self.starts) > 0
 
-    def at(self, station: Float, inside: Float | None = None, slope: bool = False) -> Float:
+    def at(self, station: Float, record_station: Float | None = None, slope: bool = False) -> Float:
         """Return values (N,), or their change per metre, at stations (N,), m.
 
         Args:
             station: where.
-            inside: (N,) places that say which cubic holds, so that ends of a stretch are those of its own cubic.
+            record_station: (N,) stations that say which cubic holds, so that an end of a stretch is that of its cubic.
             slope: whether the change per metre is returned.
         """
         station = np.asarray(station, dtype=np.float64)
         if not len(self.starts):
             return np.zeros(station.shape)
-        deciding_station = station if inside is None else inside
+        deciding_station = station if record_station is None else record_station
         row = np.searchsorted(self.starts, deciding_station, side="right") - 1
         is_before = row < 0
         row = np.maximum(row, 0)
@@ -107,7 +107,7 @@ class FileSection:
     lanes: dict[int, tuple[FileLane, ...]]
     centre: Element | None
 
-    def borders(self, station: Float, inside: Float, offset: Float) -> dict[int, list[Float]]:
+    def borders(self, station: Float, record_station: Float, offset: Float) -> dict[int, list[Float]]:
         """Return t (N,) of the borders on either side, from the centre lane out, at stations (N,), m.
 
         Borders hold from the reference line, which no lane offset moves. On the right some programs write them as
@@ -115,27 +115,27 @@ class FileSection:
         """
         borders: dict[int, list[Float]] = {}
         for sign, lanes in self.lanes.items():
-            edges = self._edges(lanes, sign, (station, inside, offset), 1.0)
+            edges = self._edges(lanes, sign, (station, record_station, offset), 1.0)
             if any(lane.borders for lane in lanes) and sign * float((edges[-1] - edges[0]).mean()) < 0.0:
-                edges = self._edges(lanes, sign, (station, inside, offset), -1.0)
+                edges = self._edges(lanes, sign, (station, record_station, offset), -1.0)
             borders[sign] = edges
         return borders
 
     @staticmethod
     def _edges(
-        lanes: Sequence[FileLane], sign: int, along: tuple[Float, Float, Float], border_sign: float
+        lanes: Sequence[FileLane], sign: int, stations_and_offset: tuple[Float, Float, Float], border_sign: float
     ) -> list[Float]:
         """Return t (N,), m, of the borders of one side's lanes, from the inside out, the line's lane offset first.
 
         `border_sign` is -1 for files that write borders on the right as positive distances.
         """
-        station, inside, offset = along
+        station, record_station, offset = stations_and_offset
         edges = [offset]
         for lane in lanes:
             if lane.widths:
-                edges.append(edges[-1] + sign * lane.widths.at(station, inside))
+                edges.append(edges[-1] + sign * lane.widths.at(station, record_station))
             else:
-                edges.append(border_sign * lane.borders.at(station, inside) if lane.borders else edges[-1])
+                edges.append(border_sign * lane.borders.at(station, record_station) if lane.borders else edges[-1])
         return edges
 
 
@@ -193,14 +193,14 @@ def merged(stations: Float, length: float) -> Float:
     return distinct
 
 
-def read_road(road: Element, name: str, length: float, up: float = 0.0) -> FileRoad:
+def read_road(road: Element, name: str, length: float, z_offset: float = 0.0) -> FileRoad:
     """Return the lanes, elevation and lateral profiles of a road.
 
     Args:
         road: its element.
         name: for messages.
         length: of its plan, m.
-        up: height that the header adds, m.
+        z_offset: height that the header adds, m.
 
     Raises:
         InputError: a number is none, or it has no lanes.
@@ -214,7 +214,7 @@ def read_road(road: Element, name: str, length: float, up: float = 0.0) -> FileR
     profile, lateral = child(road, "elevationProfile"), child(road, "lateralProfile")
     rows = {} if lateral is None else {tag: children(lateral, tag) for tag in ("superelevation", "crossfall", "shape")}
     elevation = Cubics.read([] if profile is None else children(profile, "elevation"))
-    elevation.rows[:, 0] += up
+    elevation.rows[:, 0] += z_offset
     return FileRoad(
         element=road,
         name=name,

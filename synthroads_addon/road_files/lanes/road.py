@@ -92,6 +92,7 @@ def whole_road(
     if len(roads) > 1:
         assume("%s: road %r runs along the same line: both are one road", path.name, roads[1].name)
     axis = exact_axis(line, round_kinks)
+    # Stations of the file, and those along the axis: curves may be longer than the file says.
     station_table = np.array(
         [
             [*(piece.station for piece in line.pieces), line.pieces[-1].station + line.pieces[-1].length],
@@ -169,18 +170,18 @@ def _partner(
     return []
 
 
-def _same_plan(first: RoadLine, second: RoadLine) -> bool:
+def _same_plan(one_line: RoadLine, other_line: RoadLine) -> bool:
     """Return whether two lines have the same pieces in plan: start, length, heading and curvatures at the ends.
 
     A piece that is no clothoid has no such curvatures: of it the start, the length and the heading are compared.
     """
-    if len(first.pieces) != len(second.pieces):
+    if len(one_line.pieces) != len(other_line.pieces):
         return False
 
     def table(line: RoadLine) -> Float:
         return np.array([(p.station, p.length, p.x, p.y, p.heading, *_end_curvatures(p)) for p in line.pieces])
 
-    return bool(np.abs(table(first) - table(second)).max() < _SAME_PLAN)
+    return bool(np.abs(table(one_line) - table(other_line)).max() < _SAME_PLAN)
 
 
 def _end_curvatures(piece: PlanPiece) -> tuple[float, float]:

@@ -256,10 +256,10 @@ def _matches(
     return pairs[::-1]
 
 
-def _common_width(first: LaneEdges, second: LaneEdges) -> float:
+def _common_width(lane_edges: LaneEdges, other_edges: LaneEdges) -> float:
     """Return the width, m, that two lanes have in common; 0 where that is half of the narrower lane or less."""
     first_span, second_span = (
-        sorted((float(edges.inner.offset[0]), float(edges.outer.offset[0]))) for edges in (first, second)
+        sorted((float(edges.inner.offset[0]), float(edges.outer.offset[0]))) for edges in (lane_edges, other_edges)
     )
     overlap = min(first_span[1], second_span[1]) - max(first_span[0], second_span[0])
     narrower = min(first_span[1] - first_span[0], second_span[1] - second_span[0])

@@ -74,22 +74,22 @@ class FileSurface:
         before = [section for section in self.road.sections if section.start <= station]
         return before[-1] if before else self.road.sections[0]
 
-    def rise(self, station: Float, inside: Float) -> Float:
+    def rise(self, station: Float, record_station: Float) -> Float:
         """Return the rise (N,) to the left, m/m in plan, of the superelevation's plane at stations (N,)."""
-        tilt = self.road.superelevation.at(station, inside)
-        return np.asarray(np.tan(tilt) / self._cosine(station, inside))
+        tilt = self.road.superelevation.at(station, record_station)
+        return np.asarray(np.tan(tilt) / self._cosine(station, record_station))
 
-    def centre(self, station: Float, inside: Float) -> Edge:
+    def centre(self, station: Float, record_station: Float) -> Edge:
         """Return the centre lane's line at stations (N,)."""
-        return self._place(self._frame(station, inside), self.road.offset.at(station, inside), 0.0)
+        return self._place(self._frame(station, record_station), self.road.offset.at(station, record_station), 0.0)
 
-    def lanes(self, section: FileSection, station: Float, inside: Float) -> dict[int, list[LaneEdges]]:
+    def lanes(self, section: FileSection, station: Float, record_station: Float) -> dict[int, list[LaneEdges]]:
         """Return a section's lanes with their edges at stations (N,), by the sign of their ids, from the inside out.
 
-        `inside` (N,) are stations that choose the cubics, so that an end of a stretch belongs to its own stretch.
+        `record_station` (N,) are stations that choose the cubics: an end of a stretch belongs to its own stretch.
         """
-        borders = section.borders(station, inside, self.road.offset.at(station, inside))
-        frame = self._frame(station, inside)
+        borders = section.borders(station, record_station, self.road.offset.at(station, record_station))
+        frame = self._frame(station, record_station)
         lane_edges: dict[int, list[LaneEdges]] = {}
         for sign, lanes in section.lanes.items():
             lane_edges[sign] = []
@@ -107,13 +107,13 @@ class FileSurface:
                 lane_edges[sign].append(LaneEdges(lane, inner, outer))
         return lane_edges
 
-    def profile_points(self, edges: LaneEdges, share: float, station: Float, inside: Float) -> Edge:
+    def profile_points(self, edges: LaneEdges, share: float, station: Float, record_station: Float) -> Edge:
         """Return points at a share of a lane's width, on its true surface where that is no straight line."""
         offset = edges.inner.offset + share * (edges.outer.offset - edges.inner.offset)
         height = edges.inner.height + share * (edges.outer.height - edges.inner.height)
         if not self.road.shapes or edges.lane.level:
             return Edge(offset, height)
-        cosine = np.cos(self.road.superelevation.at(station, inside))
+        cosine = np.cos(self.road.superelevation.at(station, record_station))
         inner_t, outer_t = edges.inner.offset / cosine, edges.outer.offset / cosine
         t = inner_t + share * (outer_t - inner_t)
         # What the shape rises above its chord between the lane's borders.
@@ -124,23 +124,26 @@ class FileSurface:
         )
         return Edge(offset, height + bulge)
 
-    def _frame(self, station: Float, inside: Float) -> _Frame:
+    def _frame(self, station: Float, record_station: Float) -> _Frame:
         """Return the plane of the superelevation and the crossfall of both sides at stations (N,), m."""
-        tilt = self.road.superelevation.at(station, inside)
-        falls = {sign: np.tan(cubics.at(station, inside)) for sign, cubics in self.road.crossfall.items() if cubics}
-        return _Frame(station, np.cos(tilt), np.sin(tilt), self._cosine(station, inside), falls)
+        tilt = self.road.superelevation.at(station, record_station)
+        falls = {
+            sign: np.tan(cubics.at(station, record_station)) for sign, cubics in self.road.crossfall.items() if cubics
+        }
+        return _Frame(station, np.cos(tilt), np.sin(tilt), self._cosine(station, record_station), falls)
 
     def _place(self, frame: _Frame, t: Float, height: Float | float) -> Edge:
         """Return the edges at t (N,), m, that lie a height (m) above the surface, measured normal to the plane."""
-        above = height + self._shape(frame.station, t)
+        normal_height = height + self._shape(frame.station, t)
         for sign, fall in frame.falls.items():
-            above = above - np.where(t * sign > 0.0, fall * np.abs(t), 0.0)
-        offset = t * frame.cos - above * frame.sin
-        return Edge(offset, (t * frame.sin + above * frame.cos) / frame.climb)
+            normal_height = normal_height - np.where(t * sign > 0.0, fall * np.abs(t), 0.0)
+        # Turned about the line by the superelevation; heights are measured upright, not normal to the climbing line.
+        offset = t * frame.cos - normal_height * frame.sin
+        return Edge(offset, (t * frame.sin + normal_height * frame.cos) / frame.climb)
 
-    def _cosine(self, station: Float, inside: Float) -> Float:
+    def _cosine(self, station: Float, record_station: Float) -> Float:
         """Return the cosine (N,) of the line's slope angle."""
-        grade = self.road.elevation.at(station, inside, slope=True)
+        grade = self.road.elevation.at(station, record_station, slope=True)
         return np.asarray(1.0 / np.sqrt(1.0 + grade**2))
 
     def _shape(self, station: Float, t: Float) -> Float:
@@ -170,5 +173,5 @@ def _lane_heights(lane: FileLane, station: Float) -> tuple[Float, Float]:
     """Return the heights (N,) of a lane's inner and outer border above the surface, m: linear between records."""
     if not len(lane.heights):
         return np.zeros(station.shape), np.zeros(station.shape)
-    stations, inner, outer = lane.heights.T
-    return np.interp(station, stations, inner), np.interp(station, stations, outer)
+    stations, inner_heights, outer_heights = lane.heights.T
+    return np.interp(station, stations, inner_heights), np.interp(station, stations, outer_heights)

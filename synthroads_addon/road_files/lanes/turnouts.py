@@ -94,8 +94,8 @@ class _Reader:
     def read(self, carriageway: str) -> Turnout:
         """Return the turnout; raise an error if it isn't one."""
         lanes = [lane for n in self.part.sections for lane in self.side.layout.of_strip(n, "turnout_lane")]
-        same = {"instance": 1, "carriageway": carriageway}
-        return self._with_ramp(lanes, same) if lanes else self._bay(same)
+        common_fields = {"instance": 1, "carriageway": carriageway}
+        return self._with_ramp(lanes, common_fields) if lanes else self._bay(common_fields)
 
     def _bay(self, common: dict[str, Any]) -> Turnout:
         """Return an emergency bay, whose widths by station form a trapezoid; `common` are fields of all turnouts."""
@@ -131,7 +131,7 @@ class _Reader:
         if not opens_forward:
             lane_rows = lane_rows[::-1]
         full_row = next(row for row in lane_rows if row[1] > 0.999 * max(width for _, width in lane_rows))
-        taper_length, lane = abs(full_row[0] - opening), abs(tip - full_row[0])
+        taper_length, full_length = abs(full_row[0] - opening), abs(tip - full_row[0])
         lane_middle, ramp_length = 0.5 * (full_row[0] + tip), abs(ramp_end - tip)
         direction = 1.0 if opens_forward else -1.0
         far_station = tip + direction * 0.98 * ramp_length
@@ -154,7 +154,7 @@ class _Reader:
             kind=kind,
             start_station=opening if opens_forward else ramp_end,
             taper_in_length=_rounded(tapers[0]),
-            lane_length=_rounded(lane),
+            lane_length=_rounded(full_length),
             taper_out_length=_rounded(tapers[1]),
             lane_width=_rounded(full_row[1]),
             edge_strip_width=_rounded(self._width("turnout_edge_strip", lane_middle)),
