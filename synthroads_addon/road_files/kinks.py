@@ -66,9 +66,8 @@ def rounded(
             solution = _round(pieces[-1], piece, aimed_distance)
             if solution is None or solution[1].deviation <= tolerance:
                 break
-            aimed_distance *= (
-                0.98 * tolerance / solution[1].deviation
-            )  # beside curves the rounding lies farther off than between straights
+            # Beside curves the rounding lies farther off than between straights: aim for less.
+            aimed_distance *= 0.98 * tolerance / solution[1].deviation
         if solution is None or abs(solution[1].curvature) > largest_curvature or solution[1].deviation > tolerance:
             pieces.append(piece)
             continue

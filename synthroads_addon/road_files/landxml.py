@@ -276,7 +276,7 @@ class _Intersection(NamedTuple):
 
 
 def _intersection(row: Element, unit: float) -> _Intersection:
-    """Return station and height (m), lengths of the tangents on both sides (m), and the radius of a circle or 0."""
+    """Return the intersection of a PVI or curve element of `ProfAlign`; raise `InputError` for half a curve."""
     kind = local_name(row)
     words = (row.text or "").split()
     if len(words) < 2:
@@ -290,12 +290,9 @@ def _intersection(row: Element, unit: float) -> _Intersection:
     elif kind == "CircCurve":
         tangent_before = tangent_behind = 0.5 * number(row, "length") * unit
         radius = abs(number(row, "radius", 0.0)) * unit
-    if min(tangent_before, tangent_behind) < 0.0 or (
-        min(tangent_before, tangent_behind) <= SHORTEST < max(tangent_before, tangent_behind)
-    ):
-        raise InputError(
-            f"{kind} at station {station:.3f} m", min(tangent_before, tangent_behind), "must have two lengths above 0 m"
-        )
+    shorter, longer = sorted((tangent_before, tangent_behind))
+    if shorter < 0.0 or shorter <= SHORTEST < longer:
+        raise InputError(f"{kind} at station {station:.3f} m", shorter, "must have two lengths above 0 m")
     return _Intersection(station, height, tangent_before, tangent_behind, radius)
 
 

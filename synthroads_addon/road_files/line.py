@@ -37,14 +37,16 @@ SHORTEST = 1e-6
 
 @contextmanager
 def within_limits(place: str) -> Iterator[None]:
-    """Context that turns a parameter set's refusal of a value of a file into one line that begins with its place."""
+    """Context that turns a parameter set's refusal of a file's value into an `InputError` that names its place."""
     try:
         yield
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
         field = ".".join(str(part) for part in fault["loc"]) or "axis"
         reason = on_one_line(str(fault["msg"]).lower())
-        raise InputError(f"{place}: {field}", fault.get("input"), f"no road may be so ({reason})") from None
+        raise InputError(
+            f"{place}: {field}", fault.get("input"), f"must be within the limits of a parameter set ({reason})"
+        ) from None
 
 
 class LineNames:

@@ -137,6 +137,7 @@ def _stations_on(pair: Pair) -> Callable[[float], float]:
     origin = pair.points[0]
     axis = on_plane(pair.points, origin)
     axis_run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(axis, axis=0).T))])
+    # Places of the axis some 5 m apart (chosen), of which the nearest one is looked for.
     count = max(2, int(min(np.ceil(axis_run[-1] / 5.0), 100_000)))
     station = np.linspace(0.0, axis_run[-1], count)
     tree = cKDTree(

@@ -119,8 +119,8 @@ def _kml(element: Element, name: str) -> Iterator[tuple[str, list[tuple[float, .
     elif kind == "Track":
         yield name or "track", [_track_point(row) for row in children(element, "coord")]
     else:
-        for inner in element:
-            yield from _kml(inner, name)
+        for child_element in element:
+            yield from _kml(child_element, name)
 
 
 def _text_of(element: Element | None) -> str:

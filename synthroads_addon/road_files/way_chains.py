@@ -193,7 +193,7 @@ def _partners(ways: Sequence[OsmWay], directed: bool) -> dict[_End, _End]:
         ends_by_node[way.nodes[-1]].append((n, 1))
     candidates = []
     for ends in ends_by_node.values():
-        # At most 20 ways of a node are looked at (chosen): no junction has more.
+        # At most 20 ways of a node are looked at (chosen): that bounds the pairs of a damaged file.
         for one, other in itertools.combinations(ends[:20], 2):
             if one[0] != other[0] and not (directed and one[1] == other[1]):
                 turn = _turn(ways, one, other)

@@ -80,8 +80,9 @@ def pavements(sides: Sequence[SideShape], verge: Verge, stations: Stations, loss
     """
     lines = {side.sign: _boundary_lines(side, loss) for side in sides}
     readings = {side.sign: read_turnouts(side, f"carriageway-{SIDE_OF[side.sign]}", loss) for side in sides}
-    turnouts_by_sign = {sign: carriageways for sign, (carriageways, _) in readings.items()}
+    turnouts_by_sign = {sign: turnouts for sign, (turnouts, _) in readings.items()}
     instance_ids = {(sign, instance): name for sign, (_, ids) in readings.items() for instance, name in ids.items()}
+    # The planes are fitted to the road without turnouts, whose ramps leave them.
     main_lines = {side.sign: _without_turnouts(side, lines[side.sign], turnouts_by_sign[side.sign]) for side in sides}
     road_planes = _planes(sides, main_lines)
     carriageways: dict[Side, Carriageway] = {}
@@ -92,6 +93,7 @@ def pavements(sides: Sequence[SideShape], verge: Verge, stations: Stations, loss
         )
         turnouts |= {key: _placed(item, stations) for key, item in turnouts_by_sign[side.sign].items()}
     if len(sides) == 2 and _touch(*(main_lines[side.sign] for side in sides)):
+        # Both sides have one inner edge: the left one mirrors the right one, so that rounding opens no gap.
         right_inner = carriageways["right"].inner_offset
         mirrored = (
             tuple(point.model_copy(update={"width": -point.width}) for point in right_inner)

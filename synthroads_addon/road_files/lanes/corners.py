@@ -71,6 +71,7 @@ def _corner_stations(function: Between, stretch_number: int, stretch: tuple[floa
     """Return stations (N,) of a stretch, m, between which chords keep within a tolerance, by halving."""
     start, end = stretch
     begin, length, stations = np.array([start]), np.array([end - start]), [np.array([start, end])]
+    # In each round all intervals that still are off are halved together.
     while len(begin):
         samples = begin[:, None] + length[:, None] * _SHARES
         values = function(samples.ravel(), stretch_number).reshape(len(begin), len(_SHARES), -1)

@@ -150,7 +150,7 @@ def _same(a: Any, b: Any, turns: bool = False) -> bool:
         return difference <= TOLERANCE
     if isinstance(a, tuple) and isinstance(b, tuple):
         return len(a) == len(b) and all(_same(x, y) for x, y in zip(a, b, strict=True))
-    if hasattr(a, "to_dict") and type(a) is type(b):
+    if hasattr(a, "to_dict") and type(a) is type(b):  # models, such as points by station
         return all(_same(getattr(a, name), getattr(b, name)) for name in type(a).model_fields)
     return bool(a == b)
 

@@ -33,7 +33,7 @@ class Loss:
     surface: bool = False
 
     def approximate(self, kind: str, why: str, deviation: float = 0.0, station: float | None = None) -> None:
-        """Add what was approximated, by how much (m) and where (m); of one kind and reason the worst is kept."""
+        """Add what was approximated, by how much (m) and where (m); of rows of one kind and reason the worst is kept."""
         kind, why = _shown(kind), _shown(why)
         row: dict[str, Any] = {"kind": kind, "why": why, "deviation": round(deviation, 6)}
         if station is not None:
@@ -55,7 +55,7 @@ class Loss:
         surface: bool = False,
         stretch: tuple[float, float] | None = None,
     ) -> None:
-        """Add what was left out, whether it was surface, and along which stretch of the set it was, stations in m."""
+        """Add what was left out, whether it was surface, and the stretch (stations of the set, m) on which it was."""
         key = _shown(kind), _shown(why)
         self.left_out[key] += count
         if stretch is not None:

@@ -340,6 +340,7 @@ def _marking(line: _Line, stations: Stations) -> LineMarking:
     elif kind in ("turnout_edge", "gore_edge"):
         position_fields = {"turnout": line.turnout}
     dash, gap = line.dash, line.gap
+    # Dashes or gaps shorter than a set allows can't be told from a solid line.
     if dash and (dash < SHORTEST_DASH or gap < SHORTEST_DASH):
         dash = gap = 0.0
     return LineMarking(
@@ -388,6 +389,7 @@ def _offset(line: _Line, stations: Stations) -> float | tuple[SignedWidthPoint, 
 
     is_inside = (side.breaks > line.start + SHORTEST) & (side.breaks < line.end - SHORTEST)
     stretch_ends = np.array([line.start, *side.breaks[is_inside], line.end])
+    # The stretch of the side's breaks in which each part of the line lies.
     numbers = np.clip(
         np.searchsorted(side.breaks, 0.5 * (stretch_ends[:-1] + stretch_ends[1:]), side="right") - 1, 0, None
     )

@@ -140,8 +140,8 @@ def _tell_structure(item: Element, places: Places, loss: Loss) -> None:
     stretch = None
     if item.get("s") is not None and item.get("length") is not None:
         start = number(item, "s")
-        low, high = places.along(np.array([start, start + number(item, "length")])).tolist()
-        stretch = (low, high)
+        start_station, end_station = places.along(np.array([start, start + number(item, "length")])).tolist()
+        stretch = (start_station, end_station)
     loss.leave_out(f"{local_name(item)}s", "the set has none of their shape", stretch=stretch)
 
 

@@ -85,6 +85,7 @@ def _best_planes(sides: Sequence[SideShape], station: Float, stretch: int) -> Fl
     columns, values, weights = [], [], []
     for n, side in enumerate(sides):
         offset, height, width = side.paved_points(station, stretch, _SHARES)
+        # Unknowns of a station: the height on the line, and the rise of each side; h = h0 + rise * offset.
         design = np.zeros((*offset.shape, 1 + len(sides)))
         design[..., 0], design[..., 1 + n] = 1.0, offset
         columns.append(design)

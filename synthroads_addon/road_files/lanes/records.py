@@ -245,11 +245,10 @@ def _shapes(rows: Sequence[Element]) -> tuple[ShapeProfile, ...]:
 def _sections(items: Sequence[Element], length: float) -> tuple[FileSection, ...]:
     """Return the lane sections in order, without those that end where they begin.
 
-    A section that is of one side only leaves the other side's lanes as the section before has them.
+    A section with `singleSide` gives the lanes of one side only: those of the other side stay as in the section before.
     """
     rows = sorted(((number(item, "s"), n) for n, item in enumerate(items)))
     sections: list[FileSection] = []
-    last: dict[int, Element] = {}
     ends = [*(s for s, _ in rows[1:]), length]
     for (start, n), end in zip(rows, ends, strict=True):
         item = items[n]
@@ -258,7 +257,6 @@ def _sections(items: Sequence[Element], length: float) -> tuple[FileSection, ...
         lanes = {sign: _lanes(side, sign, start) for sign, side in sides.items()}
         if is_single_sided and sections:
             lanes = {s: lanes[s] if sides[s] is not None else sections[-1].lanes[s] for s in SIDES}
-        last = {sign: side for sign, side in sides.items() if side is not None} or last
         if min(end, length) - start <= SHORTEST:
             continue
         centre = child(item, "center")
@@ -266,7 +264,7 @@ def _sections(items: Sequence[Element], length: float) -> tuple[FileSection, ...
     if not sections:
         raise InputError("laneSection", None, "must begin before the road's end")
     first_section = sections[0]
-    if first_section.start > 0.0:
+    if first_section.start > 0.0:  # its lanes hold from the road's begin on
         sections[0] = FileSection(0.0, first_section.end, first_section.lanes, first_section.centre)
     return tuple(sections)
 

@@ -66,7 +66,7 @@ class WholeRoad:
 def whole_road(
     path: Path, scenario: RoadScenario, name: str | None = None, round_kinks: float | None = None
 ) -> WholeRoad:
-    """Return all that an OpenDRIVE file says of a road, or of the two roads that are its carriageways.
+    """Return all that an OpenDRIVE file says of a road, or of two roads that are its two carriageways.
 
     Args:
         path: the file.

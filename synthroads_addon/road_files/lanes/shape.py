@@ -62,13 +62,14 @@ class SideShape:
         return self.surface.lanes(section, station, self.inside(station, stretch))
 
     def boundaries(self, station: Float, stretch: int) -> Boundaries:
-        """Return the boundaries at stations (N,) of a stretch."""
+        """Return the boundaries of all strips at stations (N,) of a stretch, from the inner edge to the verge's."""
         section_number = int(self.sections[stretch])
         lanes = self.lanes(station, stretch)
         edges_by_number = {edges.lane.number: edges for edges in lanes[self.sign]}
         layout = self.layout
         line_edge = self.surface.centre(station, self.inside(station, stretch))
         other_edges = {edges.lane.number: edges for edges in lanes[-self.sign]}
+        # A single carriageway reaches over the line to paved lanes there; one with a median begins at the median.
         inner_edge = line_edge
         for lane in layout.across.get(section_number, ()):
             inner_edge = other_edges[lane.number].outer

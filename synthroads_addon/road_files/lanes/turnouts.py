@@ -27,7 +27,10 @@ _RAMP_TYPES = frozenset({"offRamp", "onRamp"})
 _KINDS = {"exit": "exit", "offRamp": "exit", "entry": "entry", "onRamp": "entry"}
 _FLAT = 5e-4
 """Height, m, up to which a ramp's edges lie in the main road's plane."""
+_RAMP_WIDTH = 6.0
+"""Usual width of a ramp, m, over which a tilt is a height."""
 _SAME_TILT, _SAME_LIFT = 1e-4, 3e-4
+"""Differences of tilts, m/m, and of heights, m, up to which usual fields fit a ramp (chosen)."""
 _DIGITS = 6
 
 
@@ -165,14 +168,15 @@ class _Reader:
     def _surface(self, tip: float, direction: float, nose: float, length: float) -> dict[str, Any]:
         """Return a ramp's crossfall, grade and what belongs to them; empty where it lies in the main road's plane."""
         length_behind = length - nose
+        # Places between the nose and the ramp's end at which its plane is read (chosen).
         shares = np.array([0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.97])
         rows = [self._ramp_plane(tip + direction * (nose + share * length_behind)) for share in shares]
         lifts, tilts, rises = np.array(rows).T
-        if max(np.abs(lifts).max(), np.abs(tilts).max() * 6.0) < _FLAT:
+        if max(np.abs(lifts).max(), np.abs(tilts).max() * _RAMP_WIDTH) < _FLAT:
             return {}
         fields: dict[str, Any] = {}
         distances = shares * length_behind
-        if np.abs(tilts).max() * 6.0 >= _FLAT:
+        if np.abs(tilts).max() * _RAMP_WIDTH >= _FLAT:
             fall, run_off = _run_off(distances, tilts, rises)
             fields["crossfall_percent"] = _rounded(100.0 * self.side.sign * fall, 4)
             fields["run_off_length"] = _rounded(run_off, 2)
