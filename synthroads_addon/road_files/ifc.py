@@ -49,7 +49,8 @@ def read_ifc(path: Path) -> list[RoadLine]:
     """Return the alignments of an IFC file that have segments in plan.
 
     Raises:
-        MissingFileError, InputError: it can't be read, `ifcopenshell` isn't installed, or a segment isn't understood.
+        MissingFileError, InputError: the file can't be read, or a segment isn't understood.
+        MissingPackageError: ifcopenshell isn't installed.
     """
     model = _open(path)
     try:

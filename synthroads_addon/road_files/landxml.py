@@ -42,7 +42,7 @@ def read_landxml(path: Path) -> list[RoadLine]:
     """Return the alignments of a LandXML file.
 
     Raises:
-        MissingFileError, InputError: it can't be read, isn't LandXML, or holds what isn't understood.
+        MissingFileError, InputError: the file can't be read, isn't LandXML, or holds what isn't understood.
     """
     root = read_xml(path)
     unit = _unit(root)

@@ -35,7 +35,7 @@ def read_opendrive(path: Path) -> list[RoadLine]:
     """Return the roads of an OpenDRIVE file, those of junctions among them.
 
     Raises:
-        MissingFileError, InputError: it can't be read, isn't OpenDRIVE, or a number in it is none.
+        MissingFileError, InputError: the file can't be read, isn't OpenDRIVE, or holds no number where one must be.
     """
     root = read_xml(path)
     header = child(root, "header")
@@ -159,6 +159,7 @@ def _piece(geometry: Element) -> PlanPiece:
 
 
 _Shape = tuple[tuple[float, float] | Curve, float, tuple[float, float]]
+"""Curvatures at both ends (1/m) or a curve; its turn (rad) against the file's heading; its start (m) in that frame."""
 _AT_START = (0.0, 0.0)
 
 

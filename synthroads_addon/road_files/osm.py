@@ -29,7 +29,7 @@ def read_osm(path: Path) -> list[PointLine]:
     """Return the roads of a file of OpenStreetMap in XML: ways chained by reference or name, see `roads_of_ways`.
 
     Raises:
-        MissingFileError, InputError: it can't be read, or a value is none of a map.
+        MissingFileError, InputError: the file can't be read, or holds a value that no map has.
     """
     data: _Data = parse_xml(path, _Target(path.name))
     return roads_of_ways(_placed(data))
@@ -39,7 +39,7 @@ def read_pbf(path: Path) -> list[PointLine]:
     """Return the roads of a binary file of OpenStreetMap, as `read_osm` does.
 
     Raises:
-        MissingFileError, InputError: it can't be read.
+        MissingFileError, InputError: the file can't be read.
         MissingPackageError: pyosmium isn't installed.
     """
     try:

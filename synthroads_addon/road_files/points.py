@@ -87,7 +87,7 @@ def read_point_lines(path: Path) -> list[PointLine]:
     """Return the lines of two points or more of a KML or GPX file.
 
     Raises:
-        MissingFileError, InputError: it can't be read, or a coordinate is none.
+        MissingFileError, InputError: the file can't be read, or a coordinate is no number.
     """
     root = read_xml(path)
     names, lines = LineNames(), list[PointLine]()

@@ -51,7 +51,7 @@ def format_of(path: Path) -> str | None:
     """Return the format of a file by its content, a key of `READERS` or of `OF_POINTS`; None for any other.
 
     Raises:
-        MissingFileError: it can't be read.
+        MissingFileError: the file can't be read.
     """
     try:
         with path.open("rb") as file:
@@ -72,7 +72,7 @@ def read_lines(path: Path) -> list[RoadLine]:
     """Return the roads and alignments of an OpenDRIVE, LandXML or IFC file.
 
     Raises:
-        MissingFileError: it can't be read.
+        MissingFileError: the file can't be read.
         InputError: it is of another format, isn't understood, or has none.
 
     Example:

@@ -22,7 +22,7 @@ def read_sbet(path: Path) -> list[PointLine]:
     """Return the path in an SBET file (radians; heights above the ellipsoid) as one line in degrees.
 
     Raises:
-        MissingFileError, InputError: it can't be read, or holds what is no trajectory.
+        MissingFileError, InputError: the file can't be read, or holds what is no trajectory.
     """
     try:
         check_size(path)

@@ -58,7 +58,7 @@ def read_vector(path: Path, kind: str) -> list[PointLine]:
     unless it is 0 everywhere; M is left aside.
 
     Raises:
-        MissingFileError, InputError: it can't be read, or a coordinate is none.
+        MissingFileError, InputError: the file can't be read, or a coordinate is no number.
         MissingPackageError: pyogrio isn't installed.
     """
     try:

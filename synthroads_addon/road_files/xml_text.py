@@ -38,7 +38,7 @@ def parse_xml(path: Path, target: Any) -> Any:
         target: with the methods of `xml.etree.ElementTree.TreeBuilder`.
 
     Raises:
-        MissingFileError: it can't be read.
+        MissingFileError: the file can't be read.
         InputError: it is no XML, has a document type, or is larger than `LARGEST`.
     """
     parser = XMLParser(target=target)  # nosec B314 (a document type is refused, so there are no entities)

@@ -211,7 +211,7 @@ def _carriageway(
         side=SIDE_OF[side.sign],
         inner_offset=_offset(inner_corners, line_stations),
         inner_edge_strip_width=_width(line_stations, widths[:, 0], _STRIP),
-        lanes=tuple(reversed(lanes)),
+        lanes=tuple(reversed(lanes)),  # a set counts them from the outside
         outer_edge_strip_width=_width(line_stations, widths[:, 1 + lane_count], _STRIP),
         hard_shoulder_width=_width(line_stations, widths[:, 2 + lane_count], _SHOULDER),
         verge_width=_width(line_stations, verge_width, _SHOULDER),

@@ -78,6 +78,9 @@ class Maker(NamedTuple):
     approximated: str = ""
 
 
+# Makers of things. Limits of sizes (m) are those of the things' fields; sizes for objects without any are chosen.
+
+
 def _stretch(stretch: Stretch) -> dict[str, Any]:
     """Return the fields that all things along the road have."""
     return {

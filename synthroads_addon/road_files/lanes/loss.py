@@ -33,7 +33,7 @@ class Loss:
     surface: bool = False
 
     def approximate(self, kind: str, why: str, deviation: float = 0.0, station: float | None = None) -> None:
-        """Add what was approximated, by how much (m) and where (m); of rows of one kind and reason the worst is kept."""
+        """Add what was approximated, by how much (m) and where (m); of rows of one kind and reason the worst stays."""
         kind, why = _shown(kind), _shown(why)
         row: dict[str, Any] = {"kind": kind, "why": why, "deviation": round(deviation, 6)}
         if station is not None:

@@ -203,7 +203,7 @@ def read_road(road: Element, name: str, length: float, z_offset: float = 0.0) ->
         z_offset: height that the header adds, m.
 
     Raises:
-        InputError: a number is none, or it has no lanes.
+        InputError: a value that must be a number isn't one, or the road has no lanes.
     """
     lanes = child(road, "lanes")
     sections = [] if lanes is None else children(lanes, "laneSection")

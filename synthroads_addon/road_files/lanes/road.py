@@ -75,7 +75,7 @@ def whole_road(
         round_kinks: distance (m) from kinks of its line that roundings may keep; None refuses kinks.
 
     Raises:
-        MissingFileError, InputError: it can't be read, or a parameter set can't hold it.
+        MissingFileError, InputError: the file can't be read, or a parameter set can't hold it.
     """
     lines = read_opendrive(path)
     line = choose_line(lines, name, path.name)
@@ -158,14 +158,19 @@ def _partner(
     lines: list[RoadLine], line: RoadLine, elements: dict[str, Element], road: FileRoad, z_offset: float
 ) -> list[FileRoad]:
     """Return, as a list, the road of the same plan with traffic only on the other side; an empty list without one."""
-    sides = driven_sides(road.sections)
-    if len(sides) != 1:
+    signs = driven_sides(road.sections)
+    if len(signs) != 1:
         return []
-    for other in lines:
-        if other is line or other.fault or other.junction != line.junction or not _same_plan(other, line):
+    for other_line in lines:
+        if (
+            other_line is line
+            or other_line.fault
+            or other_line.junction != line.junction
+            or not _same_plan(other_line, line)
+        ):
             continue
-        partner = read_road(elements[other.name], other.name, other.length, z_offset)
-        if driven_sides(partner.sections) == [-sides[0]]:
+        partner = read_road(elements[other_line.name], other_line.name, other_line.length, z_offset)
+        if driven_sides(partner.sections) == [-signs[0]]:
             return [partner]
     return []
 
