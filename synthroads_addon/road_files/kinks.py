@@ -76,21 +76,27 @@ def rounded(
     return replace(line, pieces=tuple(pieces)), roundings
 
 
-def _round(before: PlanPiece, after: PlanPiece, tolerance: float) -> tuple[list[PlanPiece], Rounding] | None:
+def _round(
+    piece_before: PlanPiece, piece_behind: PlanPiece, tolerance: float
+) -> tuple[list[PlanPiece], Rounding] | None:
     """Return the four pieces that take the place of two pieces with a kink, and the rounding; None without a solution.
 
     There is none where a piece is no line, arc or clothoid, or where Newton's method finds no pair of clothoids.
     """
-    if not (isinstance(before.shape, tuple) and isinstance(after.shape, tuple)):
+    if not (isinstance(piece_before.shape, tuple) and isinstance(piece_behind.shape, tuple)):
         return None
-    line_before = Alignment([Element(before.length, *before.shape)], before.x, before.y, before.heading)
-    line_behind = Alignment([Element(after.length, *after.shape)], after.x, after.y, after.heading)
-    angle = math.remainder(after.heading - float(line_before.heading(before.length)), 2.0 * math.pi)
+    line_before = Alignment(
+        [Element(piece_before.length, *piece_before.shape)], piece_before.x, piece_before.y, piece_before.heading
+    )
+    line_behind = Alignment(
+        [Element(piece_behind.length, *piece_behind.shape)], piece_behind.x, piece_behind.y, piece_behind.heading
+    )
+    angle = math.remainder(piece_behind.heading - float(line_before.heading(piece_before.length)), 2.0 * math.pi)
     # Length cut off both pieces: between straights the clothoids are 6 e / angle long, e the distance from the corner.
-    cut = min(0.99 * 6.0 * tolerance / abs(angle), _SHARE * before.length, _SHARE * after.length)
+    cut = min(0.99 * 6.0 * tolerance / abs(angle), _SHARE * piece_before.length, _SHARE * piece_behind.length)
     if cut < _SHORTEST:
         return None
-    start, heading, k1 = line_before.frame(before.length - cut)
+    start, heading, k1 = line_before.frame(piece_before.length - cut)
     end, end_heading, k2 = line_behind.frame(cut)
     turn = math.remainder(float(end_heading) - float(heading), 2.0 * math.pi)
     solution = _clothoids(np.array([*start, float(heading)]), np.array([*end, turn]), float(k1), float(k2), cut)
@@ -99,23 +105,23 @@ def _round(before: PlanPiece, after: PlanPiece, tolerance: float) -> tuple[list[
     length_1, length_2, joint_curvature = solution
     elements = [Element(length_1, float(k1), joint_curvature), Element(length_2, joint_curvature, float(k2))]
     pair = Alignment(elements, float(start[0]), float(start[1]), float(heading))
-    corner = np.array([[after.x, after.y]])
+    corner = np.array([[piece_behind.x, piece_behind.y]])
     deviation = float(abs(pair.project(corner)[1][0]))
     joint, joint_heading, _ = pair.frame(length_1)
-    station = after.station
+    station = piece_behind.station
     parts = (
-        replace(before, length=before.length - cut, shape=(before.shape[0], float(k1))),
+        replace(piece_before, length=piece_before.length - cut, shape=(piece_before.shape[0], float(k1))),
         replace(
-            before, kind="rounding", station=station - cut, length=length_1, x=float(start[0]), y=float(start[1]),
+            piece_before, kind="rounding", station=station - cut, length=length_1, x=float(start[0]), y=float(start[1]),
             heading=float(heading), shape=(float(k1), joint_curvature),
         ),
         replace(
-            before, kind="rounding", station=station, length=length_2, x=float(joint[0]), y=float(joint[1]),
+            piece_before, kind="rounding", station=station, length=length_2, x=float(joint[0]), y=float(joint[1]),
             heading=float(joint_heading), shape=(joint_curvature, float(k2)),
         ),
         replace(
-            after, station=station + cut, length=after.length - cut, x=float(end[0]), y=float(end[1]),
-            heading=float(end_heading), shape=(float(k2), after.shape[1]),
+            piece_behind, station=station + cut, length=piece_behind.length - cut, x=float(end[0]), y=float(end[1]),
+            heading=float(end_heading), shape=(float(k2), piece_behind.shape[1]),
         ),
     )  # fmt: skip
     return list(parts), Rounding(station, angle, length_1 + length_2, joint_curvature, deviation)

@@ -343,21 +343,23 @@ def _height_pieces(rows: list[_Intersection]) -> list[HeightPiece]:
     reached, height = rows[0].station, rows[0].height  # where the pieces so far end
     for n, row in enumerate(rows):
         is_inner = 0 < n < len(rows) - 1
-        before, behind = _tangents(row, grades[n - 1], grades[n]) if is_inner else (0.0, 0.0)
+        tangent_before, tangent_behind = _tangents(row, grades[n - 1], grades[n]) if is_inner else (0.0, 0.0)
         if n:
-            curve_begin = row.station - before
+            curve_begin = row.station - tangent_before
             if curve_begin < reached - 1e-3:
                 room = row.station - reached
-                allowed = f"curves must not overlap: this one needs {before:.3f} m before it, but has {room:.3f} m"
-                raise InputError(f"ProfAlign at station {row.station:.3f} m", before, allowed)
+                allowed = (
+                    f"curves must not overlap: this one needs {tangent_before:.3f} m before it, but has {room:.3f} m"
+                )
+                raise InputError(f"ProfAlign at station {row.station:.3f} m", tangent_before, allowed)
             if curve_begin - reached > SHORTEST:
                 pieces.append(HeightPiece(reached, curve_begin, height, grades[n - 1]))
                 height += grades[n - 1] * (curve_begin - reached)
                 reached = curve_begin
-        if is_inner and before + behind > SHORTEST:
-            pieces += _rounding(row, (before, behind), height, (grades[n - 1], grades[n]))
-            reached = row.station + behind
-            height = row.height + grades[n] * behind
+        if is_inner and tangent_before + tangent_behind > SHORTEST:
+            pieces += _rounding(row, (tangent_before, tangent_behind), height, (grades[n - 1], grades[n]))
+            reached = row.station + tangent_behind
+            height = row.height + grades[n] * tangent_behind
     return pieces
 
 

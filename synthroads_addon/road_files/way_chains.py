@@ -188,28 +188,28 @@ def _mostly_ahead(chain: Sequence[OsmWay], ways: Sequence[OsmWay]) -> bool:
 def _partners(ways: Sequence[OsmWay], directed: bool) -> dict[_End, _End]:
     """Return the end that each end of a way is joined to; those that aren't joined are left out."""
     ends_by_node: dict[int, list[_End]] = defaultdict(list)
-    for n, way in enumerate(ways):
-        ends_by_node[way.nodes[0]].append((n, 0))
-        ends_by_node[way.nodes[-1]].append((n, 1))
+    for number, way in enumerate(ways):
+        ends_by_node[way.nodes[0]].append((number, 0))
+        ends_by_node[way.nodes[-1]].append((number, 1))
     candidates = []
     for ends in ends_by_node.values():
         # At most 20 ways of a node are looked at (chosen): that bounds the pairs of a damaged file.
-        for one, other in itertools.combinations(ends[:20], 2):
-            if one[0] != other[0] and not (directed and one[1] == other[1]):
-                turn = _turn(ways, one, other)
+        for end, other_end in itertools.combinations(ends[:20], 2):
+            if end[0] != other_end[0] and not (directed and end[1] == other_end[1]):
+                turn = _turn(ways, end, other_end)
                 if turn <= _SHARPEST_JOINT:
-                    candidates.append((turn, one, other))
-    partner: dict[_End, _End] = {}
+                    candidates.append((turn, end, other_end))
+    partners: dict[_End, _End] = {}
     # The straightest joints come first; each end has one partner.
-    for _, one, other in sorted(candidates):
-        if one not in partner and other not in partner:
-            partner[one], partner[other] = other, one
-    return partner
+    for _, end, other_end in sorted(candidates):
+        if end not in partners and other_end not in partners:
+            partners[end], partners[other_end] = other_end, end
+    return partners
 
 
-def _turn(ways: Sequence[OsmWay], one: _End, other: _End) -> float:
+def _turn(ways: Sequence[OsmWay], end: _End, other_end: _End) -> float:
     """Return the change of direction (rad, 0 to pi) where the way of one end goes on in the way of the other end."""
-    arrival, departure = _towards(ways[one[0]], one[1]), _towards(ways[other[0]], other[1])
+    arrival, departure = _towards(ways[end[0]], end[1]), _towards(ways[other_end[0]], other_end[1])
     return math.pi - abs(math.remainder(arrival - departure, 2.0 * math.pi))
 
 

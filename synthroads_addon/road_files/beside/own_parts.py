@@ -61,14 +61,16 @@ def own_parts(model: Any) -> tuple[GivenRoad | None, Counter[str], list[str]]:
     if not by_side or len(by_side) < len(carriageways):
         return None, Counter(), _of_others(model)
     ids = {name: f"carriageway-{item.side}" for name, item in carriageways.items()}
-    others = {name: _with_carriageway(item, ids) for name, item in items.items() if name not in ids}
-    turnouts = {name: item for name, item in others.items() if isinstance(item, Turnout) and _refers(item, by_side, {})}
+    other_parts = {name: _with_carriageway(item, ids) for name, item in items.items() if name not in ids}
+    turnouts = {
+        name: item for name, item in other_parts.items() if isinstance(item, Turnout) and _refers(item, by_side, {})
+    }
     markings = {
         name: item
-        for name, item in others.items()
+        for name, item in other_parts.items()
         if isinstance(item, tuple(_PAINT.values())) and _refers(item, by_side, turnouts)
     }
-    things = {name: cast(Thing, item) for name, item in others.items() if type(item).__name__ in THINGS}
+    things = {name: cast(Thing, item) for name, item in other_parts.items() if type(item).__name__ in THINGS}
     misfits += Counter(type(item).__name__ for item in items.values())
     parts: list[RoadObject] = [*by_side.values(), *turnouts.values(), *markings.values(), *things.values()]
     counts = Counter(type(item).__name__ for item in parts)
@@ -98,8 +100,8 @@ def _word(kind: str) -> str:
 
 def _with_carriageway(item: RoadObject, ids: Mapping[str, str]) -> RoadObject:
     """Return an object whose carriageway has the set's id in place of the file's, by `ids` (file's id -> set's id)."""
-    named = str(getattr(item, "carriageway", ""))
-    return item.model_copy(update={"carriageway": ids[named]}) if named in ids else item
+    carriageway_id = str(getattr(item, "carriageway", ""))
+    return item.model_copy(update={"carriageway": ids[carriageway_id]}) if carriageway_id in ids else item
 
 
 def _values(definition: Any) -> dict[str, Any]:

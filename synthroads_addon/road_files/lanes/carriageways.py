@@ -152,8 +152,8 @@ def _planes(sides: Sequence[SideShape], lines: Mapping[int, Polyline]) -> Planes
     if len({id(side.surface) for side in sides}) == 1:
         return planes(sides)
     # Two roads along one line: each rotation axis has a distance from the line on either side.
-    right, left = sorted(sides, key=lambda side: side.sign)
-    breaks = merged(np.concatenate([side.breaks for side in sides]), float(right.breaks[-1]))
+    right_side, left_side = sorted(sides, key=lambda side: side.sign)
+    breaks = merged(np.concatenate([side.breaks for side in sides]), float(right_side.breaks[-1]))
     pivots: dict[RotationAxis, dict[int, Polyline]] = {"carriageway_axis": {}, "inner_edge": {}, "centreline": {}}
     for side in sides:
         boundaries, outer_column = lines[side.sign], paved_index(side)
@@ -165,7 +165,7 @@ def _planes(sides: Sequence[SideShape], lines: Mapping[int, Polyline]) -> Planes
         }
         for axis, lines_by_sign in pivots.items():
             lines_by_sign[side.sign] = Polyline(boundaries.stations, distances_by_axis[axis], boundaries.jumps)
-    return joined(right, left, breaks, pivots)
+    return joined(right_side, left_side, breaks, pivots)
 
 
 def paved_index(side: SideShape) -> int:

@@ -43,15 +43,15 @@ class Size:
     def __getitem__(self, name: str) -> float:
         return self._given[name]
 
-    def within(self, name: str, low: float, high: float, usual: float) -> float:
+    def within(self, name: str, lowest: float, highest: float, usual: float) -> float:
         """Return the file's size of a name (m), clipped to limits and noted if it was; the usual one if it is 0."""
-        return self.fit(name, self._given[name], low, high, usual)
+        return self.fit(name, self._given[name], lowest, highest, usual)
 
-    def fit(self, name: str, value: float, low: float, high: float, usual: float) -> float:
+    def fit(self, name: str, value: float, lowest: float, highest: float, usual: float) -> float:
         """Return a value (m), clipped to limits and noted under a name if it was; the usual one if it is 0 or less."""
         if not value > 0.0:
             return usual
-        fitted_value = min(max(value, low), high)
+        fitted_value = min(max(value, lowest), highest)
         if abs(fitted_value - value) > _TOLD:
             self.limited[name] = max(abs(fitted_value - value), self.limited.get(name, 0.0))
         return fitted_value

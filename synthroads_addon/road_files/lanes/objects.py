@@ -174,8 +174,8 @@ def _own_thing(model: type[RoadObject], item: Element, notes: dict[str, str], pl
         if "height" in values and abs(number(item, "height", 0.0) - values["height"]) > _CHANGED:
             values["height"] = number(item, "height")
         thing = model.from_dict(values)
-        right, left = thing.reach()
-        return _moved(thing, float(offset[0]) - 0.5 * (left - right))
+        right_reach, left_reach = thing.reach()
+        return _moved(thing, float(offset[0]) - 0.5 * (left_reach - right_reach))
     if "station" not in model.model_fields:
         return model.from_dict(values)
     station, offset = places.at(*_place(item))

@@ -214,35 +214,37 @@ def _chain(layout: SideLayout, number: int, surface: FileSurface, lanes: Sequenc
             else:
                 slot_number += 1
                 layout.slots.insert(slot_number, LaneSlot())
-                slot_of_lane = {m: at + (at >= slot_number) for m, at in slot_of_lane.items()}
+                slot_of_lane = {m: slot_row + (slot_row >= slot_number) for m, slot_row in slot_of_lane.items()}
         layout.slots[slot_number].lanes[number] = lane
 
 
 def _matches(
-    surface: FileSurface, number: int, sign: int, before: Sequence[FileLane], after: Sequence[FileLane]
+    surface: FileSurface, number: int, sign: int, lanes_before: Sequence[FileLane], lanes_after: Sequence[FileLane]
 ) -> list[tuple[int, int]]:
-    """Return pairs of rows (in `before`, in `after`) of lanes that are one lane on both sides of a section's start.
+    """Return pairs of rows (of `lanes_before`, of `lanes_after`) of lanes that go on over a section's start.
 
     They are where most of the narrower lane lies beside the other one. The pairs keep the lanes' order and have the
     largest sum of widths in common.
     """
-    if not before or not after:
+    if not lanes_before or not lanes_after:
         return []
     section, section_before = surface.road.sections[number], surface.road.sections[number - 1]
-    at = np.array([section.start])
+    start_station = np.array([section.start])
     end_before = np.array([max(section.start - SHORTEST, section_before.start)])
-    edges_before = {edges.lane.number: edges for edges in surface.lanes(section_before, at, end_before)[sign]}
-    edges_after = {edges.lane.number: edges for edges in surface.lanes(section, at, at)[sign]}
+    edges_before = {
+        edges.lane.number: edges for edges in surface.lanes(section_before, start_station, end_before)[sign]
+    }
+    edges_after = {edges.lane.number: edges for edges in surface.lanes(section, start_station, start_station)[sign]}
     common_width = np.array(
-        [[_common_width(edges_before[a.number], edges_after[b.number]) for b in after] for a in before]
+        [[_common_width(edges_before[a.number], edges_after[b.number]) for b in lanes_after] for a in lanes_before]
     )
     # Longest common subsequence, weighted by the widths in common (Needleman and Wunsch, without gap costs).
-    best_sum = np.zeros((len(before) + 1, len(after) + 1))
-    for i in range(len(before)):
-        for j in range(len(after)):
+    best_sum = np.zeros((len(lanes_before) + 1, len(lanes_after) + 1))
+    for i in range(len(lanes_before)):
+        for j in range(len(lanes_after)):
             best_sum[i + 1, j + 1] = max(best_sum[i, j] + common_width[i, j], best_sum[i, j + 1], best_sum[i + 1, j])
     # Traced back from the end of both.
-    pairs, i, j = [], len(before), len(after)
+    pairs, i, j = [], len(lanes_before), len(lanes_after)
     while i and j:
         if common_width[i - 1, j - 1] > 0.0 and np.isclose(
             best_sum[i, j], best_sum[i - 1, j - 1] + common_width[i - 1, j - 1]
