@@ -223,7 +223,7 @@ def _matches(
 ) -> list[tuple[int, int]]:
     """Return pairs of rows (of `lanes_before`, of `lanes_after`) of lanes that go on over a section's start.
 
-    They are where most of the narrower lane lies beside the other one. The pairs keep the lanes' order and have the
+    Two lanes are one where most of the narrower lies beside the other. The pairs keep the lanes' order and have the
     largest sum of widths in common.
     """
     if not lanes_before or not lanes_after:
