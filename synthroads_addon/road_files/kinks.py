@@ -145,10 +145,10 @@ def _clothoids(start: Float, target: Float, k1: float, k2: float, reach: float) 
         pair = Alignment(
             [Element(length_1, k1, joint_curvature), Element(length_2, joint_curvature, k2)], *(float(v) for v in start)
         )
-        end = pair.position(pair.length) - target[:2]
-        return np.array(
-            [*end, 0.5 * (k1 + joint_curvature) * length_1 + 0.5 * (joint_curvature + k2) * length_2 - target[2]]
-        )
+        gap = pair.position(pair.length) - target[:2]
+        # A clothoid turns by its mean curvature times its length.
+        turn = 0.5 * (k1 + joint_curvature) * length_1 + 0.5 * (joint_curvature + k2) * length_2
+        return np.array([*gap, turn - target[2]])
 
     unknown = np.array([reach, reach, (target[2] - 0.5 * (k1 + k2) * reach) / reach])
     increments = np.array([1e-6 * reach, 1e-6 * reach, 1e-8])

@@ -126,6 +126,7 @@ def chained(ways: Iterable[OsmWay]) -> list[Chain]:
     One-way roads are joined in their direction alone; ramps and roundabouts by themselves. Where several ways of a name
     leave a node those that go on straightest belong together.
     """
+    # By label (a number of its own for a way without), and whether one-way, a ramp, a roundabout.
     groups: dict[tuple[str | int, bool, bool, bool], list[OsmWay]] = defaultdict(list)
     for number, way in enumerate(ways):
         direction = driving_direction(way.tags)
@@ -138,9 +139,9 @@ def chained(ways: Iterable[OsmWay]) -> list[Chain]:
         )
         groups[key].append(way.reversed if direction < 0 else way)
     return [
-        Chain(label_of(chain[0].tags), tuple(chain), key[1])
-        for key, group in groups.items()
-        for chain in _joined(group, key[1])
+        Chain(label_of(chain[0].tags), tuple(chain), directed)
+        for (_, directed, _, _), group in groups.items()
+        for chain in _joined(group, directed)
     ]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from .corners import Polyline, corners, polyline, rounded_points
 from .loss import Loss
 from .plane import Planes, RotationAxis, joined, planes
 from .records import merged
-from .shape import OUTSIDE, SideShape
+from .shape import OUTSIDE, Boundaries, SideShape
 from .strips import DRIVEN
 from .turnouts import beside, read_turnouts
 
@@ -269,6 +269,21 @@ def _verge_slope(side: SideShape, turnouts: dict[str, Turnout], usual_fall: floa
     return round_value(min(max(percent, 0.0), _STEEPEST_VERGE), 4)
 
 
+class _Comparison(NamedTuple):
+    """Boundaries of the file and of the set at some stations of a stretch.
+
+    Attributes:
+        stations: (N,) of the file, m.
+        boundaries: of the file, (N, B).
+        distances, heights: of the set's boundaries (N, C), m; heights above the file's elevation.
+    """
+
+    stations: Float
+    boundaries: Boundaries
+    distances: Float
+    heights: Float
+
+
 def deviations(parts: Pavements, road: RoadGeometry, stations: Stations, loss: Loss) -> dict[str, Any]:
     """Return how far the boundaries of a set's strips are from the file's, and note what is more than 1 mm off.
 
@@ -292,7 +307,7 @@ def deviations(parts: Pavements, road: RoadGeometry, stations: Stations, loss: L
             crossfall = road.crossfall(section.carriageway, set_station)
             heights = levels.elevation(set_station)[:, None] + section.elevations(set_station, crossfall, set_distances)
             line_heights = side.surface.road.elevation.at(station, side.inside(station, stretch))[:, None]
-            rows.append((station, boundaries, set_distances, heights - line_heights))
+            rows.append(_Comparison(station, boundaries, set_distances, heights - line_heights))
         report[SIDE_OF[sign]] = _worst(side, section, rows, stations, loss)
     return report
 
@@ -303,41 +318,47 @@ def _columns(column_mask: Any, strip_numbers: list[int]) -> list[int]:
 
 
 def _worst(
-    side: SideShape, section: CarriagewaySection, rows: list[Any], stations: Stations, loss: Loss
+    side: SideShape, section: CarriagewaySection, rows: Sequence[_Comparison], stations: Stations, loss: Loss
 ) -> dict[str, Any]:
     """Return the largest errors of offsets and heights of pavement, turnouts and verge, with their stations, in m.
 
-    `rows` holds for each stretch its stations (N,), the file's boundaries, and the set's distances and heights (N, B).
+    Strips of the file that have no width, or that the set lacks, are passed over.
     """
     kinds, turnouts = section.kinds, {str(n): shape.turnout for n, shape in enumerate(section.turnouts)}
     names = ["inner_edge_strip", *["lane"] * len(side.layout.slots), *OUTSIDE]
-    station = np.concatenate([row[0] for row in rows])
+    station = np.concatenate([row.stations for row in rows])
     is_beside_turnout = beside(stations(station), turnouts)
-    distances = np.concatenate([row[1].distances for row in rows])
-    heights = np.concatenate([row[1].heights for row in rows])
-    begins = np.concatenate([row[1].inner_heights for row in rows])
-    set_distances, set_heights = np.concatenate([row[2] for row in rows]), np.concatenate([row[3] for row in rows])
+    file_distances = np.concatenate([row.boundaries.distances for row in rows])
+    file_heights = np.concatenate([row.boundaries.heights for row in rows])
+    file_inner_heights = np.concatenate([row.boundaries.inner_heights for row in rows])
+    set_distances = np.concatenate([row.distances for row in rows])
+    set_heights = np.concatenate([row.heights for row in rows])
     # Strips that are nowhere wider than 0 aren't among the set's.
     strip_numbers = [
-        n for n in range(len(names)) if (distances[:, n + 1] - distances[:, n]).max() > _NONE and names[n] in kinds
+        n
+        for n in range(len(names))
+        if (file_distances[:, n + 1] - file_distances[:, n]).max() > _NONE and names[n] in kinds
     ]
-    inner_index = [kinds.index(names[n]) + _lanes_before(names, strip_numbers, n) for n in strip_numbers]
-    set_columns = [0, *(n + 1 for n in inner_index)]
+    # Columns of the set's boundaries on the inner and outer side of each strip, then the file's on its outer side.
+    inner_columns = [kinds.index(names[n]) + _lanes_before(names, strip_numbers, n) for n in strip_numbers]
+    set_outer_columns = [0, *(n + 1 for n in inner_columns)]
     has_verge = bool(strip_numbers) and names[strip_numbers[-1]] == "verge"
-    columns = [0, *(n + 1 for n in strip_numbers)]
-    offset_errors = np.abs(set_distances[:, set_columns] - distances[:, columns])
-    height_errors = np.maximum(np.abs(set_heights[:, set_columns] - heights[:, columns]), 0.0)
-    has_width = np.diff(distances, axis=1)[:, strip_numbers] > _NONE
+    file_columns = [0, *(n + 1 for n in strip_numbers)]
+    offset_errors = np.abs(set_distances[:, set_outer_columns] - file_distances[:, file_columns])
+    height_errors = np.abs(set_heights[:, set_outer_columns] - file_heights[:, file_columns])
+    has_width = np.diff(file_distances, axis=1)[:, strip_numbers] > _NONE
     # Inner borders count as well, which differ from the neighbour's where a lane is a step higher.
     height_errors[:, 1:] = np.where(
         has_width,
-        np.maximum(height_errors[:, 1:], np.abs(set_heights[:, inner_index] - begins[:, columns[1:]])),
+        np.maximum(
+            height_errors[:, 1:], np.abs(set_heights[:, inner_columns] - file_inner_heights[:, file_columns[1:]])
+        ),
         height_errors[:, 1:],
     )
     report: dict[str, Any] = {}
     for kind, values in (("offset", offset_errors), ("height", height_errors)):
         of_turnouts = np.array([False, *(names[n] in TURNOUT_STRIPS for n in strip_numbers)])
-        of_verge = np.array([has_verge and n == len(columns) - 1 for n in range(len(columns))])
+        of_verge = np.array([has_verge and n == len(file_columns) - 1 for n in range(len(file_columns))])
         parts = (
             ("pavement", ~of_turnouts & ~of_verge, TOLD),
             ("turnouts", of_turnouts, _TURNOUTS),
@@ -345,7 +366,7 @@ def _worst(
         )
         for part, column_mask, limit in parts:
             errors = values[:, column_mask].copy()
-            if part == "pavement":  # the shoulder beside a turnout is its
+            if part == "pavement":  # beside a turnout the shoulder is one of its strips
                 errors[
                     np.ix_(
                         is_beside_turnout,
@@ -354,12 +375,12 @@ def _worst(
                 ] = 0.0
             if not errors.size:
                 continue
-            row = int(errors.max(axis=1).argmax())
+            worst_row = int(errors.max(axis=1).argmax())
             largest = float(errors.max())
             report[f"{part}_{kind}"] = round(largest, 6)
-            report[f"{part}_{kind}_station"] = round(float(station[row]), 3)
+            report[f"{part}_{kind}_station"] = round(float(station[worst_row]), 3)
             if largest > limit:
-                loss.approximate(f"{SIDE_OF[side.sign]} {part}", f"its {kind}s", largest, float(station[row]))
+                loss.approximate(f"{SIDE_OF[side.sign]} {part}", f"its {kind}s", largest, float(station[worst_row]))
                 loss.surface = True
     return report
 
