@@ -87,13 +87,13 @@ def line_deviation(line: RoadLine, axis: ExactAxis) -> tuple[float, Float, Float
         the axis' length, and of places of the line at most a metre apart the stations, the distances to the left of
         the axis and the heights above it (N,), m; None for the heights where the file has none.
     """
-    places, given = sampled(line)
-    station, across = axis.alignment.project(places)
+    places, file_stations = sampled(line)
+    station, offsets = axis.alignment.project(places)
     station = np.clip(station, 0.0, axis.alignment.length)
     if axis.heights is None:
-        return axis.alignment.length, station, across, None
+        return axis.alignment.length, station, offsets, None
     profile = Profile(axis.heights.points)
-    return axis.alignment.length, station, across, heights_at(line, given) - profile.elevation(station)
+    return axis.alignment.length, station, offsets, heights_at(line, file_stations) - profile.elevation(station)
 
 
 def _checked_object(path: Path, axis: ExactAxis, origin: Float, line: RoadLine) -> AlignmentObject:
@@ -145,6 +145,7 @@ def report_of(path: Path, line: RoadLine, axis: ExactAxis) -> dict[str, Any]:
 
 
 def _worst(heights: Any) -> dict[str, Any]:
+    """Return the profile's largest deviation and the steps left out, as JSON data."""
     steps = [{"station": round(station, 3), "step": round(step, 6)} for station, step in heights.jumps]
     figures: dict[str, Any] = {"deviation": round(heights.deviation, 6), "deviation_station": round(heights.station, 3)}
     return figures | ({"steps_left_out": steps} if steps else {})
@@ -153,38 +154,38 @@ def _worst(heights: Any) -> dict[str, Any]:
 def _placed(
     path: Path, line: RoadLine, axis: ExactAxis, scenario: RoadScenario
 ) -> tuple[MapSystem | None, ExactAxis, str]:
-    """Return the system that the axis lies in, the axis there, and how it came there."""
-    given = "epsg" in scenario.model_fields_set
-    system = MapSystem.of(scenario.epsg, scenario.height_epsg) if given else None
-    declared = line.system
-    if declared is not None and declared.local:
-        declared = None
-    if declared is None:
+    """Return the map system of the axis (None if unknown), the axis in it, and a text on how it came there."""
+    has_epsg = "epsg" in scenario.model_fields_set
+    system = MapSystem.of(scenario.epsg, scenario.height_epsg) if has_epsg else None
+    file_system = line.system
+    if file_system is not None and file_system.local:
+        file_system = None
+    if file_system is None:
         name = MapSystem.of(scenario.epsg).label
-        remedy = "" if given else "; --set road.epsg=CODE names another"
+        remedy = "" if has_epsg else "; --set road.epsg=CODE names another"
         assume("%s names no coordinate system: its coordinates are read as %s%s", path.name, name, remedy)
         return None, axis, f"as the file has it, read as {name}"
-    if declared.unit is None:
+    if file_system.unit is None:
         raise InputError(
-            f"{path.name}: coordinate system", declared.label, "must have metres as its unit; this one has degrees"
+            f"{path.name}: coordinate system", file_system.label, "must have metres as its unit; this one has degrees"
         )
-    if not declared.in_metres:
-        declared = declared.metric()  # readers give metres, whatever the file's unit is
+    if not file_system.in_metres:
+        file_system = file_system.metric()  # readers give metres, whatever the file's unit is
     middle = axis.alignment.position(np.array([0.5 * axis.alignment.length]))
-    if declared.outside(middle).max() > 0.0:
-        warn("%s lies outside of the area that %s is meant for (%s)", path.name, declared.label, declared.area)
-    if system is not None and declared.same_as(system):
+    if file_system.outside(middle).max() > 0.0:
+        warn("%s lies outside of the area that %s is meant for (%s)", path.name, file_system.label, file_system.area)
+    if system is not None and file_system.same_as(system):
         return system, axis, "as the file has it"
-    if system is None and declared.epsg:
-        return declared, axis, f"as the file has it, in {declared.label}"
-    target = system or _utm(declared, middle)
-    return target, *_moved_rigidly(path, axis, declared, target)
+    if system is None and file_system.epsg:
+        return file_system, axis, f"as the file has it, in {file_system.label}"
+    target = system or _utm(file_system, middle)
+    return target, *_moved_rigidly(path, axis, file_system, target)
 
 
 def _utm(system: MapSystem, place: Float) -> MapSystem:
-    """Return the zone of UTM (WGS 84) that a place (1, 2) of a system lies in."""
-    there, _ = moved(np.column_stack([place, [0.0]]), system, MapSystem.read(LONGITUDE_LATITUDE))
-    return utm_zone(*there[0, :2].tolist())
+    """Return the zone of UTM (WGS 84) of a place (1, 2) given in a system."""
+    degrees, _ = moved(np.column_stack([place, [0.0]]), system, MapSystem.read(LONGITUDE_LATITUDE))
+    return utm_zone(*degrees[0, :2].tolist())
 
 
 def utm_zone(longitude: float, latitude: float) -> MapSystem:
@@ -196,23 +197,26 @@ def utm_zone(longitude: float, latitude: float) -> MapSystem:
 def _moved_rigidly(path: Path, axis: ExactAxis, source: MapSystem, target: MapSystem) -> tuple[ExactAxis, str]:
     """Return an axis moved and turned about its middle into another system, lengths as they are.
 
-    A projection's elements are none of another's: what the axis' ends are off is told.
+    Arcs and clothoids of one projection aren't exactly such curves in another: a warning says how far the ends are off.
     """
     alignment = axis.alignment
     middle = alignment.position(0.5 * alignment.length)
     arms = middle + _ARM * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     ends = alignment.position(np.array([0.0, alignment.length]))
-    flat = np.vstack([middle, arms, ends])
-    there = moved(np.column_stack([flat, np.zeros(len(flat))]), source, target)[0][:, :2]
-    east, north = there[1] - there[2], there[3] - there[4]
+    points = np.vstack([middle, arms, ends])
+    moved_points = moved(np.column_stack([points, np.zeros(len(points))]), source, target)[0][:, :2]
+    east, north = moved_points[1] - moved_points[2], moved_points[3] - moved_points[4]
+    # The rotation that fits both axes best (least squares, Procrustes in two dimensions).
     turn = math.atan2(east[1] - north[0], east[0] + north[1])
     cos, sin = math.cos(turn), math.sin(turn)
     rotation = np.array([[cos, -sin], [sin, cos]])
-    start = there[0] + rotation @ (np.array([alignment.x, alignment.y]) - middle)
-    placed = Alignment(alignment.elements, float(start[0]), float(start[1]), alignment.start_heading + turn)
-    off = float(np.hypot(*(placed.position(np.array([0.0, alignment.length])) - there[5:]).T).max())
+    start = moved_points[0] + rotation @ (np.array([alignment.x, alignment.y]) - middle)
+    moved_alignment = Alignment(alignment.elements, float(start[0]), float(start[1]), alignment.start_heading + turn)
+    end_error = float(
+        np.hypot(*(moved_alignment.position(np.array([0.0, alignment.length])) - moved_points[5:]).T).max()
+    )
     name = source.label if source.epsg else "the file's own projection"
     text = f"moved from {name} to {target.label} about its middle, lengths as they are: its ends are off by"
-    text += f" {off:.3f} m"
+    text += f" {end_error:.3f} m"
     warn("%s is %s", path.name, text)
-    return replace(axis, alignment=placed), text
+    return replace(axis, alignment=moved_alignment), text

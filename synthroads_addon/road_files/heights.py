@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,9 +15,9 @@ TOLERANCE = 5e-4
 """Height (m) that parabolas may keep from a cubic or a circle."""
 _MOST_PIECES = 256
 _SHORTEST = 1e-9
-"""Parabolas shorter than this, m, are none."""
+"""Parabolas shorter than this, m, are left out (chosen)."""
 _FLAT = 1e-9
-"""Change of grade below this is none: 1 nm in a metre."""
+"""Changes of grade below this, m/m, count as none (chosen): 1 nm in a metre."""
 JUMP = 1e-3
 """Heights that jump by more than this (m) from one piece to the next are told."""
 
@@ -67,27 +68,39 @@ class Heights:
     jumps: tuple[tuple[float, float], ...]
 
 
-def circle(start: float, end: float, elevation: float, first: float, last: float) -> list[HeightPiece]:
-    """Return cubics within 0.1 mm of a circular arc in the profile, with its heights and grades at their ends.
+class _Parabola(NamedTuple):
+    """A parabola of the profile: stations and height at its start in m, grades at both ends in m/m."""
+
+    start: float
+    end: float
+    height: float
+    start_grade: float
+    end_grade: float
+
+
+def circle(start: float, end: float, elevation: float, start_grade: float, end_grade: float) -> list[HeightPiece]:
+    """Return cubics within 0.1 mm of a circular arc in the profile, with the arc's heights and grades at their ends.
 
     Args:
         start, end: stations, m.
         elevation: at the start, m.
-        first, last: grades at both ends, m/m; the radius follows: R = (end - start) / (sin b - sin a) with a = atan
-            first and b = atan last.
+        start_grade, end_grade: m/m; the radius (m, positive in a sag) follows from them: R = (end - start) /
+            (sin b - sin a), with the slope angles a = atan start_grade and b = atan end_grade.
     """
-    low, high = np.sin(np.arctan([first, last]))
-    radius = (end - start) / (high - low)
-    count = max(1, int(np.ceil(abs(high - low) / 0.02)))
+    start_sine, end_sine = np.sin(np.arctan([start_grade, end_grade]))
+    radius = (end - start) / (end_sine - start_sine)
+    # Chosen: each cubic turns the slope by 0.02 rad at most, so that it keeps within 0.1 mm of the circle.
+    count = max(1, int(np.ceil(abs(end_sine - start_sine) / 0.02)))
     edges = np.linspace(start, end, count + 1)
-    sine = low + (edges - start) / radius
-    height = elevation + radius * (np.sqrt(1.0 - low**2) - np.sqrt(1.0 - sine**2))
+    sine = start_sine + (edges - start) / radius
+    height = elevation + radius * (np.sqrt(1.0 - start_sine**2) - np.sqrt(1.0 - sine**2))
     grade = sine / np.sqrt(1.0 - sine**2)
     pieces = []
     for n in range(count):
-        step, rise = edges[n + 1] - edges[n], height[n + 1] - height[n]
-        square = (3.0 * rise / step - 2.0 * grade[n] - grade[n + 1]) / step
-        cube = (grade[n] + grade[n + 1] - 2.0 * rise / step) / step**2
+        length, rise = edges[n + 1] - edges[n], height[n + 1] - height[n]
+        # Hermite's cubic: heights and grades at both ends are those of the circle.
+        square = (3.0 * rise / length - 2.0 * grade[n] - grade[n + 1]) / length
+        cube = (grade[n] + grade[n + 1] - 2.0 * rise / length) / length**2
         pieces.append(HeightPiece(*(float(v) for v in (edges[n], edges[n + 1], height[n], grade[n], square, cube))))
     return pieces
 
@@ -98,83 +111,80 @@ def as_parabolas(pieces: Sequence[HeightPiece], tolerance: float = TOLERANCE) ->
     Grades and parabolas are exact. A cubic becomes pairs of parabolas with its heights and grades at their ends. Where
     a piece doesn't begin at the height at which the one before ends, the later one is shifted.
     """
-    parabolas: list[tuple[float, float, float, float, float]] = []  # start, end, height, both grades
-    shift, jumps, worst, where = 0.0, [], 0.0, pieces[0].start
+    parabolas: list[_Parabola] = []
+    shift, jumps = 0.0, []
+    worst, worst_station = 0.0, pieces[0].start
     for n, piece in enumerate(pieces):
         if n:
-            before = pieces[n - 1]
-            step = piece.elevation - before.elevation_at(before.end)
+            previous = pieces[n - 1]
+            step = piece.elevation - previous.elevation_at(previous.end)
             shift -= step
             if abs(step) > JUMP:
                 jumps.append((piece.start, step))
         for parabola in _parabolas(piece, tolerance):
-            parabolas.append((*parabola[:2], parabola[2] + shift, *parabola[3:]))
-        deviation, at = _deviation(piece, parabolas, shift)
+            parabolas.append(parabola._replace(height=parabola.height + shift))
+        deviation, station = _deviation(piece, parabolas, shift)
         if deviation > worst:
-            worst, where = deviation, at
-    return Heights(_points(parabolas), worst, where, tuple(jumps))
+            worst, worst_station = deviation, station
+    return Heights(_points(parabolas), worst, worst_station, tuple(jumps))
 
 
-def _parabolas(piece: HeightPiece, tolerance: float) -> list[tuple[float, float, float, float, float]]:
-    """Return start, end, height and both grades of the parabolas that a piece becomes."""
+def _parabolas(piece: HeightPiece, tolerance: float) -> list[_Parabola]:
+    """Return the parabolas that keep within a tolerance (m) of a piece: one, or a pair for each part of a cubic."""
     length = piece.end - piece.start
+    single = _Parabola(piece.start, piece.end, piece.elevation, piece.grade, piece.grade_at(piece.end))
     if piece.cube == 0.0:
-        return [(piece.start, piece.end, piece.elevation, piece.grade, piece.grade_at(piece.end))]
-    # Of a pair of parabolas with a cubic's ends the middle is off by |d| L^3 / 32 at most.
+        return [single]
+    # A pair of parabolas with the heights and grades of a cubic d u^3 at its ends is off by |d| L^3 / 32 at most.
     count = int(np.clip(np.ceil((abs(piece.cube) * length**3 / (32.0 * tolerance)) ** (1.0 / 3.0)), 1, _MOST_PIECES))
     edges = np.linspace(piece.start, piece.end, count + 1).tolist()
     parabolas = []
-    for first, last in itertools.pairwise(edges):
-        half = 0.5 * (last - first)
+    for start, end in itertools.pairwise(edges):
+        half = 0.5 * (end - start)
         if half < _SHORTEST:
             continue
-        low, high = piece.elevation_at(first), piece.elevation_at(last)
-        rise, fall = piece.grade_at(first), piece.grade_at(last)
-        inner = (high - low) / half - 0.5 * (rise + fall)  # so that both parabolas end where the cubic does
-        parabolas.append((first, first + half, low, rise, inner))
-        parabolas.append((first + half, last, low + 0.5 * half * (rise + inner), inner, fall))
-    return parabolas or [(piece.start, piece.end, piece.elevation, piece.grade, piece.grade_at(piece.end))]
+        start_height, end_height = piece.elevation_at(start), piece.elevation_at(end)
+        start_grade, end_grade = piece.grade_at(start), piece.grade_at(end)
+        # The grade at which the pair meets, so that the second parabola ends at the cubic's height.
+        middle_grade = (end_height - start_height) / half - 0.5 * (start_grade + end_grade)
+        middle_height = start_height + 0.5 * half * (start_grade + middle_grade)
+        parabolas.append(_Parabola(start, start + half, start_height, start_grade, middle_grade))
+        parabolas.append(_Parabola(start + half, end, middle_height, middle_grade, end_grade))
+    return parabolas or [single]
 
 
-def _deviation(
-    piece: HeightPiece, parabolas: Sequence[tuple[float, float, float, float, float]], shift: float
-) -> tuple[float, float]:
-    """Return the largest height (m) between a piece and its parabolas, and its station."""
-    worst, where = 0.0, piece.start
-    if piece.cube == 0.0:
-        return worst, where
-    for first, last, height, rise, fall in parabolas:
-        if first >= piece.start - 1e-9 and last <= piece.end + 1e-9:
-            for share in (0.25, 0.5, 0.75):
-                u = share * (last - first)
-                elevation = height + u * (rise + 0.5 * (fall - rise) * share)
-                off = abs(elevation - shift - piece.elevation_at(first + u))
-                if off > worst:
-                    worst, where = off, first + u
-    return worst, where
+def _deviation(piece: HeightPiece, parabolas: Sequence[_Parabola], shift: float) -> tuple[float, float]:
+    """Return the largest height (m) between a piece and its parabolas, and the station (m) of it.
 
-
-def _points(parabolas: Sequence[tuple[float, float, float, float, float]]) -> tuple[IntersectionPoint, ...]:
-    """Return the intersections: one at either end, one at each kink, one in the middle of each rounding.
-
-    Args:
-        parabolas: in order, without gaps: start and end, m, height at the start, m, grades at the start and the end.
+    The parabolas lie `shift` (m) higher than the file's heights; those outside of the piece are passed over.
     """
-    first_start, _, first_height, _, _ = parabolas[0]
-    rows = [(first_start, first_height, 0.0)]  # station, height and length of tangent, m, of each intersection
-    grade_before = parabolas[0][3]
+    worst, worst_station = 0.0, piece.start
+    if piece.cube == 0.0:
+        return worst, worst_station
     for start, end, height, start_grade, end_grade in parabolas:
-        is_kink = abs(start_grade - grade_before) > _FLAT
-        if is_kink:
+        if start >= piece.start - 1e-9 and end <= piece.end + 1e-9:
+            for share in (0.25, 0.5, 0.75):
+                u = share * (end - start)
+                elevation = height + u * (start_grade + 0.5 * (end_grade - start_grade) * share)
+                deviation = abs(elevation - shift - piece.elevation_at(start + u))
+                if deviation > worst:
+                    worst, worst_station = deviation, start + u
+    return worst, worst_station
+
+
+def _points(parabolas: Sequence[_Parabola]) -> tuple[IntersectionPoint, ...]:
+    """Return the points of vertical intersection: in the middle of each rounding, at each kink, and at both ends."""
+    begin, final = parabolas[0], parabolas[-1]
+    rows = [(begin.start, begin.height, 0.0)]  # station, height, length of the tangents, m
+    for n, (start, end, height, start_grade, end_grade) in enumerate(parabolas):
+        if n and abs(start_grade - parabolas[n - 1].end_grade) > _FLAT:
             rows.append((start, height, 0.0))
-        is_rounding = abs(end_grade - start_grade) > _FLAT
-        if is_rounding:
-            # The tangents at both ends of a parabola meet in its middle.
-            tangent_length = 0.5 * (end - start)
-            rows.append((start + tangent_length, height + start_grade * tangent_length, tangent_length))
-        grade_before = end_grade
-    start, end, height, start_grade, end_grade = parabolas[-1]
-    rows.append((end, height + 0.5 * (end - start) * (start_grade + end_grade), 0.0))
+        if abs(end_grade - start_grade) > _FLAT:
+            half = 0.5 * (end - start)
+            rows.append((start + half, height + start_grade * half, half))
+    # A parabola rises by its length times the mean of its grades.
+    end_height = final.height + 0.5 * (final.end - final.start) * (final.start_grade + final.end_grade)
+    rows.append((final.end, end_height, 0.0))
     station, height, tangent = np.array(rows).T
     # A rounding's tangent is T = R |dg| / 2 with the change dg of the grade. It is taken from the grades between the
     # intersections, so that roundings which touch don't overlap.

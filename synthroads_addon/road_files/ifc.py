@@ -49,7 +49,8 @@ def read_ifc(path: Path) -> list[RoadLine]:
     """Return the alignments of an IFC file that have segments in plan.
 
     Raises:
-        MissingFileError, InputError: it can't be read, `ifcopenshell` isn't installed, or a segment isn't understood.
+        MissingFileError, InputError: the file can't be read, or a segment isn't understood.
+        MissingPackageError: ifcopenshell isn't installed.
     """
     model = _open(path)
     try:
@@ -60,12 +61,12 @@ def read_ifc(path: Path) -> list[RoadLine]:
 
 def _first_line(error: Exception) -> str:
     """Return the first line of an error, shortened, its letters printable."""
-    said = next(iter(str(error).splitlines()), type(error).__name__)[:_LONGEST]
-    return "".join(letter if letter.isprintable() else "?" for letter in said)
+    line = next(iter(str(error).splitlines()), type(error).__name__)[:_LONGEST]
+    return "".join(letter if letter.isprintable() else "?" for letter in line)
 
 
 def _lines(path: Path, model: Any) -> list[RoadLine]:
-    """Return the alignments of a model, those that can't be used with their fault."""
+    """Return the lines of a model's alignments; one that can't be used has its fault."""
     unit, angle = _units(model)
     system, place = _map(path, model, unit)
     names, lines = LineNames(), list[RoadLine]()
@@ -78,15 +79,14 @@ def _lines(path: Path, model: Any) -> list[RoadLine]:
         except InputError as error:
             lines.append(RoadLine(unique, "IFC alignment", (), system=system, fault=error))
     # With several alignments nothing says which of them the parts of the road belong to.
-    given, taken, left_out = own_parts(model)
-    alone = given is None or len(alignments) == 1
-    if not alone:
-        given, taken, left_out = None, Counter(), [f"lanes: those of {len(alignments)} alignments"]
-    return [replace(one, given=given, taken=taken, left_out=(*one.left_out, *left_out)) for one in lines]
+    parts, counts, left_out = own_parts(model)
+    if parts is not None and len(alignments) != 1:
+        parts, counts, left_out = None, Counter(), [f"lanes: those of {len(alignments)} alignments"]
+    return [replace(line, given=parts, taken=counts, left_out=(*line.left_out, *left_out)) for line in lines]
 
 
 def _open(path: Path) -> Any:
-    """Return the model of a file, read from a copy with a header of its own.
+    """Return the model of a file, read from a copy with a new header.
 
     The library knows one name of the schema alone, and a broken header can end the process.
     """
@@ -138,29 +138,37 @@ def _placement(placement: Any, unit: float) -> np.ndarray:
         return np.eye(4)
     from ifcopenshell.util.placement import get_local_placement  # an extra
 
-    matrix = np.array(get_local_placement(placement), dtype=np.float64)
-    matrix[:3, 3] *= unit
-    return matrix
+    pose = np.array(get_local_placement(placement), dtype=np.float64)
+    pose[:3, 3] *= unit
+    return pose
 
 
 def _map(path: Path, model: Any, unit: float) -> tuple[MapSystem | None, np.ndarray]:
     """Return the map's coordinate system, and the matrix (4, 4) from the file's coordinates to the map's, m."""
     matrix = np.eye(4)
-    rows = model.by_type("IfcMapConversion")
-    if not rows:
+    conversions = model.by_type("IfcMapConversion")
+    if not conversions:
         return None, matrix
-    row = rows[0]
+    conversion = conversions[0]
     # The axis may be no unit vector, and its absence means the map's own east.
-    east, north = (1.0 if row.XAxisAbscissa is None else row.XAxisAbscissa), (row.XAxisOrdinate or 0.0)
+    east, north = (
+        (1.0 if conversion.XAxisAbscissa is None else conversion.XAxisAbscissa),
+        (conversion.XAxisOrdinate or 0.0),
+    )
     size = math.hypot(east, north)
     if size == 0.0:
         east, north, size = 1.0, 0.0, 1.0
-    scale = row.Scale or 1.0
+    scale = conversion.Scale or 1.0
     # Scale turns the file's units into the map's; coordinates here are metres already.
-    away = scale / unit if abs(scale - unit) < 1e-6 * unit else 1.0 if abs(scale - 1.0) > 0.1 else scale
-    matrix[:2, :2] = np.array([[east, -north], [north, east]]) / size * away
-    matrix[:3, 3] = row.Eastings, row.Northings, row.OrthogonalHeight
-    target = row.TargetCRS
+    if abs(scale - unit) < 1e-6 * unit:
+        factor = scale / unit
+    elif abs(scale - 1.0) > 0.1:  # units other than those that the file declares: metres stay as they are
+        factor = 1.0
+    else:
+        factor = scale
+    matrix[:2, :2] = np.array([[east, -north], [north, east]]) / size * factor
+    matrix[:3, 3] = conversion.Eastings, conversion.Northings, conversion.OrthogonalHeight
+    target = conversion.TargetCRS
     names = [text for text in (getattr(target, "Name", None), getattr(target, "Description", None)) if text]
     for text in names:
         try:
@@ -174,7 +182,7 @@ def _map(path: Path, model: Any, unit: float) -> tuple[MapSystem | None, np.ndar
 
 def _placed(line: RoadLine, matrix: np.ndarray, system: MapSystem | None) -> RoadLine:
     """Return a line moved and turned into the map by a matrix (4, 4)."""
-    turn = math.atan2(matrix[1, 0], matrix[0, 0])
+    rotation = math.atan2(matrix[1, 0], matrix[0, 0])
     scale = math.hypot(matrix[0, 0], matrix[1, 0])
     if abs(scale - 1.0) > 1e-2:
         raise InputError(
@@ -185,21 +193,22 @@ def _placed(line: RoadLine, matrix: np.ndarray, system: MapSystem | None) -> Roa
     pieces = []
     for piece in line.pieces:
         x, y = (matrix @ np.array([piece.x, piece.y, 0.0, 1.0]))[:2].tolist()
-        pieces.append(PlanPiece(piece.kind, piece.station, piece.length, x, y, piece.heading + turn, piece.shape))
-    up = float(matrix[2, 3])
-    heights = tuple(HeightPiece(h.start, h.end, h.elevation + up, h.grade, h.square, h.cube) for h in line.heights)
+        pieces.append(PlanPiece(piece.kind, piece.station, piece.length, x, y, piece.heading + rotation, piece.shape))
+    shift = float(matrix[2, 3])
+    heights = tuple(HeightPiece(h.start, h.end, h.elevation + shift, h.grade, h.square, h.cube) for h in line.heights)
     return replace(line, pieces=tuple(pieces), heights=heights, system=system)
 
 
 def _nested(item: Any) -> list[Any]:
-    """Return what is nested below an object, in order; what is aggregated as well, as older files have it."""
-    parts = [each for relation in (item.IsNestedBy or ()) for each in relation.RelatedObjects]
-    return parts + [
+    """Return the objects nested below an object, in order, and those aggregated, as older files have them."""
+    nested_parts = [each for relation in (item.IsNestedBy or ()) for each in relation.RelatedObjects]
+    return nested_parts + [
         each for relation in (getattr(item, "IsDecomposedBy", None) or ()) for each in relation.RelatedObjects
     ]
 
 
 def _alignment(alignment: Any, name: str, unit: float, angle: float) -> RoadLine | None:
+    """Return the line of an alignment; None where it has no segment in plan. `unit` is in m, `angle` in rad."""
     layouts = _nested(alignment)
     plans = [each for each in layouts if each.is_a("IfcAlignmentHorizontal")]
     profiles = [each for each in layouts if each.is_a("IfcAlignmentVertical")]
@@ -210,11 +219,11 @@ def _alignment(alignment: Any, name: str, unit: float, angle: float) -> RoadLine
         return None
     segments = [each for each in _nested(plans[0]) if each.is_a("IfcAlignmentSegment")]
     pieces: list[PlanPiece] = []
-    run = 0.0
+    station = 0.0
     for segment in segments:
-        if piece := _plan_piece(segment.DesignParameters, run, unit, angle):
+        if piece := _plan_piece(segment.DesignParameters, station, unit, angle):
             pieces.append(piece)
-            run += piece.length
+            station += piece.length
     if not pieces:
         return None
     heights = _heights(profiles[0], unit) if profiles else []
@@ -222,40 +231,42 @@ def _alignment(alignment: Any, name: str, unit: float, angle: float) -> RoadLine
     left_out = [f"{len(profiles) - 1} more profiles"] if len(profiles) > 1 else []
     left_out += ["the cant of a railway"] if cants else []
     start = getattr(plans[0], "StartDistAlong", None)
-    first, equations = _stationing(layouts, unit)
-    if first is None:
-        first = 0.0 if start is None else float(start) * unit
+    station_count, equations = _stationing(layouts, unit)
+    if station_count is None:
+        station_count = 0.0 if start is None else float(start) * unit
     return RoadLine(
         name=name,
         source="IFC alignment",
         pieces=tuple(pieces),
         heights=tuple(heights),
-        first_station=first,
+        first_station=station_count,
         equations=equations,
         left_out=tuple(left_out),
     )
 
 
-def _stationing(nested: list[Any], unit: float) -> tuple[float | None, tuple[Equation, ...]]:
-    """Return the count at the begin (m; None without referents) and the station equations that referents give."""
+def _stationing(layouts: list[Any], unit: float) -> tuple[float | None, tuple[Equation, ...]]:
+    """Return the station count at the begin (m; None without referents), and the station equations of referents."""
     rows = []
-    for referent in nested:
+    for referent in layouts:
         if not referent.is_a("IfcReferent"):
             continue
-        count, back = (_stated(referent, name) for name in ("Station", "IncomingStation"))
+        count, incoming = (_stationing_value(referent, name) for name in ("Station", "IncomingStation"))
         location = getattr(getattr(referent.ObjectPlacement, "RelativePlacement", None), "Location", None)
-        along = getattr(getattr(location, "DistanceAlong", None), "wrappedValue", None)
-        if count is not None and along is not None:
-            rows.append((float(along) * unit, count * unit, None if back is None else back * unit))
+        distance = getattr(getattr(location, "DistanceAlong", None), "wrappedValue", None)
+        if count is not None and distance is not None:
+            rows.append((float(distance) * unit, count * unit, None if incoming is None else incoming * unit))
     if not rows:
         return None, ()
     rows.sort(key=lambda row: row[0])
-    station, count, back = rows[0]
-    equations = tuple(Equation(at, before, there) for at, there, before in rows if before is not None)
-    return (count if back is None else back) - station, equations
+    station, count, incoming = rows[0]
+    equations = tuple(
+        Equation(place, back_count, ahead_count) for place, ahead_count, back_count in rows if back_count is not None
+    )
+    return (count if incoming is None else incoming) - station, equations
 
 
-def _stated(referent: Any, name: str) -> float | None:
+def _stationing_value(referent: Any, name: str) -> float | None:
     """Return a number of a referent's Pset_Stationing; None without it."""
     for relation in getattr(referent, "IsDefinedBy", ()) or ():
         definition = getattr(relation, "RelatingPropertyDefinition", None)
@@ -267,54 +278,61 @@ def _stated(referent: Any, name: str) -> float | None:
     return None
 
 
-def _plan_piece(row: Any, run: float, unit: float, angle: float) -> PlanPiece | None:
+def _plan_piece(segment: Any, station: float, unit: float, angle: float) -> PlanPiece | None:
     """Return the piece of one horizontal segment that begins at a station (m); None for one without a length."""
-    if row is None or not row.is_a("IfcAlignmentHorizontalSegment"):
+    if segment is None or not segment.is_a("IfcAlignmentHorizontalSegment"):
         raise InputError(
-            f"segment at station {run:.3f} m", None, "must have the DesignParameters of a horizontal segment"
+            f"segment at station {station:.3f} m", None, "must have the DesignParameters of a horizontal segment"
         )
-    length = float(row.SegmentLength) * unit
+    length = float(segment.SegmentLength) * unit
     if length <= SHORTEST:
         return None
-    x, y = (float(value) * unit for value in row.StartPoint.Coordinates[:2])
-    heading = float(row.StartDirection) * angle
-    kind = row.PredefinedType
-    first, last = (
-        1.0 / (float(r) * unit) if r else 0.0 for r in (row.StartRadiusOfCurvature, row.EndRadiusOfCurvature)
+    x, y = (float(value) * unit for value in segment.StartPoint.Coordinates[:2])
+    heading = float(segment.StartDirection) * angle
+    kind = segment.PredefinedType
+    start_curvature, end_curvature = (
+        1.0 / (float(radius) * unit) if radius else 0.0
+        for radius in (segment.StartRadiusOfCurvature, segment.EndRadiusOfCurvature)
     )
     shape: tuple[float, float] | Curve
     if kind == "LINE":
         shape = (0.0, 0.0)
     elif kind == "CIRCULARARC":
-        shape = (first, first)
+        shape = (start_curvature, start_curvature)
     elif kind == "CLOTHOID":
-        shape = (first, last)
+        shape = (start_curvature, end_curvature)
     elif kind in _KINDS:
-        shape = transition(_KINDS[kind], length, first, last)
+        shape = transition(_KINDS[kind], length, start_curvature, end_curvature)
     else:
         allowance = f"must be one of LINE, CIRCULARARC, {', '.join(_KINDS)}"
-        raise InputError(f"segment at station {run:.3f} m: PredefinedType", kind, allowance)
-    return PlanPiece(_KINDS.get(kind, kind.lower()), run, length, x, y, heading, shape)
+        raise InputError(f"segment at station {station:.3f} m: PredefinedType", kind, allowance)
+    return PlanPiece(_KINDS.get(kind, kind.lower()), station, length, x, y, heading, shape)
 
 
 def _heights(profile: Any, unit: float) -> list[HeightPiece]:
-    """Return the pieces of a vertical layout."""
+    """Return the pieces of a vertical layout, in m."""
     pieces: list[HeightPiece] = []
     for segment in _nested(profile):
-        row = getattr(segment, "DesignParameters", None)
-        if row is None or not row.is_a("IfcAlignmentVerticalSegment"):
+        design = getattr(segment, "DesignParameters", None)
+        if design is None or not design.is_a("IfcAlignmentVerticalSegment"):
             continue
-        start, length, height = (float(v) * unit for v in (row.StartDistAlong, row.HorizontalLength, row.StartHeight))
+        start, length, height = (
+            float(v) * unit for v in (design.StartDistAlong, design.HorizontalLength, design.StartHeight)
+        )
         if length <= SHORTEST:
             continue
-        first, last = float(row.StartGradient), float(row.EndGradient)
-        kind = row.PredefinedType
-        if kind == "CONSTANTGRADIENT" or (kind in ("PARABOLICARC", "CIRCULARARC") and abs(last - first) < 1e-12):
-            pieces.append(HeightPiece(start, start + length, height, first))
+        start_grade, end_grade = float(design.StartGradient), float(design.EndGradient)
+        kind = design.PredefinedType
+        if kind == "CONSTANTGRADIENT" or (
+            kind in ("PARABOLICARC", "CIRCULARARC") and abs(end_grade - start_grade) < 1e-12
+        ):
+            pieces.append(HeightPiece(start, start + length, height, start_grade))
         elif kind == "PARABOLICARC":
-            pieces.append(HeightPiece(start, start + length, height, first, 0.5 * (last - first) / length))
+            pieces.append(
+                HeightPiece(start, start + length, height, start_grade, 0.5 * (end_grade - start_grade) / length)
+            )
         elif kind == "CIRCULARARC":
-            pieces += circle(start, start + length, height, first, last)
+            pieces += circle(start, start + length, height, start_grade, end_grade)
         else:
             allowance = "must be one of CONSTANTGRADIENT, PARABOLICARC, CIRCULARARC"
             raise InputError(f"vertical segment at {start:.3f} m: PredefinedType", kind, allowance)

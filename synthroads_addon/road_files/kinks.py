@@ -47,103 +47,120 @@ class Rounding:
 
 
 def rounded(
-    line: RoadLine, joints: Sequence[float], least: float, tolerance: float, sharpest: float
+    line: RoadLine, angles: Sequence[float], smallest: float, tolerance: float, largest_curvature: float
 ) -> tuple[RoadLine, list[Rounding]]:
-    """Return a line whose kinks are rounded, as far as the tolerance and its elements' lengths allow, and which were.
+    """Return a line with its kinks rounded where tolerance and lengths of its elements allow it, and the roundings.
 
     Args:
         line: of a file.
-        joints: change of direction (rad) before each piece.
-        least: those up to it are none, rad.
+        angles: change of direction (rad) before each piece.
+        smallest: angle (rad) up to which a change of direction counts as none.
         tolerance: largest distance from a kink, m.
-        sharpest: largest curvature of a road, 1/m.
+        largest_curvature: of a road, 1/m.
     """
     pieces: list[PlanPiece] = [line.pieces[0]]
     roundings: list[Rounding] = []
-    for piece, turn in zip(line.pieces[1:], joints[1:], strict=True):
-        made, aim = None, tolerance
-        for _ in range(_TRIALS if abs(turn) > least else 0):
-            made = _round(pieces[-1], piece, aim)
-            if made is None or made[1].deviation <= tolerance:
+    for piece, angle in zip(line.pieces[1:], angles[1:], strict=True):
+        solution, aimed_distance = None, tolerance
+        for _ in range(_TRIALS if abs(angle) > smallest else 0):
+            solution = _round(pieces[-1], piece, aimed_distance)
+            if solution is None or solution[1].deviation <= tolerance:
                 break
-            aim *= 0.98 * tolerance / made[1].deviation  # beside curves the rounding lies otherwise
-        if made is None or abs(made[1].curvature) > sharpest or made[1].deviation > tolerance:
+            # Beside curves the rounding lies farther off than between straights: aim for less.
+            aimed_distance *= 0.98 * tolerance / solution[1].deviation
+        if solution is None or abs(solution[1].curvature) > largest_curvature or solution[1].deviation > tolerance:
             pieces.append(piece)
             continue
-        pieces[-1:] = made[0]
-        roundings.append(made[1])
+        pieces[-1:] = solution[0]
+        roundings.append(solution[1])
     return replace(line, pieces=tuple(pieces)), roundings
 
 
-def _round(before: PlanPiece, after: PlanPiece, tolerance: float) -> tuple[list[PlanPiece], Rounding] | None:
-    """Return what two pieces become, and the rounding; None where it can't be: other curves, or no solution."""
-    if not (isinstance(before.shape, tuple) and isinstance(after.shape, tuple)):
+def _round(
+    piece_before: PlanPiece, piece_behind: PlanPiece, tolerance: float
+) -> tuple[list[PlanPiece], Rounding] | None:
+    """Return the four pieces that take the place of two pieces with a kink, and the rounding; None without a solution.
+
+    There is none where a piece is no line, arc or clothoid, or where Newton's method finds no pair of clothoids.
+    """
+    if not (isinstance(piece_before.shape, tuple) and isinstance(piece_behind.shape, tuple)):
         return None
-    first = Alignment([Element(before.length, *before.shape)], before.x, before.y, before.heading)
-    second = Alignment([Element(after.length, *after.shape)], after.x, after.y, after.heading)
-    angle = math.remainder(after.heading - float(first.heading(before.length)), 2.0 * math.pi)
-    # Between straights both clothoids are 6 e / angle long, e the distance from the corner.
-    reach = min(0.99 * 6.0 * tolerance / abs(angle), _SHARE * before.length, _SHARE * after.length)
-    if reach < _SHORTEST:
+    line_before = Alignment(
+        [Element(piece_before.length, *piece_before.shape)], piece_before.x, piece_before.y, piece_before.heading
+    )
+    line_behind = Alignment(
+        [Element(piece_behind.length, *piece_behind.shape)], piece_behind.x, piece_behind.y, piece_behind.heading
+    )
+    angle = math.remainder(piece_behind.heading - float(line_before.heading(piece_before.length)), 2.0 * math.pi)
+    # Length cut off both pieces: between straights the clothoids are 6 e / angle long, e the distance from the corner.
+    cut = min(0.99 * 6.0 * tolerance / abs(angle), _SHARE * piece_before.length, _SHARE * piece_behind.length)
+    if cut < _SHORTEST:
         return None
-    start, heading, k1 = first.frame(before.length - reach)
-    goal, ahead, k2 = second.frame(reach)
-    turn = math.remainder(float(ahead) - float(heading), 2.0 * math.pi)
-    solution = _clothoids(np.array([*start, float(heading)]), np.array([*goal, turn]), float(k1), float(k2), reach)
+    start, heading, k1 = line_before.frame(piece_before.length - cut)
+    end, end_heading, k2 = line_behind.frame(cut)
+    turn = math.remainder(float(end_heading) - float(heading), 2.0 * math.pi)
+    solution = _clothoids(np.array([*start, float(heading)]), np.array([*end, turn]), float(k1), float(k2), cut)
     if solution is None:
         return None
-    one, two, middle = solution
-    elements = [Element(one, float(k1), middle), Element(two, middle, float(k2))]
+    length_1, length_2, joint_curvature = solution
+    elements = [Element(length_1, float(k1), joint_curvature), Element(length_2, joint_curvature, float(k2))]
     pair = Alignment(elements, float(start[0]), float(start[1]), float(heading))
-    corner = np.array([[after.x, after.y]])
+    corner = np.array([[piece_behind.x, piece_behind.y]])
     deviation = float(abs(pair.project(corner)[1][0]))
-    inner, towards, _ = pair.frame(one)
-    station = after.station
-    here = (
-        replace(before, length=before.length - reach, shape=(before.shape[0], float(k1))),
+    joint, joint_heading, _ = pair.frame(length_1)
+    station = piece_behind.station
+    parts = (
+        replace(piece_before, length=piece_before.length - cut, shape=(piece_before.shape[0], float(k1))),
         replace(
-            before, kind="rounding", station=station - reach, length=one, x=float(start[0]), y=float(start[1]),
-            heading=float(heading), shape=(float(k1), middle),
+            piece_before, kind="rounding", station=station - cut, length=length_1, x=float(start[0]), y=float(start[1]),
+            heading=float(heading), shape=(float(k1), joint_curvature),
         ),
         replace(
-            before, kind="rounding", station=station, length=two, x=float(inner[0]), y=float(inner[1]),
-            heading=float(towards), shape=(middle, float(k2)),
+            piece_before, kind="rounding", station=station, length=length_2, x=float(joint[0]), y=float(joint[1]),
+            heading=float(joint_heading), shape=(joint_curvature, float(k2)),
         ),
         replace(
-            after, station=station + reach, length=after.length - reach, x=float(goal[0]), y=float(goal[1]),
-            heading=float(ahead), shape=(float(k2), after.shape[1]),
+            piece_behind, station=station + cut, length=piece_behind.length - cut, x=float(end[0]), y=float(end[1]),
+            heading=float(end_heading), shape=(float(k2), piece_behind.shape[1]),
         ),
     )  # fmt: skip
-    return list(here), Rounding(station, angle, one + two, middle, deviation)
+    return list(parts), Rounding(station, angle, length_1 + length_2, joint_curvature, deviation)
 
 
-def _clothoids(start: Float, goal: Float, k1: float, k2: float, reach: float) -> tuple[float, float, float] | None:
-    """Return both lengths (m) and the curvature between (1/m) of two clothoids from a pose to a place and a turn.
+def _clothoids(start: Float, target: Float, k1: float, k2: float, reach: float) -> tuple[float, float, float] | None:
+    """Return both lengths (m) and the curvature between (1/m) of two clothoids from a pose to a place and turn.
+
+    The three unknowns are solved by Newton's method; None where it doesn't converge.
 
     Args:
         start: (3,) x, y, m, and heading, rad.
-        goal: (3,) x, y, m, and the turn up to there, rad.
+        target: (3,) x, y, m, and the turn up to there, rad.
         k1, k2: curvatures at their outer ends, 1/m.
         reach: length of either to begin with, m.
     """
 
-    def missed(unknown: Float) -> Float:
-        one, two, middle = (float(v) for v in unknown)
-        pair = Alignment([Element(one, k1, middle), Element(two, middle, k2)], *(float(v) for v in start))
-        end = pair.position(pair.length) - goal[:2]
-        return np.array([*end, 0.5 * (k1 + middle) * one + 0.5 * (middle + k2) * two - goal[2]])
+    def miss(unknown: Float) -> Float:
+        """Return how far (m, m, rad) the clothoids with both lengths and the middle curvature are from the target."""
+        length_1, length_2, joint_curvature = (float(v) for v in unknown)
+        pair = Alignment(
+            [Element(length_1, k1, joint_curvature), Element(length_2, joint_curvature, k2)], *(float(v) for v in start)
+        )
+        gap = pair.position(pair.length) - target[:2]
+        # A clothoid turns by its mean curvature times its length.
+        turn = 0.5 * (k1 + joint_curvature) * length_1 + 0.5 * (joint_curvature + k2) * length_2
+        return np.array([*gap, turn - target[2]])
 
-    unknown = np.array([reach, reach, (goal[2] - 0.5 * (k1 + k2) * reach) / reach])
-    steps = np.array([1e-6 * reach, 1e-6 * reach, 1e-8])
+    unknown = np.array([reach, reach, (target[2] - 0.5 * (k1 + k2) * reach) / reach])
+    increments = np.array([1e-6 * reach, 1e-6 * reach, 1e-8])
     if abs(unknown[2]) >= _SHARPEST:
         return None
     for _ in range(_STEPS):
-        rest = missed(unknown)
-        if np.abs(rest).max() < _NEAR:
+        residual = miss(unknown)
+        if np.abs(residual).max() < _NEAR:
             return float(unknown[0]), float(unknown[1]), float(unknown[2])
-        slope = np.column_stack([(missed(unknown + step) - rest) / step.sum() for step in np.diag(steps)])
+        jacobian = np.column_stack([(miss(unknown + step) - residual) / step.sum() for step in np.diag(increments)])
         try:
-            unknown = unknown - np.linalg.solve(slope, rest)
+            unknown = unknown - np.linalg.solve(jacobian, residual)
         except np.linalg.LinAlgError:
             return None
         if not (np.isfinite(unknown).all() and unknown[:2].min() > _SHORTEST and abs(unknown[2]) < _SHARPEST):

@@ -12,6 +12,7 @@ import math
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree.ElementTree import Element  # nosec B405 (its type alone)
 
 import numpy as np
@@ -41,31 +42,31 @@ def read_landxml(path: Path) -> list[RoadLine]:
     """Return the alignments of a LandXML file.
 
     Raises:
-        MissingFileError, InputError: it can't be read, isn't LandXML, or holds what isn't understood.
+        MissingFileError, InputError: the file can't be read, isn't LandXML, or holds what isn't understood.
     """
     root = read_xml(path)
     unit = _unit(root)
     system = _system(root)
     names, lines, roadways = LineNames(), list[RoadLine](), _roadways(root)
     for group in children(root, "Alignments"):
-        for number_of, alignment in enumerate(children(group, "Alignment")):
-            unique = names.unique(alignment.get("name"), f"alignment {number_of + 1}")
+        for row, alignment in enumerate(children(group, "Alignment")):
+            name = names.unique(alignment.get("name"), f"alignment {row + 1}")
             try:
-                if line := _alignment(alignment, unique, unit, system):
-                    more = roadways.get(alignment.get("name", ""), ())
-                    lines.append(replace(line, left_out=(*line.left_out, *more)))
+                if line := _alignment(alignment, name, unit, system):
+                    roadway_texts = roadways.get(alignment.get("name", ""), ())
+                    lines.append(replace(line, left_out=(*line.left_out, *roadway_texts)))
             except InputError as error:
-                lines.append(RoadLine(unique, "LandXML alignment", (), system=system, fault=error))
+                lines.append(RoadLine(name, "LandXML alignment", (), system=system, fault=error))
     return lines
 
 
 def _unit(root: Element) -> float:
     """Return metres per unit of length."""
     units = child(root, "Units")
-    stated = None if units is None else next(iter(children(units, "Metric", "Imperial")), None)
-    if stated is None:
+    unit_system = None if units is None else next(iter(children(units, "Metric", "Imperial")), None)
+    if unit_system is None:
         raise InputError("Units", None, "must contain Metric or Imperial, as coordinates could be metres or feet")
-    name = stated.get("linearUnit", "")
+    name = unit_system.get("linearUnit", "")
     if name.lower() not in _UNITS:
         raise InputError("Units linearUnit", name, f"must be one of {', '.join(_UNITS)}")
     return _UNITS[name.lower()]
@@ -73,11 +74,11 @@ def _unit(root: Element) -> float:
 
 def _system(root: Element) -> MapSystem | None:
     """Return the coordinate system that the file names by its code or its WKT; None without."""
-    named = child(root, "CoordinateSystem")
-    if named is None:
+    reference = child(root, "CoordinateSystem")
+    if reference is None:
         return None
-    code = named.get("epsgCode", "").strip()
-    text = f"EPSG:{code}" if code.isdigit() and int(code) else named.get("ogcWktCode", "").strip()
+    code = reference.get("epsgCode", "").strip()
+    text = f"EPSG:{code}" if code.isdigit() and int(code) else reference.get("ogcWktCode", "").strip()
     if not text:
         return None
     try:
@@ -88,26 +89,27 @@ def _system(root: Element) -> MapSystem | None:
 
 
 def _alignment(alignment: Element, name: str, unit: float, system: MapSystem | None) -> RoadLine | None:
+    """Return the line of an alignment; None without elements in plan. `unit` is the metres of the file's unit."""
     geometry = child(alignment, "CoordGeom")
     if geometry is None:
         return None
     start = number(alignment, "staStart", 0.0) * unit
     pieces: list[PlanPiece] = []
-    run = 0.0
+    station = 0.0
     for element in geometry:
         kind = local_name(element)
         if kind in ("Feature", ""):
             continue
         if kind not in _ELEMENTS:
-            raise InputError(f"CoordGeom at station {run:.3f} m", kind, f"must be one of {', '.join(_ELEMENTS)}")
-        for piece in _ELEMENTS[kind](element, run, unit):
+            raise InputError(f"CoordGeom at station {station:.3f} m", kind, f"must be one of {', '.join(_ELEMENTS)}")
+        for piece in _ELEMENTS[kind](element, station, unit):
             if piece.length > SHORTEST:
                 pieces.append(piece)
-                run += piece.length
+                station += piece.length
     if not pieces:
         return None
     equations = tuple(_equations(alignment, unit, start))
-    heights, left_out = _profile(alignment, unit, start, equations)
+    heights, left_out = _profile(alignment, unit, start)
     tilt = read_superelevation(alignment, pieces, unit, start)
     return RoadLine(
         name=name,
@@ -125,7 +127,7 @@ def _alignment(alignment: Element, name: str, unit: float, system: MapSystem | N
 
 
 def _point(element: Element, name: str, unit: float) -> complex:
-    """Return a point x + iy, m, of a child that says north before east, perhaps a height behind."""
+    """Return a point x + iy, m, from a child element that has northing, easting and perhaps a height."""
     point = child(element, name)
     words = (point.text or "").split() if point is not None else []
     place = f"{local_name(element)} {name}"
@@ -146,25 +148,27 @@ def _rotation(element: Element) -> float:
 
 
 def _line(element: Element, run: float, unit: float) -> list[PlanPiece]:
+    """Return the straight piece of a `Line` that begins at a station `run`, m."""
     start, end = (_point(element, name, unit) for name in ("Start", "End"))
     return [_straight("line", run, start, end)]
 
 
 def _straight(kind: str, run: float, start: complex, end: complex) -> PlanPiece:
-    way = end - start
-    return PlanPiece(kind, run, abs(way), start.real, start.imag, math.atan2(way.imag, way.real), (0.0, 0.0))
+    """Return a straight piece between two points x + iy, m."""
+    chord = end - start
+    return PlanPiece(kind, run, abs(chord), start.real, start.imag, math.atan2(chord.imag, chord.real), (0.0, 0.0))
 
 
 def _points(element: Element, run: float, unit: float) -> list[PlanPiece]:
-    """Return the straight pieces of an irregular line, which is what its points are joined by."""
-    inner = next(iter(children(element, "PntList2D", "PntList3D")), None)
-    words = [] if inner is None else (inner.text or "").split()
-    step = 2 if inner is not None and local_name(inner) == "PntList2D" else 3
+    """Return the straight pieces that join the points of an irregular line, which begins at a station `run`, m."""
+    point_list = next(iter(children(element, "PntList2D", "PntList3D")), None)
+    words = [] if point_list is None else (point_list.text or "").split()
+    dimension = 2 if point_list is not None and local_name(point_list) == "PntList2D" else 3
     values = [finite("IrregularLine", word) * unit for word in words]
-    line = [complex(values[n + 1], values[n]) for n in range(0, len(values) - step + 1, step)]
-    line = [_point(element, "Start", unit), *line, _point(element, "End", unit)]
+    points = [complex(values[n + 1], values[n]) for n in range(0, len(values) - dimension + 1, dimension)]
+    points = [_point(element, "Start", unit), *points, _point(element, "End", unit)]
     pieces = []
-    for start, end in itertools.pairwise(line):
+    for start, end in itertools.pairwise(points):
         if abs(end - start) > SHORTEST:
             pieces.append(_straight("irregular line", run, start, end))
             run += pieces[-1].length
@@ -172,24 +176,26 @@ def _points(element: Element, run: float, unit: float) -> list[PlanPiece]:
 
 
 def _curve(element: Element, run: float, unit: float) -> list[PlanPiece]:
+    """Return the arc of a `Curve` that begins at a station `run`, m, by its start, centre and end."""
     start, centre, end = (_point(element, name, unit) for name in ("Start", "Center", "End"))
-    sense = _rotation(element)
+    rotation = _rotation(element)
     spokes = start - centre, end - centre
     radius = abs(spokes[0])
     if radius < SHORTEST or abs(abs(spokes[1]) - radius) > max(1e-3, 1e-5 * radius):
         raise InputError(
             f"Curve at station {run:.3f} m", abs(spokes[1]), f"its end must lie {radius:.6g} m from Center"
         )
-    turn = sense * (math.atan2((spokes[1] / spokes[0]).imag, (spokes[1] / spokes[0]).real)) % (2.0 * math.pi)
+    turn = rotation * (math.atan2((spokes[1] / spokes[0]).imag, (spokes[1] / spokes[0]).real)) % (2.0 * math.pi)
+    # Rounding may make an almost full circle one of no angle.
     if turn < 1e-9 and abs(end - start) > SHORTEST:
         turn = 2.0 * math.pi
-    heading = math.atan2(spokes[0].imag, spokes[0].real) + sense * 0.5 * math.pi
-    curvature = sense / radius
+    heading = math.atan2(spokes[0].imag, spokes[0].real) + rotation * 0.5 * math.pi
+    curvature = rotation / radius
     return [PlanPiece("arc", run, turn * radius, start.real, start.imag, heading, (curvature, curvature))]
 
 
-def _radius(element: Element, name: str, unit: float) -> float:
-    """Return the curvature (1/m, not signed) of a radius that may be a word for infinity, or 0."""
+def _curvature(element: Element, name: str, unit: float) -> float:
+    """Return the curvature (1/m, not signed) of a radius; 0 for a radius of 0 or a word for infinity."""
     text = element.get(name, "").strip()
     if text.lower() in ("inf", "infinity", "infinite", "-inf", "+inf"):
         return 0.0
@@ -197,28 +203,29 @@ def _radius(element: Element, name: str, unit: float) -> float:
     return 1.0 / value if value > 1e-9 else 0.0
 
 
-def _spiral(element: Element, run: float, unit: float) -> list[PlanPiece]:
+def _spiral(element: Element, station: float, unit: float) -> list[PlanPiece]:
+    """Return the transition curve of a `Spiral` that begins at a station, m; an empty list for one without length."""
     start, end = (_point(element, name, unit) for name in ("Start", "End"))
     name = element.get("spiType", "clothoid")
     length = number(element, "length") * unit
-    sense = _rotation(element)
-    ends = sense * _radius(element, "radiusStart", unit), sense * _radius(element, "radiusEnd", unit)
-    place = f"Spiral at station {run:.3f} m"
+    rotation = _rotation(element)
+    curvatures = rotation * _curvature(element, "radiusStart", unit), rotation * _curvature(element, "radiusEnd", unit)
+    place = f"Spiral at station {station:.3f} m"
     if name.lower() not in _SPIRALS:
         raise InputError(f"{place}: spiType", name, f"must be one of {', '.join(_SPIRALS)}")
     if length <= SHORTEST:
         return []
     kind = _SPIRALS[name.lower()]
-    shape: tuple[float, float] | Curve = ends if kind == "clothoid" else transition(kind, length, *ends)
-    curve = transition(kind, length, *ends)
-    # Its chord says how it lies: no direction has to be believed.
+    shape: tuple[float, float] | Curve = curvatures if kind == "clothoid" else transition(kind, length, *curvatures)
+    curve = transition(kind, length, *curvatures)
+    # The chord between its end points gives its heading, so that no direction of the file is needed.
     chord = complex(*curve.positions(np.array([length]))[0].tolist())
-    away = abs(abs(end - start) - abs(chord))
-    if away > max(2e-3, 1e-5 * length):
+    length_error = abs(abs(end - start) - abs(chord))
+    if length_error > max(2e-3, 1e-5 * length):
         condition = f"its ends must be {abs(chord):.6f} m apart, as its length and radii say"
         raise InputError(place, round(abs(end - start), 6), condition)
     heading = math.atan2((end - start).imag, (end - start).real) - math.atan2(chord.imag, chord.real)
-    return [PlanPiece(name.lower(), run, length, start.real, start.imag, heading, shape)]
+    return [PlanPiece(name.lower(), station, length, start.real, start.imag, heading, shape)]
 
 
 _ELEMENTS = {"Line": _line, "Curve": _curve, "Spiral": _spiral, "IrregularLine": _points}
@@ -226,161 +233,180 @@ assert set(_SPIRALS.values()) <= set(TRANSITIONS)
 
 
 def _equations(alignment: Element, unit: float, start: float) -> list[Equation]:
+    """Return an alignment's station equations in order, with places counted from its begin, m."""
     equations = []
     for row in children(alignment, "StaEquation"):
-        internal = number(row, "staInternal") * unit - start
-        ahead = number(row, "staAhead") * unit
-        back = number(row, "staBack", number(row, "staInternal")) * unit
-        equations.append(Equation(internal, back, ahead))
+        distance = number(row, "staInternal") * unit - start
+        ahead_station = number(row, "staAhead") * unit
+        back_station = number(row, "staBack", number(row, "staInternal")) * unit
+        equations.append(Equation(distance, back_station, ahead_station))
     return sorted(equations, key=lambda each: each.station)
 
 
-def _profile(
-    alignment: Element, unit: float, start: float, equations: tuple[Equation, ...]
-) -> tuple[list[HeightPiece], list[str]]:
+def _profile(alignment: Element, unit: float, start: float) -> tuple[list[HeightPiece], list[str]]:
     """Return the pieces of the first design profile of an alignment, and what is left out of the others."""
     designs = [each for profile in children(alignment, "Profile") for each in children(profile, "ProfAlign")]
-    ground = [each for profile in children(alignment, "Profile") for each in children(profile, "ProfSurf")]
+    ground_profiles = [each for profile in children(alignment, "Profile") for each in children(profile, "ProfSurf")]
     left_out = [f"{len(designs) - 1} more design profiles"] if len(designs) > 1 else []
-    left_out += [f"{len(ground)} profiles of the ground"] if ground else []
+    left_out += [f"{len(ground_profiles)} profiles of the ground"] if ground_profiles else []
     if not designs:
         return [], left_out
     rows = [_intersection(row, unit) for row in designs[0] if local_name(row) in _CURVES]
     if not rows:
         return [], left_out
-    shift = _profile_shift(rows, start, _plan_length(alignment, unit), equations)
-    rows = [(station - shift, *rest) for station, *rest in rows]  # type: ignore[misc]
+    shift = _profile_shift(rows, start, _plan_length(alignment, unit))
+    rows = [row._replace(station=row.station - shift) for row in rows]
     return _height_pieces(rows), left_out
 
 
-_Row = tuple[float, float, float, float, float]  # station, height, tangents before and behind, radius
+class _Intersection(NamedTuple):
+    """A point of vertical intersection with its curve, lengths in m.
+
+    Attributes:
+        station, height: of the point.
+        before, behind: lengths of the curve's tangents, in plan.
+        radius: of a circle; 0 for a parabola or no curve.
+    """
+
+    station: float
+    height: float
+    before: float
+    behind: float
+    radius: float
 
 
-def _intersection(row: Element, unit: float) -> _Row:
-    """Return station and height (m), lengths of the tangents on both sides (m), and the radius of a circle or 0."""
+def _intersection(row: Element, unit: float) -> _Intersection:
+    """Return the intersection of a PVI or curve element of `ProfAlign`; raise `InputError` for half a curve."""
     kind = local_name(row)
     words = (row.text or "").split()
     if len(words) < 2:
         raise InputError(kind, " ".join(words) or None, "must be a station and an elevation")
     station, height = (finite(kind, word) * unit for word in words[:2])
-    before = behind = radius = 0.0
+    tangent_before = tangent_behind = radius = 0.0
     if kind == "ParaCurve":
-        before = behind = 0.5 * number(row, "length") * unit
+        tangent_before = tangent_behind = 0.5 * number(row, "length") * unit
     elif kind == "UnsymParaCurve":
-        before, behind = number(row, "lengthIn") * unit, number(row, "lengthOut") * unit
+        tangent_before, tangent_behind = number(row, "lengthIn") * unit, number(row, "lengthOut") * unit
     elif kind == "CircCurve":
-        before = behind = 0.5 * number(row, "length") * unit
+        tangent_before = tangent_behind = 0.5 * number(row, "length") * unit
         radius = abs(number(row, "radius", 0.0)) * unit
-    if min(before, behind) < 0.0 or (min(before, behind) <= SHORTEST < max(before, behind)):
-        raise InputError(f"{kind} at station {station:.3f} m", min(before, behind), "must have two lengths above 0 m")
-    return station, height, before, behind, radius
+    shorter, longer = sorted((tangent_before, tangent_behind))
+    if shorter < 0.0 or shorter <= SHORTEST < longer:
+        raise InputError(f"{kind} at station {station:.3f} m", shorter, "must have two lengths above 0 m")
+    return _Intersection(station, height, tangent_before, tangent_behind, radius)
 
 
 _CURVES = ("PVI", "ParaCurve", "UnsymParaCurve", "CircCurve")
 
 
 def _plan_length(alignment: Element, unit: float) -> float:
+    """Return the length, m, that an alignment states; 0 without any."""
     return number(alignment, "length", 0.0) * unit
 
 
-def _profile_shift(rows: list[_Row], start: float, length: float, equations: tuple[Equation, ...]) -> float:
-    """Return what the profile's stations are larger by than the distance from the line's begin, m.
+def _profile_shift(rows: list[_Intersection], start: float, length: float) -> float:
+    """Return the difference, m, between the profile's stations and the distances from the line's begin.
 
-    They may include the alignment's first station, or begin with 0: what covers more of the plan is taken, and told
-    where both would do.
+    A profile's stations may include the alignment's first station, or begin with 0. The difference is taken with which
+    the profile covers more of the plan.
     """
-    low, high = rows[0][0], rows[-1][0]
+    begin, end = rows[0].station, rows[-1].station
     if abs(start) < SHORTEST or length <= 0.0:
         return start
 
     def covered(shift: float) -> float:
-        return max(0.0, min(high - shift, length) - max(low - shift, 0.0))
+        """Return the length, m, of the plan that the profile covers when its stations are less by a shift (m)."""
+        return max(0.0, min(end - shift, length) - max(begin - shift, 0.0))
 
-    with_start, without = covered(start), covered(0.0)
-    if without > with_start + 1e-6:
+    with_start, without_start = covered(start), covered(0.0)
+    if without_start > with_start + 1e-6:
         text = "stations of the profile begin with %.3f m and not with the alignment's %.3f m: taken from its begin"
-        warn(text, low, start)
+        warn(text, begin, start)
         return 0.0
     return start
 
 
-def _height_pieces(rows: list[_Row]) -> list[HeightPiece]:
-    """Return grades and curves between intersections, in order of their stations.
+def _height_pieces(rows: list[_Intersection]) -> list[HeightPiece]:
+    """Return the pieces of the profile, grades and curves, between intersections in order of their stations.
 
     Raises:
         InputError: stations don't grow, or the curves of neighbours overlap.
     """
-    station = [row[0] for row in rows]
-    for before, after in itertools.pairwise(station):
-        if after - before <= SHORTEST:
-            raise InputError("ProfAlign", after, f"must be more than {before:g} m, as stations must increase")
-    if len(rows) == 1:
-        return [HeightPiece(station[0], station[0] + 1.0, rows[0][1], 0.0)]
-    grades = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in itertools.pairwise(rows)]
+    for row, next_row in itertools.pairwise(rows):
+        if next_row.station - row.station <= SHORTEST:
+            allowed = f"must be more than {row.station:g} m, as stations must increase"
+            raise InputError("ProfAlign", next_row.station, allowed)
+    if len(rows) == 1:  # one height says nothing of a grade: the profile is level
+        return [HeightPiece(rows[0].station, rows[0].station + 1.0, rows[0].height, 0.0)]
+    grades = [(b.height - a.height) / (b.station - a.station) for a, b in itertools.pairwise(rows)]
     pieces: list[HeightPiece] = []
-    at, height = station[0], rows[0][1]
+    reached, height = rows[0].station, rows[0].height  # where the pieces so far end
     for n, row in enumerate(rows):
-        inner = 0 < n < len(rows) - 1
-        before, behind = _tangents(row, grades[n - 1], grades[n]) if inner else (0.0, 0.0)
+        is_inner = 0 < n < len(rows) - 1
+        tangent_before, tangent_behind = _tangents(row, grades[n - 1], grades[n]) if is_inner else (0.0, 0.0)
         if n:
-            reach = row[0] - before
-            if reach < at - 1e-3:
+            curve_begin = row.station - tangent_before
+            if curve_begin < reached - 1e-3:
+                room = row.station - reached
                 allowed = (
-                    f"curves must not overlap: this one needs {before:.3f} m before it, but has {row[0] - at:.3f} m"
+                    f"curves must not overlap: this one needs {tangent_before:.3f} m before it, but has {room:.3f} m"
                 )
-                raise InputError(f"ProfAlign at station {row[0]:.3f} m", before, allowed)
-            if reach - at > SHORTEST:
-                pieces.append(HeightPiece(at, reach, height, grades[n - 1]))
-                height += grades[n - 1] * (reach - at)
-                at = reach
-        if inner and before + behind > SHORTEST:
-            pieces += _rounding(row, (before, behind), height, (grades[n - 1], grades[n]))
-            at = row[0] + behind
-            height = row[1] + grades[n] * behind
+                raise InputError(f"ProfAlign at station {row.station:.3f} m", tangent_before, allowed)
+            if curve_begin - reached > SHORTEST:
+                pieces.append(HeightPiece(reached, curve_begin, height, grades[n - 1]))
+                height += grades[n - 1] * (curve_begin - reached)
+                reached = curve_begin
+        if is_inner and tangent_before + tangent_behind > SHORTEST:
+            pieces += _rounding(row, (tangent_before, tangent_behind), height, (grades[n - 1], grades[n]))
+            reached = row.station + tangent_behind
+            height = row.height + grades[n] * tangent_behind
     return pieces
 
 
-def _tangents(row: _Row, rise: float, fall: float) -> tuple[float, float]:
+def _tangents(row: _Intersection, grade_before: float, grade_behind: float) -> tuple[float, float]:
     """Return how far (m) a curve reaches before and behind its intersection, between two grades.
 
     A circle's tangents are R tan(angle / 2) long along the slope, so that they differ in plan.
     """
-    if not row[4]:
-        return row[2], row[3]
-    low, high = math.atan(rise), math.atan(fall)
-    tangent = row[4] * math.tan(0.5 * abs(high - low))
-    return tangent * math.cos(low), tangent * math.cos(high)
+    if not row.radius:
+        return row.before, row.behind
+    slope_before, slope_behind = math.atan(grade_before), math.atan(grade_behind)
+    tangent = row.radius * math.tan(0.5 * abs(slope_behind - slope_before))
+    return tangent * math.cos(slope_before), tangent * math.cos(slope_behind)
 
 
 def _rounding(
-    row: _Row, tangents: tuple[float, float], height: float, grades: tuple[float, float]
+    row: _Intersection, tangents: tuple[float, float], height: float, grades: tuple[float, float]
 ) -> list[HeightPiece]:
     """Return the pieces of a curve at an intersection, from the height (m) at its begin."""
-    station, (first, second), (before, behind) = row[0], tangents, grades
-    start, end = station - first, station + second
-    if row[4] and abs(behind - before) > 1e-12:
-        return circle(start, end, height, before, behind)
-    if abs(first - second) < SHORTEST:
-        return [HeightPiece(start, end, height, before, 0.5 * (behind - before) / (end - start))]
+    station, (tangent_before, tangent_behind), (grade_before, grade_behind) = row.station, tangents, grades
+    start, end = station - tangent_before, station + tangent_behind
+    if row.radius and abs(grade_behind - grade_before) > 1e-12:
+        return circle(start, end, height, grade_before, grade_behind)
+    if abs(tangent_before - tangent_behind) < SHORTEST:
+        return [HeightPiece(start, end, height, grade_before, 0.5 * (grade_behind - grade_before) / (end - start))]
     # Two parabolas that meet at the intersection's station, with the chord's grade there.
-    middle = (before * first + behind * second) / (first + second)
-    rise = 0.5 * (before + middle) * first
+    middle_grade = (grade_before * tangent_before + grade_behind * tangent_behind) / (tangent_before + tangent_behind)
+    half_rise = 0.5 * (grade_before + middle_grade) * tangent_before
     return [
-        HeightPiece(start, station, height, before, 0.5 * (middle - before) / first),
-        HeightPiece(station, end, height + rise, middle, 0.5 * (behind - middle) / second),
+        HeightPiece(start, station, height, grade_before, 0.5 * (middle_grade - grade_before) / tangent_before),
+        HeightPiece(
+            station, end, height + half_rise, middle_grade, 0.5 * (grade_behind - middle_grade) / tangent_behind
+        ),
     ]
 
 
 def _others(alignment: Element) -> list[str]:
+    """Return texts on those elements of an alignment that aren't read, with their numbers."""
     counts = Counter(local_name(row) for row in alignment)
-    known = ("CoordGeom", "Profile", "StaEquation", "Feature", "Superelevation", "CrossSects", "")
+    read_names = ("CoordGeom", "Profile", "StaEquation", "Feature", "Superelevation", "CrossSects", "")
     sections = sum(len(children(row, "CrossSect")) for row in children(alignment, "CrossSects"))
-    lost = [f"crossfall: {sections} cross-sections, which don't say what of them is paved"] if sections else []
-    return lost + [f"{count} {name}" for name, count in sorted(counts.items()) if name not in known]
+    texts = [f"crossfall: {sections} cross-sections, which don't say what of them is paved"] if sections else []
+    return texts + [f"{count} {name}" for name, count in sorted(counts.items()) if name not in read_names]
 
 
 def _roadways(root: Element) -> dict[str, list[str]]:
-    """Return what roadways say of lanes and speeds and isn't read, as text with numbers, by names of alignments."""
+    """Return texts on lanes and speeds of roadways, which aren't read, by the names of their alignments."""
     texts_by_name: dict[str, list[str]] = {}
     for roadway in (each for group in children(root, "Roadways") for each in children(group, "Roadway")):
         counts = Counter(local_name(each) for group in children(roadway, "Lanes") for each in group)

@@ -37,14 +37,16 @@ SHORTEST = 1e-6
 
 @contextmanager
 def within_limits(place: str) -> Iterator[None]:
-    """Context that turns a parameter set's refusal of a value of a file into one line that begins with its place."""
+    """Context that turns a parameter set's refusal of a file's value into an `InputError` that names its place."""
     try:
         yield
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
         field = ".".join(str(part) for part in fault["loc"]) or "axis"
-        wrong = on_one_line(str(fault["msg"]).lower())
-        raise InputError(f"{place}: {field}", fault.get("input"), f"no road may be so ({wrong})") from None
+        reason = on_one_line(str(fault["msg"]).lower())
+        raise InputError(
+            f"{place}: {field}", fault.get("input"), f"must be within the limits of a parameter set ({reason})"
+        ) from None
 
 
 class LineNames:
@@ -54,7 +56,7 @@ class LineNames:
         self._used: Counter[str] = Counter()
 
     def unique(self, name: str | None, otherwise: str) -> str:
-        """Return the name for a line of a name; of one without any, what is said otherwise."""
+        """Return a line's name (`otherwise` if it has none), with a number behind it where an earlier line has it."""
         shown = (name or "").strip()[:_LONGEST_NAME] or otherwise
         self._used[shown] += 1
         return shown if self._used[shown] == 1 else f"{shown} ({self._used[shown]})"
@@ -168,6 +170,8 @@ class ExactAxis:
 
 @dataclass
 class _Chain:
+    """Elements in order, exact stations (m) of the file's pieces, and the rows of `ExactAxis.approximated`."""
+
     elements: list[Element] = field(default_factory=list)
     starts: list[float] = field(default_factory=list)  # exact stations of the pieces
     approximated: list[tuple[str, float, int, float]] = field(default_factory=list)
@@ -187,30 +191,37 @@ def exact_axis(line: RoadLine, round_kinks: float | None = None) -> ExactAxis:
     if round_kinks is not None and line.pieces:
         line, roundings = rounded(line, _joints(line.pieces)[1], KINK, round_kinks, SHARPEST)
     chain = _Chain()
-    run = 0.0
+    chained_length = 0.0
     for piece in line.pieces:
-        chain.starts.append(run)
-        _refuse_unfit(line, piece, run)
+        chain.starts.append(chained_length)
+        _refuse_unfit(line, piece, chained_length)
         if isinstance(piece.shape, Curve):
-            elements, worst = as_elements(piece.shape)
-            chain.approximated.append((piece.kind, piece.station, len(elements), worst))
+            elements, deviation = as_elements(piece.shape)
+            chain.approximated.append((piece.kind, piece.station, len(elements), deviation))
         else:
             elements = [Element(piece.length, *piece.shape)]
         chain.elements += elements
-        run += math.fsum(element.length for element in elements)
+        chained_length += math.fsum(element.length for element in elements)
     if not chain.elements:
         raise InputError(line.name, None, "must have an element that is longer than 0 m")
-    first = line.pieces[0]
-    alignment = Alignment(chain.elements, first.x, first.y, first.heading)
+    first_piece = line.pieces[0]
+    alignment = Alignment(chain.elements, first_piece.x, first_piece.y, first_piece.heading)
     gaps, kinks = _joints(line.pieces)
     drift = _drift(alignment, line.pieces, chain.starts)
-    at = [piece.station for piece in line.pieces]
+    stations = [piece.station for piece in line.pieces]
     worst_gap, worst_kink, worst_drift = (int(np.argmax(values)) for values in (gaps, kinks, drift))
     axis = ExactAxis(
         alignment,
-        as_parabolas(_moved(line, chain.starts, run)) if line.heights else None,
+        as_parabolas(_heights_along(line, chain.starts, chained_length)) if line.heights else None,
         tuple(chain.approximated),
-        *(gaps[worst_gap], at[worst_gap], kinks[worst_kink], at[worst_kink], drift[worst_drift], at[worst_drift]),
+        *(
+            gaps[worst_gap],
+            stations[worst_gap],
+            kinks[worst_kink],
+            stations[worst_kink],
+            drift[worst_drift],
+            stations[worst_drift],
+        ),
         starts=tuple(chain.starts),
         roundings=tuple(roundings),
     )
@@ -218,101 +229,105 @@ def exact_axis(line: RoadLine, round_kinks: float | None = None) -> ExactAxis:
     return axis
 
 
-def _refuse_unfit(line: RoadLine, piece: PlanPiece, run: float) -> None:
-    """Raise `InputError` for a piece that no road has, from a station (m) on: too long, or too sharp a bend."""
+def _refuse_unfit(line: RoadLine, piece: PlanPiece, start: float) -> None:
+    """Raise `InputError` for a piece that begins at a station (m) and is too long or too sharp a bend for a road."""
     curve = piece.shape if isinstance(piece.shape, Curve) else None
     length = curve.length if curve else piece.length
     place = f"{line.name}: {piece.kind} at station {piece.station:.3f} m"
-    if run + length > LONGEST_ROAD:
-        raise InputError(f"{place}: its end, m", run + length, f"must be at most {LONGEST_ROAD:g} m")
-    bends = curve.curvature(np.linspace(0.0, length, _SAMPLES)) if curve else np.array(piece.shape)
-    sharpest = float(np.abs(bends).max())
-    if not sharpest <= SHARPEST:
+    if start + length > LONGEST_ROAD:
+        raise InputError(f"{place}: its end, m", start + length, f"must be at most {LONGEST_ROAD:g} m")
+    curvatures = curve.curvature(np.linspace(0.0, length, _SAMPLES)) if curve else np.array(piece.shape)
+    largest_curvature = float(np.abs(curvatures).max())
+    if not largest_curvature <= SHARPEST:
         raise InputError(
-            f"{place}: curvature, 1/m", sharpest, f"must be at most {SHARPEST:g}, as no road has sharper bends"
+            f"{place}: curvature, 1/m", largest_curvature, f"must be at most {SHARPEST:g}, as no road has sharper bends"
         )
 
 
 def _joints(pieces: Sequence[PlanPiece]) -> tuple[list[float], list[float]]:
-    """Return the gap (m) and the kink (rad) before each piece, 0 before the first."""
+    """Return the gap (m) and the kink (rad, not signed) before each piece, 0 before the first."""
     gaps, kinks = [0.0], [0.0]
-    for piece, after in itertools.pairwise(pieces):
+    for piece, next_piece in itertools.pairwise(pieces):
         x, y, heading = end_pose(piece)
-        gaps.append(math.hypot(after.x - x, after.y - y))
-        kinks.append(abs(math.remainder(after.heading - heading, 2.0 * math.pi)))
+        gaps.append(math.hypot(next_piece.x - x, next_piece.y - y))
+        kinks.append(abs(math.remainder(next_piece.heading - heading, 2.0 * math.pi)))
     return gaps, kinks
 
 
 def end_pose(piece: PlanPiece) -> tuple[float, float, float]:
-    """Return where a piece ends: x, y (m) and heading (rad)."""
+    """Return x, y (m) and heading (rad) of a piece's end."""
     if isinstance(piece.shape, Curve):
         end = np.array([piece.shape.length])
-        along, across = piece.shape.positions(end)[0].tolist()
+        forward, leftward = piece.shape.positions(end)[0].tolist()
         cos, sin = math.cos(piece.heading), math.sin(piece.heading)
-        turned = piece.heading + float(piece.shape.heading(end)[0])
-        return piece.x + along * cos - across * sin, piece.y + along * sin + across * cos, turned
-    alone = Alignment([Element(piece.length, *piece.shape)], piece.x, piece.y, piece.heading)
-    position, heading, _ = alone.frame(alone.length)
+        end_heading = piece.heading + float(piece.shape.heading(end)[0])
+        return piece.x + forward * cos - leftward * sin, piece.y + forward * sin + leftward * cos, end_heading
+    alignment = Alignment([Element(piece.length, *piece.shape)], piece.x, piece.y, piece.heading)
+    position, heading, _ = alignment.frame(alignment.length)
     return float(position[0]), float(position[1]), float(heading)
 
 
 def sampled(line: RoadLine) -> tuple[Float, Float]:
-    """Return places (N, 2) along a line's pieces as the file has them, a metre or less apart, and stations (N,), m."""
+    """Return places (N, 2), m, on a line's pieces as the file has them, at most 1 m apart, and stations (N,), m."""
     places, stations = [], []
     for piece in line.pieces:
-        long = piece.shape.length if isinstance(piece.shape, Curve) else piece.length
-        along = np.linspace(0.0, long, max(2, min(_SAMPLES, math.ceil(long) + 1)))
+        curve_length = piece.shape.length if isinstance(piece.shape, Curve) else piece.length
+        distances = np.linspace(0.0, curve_length, max(2, min(_SAMPLES, math.ceil(curve_length) + 1)))
         if isinstance(piece.shape, Curve):
-            inner = piece.shape.positions(along) @ np.array([1.0, 1j]) * np.exp(1j * piece.heading)
-            places.append(np.column_stack([inner.real, inner.imag]) + [piece.x, piece.y])
+            curve_places = piece.shape.positions(distances) @ np.array([1.0, 1j]) * np.exp(1j * piece.heading)
+            places.append(np.column_stack([curve_places.real, curve_places.imag]) + [piece.x, piece.y])
         else:
-            alone = Alignment([Element(piece.length, *piece.shape)], piece.x, piece.y, piece.heading)
-            places.append(alone.position(along))
-        stations.append(piece.station + along * (piece.length / long))
+            alignment = Alignment([Element(piece.length, *piece.shape)], piece.x, piece.y, piece.heading)
+            places.append(alignment.position(distances))
+        # A curve may be longer than the file says: its stations are spread over the file's length.
+        stations.append(piece.station + distances * (piece.length / curve_length))
     return np.vstack(places), np.concatenate(stations)
 
 
 def heights_at(line: RoadLine, station: Float) -> Float:
     """Return the file's heights (N,), m, at stations (N,) of a line with heights; end grades go on beyond its ends."""
     starts = np.array([piece.start for piece in line.heights])
-    owner = np.clip(np.searchsorted(starts, station, "right") - 1, 0, len(starts) - 1)
-    rows = np.array([(h.start, h.end, h.elevation, h.grade, h.square, h.cube) for h in line.heights])[owner]
-    first, last, level, grade, square, cube = rows.T
-    u = np.clip(station, first, last) - first
-    beyond = station - first - u
-    there = level + u * (grade + u * (square + u * cube))
-    return np.asarray(there + beyond * (grade + u * (2.0 * square + 3.0 * u * cube)))
+    piece_index = np.clip(np.searchsorted(starts, station, "right") - 1, 0, len(starts) - 1)
+    rows = np.array([(h.start, h.end, h.elevation, h.grade, h.square, h.cube) for h in line.heights])[piece_index]
+    piece_start, piece_end, start_height, grade, square, cube = rows.T
+    u = np.clip(station, piece_start, piece_end) - piece_start
+    overhang = station - piece_start - u
+    inner_height = start_height + u * (grade + u * (square + u * cube))
+    return np.asarray(inner_height + overhang * (grade + u * (2.0 * square + 3.0 * u * cube)))
 
 
 def _drift(alignment: Alignment, pieces: Sequence[PlanPiece], starts: Sequence[float]) -> list[float]:
-    """Return how far (m) the chained elements are from the start of each piece."""
-    given = np.array([(piece.x, piece.y) for piece in pieces])
-    distances: list[float] = np.hypot(*(alignment.position(np.array(starts)) - given).T).tolist()
+    """Return for each piece how far (m) the chained elements are from the start that the file gives the piece."""
+    file_starts = np.array([(piece.x, piece.y) for piece in pieces])
+    distances: list[float] = np.hypot(*(alignment.position(np.array(starts)) - file_starts).T).tolist()
     return distances
 
 
-def _moved(line: RoadLine, starts: Sequence[float], length: float) -> list[HeightPiece]:
-    """Return the pieces of the profile with stations along the alignment, whose curves may be longer than said."""
-    given = np.array([*(piece.station for piece in line.pieces), line.length])
-    exact = np.array([*starts, length])
-    if np.abs(given - exact).max() < 1e-9:
+def _heights_along(line: RoadLine, starts: Sequence[float], length: float) -> list[HeightPiece]:
+    """Return the profile's pieces with stations along the alignment, whose curves may be longer than the file says."""
+    file_stations = np.array([*(piece.station for piece in line.pieces), line.length])
+    axis_stations = np.array([*starts, length])
+    if np.abs(file_stations - axis_stations).max() < 1e-9:
         return list(line.heights)
     borders = np.array([[piece.start, piece.end] for piece in line.heights])
-    there = np.interp(borders, given, exact) + np.where(borders > given[-1], borders - given[-1], 0.0)
-    there += np.where(borders < 0.0, borders, 0.0)
+    # Before the first piece and behind the last one stations are shifted by as much as at that end.
+    moved_borders = np.interp(borders, file_stations, axis_stations) + np.where(
+        borders > file_stations[-1], borders - file_stations[-1], 0.0
+    )
+    moved_borders += np.where(borders < 0.0, borders, 0.0)
     return [
         HeightPiece(float(a), float(b), piece.elevation, piece.grade, piece.square, piece.cube)
-        for piece, (a, b) in zip(line.heights, there, strict=True)
+        for piece, (a, b) in zip(line.heights, moved_borders, strict=True)
     ]
 
 
 def _refuse_broken(line: RoadLine, axis: ExactAxis) -> None:
-    """Raise `InputError` where elements don't join, or a curve isn't followed as near as that."""
+    """Raise `InputError` where elements have a gap or kink between them, or keep too far from a curve."""
     name = f"{line.source} {line.name!r}"
-    for kind, station, _, worst in axis.approximated:
-        if worst > GAP:
+    for kind, station, _, deviation in axis.approximated:
+        if deviation > GAP:
             allowed = f"clothoids must follow this curve within {1000 * GAP:g} mm, but can't, as it bends too much"
-            raise InputError(f"{name}: {kind} at station {station:.3f} m: distance, m", round(worst, 6), allowed)
+            raise InputError(f"{name}: {kind} at station {station:.3f} m: distance, m", round(deviation, 6), allowed)
     if axis.gap > GAP:
         allowed = f"elements must join within {1000 * GAP:g} mm, but those at station {axis.gap_station:.3f} m don't"
         raise InputError(f"{name}: gap, m", round(axis.gap, 6), allowed)

@@ -35,27 +35,27 @@ def read_opendrive(path: Path) -> list[RoadLine]:
     """Return the roads of an OpenDRIVE file, those of junctions among them.
 
     Raises:
-        MissingFileError, InputError: it can't be read, isn't OpenDRIVE, or a number in it is none.
+        MissingFileError, InputError: the file can't be read, isn't OpenDRIVE, or holds no number where one must be.
     """
     root = read_xml(path)
     header = child(root, "header")
     system = _system(path, header)
     shift = _shift(header)
     names, lines = LineNames(), list[RoadLine]()
-    for number_of, road in enumerate(children(root, "road")):
-        unique = names.unique(road.get("name"), f"road {road.get('id', number_of)}")
+    for row, road in enumerate(children(root, "road")):
+        name = names.unique(road.get("name"), f"road {road.get('id', row)}")
         try:
-            if line := _road(road, unique, system, shift):
+            if line := _road(road, name, system, shift):
                 lines.append(line)
         except InputError as error:
-            lines.append(RoadLine(unique, "OpenDRIVE road", (), system=system, fault=error))
+            lines.append(RoadLine(name, "OpenDRIVE road", (), system=system, fault=error))
     return lines
 
 
 def _system(path: Path, header: Element | None) -> MapSystem | None:
     """Return the system that the header names; None without a word on it, and where nobody knows it (warned)."""
-    named = None if header is None else child(header, "geoReference")
-    text = "" if named is None else "".join(named.itertext()).strip()
+    reference = None if header is None else child(header, "geoReference")
+    text = "" if reference is None else "".join(reference.itertext()).strip()
     if not text:
         return None
     try:
@@ -68,13 +68,13 @@ def _system(path: Path, header: Element | None) -> MapSystem | None:
 
 
 def _with_noted_codes(header: Element | None, system: MapSystem) -> MapSystem:
-    """Return the system by the EPSG codes that a header of ours notes beside its PROJ string, if both are one system.
+    """Return the system with EPSG codes that our own files note beside the PROJ string, if that is the same system.
 
     A PROJ string names neither the datum nor what heights are counted from.
     """
-    notes = {} if header is None else {row.get("code"): row.get("value", "") for row in children(header, "userData")}
+    values = {} if header is None else {row.get("code"): row.get("value", "") for row in children(header, "userData")}
     codes = [
-        int(text) if _CODE.fullmatch(text) else None for text in (notes.get("epsg", ""), notes.get("height_epsg", ""))
+        int(text) if _CODE.fullmatch(text) else None for text in (values.get("epsg", ""), values.get("height_epsg", ""))
     ]
     if codes[0] is None:
         return system
@@ -101,6 +101,10 @@ def _shift(header: Element | None) -> tuple[float, float, float, float]:
 def _road(
     road: Element, name: str, system: MapSystem | None, shift: tuple[float, float, float, float]
 ) -> RoadLine | None:
+    """Return the line of a road element in the map's coordinates; None without a geometry that is longer than 0 m.
+
+    `shift` is what `_shift` returns for the header.
+    """
     plan = child(road, "planView")
     pieces = [] if plan is None else [_piece(geometry) for geometry in children(plan, "geometry")]
     pieces = [piece for piece in pieces if piece.length > SHORTEST]
@@ -108,7 +112,7 @@ def _road(
         return None
     x, y, z, turn = shift
     cos, sin = math.cos(turn), math.sin(turn)
-    placed = tuple(
+    map_pieces = tuple(
         replace(
             piece,
             x=x + piece.x * cos - piece.y * sin,
@@ -117,11 +121,11 @@ def _road(
         )
         for piece in pieces
     )
-    end = placed[-1].station + placed[-1].length
+    end = map_pieces[-1].station + map_pieces[-1].length
     return RoadLine(
         name=name,
         source="OpenDRIVE road",
-        pieces=placed,
+        pieces=map_pieces,
         heights=tuple(_heights(road, end, z)),
         system=system,
         lanes=_lane_count(road, 0.5 * end),
@@ -131,6 +135,7 @@ def _road(
 
 
 def _piece(geometry: Element) -> PlanPiece:
+    """Return the piece of a geometry element in the file's coordinates; raise `InputError` for one that is no curve."""
     station, length = number(geometry, "s"), number(geometry, "length")
     x, y, heading = (number(geometry, name) for name in ("x", "y", "hdg"))
     shapes = [each for each in geometry if local_name(each) in _SHAPES]
@@ -142,7 +147,7 @@ def _piece(geometry: Element) -> PlanPiece:
     if length <= SHORTEST:
         return PlanPiece(kind, station, 0.0, x, y, heading, (0.0, 0.0))
     try:
-        shape, turn, start = _SHAPES[kind](shapes[0], length)
+        shape, start_turn, start = _SHAPES[kind](shapes[0], length)
     except ValueError as error:
         raise InputError(place, kind, f"must be a curve, but {error}") from None
     cos, sin = math.cos(heading), math.sin(heading)
@@ -150,44 +155,50 @@ def _piece(geometry: Element) -> PlanPiece:
     if isinstance(shape, Curve) and abs(shape.length - length) > _LENGTHS * length:
         text = "the curve at s = %.3f m is %.3f m long, where the file says %.3f m: the curve counts"
         warn(text, station, shape.length, length)
-    return PlanPiece(kind, station, length, x, y, heading + turn, shape)
+    return PlanPiece(kind, station, length, x, y, heading + start_turn, shape)
 
 
 _Shape = tuple[tuple[float, float] | Curve, float, tuple[float, float]]
+"""Curvatures at both ends (1/m) or a curve; its turn (rad) against the file's heading; its start (m) in that frame."""
 _AT_START = (0.0, 0.0)
 
 
 def _line(_: Element, __: float) -> _Shape:
+    """Return the shape of a straight line."""
     return (0.0, 0.0), 0.0, _AT_START
 
 
 def _arc(element: Element, _: float) -> _Shape:
+    """Return the shape of an arc of constant curvature."""
     curvature = number(element, "curvature")
     return (curvature, curvature), 0.0, _AT_START
 
 
 def _spiral(element: Element, _: float) -> _Shape:
+    """Return the shape of a clothoid between two curvatures."""
     return (number(element, "curvStart"), number(element, "curvEnd")), 0.0, _AT_START
 
 
 def _poly3(element: Element, length: float) -> _Shape:
+    """Return the shape of a cubic of the distance along the tangent (m), up to an arc length (m)."""
     v = np.array([number(element, name) for name in "abcd"])
     curve, turn, start = cubic_up_to(v, length)
     return curve, turn, (float(start[0]), float(start[1]))
 
 
 def _param_poly3(element: Element, length: float) -> _Shape:
+    """Return the shape of two cubics of a parameter, which ends at 1 or at the length (m)."""
     u, v = (np.array([number(element, f"{power}{axis}") for power in "abcd"]) for axis in "UV")
-    last = 1.0 if element.get("pRange", "normalized") == "normalized" else length
-    curve, turn, start = cubic_curve(u, v, last)
+    end = 1.0 if element.get("pRange", "normalized") == "normalized" else length
+    curve, turn, start = cubic_curve(u, v, end)
     return curve, turn, (float(start[0]), float(start[1]))
 
 
 _SHAPES = {"line": _line, "arc": _arc, "spiral": _spiral, "poly3": _poly3, "paramPoly3": _param_poly3}
 
 
-def _heights(road: Element, end: float, up: float) -> list[HeightPiece]:
-    """Return the pieces of a road's elevation up to its end, m; empty where it has none."""
+def _heights(road: Element, end: float, z_offset: float) -> list[HeightPiece]:
+    """Return the pieces of a road's elevation up to its end, m, raised by the header's z; empty where it has none."""
     profile = child(road, "elevationProfile")
     rows = [] if profile is None else children(profile, "elevation")
     records = sorted([number(row, name) for name in ("s", "a", "b", "c", "d")] for row in rows)
@@ -196,10 +207,10 @@ def _heights(road: Element, end: float, up: float) -> list[HeightPiece]:
     if not records:
         return []
     ends = [row[0] for row in records[1:]] + [end]
-    pieces = [HeightPiece(s, e, a + up, b, c, d) for (s, a, b, c, d), e in zip(records, ends, strict=True)]
-    first = pieces[0]
-    if first.start > SHORTEST:  # heights begin with 0 before the first record
-        pieces.insert(0, HeightPiece(0.0, first.start, up, 0.0))
+    pieces = [HeightPiece(s, e, a + z_offset, b, c, d) for (s, a, b, c, d), e in zip(records, ends, strict=True)]
+    first_piece = pieces[0]
+    if first_piece.start > SHORTEST:  # heights begin with 0 before the first record
+        pieces.insert(0, HeightPiece(0.0, first_piece.start, z_offset, 0.0))
     return pieces
 
 
@@ -209,13 +220,13 @@ def _lane_count(road: Element, station: float) -> int | None:
     sections = [] if lanes is None else children(lanes, "laneSection")
     if not sections:
         return None
-    before = [section for section in sections if number(section, "s") <= station] or sections[:1]
-    sides = [side for name in ("left", "right") for side in children(before[-1], name)]
+    sections_before = [section for section in sections if number(section, "s") <= station] or sections[:1]
+    sides = [side for name in ("left", "right") for side in children(sections_before[-1], name)]
     return sum(len(children(side, "lane")) for side in sides)
 
 
 def _left_out(road: Element) -> list[str]:
-    """Return what is on a road beside its line, as texts with numbers."""
+    """Return texts with the numbers of lane sections, lateral profiles, objects and signals, which aren't read here."""
     texts = []
     lanes = child(road, "lanes")
     if lanes is not None and (sections := children(lanes, "laneSection")):
@@ -225,7 +236,7 @@ def _left_out(road: Element) -> list[str]:
         counts = Counter(local_name(row) for row in lateral)
         texts.append("lateral profile: " + ", ".join(f"{count} {name}" for name, count in sorted(counts.items())))
     for group, text in _OBJECTS.items():
-        things = child(road, group)
-        if things is not None and len(things):
-            texts.append(f"{len(things)} {text}")
+        group_element = child(road, group)
+        if group_element is not None and len(group_element):
+            texts.append(f"{len(group_element)} {text}")
     return texts

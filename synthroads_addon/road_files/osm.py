@@ -29,7 +29,7 @@ def read_osm(path: Path) -> list[PointLine]:
     """Return the roads of a file of OpenStreetMap in XML: ways chained by reference or name, see `roads_of_ways`.
 
     Raises:
-        MissingFileError, InputError: it can't be read, or a value is none of a map.
+        MissingFileError, InputError: the file can't be read, or holds a value that no map has.
     """
     data: _Data = parse_xml(path, _Target(path.name))
     return roads_of_ways(_placed(data))
@@ -39,7 +39,7 @@ def read_pbf(path: Path) -> list[PointLine]:
     """Return the roads of a binary file of OpenStreetMap, as `read_osm` does.
 
     Raises:
-        MissingFileError, InputError: it can't be read.
+        MissingFileError, InputError: the file can't be read.
         MissingPackageError: pyosmium isn't installed.
     """
     try:
@@ -54,7 +54,7 @@ def read_pbf(path: Path) -> list[PointLine]:
         for way in osmium.FileProcessor(source, osmium.osm.WAY).with_filter(osmium.filter.KeyFilter("highway")):
             data.take(way.id, {tag.k: tag.v for tag in way.tags}, [node.ref for node in way.nodes])
         source = osmium.io.File(str(path.resolve()), "pbf")
-        node_ids = data.wanted
+        node_ids = data.node_ids
         node: Any
         for node in osmium.FileProcessor(source, osmium.osm.NODE):
             if node.id in node_ids and node.location.valid():
@@ -80,30 +80,30 @@ class _Data:
             self.ways[number] = {key: on_one_line(value) for key, value in tags.items()}, nodes
 
     @property
-    def wanted(self) -> set[int]:
+    def node_ids(self) -> set[int]:
         """Return the numbers of the nodes of its roads."""
         return {node for _, nodes in self.ways.values() for node in nodes}
 
 
 def _placed(data: _Data) -> Iterable[OsmWay]:
-    """Yield the roads in order of their numbers with the places of their nodes, where these are in the file.
+    """Yield the roads in order of their numbers, with longitude and latitude (N, 2) of those nodes that the file has.
 
     A way whose nodes are partly outside of the file, as at the edge of an extract, becomes several.
     """
     for number, (tags, nodes) in sorted(data.ways.items()):
         runs: list[list[int]] = [[]]
-        missing = 0
+        missing_count = 0
         for node in nodes:
             if node in data.nodes:
                 if not runs[-1] or runs[-1][-1] != node:
                     runs[-1].append(node)
             else:
-                missing += 1
+                missing_count += 1
                 runs.append([])
         for run in runs:
             if len(run) > 1:
                 place: Float = np.array([data.nodes[node] for node in run], dtype=np.float64)
-                yield OsmWay(number, tags, tuple(run), place, missing)
+                yield OsmWay(number, tags, tuple(run), place, missing_count)
 
 
 class _Target:
@@ -116,24 +116,24 @@ class _Target:
         self._root = False
 
     def start(self, tag: str, attributes: Mapping[str, str]) -> None:
-        """Take an element's attributes."""
+        """Take a node, begin a way, or add a node's number or a tag to the way that was begun."""
         if not self._root and tag != "osm":
-            raise InputError(
-                self._name, tag[:80], "must have osm as its root element: this file is no map of OpenStreetMap"
-            )
+            allowed = "must have osm as its root element: this file is no map of OpenStreetMap"
+            raise InputError(self._name, tag[:80], allowed)
         self._root = True
         if tag == "node":
             self._node(attributes)
         elif tag == "way":
-            kept = attributes.get("visible") != "false" and attributes.get("action") != "delete"
-            self._way = (self._number(attributes, "way id", "id"), {}, []) if kept else None
+            is_current = attributes.get("visible") != "false" and attributes.get("action") != "delete"
+            # Editors mark what is deleted; such a way isn't on the map any more.
+            self._way = (self._number(attributes, "way id", "id"), {}, []) if is_current else None
         elif self._way is not None and tag == "nd":
             self._way[2].append(self._number(attributes, "nd ref", "ref"))
         elif self._way is not None and tag == "tag":
             self._way[1][attributes.get("k", "")[:255]] = attributes.get("v", "")[:255]
 
     def end(self, tag: str) -> None:
-        """Keep a way that is complete."""
+        """Keep a way at its end tag, if it is a road."""
         if tag == "way" and self._way is not None:
             number, tags, nodes = self._way
             self._data.take(number, tags, nodes)
@@ -144,10 +144,11 @@ class _Target:
         refuse_doctype(name)
 
     def close(self) -> _Data:
-        """Return what was kept."""
+        """Return the nodes and roads of the file."""
         return self._data
 
     def _node(self, attributes: Mapping[str, str]) -> None:
+        """Keep longitude and latitude (degrees) of a node that isn't deleted, by its number."""
         if attributes.get("visible") == "false" or attributes.get("action") == "delete":
             return
         number = self._number(attributes, "node id", "id")
@@ -157,9 +158,10 @@ class _Target:
             raise InputError(place, [longitude, latitude], "must be a longitude and a latitude in degrees")
         self._data.nodes[number] = longitude, latitude
 
-    def _number(self, attributes: Mapping[str, str], what: str, key: str) -> int:
+    def _number(self, attributes: Mapping[str, str], field: str, key: str) -> int:
+        """Return the whole number in an element's attribute `key`; an error calls it by `field`."""
         text = attributes.get(key, "")
         digits = text.removeprefix("-")  # editors give what is new negative numbers
         if not (digits.isascii() and digits.isdecimal() and len(digits) < 20 and int(digits) < _LARGEST_ID):
-            raise InputError(f"{self._name}: {what}", text[:80] or None, "must be a whole number")
+            raise InputError(f"{self._name}: {field}", text[:80] or None, "must be a whole number")
         return int(text)

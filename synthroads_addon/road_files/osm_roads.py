@@ -45,12 +45,12 @@ def roads_of_ways(ways: Iterable[OsmWay]) -> list[PointLine]:
         may_pair = chain.directed and chain.label and not chain.link and not chain.roundabout
         groups[chain.label if may_pair else None].append(chain)
     for label, chains in groups.items():
-        pairs, why = pairs_of(chains) if label is not None else ([], {})
+        pairs, reasons = pairs_of(chains) if label is not None else ([], {})
         lines += [(label or "", _of_pair(pair)) for pair in pairs]
         for n, chain in enumerate(chains):
-            other, reason = why.get(n, (n, ""))
-            lonely = f"{label} {_heading(chains[other])} isn't paired with it: {reason}" if reason else None
-            line = replace(_of_chain(chain, lonely), carriageway=any(chain in (p.one, p.other) for p in pairs))
+            other, reason = reasons.get(n, (n, ""))
+            remark = f"{label} {_heading(chains[other])} isn't paired with it: {reason}" if reason else None
+            line = replace(_of_chain(chain, remark), carriageway=any(chain in (p.one, p.other) for p in pairs))
             lines.append(_named(line, chain))
     lines.sort(key=lambda row: -_length(row[1].points))
     names = LineNames()
@@ -58,7 +58,7 @@ def roads_of_ways(ways: Iterable[OsmWay]) -> list[PointLine]:
 
 
 def _named(line: PointLine, chain: Chain) -> tuple[str, PointLine]:
-    """Return a chain's line and its name, with the direction it leads to if it is driven in one."""
+    """Return a chain's name, with the direction it leads to if it is one-way, and its line."""
     if chain.label is None:
         way = chain.ways[0]
         return f"{way.tags['highway']} {way.number}", line
@@ -66,6 +66,7 @@ def _named(line: PointLine, chain: Chain) -> tuple[str, PointLine]:
 
 
 def _length(points: Float) -> float:
+    """Return the length (m) of a line of longitudes and latitudes (N, 2 or 3), degrees."""
     return float(np.hypot(*np.diff(on_plane(points[:, :2], points[0, :2]), axis=0).T).sum())
 
 
@@ -76,17 +77,19 @@ def _heading(chain: Chain) -> str:
 
 
 def _with_heights(points: Float) -> Float:
+    """Return points (N, 2) with a height of 0: (N, 3)."""
     return np.column_stack([points, np.zeros(len(points))])
 
 
 def _of_chain(chain: Chain, not_paired: str | None) -> PointLine:
+    """Return a chain's line, without a name yet; `not_paired` is a remark on why it is no carriageway of a pair."""
     spans = list(chain.spans())
-    section, left_out, remarks = _told({"": spans})
+    section, left_out, remarks = _section_of({"": spans})
     if not_paired:
         remarks = (*remarks, not_paired)
-    missing = sum(way.missing for way in {way.number: way for way in chain.ways}.values())
-    if missing:
-        left_out = (*left_out, f"nodes that the file lacks: {missing}")
+    missing_count = sum(way.missing for way in {way.number: way for way in chain.ways}.values())
+    if missing_count:
+        left_out = (*left_out, f"nodes that the file lacks: {missing_count}")
     points = _with_heights(chain.points)
     tags = chain.tags
     junction = chain.link or chain.roundabout
@@ -95,13 +98,16 @@ def _of_chain(chain: Chain, not_paired: str | None) -> PointLine:
 
 
 def _of_pair(pair: Pair) -> PointLine:
-    first = _within(pair.one.spans(), lambda s: s - pair.begin, pair.end - pair.begin)
-    second = _within(pair.other.spans(), _stations_on(pair), pair.end - pair.begin)
-    section, left_out, remarks = _told({_heading(pair.one): first, _heading(pair.other): second})
-    low, high = pair.spread_range
+    """Return the axis of a pair of carriageways as a line without a name, with what the tags of both say."""
+    one_spans = _within(pair.one.spans(), lambda s: s - pair.begin, pair.end - pair.begin)
+    other_spans = _within(pair.other.spans(), _stations_on(pair), pair.end - pair.begin)
+    section, left_out, remarks = _section_of({_heading(pair.one): one_spans, _heading(pair.other): other_spans})
+    least, largest = pair.spread_range
     section = replace(section, spread=pair.spread, one_way=False)
-    if high - low > _SAME_WIDTH:
-        left_out += (f"median: the carriageways are {low:.1f} to {high:.1f} m apart, {pair.spread:.1f} m all along",)
+    if largest - least > _SAME_WIDTH:
+        left_out += (
+            f"median: the carriageways are {least:.1f} to {largest:.1f} m apart, {pair.spread:.1f} m all along",
+        )
     names = f"{_heading(pair.one)} and {_heading(pair.other)}"
     remarks += (
         f"its axis lies midway between its carriageways, {names}, which are {pair.spread:.1f} m apart",
@@ -114,11 +120,14 @@ def _of_pair(pair: Pair) -> PointLine:
 
 
 def _cut(chain: Chain, pair: Pair) -> Float:
-    """Return the nodes (N, 2) of a carriageway that the axis of its pair runs beside; all if these are too few."""
-    place = np.array([_stations_on(pair)(s) for s in chain.stations.tolist()]) if chain is pair.other else None
-    station = chain.stations - pair.begin if place is None else place
-    kept = chain.points[(station >= 0.0) & (station <= pair.end - pair.begin)]
-    return kept if len(kept) > 1 else chain.points
+    """Return the nodes (N, 2) of a carriageway beside its pair's axis; all nodes where fewer than two are."""
+    if chain is pair.other:
+        axis_station = _stations_on(pair)
+        station = np.array([axis_station(s) for s in chain.stations.tolist()])
+    else:
+        station = chain.stations - pair.begin
+    nodes = chain.points[(station >= 0.0) & (station <= pair.end - pair.begin)]
+    return nodes if len(nodes) > 1 else chain.points
 
 
 def _stations_on(pair: Pair) -> Callable[[float], float]:
@@ -127,31 +136,35 @@ def _stations_on(pair: Pair) -> Callable[[float], float]:
 
     origin = pair.points[0]
     axis = on_plane(pair.points, origin)
-    run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(axis, axis=0).T))])
-    count = max(2, int(min(np.ceil(run[-1] / 5.0), 100_000)))
-    station = np.linspace(0.0, run[-1], count)
-    tree = cKDTree(np.column_stack([np.interp(station, run, axis[:, 0]), np.interp(station, run, axis[:, 1])]))
+    axis_run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(axis, axis=0).T))])
+    # Places of the axis some 5 m apart (chosen), of which the nearest one is looked for.
+    count = max(2, int(min(np.ceil(axis_run[-1] / 5.0), 100_000)))
+    station = np.linspace(0.0, axis_run[-1], count)
+    tree = cKDTree(
+        np.column_stack([np.interp(station, axis_run, axis[:, 0]), np.interp(station, axis_run, axis[:, 1])])
+    )
     nodes = on_plane(pair.other.points, origin)
 
-    def there(along: float) -> float:
-        at = [np.interp(along, pair.other.stations, nodes[:, axis]) for axis in (0, 1)]
-        return float(station[tree.query(at)[1]])
+    def axis_station(other_station: float) -> float:
+        """Return the station of the axis' place nearest to a station of the second carriageway, m."""
+        place = [np.interp(other_station, pair.other.stations, nodes[:, axis]) for axis in (0, 1)]
+        return float(station[tree.query(place)[1]])
 
-    return there
+    return axis_station
 
 
 def _within(spans: Iterable[_Span], station: Callable[[float], float], length: float) -> list[_Span]:
-    """Return spans with stations of an axis (m), cut to its length; those beside it are left out."""
+    """Return spans (begin, end, tags), m, cut to an axis' length; `station` turns stations into the axis' ones."""
     rows = []
     for begin, end, tags in spans:
-        low, high = sorted((station(begin), station(end)))
-        if min(high, length) - max(low, 0.0) > 1e-6:
-            rows.append((max(low, 0.0), min(high, length), tags))
+        axis_begin, axis_end = sorted((station(begin), station(end)))
+        if min(axis_end, length) - max(axis_begin, 0.0) > 1e-6:
+            rows.append((max(axis_begin, 0.0), min(axis_end, length), tags))
     return rows
 
 
-def _told(carriageways: _Carriageways) -> tuple[MappedSection, tuple[str, ...], tuple[str, ...]]:
-    """Return what the tags of a road say of its section, what is left out of them, and remarks."""
+def _section_of(carriageways: _Carriageways) -> tuple[MappedSection, tuple[str, ...], tuple[str, ...]]:
+    """Return the cross-section that a road's tags describe, the texts of what is left out of them, and remarks."""
     spans = [span for rows in carriageways.values() for span in rows]
     left_out, remarks = list[str](), list[str]()
     lanes, one_way = _most(spans, lambda tags: lanes_each_way(tags)[0]), driving_direction(spans[0][2]) != 0
@@ -172,23 +185,25 @@ def _told(carriageways: _Carriageways) -> tuple[MappedSection, tuple[str, ...], 
     ):
         left_out += [f"structures: {rows}"] if rows else []
     surface = _most(spans, lambda tags: tags.get("surface"))
-    known = _values(spans, lambda tags: tags.get("surface"))
-    if len(known) > 1 or any(word not in _PAVED for word in known):
+    surfaces = _values(spans, lambda tags: tags.get("surface"))
+    if len(surfaces) > 1 or any(word not in _PAVED for word in surfaces):
         left_out.append(f"surfaces: {_stretches(carriageways, lambda tags: tags.get('surface'), 'surface={}')}")
     section = MappedSection(lanes, lane_width, None, one_way, speed, _PAVED.get(surface or ""))
     return section, tuple(left_out), tuple(remarks)
 
 
 def _values(spans: Sequence[_Span], value: Callable[[Mapping[str, str]], T | None]) -> set[T]:
+    """Return the set of values, other than None, that a function of a span's tags takes."""
     return {tag_value for _, _, tags in spans if (tag_value := value(tags)) is not None}
 
 
 def _there(value: str | None) -> str | None:
+    """Return the value of a tag such as ``bridge``; None where it is missing or ``no``."""
     return None if value in (None, "no") else value
 
 
 def _lane_width(spans: Sequence[_Span], lanes: int | None, one_way: bool) -> tuple[float | None, str | None]:
-    """Return the width of a lane (m) by the width of the carriageway, and what is to be said where it gives none."""
+    """Return a lane's width (m) by the tag ``width`` of the carriageway, and a text on it where that gives none."""
     text = _most(spans, lambda tags: tags.get("width"))
     if text is None:
         return None, None
@@ -197,14 +212,17 @@ def _lane_width(spans: Sequence[_Span], lanes: int | None, one_way: bool) -> tup
         return None, f"width={text[:40]!r}: " + (
             "it is no length" if width is None else "the number of lanes is missing"
         )
-    lane = width / (lanes if one_way else 2 * lanes)
-    if not _NARROWEST <= lane <= _WIDEST:
-        return None, f"width={text[:40]!r}: lanes would be {lane:.2f} m wide, {_NARROWEST:g} to {_WIDEST:g} are allowed"
-    return round(lane, 3), None
+    lane_width = width / (lanes if one_way else 2 * lanes)
+    if not _NARROWEST <= lane_width <= _WIDEST:
+        return (
+            None,
+            f"width={text[:40]!r}: lanes would be {lane_width:.2f} m wide, {_NARROWEST:g} to {_WIDEST:g} are allowed",
+        )
+    return round(lane_width, 3), None
 
 
 def _most(spans: Sequence[_Span], value: Callable[[Mapping[str, str]], T | None]) -> T | None:
-    """Return the value that most of the length has, None where none has any."""
+    """Return the value, other than None, that the spans have over the greatest length; None where none has any."""
     lengths: dict[T, float] = defaultdict(float)
     for begin, end, tags in spans:
         tag_value = value(tags)
@@ -214,9 +232,12 @@ def _most(spans: Sequence[_Span], value: Callable[[Mapping[str, str]], T | None]
 
 
 def _stretches(
-    carriageways: _Carriageways, value: Callable[[Mapping[str, str]], object], text: str, also: str | None = None
+    carriageways: _Carriageways, value: Callable[[Mapping[str, str]], object], text: str, extra_key: str | None = None
 ) -> str:
-    """Return where a value holds on each carriageway, as text; stretches of one value in a row are one."""
+    """Return as text from where to where a value holds on each carriageway; neighbours of one value are joined.
+
+    `text` is the format of a value; the tag `extra_key` follows it where a span has that.
+    """
     texts = list[str]()
     for name, spans in carriageways.items():
         rows: list[tuple[str, float, float]] = []
@@ -224,14 +245,14 @@ def _stretches(
             tag_value = value(tags)
             if tag_value is None:
                 continue
-            shown = text.format(str(tag_value)[:40])
-            if also and also in tags:
-                shown += f" {also}={tags[also][:10]}"
-            if rows and rows[-1][0] == shown and begin <= rows[-1][2] + 1.0:
-                rows[-1] = (shown, rows[-1][1], max(rows[-1][2], end))
+            label = text.format(str(tag_value)[:40])
+            if extra_key and extra_key in tags:
+                label += f" {extra_key}={tags[extra_key][:10]}"
+            if rows and rows[-1][0] == label and begin <= rows[-1][2] + 1.0:
+                rows[-1] = (label, rows[-1][1], max(rows[-1][2], end))
             else:
-                rows.append((shown, begin, end))
-        shown_rows = [f"{shown} from {begin:.0f} m to {end:.0f} m" for shown, begin, end in rows[:_SHOWN]]
+                rows.append((label, begin, end))
+        phrases = [f"{label} from {begin:.0f} m to {end:.0f} m" for label, begin, end in rows[:_SHOWN]]
         more = f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else ""
-        texts += [(f"{name}: " if name else "") + ", ".join(shown_rows) + more] if rows else []
+        texts += [(f"{name}: " if name else "") + ", ".join(phrases) + more] if rows else []
     return "; ".join(texts)

@@ -15,8 +15,8 @@ _UNITS = {None: 1.0, "m": 1.0, "cm": 0.01, "km": 1000.0, "ft": FOOT, "feet": FOO
 _PER_HOUR = {None: 1.0, "km/h": 1.0, "kmh": 1.0, "kph": 1.0, "mph": MILE / 1000.0, "knots": 1.852}
 _SPEED_WORDS = {"walk": 7.0, "urban": 50.0, "rural": 100.0, "nsl_single": 60.0 * MILE / 1000.0}
 _SPEED_WORDS |= {"nsl_dual": 70.0 * MILE / 1000.0, "nsl_restricted": 30.0 * MILE / 1000.0, "living_street": 7.0}
-"""Speeds of words such as ``DE:urban``, km/h, as most countries have them, which is told. ``motorway`` isn't
-among them: its limit is another in each, and in Germany there is none."""
+"""Speed limits that words such as ``DE:urban`` stand for in most countries, km/h; a remark says so. ``motorway`` is
+missing, as its limit differs from country to country, and Germany has none."""
 _YES = frozenset({"yes", "true", "1"})
 DRIVEN = frozenset(
     {"motorway", "trunk", "primary", "secondary", "tertiary", "unclassified", "residential", "living_street"}
@@ -26,7 +26,7 @@ DRIVEN = frozenset(
 
 
 def driving_direction(tags: Mapping[str, str]) -> int:
-    """Return 1 where a way is driven along its nodes alone, -1 against them alone, 0 both ways.
+    """Return 1 where traffic runs only in the order of a way's nodes, -1 where only against it, 0 where both ways.
 
     Motorways and roundabouts are driven one way where they don't say otherwise.
     """
@@ -40,25 +40,29 @@ def driving_direction(tags: Mapping[str, str]) -> int:
 
 
 def lanes_each_way(tags: Mapping[str, str]) -> tuple[int | None, str | None]:
-    """Return the lanes of one direction that a way's tags say, None where they don't, and what is odd about them.
+    """Return the number of lanes of one direction by a way's tags, None if they don't say it, and a remark or None.
 
     ``lanes`` counts both directions, except on a way that is driven in one.
     """
-    total = _whole(tags.get("lanes"))
+    total_lanes = _whole(tags.get("lanes"))
     if driving_direction(tags):
-        if total is None and "lanes" in tags:
+        if total_lanes is None and "lanes" in tags:
             return None, f"lanes={tags['lanes'][:40]!r} is no number"
-        return total, None
-    forward, backward = _whole(tags.get("lanes:forward")), _whole(tags.get("lanes:backward"))
-    if forward and backward:
-        odd = f"{forward} lanes ahead and {backward} back: the same number is taken" if forward != backward else None
-        return max(forward, backward), odd
-    if total is None:
+        return total_lanes, None
+    forward_lanes, backward_lanes = _whole(tags.get("lanes:forward")), _whole(tags.get("lanes:backward"))
+    if forward_lanes and backward_lanes:
+        remark = (
+            f"{forward_lanes} lanes ahead and {backward_lanes} back: the same number is taken"
+            if forward_lanes != backward_lanes
+            else None
+        )
+        return max(forward_lanes, backward_lanes), remark
+    if total_lanes is None:
         return None, f"lanes={tags['lanes'][:40]!r} is no number" if "lanes" in tags else None
-    if total % 2:
-        odd = f"{total} lanes in both directions together: {(total + 1) // 2} each way are taken"
-        return (total + 1) // 2, odd
-    return total // 2, None
+    if total_lanes % 2:
+        remark = f"{total_lanes} lanes in both directions together: {(total_lanes + 1) // 2} each way are taken"
+        return (total_lanes + 1) // 2, remark
+    return total_lanes // 2, None
 
 
 def _whole(text: str | None) -> int | None:
@@ -77,7 +81,7 @@ def metres(text: str | None) -> float | None:
 
 
 def kilometres_per_hour(text: str | None) -> tuple[float | None, str | None]:
-    """Return a speed in km/h, None where a text says none, and what was taken for a word.
+    """Return a speed in km/h, None for a text without one, and a remark where a word was read as a speed.
 
     ``100``, ``65 mph``, ``DE:urban``, ``none`` (no limit), ``signals``, ``variable``.
     """
@@ -90,4 +94,5 @@ def kilometres_per_hour(text: str | None) -> tuple[float | None, str | None]:
 
 
 def _number(text: str) -> float:
+    """Return the number that a text with a decimal point or comma is."""
     return float(text.replace(",", "."))

@@ -87,29 +87,30 @@ def read_point_lines(path: Path) -> list[PointLine]:
     """Return the lines of two points or more of a KML or GPX file.
 
     Raises:
-        MissingFileError, InputError: it can't be read, or a coordinate is none.
+        MissingFileError, InputError: the file can't be read, or a coordinate is no number.
     """
     root = read_xml(path)
     names, lines = LineNames(), list[PointLine]()
-    for name, rows in _gpx(root) if local_name(root) == "gpx" else _kml(root, ""):
-        points = np.array(rows, dtype=np.float64).reshape(-1, 3)
+    for name, coordinates in _gpx(root) if local_name(root) == "gpx" else _kml(root, ""):
+        points = np.array(coordinates, dtype=np.float64).reshape(-1, 3)
         if len(points) < 2:
             continue
         if np.abs(points[:, 0]).max() > 360.0 or np.abs(points[:, 1]).max() > 90.0:
-            at = int(np.argmax(np.maximum(np.abs(points[:, 0]) / 360.0, np.abs(points[:, 1]) / 90.0)))
+            row = int(np.argmax(np.maximum(np.abs(points[:, 0]) / 360.0, np.abs(points[:, 1]) / 90.0)))
             need = "must be a longitude and a latitude in degrees"
-            raise InputError(f"{path.name}: {name}: point {at + 1}", points[at, :2].tolist(), need)
+            raise InputError(f"{path.name}: {name}: point {row + 1}", points[row, :2].tolist(), need)
         source = "GPX line" if local_name(root) == "gpx" else "KML line"
         lines.append(PointLine(names.unique(name, "line"), points, bool(points[:, 2].any()), source))
     return lines
 
 
 def _text(element: Element | None) -> str:
+    """Return the text below an element with single spaces, at most 200 characters; "" without an element."""
     return "" if element is None else " ".join("".join(element.itertext()).split())[:200]
 
 
 def _kml(element: Element, name: str) -> Iterator[tuple[str, list[tuple[float, ...]]]]:
-    """Yield name and points of each line below an element, named by the placemark around it."""
+    """Yield name and points (longitude, latitude, height) of each line below an element, named by its placemark."""
     kind = local_name(element)
     if kind == "Placemark":
         name = _text(child(element, "name")) or "line"
@@ -118,15 +119,17 @@ def _kml(element: Element, name: str) -> Iterator[tuple[str, list[tuple[float, .
     elif kind == "Track":
         yield name or "track", [_track_point(row) for row in children(element, "coord")]
     else:
-        for inner in element:
-            yield from _kml(inner, name)
+        for child_element in element:
+            yield from _kml(child_element, name)
 
 
 def _text_of(element: Element | None) -> str:
+    """Return the text directly in an element; "" without an element."""
     return "" if element is None else (element.text or "")
 
 
 def _kml_point(word: str) -> tuple[float, ...]:
+    """Return longitude, latitude (degrees) and height (m) of a word of KML's `coordinates`."""
     numbers = word.split(",")
     if len(numbers) not in (2, 3):
         raise InputError("coordinates", word[:80], "must be longitude,latitude,height, separated by commas")
@@ -134,6 +137,7 @@ def _kml_point(word: str) -> tuple[float, ...]:
 
 
 def _track_point(row: Element) -> tuple[float, ...]:
+    """Return longitude, latitude (degrees) and height (m) of a `gx:coord` element of a track."""
     numbers = _text_of(row).split()
     if len(numbers) not in (2, 3):
         raise InputError("coord", _text_of(row)[:80], "must be a longitude, a latitude and a height")
@@ -141,6 +145,7 @@ def _track_point(row: Element) -> tuple[float, ...]:
 
 
 def _point(place: str, numbers: list[str]) -> tuple[float, ...]:
+    """Return the numbers of a point with a height of 0 where it has none; errors name the place."""
     values = [finite(place, number) for number in numbers]
     return (*values, 0.0)[:3]
 
@@ -152,7 +157,7 @@ def _gpx(root: Element) -> Iterator[tuple[str, list[tuple[float, ...]]]]:
         for part in [line] if local_name(line) == "rte" else children(line, "trkseg"):
             rows: list[tuple[float, ...]] = []
             for row in children(part, "rtept", "trkpt"):
-                up = child(row, "ele")
-                height = 0.0 if up is None else finite("ele", _text_of(up))
+                elevation = child(row, "ele")
+                height = 0.0 if elevation is None else finite("ele", _text_of(elevation))
                 rows.append((finite("lon", row.get("lon")), finite("lat", row.get("lat")), height))
             yield name, rows

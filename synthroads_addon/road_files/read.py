@@ -51,7 +51,7 @@ def format_of(path: Path) -> str | None:
     """Return the format of a file by its content, a key of `READERS` or of `OF_POINTS`; None for any other.
 
     Raises:
-        MissingFileError: it can't be read.
+        MissingFileError: the file can't be read.
     """
     try:
         with path.open("rb") as file:
@@ -61,18 +61,18 @@ def format_of(path: Path) -> str | None:
         raise MissingFileError(str(path), None, f"must be a readable axis file ({error.strerror})") from None
     if head[4:].startswith(PBF_MARK):
         return "OpenStreetMap PBF"
-    if (vector := vector_format(head)) is not None:
-        return vector
-    text = head.replace(b"\0", b"")  # UTF-16
-    known = next((name for mark, name in _MARKS if mark in text), None)
-    return "SBET" if known is None and is_sbet(head, size) else known
+    if (gis_format := vector_format(head)) is not None:
+        return gis_format
+    text = head.replace(b"\0", b"")  # so that words of UTF-16 are found as well
+    text_format = next((name for mark, name in _MARKS if mark in text), None)
+    return "SBET" if text_format is None and is_sbet(head, size) else text_format
 
 
 def read_lines(path: Path) -> list[RoadLine]:
     """Return the roads and alignments of an OpenDRIVE, LandXML or IFC file.
 
     Raises:
-        MissingFileError: it can't be read.
+        MissingFileError: the file can't be read.
         InputError: it is of another format, isn't understood, or has none.
 
     Example:
@@ -98,22 +98,22 @@ def read_points(path: Path, kind: str) -> list[PointLine]:
     return OF_POINTS[kind](path)
 
 
-def named_line(lines: Sequence[Named], wanted: str, file: str) -> Named:
-    """Return the line of a name; raise `InputError` where a file has none of it."""
+def named_line(lines: Sequence[Named], line_name: str, file: str) -> Named:
+    """Return the line of a name; raise `InputError` where no line of the file has it."""
     for line in lines:
-        if line.name == wanted:
+        if line.name == line_name:
             return line
     names = ", ".join(repr(line.name) for line in lines[:20])
     more = f" and {len(lines) - 20} more" if len(lines) > 20 else ""
-    raise InputError(f"{file}: road", wanted, f"must be one of the roads in the file: {names}{more}")
+    raise InputError(f"{file}: road", line_name, f"must be one of the roads in the file: {names}{more}")
 
 
-def choose_line(lines: Sequence[RoadLine], wanted: str | None, file: str) -> RoadLine:
+def choose_line(lines: Sequence[RoadLine], line_name: str | None, file: str) -> RoadLine:
     """Return the line of a name, or without one the longest that belongs to no junction.
 
     Args:
         lines: of the file.
-        wanted: name of the line, None for the longest.
+        line_name: name of the line, None for the longest.
         file: name for messages.
 
     Raises:
@@ -121,8 +121,8 @@ def choose_line(lines: Sequence[RoadLine], wanted: str | None, file: str) -> Roa
     """
     if not lines:
         raise InputError(file, None, _NO_LINE)
-    if wanted is not None:
-        choice = named_line(lines, wanted, file)
+    if line_name is not None:
+        choice = named_line(lines, line_name, file)
     else:
         usable = [line for line in lines if line.fault is None] or list(lines)
         choice = max([line for line in usable if not line.junction] or usable, key=lambda line: line.length)

@@ -22,7 +22,7 @@ def read_sbet(path: Path) -> list[PointLine]:
     """Return the path in an SBET file (radians; heights above the ellipsoid) as one line in degrees.
 
     Raises:
-        MissingFileError, InputError: it can't be read, or holds what is no trajectory.
+        MissingFileError, InputError: the file can't be read, or holds what is no trajectory.
     """
     try:
         check_size(path)
@@ -31,16 +31,18 @@ def read_sbet(path: Path) -> list[PointLine]:
         raise MissingFileError(str(path), None, f"cannot be read ({error.strerror})") from None
     records = read_records(path.name, data)
     points = np.column_stack([np.rad2deg(records[:, [2, 1]]), records[:, 3]])
-    flat = not points[:, 2].any()
-    return [PointLine(path.stem, points, not flat, "SBET path", driven=True, remarks=() if flat else (_ELLIPSOIDAL,))]
+    is_flat = not points[:, 2].any()
+    return [
+        PointLine(path.stem, points, not is_flat, "SBET path", driven=True, remarks=() if is_flat else (_ELLIPSOIDAL,))
+    ]
 
 
 def has_times(path: Path) -> bool:
-    """Return whether a file is CSV whose header names a column ``time``: the path of a vehicle, and no axis."""
+    """Return whether a file is CSV with columns ``time``, ``x`` and ``y``: the path of a vehicle, and no axis."""
     text = read_text(str(path), "must be CSV or GeoJSON", "must be a readable axis file", encoding="utf-8-sig")
     lines = (line for line in text[: 1 << 16].splitlines() if line.strip() and not line.lstrip().startswith("#"))
-    head = next(lines, "").lower()
-    for mark in ";,\t":
-        head = head.replace(mark, " ")
-    names = [word.strip("\"'") for word in head.split()]
+    header = next(lines, "").lower()
+    for separator in ";,\t":
+        header = header.replace(separator, " ")
+    names = [word.strip("\"'") for word in header.split()]
     return "time" in names and {"x", "y"} <= set(names)

@@ -65,12 +65,12 @@ class Chain:
 
     @property
     def roundabout(self) -> bool:
-        """Return whether it is one."""
+        """Return whether the chain is a roundabout."""
         return self.ways[0].tags.get("junction") in ("roundabout", "circular")
 
     @property
     def link(self) -> bool:
-        """Return whether it is a ramp."""
+        """Return whether the chain is a ramp (`highway=..._link`)."""
         return self.ways[0].tags.get("highway", "").endswith("_link")
 
     @cached_property
@@ -90,18 +90,19 @@ class Chain:
 
     def spans(self) -> Iterator[tuple[float, float, Mapping[str, str]]]:
         """Yield begin and end (m) and the tags of each way."""
-        first = 0
+        begin_row = 0
         for way in self.ways:
-            last = first + len(way.points) - 1
-            yield float(self.stations[first]), float(self.stations[last]), way.tags
-            first = last
+            end_row = begin_row + len(way.points) - 1
+            yield float(self.stations[begin_row]), float(self.stations[end_row]), way.tags
+            begin_row = end_row
 
 
 def steps(points: Float) -> Float:
     """Return the distances (N - 1,), m, between neighbours among points (N, 2) of longitude and latitude, degrees."""
-    step = np.diff(points, axis=0)
-    step[:, 0] -= 360.0 * np.round(step[:, 0] / 360.0)
-    return np.hypot(*(step * _metres_per_degree(0.5 * (points[:-1, 1] + points[1:, 1]))).T)
+    degrees = np.diff(points, axis=0)
+    # Across the 180th meridian the shorter way counts.
+    degrees[:, 0] -= 360.0 * np.round(degrees[:, 0] / 360.0)
+    return np.hypot(*(degrees * _metres_per_degree(0.5 * (points[:-1, 1] + points[1:, 1]))).T)
 
 
 def on_plane(points: Float, origin: Float) -> Float:
@@ -112,9 +113,10 @@ def on_plane(points: Float, origin: Float) -> Float:
 def _metres_per_degree(latitude: Float) -> Float:
     """Return metres east and north (..., 2) per degree at latitudes (...): by the ellipsoid's radii of curvature."""
     sine = np.sin(np.radians(latitude))
-    across = _AXIS / np.sqrt(1.0 - _SQUARE * sine**2)
-    along = across * (1.0 - _SQUARE) / (1.0 - _SQUARE * sine**2)
-    scale = np.stack([across * np.cos(np.radians(latitude)), along], axis=-1)
+    # Radii of curvature across the meridian (prime vertical) and along it.
+    east_radius = _AXIS / np.sqrt(1.0 - _SQUARE * sine**2)
+    north_radius = east_radius * (1.0 - _SQUARE) / (1.0 - _SQUARE * sine**2)
+    scale = np.stack([east_radius * np.cos(np.radians(latitude)), north_radius], axis=-1)
     return np.radians(scale)
 
 
@@ -124,6 +126,7 @@ def chained(ways: Iterable[OsmWay]) -> list[Chain]:
     One-way roads are joined in their direction alone; ramps and roundabouts by themselves. Where several ways of a name
     leave a node those that go on straightest belong together.
     """
+    # By label (a number of its own for a way without), and whether one-way, a ramp, a roundabout.
     groups: dict[tuple[str | int, bool, bool, bool], list[OsmWay]] = defaultdict(list)
     for number, way in enumerate(ways):
         direction = driving_direction(way.tags)
@@ -136,9 +139,9 @@ def chained(ways: Iterable[OsmWay]) -> list[Chain]:
         )
         groups[key].append(way.reversed if direction < 0 else way)
     return [
-        Chain(label_of(chain[0].tags), tuple(chain), key[1])
-        for key, group in groups.items()
-        for chain in _joined(group, key[1])
+        Chain(label_of(chain[0].tags), tuple(chain), directed)
+        for (_, directed, _, _), group in groups.items()
+        for chain in _joined(group, directed)
     ]
 
 
@@ -152,60 +155,67 @@ _End = tuple[int, int]
 
 
 def _joined(ways: Sequence[OsmWay], directed: bool) -> Iterator[list[OsmWay]]:
-    """Yield the chains of a group of ways."""
-    partner = _partners(ways, directed)
-    used: set[int] = set()
-    begins = [(n, end) for n in range(len(ways)) for end in (0, 1) if (n, end) not in partner]
+    """Yield the chains of a group of ways, each as its ways in order, turned so that they follow each other.
+
+    `directed` says that traffic runs only in the order of the nodes, so that no way may be turned.
+    """
+    partners = _partners(ways, directed)
+    used_ways: set[int] = set()
+    begins = [(n, end) for n in range(len(ways)) for end in (0, 1) if (n, end) not in partners]
     if directed:
         begins = [begin for begin in begins if begin[1] == 0]
-    for begin in itertools.chain(begins, ((n, 0) for n in range(len(ways)))):  # the latter: rings
-        if begin[0] in used:
+    for begin in itertools.chain(
+        begins, ((n, 0) for n in range(len(ways)))
+    ):  # ways that no begin reaches form rings, which may start anywhere
+        if begin[0] in used_ways:
             continue
-        chain, at = list[OsmWay](), begin
-        while at[0] not in used:
-            used.add(at[0])
-            chain.append(ways[at[0]] if at[1] == 0 else ways[at[0]].reversed)
-            far = (at[0], 1 - at[1])
-            if far not in partner:
+        chain, way_end = list[OsmWay](), begin
+        while way_end[0] not in used_ways:
+            used_ways.add(way_end[0])
+            chain.append(ways[way_end[0]] if way_end[1] == 0 else ways[way_end[0]].reversed)
+            end_of_way = (way_end[0], 1 - way_end[1])
+            if end_of_way not in partners:
                 break
-            at = partner[far]
+            way_end = partners[end_of_way]
         yield chain if directed or _mostly_ahead(chain, ways) else [way.reversed for way in reversed(chain)]
 
 
 def _mostly_ahead(chain: Sequence[OsmWay], ways: Sequence[OsmWay]) -> bool:
-    """Return whether most of a chain runs in the direction of its ways' nodes."""
+    """Return whether most of a chain's length runs in the order in which the map has its ways' nodes."""
     ids = {id(way) for way in ways}
     return math.fsum(float(steps(way.points).sum()) * (1 if id(way) in ids else -1) for way in chain) >= 0.0
 
 
 def _partners(ways: Sequence[OsmWay], directed: bool) -> dict[_End, _End]:
     """Return the end that each end of a way is joined to; those that aren't joined are left out."""
-    at: dict[int, list[_End]] = defaultdict(list)
-    for n, way in enumerate(ways):
-        at[way.nodes[0]].append((n, 0))
-        at[way.nodes[-1]].append((n, 1))
-    pairs = []
-    for ends in at.values():
-        for one, other in itertools.combinations(ends[:20], 2):
-            if one[0] != other[0] and not (directed and one[1] == other[1]):
-                turn = _turn(ways, one, other)
+    ends_by_node: dict[int, list[_End]] = defaultdict(list)
+    for number, way in enumerate(ways):
+        ends_by_node[way.nodes[0]].append((number, 0))
+        ends_by_node[way.nodes[-1]].append((number, 1))
+    candidates = []
+    for ends in ends_by_node.values():
+        # At most 20 ways of a node are looked at (chosen): that bounds the pairs of a damaged file.
+        for end, other_end in itertools.combinations(ends[:20], 2):
+            if end[0] != other_end[0] and not (directed and end[1] == other_end[1]):
+                turn = _turn(ways, end, other_end)
                 if turn <= _SHARPEST_JOINT:
-                    pairs.append((turn, one, other))
-    partner: dict[_End, _End] = {}
-    for _, one, other in sorted(pairs):
-        if one not in partner and other not in partner:
-            partner[one], partner[other] = other, one
-    return partner
+                    candidates.append((turn, end, other_end))
+    partners: dict[_End, _End] = {}
+    # The straightest joints come first; each end has one partner.
+    for _, end, other_end in sorted(candidates):
+        if end not in partners and other_end not in partners:
+            partners[end], partners[other_end] = other_end, end
+    return partners
 
 
-def _turn(ways: Sequence[OsmWay], one: _End, other: _End) -> float:
-    """Return the change of direction (rad) from the way that ends at one end to that which begins at the other."""
-    come, go = _towards(ways[one[0]], one[1]), _towards(ways[other[0]], other[1])
-    return math.pi - abs(math.remainder(come - go, 2.0 * math.pi))
+def _turn(ways: Sequence[OsmWay], end: _End, other_end: _End) -> float:
+    """Return the change of direction (rad, 0 to pi) where the way of one end goes on in the way of the other end."""
+    arrival, departure = _towards(ways[end[0]], end[1]), _towards(ways[other_end[0]], other_end[1])
+    return math.pi - abs(math.remainder(arrival - departure, 2.0 * math.pi))
 
 
 def _towards(way: OsmWay, end: int) -> float:
-    """Return the direction (rad) in which a way leaves one of its ends."""
-    row = way.points if end == 0 else way.points[::-1]
-    east, north = on_plane(row[1:2], row[0])[0].tolist()
+    """Return the direction (rad, counter-clockwise from east) in which a way leaves one of its ends."""
+    nodes = way.points if end == 0 else way.points[::-1]
+    east, north = on_plane(nodes[1:2], nodes[0])[0].tolist()
     return math.atan2(north, east)

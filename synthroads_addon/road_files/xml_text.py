@@ -31,14 +31,14 @@ def read_xml(path: Path) -> Element:
 
 
 def parse_xml(path: Path, target: Any) -> Any:
-    """Return what a target of the parser makes of an XML file; it must refuse document types, as `refuse_doctype` does.
+    """Return the result of a parser's target for an XML file; the target must refuse document types (`refuse_doctype`).
 
     Args:
         path: the file.
         target: with the methods of `xml.etree.ElementTree.TreeBuilder`.
 
     Raises:
-        MissingFileError: it can't be read.
+        MissingFileError: the file can't be read.
         InputError: it is no XML, has a document type, or is larger than `LARGEST`.
     """
     parser = XMLParser(target=target)  # nosec B314 (a document type is refused, so there are no entities)
@@ -55,7 +55,7 @@ def parse_xml(path: Path, target: Any) -> Any:
 
 
 def check_size(path: Path) -> None:
-    """Raise `InputError` for a file larger than `LARGEST`, OSError for none."""
+    """Raise `InputError` for a file larger than `LARGEST`; OSError where no file can be looked at."""
     size = path.stat().st_size
     if size > LARGEST:
         raise InputError(str(path), f"{size / 1e6:,.0f} MB", f"must be at most {LARGEST / 1e6:,.0f} MB")
@@ -96,7 +96,7 @@ def number(element: Element, name: str, default: float | None = None) -> float:
 
 
 def finite(place: str, text: Any) -> float:
-    """Return the finite number that a text is; raise `InputError` for any other."""
+    """Return a text's finite number, at most 1e12 in size; raise `InputError` naming a place for any other text."""
     try:
         value = float(text)
     except (TypeError, ValueError, OverflowError):

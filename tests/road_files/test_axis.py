@@ -107,7 +107,9 @@ def test_without_a_system_the_scenarios_is_assumed_and_told(tmp_path: Path) -> N
 def test_what_no_road_may_be_is_one_line(tmp_path: Path, curvature: float) -> None:
     shape = f'<arc curvature="{curvature}"/>'
     path = opendrive(tmp_path / "a.xodr", [xodr_road([(0.0, 3.0, (0.0, 0.0, 0.0), shape)])])
-    with pytest.raises(InputError, match=r"main: arc at station 0\.000 m: curvature, 1/m is (0\.5|3\.0): at most 0\.1"):
+    with pytest.raises(
+        InputError, match=r"main: arc at station 0\.000 m: curvature, 1/m is (0\.5|3\.0): must be at most 0\.1"
+    ):
         road_axis(path, RoadScenario())
 
 

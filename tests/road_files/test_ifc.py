@@ -113,7 +113,7 @@ def test_segments_are_taken_over_under_every_name_of_the_schema(tmp_path: Path, 
 @pytest.mark.parametrize("schema", ["IFC4", "IFC2X3", "IFC4X2"])
 def test_older_schemas_are_refused(tmp_path: Path, schema: str) -> None:
     written(tmp_path / "a.ifc", schema)
-    with pytest.raises(InputError, match=rf"a\.ifc is '{schema}': IFC 4\.3"):
+    with pytest.raises(InputError, match=rf"a\.ifc is '{schema}': must be IFC 4\.3"):
         read_lines(tmp_path / "a.ifc")
 
 

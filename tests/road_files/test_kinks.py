@@ -55,7 +55,7 @@ def test_kinks_are_refused_without_it_and_where_no_rounding_keeps_the_distance(t
     path, *_ = kinked(tmp_path / "kink.xodr", 0.1)
     with pytest.raises(InputError, match="--round-kinks"):
         road_axis(path, RoadScenario())
-    with pytest.raises(InputError, match="are a kink"):
+    with pytest.raises(InputError, match="form a kink"):
         road_axis(path, RoadScenario(), round_kinks=0.001)  # it would have a radius of 0.6 m
 
 

@@ -55,7 +55,7 @@ def test_a_line_is_taken_with_its_system_and_heights(tmp_path: Path, driver: str
         ("axis", len(line()), True, "EPSG:25833"),
     ]
     assert axis_from_file(path, RoadScenario(), 1, "short")[2]["name"] == "short"
-    with pytest.raises(InputError, match=r"it has ('short', 'axis'|'axis', 'short')"):
+    with pytest.raises(InputError, match=r"must be one of the roads in the file: ('short', 'axis'|'axis', 'short')"):
         axis_from_file(path, RoadScenario(), 1, "long")
 
 

@@ -173,9 +173,9 @@ class GridConvolution(nn.Module):
 
     Args:
         width: features.
-        along: slices that it spans, odd.
-        across: kernel points that it looks at, odd.
-        dilation: distance of these from one to the next, kernel points; 1 for neighbours.
+        slices: number of slices that the kernel spans, odd.
+        kernel_points: number of kernel points that it spans, odd.
+        dilation: distance from one of these to the next, in kernel points; 1 for neighbours.
     """
 
     def __init__(self, width: int, slices: int, kernel_points: int, dilation: int = 1) -> None:

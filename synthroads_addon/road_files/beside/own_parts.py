@@ -32,11 +32,11 @@ def own_parts(model: Any) -> tuple[GivenRoad | None, Counter[str], list[str]]:
         model: of ifcopenshell.
 
     Returns:
-        None where no carriageway is among them, as in files of other programs; what is left out is then all of the
-        road's surface and objects, by class.
+        the parts, None where no carriageway is among them, as in files of other programs; their numbers by kind; texts
+        on what is left out: without a carriageway all of the road's surface and objects, by class.
     """
     items: dict[str, RoadObject] = {}
-    wrong: Counter[str] = Counter()
+    misfits: Counter[str] = Counter()
     for relation in model.by_type("IfcRelDefinesByProperties"):
         definition = relation.RelatingPropertyDefinition
         if getattr(definition, "Name", None) != _SET:
@@ -50,36 +50,40 @@ def own_parts(model: Any) -> tuple[GivenRoad | None, Counter[str], list[str]]:
         try:
             item = _KINDS[kind].from_dict(fields | {"instance": 1})
         except InputError:
-            wrong[kind] += 1
+            misfits[kind] += 1
             continue
         if re.fullmatch(OBJECT_ID, name):
             items[name] = item
         else:
-            wrong[kind] += 1
+            misfits[kind] += 1
     carriageways = {name: item for name, item in items.items() if isinstance(item, Carriageway)}
     by_side: dict[Side, Carriageway] = {item.side: item for item in carriageways.values()}
     if not by_side or len(by_side) < len(carriageways):
         return None, Counter(), _of_others(model)
     ids = {name: f"carriageway-{item.side}" for name, item in carriageways.items()}
-    others = {name: _with_carriageway(item, ids) for name, item in items.items() if name not in ids}
-    turnouts = {name: item for name, item in others.items() if isinstance(item, Turnout) and _refers(item, by_side, {})}
+    other_parts = {name: _with_carriageway(item, ids) for name, item in items.items() if name not in ids}
+    turnouts = {
+        name: item for name, item in other_parts.items() if isinstance(item, Turnout) and _refers(item, by_side, {})
+    }
     markings = {
         name: item
-        for name, item in others.items()
+        for name, item in other_parts.items()
         if isinstance(item, tuple(_PAINT.values())) and _refers(item, by_side, turnouts)
     }
-    things = {name: cast(Thing, item) for name, item in others.items() if type(item).__name__ in THINGS}
-    wrong += Counter(type(item).__name__ for item in items.values())
-    kept: list[RoadObject] = [*by_side.values(), *turnouts.values(), *markings.values(), *things.values()]
-    taken = Counter(type(item).__name__ for item in kept)
-    lost = [f"{_word(kind)}: {n} {kind} with other values than ours" for kind, n in sorted((wrong - taken).items())]
-    return GivenRoad(by_side, turnouts, markings, things), taken, lost
+    things = {name: cast(Thing, item) for name, item in other_parts.items() if type(item).__name__ in THINGS}
+    misfits += Counter(type(item).__name__ for item in items.values())
+    parts: list[RoadObject] = [*by_side.values(), *turnouts.values(), *markings.values(), *things.values()]
+    counts = Counter(type(item).__name__ for item in parts)
+    left_out = [
+        f"{_word(kind)}: {n} {kind} with other values than ours" for kind, n in sorted((misfits - counts).items())
+    ]
+    return GivenRoad(by_side, turnouts, markings, things), counts, left_out
 
 
 def _refers(item: RoadObject, by_side: Mapping[Side, Carriageway], turnouts: Mapping[str, Turnout]) -> bool:
-    """Return whether the carriageway, lane boundary and turnout that an object names are there."""
+    """Return whether the set has the carriageway, the lane boundary and the turnout that an object names."""
     carriageways = {f"carriageway-{side}": carriageway for side, carriageway in by_side.items()}
-    # Not every kind of object has each of the three: what it hasn't it needn't find.
+    # Not every kind of object has all three fields; one that it lacks refers to nothing.
     carriageway_id, turnout_id = getattr(item, "carriageway", None), getattr(item, "turnout", None)
     boundary = getattr(item, "boundary", 0)
     if carriageway_id is not None and (
@@ -90,13 +94,14 @@ def _refers(item: RoadObject, by_side: Mapping[Side, Carriageway], turnouts: Map
 
 
 def _word(kind: str) -> str:
+    """Return the heading under which a kind of object is listed: ``lanes`` or ``objects``."""
     return "lanes" if kind in ("Carriageway", "Turnout") else "objects"
 
 
 def _with_carriageway(item: RoadObject, ids: Mapping[str, str]) -> RoadObject:
-    """Return an object that names its carriageway as the sampled parts do."""
-    named = str(getattr(item, "carriageway", ""))
-    return item.model_copy(update={"carriageway": ids[named]}) if named in ids else item
+    """Return an object whose carriageway has the set's id in place of the file's, by `ids` (file's id -> set's id)."""
+    carriageway_id = str(getattr(item, "carriageway", ""))
+    return item.model_copy(update={"carriageway": ids[carriageway_id]}) if carriageway_id in ids else item
 
 
 def _values(definition: Any) -> dict[str, Any]:
@@ -112,11 +117,11 @@ def _values(definition: Any) -> dict[str, Any]:
 
 
 def _of_others(model: Any) -> list[str]:
-    """Return what a model says of a road's surface and objects, as text with numbers by class."""
-    numbers = Counter(each.is_a() for each in (*model.by_type("IfcElement"), *model.by_type("IfcRoadPart")))
+    """Return texts with the numbers, by class, of surface parts, objects and events of a model of another program."""
+    counts = Counter(each.is_a() for each in (*model.by_type("IfcElement"), *model.by_type("IfcRoadPart")))
     texts = []
-    for word, mine in (("lanes", True), ("objects", False)):
-        rows = [f"{count} {kind}" for kind, count in sorted(numbers.items()) if (kind in _SURFACE) == mine]
+    for word, is_surface in (("lanes", True), ("objects", False)):
+        rows = [f"{count} {kind}" for kind, count in sorted(counts.items()) if (kind in _SURFACE) == is_surface]
         texts += [f"{word}: {', '.join(rows)}"] if rows else []
     kinds = Counter(_kind(each) for name in ("IfcReferent", "IfcAnnotation") for each in model.by_type(name))
     for kind, text in (

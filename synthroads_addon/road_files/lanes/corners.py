@@ -18,7 +18,7 @@ JUMP = 2e-4
 _SHARES = np.array([0.0, 0.21, 0.5, 0.77, 1.0])
 _SHORTEST = 0.05
 STRAIGHT = 1e-5
-"""Distance, m, of a corner from the chord of its neighbours up to which it is none."""
+"""Distance, m, from the chord of its neighbours up to which a point is no corner (chosen)."""
 _SAMPLES = 9
 Between = Callable[[Float, int], Float]
 """Values (N, K) at stations (N,) of the stretch with a number."""
@@ -45,70 +45,73 @@ class Polyline:
 
 
 def polyline(function: Between, breaks: Float, tolerance: float) -> Polyline:
-    """Return a polyline that keeps within a tolerance of a function; where that jumps it does so over `STEP`."""
+    """Return a polyline within a tolerance of a function that is smooth between breaks (B,), m."""
+    # Where the function jumps at a break, the polyline goes over to the new value within `STEP`.
     stations, values, jumps = list[float](), list[Float](), list[tuple[float, float]]()
-    for number, (start, end) in enumerate(itertools.pairwise(breaks.tolist())):
-        at = _corner_stations(function, number, (start, end), tolerance)
-        samples = function(at, number)
+    for stretch, (start, end) in enumerate(itertools.pairwise(breaks.tolist())):
+        corner_stations = _corner_stations(function, stretch, (start, end), tolerance)
+        corner_values = function(corner_stations, stretch)
         if stations:
-            jump = float(np.abs(samples[0] - values[-1]).max())
+            jump = float(np.abs(corner_values[0] - values[-1]).max())
             if jump > JUMP:
                 jumps.append((start, jump))
-                begin = start + min(STEP, 0.5 * (end - start))
-                kept = at > begin + 1e-9
-                at = np.concatenate([[begin], at[kept]])
-                samples = np.concatenate([function(np.array([begin]), number), samples[kept]])
+                step_end = start + min(STEP, 0.5 * (end - start))
+                is_behind_step = corner_stations > step_end + 1e-9
+                corner_stations = np.concatenate([[step_end], corner_stations[is_behind_step]])
+                corner_values = np.concatenate([function(np.array([step_end]), stretch), corner_values[is_behind_step]])
             else:
-                values[-1] = 0.5 * (values[-1] + samples[0])
-                at, samples = at[1:], samples[1:]
-        stations += at.tolist()
-        values += list(samples)
+                values[-1] = 0.5 * (values[-1] + corner_values[0])
+                corner_stations, corner_values = corner_stations[1:], corner_values[1:]
+        stations += corner_stations.tolist()
+        values += list(corner_values)
     return Polyline(np.array(stations), np.array(values), np.array(jumps).reshape(-1, 2))
 
 
-def _corner_stations(function: Between, number: int, stretch: tuple[float, float], tolerance: float) -> Float:
+def _corner_stations(function: Between, stretch_number: int, stretch: tuple[float, float], tolerance: float) -> Float:
+    """Return stations (N,) of a stretch, m, between which chords keep within a tolerance, by halving."""
     start, end = stretch
     begin, length, stations = np.array([start]), np.array([end - start]), [np.array([start, end])]
+    # In each round all intervals that still are off are halved together.
     while len(begin):
-        at = begin[:, None] + length[:, None] * _SHARES
-        values = function(at.ravel(), number).reshape(len(begin), len(_SHARES), -1)
+        samples = begin[:, None] + length[:, None] * _SHARES
+        values = function(samples.ravel(), stretch_number).reshape(len(begin), len(_SHARES), -1)
         chord = values[:, :1] + _SHARES[:, None] * (values[:, -1:] - values[:, :1])
-        wrong = (np.abs(values - chord).max(axis=(1, 2)) > tolerance) & (length > 2.0 * _SHORTEST)
-        half = 0.5 * length[wrong]
-        middle = begin[wrong] + half
+        is_off = (np.abs(values - chord).max(axis=(1, 2)) > tolerance) & (length > 2.0 * _SHORTEST)
+        half_length = 0.5 * length[is_off]
+        middle = begin[is_off] + half_length
         stations.append(middle)
-        begin, length = np.concatenate([begin[wrong], middle]), np.concatenate([half, half])
+        begin, length = np.concatenate([begin[is_off], middle]), np.concatenate([half_length, half_length])
     return np.unique(np.concatenate(stations))
 
 
-def corners(stations: Float, values: Float, straight: float = STRAIGHT) -> list[tuple[float, float]]:
+def corners(stations: Float, values: Float, tolerance: float = STRAIGHT) -> list[tuple[float, float]]:
     """Return (station, value) of a polyline's corners; of a constant one its first point alone.
 
     Args:
         stations, values: (N,) of the polyline.
-        straight: distance of a corner from the chord of its neighbours up to which it is none.
+        tolerance: distance of a corner from the chord of its neighbours up to which it is none.
     """
-    if np.ptp(values) <= straight:
+    if np.ptp(values) <= tolerance:
         return [(float(stations[0]), float(np.median(values)))]
-    kept = [0]
+    corner_rows = [0]
     for n in range(1, len(stations) - 1):
-        first = kept[-1]
-        inner = np.arange(first + 1, n + 1)
-        share = (stations[inner] - stations[first]) / (stations[n + 1] - stations[first])
-        chord = values[first] + share * (values[n + 1] - values[first])
-        if np.abs(values[inner] - chord).max() > straight:
-            kept.append(n)
-    kept.append(len(stations) - 1)
-    return [(float(stations[n]), float(values[n])) for n in kept]
+        corner = corner_rows[-1]
+        rows_between = np.arange(corner + 1, n + 1)
+        share = (stations[rows_between] - stations[corner]) / (stations[n + 1] - stations[corner])
+        chord = values[corner] + share * (values[n + 1] - values[corner])
+        if np.abs(values[rows_between] - chord).max() > tolerance:
+            corner_rows.append(n)
+    corner_rows.append(len(stations) - 1)
+    return [(float(stations[n]), float(values[n])) for n in corner_rows]
 
 
 def rounded_points(points: Sequence[tuple[float, float]], digits: int = 9) -> list[tuple[float, float]]:
-    """Return (station, value) with rounded stations, without those that fall on the one before so."""
+    """Return (station, value) with rounded stations, without points whose station isn't larger than the one before."""
     rows: list[tuple[float, float]] = []
     for station, value in points:
-        at = round_value(station, digits)
-        if not rows or at > rows[-1][0]:
-            rows.append((at, value))
+        rounded_station = round_value(station, digits)
+        if not rows or rounded_station > rows[-1][0]:
+            rows.append((rounded_station, value))
     return rows
 
 
@@ -119,56 +122,57 @@ def height_pieces(function: Callable[[Float, int], Float], breaks: Float, tolera
     where one cubic holds for several.
     """
     stations = [np.linspace(a, b, _SAMPLES) for a, b in itertools.pairwise(breaks.tolist())]
-    heights = [function(at, number) for number, at in enumerate(stations)]
+    heights = [function(samples, number) for number, samples in enumerate(stations)]
     pieces: list[HeightPiece] = []
 
-    def fitted(at: Sequence[Float], height: Sequence[Float]) -> tuple[HeightPiece, float]:
+    def fitted(samples: Sequence[Float], height: Sequence[Float]) -> tuple[HeightPiece, float]:
+        """Return a piece near heights at stations, smooth behind the last piece if it can be, and its deviation, m."""
         if pieces:
-            before = pieces[-1]
-            level, grade = before.elevation_at(before.end), before.grade_at(before.end)
-            smooth = _fitted(at, height, level, grade, tolerance)
-            return smooth if smooth[1] <= tolerance else _fitted(at, height, level, None, tolerance)
-        return _fitted(at, height, float(heights[0][0]), None, tolerance)
+            previous_piece = pieces[-1]
+            level, grade = previous_piece.elevation_at(previous_piece.end), previous_piece.grade_at(previous_piece.end)
+            smooth_fit = _fitted(samples, height, level, grade, tolerance)
+            return smooth_fit if smooth_fit[1] <= tolerance else _fitted(samples, height, level, None, tolerance)
+        return _fitted(samples, height, float(heights[0][0]), None, tolerance)
 
-    first = 0
-    while first < len(stations):
-        last = first + 1
-        piece, off = fitted(stations[first:last], heights[first:last])
-        if off > tolerance and breaks[last] - breaks[first] > 1.0:  # no cubic follows it: in parts
-            parts = np.linspace(breaks[first], breaks[last], 2 + int(breaks[last] - breaks[first]) // 5)
-            for start, end in itertools.pairwise(parts.tolist()):
-                at = np.linspace(start, end, _SAMPLES)
-                pieces.append(fitted([at], [function(at, first)])[0])
-            first = last
+    begin = 0
+    while begin < len(stations):
+        stop = begin + 1
+        piece, deviation = fitted(stations[begin:stop], heights[begin:stop])
+        if deviation > tolerance and breaks[stop] - breaks[begin] > 1.0:  # no cubic follows it: in parts
+            part_ends = np.linspace(breaks[begin], breaks[stop], 2 + int(breaks[stop] - breaks[begin]) // 5)
+            for start, end in itertools.pairwise(part_ends.tolist()):
+                samples = np.linspace(start, end, _SAMPLES)
+                pieces.append(fitted([samples], [function(samples, begin)])[0])
+            begin = stop
             continue
-        while last < len(stations):
-            longer, off = fitted(stations[first : last + 1], heights[first : last + 1])
-            if off > tolerance:
+        while stop < len(stations):
+            longer_piece, deviation = fitted(stations[begin : stop + 1], heights[begin : stop + 1])
+            if deviation > tolerance:
                 break
-            piece, last = longer, last + 1
+            piece, stop = longer_piece, stop + 1
         pieces.append(piece)
-        first = last
+        begin = stop
     return pieces
 
 
 def _fitted(
     stations: Sequence[Float], heights: Sequence[Float], level: float, grade: float | None, tolerance: float
 ) -> tuple[HeightPiece, float]:
-    """Return the polynomial of the lowest degree near heights (m), and how far it is off, m.
+    """Return the polynomial of the lowest degree (1 to 3) within a tolerance of heights, and its largest deviation, m.
 
-    It begins at a level (m), and with a grade (m/m) if one is given.
+    The polynomial begins at a level (m) and, where `grade` (m/m) isn't None, with that grade.
     """
-    at, height = np.concatenate(stations), np.concatenate(heights)
-    length = float(at[-1] - at[0])
-    u, worst, best = (at - at[0]) / length, np.inf, np.zeros(3)
-    given = np.zeros(0) if grade is None else np.array([grade * length])
-    rest = height - level - (0.0 if grade is None else grade * length * u)
+    station, height = np.concatenate(stations), np.concatenate(heights)
+    length = float(station[-1] - station[0])
+    u, deviation, coefficients = (station - station[0]) / length, np.inf, np.zeros(3)
+    linear_term = np.zeros(0) if grade is None else np.array([grade * length])
+    remainder = height - level - (0.0 if grade is None else grade * length * u)
     for degree in range(1, 4):
-        powers = u[:, None] ** np.arange(1 + len(given), degree + 1)
-        solved = np.linalg.lstsq(powers, rest, rcond=None)[0] if powers.shape[1] else np.zeros(0)
-        worst = float(np.abs(powers @ solved - rest).max())
-        best = np.concatenate([given, solved, np.zeros(3 - degree)])
-        if worst <= tolerance:
+        powers = u[:, None] ** np.arange(1 + len(linear_term), degree + 1)
+        solution = np.linalg.lstsq(powers, remainder, rcond=None)[0] if powers.shape[1] else np.zeros(0)
+        deviation = float(np.abs(powers @ solution - remainder).max())
+        coefficients = np.concatenate([linear_term, solution, np.zeros(3 - degree)])
+        if deviation <= tolerance:
             break
-    rise, square, cube = (best / length ** np.arange(1, 4)).tolist()
-    return HeightPiece(float(at[0]), float(at[-1]), level, rise, square, cube), worst
+    slope, square, cube = (coefficients / length ** np.arange(1, 4)).tolist()
+    return HeightPiece(float(station[0]), float(station[-1]), level, slope, square, cube), deviation

@@ -43,18 +43,18 @@ class Size:
     def __getitem__(self, name: str) -> float:
         return self._given[name]
 
-    def within(self, name: str, low: float, high: float, otherwise: float) -> float:
-        """Return a size (m) within limits, which is noted; of one that isn't given (0) the usual."""
-        return self.fit(name, self._given[name], low, high, otherwise)
+    def within(self, name: str, lowest: float, highest: float, usual: float) -> float:
+        """Return the file's size of a name (m), clipped to limits and noted if it was; the usual one if it is 0."""
+        return self.fit(name, self._given[name], lowest, highest, usual)
 
-    def fit(self, name: str, value: float, low: float, high: float, otherwise: float) -> float:
-        """Return a value (m) within limits, which is noted under a name; of one that isn't given (0) the usual."""
+    def fit(self, name: str, value: float, lowest: float, highest: float, usual: float) -> float:
+        """Return a value (m), clipped to limits and noted under a name if it was; the usual one if it is 0 or less."""
         if not value > 0.0:
-            return otherwise
-        used = min(max(value, low), high)
-        if abs(used - value) > _TOLD:
-            self.limited[name] = max(abs(used - value), self.limited.get(name, 0.0))
-        return used
+            return usual
+        fitted_value = min(max(value, lowest), highest)
+        if abs(fitted_value - value) > _TOLD:
+            self.limited[name] = max(abs(fitted_value - value), self.limited.get(name, 0.0))
+        return fitted_value
 
 
 Along = Callable[["Stretch", Size], RoadObject]
@@ -78,7 +78,11 @@ class Maker(NamedTuple):
     approximated: str = ""
 
 
+# Makers of things. Limits of sizes (m) are those of the things' fields; sizes for objects without any are chosen.
+
+
 def _stretch(stretch: Stretch) -> dict[str, Any]:
+    """Return the fields that all things along the road have."""
     return {
         "instance": 1,
         "start_station": stretch.start,
@@ -88,85 +92,104 @@ def _stretch(stretch: Stretch) -> dict[str, Any]:
 
 
 def _guardrail(stretch: Stretch, size: Size) -> RoadObject:
+    """Return a guardrail along a stretch, its face towards the road."""
     height = size.within("height", 0.3, 1.5, 0.75)
     return Guardrail(**_stretch(stretch), faces="left" if stretch.offset < 0.0 else "right", height=height)
 
 
 def _concrete_barrier(stretch: Stretch, size: Size) -> RoadObject:
-    foot = size.within("width", 0.3, 1.2, 0.54)
-    return ConcreteBarrier(**_stretch(stretch), height=size.within("height", 0.4, 2.0, 0.9), base_width=foot)
+    """Return a concrete barrier along a stretch."""
+    foot_width = size.within("width", 0.3, 1.2, 0.54)
+    return ConcreteBarrier(**_stretch(stretch), height=size.within("height", 0.4, 2.0, 0.9), base_width=foot_width)
 
 
 def _noise_barrier(stretch: Stretch, size: Size) -> RoadObject:
+    """Return a noise barrier along a stretch."""
     return NoiseBarrier(**_stretch(stretch), height=size.within("height", 1.0, 12.0, 4.0))
 
 
 def _fence(stretch: Stretch, size: Size) -> RoadObject:
+    """Return a fence along a stretch."""
     return Fence(**_stretch(stretch), height=size.within("height", 0.5, 4.0, 1.8))
 
 
 def _wall(stretch: Stretch, size: Size) -> RoadObject:
-    thick = size.within("width", 0.08, 1.0, 0.24)
-    return Wall(**_stretch(stretch), height=size.within("height", 0.3, 6.0, 1.8), thickness=thick)
+    """Return a wall along a stretch."""
+    wall_thickness = size.within("width", 0.08, 1.0, 0.24)
+    return Wall(**_stretch(stretch), height=size.within("height", 0.3, 6.0, 1.8), thickness=wall_thickness)
 
 
 def _hedge(stretch: Stretch, size: Size) -> RoadObject:
-    wide = size.within("width", 0.3, 5.0, 1.2)
-    return Hedge(**_stretch(stretch), height=size.within("height", 0.3, 8.0, 1.8), width=wide)
+    """Return a hedge along a stretch."""
+    hedge_width = size.within("width", 0.3, 5.0, 1.2)
+    return Hedge(**_stretch(stretch), height=size.within("height", 0.3, 8.0, 1.8), width=hedge_width)
 
 
 def _delineator(place: dict[str, Any], size: Size) -> RoadObject:
+    """Return a delineator at a place."""
     return Delineator(**place, height=size.within("height", 0.3, 1.5, 1.0))
 
 
 def _lamp(place: dict[str, Any], size: Size) -> RoadObject:
+    """Return a lighting pole at a place."""
     return Pole(**place, kind="lighting", height=size.within("height", 2.0, 30.0, 12.0))
 
 
 def _pole(place: dict[str, Any], size: Size) -> RoadObject:
-    thick = size.fit("width", 2.0 * size["radius"] or size["width"], 0.05, 0.6, 0.2)
-    return Pole(**place, height=size.within("height", 2.0, 30.0, 6.0), diameter=thick, arm_length=0.0)
+    """Return a pole without an arm at a place."""
+    pole_diameter = size.fit("width", 2.0 * size["radius"] or size["width"], 0.05, 0.6, 0.2)
+    return Pole(**place, height=size.within("height", 2.0, 30.0, 6.0), diameter=pole_diameter, arm_length=0.0)
 
 
 def _beacon(place: dict[str, Any], size: Size) -> RoadObject:
-    wide = size.fit("width", size["width"] or 2.0 * size["radius"], 0.1, 0.6, 0.25)
-    high = size.within("height", 0.5, 2.0, 1.0)
-    return ConstructionBeacon(**place, pass_side="left" if place["offset"] < 0.0 else "right", width=wide, height=high)
+    """Return a construction beacon at a place, passed on the side of the line."""
+    beacon_width = size.fit("width", size["width"] or 2.0 * size["radius"], 0.1, 0.6, 0.25)
+    beacon_height = size.within("height", 0.5, 2.0, 1.0)
+    return ConstructionBeacon(
+        **place, pass_side="left" if place["offset"] < 0.0 else "right", width=beacon_width, height=beacon_height
+    )
 
 
 def _building(place: dict[str, Any], size: Size) -> RoadObject:
-    wide, deep = size.within("length", 2.0, 80.0, 11.0), size.within("width", 2.0, 60.0, 9.0)
-    tall = size.within("height", 2.0, 30.0, 5.6)
-    return Building(**place, kind="hall", width=wide, depth=deep, height=tall, roof_height=0.0)
+    """Return a building in the form of a box at a place."""
+    building_width, building_depth = size.within("length", 2.0, 80.0, 11.0), size.within("width", 2.0, 60.0, 9.0)
+    building_height = size.within("height", 2.0, 30.0, 5.6)
+    return Building(
+        **place, kind="hall", width=building_width, depth=building_depth, height=building_height, roof_height=0.0
+    )
 
 
 def _gantry(place: dict[str, Any], size: Size) -> RoadObject:
-    half, middle = 0.5 * size.within("width", 4.0, 80.0, 20.0), place["offset"]
-    return Gantry(**place, kind="two_sided", left_offset=middle + half, right_offset=middle - half)
+    """Return a gantry over its width at a place, with a leg at each end."""
+    half_width, middle = 0.5 * size.within("width", 4.0, 80.0, 20.0), place["offset"]
+    return Gantry(**place, kind="two_sided", left_offset=middle + half_width, right_offset=middle - half_width)
 
 
 def _cabinet(place: dict[str, Any], size: Size) -> RoadObject:
+    """Return a utility cabinet at a place."""
     return Cabinet(**place, kind="utility", **_box(size, 0.8, 0.4))
 
 
 def _phone(place: dict[str, Any], size: Size) -> RoadObject:
+    """Return an emergency phone at a place."""
     return Cabinet(**place, kind="emergency_phone", **_box(size, 0.3, 0.3))
 
 
 def _box(size: Size, width: float, depth: float) -> dict[str, float]:
-    """Return width, depth and height of a cabinet, m: the first two of a file without them as given."""
-    wide, deep = size.within("length", 0.1, 3.0, width), size.within("width", 0.1, 3.0, depth)
-    usual = float(Cabinet.model_fields["height"].default)
-    return {"width": wide, "depth": deep, "height": size.within("height", 0.4, 3.0, usual)}
+    """Return width, depth and height of a cabinet, m; `width` and `depth` hold where the file has none."""
+    box_width, box_depth = size.within("length", 0.1, 3.0, width), size.within("width", 0.1, 3.0, depth)
+    usual_height = float(Cabinet.model_fields["height"].default)
+    return {"width": box_width, "depth": box_depth, "height": size.within("height", 0.4, 3.0, usual_height)}
 
 
 def _shaft(place: dict[str, Any], size: Size) -> RoadObject:
-    """Return a shaft: a round one is a manhole."""
+    """Return a shaft at a place: a manhole where the file gives a radius, else an inlet."""
     kind: Literal["inlet", "manhole"] = "manhole" if size["radius"] > 0.0 else "inlet"
     return Shaft(**place, kind=kind, size=size.fit("width", 2.0 * size["radius"] or size["width"], 0.3, 1.5, 0.6))
 
 
 def _light(place: dict[str, Any], size: Size) -> RoadObject:
+    """Return a traffic light at a place."""
     return TrafficLight(**place, height=size.within("height", 1.5, 8.0, 3.2))
 
 

@@ -33,7 +33,7 @@ class Loss:
     surface: bool = False
 
     def approximate(self, kind: str, why: str, deviation: float = 0.0, station: float | None = None) -> None:
-        """Add what was approximated, by how much (m) and where (m); of one kind and reason the worst is kept."""
+        """Add what was approximated, by how much (m) and where (m); of rows of one kind and reason the worst stays."""
         kind, why = _shown(kind), _shown(why)
         row: dict[str, Any] = {"kind": kind, "why": why, "deviation": round(deviation, 6)}
         if station is not None:
@@ -55,7 +55,7 @@ class Loss:
         surface: bool = False,
         stretch: tuple[float, float] | None = None,
     ) -> None:
-        """Add what was left out, whether it was surface, and along which stretch of the set it was, stations in m."""
+        """Add what was left out, whether it was surface, and the stretch (stations of the set, m) on which it was."""
         key = _shown(kind), _shown(why)
         self.left_out[key] += count
         if stretch is not None:
@@ -63,7 +63,7 @@ class Loss:
         self.surface |= surface
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as JSON data."""
+        """Return the list as JSON data."""
         return {
             "read": dict(sorted(self.read.items())),
             "approximated": self.approximated,
@@ -76,20 +76,23 @@ class Loss:
         }
 
     def lines(self) -> list[str]:
-        """Return it as lines for people."""
+        """Return the list as lines of text for people."""
         sentences = [f"read: {', '.join(f'{count} {kind}' for kind, count in sorted(self.read.items()))}"]
         for row in self.approximated:
-            off = f", within {1000.0 * row['deviation']:.2f} mm" if row["deviation"] else ""
-            where = f" (worst at station {row['station']:.1f} m)" if "station" in row else ""
-            sentences.append(f"approximated: {row['kind']}: {row['why']}{off}{where}")
-        for (kind, why), count in sorted(self.left_out.items()):
-            stretches = self.stretches.get((kind, why), [])
-            named = ", ".join(f"{low:.1f} to {high:.1f} m" for low, high in stretches[:_SHOWN])
+            deviation = f", within {1000.0 * row['deviation']:.2f} mm" if row["deviation"] else ""
+            place = f" (worst at station {row['station']:.1f} m)" if "station" in row else ""
+            sentences.append(f"approximated: {row['kind']}: {row['why']}{deviation}{place}")
+        for (kind, reason), count in sorted(self.left_out.items()):
+            stretches = self.stretches.get((kind, reason), [])
+            named_stretches = ", ".join(f"{start:.1f} to {end:.1f} m" for start, end in stretches[:_SHOWN])
             more = f" and {len(stretches) - _SHOWN} more" if len(stretches) > _SHOWN else ""
-            sentences.append(f"left out: {count} {kind}: {why}" + (f" (stations {named}{more})" if named else ""))
+            sentences.append(
+                f"left out: {count} {kind}: {reason}"
+                + (f" (stations {named_stretches}{more})" if named_stretches else "")
+            )
         return sentences
 
 
 def _shown(text: str) -> str:
-    """Return a text of which a file may have written a part as one line."""
+    """Return a text, which may hold words of a file, on one line and at most 300 characters long."""
     return on_one_line(text)[:_LONGEST]

@@ -80,22 +80,22 @@ def line_markings(
     shapes = list(pavements.shapes.values())
     surfaces = {id(side.surface): side.surface for side in shapes}
     lines: list[_Line] = []
-    marked = False
+    has_marks = False
     for key, surface in surfaces.items():
-        mine = {side.sign: side for side in shapes if id(side.surface) == key}
+        sides_by_sign = {side.sign: side for side in shapes if id(side.surface) == key}
         for section_number, section in enumerate(surface.road.sections):
             lanes: list[tuple[int, FileLane | None, Element]] = []
             if section.centre is not None:
                 lanes.append((0, None, section.centre))
             lanes += [(lane.number, lane, lane.element) for side in section.lanes.values() for lane in side]
             for lane_number, lane, element in lanes:
-                side, border, turnout = _border(mine, pavements, section_number, lane)
-                about = (side, border, turnout, (lane_number, section_number))
-                for group in _lines_of(element, about, (section.start, section.end), scenario, loss):
-                    marked = True
-                    if group is not None:
-                        lines.append(group)
-    if not marked:
+                side, border, turnout = _border(sides_by_sign, pavements, section_number, lane)
+                position = (side, border, turnout, (lane_number, section_number))
+                for line in _lines_of(element, position, (section.start, section.end), scenario, loss):
+                    has_marks = True
+                    if line is not None:
+                        lines.append(line)
+    if not has_marks:
         return None
     return _markings(lines, stations, loss)
 
@@ -103,7 +103,7 @@ def line_markings(
 def _border(
     sides: Mapping[int, SideShape], pavements: Pavements, section: int, lane: FileLane | None
 ) -> tuple[SideShape, tuple[int, int] | None, str | None]:
-    """Return the side that a lane's outer border is on, the lane boundaries that it is, and the turnout's id."""
+    """Return the side that a lane's outer border is on, the lane boundaries there, and the id of a turnout or None."""
     for sign in (-1, 1):  # the line between two directions is the right carriageway's
         side = sides.get(sign)
         if side is None or (lane is not None and lane.number * sign < 0):
@@ -120,25 +120,25 @@ def _border(
 
 
 def _lane_border(side: SideShape, section: int, lane: FileLane | None) -> tuple[int, int] | None:
-    """Return the lane boundaries that lie at a lane's outer border, as lanes between have no width; None if none do."""
+    """Return the first and last lane boundary at a lane's outer border, several where lanes have no width; or None."""
     slots = side.layout.slots
-    there = [(n, slot.lanes[section]) for n, slot in enumerate(slots) if section in slot.lanes]
-    for place, (n, other) in enumerate(there):
-        if other is lane:
-            outer = there[place + 1][0] if place + 1 < len(there) else len(slots)
-            return len(slots) - outer, len(slots) - 1 - n
-    if not there:
+    section_lanes = [(n, slot.lanes[section]) for n, slot in enumerate(slots) if section in slot.lanes]
+    for row, (n, slot_lane) in enumerate(section_lanes):
+        if slot_lane is lane:
+            next_slot = section_lanes[row + 1][0] if row + 1 < len(section_lanes) else len(slots)
+            return len(slots) - next_slot, len(slots) - 1 - n
+    if not section_lanes:
         return None
     lanes = side.surface.road.sections[section].lanes[side.sign]
-    inside = [other for other in lanes if abs(other.number) < abs(there[0][1].number)]
-    if (inside[-1] if inside else None) is lane:
-        return len(slots) - there[0][0], len(slots)
+    inner_lanes = [slot_lane for slot_lane in lanes if abs(slot_lane.number) < abs(section_lanes[0][1].number)]
+    if (inner_lanes[-1] if inner_lanes else None) is lane:
+        return len(slots) - section_lanes[0][0], len(slots)
     return None
 
 
 def _lines_of(
     element: Element,
-    about: tuple[SideShape, tuple[int, int] | None, str | None, tuple[int, int]],
+    position: tuple[SideShape, tuple[int, int] | None, str | None, tuple[int, int]],
     span: tuple[float, float],
     scenario: RoadScenario,
     loss: Loss,
@@ -147,65 +147,70 @@ def _lines_of(
     start, end = span
     marks = sorted(children(element, "roadMark"), key=lambda mark: number(mark, "sOffset", 0.0))
     begins = [start + number(mark, "sOffset", 0.0) for mark in marks]
-    for mark, begin, until in zip(marks, begins, [*begins[1:], end], strict=False):
-        low, high = max(begin, start), min(until, end)
+    for mark, begin, next_begin in zip(marks, begins, [*begins[1:], end], strict=False):
+        first_station, last_station = max(begin, start), min(next_begin, end)
         kind = mark.get("type", "none").strip()
-        if kind == "none" or high - low <= SHORTEST:
+        if kind == "none" or last_station - first_station <= SHORTEST:
             continue
-        yield from _lines_of_mark(mark, about, (low, high), scenario, loss)
+        yield from _lines_of_mark(mark, position, (first_station, last_station), scenario, loss)
 
 
 def _lines_of_mark(
     mark: Element,
-    about: tuple[SideShape, tuple[int, int] | None, str | None, tuple[int, int]],
+    position: tuple[SideShape, tuple[int, int] | None, str | None, tuple[int, int]],
     span: tuple[float, float],
     scenario: RoadScenario,
     loss: Loss,
 ) -> Iterator[_Line | None]:
-    side, border, turnout, place = about
+    """Yield the lines that one road mark consists of within a span (m); None for a mark that is left out.
+
+    `position` is the lines' side, border, turnout and place, as in `_Line`.
+    """
+    side, border, turnout, place = position
     kind = mark.get("type", "none").strip()
-    shown = child(mark, "type")
-    rows = [] if shown is None else children(shown, "line")
+    type_element = child(mark, "type")
+    rows = [] if type_element is None else children(type_element, "line")
     if kind not in _PAINTED and not rows:
         loss.leave_out("road marks", f"of type {kind}")
         yield None
         return
     notes = {row.get("code", ""): row.get("value", "") for row in children(mark, "userData")}
-    usual = _BROAD if mark.get("weight", "standard").strip() == "bold" else _NARROW
-    width = number(mark, "width", 0.0) or (0.0 if shown is None else number(shown, "width", 0.0))
+    usual_width = _BROAD if mark.get("weight", "standard").strip() == "bold" else _NARROW
+    width = number(mark, "width", 0.0) or (0.0 if type_element is None else number(type_element, "width", 0.0))
     if not width and not (rows and all(number(row, "width", 0.0) for row in rows)):
-        loss.approximate("road marks", f"a width that isn't given is {usual:g} m")
-        width = usual
+        loss.approximate("road marks", f"a width that isn't given is {usual_width:g} m")
+        width = usual_width
     film = number(mark, "height", 0.0)
     common: dict[str, Any] = {
         "side": side, "border": border, "turnout": turnout, "place": place, "start": span[0], "end": span[1],
         "film": film if 0.0005 <= film <= 0.006 else 0.003,
-        "kind": shown.get("name", "") if shown is not None and "instance" in notes else "",
+        "kind": type_element.get("name", "") if type_element is not None and "instance" in notes else "",
         "name": notes.get("id", ""),
     }  # fmt: skip
     if rows:
         for row in rows:
             dash, gap = number(row, "length", 0.0), number(row, "space", 0.0)
-            dashed = gap > 0.0
+            is_dashed = gap > 0.0
             color = _colour(row.get("color") or mark.get("color") or "standard", loss)
             yield _Line(
-                **common, dash=dash if dashed else 0.0, gap=gap, first=span[0] + number(row, "sOffset", 0.0),
+                **common, dash=dash if is_dashed else 0.0, gap=gap, first=span[0] + number(row, "sOffset", 0.0),
                 shift=number(row, "tOffset", 0.0), width=number(row, "width", 0.0) or width, color=color,
             )  # fmt: skip
         return
-    solids = _PAINTED[kind]
+    solid_flags = _PAINTED[kind]
     dash, gap = scenario.markings.lane_dash or _DASH, scenario.markings.lane_gap or _GAP
-    if not all(solids):
+    if not all(solid_flags):
         loss.approximate("road marks", f"dashes and gaps that aren't given are {dash:g} m and {gap:g} m")
-    inwards = 1.0 if place[0] <= 0 else -1.0  # lines are named from the inside out, at the centre from the left
-    shifts = (0.0,) if len(solids) == 1 else (inwards * width, -inwards * width)
+    inward_sign = 1.0 if place[0] <= 0 else -1.0  # lines are named from the inside out, at the centre from the left
+    shifts = (0.0,) if len(solid_flags) == 1 else (inward_sign * width, -inward_sign * width)
     color = _colour(mark.get("color", "standard"), loss)
-    for solid, shift in zip(solids, shifts, strict=True):
-        lengths = (0.0, 0.0) if solid else (dash, gap)
+    for is_solid, shift in zip(solid_flags, shifts, strict=True):
+        lengths = (0.0, 0.0) if is_solid else (dash, gap)
         yield _Line(**common, dash=lengths[0], gap=lengths[1], first=span[0], shift=shift, width=width, color=color)
 
 
 def _colour(name: str, loss: Loss) -> str:
+    """Return the paint, white or yellow, of a colour of OpenDRIVE; another colour is noted as approximated."""
     colour = _COLOURS.get(name.strip())
     if colour is None:
         colour = "yellow" if name.strip() == "orange" else "white"
@@ -214,6 +219,7 @@ def _colour(name: str, loss: Loss) -> str:
 
 
 def _markings(lines: Sequence[_Line], stations: Stations, loss: Loss) -> dict[str, LineMarking]:
+    """Return the line markings by id; lines that a parameter set can't hold are noted as left out."""
     markings: dict[str, LineMarking] = {}
     for line in _joined(lines):
         name = line.name
@@ -236,9 +242,9 @@ def _markings(lines: Sequence[_Line], stations: Stations, loss: Loss) -> dict[st
 
 
 def _joined(lines: Sequence[_Line]) -> list[_Line]:
-    """Return lines with those joined that go on in the next lane section with the same dashes.
+    """Return the lines, with those joined that go on in the next lane section with the same dashes.
 
-    A dash that a section cuts is a solid line in our own files: what has one id is one line.
+    Our own files write a dash that a section cuts as a solid line, so there all lines of one id are one line.
     """
     parts_by_name: dict[str, list[_Line]] = {}
     others: list[_Line] = []
@@ -247,70 +253,78 @@ def _joined(lines: Sequence[_Line]) -> list[_Line]:
             parts_by_name.setdefault(line.name, []).append(line)
         else:
             others.append(line)
+    # Lines of our own files: parts of one id that follow each other, whatever their dashes.
     joined: list[_Line] = []
     for parts in parts_by_name.values():
         runs: list[list[_Line]] = []
         for part in parts:
             last = runs[-1][-1] if runs else None
             border = _common(last.border, part.border) if last is not None else None
-            near = last is not None and part.start - last.end < _SAME and _key(part)[:-3] == _key(last)[:-3]
-            if near and last is not None and (border or last.border is part.border is None):
+            continues = last is not None and part.start - last.end < _SAME and _key(part)[:-3] == _key(last)[:-3]
+            if continues and last is not None and (border or last.border is part.border is None):
                 runs[-1].append(replace(part, border=border))
             else:
                 runs.append([part])
         for run in runs:
-            broken = next((part for part in run if part.gap), run[0])
+            dashed_part = next((part for part in run if part.gap), run[0])
             joined.append(
                 replace(
                     run[0],
                     end=run[-1].end,
-                    dash=broken.dash,
-                    gap=broken.gap,
+                    dash=dashed_part.dash,
+                    gap=dashed_part.gap,
                     border=run[-1].border,
                     first=run[0].first if run[0].gap else run[0].start,
                 )
             )
-    rest: list[_Line] = []
+    # Lines of other programs: a line goes on where paint, place and the phase of the dashes are the same.
+    joined_others: list[_Line] = []
     for line in others:
-        for n, other in enumerate(rest):
+        for n, other in enumerate(joined_others):
             border = _common(other.border, line.border)
-            same = border is not None or other.border is line.border is None
-            if same and abs(other.end - line.start) < _SAME and _key(other) == _key(line) and _goes_on(other, line):
-                rest[n] = replace(other, end=line.end, border=border)
+            same_border = border is not None or other.border is line.border is None
+            if (
+                same_border
+                and abs(other.end - line.start) < _SAME
+                and _key(other) == _key(line)
+                and _goes_on(other, line)
+            ):
+                joined_others[n] = replace(other, end=line.end, border=border)
                 break
         else:
-            rest.append(line)
-    return joined + rest
+            joined_others.append(line)
+    return joined + joined_others
 
 
-def _common(first: tuple[int, int] | None, second: tuple[int, int] | None) -> tuple[int, int] | None:
+def _common(border: tuple[int, int] | None, other_border: tuple[int, int] | None) -> tuple[int, int] | None:
     """Return the lane boundaries that two lines may both lie on, None without any."""
-    if first is None or second is None:
+    if border is None or other_border is None:
         return None
-    low, high = max(first[0], second[0]), min(first[1], second[1])
-    return (low, high) if low <= high else None
+    start, end = max(border[0], other_border[0]), min(border[1], other_border[1])
+    return (start, end) if start <= end else None
 
 
 def _boundary(line: _Line) -> int:
-    """Return the lane boundary that a line follows: of several the outermost or innermost of all, else the inner."""
+    """Return the lane boundary that a line follows: the outermost or innermost one if possible, else the inner one."""
     assert line.border is not None
-    low, high = line.border
-    return 0 if low == 0 and high < len(line.side.layout.slots) else high
+    outermost, innermost = line.border
+    return 0 if outermost == 0 and innermost < len(line.side.layout.slots) else innermost
 
 
 def _key(line: _Line) -> tuple[Any, ...]:
+    """Return what two lines must have in common to be one: side, turnout, place and paint; dash and gap come last."""
     border = None if line.border is not None else ("free", line.place[0])
     shape = (round(line.shift, 4), round(line.width, 4), line.color, line.film)
     return (line.side.sign, line.turnout, *shape, border, round(line.dash, 4), round(line.gap, 4))
 
 
-def _goes_on(first: _Line, second: _Line) -> bool:
-    """Return whether the second line's dashes are where the first's would be."""
-    period = first.dash + first.gap
+def _goes_on(line: _Line, next_line: _Line) -> bool:
+    """Return whether the second line's dashes lie where the first line's pattern would go on."""
+    period = line.dash + line.gap
     if not period:
         return True
-    off = (second.first - first.first) % period
-    return min(off, period - off) < _SAME
+    phase = (next_line.first - line.first) % period
+    return min(phase, period - phase) < _SAME
 
 
 def _marking(line: _Line, stations: Stations) -> LineMarking:
@@ -354,27 +368,28 @@ def _marking(line: _Line, stations: Stations) -> LineMarking:
     )
 
 
-def _kind(line: _Line, outwards: float) -> str:
-    """Return the kind whose place is that of a line so many widths outwards from its border."""
-    if line.kind in _KINDS and abs(_OUTWARDS.get(line.kind, 0.0) - outwards) < _SAME:
+def _kind(line: _Line, outward_shift: float) -> str:
+    """Return the kind of marking that lies so far outwards (in widths of the line) from its border."""
+    if line.kind in _KINDS and abs(_OUTWARDS.get(line.kind, 0.0) - outward_shift) < _SAME:
         if line.kind in ("turnout_edge", "gore_edge"):
             return line.kind if line.turnout else "free"
         return line.kind if line.border is not None else "free"
     if line.border is None:
         return "free"
-    last, boundary = len(line.side.layout.slots), _boundary(line)
-    if boundary == 0 and abs(outwards - 0.5) < _SAME:
+    innermost, boundary = len(line.side.layout.slots), _boundary(line)
+    if boundary == 0 and abs(outward_shift - 0.5) < _SAME:
         return "outer_edge"
-    if boundary == last and abs(outwards + 0.5) < _SAME:
+    if boundary == innermost and abs(outward_shift + 0.5) < _SAME:
         return "inner_edge"
-    return "lane" if abs(outwards) < _SAME else "free"
+    return "lane" if abs(outward_shift) < _SAME else "free"
 
 
 def _offset(line: _Line, stations: Stations) -> float | tuple[SignedWidthPoint, ...]:
-    """Return the distance of a free line's axis from the centreline, by station."""
+    """Return the distance, m, of a free line's axis from the centreline by station, or one number if it is constant."""
     side, lane = line.side, line.place[0]
 
-    def border(station: Float, stretch: int) -> Float:
+    def axis_distance(station: Float, stretch: int) -> Float:
+        """Return the distances (N, 1), m, of the line's axis outwards from the reference line at stations (N,)."""
         if lane == 0:
             edge = side.surface.centre(station, side.inside(station, stretch)).offset
         else:
@@ -382,10 +397,13 @@ def _offset(line: _Line, stations: Stations) -> float | tuple[SignedWidthPoint, 
             edge = next((row.outer.offset for row in rows if row.lane.number == lane), rows[-1].outer.offset)
         return np.asarray(side.sign * (edge + line.shift))[:, None]
 
-    inner = (side.breaks > line.start + SHORTEST) & (side.breaks < line.end - SHORTEST)
-    marks = np.array([line.start, *side.breaks[inner], line.end])
-    numbers = np.clip(np.searchsorted(side.breaks, 0.5 * (marks[:-1] + marks[1:]), side="right") - 1, 0, None)
-    distances = polyline(lambda s, n: border(s, int(numbers[n])), marks, _SAME * 0.3)
+    is_inside = (side.breaks > line.start + SHORTEST) & (side.breaks < line.end - SHORTEST)
+    stretch_ends = np.array([line.start, *side.breaks[is_inside], line.end])
+    # The stretch of the side's breaks in which each part of the line lies.
+    numbers = np.clip(
+        np.searchsorted(side.breaks, 0.5 * (stretch_ends[:-1] + stretch_ends[1:]), side="right") - 1, 0, None
+    )
+    distances = polyline(lambda s, n: axis_distance(s, int(numbers[n])), stretch_ends, _SAME * 0.3)
     points = corners(stations(distances.stations), distances.values[:, 0])
     if len(points) == 1:
         return round_value(points[0][1], 6)

@@ -13,6 +13,7 @@ from .records import SHORTEST
 from .surface import FileSurface
 
 _APPROXIMATIONS = 2
+"""Newton's steps to the foot of a point on the line (chosen)."""
 
 
 @dataclass(frozen=True)
@@ -30,32 +31,40 @@ class Places:
     stations: Callable[[Float], Float]
 
     def along(self, s: Float) -> Float:
-        """Return stations (N,) of the line at those of the file, m, within the road."""
+        """Return stations (N,), m, of the alignment at stations `s` (N,) of the file, clipped to the road."""
         return self.stations(np.clip(s, 0.0, self.surface.road.length))
 
     def at(self, s: Float, t: Float, height: Float) -> tuple[Float, Float]:
         """Return stations and offsets (N,), m, of points at s, t and heights (N,) normal to the road's plane.
 
-        The plane is tilted about the line as it climbs: what stands off it lies a little behind or before s.
+        The plane is tilted about the line as the line climbs. So a point off the line lies, in plan, a little behind or
+        before the place at s.
         """
         s, t, height = (np.asarray(values, dtype=np.float64) for values in (s, t, height))
         road = self.surface.road
         s = np.clip(s, 0.0, road.length)
         climb = np.arctan(road.elevation.at(s, slope=True))
-        tilt = road.superelevation.at(s)
-        above = t * np.sin(tilt) + height * np.cos(tilt)
-        ahead, offset = -np.sin(climb) * above, t * np.cos(tilt) - height * np.sin(tilt)
-        along = self.stations(s)
-        plan, heading, _ = self.alignment.frame(along)
-        way = np.column_stack([np.cos(heading), np.sin(heading)])
-        point = plan + ahead[:, None] * way + offset[:, None] * np.column_stack([-way[:, 1], way[:, 0]])
-        station = along
+        bank = road.superelevation.at(s)
+        rise = t * np.sin(bank) + height * np.cos(bank)
+        forward, offset = -np.sin(climb) * rise, t * np.cos(bank) - height * np.sin(bank)
+        line_station = self.stations(s)
+        plan, heading, _ = self.alignment.frame(line_station)
+        direction = np.column_stack([np.cos(heading), np.sin(heading)])
+        point = (
+            plan + forward[:, None] * direction + offset[:, None] * np.column_stack([-direction[:, 1], direction[:, 0]])
+        )
+        station = line_station
+        # The foot on the curved line is found by Newton's steps: a metre along it is 1 - k t metres at the offset t.
         for _ in range(_APPROXIMATIONS):
-            plan, heading, bend = self.alignment.frame(station)
-            way = np.column_stack([np.cos(heading), np.sin(heading)])
-            away = point - plan
-            offset = away[:, 1] * way[:, 0] - away[:, 0] * way[:, 1]
-            station = np.clip(station + (away * way).sum(axis=1) / (1.0 - bend * offset), 0.0, self.alignment.length)
+            plan, heading, curvature = self.alignment.frame(station)
+            direction = np.column_stack([np.cos(heading), np.sin(heading)])
+            gap = point - plan
+            offset = gap[:, 1] * direction[:, 0] - gap[:, 0] * direction[:, 1]
+            station = np.clip(
+                station + (gap * direction).sum(axis=1) / (1.0 - curvature * offset), 0.0, self.alignment.length
+            )
         # What begins or ends with the road does so on its plane as well.
-        ends = np.where(s <= SHORTEST, 0.0, np.where(s >= road.length - SHORTEST, self.alignment.length, station))
-        return ends, offset
+        road_station = np.where(
+            s <= SHORTEST, 0.0, np.where(s >= road.length - SHORTEST, self.alignment.length, station)
+        )
+        return road_station, offset

@@ -18,8 +18,9 @@ TOLERANCE = 2e-4
 """Height, m, that linear crossfall may be off at the pavement's edge."""
 _PROFILE_TOLERANCE = 1e-5
 _SAME = 1e-4
-"""Heights, m, that differ by less are one."""
+"""Heights, m, that differ by less are the same."""
 _SHARES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+"""Places across a lane at which its height is taken, as shares of its width (chosen)."""
 _REACH = 15.0
 """Distance from the line, m, at which the tolerance holds."""
 
@@ -51,52 +52,59 @@ def planes(sides: Sequence[SideShape]) -> Planes:
         return Planes({side.sign: plane for side in sides}, None, "centreline")
 
     def fitted(station: Float, stretch: int) -> Float:
+        """Return height on the line and rises (N, 1 + sides), each as a height (m) at `_REACH`."""
         return _best_planes(sides, station, stretch) * np.array([1.0, *(_REACH for _ in sides)])
 
-    both = polyline(fitted, breaks, TOLERANCE)
+    fit = polyline(fitted, breaks, TOLERANCE)
     rises = {
-        side.sign: Polyline(both.stations, both.values[:, [n]] / _REACH, both.jumps) for n, side in enumerate(sides, 1)
+        side.sign: Polyline(fit.stations, fit.values[:, [n]] / _REACH, fit.jumps) for n, side in enumerate(sides, 1)
     }
-    level = Polyline(both.stations, both.values[:, :1], both.jumps)
-    if np.abs(level.values).max() < _SAME:
+    line_height = Polyline(fit.stations, fit.values[:, :1], fit.jumps)
+    if np.abs(line_height.values).max() < _SAME:
         return Planes(rises, None, "centreline")
-    marks = np.union1d(breaks, both.stations)
+    stretch_ends = np.union1d(breaks, fit.stations)
 
     def height(station: Float, stretch: int) -> Float:
-        middle = np.full(station.shape, 0.5 * (marks[stretch] + marks[stretch + 1]))
-        return surface.road.elevation.at(station, middle) + level.at(station)[:, 0]
+        """Return the heights (N,), m, of the profile that fits both sides."""
+        middle = np.full(station.shape, 0.5 * (stretch_ends[stretch] + stretch_ends[stretch + 1]))
+        return surface.road.elevation.at(station, middle) + line_height.at(station)[:, 0]
 
-    return Planes(rises, height_pieces(height, marks, _PROFILE_TOLERANCE), "centreline")
+    return Planes(rises, height_pieces(height, stretch_ends, _PROFILE_TOLERANCE), "centreline")
 
 
 def _scaled(line: Polyline) -> Polyline:
+    """Return a polyline of heights (m) at `_REACH` from the line as one of rises (m/m)."""
     return Polyline(line.stations, line.values / _REACH, line.jumps)
 
 
 def _best_planes(sides: Sequence[SideShape], station: Float, stretch: int) -> Float:
-    """Return the height on the line (m) and each side's rise (N, 1 + sides) that fit the pavement best."""
+    """Return the height on the line (m) and the rise of each side (m/m), (N, 1 + sides), that fit the pavement best.
+
+    Least squares, weighted by the widths that the pavement's points stand for.
+    """
     columns, values, weights = [], [], []
     for n, side in enumerate(sides):
         offset, height, width = side.paved_points(station, stretch, _SHARES)
-        row = np.zeros((*offset.shape, 1 + len(sides)))
-        row[..., 0], row[..., 1 + n] = 1.0, offset
-        columns.append(row)
+        # Unknowns of a station: the height on the line, and the rise of each side; h = h0 + rise * offset.
+        design = np.zeros((*offset.shape, 1 + len(sides)))
+        design[..., 0], design[..., 1 + n] = 1.0, offset
+        columns.append(design)
         values.append(height)
         weights.append(width)
-    matrix, heights = np.concatenate(columns, axis=1), np.concatenate(values, axis=1)
+    designs, heights = np.concatenate(columns, axis=1), np.concatenate(values, axis=1)
     weight = np.sqrt(np.concatenate(weights, axis=1) + 1e-9)
-    if not matrix.shape[1]:
+    if not designs.shape[1]:
         return np.zeros((len(station), 1 + len(sides)))
-    matrix, heights = matrix * weight[..., None], heights * weight
-    inverse = np.linalg.pinv(matrix, rcond=1e-9)
-    return np.asarray(np.einsum("nij,nj->ni", inverse, heights))
+    designs, heights = designs * weight[..., None], heights * weight
+    inverses = np.linalg.pinv(designs, rcond=1e-9)
+    return np.asarray(np.einsum("nij,nj->ni", inverses, heights))
 
 
 def joined(right: SideShape, left: SideShape, breaks: Float, pivots: dict[RotationAxis, dict[int, Polyline]]) -> Planes:
     """Return the planes of two roads along one line, each with a plane of its own, as carriageways of one profile.
 
-    Of the lines about which the crossfall may turn the one is taken on which both have the same heights, or the most
-    alike ones.
+    The crossfall turns about one of the lines of `pivots`: the one on which both planes have the same heights, or else
+    the one with the smallest step between them.
 
     Args:
         right, left: a side of each.
@@ -109,21 +117,23 @@ def joined(right: SideShape, left: SideShape, breaks: Float, pivots: dict[Rotati
     middle = 0.5 * (breaks[:-1] + breaks[1:])
 
     def heights(axis: RotationAxis, side: SideShape, station: Float, stretch: int) -> Float:
-        inside = np.full(station.shape, middle[stretch])
-        level = side.surface.road.elevation.at(station, inside)
+        """Return the heights (N,), m, of a side's plane at a rotation axis."""
+        stretch_middle = np.full(station.shape, middle[stretch])
+        level = side.surface.road.elevation.at(station, stretch_middle)
         pivot = pivots[axis][side.sign].at(station)[:, 0]
-        return np.asarray(level + side.surface.rise(station, inside) * side.sign * pivot)
+        return np.asarray(level + side.surface.rise(station, stretch_middle) * side.sign * pivot)
 
-    def apart(axis: RotationAxis) -> float:
-        worst = 0.0
+    def largest_step(axis: RotationAxis) -> float:
+        """Return the largest height, m, between both planes at a rotation axis."""
+        largest = 0.0
         for stretch in range(len(middle)):
             station = np.linspace(breaks[stretch], breaks[stretch + 1], 5)
-            both = heights(axis, right, station, stretch) - heights(axis, left, station, stretch)
-            worst = max(worst, float(np.abs(both).max()))
-        return worst
+            steps = heights(axis, right, station, stretch) - heights(axis, left, station, stretch)
+            largest = max(largest, float(np.abs(steps).max()))
+        return largest
 
-    off = {axis: apart(axis) for axis in pivots}
-    axis = min(off, key=lambda name: off[name] if off[name] > _SAME else 0.0)
+    steps_by_axis = {axis: largest_step(axis) for axis in pivots}
+    axis = min(steps_by_axis, key=lambda name: steps_by_axis[name] if steps_by_axis[name] > _SAME else 0.0)
 
     def height(station: Float, stretch: int) -> Float:
         return 0.5 * (heights(axis, right, station, stretch) + heights(axis, left, station, stretch))

@@ -29,7 +29,7 @@ class Cubics:
     Attributes:
         starts: (K,) increasing stations, m.
         rows: (K, 4) a, b, c, d.
-        begins: whether the first holds before its start as well; else the value there is 0.
+        begins: whether the first cubic holds before its start as well; else the value there is 0.
     """
 
     starts: Float
@@ -46,25 +46,26 @@ class Cubics:
     def __bool__(self) -> bool:
         return len(self.starts) > 0
 
-    def at(self, station: Float, inside: Float | None = None, slope: bool = False) -> Float:
+    def at(self, station: Float, record_station: Float | None = None, slope: bool = False) -> Float:
         """Return values (N,), or their change per metre, at stations (N,), m.
 
         Args:
             station: where.
-            inside: (N,) places that say which cubic holds, so that ends of a stretch are those of its own cubic.
-            slope: whether the change per metre is wanted.
+            record_station: (N,) stations that say which cubic holds, so that an end of a stretch is that of its cubic.
+            slope: whether the change per metre is returned.
         """
         station = np.asarray(station, dtype=np.float64)
         if not len(self.starts):
             return np.zeros(station.shape)
-        there = station if inside is None else inside
-        piece = np.searchsorted(self.starts, there, side="right") - 1
-        before = piece < 0
-        piece = np.maximum(piece, 0)
-        a, b, c, d = self.rows[piece].T
-        u = station - self.starts[piece]
+        deciding_station = station if record_station is None else record_station
+        row = np.searchsorted(self.starts, deciding_station, side="right") - 1
+        is_before = row < 0
+        row = np.maximum(row, 0)
+        a, b, c, d = self.rows[row].T
+        # a + b u + c u^2 + d u^3, u the distance from the cubic's start.
+        u = station - self.starts[row]
         values = b + u * (2.0 * c + 3.0 * d * u) if slope else a + u * (b + u * (c + u * d))
-        return np.where(before, 0.0, values) if not self.begins else values
+        return np.where(is_before, 0.0, values) if not self.begins else values
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ class FileSection:
     lanes: dict[int, tuple[FileLane, ...]]
     centre: Element | None
 
-    def borders(self, station: Float, inside: Float, offset: Float) -> dict[int, list[Float]]:
+    def borders(self, station: Float, record_station: Float, offset: Float) -> dict[int, list[Float]]:
         """Return t (N,) of the borders on either side, from the centre lane out, at stations (N,), m.
 
         Borders hold from the reference line, which no lane offset moves. On the right some programs write them as
@@ -114,21 +115,27 @@ class FileSection:
         """
         borders: dict[int, list[Float]] = {}
         for sign, lanes in self.lanes.items():
-            edges = self._edges(lanes, sign, (station, inside, offset), 1.0)
+            edges = self._edges(lanes, sign, (station, record_station, offset), 1.0)
             if any(lane.borders for lane in lanes) and sign * float((edges[-1] - edges[0]).mean()) < 0.0:
-                edges = self._edges(lanes, sign, (station, inside, offset), -1.0)
+                edges = self._edges(lanes, sign, (station, record_station, offset), -1.0)
             borders[sign] = edges
         return borders
 
     @staticmethod
-    def _edges(lanes: Sequence[FileLane], sign: int, where: tuple[Float, Float, Float], turn: float) -> list[Float]:
-        station, inside, offset = where
+    def _edges(
+        lanes: Sequence[FileLane], sign: int, stations_and_offset: tuple[Float, Float, Float], border_sign: float
+    ) -> list[Float]:
+        """Return t (N,), m, of the borders of one side's lanes, from the inside out, the line's lane offset first.
+
+        `border_sign` is -1 for files that write borders on the right as positive distances.
+        """
+        station, record_station, offset = stations_and_offset
         edges = [offset]
         for lane in lanes:
             if lane.widths:
-                edges.append(edges[-1] + sign * lane.widths.at(station, inside))
+                edges.append(edges[-1] + sign * lane.widths.at(station, record_station))
             else:
-                edges.append(turn * lane.borders.at(station, inside) if lane.borders else edges[-1])
+                edges.append(border_sign * lane.borders.at(station, record_station) if lane.borders else edges[-1])
         return edges
 
 
@@ -180,23 +187,23 @@ class FileRoad:
 
 def merged(stations: Float, length: float) -> Float:
     """Return the stations from 0 to a length (m) in order, those nearer than `SHORTEST` to the one before left out."""
-    inside = np.unique(np.clip(stations, 0.0, length))
-    kept = inside[np.concatenate([[True], np.diff(inside) > SHORTEST])]
-    kept[-1] = length
-    return kept
+    in_range = np.unique(np.clip(stations, 0.0, length))
+    distinct = in_range[np.concatenate([[True], np.diff(in_range) > SHORTEST])]
+    distinct[-1] = length
+    return distinct
 
 
-def read_road(road: Element, name: str, length: float, up: float = 0.0) -> FileRoad:
-    """Return what a road says beside its plan.
+def read_road(road: Element, name: str, length: float, z_offset: float = 0.0) -> FileRoad:
+    """Return the lanes, elevation and lateral profiles of a road.
 
     Args:
         road: its element.
         name: for messages.
         length: of its plan, m.
-        up: height that the header adds, m.
+        z_offset: height that the header adds, m.
 
     Raises:
-        InputError: a number is none, or it has no lanes.
+        InputError: a value that must be a number isn't one, or the road has no lanes.
     """
     lanes = child(road, "lanes")
     sections = [] if lanes is None else children(lanes, "laneSection")
@@ -207,7 +214,7 @@ def read_road(road: Element, name: str, length: float, up: float = 0.0) -> FileR
     profile, lateral = child(road, "elevationProfile"), child(road, "lateralProfile")
     rows = {} if lateral is None else {tag: children(lateral, tag) for tag in ("superelevation", "crossfall", "shape")}
     elevation = Cubics.read([] if profile is None else children(profile, "elevation"))
-    elevation.rows[:, 0] += up
+    elevation.rows[:, 0] += z_offset
     return FileRoad(
         element=road,
         name=name,
@@ -228,6 +235,7 @@ def read_road(road: Element, name: str, length: float, up: float = 0.0) -> FileR
 
 
 def _shapes(rows: Sequence[Element]) -> tuple[ShapeProfile, ...]:
+    """Return the lateral profiles in order of their stations, each with the cubics of t of all rows at its station."""
     by_station: dict[float, list[Element]] = {}
     for row in rows:
         by_station.setdefault(number(row, "s"), []).append(row)
@@ -235,40 +243,40 @@ def _shapes(rows: Sequence[Element]) -> tuple[ShapeProfile, ...]:
 
 
 def _sections(items: Sequence[Element], length: float) -> tuple[FileSection, ...]:
-    """Return the lane sections in order; one that ends where it begins is none.
+    """Return the lane sections in order, without those that end where they begin.
 
-    A section that is of one side only leaves the other side's lanes as the section before has them.
+    A section with `singleSide` gives the lanes of one side only: those of the other side stay as in the section before.
     """
     rows = sorted(((number(item, "s"), n) for n, item in enumerate(items)))
     sections: list[FileSection] = []
-    last: dict[int, Element] = {}
-    edges = [*(s for s, _ in rows[1:]), length]
-    for (start, n), end in zip(rows, edges, strict=True):
+    ends = [*(s for s, _ in rows[1:]), length]
+    for (start, n), end in zip(rows, ends, strict=True):
         item = items[n]
         sides = {sign: child(item, name) for sign, name in zip(SIDES, ("left", "right"), strict=True)}
-        single = item.get("singleSide", "false").strip().lower() in ("true", "1")
+        is_single_sided = item.get("singleSide", "false").strip().lower() in ("true", "1")
         lanes = {sign: _lanes(side, sign, start) for sign, side in sides.items()}
-        if single and sections:
+        if is_single_sided and sections:
             lanes = {s: lanes[s] if sides[s] is not None else sections[-1].lanes[s] for s in SIDES}
-        last = {sign: side for sign, side in sides.items() if side is not None} or last
         if min(end, length) - start <= SHORTEST:
             continue
         centre = child(item, "center")
         sections.append(FileSection(start, min(end, length), lanes, None if centre is None else child(centre, "lane")))
     if not sections:
         raise InputError("laneSection", None, "must begin before the road's end")
-    first = sections[0]
-    if first.start > 0.0:
-        sections[0] = FileSection(0.0, first.end, first.lanes, first.centre)
+    first_section = sections[0]
+    if first_section.start > 0.0:  # its lanes hold from the road's begin on
+        sections[0] = FileSection(0.0, first_section.end, first_section.lanes, first_section.centre)
     return tuple(sections)
 
 
 def _lanes(side: Element | None, sign: int, start: float) -> tuple[FileLane, ...]:
+    """Return the lanes of one side of a section, from the inside out; `start` is the section's station, m."""
     lanes = [] if side is None else [_lane(item, start) for item in children(side, "lane")]
     return tuple(sorted((lane for lane in lanes if lane.number * sign > 0), key=lambda lane: abs(lane.number)))
 
 
 def _lane(item: Element, start: float) -> FileLane:
+    """Return a lane; its records count stations from the section's start, m."""
     heights = sorted([number(row, "sOffset") + start, number(row, "inner"), number(row, "outer")]
                      for row in children(item, "height"))  # fmt: skip
     return FileLane(

@@ -49,11 +49,11 @@ class SideShape:
 
     @property
     def sign(self) -> int:
-        """Return the sign of its offsets."""
+        """Return the sign of the offsets on this side: 1 left, -1 right."""
         return self.layout.sign
 
     def inside(self, station: Float, stretch: int) -> Float:
-        """Return places (N,) that choose the records of a stretch."""
+        """Return the middle of a stretch (N,), m: cubics are chosen by it, so that ends belong to their own stretch."""
         return np.full(np.shape(station), 0.5 * (self.breaks[stretch] + self.breaks[stretch + 1]))
 
     def lanes(self, station: Float, stretch: int) -> dict[int, list[LaneEdges]]:
@@ -62,42 +62,47 @@ class SideShape:
         return self.surface.lanes(section, station, self.inside(station, stretch))
 
     def boundaries(self, station: Float, stretch: int) -> Boundaries:
-        """Return the boundaries at stations (N,) of a stretch."""
-        number = int(self.sections[stretch])
+        """Return the boundaries of all strips at stations (N,) of a stretch, from the inner edge to the verge's."""
+        section_number = int(self.sections[stretch])
         lanes = self.lanes(station, stretch)
-        mine = {edges.lane.number: edges for edges in lanes[self.sign]}
+        edges_by_number = {edges.lane.number: edges for edges in lanes[self.sign]}
         layout = self.layout
-        edge = self.surface.centre(station, self.inside(station, stretch))
-        across = {edges.lane.number: edges for edges in lanes[-self.sign]}
-        inner = edge
-        for lane in layout.across.get(number, ()):
-            inner = across[lane.number].outer
-        for lane in layout.of_strip(number, "median"):
-            inner = edge = mine[lane.number].outer
-        rows: list[tuple[Edge, Edge]] = [(inner, inner)]
-        strip = _last(mine, layout.of_strip(number, "inner_edge_strip"), edge)
-        rows.append((strip[0], inner) if layout.across.get(number) else strip)
+        line_edge = self.surface.centre(station, self.inside(station, stretch))
+        other_edges = {edges.lane.number: edges for edges in lanes[-self.sign]}
+        # A single carriageway reaches over the line to paved lanes there; one with a median begins at the median.
+        inner_edge = line_edge
+        for lane in layout.across.get(section_number, ()):
+            inner_edge = other_edges[lane.number].outer
+        for lane in layout.of_strip(section_number, "median"):
+            inner_edge = line_edge = edges_by_number[lane.number].outer
+        # Each row has the outer edge of a strip and its inner edge; a strip that the section lacks has no width.
+        rows: list[tuple[Edge, Edge]] = [(inner_edge, inner_edge)]
+        strip_edges = _strip_edges(edges_by_number, layout.of_strip(section_number, "inner_edge_strip"), line_edge)
+        rows.append((strip_edges[0], inner_edge) if layout.across.get(section_number) else strip_edges)
         for slot in layout.slots:
-            there = slot.lanes.get(number)
-            rows.append(_last(mine, [] if there is None else [there], rows[-1][0]))
+            slot_lane = slot.lanes.get(section_number)
+            rows.append(_strip_edges(edges_by_number, [] if slot_lane is None else [slot_lane], rows[-1][0]))
         for kind in OUTSIDE:
-            rows.append(_last(mine, layout.of_strip(number, kind), rows[-1][0]))
-        outer = np.stack([self.sign * row[0].offset for row in rows], axis=-1)
+            rows.append(_strip_edges(edges_by_number, layout.of_strip(section_number, kind), rows[-1][0]))
+        distances = np.stack([self.sign * row[0].offset for row in rows], axis=-1)
         heights = np.stack([row[0].height for row in rows], axis=-1)
-        begins = np.stack([row[1].height for row in rows], axis=-1)
-        return Boundaries(outer, heights, begins)
+        inner_heights = np.stack([row[1].height for row in rows], axis=-1)
+        return Boundaries(distances, heights, inner_heights)
 
     def paved_points(self, station: Float, stretch: int, shares: Float) -> tuple[Float, Float, Float]:
-        """Return points of the pavement at stations (N,): offsets, heights (N, M), m, and the widths they stand for."""
-        number = int(self.sections[stretch])
-        mine = {edges.lane.number: edges for edges in self.lanes(station, stretch)[self.sign]}
+        """Return points of the pavement at stations (N,): offsets, heights and widths they stand for, (N, M), m.
+
+        `shares` (S,) are the places of the points across each lane, from 0 at its inner edge to 1 at its outer one.
+        """
+        section_number = int(self.sections[stretch])
+        edges_by_number = {edges.lane.number: edges for edges in self.lanes(station, stretch)[self.sign]}
         layout = self.layout
-        chosen = [lane for kind in ("inner_edge_strip", "outer_edge_strip", "hard_shoulder")
-                  for lane in layout.of_strip(number, kind)]  # fmt: skip
-        chosen += [slot.lanes[number] for slot in layout.slots if number in slot.lanes]
+        paved_lanes = [lane for kind in ("inner_edge_strip", "outer_edge_strip", "hard_shoulder")
+                  for lane in layout.of_strip(section_number, kind)]  # fmt: skip
+        paved_lanes += [slot.lanes[section_number] for slot in layout.slots if section_number in slot.lanes]
         offsets, heights, weights = [], [], []
-        for lane in chosen:
-            edges = mine[lane.number]
+        for lane in paved_lanes:
+            edges = edges_by_number[lane.number]
             width = np.abs(edges.outer.offset - edges.inner.offset)
             for share in shares.tolist():
                 point = self.surface.profile_points(edges, share, station, self.inside(station, stretch))
@@ -105,13 +110,15 @@ class SideShape:
                 heights.append(point.height)
                 weights.append(width)
         if not offsets:
-            nothing = np.zeros((len(station), 0))
-            return nothing, nothing, nothing
+            no_points = np.zeros((len(station), 0))
+            return no_points, no_points, no_points
         return np.stack(offsets, axis=-1), np.stack(heights, axis=-1), np.stack(weights, axis=-1)
 
 
-def _last(mine: dict[int, LaneEdges], lanes: Sequence[FileLane], before: Edge) -> tuple[Edge, Edge]:
-    """Return the outer edge of the last of some lanes, and the inner edge of the first; without any the one before."""
+def _strip_edges(
+    edges_by_number: dict[int, LaneEdges], lanes: Sequence[FileLane], previous_edge: Edge
+) -> tuple[Edge, Edge]:
+    """Return the outer edge of the last and the inner edge of the first of a strip's lanes; else the edge before."""
     if not lanes:
-        return before, before
-    return mine[lanes[-1].number].outer, mine[lanes[0].number].inner
+        return previous_edge, previous_edge
+    return edges_by_number[lanes[-1].number].outer, edges_by_number[lanes[0].number].inner

@@ -33,22 +33,22 @@ def kilometres_per_hour(value: float, unit: str) -> float | None:
 
 
 def sign_of(signal: Element, places: Places, loss: Loss) -> Iterator[tuple[str, RoadObject]]:
-    """Yield the id and the thing that a signal becomes; those without one are told."""
+    """Yield the id and the sign or light that a signal becomes; one without either is noted as left out."""
     kind, subtype = signal.get("type", "-1").strip(), signal.get("subtype", "-1").strip()
     station, offset = places.at(*(np.array([number(signal, name, 0.0)]) for name in ("s", "t", "zOffset")))
     turn = number(signal, "hOffset", 0.0) + (math.pi if signal.get("orientation", "+").strip() == "-" else 0.0)
-    about: dict[str, Any] = {
+    common: dict[str, Any] = {
         "instance": 1,
         "station": round_value(max(float(station[0]), 0.0), 6),
         "offset": round_value(float(offset[0]), 6),
         "rotation_deg": round_value(math.degrees(math.remainder(turn, math.tau)), 6),
     }
     name = signal.get("name") or f"signal-{signal.get('id', '')}"
-    if not abs(about["offset"]) <= 100.0:
+    if not abs(common["offset"]) <= 100.0:
         loss.leave_out("signals", "they stand more than 100 m from the line")
         return
     if kind in _LIGHTS:
-        yield name, TrafficLight(**about)
+        yield name, TrafficLight(**common)
         return
     code = _code(signal, kind, subtype)
     entry = sign_catalogue().signs.get(code)
@@ -60,7 +60,7 @@ def sign_of(signal: Element, places: Places, loss: Loss) -> Iterator[tuple[str, 
     if 0.0 < width <= 12.0 and 0.0 < height <= 8.0:
         fields |= {"width": width, "height": height}
     text = tuple(line for line in signal.get("text", "").splitlines() if line)[:6]
-    yield name, TrafficSign(**about, **fields, code=code, text=text or _text(code, entry.text))
+    yield name, TrafficSign(**common, **fields, code=code, text=text or _text(code, entry.text))
 
 
 def _code(signal: Element, kind: str, subtype: str) -> str:
@@ -73,6 +73,6 @@ def _code(signal: Element, kind: str, subtype: str) -> str:
     return f"{kind}-{subtype}" if f"{kind}-{subtype}" in signs or kind not in signs else kind
 
 
-def _text(code: str, usual: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the writing of a sign whose signal says none: what doesn't depend on a place."""
-    return tuple(line for line in usual if "{" not in line)
+def _text(code: str, lines: tuple[str, ...]) -> tuple[str, ...]:
+    """Return a sign's usual lines of text without those that depend on its place, which have a field in braces."""
+    return tuple(line for line in lines if "{" not in line)

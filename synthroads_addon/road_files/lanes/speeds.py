@@ -24,7 +24,7 @@ def speed_limit(roads: Sequence[FileRoad], loss: Loss) -> float | None:
     What else the records say is added to what is left out.
     """
     lengths: dict[float, float] = defaultdict(float)
-    records = lanes = unknown = 0
+    record_count = lane_speeds = unreadable = 0
     for road in roads:
         types = sorted(children(road.element, "type"), key=lambda row: number(row, "s", 0.0))
         starts = [number(row, "s", 0.0) for row in types]
@@ -33,26 +33,26 @@ def speed_limit(roads: Sequence[FileRoad], loss: Loss) -> float | None:
             if speed is None:
                 continue
             value = _value(speed)
-            unknown += value is None and speed.get("max", "").strip() not in _NO_LIMIT
+            unreadable += value is None and speed.get("max", "").strip() not in _NO_LIMIT
             if value is not None:
-                records += 1
+                record_count += 1
                 lengths[value] += max(end - start, 0.0)
-        lanes += sum(local_name(item) == "speed" for lane in road.element.iter() if local_name(lane) == "lane"
+        lane_speeds += sum(local_name(item) == "speed" for lane in road.element.iter() if local_name(lane) == "lane"
                      for item in lane)  # fmt: skip
-    most = max(lengths, key=lambda value: lengths[value]) if lengths else None
-    if most is not None:
-        loss.read["speed limits of the road"] += records
+    limit = max(lengths, key=lambda value: lengths[value]) if lengths else None
+    if limit is not None:
+        loss.read["speed limits of the road"] += record_count
     if len(lengths) > 1:
-        loss.leave_out("speed limits of the road", f"cars drive at most {most:g} km/h all along", len(lengths) - 1)
-    if unknown:
-        loss.leave_out("speed limits of the road", "their number or unit isn't known", unknown)
-    if lanes:
-        loss.leave_out("speed limits of lanes", "in a parameter set signs alone say them", lanes)
-    return most
+        loss.leave_out("speed limits of the road", f"cars drive at most {limit:g} km/h all along", len(lengths) - 1)
+    if unreadable:
+        loss.leave_out("speed limits of the road", "their number or unit isn't known", unreadable)
+    if lane_speeds:
+        loss.leave_out("speed limits of lanes", "in a parameter set signs alone say them", lane_speeds)
+    return limit
 
 
 def _value(speed: Element) -> float | None:
-    """Return a record's speed, km/h; None where it has no limit, or one that isn't understood."""
+    """Return a record's speed, km/h; None where it sets no limit, or its number or unit is unknown."""
     text = speed.get("max", "").strip()
     try:
         value = kilometres_per_hour(finite("speed max", text), speed.get("unit", ""))

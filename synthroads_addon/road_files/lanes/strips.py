@@ -20,11 +20,12 @@ DRIVEN = frozenset(
 )  # fmt: skip
 """Types of lanes that traffic drives on."""
 _TURNING = frozenset({"entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "mwyEntry", "mwyExit"})
-"""Those of them that lead off a road or onto it."""
+"""Types of driven lanes that lead off a road or onto it."""
 PAVED = frozenset({"shoulder", "border", "stop", "parking", "biking", "restricted", "shared"})
-"""Types of lanes beside them that are paved."""
+"""Types of paved lanes beside the lanes that traffic drives on."""
 _OWN = frozenset({"median", "inner_edge_strip", "lane", "outer_edge_strip", "hard_shoulder", "verge", *TURNOUT_STRIPS})
 _MOST_LANES = 8
+"""Lanes of one side that a parameter set can have."""
 _MATCH = 0.5
 """Share of the narrower of two lanes that must lie beside the other for them to be one."""
 
@@ -112,8 +113,8 @@ def side_layouts(surface: FileSurface, with_median: bool = False) -> dict[int, S
     layouts = {sign: SideLayout(sign) for sign in sides}
     for number, section in enumerate(sections):
         for sign, layout in layouts.items():
-            driven = _sort_lanes(layout, number, section.lanes[sign])
-            _chain(layout, number, surface, driven)
+            driven_lanes = _sort_lanes(layout, number, section.lanes[sign])
+            _chain(layout, number, surface, driven_lanes)
             if -sign not in layouts and not with_median:
                 _take_across(layout, number, section.lanes[-sign])
     for layout in layouts.values():
@@ -129,7 +130,10 @@ def side_layouts(surface: FileSurface, with_median: bool = False) -> dict[int, S
 
 
 def _sort_lanes(layout: SideLayout, number: int, lanes: Sequence[FileLane]) -> list[FileLane]:
-    """Put a section's lanes of one side into strips; return those that are lanes, from the inside out."""
+    """Put a section's lanes of one side into strips, and return those that traffic drives on, from the inside out.
+
+    Lanes of our own files say which strip they are; others are sorted by their types.
+    """
     strips = layout.strips.setdefault(number, [])
     if any(lane.notes.get("strip") in _OWN for lane in lanes):
         for lane in lanes:
@@ -139,51 +143,51 @@ def _sort_lanes(layout: SideLayout, number: int, lanes: Sequence[FileLane]) -> l
             elif kind != "lane":
                 layout.lost.append((number, lane, f"a {lane.type} lane among strips"))
         return [lane for lane in lanes if lane.notes.get("strip") == "lane"]
-    places = [n for n, lane in enumerate(lanes) if is_driven(lane)]
-    if not places:
-        first, last = len(lanes), len(lanes)
+    driven_rows = [n for n, lane in enumerate(lanes) if is_driven(lane)]
+    if not driven_rows:
+        begin, end = len(lanes), len(lanes)
     else:
-        first, last = places[0], places[-1] + 1
-    before = list(lanes[:first]) if places else []
-    after = list(lanes[last:]) if places else list(lanes)
-    paved_from = len(before)
-    while paved_from and before[paved_from - 1].type in PAVED:
+        begin, end = driven_rows[0], driven_rows[-1] + 1
+    inner_lanes = list(lanes[:begin]) if driven_rows else []
+    outer_lanes = list(lanes[end:]) if driven_rows else list(lanes)
+    paved_from = len(inner_lanes)
+    while paved_from and inner_lanes[paved_from - 1].type in PAVED:
         paved_from -= 1
-    strips += [("median", lane) for lane in before[:paved_from]]
-    strips += [("inner_edge_strip", lane) for lane in before[paved_from:]]
-    strips += _beside(layout, number, after)
-    return list(lanes[first:last])
+    strips += [("median", lane) for lane in inner_lanes[:paved_from]]
+    strips += [("inner_edge_strip", lane) for lane in inner_lanes[paved_from:]]
+    strips += _outer_strips(layout, number, outer_lanes)
+    return list(lanes[begin:end])
 
 
-def _beside(layout: SideLayout, number: int, lanes: Sequence[FileLane]) -> list[tuple[str, FileLane]]:
+def _outer_strips(layout: SideLayout, number: int, lanes: Sequence[FileLane]) -> list[tuple[str, FileLane]]:
     """Return the strips outside of the lanes that traffic drives on: border, shoulder, verge, in this order.
 
-    A border outside of all that is paved is the verge: others write their grass so.
+    A border outside of all that is paved is the verge: other programs write grass as a border.
     """
     strips: list[tuple[str, FileLane]] = []
-    reached = 0  # 0 edge strip, 1 hard shoulder, 2 verge
-    stopped = False
+    outermost = 0  # strip reached so far: 0 edge strip, 1 hard shoulder, 2 verge
+    has_stop_lane = False
     last_paved = max((n for n, lane in enumerate(lanes) if lane.type in PAVED - {"border"}), default=-1)
     for n, lane in enumerate(lanes):
-        if lane.type == "border" and reached == 0 and not strips:
+        if lane.type == "border" and outermost == 0 and not strips:
             strips.append(("outer_edge_strip", lane))
             continue
-        paved = lane.type in PAVED and not (stopped and lane.type == "shoulder")
-        paved = paved and not (lane.type == "border" and n > last_paved)
-        if reached < 2 and paved:
-            reached, stopped = 1, stopped or lane.type == "stop"
+        is_paved = lane.type in PAVED and not (has_stop_lane and lane.type == "shoulder")
+        is_paved = is_paved and not (lane.type == "border" and n > last_paved)
+        if outermost < 2 and is_paved:
+            outermost, has_stop_lane = 1, has_stop_lane or lane.type == "stop"
             strips.append(("hard_shoulder", lane))
             continue
-        if paved:
+        if is_paved:
             layout.lost.append((number, lane, f"a {lane.type} lane outside of the verge"))
             continue
-        reached = 2
+        outermost = 2
         strips.append(("verge", lane))
     return strips
 
 
 def _take_across(layout: SideLayout, number: int, lanes: Sequence[FileLane]) -> None:
-    """Take paved lanes on the other side of a carriageway that has none there to its inner edge strip."""
+    """Give the paved lanes beyond the line to the inner edge strip of a carriageway without a counterpart there."""
     count = 0
     while count < len(lanes) and lanes[count].type in PAVED and lanes[count].notes.get("strip") != "median":
         count += 1
@@ -193,61 +197,72 @@ def _take_across(layout: SideLayout, number: int, lanes: Sequence[FileLane]) -> 
 
 
 def _chain(layout: SideLayout, number: int, surface: FileSurface, lanes: Sequence[FileLane]) -> None:
-    """Give a section's lanes to the slots that they continue, and new ones to those that continue none."""
-    before = [(n, slot) for n, slot in enumerate(layout.slots) if number - 1 in slot.lanes]
-    pairs = _matches(surface, number, layout.sign, [slot.lanes[number - 1] for _, slot in before], lanes)
-    place = {after: before[first][0] for first, after in pairs}
-    done = -1
+    """Give each lane of a section to the slot that it continues, or to a free or new slot between its neighbours'."""
+    slots_before = [(n, slot) for n, slot in enumerate(layout.slots) if number - 1 in slot.lanes]
+    pairs = _matches(surface, number, layout.sign, [slot.lanes[number - 1] for _, slot in slots_before], lanes)
+    slot_of_lane = {lane_row: slots_before[row][0] for row, lane_row in pairs}
+    slot_number = -1
     for n, lane in enumerate(lanes):
-        if n in place:
-            done = place[n]
+        if n in slot_of_lane:
+            slot_number = slot_of_lane[n]
         else:
-            later = [place[m] for m in range(n + 1, len(lanes)) if m in place]
-            end = later[0] if later else len(layout.slots)
-            free = [m for m in range(done + 1, end) if number not in layout.slots[m].lanes]
-            if free:
-                done = free[0]
+            later_slots = [slot_of_lane[m] for m in range(n + 1, len(lanes)) if m in slot_of_lane]
+            end = later_slots[0] if later_slots else len(layout.slots)
+            free_slots = [m for m in range(slot_number + 1, end) if number not in layout.slots[m].lanes]
+            if free_slots:
+                slot_number = free_slots[0]
             else:
-                done += 1
-                layout.slots.insert(done, LaneSlot())
-                place = {m: at + (at >= done) for m, at in place.items()}
-        layout.slots[done].lanes[number] = lane
+                slot_number += 1
+                layout.slots.insert(slot_number, LaneSlot())
+                slot_of_lane = {m: slot_row + (slot_row >= slot_number) for m, slot_row in slot_of_lane.items()}
+        layout.slots[slot_number].lanes[number] = lane
 
 
 def _matches(
-    surface: FileSurface, number: int, sign: int, before: Sequence[FileLane], after: Sequence[FileLane]
+    surface: FileSurface, number: int, sign: int, lanes_before: Sequence[FileLane], lanes_after: Sequence[FileLane]
 ) -> list[tuple[int, int]]:
-    """Return (place among those before, place among those after) of lanes that are one at a section's start.
+    """Return pairs of rows (of `lanes_before`, of `lanes_after`) of lanes that go on over a section's start.
 
-    Lanes are one where most of the narrower lies beside the other; so many are joined, in order, as can be.
+    Two lanes are one where most of the narrower lies beside the other. The pairs keep the lanes' order and have the
+    largest sum of widths in common.
     """
-    if not before or not after:
+    if not lanes_before or not lanes_after:
         return []
-    here, last = surface.road.sections[number], surface.road.sections[number - 1]
-    at = np.array([here.start])
-    before_it = np.array([max(here.start - SHORTEST, last.start)])
-    old = {edges.lane.number: edges for edges in surface.lanes(last, at, before_it)[sign]}
-    new = {edges.lane.number: edges for edges in surface.lanes(here, at, at)[sign]}
-    score = np.array([[_shared(old[a.number], new[b.number]) for b in after] for a in before])
-    best = np.zeros((len(before) + 1, len(after) + 1))
-    for i in range(len(before)):
-        for j in range(len(after)):
-            best[i + 1, j + 1] = max(best[i, j] + score[i, j], best[i, j + 1], best[i + 1, j])
-    pairs, i, j = [], len(before), len(after)
+    section, section_before = surface.road.sections[number], surface.road.sections[number - 1]
+    start_station = np.array([section.start])
+    end_before = np.array([max(section.start - SHORTEST, section_before.start)])
+    edges_before = {
+        edges.lane.number: edges for edges in surface.lanes(section_before, start_station, end_before)[sign]
+    }
+    edges_after = {edges.lane.number: edges for edges in surface.lanes(section, start_station, start_station)[sign]}
+    common_width = np.array(
+        [[_common_width(edges_before[a.number], edges_after[b.number]) for b in lanes_after] for a in lanes_before]
+    )
+    # Longest common subsequence, weighted by the widths in common (Needleman and Wunsch, without gap costs).
+    best_sum = np.zeros((len(lanes_before) + 1, len(lanes_after) + 1))
+    for i in range(len(lanes_before)):
+        for j in range(len(lanes_after)):
+            best_sum[i + 1, j + 1] = max(best_sum[i, j] + common_width[i, j], best_sum[i, j + 1], best_sum[i + 1, j])
+    # Traced back from the end of both.
+    pairs, i, j = [], len(lanes_before), len(lanes_after)
     while i and j:
-        if score[i - 1, j - 1] > 0.0 and np.isclose(best[i, j], best[i - 1, j - 1] + score[i - 1, j - 1]):
+        if common_width[i - 1, j - 1] > 0.0 and np.isclose(
+            best_sum[i, j], best_sum[i - 1, j - 1] + common_width[i - 1, j - 1]
+        ):
             i, j = i - 1, j - 1
             pairs.append((i, j))
-        elif best[i - 1, j] >= best[i, j - 1]:
+        elif best_sum[i - 1, j] >= best_sum[i, j - 1]:
             i -= 1
         else:
             j -= 1
     return pairs[::-1]
 
 
-def _shared(first: LaneEdges, second: LaneEdges) -> float:
-    """Return the width that two lanes share, m; 0 where that is little of the narrower, or one has none."""
-    low, high = (sorted((float(edges.inner.offset[0]), float(edges.outer.offset[0]))) for edges in (first, second))
-    common = min(low[1], high[1]) - max(low[0], high[0])
-    narrower = min(low[1] - low[0], high[1] - high[0])
-    return common if narrower > 1e-3 and common > _MATCH * narrower else 0.0
+def _common_width(lane_edges: LaneEdges, other_edges: LaneEdges) -> float:
+    """Return the width, m, that two lanes have in common; 0 where that is half of the narrower lane or less."""
+    first_span, second_span = (
+        sorted((float(edges.inner.offset[0]), float(edges.outer.offset[0]))) for edges in (lane_edges, other_edges)
+    )
+    overlap = min(first_span[1], second_span[1]) - max(first_span[0], second_span[0])
+    narrower = min(first_span[1] - first_span[0], second_span[1] - second_span[0])
+    return overlap if narrower > 1e-3 and overlap > _MATCH * narrower else 0.0

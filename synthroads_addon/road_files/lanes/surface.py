@@ -38,7 +38,13 @@ class LaneEdges:
 
 @dataclass(frozen=True)
 class _Frame:
-    """The plane at stations (N,): cosine and sine of its tilt, cosine of the grade, crossfall of sides with any."""
+    """The plane of the superelevation at stations (N,), m.
+
+    Attributes:
+        cos, sin: of its tilt about the reference line.
+        climb: cosine of the slope angle of the line.
+        falls: by sign of the side, tangent of the crossfall that comes on top; sides without any are missing.
+    """
 
     station: Float
     cos: Float
@@ -68,82 +74,98 @@ class FileSurface:
         before = [section for section in self.road.sections if section.start <= station]
         return before[-1] if before else self.road.sections[0]
 
-    def rise(self, station: Float, inside: Float) -> Float:
-        """Return how much (N,) the plane of the superelevation rises to the left at stations (N,), m/m."""
-        tilt = self.road.superelevation.at(station, inside)
-        return np.asarray(np.tan(tilt) / self._cosine(station, inside))
+    def rise(self, station: Float, record_station: Float) -> Float:
+        """Return the rise (N,) to the left, m/m in plan, of the superelevation's plane at stations (N,)."""
+        tilt = self.road.superelevation.at(station, record_station)
+        return np.asarray(np.tan(tilt) / self._cosine(station, record_station))
 
-    def centre(self, station: Float, inside: Float) -> Edge:
+    def centre(self, station: Float, record_station: Float) -> Edge:
         """Return the centre lane's line at stations (N,)."""
-        return self._place(self._frame(station, inside), self.road.offset.at(station, inside), 0.0)
+        return self._place(self._frame(station, record_station), self.road.offset.at(station, record_station), 0.0)
 
-    def lanes(self, section: FileSection, station: Float, inside: Float) -> dict[int, list[LaneEdges]]:
-        """Return a section's lanes by the sign of their ids, from the inside out, at stations (N,)."""
-        borders = section.borders(station, inside, self.road.offset.at(station, inside))
-        frame = self._frame(station, inside)
+    def lanes(self, section: FileSection, station: Float, record_station: Float) -> dict[int, list[LaneEdges]]:
+        """Return a section's lanes with their edges at stations (N,), by the sign of their ids, from the inside out.
+
+        `record_station` (N,) are stations that choose the cubics: an end of a stretch belongs to its own stretch.
+        """
+        borders = section.borders(station, record_station, self.road.offset.at(station, record_station))
+        frame = self._frame(station, record_station)
         lane_edges: dict[int, list[LaneEdges]] = {}
         for sign, lanes in section.lanes.items():
             lane_edges[sign] = []
-            flat_from: Edge | None = None
-            for lane, inner, outer in zip(lanes, borders[sign][:-1], borders[sign][1:], strict=True):
-                low, high = _lane_heights(lane, station)
-                edges = [self._place(frame, inner, low), self._place(frame, outer, high)]
-                if lane.level and flat_from is None:
-                    flat_from = edges[0]
-                if flat_from is not None:  # level from the inner border on, as the standard's figures show
-                    beyond = flat_from
-                    edges = [
-                        Edge(edge.offset, beyond.height + rise) for edge, rise in zip(edges, (low, high), strict=True)
-                    ]
-                lane_edges[sign].append(LaneEdges(lane, *edges))
+            level_height: Float | None = None  # of the innermost level lane's inner border
+            for lane, inner_t, outer_t in zip(lanes, borders[sign][:-1], borders[sign][1:], strict=True):
+                inner_rise, outer_rise = _lane_heights(lane, station)
+                inner = self._place(frame, inner_t, inner_rise)
+                outer = self._place(frame, outer_t, outer_rise)
+                if lane.level and level_height is None:
+                    level_height = inner.height
+                # From the inner border of a level lane outwards all lanes are level, as the standard's figures show.
+                if level_height is not None:
+                    inner = Edge(inner.offset, level_height + inner_rise)
+                    outer = Edge(outer.offset, level_height + outer_rise)
+                lane_edges[sign].append(LaneEdges(lane, inner, outer))
         return lane_edges
 
-    def profile_points(self, edges: LaneEdges, share: float, station: Float, inside: Float) -> Edge:
+    def profile_points(self, edges: LaneEdges, share: float, station: Float, record_station: Float) -> Edge:
         """Return points at a share of a lane's width, on its true surface where that is no straight line."""
         offset = edges.inner.offset + share * (edges.outer.offset - edges.inner.offset)
         height = edges.inner.height + share * (edges.outer.height - edges.inner.height)
         if not self.road.shapes or edges.lane.level:
             return Edge(offset, height)
-        tilt = np.cos(self.road.superelevation.at(station, inside))
-        inner, outer = edges.inner.offset / tilt, edges.outer.offset / tilt
-        t = inner + share * (outer - inner)
-        bow = (
-            self._shape(station, t) - (1.0 - share) * self._shape(station, inner) - share * self._shape(station, outer)
+        cosine = np.cos(self.road.superelevation.at(station, record_station))
+        inner_t, outer_t = edges.inner.offset / cosine, edges.outer.offset / cosine
+        t = inner_t + share * (outer_t - inner_t)
+        # What the shape rises above its chord between the lane's borders.
+        bulge = (
+            self._shape(station, t)
+            - (1.0 - share) * self._shape(station, inner_t)
+            - share * self._shape(station, outer_t)
         )
-        return Edge(offset, height + bow)
+        return Edge(offset, height + bulge)
 
-    def _frame(self, station: Float, inside: Float) -> _Frame:
-        tilt = self.road.superelevation.at(station, inside)
-        falls = {sign: np.tan(cubics.at(station, inside)) for sign, cubics in self.road.crossfall.items() if cubics}
-        return _Frame(station, np.cos(tilt), np.sin(tilt), self._cosine(station, inside), falls)
+    def _frame(self, station: Float, record_station: Float) -> _Frame:
+        """Return the plane of the superelevation and the crossfall of both sides at stations (N,), m."""
+        tilt = self.road.superelevation.at(station, record_station)
+        falls = {
+            sign: np.tan(cubics.at(station, record_station)) for sign, cubics in self.road.crossfall.items() if cubics
+        }
+        return _Frame(station, np.cos(tilt), np.sin(tilt), self._cosine(station, record_station), falls)
 
     def _place(self, frame: _Frame, t: Float, height: Float | float) -> Edge:
-        """Return where points of t (N,) lie that are so high (m) above the surface, normal to its plane."""
-        above = height + self._shape(frame.station, t)
+        """Return the edges at t (N,), m, that lie a height (m) above the surface, measured normal to the plane."""
+        normal_height = height + self._shape(frame.station, t)
         for sign, fall in frame.falls.items():
-            above = above - np.where(t * sign > 0.0, fall * np.abs(t), 0.0)
-        offset = t * frame.cos - above * frame.sin
-        return Edge(offset, (t * frame.sin + above * frame.cos) / frame.climb)
+            normal_height = normal_height - np.where(t * sign > 0.0, fall * np.abs(t), 0.0)
+        # Turned about the line by the superelevation; heights are measured upright, not normal to the climbing line.
+        offset = t * frame.cos - normal_height * frame.sin
+        return Edge(offset, (t * frame.sin + normal_height * frame.cos) / frame.climb)
 
-    def _cosine(self, station: Float, inside: Float) -> Float:
-        grade = self.road.elevation.at(station, inside, slope=True)
+    def _cosine(self, station: Float, record_station: Float) -> Float:
+        """Return the cosine (N,) of the line's slope angle."""
+        grade = self.road.elevation.at(station, record_station, slope=True)
         return np.asarray(1.0 / np.sqrt(1.0 + grade**2))
 
     def _shape(self, station: Float, t: Float) -> Float:
+        """Return the heights (N,), m, of the lateral shape at stations and t (N,), linear between its profiles."""
         shapes = self.road.shapes
         if not shapes:
             return np.zeros(np.shape(t))
-        at = np.array([shape.station for shape in shapes])
-        after = np.searchsorted(at, station, side="right")
-        first, last = np.clip(after - 1, 0, len(at) - 1), np.clip(after, 0, len(at) - 1)
-        span = np.where(last > first, at[last] - at[first], 1.0)
-        share = np.clip((station - at[first]) / span, 0.0, 1.0)
+        shape_stations = np.array([shape.station for shape in shapes])
+        count_before = np.searchsorted(shape_stations, station, side="right")
+        shape_before, shape_behind = (
+            np.clip(count_before - 1, 0, len(shape_stations) - 1),
+            np.clip(count_before, 0, len(shape_stations) - 1),
+        )
+        span = np.where(shape_behind > shape_before, shape_stations[shape_behind] - shape_stations[shape_before], 1.0)
+        share = np.clip((station - shape_stations[shape_before]) / span, 0.0, 1.0)
         values = np.stack([_profile(shape, t) for shape in shapes])
         columns = np.arange(len(t))
-        return np.asarray(values[first, columns] * (1.0 - share) + values[last, columns] * share)
+        return np.asarray(values[shape_before, columns] * (1.0 - share) + values[shape_behind, columns] * share)
 
 
 def _profile(shape: ShapeProfile, t: Float) -> Float:
+    """Return the heights (N,), m, of one lateral profile at t (N,), m."""
     return shape.cubics.at(t)
 
 
@@ -151,5 +173,5 @@ def _lane_heights(lane: FileLane, station: Float) -> tuple[Float, Float]:
     """Return the heights (N,) of a lane's inner and outer border above the surface, m: linear between records."""
     if not len(lane.heights):
         return np.zeros(station.shape), np.zeros(station.shape)
-    at, inner, outer = lane.heights.T
-    return np.interp(station, at, inner), np.interp(station, at, outer)
+    stations, inner_heights, outer_heights = lane.heights.T
+    return np.interp(station, stations, inner_heights), np.interp(station, stations, outer_heights)

@@ -112,7 +112,7 @@ class ReadyProgram:
         program = self.program
         results = [outputs[name] for name, _ in program.outputs]
         count = len(results[0]) if results else 0
-        inputs = [np.ascontiguousarray(values[what], np.float32) for what in program.inputs]
+        inputs = [np.ascontiguousarray(values[surface_input], np.float32) for surface_input in program.inputs]
         if any(array.shape != (count, 4) for array in inputs):
             raise ValueError(f"values of {[array.shape for array in inputs]}: must be ({count}, 4)")
         for result, (name, parts) in zip(results, program.outputs, strict=True):

@@ -153,16 +153,16 @@ class ProgramBuilder:
         """Return the number that a value stands for; None if it is the result of an operation."""
         return self._constants.get(value)
 
-    def load(self, what: SurfaceInput, part: int) -> int:
+    def load(self, surface_input: SurfaceInput, part: int) -> int:
         """Return the value of a component of an input that is read at each place.
 
         Args:
-            what: the input.
+            surface_input: the input.
             part: number of its component.
         """
-        if what not in self.inputs:
-            self.inputs.append(what)
-        return self._add(Op.LOAD, (), (self.inputs.index(what), part), 1, uniform=False)
+        if surface_input not in self.inputs:
+            self.inputs.append(surface_input)
+        return self._add(Op.LOAD, (), (self.inputs.index(surface_input), part), 1, uniform=False)
 
     def add(self, op: Op, *operands: int, settings: Sequence[int] = (), results: int = 1) -> int:
         """Return the first of the results of an operation; the others are the values that follow.
@@ -314,8 +314,8 @@ class _Allocation:
         inputs: dict[SurfaceInput, int] = {}
         for number, row in enumerate(rows):
             if row[0] == Op.LOAD:
-                what = self._builder.inputs[row[2]]
-                rows[number] = (*row[:2], inputs.setdefault(what, len(inputs)), *row[3:])
+                surface_input = self._builder.inputs[row[2]]
+                rows[number] = (*row[:2], inputs.setdefault(surface_input, len(inputs)), *row[3:])
         return tuple(inputs)
 
     def _take(self, first_value: int, count: int) -> None:
