@@ -221,7 +221,7 @@ class TestOnTheRoad:
             assert corners[:, 2].max() - place[2] == pytest.approx(height, rel=MARGIN)
             reach = np.linalg.norm(corners[:, :2] - place[:2], axis=1)
             assert 0.6 * radius < reach.max() < 1.4 * radius + LEANING * height
-            if plant.about.kind == "tree":
+            if plant.vegetation.kind == "tree":
                 foot = corners[corners[:, 2].argmin(), :2]
                 assert np.linalg.norm(foot - place[:2]) < 0.05 * height
 
