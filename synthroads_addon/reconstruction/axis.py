@@ -66,12 +66,14 @@ class FoundRoad:
         half_width: reach of the cross profiles to either side of the path, m.
         layout: carriageways and lines that profiles along a path parallel to the road show.
         axis: offsets of the axis from that path, on which all views agree.
+        asked: kind of road that the user gave; None if the cloud had to tell.
     """
 
     cloud: RoadCloud
     half_width: float
     layout: RoadLayout
     axis: FusedAxis
+    asked: RoadKind | None = None
 
     @property
     def path(self) -> CloudPath:
@@ -81,7 +83,7 @@ class FoundRoad:
     def layout_along(self, path: CloudPath, kind: RoadKind | None) -> RoadLayout:
         """Return the layout that profiles along another path show; InputError if they show no road of that kind."""
         profiles = make_profiles(self.cloud, path, self.half_width, keep_points=True)
-        return find_layout(profiles, find_lines(profiles), kind)
+        return find_layout(profiles, find_lines(profiles), kind, asked=self.asked is not None)
 
     def open_along(self, path: CloudPath, stations: Float) -> Bool:
         """Return at which of the stations (K,), m, along a path the views of the axis disagree, as a mask (K,)."""
@@ -177,7 +179,7 @@ def _look_along(cloud: RoadCloud, path: CloudPath, half_width: float, options: O
     """Return the road that profiles along a path show: its layout, and its axis by the rule-based views."""
     profiles = make_profiles(cloud, path, half_width, keep_points=True)
     layout = find_layout(profiles, find_lines(profiles), options.road)
-    return FoundRoad(cloud, half_width, layout, find_fused_axis(layout))
+    return FoundRoad(cloud, half_width, layout, find_fused_axis(layout), options.road)
 
 
 def _learned_view(cloud: RoadCloud, profiles: Profiles, options: Options) -> list[View]:

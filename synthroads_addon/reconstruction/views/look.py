@@ -7,6 +7,7 @@ import numpy as np
 from ...base.arrays import Float
 from ..layout import FoundAxis, RoadLayout, axis_from_lines
 from ..smoothing import fill_gaps
+from .band import find_band, view_band
 from .extent import view_extent
 from .fusion import FusedAxis, fuse
 from .markings import view_lines
@@ -29,17 +30,20 @@ def find_fused_axis(layout: RoadLayout, extra_views: Sequence[View] = ()) -> Fus
 
 
 def rule_views(layout: RoadLayout, lines: FoundAxis) -> list[View]:
-    """Return the rule-based views: lines, marking period, brightness, dark skeleton, cross-profile, extent."""
+    """Return the rule-based views: lines, marking period, brightness, dark skeleton, cross-profile, dark band, extent."""
     profiles, dual = layout.profiles, layout.kind == "dual"
     cores = [0.5 * (band.low + band.high) for band in layout.bands]
     axis_offset = float(np.median(lines.offsets))
     unevenness = _unevenness(layout)
+    # Two carriageways have two bands, and shoulders that differ from lanes.
+    band_views = [] if dual else [view_band(find_band(profiles))]
     return [
         view_lines(layout, lines),
         view_period(profiles, dual, axis_offset),
         view_brightness(profiles, cores, dual),
         view_skeleton(profiles, cores).less_sure(0.5 * unevenness),
         view_symmetry(profiles).less_sure(unevenness),
+        *band_views,
         view_extent(profiles),
     ]
 
