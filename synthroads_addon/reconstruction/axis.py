@@ -31,6 +31,8 @@ _REGISTRATIONS, _PARALLEL = 6, 0.3
 lines that bend by less are followed."""
 _GRIDS = (-0.5, -0.25, 0.25)
 """Shifts of further grids beside the first, bins. Chosen: a fraction of a bin moves points to other bins."""
+_CONFIRMED = 0.3
+"""Distance from the axis within which lines and a network confirm each other, m. Chosen: two widths of a line."""
 _PASSES, _STILL = 4, 0.15
 """Times that the axis is looked for at most, and distance that it may still move by, m. Chosen: bounds the work; a
 line's width."""
@@ -89,6 +91,15 @@ class FoundRoad:
         """Return at which of the stations (K,), m, along a path the views of the axis disagree, as a mask (K,)."""
         station, _ = path.project(self.path.place(self.axis.stations, self.axis.offsets))
         return np.interp(stations, station, self.axis.open.astype(np.float64)) > 0.5
+
+    def confirmed_along(self, path: CloudPath, stations: Float) -> Bool:
+        """Return at which of the stations (K,), m, along a path lines and a network agree on the axis, as a mask (K,)."""
+        station, _ = path.project(self.path.place(self.axis.stations, self.axis.offsets))
+        agrees = np.ones(len(station), dtype=bool)
+        for name in ("lines", "network"):
+            distances = [np.abs(view.offsets - self.axis.offsets) for view in self.axis.views if view.name == name]
+            agrees &= distances[0] < _CONFIRMED if distances else False
+        return np.interp(stations, station, agrees.astype(np.float64)) > 0.5
 
     def parted_line(self, path: CloudPath, stations: Float) -> Float | None:
         """Return the offsets (K,), m, from a path of the line midway between both branches of a middle line that parts.

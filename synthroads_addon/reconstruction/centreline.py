@@ -82,7 +82,8 @@ def find_centreline(cloud: RoadCloud, options: Options | None = None, progress: 
         name: np.interp(line.stations, axis_stations, half_width(road.axis, share, factor, DEFINITION))
         for name, (share, factor) in INTERVALS.items()
     }
-    judgement = judge(layout, cores, rivals, road.parted_line(line, profiles.middles))
+    confirmed = road.confirmed_along(line, profiles.middles)
+    judgement = judge(layout, cores, rivals, road.parted_line(line, profiles.middles), confirmed)
     return Centreline(layout.kind, line, _heights(profiles), std, half_widths, road.axis, judgement, layout.notes)
 
 

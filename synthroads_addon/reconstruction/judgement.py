@@ -101,6 +101,7 @@ def judge(
     cores: Sequence[float],
     rivals: Bool | None = None,
     parted: Float | None = None,
+    confirmed: Bool | None = None,
 ) -> Judgement:
     """Return the judgement of an axis, offset 0 of the layout's profiles: where it isn't to be trusted, and why.
 
@@ -110,6 +111,8 @@ def judge(
         rivals: (K,) mask of the stretches where views of the axis disagree; None if nowhere.
         parted: (K,) offsets of the line midway between both branches of a middle line that parts, m
             (`FoundRoad.parted_line`); None if it parts nowhere.
+        confirmed: (K,) mask of the stretches where a view that needs neither lines nor edges agrees with the lines;
+            None if nowhere.
     """
     profiles, guides = layout.profiles, axis_guides(layout)
     lines = np.mean([guide.measured for guide in guides], axis=0) if parted is None else parted
@@ -127,6 +130,10 @@ def judge(
             [_is_painted(band, guide) for band, guide in zip(layout.bands, guides, strict=True)], axis=0
         )
         unseen &= ~_widen_mask(both_painted)
+    else:  # edges that the cloud doesn't hold say nothing against lines
+        unseen &= ~_framed_by_lines(layout)
+    if confirmed is not None:
+        unseen &= ~(confirmed & _widen_mask(np.isfinite(lines)))
     reasons = {
         "neither lines nor edges are seen": ~_widen_mask(np.isfinite(lines)),
         f"the lines lie more than {FARTHEST_LINES:g} m beside it": np.abs(lines) > FARTHEST_LINES,
@@ -135,6 +142,9 @@ def judge(
         "the ground on its lanes is too rough for a pavement": lane_roughness(profiles, cores) > ROUGHEST,
     }
     reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(layout) > RAISED
+    if layout.parted is not None:
+        is_other = layout.parted < 0.5 if layout.kind == "dual" else layout.parted > 0.5
+        reasons["whether the road has one carriageway or two isn't clear"] = is_other
     if rivals is not None:
         reasons[f"views of it disagree by more than {APART:g} m"] = rivals
     masks = {reason: _without_short_runs(mask) for reason, mask in reasons.items()}
@@ -156,6 +166,25 @@ def _middles_by_class(layout: RoadLayout) -> Float:
 def _axis_by_votes(layout: RoadLayout) -> Float:
     """Return the axis' offset (K,), m, by the votes of all lines of a layout; a single NaN if it has no lines."""
     return axis_from_lines(layout).raw if any(band.lines for band in layout.bands) else np.array(np.nan)
+
+
+def _framed_by_lines(layout: RoadLayout) -> Bool:
+    """Return a mask (K,) of the stretches in which lines on both sides, or one and the middle one, hold the axis.
+
+    The road's painted lines must lie the same to both sides of the axis; then any two of them tell in a stretch where it
+    runs, also where the cloud ends within the pavement.
+    """
+    lines = [line for band in layout.bands for line in band.lines if line.width > 0.0]
+    places = np.array([layout.bands[0].place(line) for line in lines])
+    right, left = places[places < -FARTHEST_LINES], places[places > FARTHEST_LINES]
+    stretches = layout.profiles.stretches
+    if not len(right) or not len(left) or abs(right[-1] + left[0]) > FARTHEST_LINES:
+        return np.zeros(stretches, dtype=bool)
+    frame = [line for line, place in zip(lines, places, strict=True) if right[-1] <= place <= left[0]]
+    in_place = [
+        np.abs(line.measured - layout.bands[0].place(line)) < FARTHEST_LINES for line in frame
+    ]  # False where unseen
+    return np.asarray(np.sum([_widen_mask(mask) for mask in in_place], axis=0) >= 2)
 
 
 def _is_painted(band: Band, guide: Line) -> Bool:

@@ -73,6 +73,8 @@ _ROUNDS = 4
 _COVERED = 0.3
 """Share of the road on which a bin must have points to belong to a strip. Chosen: bins between rows of points are often
 empty."""
+_ON_BAND = 0.5
+"""Distance beside the dark band that a line on it may lie at, m. Chosen: what the band's edge is off by."""
 _CRACK = 0.3
 """Gaps in the pavement that are closed to either side, m. Chosen: seams and bins between rows of points; a median is
 wider."""
@@ -176,11 +178,12 @@ def find_layout(
     Raises:
         InputError: no carriageway can be made out.
     """
-    # Classes tell a median from pavement; without them lines and ground do, where brightness alone can't.
-    medians = find_medians(profiles, lines) if profiles.paved is None and kind != "single" else []
+    # Classes tell a median from pavement; without them lines and ground do.
+    medians: list[Median] = []
     share, band = profiles.paved, None
     if share is None:
         band = None if kind == "dual" else _unpainted_band(profiles, lines)
+        medians = find_medians(profiles, lines) if band is None and kind != "single" else []
         share = band.share(profiles) if band else cut_medians(paved_by_brightness(profiles, lines), profiles, medians)
     pavement, notes = Pavement(profiles, share), []
     spans = paved_spans(pavement)
@@ -208,14 +211,20 @@ def find_layout(
 def _unpainted_band(profiles: Profiles, lines: list[Line]) -> DarkBand | None:
     """Return the dark band of a road without paint; None where lane lines are seen, or no band.
 
-    Kerbs, gutters and grass pass for lines as well, but not for dashes of a usual length along the road.
+    Kerbs, gutters and grass pass for lines as well. Dashes that fill a third of their line's length are paint, equally
+    long ones only on the band.
     """
-    has_paint = any(
-        (line.dash, line.gap) in STANDARD_DASHES and line.length >= _SEEN_RURAL * profiles.covered_length
-        for line in lines
-    )
-    band = None if has_paint else find_band(profiles)
-    return band if band is not None and band.seen >= _SEEN else None
+    band = find_band(profiles)
+    if band.seen < _SEEN:
+        return None
+    for line in lines:
+        on_band = (line.offsets > band.right - _ON_BAND) & (line.offsets < band.left + _ON_BAND)
+        is_on_band = float(on_band.mean()) > 0.5 * line.length / profiles.covered_length
+        is_paint = is_on_band or (line.gap > 1.5 * line.dash)
+        least = (_SEEN_RURAL if is_on_band else _SEEN) * profiles.covered_length
+        if is_paint and (line.dash, line.gap) in STANDARD_DASHES and line.length >= least:
+            return None
+    return band
 
 
 def _one_carriageway(asked: bool) -> InputError:

@@ -125,7 +125,9 @@ def _median_between(profiles: Profiles, right: Line, left: Line, lines: Sequence
     has_lanes = [bool(found) or _is_cut_off(profiles, line, sign) for found, (line, sign) in zip(lane_lines, sides, strict=True)]
     odds = _ground_odds(profiles, right_offsets, left_offsets)
     gap = left.offset - right.offset
-    prior = _PRIOR if all(has_lanes) and any(lane_lines) else -np.inf
+    # Kerbs and edges pass for solid lines: where the cloud hides one lane's other line the other lane must be sure.
+    is_sure = all(lane_lines) or any(is_dashed(other) for found in lane_lines for other in found)
+    prior = _PRIOR if all(has_lanes) and is_sure else -np.inf
     if all(any(is_dashed(other) for other in found) for found in lane_lines):
         prior += _FRAMED + (0.0 if _LIKE_A_LANE[0] <= gap <= _LIKE_A_LANE[1] else _NO_LANE)
     strip = min(_EDGE_STRIP, 0.25 * gap)
