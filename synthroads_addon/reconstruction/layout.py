@@ -18,7 +18,7 @@ from .path import SPACING
 from .profiles import ACROSS, STRETCH, Grid, Profiles
 from .smoothing import bisquare, fill_gaps, hidden_std, mean_with_std, robust_scale, smooth
 from .views.band import DarkBand, find_band
-from .views.medians import Median, cut_medians, find_medians
+from .views.medians import Median, cut_medians, find_medians, median_level
 
 RoadKind = Literal["dual", "single"]
 
@@ -73,6 +73,11 @@ _ROUNDS = 4
 _COVERED = 0.3
 """Share of the road on which a bin must have points to belong to a strip. Chosen: bins between rows of points are often
 empty."""
+_ON_AND_BESIDE = ((-0.1, 0.1), (-0.8, -0.3), (0.3, 0.8))
+"""Distances from a line's middle, m: on it, to the right, to the left. Chosen: beyond its paint, within a verge."""
+_BRIGHTER = 0.8
+"""Share of the stretches in which paint is brighter than both sides. Chosen: of noise it is a half, of paint nearly
+all."""
 _ON_BAND = 0.5
 """Distance beside the dark band that a line on it may lie at, m. Chosen: what the band's edge is off by."""
 _CRACK = 0.3
@@ -209,22 +214,27 @@ def find_layout(
 
 
 def _unpainted_band(profiles: Profiles, lines: list[Line]) -> DarkBand | None:
-    """Return the dark band of a road without paint; None where lane lines are seen, or no band.
-
-    Kerbs, gutters and grass pass for lines as well. Dashes that fill a third of their line's length are paint, equally
-    long ones only on the band.
-    """
+    """Return the dark band of a road without paint; None where paint is seen, or no band."""
     band = find_band(profiles)
     if band.seen < _SEEN:
         return None
     for line in lines:
         on_band = (line.offsets > band.right - _ON_BAND) & (line.offsets < band.left + _ON_BAND)
         is_on_band = float(on_band.mean()) > 0.5 * line.length / profiles.covered_length
-        is_paint = is_on_band or (line.gap > 1.5 * line.dash)
+        # Grass passes for dashes as long as their gaps, paint of that kind lies on the band.
+        is_dashed_paint = (line.dash, line.gap) in STANDARD_DASHES and (is_on_band or line.gap > 1.5 * line.dash)
         least = (_SEEN_RURAL if is_on_band else _SEEN) * profiles.covered_length
-        if is_paint and (line.dash, line.gap) in STANDARD_DASHES and line.length >= least:
+        if line.length >= least and (is_dashed_paint or (not is_dashed(line) and _is_strip(profiles, line))):
             return None
     return band
+
+
+def _is_strip(profiles: Profiles, line: Line) -> bool:
+    """Return whether a line is brighter than the ground on either side, as paint is; kerbs part two grounds."""
+    places = [(line.offsets + start, line.offsets + end) for start, end in _ON_AND_BESIDE]
+    on_line, right, left = (median_level(profiles, profiles.brightness, *place) for place in places)
+    is_seen = np.isfinite(on_line) & np.isfinite(right) & np.isfinite(left)
+    return bool(is_seen.any()) and float((on_line > np.maximum(right, left))[is_seen].mean()) >= _BRIGHTER
 
 
 def _one_carriageway(asked: bool) -> InputError:

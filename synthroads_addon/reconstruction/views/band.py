@@ -30,6 +30,9 @@ _LEAST = 0.03
 """Score from which on a band counts. Chosen: a fifth of a full one."""
 _ROUGHER = 1.3
 """Roughness of the band over the lesser one beside it, at most. Chosen: footways are as smooth as streets."""
+_SUNK, _BANK = 0.4, (3, 13)
+"""Height of the ground on both sides above the band, m, from which on it is a channel, and the bins beyond its edges in
+which. Chosen: twice a high kerb; a metre of bank."""
 _SLIP = 0.03
 """Score that a move by a metre from one stretch to the next costs, of each edge. Chosen: a jump of 5 m is no better than
 no band."""
@@ -74,13 +77,26 @@ def view_band(band: DarkBand) -> View:
 def find_band(profiles: Profiles) -> DarkBand:
     """Return the dark band along the road that is clearest and moves least."""
     stretches = profiles.stretches
-    step = np.abs(np.diff(remove_grade(profiles.height), axis=1, append=np.nan))
+    height = remove_grade(profiles.height)
+    step = np.abs(np.diff(height, axis=1, append=np.nan))
     choices = []
     for number in range(stretches):
         with np.errstate(divide="ignore", invalid="ignore"):
             level = np.log(median_profile(profiles.brightness, number))
-        choices.append(_bands_of(profiles, level, median_profile(step, number)))
+        bands = _bands_of(profiles, level, median_profile(step, number))
+        choices.append(_without_channels(profiles, bands, median_profile(height, number)))
     return _course(choices)
+
+
+def _without_channels(profiles: Profiles, bands: Float, height: Float) -> Float:
+    """Return the bands (C, 3) of a profile of heights (U,), m, that don't lie deep between banks, as water does."""
+    keep = np.ones(len(bands), dtype=bool)
+    for row, (right, left, _) in enumerate(bands):
+        first, last = profiles.column(right), profiles.column(left)
+        parts = height[first:last], height[max(0, first - _BANK[1]) : max(0, first - _BANK[0])], height[last + _BANK[0] : last + _BANK[1]]
+        band, *banks = (float(np.median(part[np.isfinite(part)])) if np.isfinite(part).any() else np.nan for part in parts)
+        keep[row] = not min(banks) - band > _SUNK
+    return bands[keep]
 
 
 def _bands_of(profiles: Profiles, level: Float, rough: Float) -> Float:

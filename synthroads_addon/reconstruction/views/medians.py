@@ -162,7 +162,7 @@ def _ground_odds(profiles: Profiles, right: Float, left: Float) -> Float:
         "left": (left + _BESIDE_PAINT, left + _BESIDE_PAINT + _STRIP),
     }
     level, rise, rough = (
-        {name: _level(profiles, values, *place) for name, place in places.items()}
+        {name: median_level(profiles, values, *place) for name, place in places.items()}
         for values in (profiles.brightness.astype(np.float64), height, step)
     )
     logarithm, rough_logarithm = (
@@ -197,10 +197,10 @@ def _odds_of(levels: dict[str, Float], same_std: float, other_std: float) -> Flo
     return np.where(share > 0.2, np.clip(odds, _AGAINST, _FOR), 0.0)
 
 
-def _level(profiles: Profiles, values: Float, low: Float, high: Float) -> Float:
-    """Return the mean (K,) of values (S, U) between two offsets (K,), m, in each stretch; NaN where hardly seen."""
+def median_level(profiles: Profiles, values: Grid | Float, low: Float, high: Float) -> Float:
+    """Return the median (K,) of values (S, U) between offsets (K,), m, in each stretch; NaN where hardly seen."""
     result = np.full(profiles.stretches, np.nan)
-    for number in range(profiles.stretches):
+    for number in np.flatnonzero(np.isfinite(low) & np.isfinite(high)):
         first, last = profiles.column(float(low[number])), profiles.column(float(high[number]))
         if last - first + 1 < 2 or abs(profiles.offsets[last] - high[number]) > 2.0 * ACROSS:
             continue
