@@ -93,7 +93,7 @@ class FoundRoad:
         return np.interp(stations, station, self.axis.open.astype(np.float64)) > 0.5
 
     def confirmed_along(self, path: CloudPath, stations: Float) -> Bool:
-        """Return at which of the stations (K,), m, along a path lines and a network agree on the axis, as a mask (K,)."""
+        """Return at which stations (K,), m, along a path lines and a network agree on the axis, as a mask (K,)."""
         station, _ = path.project(self.path.place(self.axis.stations, self.axis.offsets))
         agrees = np.ones(len(station), dtype=bool)
         for name in ("lines", "network"):

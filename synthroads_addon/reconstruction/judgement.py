@@ -40,8 +40,8 @@ next."""
 _FEWEST_STEPS = 50
 """Steps between bins that a roughness is told from. Chosen: its deviation is then known to a tenth."""
 _WIDEST_LANE, _UNDIVIDED = 5.2, 7.5
-"""Widths of a lane, m, and between the edge lines of a road without a line in its middle. Chosen: above any lane of RAL,
-as in `layout`; roads that are wider have such a line."""
+"""Widths of a lane, m, and between the edge lines of a road without a line in its middle. Chosen: above any lane of
+RAL, as in `layout`; roads that are wider have such a line."""
 _CUT, _VERGE = 2, 1.5
 """Stretches around one that hide its edge where they are cut off, and ground beyond a line, m, that shows an edge.
 Chosen: the reach of an edge's median profile; an edge strip and some verge."""
@@ -177,8 +177,8 @@ def _axis_by_votes(layout: RoadLayout) -> Float:
 def _framed_by_lines(layout: RoadLayout) -> Bool:
     """Return a mask (K,) of the stretches that are cut off within the pavement, but whose lines hold the axis.
 
-    The road's painted lines must lie the same to both sides of the axis; then any two of them tell in a stretch where it
-    runs. Where the cloud doesn't end the edges could be seen: that they aren't speaks against the axis.
+    The road's painted lines must lie the same to both sides of the axis; then any two of them tell in a stretch where
+    it runs. Where the cloud doesn't end the edges could be seen: that they aren't speaks against the axis.
     """
     lines = [line for band in layout.bands for line in band.lines if line.width > 0.0]
     places = np.array([layout.bands[0].place(line) for line in lines])

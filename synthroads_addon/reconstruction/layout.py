@@ -169,9 +169,7 @@ class RoadLayout:
         return self.pavement.profiles
 
 
-def find_layout(
-    profiles: Profiles, lines: list[Line], kind: RoadKind | None = None, asked: bool = True
-) -> RoadLayout:
+def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = None, asked: bool = True) -> RoadLayout:
     """Return the layout of carriageways and lanes that lines and pavement of the profiles show.
 
     Args:

@@ -34,12 +34,12 @@ _SUNK, _BANK = 0.4, (3, 13)
 """Height of the ground on both sides above the band, m, from which on it is a channel, and the bins beyond its edges in
 which. Chosen: twice a high kerb; a metre of bank."""
 _SLIP = 0.03
-"""Score that a move by a metre from one stretch to the next costs, of each edge. Chosen: a jump of 5 m is no better than
-no band."""
+"""Score that a move by a metre from one stretch to the next costs, of each edge. Chosen: a jump of 5 m is no better
+than no band."""
 _CHOICES = 8
 """Bands of a stretch that a course may go through. Chosen: those of street, footways and gardens."""
-_FLOOR = 0.2
-"""Deviation of the band's middle from the axis where nothing scatters, m. Chosen: gutters, parked cars, growth."""
+_FLOOR = 0.12
+"""Deviation of the band's middle from the axis where nothing scatters, m. Chosen: half of a gutter's width."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,10 @@ class DarkBand:
         return float(np.isfinite(self.right).mean())
 
     def share(self, profiles: Profiles) -> Grid:
-        """Return shares of pavement (S, U): 1 in the band, bridged where it isn't seen, 0 beside; NaN without points."""
-        right, left = (np.repeat(fill_gaps(edge), STRETCH)[: len(profiles.stations)] for edge in (self.right, self.left))
+        """Return shares of pavement (S, U): 1 in the band, bridged in gaps, 0 beside; NaN without points."""
+        right, left = (
+            np.repeat(fill_gaps(edge), STRETCH)[: len(profiles.stations)] for edge in (self.right, self.left)
+        )
         inside = (profiles.offsets > right[:, None]) & (profiles.offsets < left[:, None])
         return np.where(np.isfinite(profiles.brightness), inside, np.nan).astype(np.float32)
 
@@ -93,8 +95,14 @@ def _without_channels(profiles: Profiles, bands: Float, height: Float) -> Float:
     keep = np.ones(len(bands), dtype=bool)
     for row, (right, left, _) in enumerate(bands):
         first, last = profiles.column(right), profiles.column(left)
-        parts = height[first:last], height[max(0, first - _BANK[1]) : max(0, first - _BANK[0])], height[last + _BANK[0] : last + _BANK[1]]
-        band, *banks = (float(np.median(part[np.isfinite(part)])) if np.isfinite(part).any() else np.nan for part in parts)
+        parts = (
+            height[first:last],
+            height[max(0, first - _BANK[1]) : max(0, first - _BANK[0])],
+            height[last + _BANK[0] : last + _BANK[1]],
+        )
+        band, *banks = (
+            float(np.median(part[np.isfinite(part)])) if np.isfinite(part).any() else np.nan for part in parts
+        )
         keep[row] = not min(banks) - band > _SUNK
     return bands[keep]
 
@@ -130,9 +138,13 @@ def _bands_of(profiles: Profiles, level: Float, rough: Float) -> Float:
             clear = min(fall[first - reach], rise[last - reach], _FULL)
             score = clear - _UNEVEN * deviation
             inside = _mean(roughness, rough_seen, first, last)
-            beside = min(_mean(roughness, rough_seen, first - reach, first), _mean(roughness, rough_seen, last, last + reach))
+            beside = min(
+                _mean(roughness, rough_seen, first - reach, first), _mean(roughness, rough_seen, last, last + reach)
+            )
             if score > _LEAST and not inside > _ROUGHER * beside:
-                result.append((profiles.offsets[first] - 0.5 * ACROSS, profiles.offsets[last - 1] + 0.5 * ACROSS, score))
+                result.append(
+                    (profiles.offsets[first] - 0.5 * ACROSS, profiles.offsets[last - 1] + 0.5 * ACROSS, score)
+                )
     return np.array(sorted(result, key=lambda row: -row[2])[:_CHOICES]).reshape(-1, 3)
 
 

@@ -19,8 +19,8 @@ from ..profiles import ACROSS, STRETCH, Grid, Profiles
 from ..smoothing import fill_gaps, robust_scale
 
 _NARROWEST, _WIDEST = 1.2, 30.0
-"""Distances of the lines beside a median, m. Chosen: a double line is laid in 1 m at most; carriageways that are farther
-apart are two roads."""
+"""Distances of the lines beside a median, m. Chosen: a double line is laid in 1 m at most; carriageways that are
+farther apart are two roads."""
 _LANE = (2.3, 5.2)
 """Widths of lanes, m. Chosen: as in `layout`."""
 _LIKE_A_LANE = (2.6, 4.1)
@@ -122,7 +122,9 @@ def _median_between(profiles: Profiles, right: Line, left: Line, lines: Sequence
         [other for other in lines if _LANE[0] <= sign * (other.offset - line.offset) <= _LANE[1]]
         for line, sign in sides
     ]
-    has_lanes = [bool(found) or _is_cut_off(profiles, line, sign) for found, (line, sign) in zip(lane_lines, sides, strict=True)]
+    has_lanes = [
+        bool(found) or _is_cut_off(profiles, line, sign) for found, (line, sign) in zip(lane_lines, sides, strict=True)
+    ]
     odds = _ground_odds(profiles, right_offsets, left_offsets)
     gap = left.offset - right.offset
     # Kerbs and edges pass for solid lines: where the cloud hides one lane's other line the other lane must be sure.
@@ -185,7 +187,9 @@ def _odds_of(levels: dict[str, Float], same_std: float, other_std: float) -> Flo
     between_lanes = levels["right"] - levels["left"]
     lanes = between_lanes[np.isfinite(between_lanes)]
     # Of a mean of two lanes and a strip the deviation is sqrt(3 / 2) of one's, that between two lanes sqrt(2).
-    scatter = np.sqrt(0.75) * max(robust_scale(lanes - np.median(lanes)), abs(float(np.median(lanes)))) if len(lanes) else 0.0
+    scatter = (
+        np.sqrt(0.75) * max(robust_scale(lanes - np.median(lanes)), abs(float(np.median(lanes)))) if len(lanes) else 0.0
+    )
     same_std = float(np.hypot(same_std, scatter))
     other_std = max(other_std, 2.0 * same_std)
     seen = np.isfinite(difference)

@@ -120,7 +120,9 @@ def _inside(ground: Ground, station: Float, offset: Float, length: float) -> Boo
     return (across > ground.low) & (across < ground.high) & (station >= ground.start)
 
 
-def _carriageway(inner: float, lanes: int, lane: float, shoulder: float, sign: int) -> tuple[Ground, list[Paint], float]:
+def _carriageway(
+    inner: float, lanes: int, lane: float, shoulder: float, sign: int
+) -> tuple[Ground, list[Paint], float]:
     """Return pavement and lines of a carriageway from its inner edge outwards, and its outer edge, m."""
     first = inner + sign * 0.5
     borders = [first + sign * lane * number for number in range(lanes + 1)]
@@ -142,7 +144,7 @@ def motorway(seed: int, decibel: float | None = None, exit_from: float | None = 
     median, lane = rng.uniform(1.5, 4.0), float(rng.choice([3.5, 3.75]))
     decibel = float(rng.uniform(0.5, 3.7)) if decibel is None else decibel
     right, right_lines, right_outer = _carriageway(-0.5 * median, 2, lane, 2.5, -1)
-    left, left_lines, left_outer = _carriageway(0.5 * median, 2, lane, 2.5, 1)
+    left, left_lines, _ = _carriageway(0.5 * median, 2, lane, 2.5, 1)
     level = ASPHALT * 10.0 ** (decibel / 10.0)
     grey = Ground(-0.5 * median, 0.5 * median, level, 0.02, 0.03)
     grounds, lines, name = [right, left, grey], [*right_lines, *left_lines], "motorway"
