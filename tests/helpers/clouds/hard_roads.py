@@ -22,8 +22,7 @@ ASPHALT, GRASS, PAINT = 0.12, 0.42, 0.7
 class Ground:
     """A strip of ground from right to left, m, with its intensity, roughness (m) and height above the pavement, m.
 
-    ``turn`` shifts a ramp's both edges outwards by so much (m) over the road's second half; of a strip that widens only
-    the outer edge is shifted, by ``widen``.
+    It begins at the station ``start``, m; until the road's end a ramp is shifted by ``turn``, m.
     """
 
     low: float
