@@ -13,12 +13,12 @@ from ..base.arrays import Bool, Float, otsu_threshold
 from ..base.errors import InputError
 from .branches import find_branch
 from .edges import FARTHEST, Pavement
+from .ground.band import DarkBand, find_band
+from .ground.medians import Median, cut_medians, find_medians, median_level
 from .lines import STANDARD_DASHES, USUAL, WAVELENGTH, Line, is_dashed
 from .path import SPACING
 from .profiles import ACROSS, STRETCH, Grid, Profiles
 from .smoothing import bisquare, fill_gaps, hidden_std, mean_with_std, robust_scale, smooth
-from .views.band import DarkBand, find_band
-from .views.medians import Median, cut_medians, find_medians, median_level
 
 RoadKind = Literal["dual", "single"]
 

@@ -12,13 +12,13 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.reconstruction.axis import FoundRoad
 from synthroads_addon.reconstruction.centreline import Centreline, centreline_report, find_centreline
 from synthroads_addon.reconstruction.cloud import RoadCloud, read_road_cloud
+from synthroads_addon.reconstruction.ground.band import find_band
+from synthroads_addon.reconstruction.ground.medians import find_medians
 from synthroads_addon.reconstruction.layout import find_layout
 from synthroads_addon.reconstruction.lines import find_lines
 from synthroads_addon.reconstruction.path import CloudPath
 from synthroads_addon.reconstruction.profiles import Profiles, make_profiles
 from synthroads_addon.reconstruction.reconstruct import reconstruct
-from synthroads_addon.reconstruction.views.band import find_band
-from synthroads_addon.reconstruction.views.medians import find_medians
 from tests.helpers.clouds.foreign_clouds import EAST, NORTH, axis_north
 from tests.helpers.clouds.hard_roads import HardRoad, motorway, rural, street
 

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...base.arrays import Float
+from ..ground.band import find_band
 from ..layout import FoundAxis, RoadLayout, axis_from_lines, axis_guides
 from ..smoothing import fill_gaps
-from .band import find_band, view_band
+from .dark_band import view_band
 from .extent import view_extent
 from .fusion import APART, FusedAxis, fuse
 from .markings import view_lines

@@ -11,10 +11,8 @@ import numpy as np
 from scipy import ndimage
 
 from ...base.arrays import Bool, Float
-from ..profiles import ACROSS, STRETCH, Grid, Profiles
+from ..profiles import ACROSS, STRETCH, Grid, Profiles, median_profile, remove_grade
 from ..smoothing import fill_gaps
-from .pavement import median_profile, remove_grade
-from .view import View
 
 _NARROWEST, _WIDEST = 3.0, 12.0
 """Widths of the band, m. Chosen: a lane; three lanes with shoulders."""
@@ -22,7 +20,7 @@ _BESIDE = 0.8
 """Width on either side of an edge whose brightness is compared, m. Chosen: a footway is wider."""
 _PAINT = 9
 """Widest bright strip that is paint, bins. Chosen: double lines, gutters."""
-_FULL = 0.15
+FULL = 0.15
 """Rise of the brightness' logarithm that counts fully. Chosen: 0.65 dB; more makes no better an edge."""
 _UNEVEN = 1.0
 """Weight of the logarithm's deviation within the band. Chosen: a band of two grounds loses more than its edges gain."""
@@ -38,8 +36,6 @@ _SLIP = 0.03
 than no band."""
 _CHOICES = 8
 """Bands of a stretch that a course may go through. Chosen: those of street, footways and gardens."""
-_FLOOR = 0.12
-"""Deviation of the band's middle from the axis where nothing scatters, m. Chosen: half of a gutter's width."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +44,7 @@ class DarkBand:
 
     Attributes:
         right, left: (K,) m; NaN where no band is seen.
-        score: (K,) how clear it is, 0 to `_FULL`.
+        score: (K,) how clear it is, 0 to `FULL`.
     """
 
     right: Float
@@ -67,13 +63,6 @@ class DarkBand:
         )
         inside = (profiles.offsets > right[:, None]) & (profiles.offsets < left[:, None])
         return np.where(np.isfinite(profiles.brightness), inside, np.nan).astype(np.float32)
-
-
-def view_band(band: DarkBand) -> View:
-    """Return the view of the band's middle."""
-    # Where the band is fainter its edges are found the less exactly.
-    std = np.where(band.score > 0.0, _FLOOR * (_FULL / np.maximum(band.score, 0.02) - 1.0), 0.0)
-    return View.of("dark band", 0.5 * (band.right + band.left), _FLOOR, std)
 
 
 def find_band(profiles: Profiles) -> DarkBand:
@@ -135,7 +124,7 @@ def _bands_of(profiles: Profiles, level: Float, rough: Float) -> Float:
             count = inner_last - inner_first
             mean = (total[inner_last] - total[inner_first]) / count
             deviation = np.sqrt(max((square[inner_last] - square[inner_first]) / count - mean**2, 0.0))
-            clear = min(fall[first - reach], rise[last - reach], _FULL)
+            clear = min(fall[first - reach], rise[last - reach], FULL)
             score = clear - _UNEVEN * deviation
             inside = _mean(roughness, rough_seen, first, last)
             beside = min(
