@@ -31,6 +31,8 @@ _REGISTRATIONS, _PARALLEL = 6, 0.3
 lines that bend by less are followed."""
 _GRIDS = (-0.5, -0.25, 0.25)
 """Shifts of further grids beside the first, bins. Chosen: a fraction of a bin moves points to other bins."""
+_CONFIRMED = 0.3
+"""Distance from the axis within which lines and a network confirm each other, m. Chosen: two widths of a line."""
 _PASSES, _STILL = 4, 0.15
 """Times that the axis is looked for at most, and distance that it may still move by, m. Chosen: bounds the work; a
 line's width."""
@@ -66,12 +68,14 @@ class FoundRoad:
         half_width: reach of the cross profiles to either side of the path, m.
         layout: carriageways and lines that profiles along a path parallel to the road show.
         axis: offsets of the axis from that path, on which all views agree.
+        asked: kind of road that the user gave; None if the cloud had to tell.
     """
 
     cloud: RoadCloud
     half_width: float
     layout: RoadLayout
     axis: FusedAxis
+    asked: RoadKind | None = None
 
     @property
     def path(self) -> CloudPath:
@@ -81,12 +85,21 @@ class FoundRoad:
     def layout_along(self, path: CloudPath, kind: RoadKind | None) -> RoadLayout:
         """Return the layout that profiles along another path show; InputError if they show no road of that kind."""
         profiles = make_profiles(self.cloud, path, self.half_width, keep_points=True)
-        return find_layout(profiles, find_lines(profiles), kind)
+        return find_layout(profiles, find_lines(profiles), kind, asked=self.asked is not None)
 
     def open_along(self, path: CloudPath, stations: Float) -> Bool:
         """Return at which of the stations (K,), m, along a path the views of the axis disagree, as a mask (K,)."""
         station, _ = path.project(self.path.place(self.axis.stations, self.axis.offsets))
         return np.interp(stations, station, self.axis.open.astype(np.float64)) > 0.5
+
+    def confirmed_along(self, path: CloudPath, stations: Float) -> Bool:
+        """Return at which stations (K,), m, along a path lines and a network agree on the axis, as a mask (K,)."""
+        station, _ = path.project(self.path.place(self.axis.stations, self.axis.offsets))
+        agrees = np.ones(len(station), dtype=bool)
+        for name in ("lines", "network"):
+            distances = [np.abs(view.offsets - self.axis.offsets) for view in self.axis.views if view.name == name]
+            agrees &= distances[0] < _CONFIRMED if distances else False
+        return np.interp(stations, station, agrees.astype(np.float64)) > 0.5
 
     def parted_line(self, path: CloudPath, stations: Float) -> Float | None:
         """Return the offsets (K,), m, from a path of the line midway between both branches of a middle line that parts.
@@ -177,7 +190,7 @@ def _look_along(cloud: RoadCloud, path: CloudPath, half_width: float, options: O
     """Return the road that profiles along a path show: its layout, and its axis by the rule-based views."""
     profiles = make_profiles(cloud, path, half_width, keep_points=True)
     layout = find_layout(profiles, find_lines(profiles), options.road)
-    return FoundRoad(cloud, half_width, layout, find_fused_axis(layout))
+    return FoundRoad(cloud, half_width, layout, find_fused_axis(layout), options.road)
 
 
 def _learned_view(cloud: RoadCloud, profiles: Profiles, options: Options) -> list[View]:

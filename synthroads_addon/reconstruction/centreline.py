@@ -1,6 +1,7 @@
 """A road's centreline as it is seen in a cloud, without an alignment fitted to it, and how far it is to be trusted."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from .judgement import Judgement, judge
 from .layout import RoadKind, find_layout
 from .lines import find_lines
 from .path import CloudPath
-from .profiles import Profiles, make_profiles
+from .profiles import STRETCH, Profiles, make_profiles
 from .smoothing import difference_figures, fill_gaps, smooth
 from .views.fusion import DEFINITION, FusedAxis
 from .views.intervals import half_width
@@ -43,6 +44,8 @@ class Centreline:
         axis: the fused axis with its views, along the path that was found first.
         judgement: stretches where the line isn't to be trusted; stations are those of the path.
         notes: remarks on what was left out.
+        parted: (K,) probability that the road has two carriageways, in each stretch of 5 m from the path's start; None
+            if nothing was looked for.
     """
 
     kind: RoadKind
@@ -53,6 +56,7 @@ class Centreline:
     axis: FusedAxis
     judgement: Judgement
     notes: tuple[str, ...]
+    parted: Float | None = None
 
 
 @linear_algebra_on_one_thread(scipy=True)
@@ -82,8 +86,10 @@ def find_centreline(cloud: RoadCloud, options: Options | None = None, progress: 
         name: np.interp(line.stations, axis_stations, half_width(road.axis, share, factor, DEFINITION))
         for name, (share, factor) in INTERVALS.items()
     }
-    judgement = judge(layout, cores, rivals, road.parted_line(line, profiles.middles))
-    return Centreline(layout.kind, line, _heights(profiles), std, half_widths, road.axis, judgement, layout.notes)
+    confirmed = road.confirmed_along(line, profiles.middles)
+    judgement = judge(layout, cores, rivals, road.parted_line(line, profiles.middles), confirmed)
+    heights, notes = _heights(profiles), layout.notes
+    return Centreline(layout.kind, line, heights, std, half_widths, road.axis, judgement, notes, layout.parted)
 
 
 def _seen_part(path: CloudPath, axis: FusedAxis) -> CloudPath:
@@ -145,6 +151,7 @@ def centreline_report(centreline: Centreline, cloud: RoadCloud) -> dict[str, Any
         )
     return {
         "road": centreline.kind,
+        "carriageways": _carriageways(centreline),
         "length": round(centreline.path.length, 2),
         "points": cloud.read,
         "views": views,
@@ -152,6 +159,21 @@ def centreline_report(centreline: Centreline, cloud: RoadCloud) -> dict[str, Any
         "judgement": centreline.judgement.to_dict() | {"doubtful": _from_start(centreline)},
         "notes": list(centreline.notes),
     }
+
+
+def _carriageways(centreline: Centreline) -> list[dict[str, Any]]:
+    """Return as JSON data the stretches with one and with two carriageways, with the number's probability, m."""
+    if centreline.parted is None:
+        return []
+    is_two = centreline.parted > 0.5
+    borders = [0, *(np.flatnonzero(np.diff(is_two)) + 1).tolist(), len(is_two)]
+    result = []
+    for first, end in pairwise(borders):
+        probability = float(np.mean(centreline.parted[first:end]))
+        number = 2 if is_two[first] else 1
+        stretch = {"start": float(STRETCH * first), "end": min(float(STRETCH * end), round(centreline.path.length, 1))}
+        result.append(stretch | {"number": number, "probability": round(max(probability, 1.0 - probability), 4)})
+    return result
 
 
 def _from_start(centreline: Centreline) -> list[dict[str, Any]]:

@@ -16,11 +16,11 @@ from scipy import ndimage
 
 from ..base.arrays import Bool, Float
 from .layout import Band, RoadLayout, axis_from_lines, axis_guides
-from .lines import Line
-from .profiles import STRETCH, Profiles
+from .lines import Line, is_dashed
+from .profiles import STRETCH, Profiles, remove_grade
 from .smoothing import difference_figures, robust_scale
 from .views.fusion import APART
-from .views.pavement import pavement_edges, remove_grade
+from .views.pavement import pavement_edges
 
 FARTHEST_MIDDLE = 0.75
 """The middle between the pavement's edges may lie so far beside the axis, m. Chosen: half of what a shoulder on one
@@ -39,6 +39,12 @@ _ON_AND_BESIDE = ((-0.05, 0.05), (-0.6, -0.3), (0.3, 0.6))
 next."""
 _FEWEST_STEPS = 50
 """Steps between bins that a roughness is told from. Chosen: its deviation is then known to a tenth."""
+_WIDEST_LANE, _UNDIVIDED = 5.2, 7.5
+"""Widths of a lane, m, and between the edge lines of a road without a line in its middle. Chosen: above any lane of
+RAL, as in `layout`; roads that are wider have such a line."""
+_CUT, _VERGE = 2, 1.5
+"""Stretches around one that hide its edge where they are cut off, and ground beyond a line, m, that shows an edge.
+Chosen: the reach of an edge's median profile; an edge strip and some verge."""
 _NEAR = 4
 """Stretches to either side of one whose evidence counts for it. Chosen: 20 m, as an axis changes little in them."""
 _SHORTEST_TRUST = 5
@@ -101,6 +107,7 @@ def judge(
     cores: Sequence[float],
     rivals: Bool | None = None,
     parted: Float | None = None,
+    confirmed: Bool | None = None,
 ) -> Judgement:
     """Return the judgement of an axis, offset 0 of the layout's profiles: where it isn't to be trusted, and why.
 
@@ -110,6 +117,8 @@ def judge(
         rivals: (K,) mask of the stretches where views of the axis disagree; None if nowhere.
         parted: (K,) offsets of the line midway between both branches of a middle line that parts, m
             (`FoundRoad.parted_line`); None if it parts nowhere.
+        confirmed: (K,) mask of the stretches where a view that needs neither lines nor edges agrees with the lines;
+            None if nowhere.
     """
     profiles, guides = layout.profiles, axis_guides(layout)
     lines = np.mean([guide.measured for guide in guides], axis=0) if parted is None else parted
@@ -127,6 +136,10 @@ def judge(
             [_is_painted(band, guide) for band, guide in zip(layout.bands, guides, strict=True)], axis=0
         )
         unseen &= ~_widen_mask(both_painted)
+    else:  # edges that the cloud doesn't hold say nothing against lines
+        unseen &= ~_framed_by_lines(layout)
+    if confirmed is not None:
+        unseen &= ~(confirmed & _widen_mask(np.isfinite(lines)))
     reasons = {
         "neither lines nor edges are seen": ~_widen_mask(np.isfinite(lines)),
         f"the lines lie more than {FARTHEST_LINES:g} m beside it": np.abs(lines) > FARTHEST_LINES,
@@ -135,6 +148,9 @@ def judge(
         "the ground on its lanes is too rough for a pavement": lane_roughness(profiles, cores) > ROUGHEST,
     }
     reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(layout) > RAISED
+    if layout.parted is not None:
+        is_other = layout.parted < 0.5 if layout.kind == "dual" else layout.parted > 0.5
+        reasons["whether the road has one carriageway or two isn't clear"] = is_other
     if rivals is not None:
         reasons[f"views of it disagree by more than {APART:g} m"] = rivals
     masks = {reason: _without_short_runs(mask) for reason, mask in reasons.items()}
@@ -156,6 +172,48 @@ def _middles_by_class(layout: RoadLayout) -> Float:
 def _axis_by_votes(layout: RoadLayout) -> Float:
     """Return the axis' offset (K,), m, by the votes of all lines of a layout; a single NaN if it has no lines."""
     return axis_from_lines(layout).raw if any(band.lines for band in layout.bands) else np.array(np.nan)
+
+
+def _framed_by_lines(layout: RoadLayout) -> Bool:
+    """Return a mask (K,) of the stretches that are cut off within the pavement, but whose lines hold the axis.
+
+    The road's painted lines must lie the same to both sides of the axis; then any two of them tell in a stretch where
+    it runs. Where the cloud doesn't end the edges could be seen: that they aren't speaks against the axis.
+    """
+    lines = [line for band in layout.bands for line in band.lines if line.width > 0.0]
+    places = np.array([layout.bands[0].place(line) for line in lines])
+    right, left = places[places < -FARTHEST_LINES], places[places > FARTHEST_LINES]
+    stretches = layout.profiles.stretches
+    if not len(right) or not len(left) or abs(right[-1] + left[0]) > FARTHEST_LINES:
+        return np.zeros(stretches, dtype=bool)
+    frame = [line for line, place in zip(lines, places, strict=True) if right[-1] <= place <= left[0]]
+    # Rows of parking bays have lines on both sides as well, but none that is dashed and a lane away.
+    is_road = (
+        left[0] - right[-1] <= 2.0 * _WIDEST_LANE and is_dashed(frame[1])
+        if len(frame) == 3
+        else left[0] - right[-1] <= _UNDIVIDED
+    )
+    if not is_road:
+        return np.zeros(stretches, dtype=bool)
+    in_place = [
+        np.abs(line.measured - layout.bands[0].place(line)) < FARTHEST_LINES for line in frame
+    ]  # False where unseen
+    is_held = np.sum([_widen_mask(mask) for mask in in_place], axis=0) >= 2
+    return np.asarray(is_held & _is_cut_off(layout.profiles, float(right[-1]), float(left[0])))
+
+
+def _is_cut_off(profiles: Profiles, right: float, left: float) -> Bool:
+    """Return a mask (K,) of the stretches in which the cloud ends, on either side, just beyond one of two lines (m)."""
+    occupied = np.zeros((profiles.stretches * STRETCH, len(profiles.offsets)))
+    occupied[: len(profiles.stations)] = profiles.count > 0
+    by_stretch, offsets = occupied.reshape(profiles.stretches, STRETCH, -1).mean(axis=1), profiles.offsets
+    outside = [(offsets > right - _VERGE) & (offsets < right), (offsets > left) & (offsets < left + _VERGE)]
+    beyond = np.min([by_stretch[:, bins].sum(axis=1) / max(bins.sum(), 1) for bins in outside], axis=0)
+    # An edge is looked for in some rows around a stretch: it is hidden where any of them is cut off.
+    beyond = ndimage.minimum_filter1d(beyond, 2 * _CUT + 1, mode="nearest")
+    within = by_stretch[:, (offsets > right) & (offsets < left)].mean(axis=1)
+    # Chosen: half as full as between the lines, as where a side is cut within the verge.
+    return np.asarray(beyond < 0.5 * np.median(within))
 
 
 def _is_painted(band: Band, guide: Line) -> Bool:

@@ -7,12 +7,15 @@ from typing import Literal, Self
 import numpy as np
 from scipy import ndimage
 from scipy.signal import find_peaks
+from scipy.special import expit
 
 from ..base.arrays import Bool, Float, otsu_threshold
 from ..base.errors import InputError
 from .branches import find_branch
 from .edges import FARTHEST, Pavement
-from .lines import STANDARD_DASHES, USUAL, WAVELENGTH, Line
+from .ground.band import DarkBand, find_band
+from .ground.medians import Median, cut_medians, find_medians, median_level
+from .lines import STANDARD_DASHES, USUAL, WAVELENGTH, Line, is_dashed
 from .path import SPACING
 from .profiles import ACROSS, STRETCH, Grid, Profiles
 from .smoothing import bisquare, fill_gaps, hidden_std, mean_with_std, robust_scale, smooth
@@ -70,9 +73,18 @@ _ROUNDS = 4
 _COVERED = 0.3
 """Share of the road on which a bin must have points to belong to a strip. Chosen: bins between rows of points are often
 empty."""
+_ON_AND_BESIDE = ((-0.1, 0.1), (-0.8, -0.3), (0.3, 0.8))
+"""Distances from a line's middle, m: on it, to the right, to the left. Chosen: beyond its paint, within a verge."""
+_BRIGHTER = 0.8
+"""Share of the stretches in which paint is brighter than both sides. Chosen: of noise it is a half, of paint nearly
+all."""
+_ON_BAND = 0.5
+"""Distance beside the dark band that a line on it may lie at, m. Chosen: what the band's edge is off by."""
 _CRACK = 0.3
 """Gaps in the pavement that are closed to either side, m. Chosen: seams and bins between rows of points; a median is
 wider."""
+_STEADY = 5
+"""Stretches over which the number of carriageways is judged. Chosen: 25 m, as no median begins for less."""
 _LEVEL_BLUR = 10.0
 """Standard deviation of the blur of the pavement's brightness along the road, m. Chosen: single cars and stains vanish
 in it."""
@@ -142,12 +154,14 @@ class RoadLayout:
         bands: carriageways from right to left: two of a dual carriageway, one of a single one.
         pavement: cross profiles with their share of pavement.
         notes: what was left out, in words.
+        parted: (K,) probability that the road has two carriageways there, not one; None if nothing was looked for.
     """
 
     kind: RoadKind
     bands: tuple[Band, ...]
     pavement: Pavement
     notes: tuple[str, ...]
+    parted: Float | None = None
 
     @property
     def profiles(self) -> Profiles:
@@ -155,24 +169,33 @@ class RoadLayout:
         return self.pavement.profiles
 
 
-def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = None) -> RoadLayout:
+def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = None, asked: bool = True) -> RoadLayout:
     """Return the layout of carriageways and lanes that lines and pavement of the profiles show.
 
     Args:
         profiles: along a path parallel to the road.
         lines: all line markings found in the profiles.
         kind: dual or single carriageway; None if the profiles must tell.
+        asked: whether the user gave the kind; else it was found along another path.
 
     Raises:
         InputError: no carriageway can be made out.
     """
-    share = profiles.paved if profiles.paved is not None else paved_by_brightness(profiles, lines)
+    # Classes tell a median from pavement; without them lines and ground do.
+    medians: list[Median] = []
+    share, band = profiles.paved, None
+    if share is None:
+        band = None if kind == "dual" else _unpainted_band(profiles, lines)
+        medians = find_medians(profiles, lines) if band is None and kind != "single" else []
+        share = band.share(profiles) if band else cut_medians(paved_by_brightness(profiles, lines), profiles, medians)
     pavement, notes = Pavement(profiles, share), []
     spans = paved_spans(pavement)
     # Rural roads have gaps in their lines, and no turnouts.
     seen_share = _SEEN_RURAL if len(spans) == 1 or kind == "single" else _SEEN
     parts = [_Part.of(pavement, spans, number) for number in range(len(spans))]
     bands = [_band(pavement, part, part.main(lines, seen_share)) for part in parts]
+    if not bands and band is not None:  # along a path that isn't parallel to it no offset is paved throughout
+        bands = [_sloping_band(profiles, band)]
     left_out = sum(all(line not in part.main(lines, seen_share) for part in parts) for line in lines)
     if left_out:
         notes.append(f"{left_out} lines were seen on a small part of the road and left out")
@@ -180,11 +203,76 @@ def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = N
         raise InputError("road", None, "no carriageway can be made out in the cloud")
     pair = None if kind == "single" else _carriageway_pair(bands)
     if pair is None and kind == "dual":
-        raise InputError("--road", "dual", "only one carriageway can be made out in the cloud")
+        raise _one_carriageway(asked)
     carriageways = pair or (max(bands, key=lambda band: (len(band.lines), band.width)),)
     if len(bands) > len(carriageways):
         notes.append(f"{len(bands) - len(carriageways)} other strips of pavement were left out")
-    return RoadLayout("dual" if pair else "single", carriageways, pavement, tuple(notes))
+    parted = _parted(pavement, pair, medians)
+    return RoadLayout("dual" if pair else "single", carriageways, pavement, tuple(notes), parted)
+
+
+def _unpainted_band(profiles: Profiles, lines: list[Line]) -> DarkBand | None:
+    """Return the dark band of a road without paint; None where paint is seen, or no band."""
+    band = find_band(profiles)
+    if band.seen < _SEEN:
+        return None
+    for line in lines:
+        on_band = (line.offsets > band.right - _ON_BAND) & (line.offsets < band.left + _ON_BAND)
+        is_on_band = float(on_band.mean()) > 0.5 * line.length / profiles.covered_length
+        # Grass passes for dashes as long as their gaps, paint of that kind lies on the band.
+        is_dashed_paint = (line.dash, line.gap) in STANDARD_DASHES and (is_on_band or line.gap > 1.5 * line.dash)
+        least = (_SEEN_RURAL if is_on_band else _SEEN) * profiles.covered_length
+        if line.length >= least and (is_dashed_paint or (not is_dashed(line) and _is_strip(profiles, line))):
+            return None
+    return band
+
+
+def _is_strip(profiles: Profiles, line: Line) -> bool:
+    """Return whether a line is brighter than the ground on either side, as paint is; kerbs part two grounds."""
+    places = [(line.offsets + start, line.offsets + end) for start, end in _ON_AND_BESIDE]
+    on_line, right, left = (median_level(profiles, profiles.brightness, *place) for place in places)
+    is_seen = np.isfinite(on_line) & np.isfinite(right) & np.isfinite(left)
+    return bool(is_seen.any()) and float((on_line > np.maximum(right, left))[is_seen].mean()) >= _BRIGHTER
+
+
+def _one_carriageway(asked: bool) -> InputError:
+    """Return the error that two carriageways can't be made out, in terms of what the user gave."""
+    if asked:
+        return InputError("--road", "dual", "only one carriageway can be made out in the cloud")
+    problem = "two carriageways can be made out along the road at first, but only one along the axis that was found; "
+    return InputError("road", None, problem + "--road single or --road dual says how many it has")
+
+
+def _parted(pavement: Pavement, pair: tuple[Band, Band] | None, medians: list[Median]) -> Float:
+    """Return the probability (K,) that the road has two carriageways in each stretch.
+
+    Between two carriageways it is as probable as the share of the ground that is unpaved there; what the lines and the
+    ground of a median say counts where it is more.
+
+    Args:
+        pavement: cross profiles with their share of pavement.
+        pair: the two carriageways; None if only one is made out.
+        medians: strips that may part them.
+    """
+    stretches, offsets = pavement.profiles.stretches, pavement.profiles.offsets
+    probability = np.zeros(stretches)
+    if pair is None:
+        medians_between = medians
+    else:
+        right_edge, left_edge = pair[0].high, pair[1].low
+        medians_between = [m for m in medians if m.right.offset < 0.5 * (right_edge + left_edge) < m.left.offset]
+        gap = pavement.share[:, (offsets > right_edge) & (offsets < left_edge)]
+        rows = np.full((stretches * STRETCH, gap.shape[1]), np.nan)
+        rows[: len(gap)] = gap
+        bins = rows.reshape(stretches, -1)
+        seen_count = np.isfinite(bins).sum(axis=1)
+        unpaved = np.where(np.isfinite(bins), 1.0 - bins, 0.0).sum(axis=1) / np.maximum(seen_count, 1)
+        # Unseen ground says nothing.
+        if not medians_between:
+            probability = np.where(seen_count > 0, unpaved, 0.5)
+    for median in medians_between:
+        probability = np.maximum(probability, expit(median.odds))
+    return np.asarray(ndimage.median_filter(probability, _STEADY, mode="nearest"))
 
 
 def with_branch(layout: RoadLayout) -> RoadLayout:
@@ -345,11 +433,6 @@ def _level_along(brightness: Grid, reference: Bool) -> Float:
     return np.asarray(ndimage.gaussian_filter1d(mean_brightness, _LEVEL_BLUR, mode="nearest"))
 
 
-def is_dashed(line: Line) -> bool:
-    """Return whether a line has dashes as lane lines have: below 10 m (chosen: the longest standard dash has 6 m)."""
-    return not line.solid and line.dash < 10.0
-
-
 def _smoother_ground(profiles: Profiles, brightness: Float) -> Bool:
     """Return a mask (S, U) of the smoother one of dark and bright ground; of all bins with points if these are few."""
     has_points = np.isfinite(brightness)
@@ -418,14 +501,30 @@ def _edge_line(pavement: Pavement, span: tuple[float, float], sign: int) -> Line
     stations = pavement.profiles.middles
     begin = np.full(len(stations), 0.5 * (right_edge + left_edge))
     edge = pavement.edge(begin, sign, 0.5 * (left_edge - right_edge) + _BESIDE)
-    weights = np.isfinite(edge.offsets).astype(np.float64)
-    smooth_edge = smooth(edge.offsets, weights, STRETCH * SPACING, WAVELENGTH, usual_std=USUAL)
+    return _line_without_paint(stations, edge.offsets, edge.spacing, left_edge if sign > 0 else right_edge)
+
+
+def _sloping_band(profiles: Profiles, dark_band: DarkBand) -> Band:
+    """Return a dark band as a carriageway without lines, its edges wherever they lie in each stretch."""
+    edges = dark_band.right, dark_band.left
+    low, high = (float(np.nanmedian(edge)) for edge in edges)
+    right, left = (
+        _line_without_paint(profiles.middles, edge, np.zeros(len(edge)), place)
+        for edge, place in zip(edges, (low, high), strict=True)
+    )
+    return Band(low, high, [], (right, left))
+
+
+def _line_without_paint(stations: Float, measured: Float, spacing: Float, usual: float) -> Line:
+    """Return an edge measured at stations (K,) as a line without paint, smoothed; at a usual offset, m, if unseen."""
+    weights = np.isfinite(measured).astype(np.float64)
+    smooth_edge = smooth(measured, weights, STRETCH * SPACING, WAVELENGTH, usual_std=USUAL)
     return Line(
         stations=stations,
-        measured=edge.offsets,
-        offsets=smooth_edge.values if weights.any() else np.full(len(stations), left_edge if sign > 0 else right_edge),
+        measured=measured,
+        offsets=smooth_edge.values if weights.any() else np.full(len(stations), usual),
         std=smooth_edge.std,
-        spacing=edge.spacing,
+        spacing=spacing,
         cover=np.zeros(len(stations)),
         start=float(stations[0]),
         end=float(stations[-1]),

@@ -111,6 +111,11 @@ class Line:
         return self.end - self.start - self.hidden
 
 
+def is_dashed(line: Line) -> bool:
+    """Return whether a line has dashes as lane lines have: below 10 m (chosen: the longest standard dash has 6 m)."""
+    return not line.solid and line.dash < 10.0
+
+
 def find_lines(profiles: Profiles) -> list[Line]:
     """Return the line markings in profiles, from right to left."""
     lines = [_measure_line(profiles, *track) for track in _tracks(profiles)]

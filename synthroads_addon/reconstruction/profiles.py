@@ -3,6 +3,7 @@
 To make a path parallel to the road, each stretch is laid over those before it so that lines and edges coincide.
 """
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,6 +56,12 @@ _DENSE = 1.5
 """Bins between points that are no gap. Chosen: a point's place within its bin is worth one bin."""
 _COARSE = 5
 """Bins along and across of which a median is the ground's height. Chosen: 5 m by 0.5 m hold points of any scanner."""
+
+_ROWS = 10
+"""Distance along the road to either side of a stretch's middle that its median profile is taken from, m. Chosen: cars
+and stains are shorter."""
+_FEWEST_ROWS = 3
+"""Rows with points of a median. Chosen: of fewer it is a single car's or stain's."""
 
 
 @dataclass(frozen=True)
@@ -385,3 +392,20 @@ def _fit_to(block: Float, template: Float, expected_shift: float, reach: float) 
     if size <= 0.0 or scores[best_shift, shear] < 0.3 * size:
         return None
     return _Fit(float(shifts[best_shift] * ACROSS), float(_SHEARS[shear]), float(scores[best_shift, shear] / size))
+
+
+def median_profile(values: Grid | Float, stretch: int) -> Float:
+    """Return the median profile (U,) of the rows about a stretch's middle; NaN where too few have points."""
+    middle = stretch * STRETCH + STRETCH // 2
+    rows = values[max(0, middle - _ROWS) : middle + _ROWS + 1].astype(np.float64)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # bins without points
+        median = np.nanmedian(rows, axis=0)
+    return np.where(np.isfinite(rows).sum(axis=0) >= _FEWEST_ROWS, median, np.nan)
+
+
+def remove_grade(height: Grid) -> Float:
+    """Return heights (S, U) less their row's median, which removes the road's grade."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # rows without points
+        return np.asarray(height - np.nanmedian(height, axis=1)[:, None], dtype=np.float64)

@@ -78,10 +78,12 @@ def test_a_grid_that_shows_no_road_has_no_say(tmp_path: Path, monkeypatch: pytes
     cloud = read_road_cloud(throw(tmp_path / "rural.laz", rural, 1, 3.0))
     whole, find_layout = line_found(cloud), axis_module.find_layout
 
-    def find_no_other(profiles: Profiles, lines: list[Line], wanted: RoadKind | None = None) -> RoadLayout:
+    def find_no_other(
+        profiles: Profiles, lines: list[Line], wanted: RoadKind | None = None, asked: bool = True
+    ) -> RoadLayout:
         if wanted is not None:  # the kind that the first grid showed
             raise InputError("road", None, "no carriageway can be made out in the cloud")
-        return find_layout(profiles, lines, wanted)
+        return find_layout(profiles, lines, wanted, asked)
 
     monkeypatch.setattr(axis_module, "find_layout", find_no_other)
     assert 0.0 < np.abs(line_found(cloud) - whole).max() < 0.03

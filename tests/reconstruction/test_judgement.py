@@ -232,7 +232,7 @@ def test_a_street_with_a_bright_gutter_has_its_axis_in_its_middle_and_is_marked(
 ) -> None:
     cloud = thrown(tmp_path / "village.laz", village, low=-12.0, high=12.0)
     assert main(["reconstruct", str(cloud), "--output", str(tmp_path / "out"), "--no-picture"]) == 3
-    assert "views of it disagree by more than 1 m" in capsys.readouterr().out
+    assert "the lines lie more than 0.5 m beside it" in capsys.readouterr().out
     report = json.loads((tmp_path / "out/reconstruction.json").read_text())
     assert report["judgement"]["trusted"] == 0.0
     line = json.loads((tmp_path / "out/centerline.geojson").read_text())["features"][0]

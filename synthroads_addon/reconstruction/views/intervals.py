@@ -16,7 +16,7 @@ SLIPS = 0.1
 """Probability that a view has slipped, as measured on generated roads whose sides were cut at random."""
 _EVIDENCE = {"lines": "paint", "marking period": "paint", "brightness": "ground", "skeleton": "ground"}
 """Kind of evidence by view: views of one kind slip together."""
-_EVIDENCE |= {"cross-profile": "ground", "edges": "ground"}
+_EVIDENCE |= {"cross-profile": "ground", "edges": "ground", "dark band": "ground"}
 _REACH, _STEP = 8.0, 0.05
 """Distance to either side in which the axis may lie, and from one place to the next, m. Chosen: two lanes; a third of
 `fusion.DEFINITION`."""

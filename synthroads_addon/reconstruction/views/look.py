@@ -5,10 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...base.arrays import Float
-from ..layout import FoundAxis, RoadLayout, axis_from_lines
+from ..ground.band import find_band
+from ..layout import FoundAxis, RoadLayout, axis_from_lines, axis_guides
 from ..smoothing import fill_gaps
+from .dark_band import view_band
 from .extent import view_extent
-from .fusion import FusedAxis, fuse
+from .fusion import APART, FusedAxis, fuse
 from .markings import view_lines
 from .pavement import view_brightness
 from .period import view_period
@@ -29,19 +31,39 @@ def find_fused_axis(layout: RoadLayout, extra_views: Sequence[View] = ()) -> Fus
 
 
 def rule_views(layout: RoadLayout, lines: FoundAxis) -> list[View]:
-    """Return the rule-based views: lines, marking period, brightness, dark skeleton, cross-profile, extent."""
+    """Return the rule-based views: of lines, marking period, ground, dark band, extent."""
     profiles, dual = layout.profiles, layout.kind == "dual"
     cores = [0.5 * (band.low + band.high) for band in layout.bands]
     axis_offset = float(np.median(lines.offsets))
     unevenness = _unevenness(layout)
-    return [
-        view_lines(layout, lines),
-        view_period(profiles, dual, axis_offset),
+    ground_views = [
         view_brightness(profiles, cores, dual),
         view_skeleton(profiles, cores).less_sure(0.5 * unevenness),
         view_symmetry(profiles).less_sure(unevenness),
+    ]
+    band_views: list[View] = []
+    if not dual:  # two carriageways have two bands, and shoulders that differ from lanes
+        band = view_band(find_band(profiles))
+        band_views = [band]
+        if not any(line.width > 0.0 for line in axis_guides(layout)):
+            ground_views = [view.less_sure(_beside_band(view, band)) for view in ground_views]
+    return [
+        view_lines(layout, lines),
+        view_period(profiles, dual, axis_offset),
+        *ground_views,
+        *band_views,
         view_extent(profiles),
     ]
+
+
+def _beside_band(view: View, band: View) -> Float:
+    """Return the distance (K,), m, of a view of all that looks like pavement from the dark band's middle.
+
+    Footways beside a street may look like it; where they differ in width the middle of all isn't the street's. 0 where
+    not both are seen, or where they lie so far apart that one of them has slipped.
+    """
+    distance = np.abs(view.offsets - band.offsets)
+    return np.where(np.isfinite(distance) & (distance <= APART), distance, 0.0)
 
 
 def _unevenness(layout: RoadLayout) -> Float:

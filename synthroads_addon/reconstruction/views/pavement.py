@@ -4,20 +4,16 @@ It is what is about as bright as the ground on the supposed lanes, and ends wher
 crack or the ground steps up or down.
 """
 
-import warnings
 from collections.abc import Sequence
 
 import numpy as np
 from scipy import ndimage
 
 from ...base.arrays import Bool, Float, otsu_threshold
-from ..profiles import ACROSS, STRETCH, Grid, Profiles
+from ..profiles import ACROSS, Profiles, median_profile, remove_grade
 from ..smoothing import fill_gaps, robust_scale
 from .view import View
 
-_ROWS = 10
-"""Distance along the road to either side of a stretch's middle that its median profile is taken from, m. Chosen: cars
-and stains are shorter."""
 _CORE = 1.5
 """Distance to either side of a carriageway's middle that is pavement if anything is, m. Chosen: a lane."""
 _PAINT = 11
@@ -30,8 +26,6 @@ _CRACK = 9
 _PATCH = 5
 """Stretches in which what differs from the ground before and behind it is a patch, a stain, an entrance. Chosen: 25
 m."""
-_FEWEST_ROWS = 3
-"""Rows with points of a median. Chosen: of fewer it is a single car's or stain's."""
 _BEYOND = 6
 """Bins beyond an edge, half of which must be known. Chosen: else the cloud ends there, not the pavement."""
 _LIKE = 4.0
@@ -80,23 +74,6 @@ def pavement_edges(profiles: Profiles, cores: Sequence[float], dual: bool, offse
             for row, row_has_points in zip(band_mask, has_points, strict=True)
         ]
     ).T
-
-
-def median_profile(values: Grid | Float, stretch: int) -> Float:
-    """Return the median profile (U,) of the rows about a stretch's middle; NaN where too few have points."""
-    middle = stretch * STRETCH + STRETCH // 2
-    rows = values[max(0, middle - _ROWS) : middle + _ROWS + 1].astype(np.float64)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # bins without points
-        median = np.nanmedian(rows, axis=0)
-    return np.where(np.isfinite(rows).sum(axis=0) >= _FEWEST_ROWS, median, np.nan)
-
-
-def remove_grade(height: Grid) -> Float:
-    """Return heights (S, U) less their row's median, which removes the road's grade."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # rows without points
-        return np.asarray(height - np.nanmedian(height, axis=1)[:, None], dtype=np.float64)
 
 
 def _is_kerb(height: Float) -> Bool:

@@ -9,9 +9,8 @@ from scipy import ndimage
 from scipy.signal import fftconvolve
 
 from ...base.arrays import Float
-from ..profiles import ACROSS, Profiles
+from ..profiles import ACROSS, Profiles, median_profile, remove_grade
 from ..smoothing import fill_gaps, robust_scale
-from .pavement import median_profile, remove_grade
 from .view import View
 
 _REACH = 8.0

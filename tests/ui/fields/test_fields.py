@@ -16,7 +16,7 @@ from pydantic import BaseModel, Field
 
 import synthroads_addon
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.schema import ClosedModel, quantity
+from synthroads_addon.base.schema import LARGEST, ClosedModel, quantity
 from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
 from synthroads_addon.road.things.limits import Interval, interval
 from synthroads_addon.scanning.devices.device import device_names, load_device
@@ -260,7 +260,11 @@ def test_numbers_are_the_schemas(panel: Any, path: str) -> None:
     high = schema.get("maximum", schema.get("exclusiveMaximum"))
     assert shown.hard_min == (np.float32(low) if shown.type == "FLOAT" else low)
     assert shown.hard_max == np.float32(high) or (shown.type == "INT" and shown.hard_max == min(high, 2**31 - 1))
-    assert shown.description == schema["description"].removesuffix(".")
+    description, _, hint = shown.description.partition(". Allowed: ")
+    assert description.partition(", e.g. ")[0] == schema["description"].removesuffix(".")
+    for limit in (low, high):
+        if limit is not None and abs(limit) < LARGEST:
+            assert f"{limit:g}" in hint
     large = field.optional and high > 2**31 - 1
     assert shown.type == ("INT" if "integer" in json.dumps(schema) and not large else "FLOAT")
     assert shown.unit == BLENDERS.get(schema["unit"], "NONE")

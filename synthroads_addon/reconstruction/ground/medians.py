@@ -1,0 +1,215 @@
+"""Medians between carriageways, each stretch by its own evidence: the lines around, and how the ground differs.
+
+A median has a solid line on either side and lanes beyond both. The ground between the lines may be brighter or darker
+than these lanes, higher or rougher, each by little: what counts is how it compares with the difference from lane to
+lane. A narrow median that is paved like the lanes is told by the lines alone, and less surely.
+"""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy import ndimage
+
+from ...base.arrays import Bool, Float
+from ..lines import Line, is_dashed
+from ..profiles import ACROSS, STRETCH, Grid, Profiles
+from ..smoothing import fill_gaps, robust_scale
+
+_NARROWEST, _WIDEST = 1.2, 30.0
+"""Distances of the lines beside a median, m. Chosen: a double line is laid in 1 m at most; carriageways that are
+farther apart are two roads."""
+_LANE = (2.3, 5.2)
+"""Widths of lanes, m. Chosen: as in `layout`."""
+_LIKE_A_LANE = (2.6, 4.1)
+"""Distances of two solid lines, m, that a lane between them has as well. Chosen: a standard lane with its tolerance."""
+_BESIDE_PAINT = 0.3
+"""Distance from a line's middle from which on its paint doesn't reach, m. Chosen: a wide line and a bin."""
+_EDGE_STRIP = 0.5
+"""Width of the pavement between a median and the line beside it, m: edge strip by RAA 2008."""
+_STRIP = 1.3
+"""Width of the ground beside lines that a median is compared with, m. Chosen: less than half of a lane."""
+_SEEN = 0.3
+"""Share of the road on which a line must be seen to frame a median. Chosen: as `layout` takes lines of rural roads."""
+_NEAR = 4
+"""Stretches to either side whose evidence counts. Chosen: 20 m; no median ends sooner."""
+_FEWEST = 4
+"""Bins of a stretch that its ground's level is told from. Chosen: less than a tenth of a strip's."""
+_BRIGHTNESS = (0.04, 0.6)
+"""Deviation of the logarithm of brightness from lane to lane at least, and of another ground's. Chosen: wear; 2.5
+dB."""
+_HEIGHT = (0.01, 0.1)
+"""The same of heights, m. Chosen: rutting; a kerb."""
+_ROUGHNESS = (0.2, 0.8)
+"""The same of the logarithm of roughness. Chosen: of some fifty heights; grass has twice to three times asphalt's."""
+_AGAINST, _FOR = -0.7, 5.0
+"""Limits of one kind of evidence, log-odds. Chosen: ground may be paved alike, so that likeness says little."""
+_PRIOR = -1.0
+"""Log-odds of a median between two solid lines with lanes beyond both. Chosen: other roads have such lines as well."""
+_FRAMED, _NO_LANE = 4.0, 1.0
+"""Log-odds that dashed lines beyond both sides add, and a distance that no lane has. Chosen: a lane between two solid
+lines amid lanes is seldom; of another width more so."""
+
+
+@dataclass(frozen=True)
+class Median:
+    """A strip between two solid lines that may be a median.
+
+    Attributes:
+        right, left: the lines beside it.
+        low, high: (K,) offsets, m, of its edges in each stretch.
+        odds: (K,) logarithm of the odds that it parts two carriageways there.
+    """
+
+    right: Line
+    left: Line
+    low: Float
+    high: Float
+    odds: Float
+
+    @property
+    def total(self) -> float:
+        """Return the mean log-odds over the road."""
+        return float(np.mean(self.odds))
+
+
+def find_medians(profiles: Profiles, lines: Sequence[Line]) -> list[Median]:
+    """Return the strips that are medians rather than lanes on most of the road, from right to left.
+
+    Of strips that overlap the likelier one is returned.
+    """
+    usual_lines = [line for line in lines if line.length >= _SEEN * profiles.covered_length]
+    strips = []
+    for right, left in combinations([line for line in usual_lines if not is_dashed(line)], 2):
+        gap = left.offset - right.offset
+        between = [line for line in usual_lines if right.offset < line.offset < left.offset]
+        if not _NARROWEST <= gap <= _WIDEST or any(is_dashed(line) for line in between):
+            continue
+        strips.append(_median_between(profiles, right, left, usual_lines))
+    chosen: list[Median] = []
+    for strip in sorted((strip for strip in strips if strip.total > 0.0), key=lambda strip: -strip.total):
+        if all(strip.left.offset <= one.right.offset or strip.right.offset >= one.left.offset for one in chosen):
+            chosen.append(strip)
+    return sorted(chosen, key=lambda strip: strip.right.offset)
+
+
+def cut_medians(share: Grid, profiles: Profiles, medians: Sequence[Median]) -> Grid:
+    """Return shares of pavement (S, U) that are 0 in the medians, in the stretches in which they are likely.
+
+    Medians that the shares show by themselves stay as they are: their edges are seen.
+    """
+    result = share.copy()
+    for median in medians:
+        between = (profiles.offsets > np.median(median.low)) & (profiles.offsets < np.median(median.high))
+        shown = share[:, between]
+        if np.isfinite(shown).any() and float(np.nanmean(shown)) < 0.5:
+            continue
+        for number in np.flatnonzero(median.odds > 0.0):
+            rows = slice(number * STRETCH, (number + 1) * STRETCH)
+            inside = (profiles.offsets > median.low[number]) & (profiles.offsets < median.high[number])
+            block = result[rows]
+            block[:, inside] = np.where(np.isfinite(block[:, inside]), 0.0, block[:, inside])
+    return result
+
+
+def _median_between(profiles: Profiles, right: Line, left: Line, lines: Sequence[Line]) -> Median:
+    """Return the strip between two lines with its odds."""
+    right_offsets, left_offsets = (_course(line) for line in (right, left))
+    sides = ((right, -1), (left, 1))
+    lane_lines = [
+        [other for other in lines if _LANE[0] <= sign * (other.offset - line.offset) <= _LANE[1]]
+        for line, sign in sides
+    ]
+    has_lanes = [
+        bool(found) or _is_cut_off(profiles, line, sign) for found, (line, sign) in zip(lane_lines, sides, strict=True)
+    ]
+    odds = _ground_odds(profiles, right_offsets, left_offsets)
+    gap = left.offset - right.offset
+    # Kerbs and edges pass for solid lines: where the cloud hides one lane's other line the other lane must be sure.
+    is_sure = all(lane_lines) or any(is_dashed(other) for found in lane_lines for other in found)
+    prior = _PRIOR if all(has_lanes) and is_sure else -np.inf
+    if all(any(is_dashed(other) for other in found) for found in lane_lines):
+        prior += _FRAMED + (0.0 if _LIKE_A_LANE[0] <= gap <= _LIKE_A_LANE[1] else _NO_LANE)
+    strip = min(_EDGE_STRIP, 0.25 * gap)
+    return Median(right, left, right_offsets + strip, left_offsets - strip, prior + odds)
+
+
+def _is_cut_off(profiles: Profiles, line: Line, sign: int) -> bool:
+    """Return whether the cloud ends within a lane beyond a line, so that the lane's other line can't be seen."""
+    distance = sign * (profiles.offsets - line.offset)
+    beyond = (distance > 0.0) & (distance < _LANE[0])
+    return not beyond.any() or float((profiles.count[:, beyond] > 0).mean()) < 0.5
+
+
+def _course(line: Line) -> Float:
+    """Return a line's offsets (K,), m, also where it isn't seen."""
+    return fill_gaps(line.offsets)
+
+
+def _ground_odds(profiles: Profiles, right: Float, left: Float) -> Float:
+    """Return the log-odds (K,) by brightness, height and roughness that the ground between two lines is no lane."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # rows without points
+        height = np.asarray(profiles.height - np.nanmedian(profiles.height, axis=1)[:, None], dtype=np.float64)
+    step = np.abs(np.diff(height, axis=1, append=np.nan))
+    floor = 1e-3 * float(np.nanmax(profiles.brightness)) + 1e-12 if np.isfinite(profiles.brightness).any() else 1.0
+    middle, half = 0.5 * (right + left), 0.5 * (left - right)
+    # The ground within the edge strips is pavement; of a narrow strip at least three bins count.
+    core = np.maximum(half - _BESIDE_PAINT - _EDGE_STRIP, 0.15)
+    places = {
+        "inside": (middle - core, middle + core),
+        "right": (right - _BESIDE_PAINT - _STRIP, right - _BESIDE_PAINT),
+        "left": (left + _BESIDE_PAINT, left + _BESIDE_PAINT + _STRIP),
+    }
+    level, rise, rough = (
+        {name: median_level(profiles, values, *place) for name, place in places.items()}
+        for values in (profiles.brightness.astype(np.float64), height, step)
+    )
+    logarithm, rough_logarithm = (
+        {name: np.log(np.maximum(values, least)) for name, values in table.items()}
+        for table, least in ((level, floor), (rough, 1e-3))
+    )
+    return np.asarray(
+        _odds_of(logarithm, *_BRIGHTNESS) + _odds_of(rise, *_HEIGHT) + _odds_of(rough_logarithm, *_ROUGHNESS)
+    )
+
+
+def _odds_of(levels: dict[str, Float], same_std: float, other_std: float) -> Float:
+    """Return the log-odds (K,) that a strip is other ground than both sides, by one quantity's levels.
+
+    Both sides are lanes: how they differ along the road says by how much pavement does.
+    """
+    difference = levels["inside"] - 0.5 * (levels["right"] + levels["left"])
+    one_sided = np.where(np.isfinite(levels["right"]), levels["right"], levels["left"])
+    difference = np.where(np.isfinite(difference), difference, levels["inside"] - one_sided)
+    between_lanes = levels["right"] - levels["left"]
+    lanes = between_lanes[np.isfinite(between_lanes)]
+    # Of a mean of two lanes and a strip the deviation is sqrt(3 / 2) of one's, that between two lanes sqrt(2).
+    scatter = (
+        np.sqrt(0.75) * max(robust_scale(lanes - np.median(lanes)), abs(float(np.median(lanes)))) if len(lanes) else 0.0
+    )
+    same_std = float(np.hypot(same_std, scatter))
+    other_std = max(other_std, 2.0 * same_std)
+    seen = np.isfinite(difference)
+    total = ndimage.uniform_filter1d(np.where(seen, difference, 0.0), 2 * _NEAR + 1, mode="nearest")
+    share = ndimage.uniform_filter1d(seen.astype(np.float64), 2 * _NEAR + 1, mode="nearest")
+    mean = np.where(share > 0.0, total / np.maximum(share, 1e-9), 0.0)
+    # ln of N(d; 0, other) / N(d; 0, same).
+    odds = np.log(same_std / other_std) + 0.5 * mean**2 * (same_std**-2 - other_std**-2)
+    return np.where(share > 0.2, np.clip(odds, _AGAINST, _FOR), 0.0)
+
+
+def median_level(profiles: Profiles, values: Grid | Float, low: Float, high: Float) -> Float:
+    """Return the median (K,) of values (S, U) between offsets (K,), m, in each stretch; NaN where hardly seen."""
+    result = np.full(profiles.stretches, np.nan)
+    for number in np.flatnonzero(np.isfinite(low) & np.isfinite(high)):
+        first, last = profiles.column(float(low[number])), profiles.column(float(high[number]))
+        if last - first + 1 < 2 or abs(profiles.offsets[last] - high[number]) > 2.0 * ACROSS:
+            continue
+        bins = values[number * STRETCH : (number + 1) * STRETCH, first : last + 1]
+        known: Bool = np.isfinite(bins)
+        if known.sum() >= _FEWEST:
+            result[number] = float(np.median(bins[known]))
+    return result

@@ -1,0 +1,159 @@
+"""Roads that brightness alone doesn't tell: grey medians, collectors, streets without paint, cut strips."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from synthroads_addon.base.arrays import Float
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.reconstruction.axis import FoundRoad
+from synthroads_addon.reconstruction.centreline import Centreline, centreline_report, find_centreline
+from synthroads_addon.reconstruction.cloud import RoadCloud, read_road_cloud
+from synthroads_addon.reconstruction.ground.band import find_band
+from synthroads_addon.reconstruction.ground.medians import find_medians
+from synthroads_addon.reconstruction.layout import find_layout
+from synthroads_addon.reconstruction.lines import find_lines
+from synthroads_addon.reconstruction.path import CloudPath
+from synthroads_addon.reconstruction.profiles import Profiles, make_profiles
+from synthroads_addon.reconstruction.reconstruct import reconstruct
+from tests.helpers.clouds.foreign_clouds import EAST, NORTH, axis_north
+from tests.helpers.clouds.hard_roads import HardRoad, motorway, rural, street
+
+WINDOW = 50.0
+"""Length, m, over which the axis is compared with its views."""
+
+
+def found_on(road: HardRoad, folder: Path) -> tuple[Centreline, RoadCloud]:
+    """Return the centreline found in a road's cloud, and the cloud."""
+    cloud = read_road_cloud(road.write(folder))
+    return find_centreline(cloud), cloud
+
+
+def errors(found: Centreline, cloud: RoadCloud, road: HardRoad) -> tuple[Float, Float]:
+    """Return stations (M,) and how far north of the road's axis a centreline's vertices lie, m, less both ends."""
+    points = found.path.points + cloud.origin[:2]
+    station = points[:, 0] - EAST
+    keep = (station > 5.0) & (station < road.length - 5.0)
+    return station[keep], (points[:, 1] - NORTH - axis_north(station, road.slant, road.length))[keep]
+
+
+def profiles_of(road: HardRoad, folder: Path) -> Profiles:
+    """Return profiles along a road's true axis."""
+    cloud = read_road_cloud(road.write(folder))
+    station = np.arange(0.0, road.length, 1.0)
+    points = np.column_stack([EAST + station, NORTH + axis_north(station, road.slant, road.length)]) - cloud.origin[:2]
+    heading = np.arctan2(*np.gradient(points, axis=0).T[::-1])
+    return make_profiles(cloud, CloudPath(points, heading), road.reach, keep_points=True)
+
+
+@pytest.mark.parametrize(
+    "road",
+    [
+        motorway(11, decibel=2.5),
+        motorway(12, decibel=0.8).cut_by(0.4),
+        pytest.param(motorway(13, decibel=3.0, exit_from=60.0), marks=pytest.mark.slow),
+        pytest.param(motorway(14, third=True).cut_by(0.3), marks=pytest.mark.slow),
+    ],
+    ids=lambda road: f"{road.name} {road.seed}",
+)
+def test_a_narrow_grey_median_parts_two_carriageways(tmp_path: Path, road: HardRoad) -> None:
+    found, cloud = found_on(road, tmp_path)
+    assert found.kind == "dual"
+    assert np.abs(errors(found, cloud, road)[1]).max() < 0.3
+    assert found.judgement.trusted > 0.85
+    (stretch,) = centreline_report(found, cloud)["carriageways"]
+    assert stretch["number"] == 2
+    assert stretch["probability"] > 0.5
+
+
+@pytest.mark.parametrize("decibel", [0.5, 2.5, 3.7])
+def test_a_median_is_likely_all_along_by_lines_and_ground(tmp_path: Path, decibel: float) -> None:
+    road = motorway(15, decibel=decibel)
+    profiles = profiles_of(road, tmp_path)
+    (median,) = find_medians(profiles, find_lines(profiles))
+    assert 0.5 * (median.low + median.high) == pytest.approx(0.0, abs=0.1)
+    assert (median.left.offset - median.right.offset) == pytest.approx(road.marks["median"] + 1.0, abs=0.1)
+    assert median.odds.min() > 0.0
+    layout = find_layout(profiles, find_lines(profiles))
+    assert layout.parted is not None
+    assert layout.parted.min() > 0.5
+
+
+def test_a_single_carriageway_has_no_median(tmp_path: Path) -> None:
+    for road in (rural(11), street(11)):
+        profiles = profiles_of(road, tmp_path)
+        lines = find_lines(profiles)
+        layout = find_layout(profiles, lines)
+        assert layout.kind == "single"
+        assert layout.parted is not None
+        assert layout.parted.max() < 0.5
+
+
+@pytest.mark.parametrize("road", [street(12), street(13).cut_by(0.4)], ids=["whole", "cut"])
+def test_a_street_without_paint_is_its_dark_band(tmp_path: Path, road: HardRoad) -> None:
+    band = find_band(profiles_of(road, tmp_path))
+    assert band.seen > 0.9
+    for edge, place in ((band.right, -road.marks["half"]), (band.left, road.marks["half"])):
+        assert edge[np.isfinite(edge)] == pytest.approx(place, abs=0.25)
+    found, cloud = found_on(road, tmp_path)
+    assert found.kind == "single"
+    assert np.abs(errors(found, cloud, road)[1]).max() < 0.3
+    assert found.judgement.trusted > 0.85
+
+
+@pytest.mark.parametrize("seed", [1, 11, pytest.param(12, marks=pytest.mark.slow)])
+def test_lines_that_agree_are_trusted_where_the_pavement_is_cut_off(tmp_path: Path, seed: int) -> None:
+    road = rural(seed).cut_by(0.75)
+    found, cloud = found_on(road, tmp_path)
+    assert np.abs(errors(found, cloud, road)[1]).max() < 0.3
+    assert found.judgement.trusted > 0.85
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "road",
+    [
+        motorway(21).cut_by(0.5),
+        motorway(22, exit_from=60.0),
+        street(21),
+        street(22).cut_by(0.5),
+        rural(21).cut_by(0.75),
+    ],
+    ids=lambda road: f"{road.name} {road.seed}",
+)
+def test_the_axis_is_hardly_worse_than_its_best_view(tmp_path: Path, road: HardRoad) -> None:
+    found, cloud = found_on(road, tmp_path)
+    station, error = errors(found, cloud, road)
+    offset = found.axis.stations - found.axis.stations[0] + station[0]  # to some metres: errors change slowly
+    for start in np.arange(5.0, road.length - WINDOW, WINDOW):
+        own = np.abs(error[(station >= start) & (station < start + WINDOW)]).mean()
+        inside = (offset >= start) & (offset < start + WINDOW)
+        views = []
+        for view in found.axis.views:
+            difference = (view.offsets - found.axis.offsets)[inside]
+            if np.isfinite(difference).mean() > 0.8:
+                of_view = np.interp(offset[inside], station, error) + difference
+                views.append(float(np.nanmean(np.abs(of_view))))
+        # 5 cm, half a bin, are no loss: which of several views within a bin is nearest is chance.
+        assert own <= 1.1 * min(views) + 0.05
+
+
+def test_an_error_names_only_what_was_given(tmp_path: Path) -> None:
+    profiles = profiles_of(rural(11), tmp_path)
+    lines = find_lines(profiles)
+    with pytest.raises(InputError, match="--road is 'dual'"):
+        find_layout(profiles, lines, "dual")
+    with pytest.raises(InputError, match=r"^road: two carriageways .* --road single or --road dual"):
+        find_layout(profiles, lines, "dual", asked=False)
+
+
+@pytest.mark.slow
+def test_a_motorway_with_an_exit_and_a_grey_median_is_reconstructed(tmp_path: Path) -> None:
+    cloud = read_road_cloud(motorway(16, decibel=3.0, exit_from=60.0).write(tmp_path))
+    reconstruction = reconstruct(cloud)
+    road: FoundRoad = reconstruction.carriageways.course.road
+    assert road.asked is None
+    assert road.layout.kind == "dual"
