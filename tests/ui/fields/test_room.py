@@ -117,7 +117,10 @@ def test_names_without_room_stand_above_their_menus(monkeypatch: pytest.MonkeyPa
         widen(monkeypatch, width)
         layouts = [drawn(panel, bpy.context) for panel in panels.CLASSES]
         found[width] = " ".join(text for layout in layouts for text, _, _ in layout.texts(room.row_width()))
-    title = presets.scenario_title(bpy.context.scene.synthroads.preset)
+    settings = bpy.context.scene.synthroads
+    road = panels.open_parameters(bpy.context.scene)
+    length = settings.road.length if road is None else road.alignment.length
+    title = panels.with_length(presets.scenario_title(settings.preset), length)
     assert f"{title} Scenario" in found[200.0]
     assert "SynthRoads Road" in found[200.0]
     assert title in found[600.0]
