@@ -52,6 +52,8 @@ def test_every_operator_answers_in_a_sentence(resources: Path, tmp_path: Path) -
     assert [row for row in answers["operators"] if row["outcome"] == "traceback"] == []
     assert (answers["left_after_disabling"], answers["registered_again"]) == ([], True)
     finished = {row["operator"] for row in answers["operators"] if row["outcome"] == "finished"}
-    wanted = ("build", "random_road", "scan", "check_rules", "compare_intensities", "show_cloud", "add_views")
+    wanted = ["build", "random_road", "check_rules", "compare_intensities", "show_cloud", "add_views"]
+    if places()["every_door"]:  # after a scan another one is refused, as its cloud is there: the one that is shown
+        wanted.append("scan")
     assert {f"synthroads.{name}" for name in wanted} <= finished
     assert answer.returncode == 0, said
