@@ -298,7 +298,7 @@ def test_wrong_configurations_are_refused(data: Path, message: str, changes: dic
 
 
 def test_missing_splits_are_refused(data: Path):
-    with pytest.raises(InputError, match="there is test, train, validation"):
+    with pytest.raises(InputError, match="the data set has test, train, validation"):
         read_roads(configuration(data).data.model_copy(update={"train_split": "none"}), "road")
 
 
