@@ -130,18 +130,18 @@ class NodeLayers:
             }
         return result
 
-    def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
+    def sample(self, points: SeenPoints, names: frozenset[str]) -> LayerValues:
         """Return the requested layers of N points, and by what each point got them (`source`)."""
         has_obstacle = self._has_obstacle[points.material]
         if not has_obstacle.any():
-            return self._work_out(points, wanted)
+            return self._work_out(points, names)
         with self._counting:
             self._left_out += np.bincount(points.material[has_obstacle], minlength=len(self._left_out))
         calculable_rows, obstacle_rows = np.flatnonzero(~has_obstacle), np.flatnonzero(has_obstacle)
         obstacle_source = self._rest or self.material
         parts = [
-            (calculable_rows, self._work_out(points.select(calculable_rows), wanted)),
-            (obstacle_rows, obstacle_source.sample(points.select(obstacle_rows), wanted)),
+            (calculable_rows, self._work_out(points.select(calculable_rows), names)),
+            (obstacle_rows, obstacle_source.sample(points.select(obstacle_rows), names)),
         ]
         arrays = {}
         for name, array in parts[0][1].arrays.items():

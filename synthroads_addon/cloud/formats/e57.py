@@ -319,7 +319,7 @@ class E57Reader(CloudReader):
         if self.header.labelled:
             return unscaled
         limits = [self._limits(scan, "intensity", fields) for scan, fields in self._scanned()]
-        known = [found is not None for found, fields in zip(limits, self._fields, strict=True) if "intensity" in fields]
+        known = [limit is not None for limit, fields in zip(limits, self._fields, strict=True) if "intensity" in fields]
         if any(known) and not all(known):
             text = "only some of its scans name the limits of intensities: intensities are read unscaled"
             assume(f"{self.header.path.name}: {text}")

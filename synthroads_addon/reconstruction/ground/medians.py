@@ -123,14 +123,15 @@ def _median_between(profiles: Profiles, right: Line, left: Line, lines: Sequence
         for line, sign in sides
     ]
     has_lanes = [
-        bool(found) or _is_cut_off(profiles, line, sign) for found, (line, sign) in zip(lane_lines, sides, strict=True)
+        bool(others) or _is_cut_off(profiles, line, sign)
+        for others, (line, sign) in zip(lane_lines, sides, strict=True)
     ]
     odds = _ground_odds(profiles, right_offsets, left_offsets)
     gap = left.offset - right.offset
     # Kerbs and edges pass for solid lines: where the cloud hides one lane's other line the other lane must be sure.
-    is_sure = all(lane_lines) or any(is_dashed(other) for found in lane_lines for other in found)
+    is_sure = all(lane_lines) or any(is_dashed(other) for others in lane_lines for other in others)
     prior = _PRIOR if all(has_lanes) and is_sure else -np.inf
-    if all(any(is_dashed(other) for other in found) for found in lane_lines):
+    if all(any(is_dashed(other) for other in others) for others in lane_lines):
         prior += _FRAMED + (0.0 if _LIKE_A_LANE[0] <= gap <= _LIKE_A_LANE[1] else _NO_LANE)
     strip = min(_EDGE_STRIP, 0.25 * gap)
     return Median(right, left, right_offsets + strip, left_offsets - strip, prior + odds)
