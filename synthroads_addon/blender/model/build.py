@@ -232,7 +232,7 @@ class _Build:
             )
             item[OF_ROAD], item[NAME] = self._road, item.name
             keep_built(item)
-            if isinstance(parameters.objects.get(role), LineObject):
+            if isinstance(parameters.objects.get(role), LineObject | Vehicle):
                 item[PLACED] = list(item.location)[:2]
             describe(item, role, parameters.objects)
         root[BUILT_PARTS] = json.dumps(list(builder.objects))

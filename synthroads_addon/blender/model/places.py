@@ -31,7 +31,7 @@ Float = NDArray[np.float64]
 IN_A_FRAME = (Gantry, Overpass, Building, PowerLine)
 """Things whose objects are placed and turned by their own matrices; other standing things are a vertex each."""
 PLACED = "synthroads_placed"
-"""Custom property of what runs along the road: its object's place (x, y), m, that its inputs belong to."""
+"""Custom property of what runs along the road, and of vehicles: the place (x, y), m, that its inputs belong to."""
 STILL = 2e-4
 """Length of a move, m, below which it counts as none: objects' places are 32-bit floats."""
 _TURNED = 1e-5

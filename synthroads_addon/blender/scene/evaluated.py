@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Generator, Hashable, Iterator,
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from itertools import chain, count
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import bpy
 import numpy as np
@@ -27,8 +27,9 @@ from ...scanning.scene.motion import (
     lane_motions,
 )
 from ..labels import Label, Labels, velocity_of
+from ..model.places import PLACED, STILL
 from ..model.roads import origin_of, parts_and_copies, road_of_id, world_matrix
-from ..things.model_builder import SUPPORT
+from ..things.model_builder import AHEAD, SUPPORT
 from .changes import Changes
 from .left_out import LeftOut
 from .reading import MeshCopy, MeshPart, Places, SceneTables, copy_mesh, join_parts, slot_names
@@ -41,6 +42,8 @@ Source: TypeAlias = bpy.types.Depsgraph | bpy.types.Scene | None
 
 _FARTHEST_FROM_MOTION = 100.0
 """Distance (m) of a vehicle's vertices from its place on its lane beyond which it is another road's; chosen."""
+_ROUNDINGS = 4.0 * float(np.finfo(np.float32).eps)
+"""Rounding of an object's place, as a share of its coordinates: it has 32 bits, and is multiplied once. Chosen."""
 _ATTEMPTS = 4
 """Number of attempts to read a scene that the user changes meanwhile; the last attempt is one step; chosen."""
 
@@ -206,9 +209,32 @@ def _moving(walk: _SceneWalk, carrier: Hashable, motion: BodyMotion, tables: Sce
     if len(mesh) and isinstance(motion, LaneMotion):
         farthest = float(np.abs(mesh.vertices).max())
         if farthest > _FARTHEST_FROM_MOTION:
-            text = f"must be that of the road in the scene: a vehicle is {farthest:.0f} m off its lane"
-            raise InputError("geometry", None, text)
+            raise _other_geometry(farthest)
     return MovingMesh(mesh, motion, walk.pass_numbers.get(carrier))
+
+
+def _other_geometry(distance: float) -> InputError:
+    """Return the error for a vehicle that is a distance (m) from its place on the lane of a road's geometry."""
+    return InputError(
+        "geometry", None, f"must be that of the road in the scene: a vehicle is {distance:.0f} m off its lane"
+    )
+
+
+class _LaneVehicle(NamedTuple):
+    """Vehicle of the road's model, as the scene holds it.
+
+    Attributes:
+        role: its id in the parameter set.
+        motion: its motion along its lane, without the user's moves.
+        has_origin_below: whether its object has its origin below its middle; in files of earlier versions an object
+            has that of the road.
+        is_as_built: whether its object is where it was built; never in files of earlier versions.
+    """
+
+    role: str
+    motion: LaneMotion
+    has_origin_below: bool
+    is_as_built: bool
 
 
 @dataclass(frozen=True)
@@ -218,14 +244,14 @@ class _MeshUse:
     Attributes:
         part: key of the mesh's part.
         label: index of the label.
-        lane: role and motion of a vehicle of the road's model, without the user's moves.
+        lane: vehicle of the road's model that the mesh belongs to; None for anything else.
         velocity: key of the moving object, and its velocity, m/s, of anything else that moves.
         values: reader of the object's values that its materials read; None if they read none.
     """
 
     part: tuple[Hashable, ...]
     label: int
-    lane: tuple[str, LaneMotion] | None
+    lane: _LaneVehicle | None
     velocity: tuple[Hashable, Float] | None
     values: ObjectValues | None
 
@@ -410,9 +436,13 @@ class _SceneWalk:
         if label.instance < 0:
             self._unnumbered[len(self._labels) - 1] = (owner_original.name_full, part_key)
         role = self._vehicle_roles.get(original, self._vehicle_roles.get(owner_original))
-        lane_motion = (role, self._lanes[role]) if role is not None else None
+        vehicle = None
+        if role is not None:
+            item = original if original in self._vehicle_roles else owner_original
+            is_as_built = PLACED in item and np.allclose(item.location[:2], item[PLACED], rtol=0.0, atol=STILL)
+            vehicle = _LaneVehicle(role, self._lanes[role], AHEAD in item, bool(is_as_built))
         values = object_values(original, slots, self._material_inputs)
-        return _MeshUse(part_key, len(self._labels) - 1, lane_motion, self._velocity(original, owner_original), values)
+        return _MeshUse(part_key, len(self._labels) - 1, vehicle, self._velocity(original, owner_original), values)
 
     def _velocity(self, item: bpy.types.Object, owner: bpy.types.Object) -> tuple[Hashable, Float] | None:
         """Return (key of the moving object, velocity (3,), m/s) of an original object; None if nothing moves it."""
@@ -433,15 +463,23 @@ class _SceneWalk:
                 self.motions[key] = LinearMotion(velocity, [self._unit * value for value in matrix[3:12:4]])
             return key
         assert mesh_use.lane is not None
-        role, motion = mesh_use.lane
+        role, motion, has_origin_below, is_as_built = mesh_use.lane
         key = (role, *matrix)
         if key not in self.motions:
             place = np.array(matrix).reshape(4, 4)
-            if not np.array_equal(place, self._root):  # the user has moved the vehicle
-                place = place @ np.linalg.inv(self._root)
-                middle = motion.pose(np.zeros(1))[1][0]
-                motion = motion.from_elsewhere(place[:3, :3] @ middle + place[:3, 3])
-            self.motions[key] = motion
+            built_middle = motion.pose(np.zeros(1))[1][0]
+            if has_origin_below:
+                middle = (np.linalg.inv(self._root) @ place)[:3, 3]
+                rounding = _ROUNDINGS * float(np.abs(place[:2, 3]).max())
+                distance = float(np.hypot(*(middle - built_middle)[:2]))
+                is_moved = distance > max(STILL, rounding)
+                if is_moved and is_as_built:
+                    raise _other_geometry(distance)
+            else:
+                move = place @ np.linalg.inv(self._root)
+                middle = move[:3, :3] @ built_middle + move[:3, 3]
+                is_moved = not np.array_equal(place, self._root)
+            self.motions[key] = motion.from_elsewhere(middle) if is_moved else motion
             self.pass_numbers[key] = motion.line.geometry.numbers.passes[role]
         return key
 

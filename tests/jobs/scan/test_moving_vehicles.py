@@ -210,7 +210,8 @@ class TestWhatMoves:
             end = geometry.point(160.0, 2.0)[0]
             turn = float(geometry.alignment.heading(160.0) - geometry.alignment.heading(100.0))
             about = Matrix.Translation(Vector(end)) @ Matrix.Rotation(turn, 4, "Z") @ Matrix.Translation(-Vector(start))
-            bpy.data.objects[name].matrix_world = about
+            bpy.context.view_layer.update()
+            bpy.data.objects[name].matrix_world = about @ bpy.data.objects[name].matrix_world
         bpy.context.view_layer.update()
         scene, whole = scanned_scene(geometry=geometry), scene_mesh()
         for name in objects:
@@ -235,7 +236,7 @@ class TestWhatMoves:
         copy = bpy.data.objects["a"].copy()
         bpy.context.scene.collection.objects.link(copy)
         here, ahead = RoadGeometry(parameters).alignment.position(np.array([100.0, 130.0]))
-        copy.location.xy = ahead - here
+        copy.location.xy = np.array(copy.location.xy) + ahead - here
         bpy.context.view_layer.update()
         edited = read_road(root)
         settle(root[ROAD], edited)
