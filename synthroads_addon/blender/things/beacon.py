@@ -139,7 +139,7 @@ def build_beacons(builder: ModelBuilder) -> None:
         "pass_side": np.array([_passing_side(beacon) for beacon in beacons]),
     }
     mesh = builder.points("Beacons", beacons, attributes)
-    builder.add("Beacons", mesh, beacon_group(), frame=builder.frame(beacons[0]))
+    builder.add("Beacons", mesh, beacon_group(), frame=builder.frame(*beacons))
 
 
 def _passing_side(beacon: ConstructionBeacon) -> int:

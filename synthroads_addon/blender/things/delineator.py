@@ -105,4 +105,4 @@ def build_delineators(builder: ModelBuilder) -> None:
     if not posts:
         return
     mesh = builder.points("Delineators", posts, {"height": np.array([post.height for post in posts])})
-    builder.add("Delineators", mesh, delineator_group(), frame=builder.frame(posts[0]))
+    builder.add("Delineators", mesh, delineator_group(), frame=builder.frame(*posts))

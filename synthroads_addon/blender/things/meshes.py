@@ -17,6 +17,11 @@ from ...road.things.thing import StandingThing
 Float = NDArray[np.float64]
 
 
+FRAME_SPACING = 1000.0
+"""Length, m, of the pieces of a road in which the frames of what runs along may begin. Chosen: within it, 32-bit
+coordinates are rounded to less than 0.1 mm."""
+
+
 class ObjectFrame(NamedTuple):
     """Frame of an object in the road's own: x along the road, y to the left, z up.
 
@@ -56,11 +61,17 @@ def line_frame(geometry: RoadGeometry, item: LineObject, stretch: tuple[float, f
         item: the line object.
         stretch: stations (m) of the stretch that is built.
     """
-    station = np.clip(np.array([item.start_station]), *stretch)
+    # Stretches that begin within the same piece of the road share a frame with the whole road, and so all roundings.
+    station = np.clip(np.array([item.start_station]), frame_piece_start(stretch[0]), stretch[1])
     offset = item.offset_at(station)
     plan = geometry.alignment.place(station, offset)[0]
     origin = np.array([*plan, known_elevation(geometry, station, offset)[0]])
     return ObjectFrame(origin, float(geometry.alignment.heading(station)[0]))
+
+
+def frame_piece_start(stretch_start: float) -> float:
+    """Return the station (m) at which the piece of `FRAME_SPACING` begins in which a stretch does."""
+    return FRAME_SPACING * float(np.floor(stretch_start / FRAME_SPACING))
 
 
 def points_mesh(

@@ -22,7 +22,7 @@ from ..compat import set_modifier_input
 from ..materials import RoadMaterials
 from ..nodes.builder import usual_materials
 from ..nodes.inputs import input_name
-from .meshes import ObjectFrame, foot_frame, line_frame, points_mesh, signed_instance
+from .meshes import ObjectFrame, foot_frame, frame_piece_start, line_frame, points_mesh, signed_instance
 
 ROLE = "synthroads_role"
 """Custom property of the objects that `build_road` makes: their role in the model."""
@@ -94,6 +94,7 @@ class ModelBuilder:
         self.stretch = self._requested_stretch
         self._is_whole_road = request.stretch is None
         self.parameters, self.materials = request.parameters, RoadMaterials.of(request.parameters, request.user_table)
+        self._uncut_parameters = request.parameters
         self.origin, self.zero = np.zeros(3), 0
         self.tolerance = request.tolerance
         self.detail = request.vegetation_detail
@@ -138,14 +139,25 @@ class ModelBuilder:
     ) -> bpy.types.Mesh:
         """Create a mesh with one vertex per point object, its heading, elevation, instance and given attributes.
 
-        It is in the frame of the first one, see `frame`.
+        It is in the frame that `frame` returns for them.
         """
-        return points_mesh(name, self.geometry, items, attributes or {}, self._local_frame(items[0]))
+        return points_mesh(name, self.geometry, items, attributes or {}, self._local_frame(self._first_of(items)))
 
-    def frame(self, item: PointObject | LineObject) -> ObjectFrame:
-        """Return the frame of a thing's object in the scene: at its foot or its beginning, with x along the road."""
-        frame = self._local_frame(item)
+    def frame(self, *items: PointObject | LineObject) -> ObjectFrame:
+        """Return the frame of an object in the scene: at a thing's foot or its beginning, with x along the road.
+
+        Several point objects of one type have the frame of the first of them: see `FRAME_SPACING` for a stretch.
+        """
+        frame = self._local_frame(items[0] if len(items) == 1 else self._first_of(items))
         return ObjectFrame(frame.origin - self.origin, frame.turn)
+
+    def _first_of(self, items: Sequence[Any]) -> Any:
+        """Return the first of all the road's objects of a type that lie in the frames' piece of the stretch."""
+        if self._is_whole_road or len(items) == 1:
+            return items[0]
+        every_item = self._uncut_parameters.of_type(type(items[0])).values()
+        piece_start = frame_piece_start(self.stretch[0])
+        return next((item for item in every_item if item.station >= piece_start), items[0])
 
     def _local_frame(self, item: PointObject | LineObject) -> ObjectFrame:
         """Return a thing's frame as `frame` does, but in the whole road's local coordinates."""

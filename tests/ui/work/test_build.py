@@ -293,7 +293,7 @@ def test_a_refused_setting_leaves_the_built_road(cheap: Any, monkeypatch: pytest
     bpy.ops.synthroads.build()
     before = digest()
     monkeypatch.setattr(build, "sample_road", refuse)
-    with pytest.raises(RuntimeError, match=r"Error: road\.radius is 1: is too small"):
+    with pytest.raises(RuntimeError, match=r"Error: Radius \(Alignment and Section\) is 1: is too small"):
         bpy.ops.synthroads.build()
     assert digest() == before
 
@@ -382,7 +382,7 @@ def test_one_more_road_that_cannot_be_leaves_the_seed(cheap: Any) -> None:  # no
     bpy.ops.synthroads.build()
     cheap.road.own_radius = True
     cheap.road.radius_minimum = cheap.road.radius_maximum = 10.0
-    with pytest.raises(RuntimeError, match="radius"):
+    with pytest.raises(RuntimeError, match="Radius"):
         bpy.ops.synthroads.build(beside=True)
     assert cheap.seed == SMALL["seed"]
     assert len(roads(bpy.context.scene)) == 1

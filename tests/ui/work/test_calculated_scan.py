@@ -128,7 +128,7 @@ def test_an_image_that_is_gone_ends_the_scan_if_cycles_shows_it(boards: Any, tmp
         assert job.error is None
         assert (tmp_path / "out" / "cloud.laz").exists()
         return
-    assert "image of the material" in str(job.error)
+    assert "image of its material" in str(job.error)
     assert not (tmp_path / "out").exists()
 
 
