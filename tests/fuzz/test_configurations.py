@@ -85,5 +85,5 @@ def test_a_checkpoint_of_something_else_is_refused(tmp_path: Path) -> None:
     sound = load_configuration("segmentation-small")
     Run.start(tmp_path, sound).begin()
     torch.save({"weights": torch.zeros(3)}, tmp_path / CHECKPOINT)
-    with pytest.raises(InputError, match=r"checkpoint\.pt: is no checkpoint"):
+    with pytest.raises(InputError, match=r"checkpoint\.pt: must be a checkpoint of SynthRoads"):
         Run.start(tmp_path, sound, resume=True)

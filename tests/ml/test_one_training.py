@@ -113,7 +113,7 @@ def test_what_a_pretraining_has_kept_is_not_lost_by_mistake(tmp_path: Path, caps
     (tmp_path / "run" / CONFIGURATION).write_text(json.dumps(json.loads(configuration.read_text()) | {"seed": 5}))
     (tmp_path / "run" / PRETRAINING / CHECKPOINT).write_bytes(b"kept")
     before = content(tmp_path / "run")
-    for more, told in (([], "holds a run already"), (["--resume"], "--resume: seed")):
+    for more, told in (([], "already holds a run"), (["--resume"], "--resume: seed")):
         assert cli.main(["train", str(configuration), "--output", str(tmp_path / "run"), *more]) == 2
         assert told in capsys.readouterr().err
         assert content(tmp_path / "run") == before

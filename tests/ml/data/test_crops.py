@@ -240,7 +240,7 @@ def test_configuration_is_the_recipe_and_refuses_what_does_not_fit() -> None:
         found.needed_sources()
     for wrong, told in (
         ({"synthetic_share": 0.5, "set_up": "real"}, "mixed"),
-        ({"features": ["x", "x"]}, "differ"),
+        ({"features": ["x", "x"]}, "twice"),
         ({"voxel": 0.0}, "voxel"),
         ({"data": {"real": [{"path": "a", "splt": "train"}]}}, "split"),
     ):

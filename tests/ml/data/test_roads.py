@@ -123,7 +123,7 @@ def test_scenes_of_a_split(tmp_path: Path) -> None:
     manifest = {"type": "Manifest", "version": "1.0", "title": "t", "generator": "g", "recipe_sha256": "0"}
     (tmp_path / "manifest.json").write_text(json.dumps(manifest | {"complete": False, "scenes": scenes}))
     assert scene_folders(tmp_path, "train") == [tmp_path / "scenes" / "a-01"]
-    with pytest.raises(InputError, match="there is test, train"):
+    with pytest.raises(InputError, match="the data set has test, train"):
         scene_folders(tmp_path, "validation")
 
 

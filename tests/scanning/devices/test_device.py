@@ -37,7 +37,7 @@ def test_every_pattern_has_a_preset() -> None:
 @pytest.mark.parametrize("name", device_names())
 def test_presets_are_plausible(name: str) -> None:
     d = load_device(name)
-    assert "ssumed" in d.source or "No real device" in d.source
+    assert "ssumed" in d.source or "no real device" in d.source
     assert min(d.divergence_mrad) > 0
     assert max(d.divergence_mrad) < 6
     assert d.minimum_range <= 150
