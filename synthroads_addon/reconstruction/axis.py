@@ -151,13 +151,15 @@ def find_axis(
 
     The axis is looked for along the given path, then again along the axis just found, until that moves no more: a
     straight line is followed better than a bent one, and a path that has slipped by a lane comes back. Where the middle
-    line parts in two the path follows one branch, the axis runs between both. ``progress`` is called with the share of
-    the passes that are done.
+    line parts in two the path follows one branch, the axis runs between both. The result is the mean of the axes in
+    several grids of bins, shifted against each other, so that where the bins lie makes no difference. ``progress`` is
+    called with the share of the passes that are done.
     """
     progress("lines", 0.0)
     road = _look_along(cloud, path, half_width, options)
     for number in range(1, _PASSES):
         progress("lines", number / _PASSES)
+        # The first path may be anywhere: only the second look, along an axis, can show that the axis stands still.
         if number > 1 and float(np.abs(road.axis.offsets).max()) <= _STILL:
             break
         # The next path is the axis itself: lines beside it are then straight, and smoothing bends none of them.

@@ -325,9 +325,8 @@ class Alignment:
         )
         if len(point_index) > len(x):
             order = np.lexsort((np.hypot(rest, offset), point_index))
-            best_foot = order[
-                np.searchsorted(point_index, np.arange(len(x)))
-            ]  # owner is sorted, so its first is the best
+            # `point_index` is sorted, and within a point the nearest foot comes first: its first row is its best.
+            best_foot = order[np.searchsorted(point_index, np.arange(len(x)))]
             station, rest, offset = station[best_foot], rest[best_foot], offset[best_foot]
         is_beyond_end = ((station <= 0.0) & (rest < 0.0)) | ((station >= self.length) & (rest > 0.0))
         if is_beyond_end.any():

@@ -101,6 +101,7 @@ def _lamps(tree: Tree, light: _Light) -> Value:
     points = op.store(row_of_points(tree, light.lights), "number", light_index)
     lamps = op.realize(put_on_points(points, dome, op.vector(tree, 0.0, _front(light), light.level(light_index))))
     light_index = op.named_attribute(tree, "number", "INT")
+    # Green is the lowest of up to three lights; a single light is red. Rounding up only makes the number an integer.
     is_green = (light_index > 0) & light_index.equals(op.round_up(op.minimum(light.lights, 3.0)) - 1)
     for glass, selection in (
         (light.yellow_material, True),

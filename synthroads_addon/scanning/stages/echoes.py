@@ -215,8 +215,9 @@ class EchoTracer:
         if not len(rows):
             return echoes
         hit_numbers = echoes.hit[rows]
-        position, _ = traced.ends(hit_numbers)
+        position, _ = traced.ends(hit_numbers)  # (3, N) local, m
         if target.moving:
+            # The pattern sticks to bodies that move: it is read where they are at time 0.
             face, times = traced.pick("face", hit_numbers), traced.times(hit_numbers)
             (position,) = target.at_time_zero(face, position, times, motions)
         intensity = echoes.intensity.copy()
