@@ -21,10 +21,8 @@ MOST_RINGS = 256
 lasers in a head for cars."""
 RINGED = 0.55
 """Share of the elevations' range in the widest tenth of the gaps, from which the elevations are rings. Chosen between
-that of places at random, `UNRINGED`, and that of sweeps, 0.9 seen from the head and 0.6 from 3 m beside it."""
-UNRINGED = 0.1 * (1.0 + np.log(10.0))
-"""The same share of elevations at random: the widest tenth of exponentially distributed gaps holds
-int_{ln 10}^{inf} t exp(-t) dt = 0.1 (1 + ln 10) of their sum, 0.33."""
+that of sweeps, 0.9 seen from the head and 0.6 from 3 m beside it, and that of elevations at random, 0.33: the widest
+tenth of exponentially distributed gaps holds int_{ln 10}^{inf} t exp(-t) dt = 0.1 (1 + ln 10) of their sum."""
 
 _SECTORS = 24
 """Directions in which the elevations are compared. Chosen: every 15 degrees."""
@@ -71,7 +69,7 @@ def find_sweep(points: Float) -> Sweep | None:
     """
     if not _FEWEST_SECTORS * _FEWEST_POINTS <= len(points) <= MOST_POINTS:
         return None
-    at_zero = _ringed_share(points, np.zeros(3))
+    at_zero = ringed_share(points, np.zeros(3))
     origin, ringed = (np.zeros(3), at_zero) if at_zero >= RINGED else _search_origin(points)
     if ringed < RINGED:
         return None
@@ -80,9 +78,9 @@ def find_sweep(points: Float) -> Sweep | None:
 
 
 def _search_origin(points: Float) -> tuple[Float, float]:
-    """Return the place (3,) from which the points look most like rings, and `_ringed_share` there."""
+    """Return the place (3,) from which the points look most like rings, and `ringed_share` there."""
     origin = _densest_place(points)
-    best = _ringed_share(points, origin)
+    best = ringed_share(points, origin)
     for step in _STEPS:
         improved = True
         while improved:
@@ -91,7 +89,7 @@ def _search_origin(points: Float) -> tuple[Float, float]:
                 for sign in (-1.0, 1.0):
                     shifted = origin.copy()
                     shifted[axis] += sign * step
-                    share = _ringed_share(points, shifted)
+                    share = ringed_share(points, shifted)
                     if share > best:
                         origin, best, improved = shifted, share, True
     return origin, best
@@ -115,7 +113,7 @@ def _densest_place(points: Float) -> Float:
     return np.array([*place, ground + _HEAD_HEIGHT])
 
 
-def _ringed_share(points: Float, origin: Float) -> float:
+def ringed_share(points: Float, origin: Float) -> float:
     """Return the median over the sectors of the mean share of the widest tenth of the gaps; 0 if too few are judged."""
     shares = []
     for elevations in _sectors(points, origin):

@@ -54,7 +54,7 @@ def foot_frame(geometry: RoadGeometry, item: PointObject) -> ObjectFrame:
 
 
 def line_frame(geometry: RoadGeometry, item: LineObject, stretch: tuple[float, float]) -> ObjectFrame:
-    """Return the frame at the beginning of a line object on the surface, or of its piece in a stretch of the road.
+    """Return the frame at a line object's beginning on the surface, or where the stretch's piece of the road begins.
 
     Args:
         geometry: of the whole road.
