@@ -133,14 +133,13 @@ class ReceiverModel:
         """Return the linear intensities (N,) that the device gives for surfaces of a brightness (N,) at ranges (N,), m.
 
         They are the power above the pedestal p: b / d^2 exp(-a d) - p for the brightness b, the range d and the air's
-        attenuation a. A device that corrects the range gives the squared range times that, of clear air: b - p d^2.
+        attenuation a. A device that corrects the range gives the squared range times that, as it doesn't know the air:
+        b exp(-a d) - p d^2.
         """
-        linear_values = brightness
-        if not self.range_corrected:
-            linear_values = received_intensity(brightness, distance, self.attenuation)
-        if not self.pedestal:
-            return linear_values
-        return np.maximum(linear_values - self.pedestal * (distance**2 if self.range_corrected else 1.0), 0.0)
+        linear_values = received_intensity(brightness, distance, self.attenuation) - self.pedestal
+        if self.range_corrected:
+            linear_values = linear_values * distance**2
+        return np.maximum(linear_values, 0.0)
 
     def to_stored(self, linear_values: Float) -> Float:
         """Return the unrounded intensities that the device stores for linear ones times its gain.

@@ -257,6 +257,8 @@ def test_a_model_of_the_devices_response_leads_numbers_back_to_power() -> None:
     logarithmic = replace(preset("velodyne-hdl-64e"), receiver=preset("velodyne-hdl-64e").receiver.model_copy())
     assert receiver_of_device(logarithmic, 0.0) == model
     assert ReceiverModel().at_range(np.array([1.0]), np.array([2.0]))[0] == 0.25
+    hazy = ReceiverModel(attenuation=0.01, range_corrected=True)
+    assert hazy.at_range(np.array([1.0]), np.array([100.0]))[0] == pytest.approx(np.exp(-1.0))
 
 
 @pytest.mark.parametrize(("bits", "found"), [(6, 6), (8, 8), (12, 12), (16, None)])
