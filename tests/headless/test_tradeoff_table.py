@@ -154,7 +154,7 @@ def test_a_damaged_row_is_one_line(
     data = json.loads(file.read_text())
     file.write_text(json.dumps(data | {"row": _kept()}))
     assert commands.command("tradeoff", words) == 0, "a sound one is kept"
-    assert json.loads((tmp_path / "rq31-600m.json").read_text())["rows"][-1] == _kept()
+    assert json.loads((tmp_path / "rq31-600m-even.json").read_text())["rows"][-1] == _kept()
     capsys.readouterr()
     file.write_text(json.dumps(data | {"row": row}))
     assert commands.command("tradeoff", words) == 2
