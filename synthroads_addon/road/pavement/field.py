@@ -13,7 +13,8 @@ What is in it, and where its figures come from:
   day's work, sealed by bitumen; what was paved at once is as bright as itself and differs from its neighbours.
 - **Slabs** of concrete: joints every slab length and between lanes, sealed (ZTV Beton-StB: 8 to 10 mm wide); each slab
   is of its own pour.
-- **Markings** lose their film where tyres cross them: lines between lanes, arrows in the wheel tracks.
+- **Markings** lose their film where tyres cross them: lines between lanes, arrows in the wheel tracks. There tyres
+  leave rubber as well; dirt dims a line in stretches, and stretches that were painted anew have neither.
 - **Patches** are new and black, or older; open cracks are dark; sealed ones are a smooth band of bitumen. Where a
   marking was ground off the aggregate is bare: brighter and rougher.
 - **Ages**: what was paved earlier or later than the rest is brighter or darker than it, see `materials.variation`.
@@ -69,6 +70,14 @@ _FILM_DARKER, _FILM_ROUGHER = 0.22, -0.06
 _FILM_MEAN = 0.05
 """Share by which a marking without wear is brighter than the mean. Chosen: about `_FILM_DARKER` times `_BESIDE`, so
 that the mean over a road's film, mostly edge lines, is 1."""
+_NEW_FILM = 0.17
+"""Share by which a new film is brighter than the mean one. It is what `materials.variation` makes of a wear of 0 beside
+the usual 0.2: its reflectivity and beads together return 0.77 where the table's return 0.66."""
+_RENEWAL, _MARK = 120.0, 4.0
+"""Lengths of a line that is painted anew at once, and that a tyre blackens, m. Chosen: a day's closure of a lane or a
+part of it; a tyre of 0.2 m that crosses a line of 0.15 m at 1 : 12, as in a swerve."""
+_RUBBER_DARKER = 0.55
+"""Share of a marking's brightness that a tyre's mark takes. Chosen: black lies on the grains' tops, white between."""
 _GROUND = 1.22
 """Brightness of where a marking was ground off."""
 _KNOTS = 64.0
@@ -93,7 +102,7 @@ class Calculus(Protocol):
     def larger(self, value: Any, other: Any) -> Any:
         """Return the larger of two."""
 
-    def below(self, value: Any, limit: float) -> Any:
+    def below(self, value: Any, limit: Any) -> Any:
         """Return 1 where values are below a limit, else 0."""
 
     def hash(self, key: Any, seed: Any) -> Any:
@@ -106,10 +115,16 @@ class Wear(NamedTuple):
     Attributes:
         polish: of the wheel tracks, 0 to 1.
         seed: 0 to 65535.
+        renewed: share of the lines' length that was painted anew.
+        dirt: share of markings' brightness that dirt takes, in the mean over what wasn't painted anew.
+        rubber: share of the length of lines that tyres cross most that is blackened by rubber; of others less.
     """
 
     polish: Any
     seed: Any
+    renewed: Any = 0.0
+    dirt: Any = 0.0
+    rubber: Any = 0.0
 
 
 class PavementPlace(NamedTuple):
@@ -319,7 +334,7 @@ def concrete_look(m: Calculus, place: PavementPlace, wear: Wear, slab_length: An
 
 
 def paint_look(m: Calculus, place: PavementPlace, wear: Wear) -> Look:
-    """Return how a marking differs from its mean at places: its film goes where traffic crosses it.
+    """Return how a marking differs from its mean at places: film, dirt and rubber, and what was painted anew.
 
     Kinds of markings are told apart by masks of 0 or 1, since nodes of materials know no branches.
 
@@ -341,7 +356,22 @@ def paint_look(m: Calculus, place: PavementPlace, wear: Wear) -> Look:
     short_variation = _slow(m, place, strip.owner, wear.seed + 1.0, _CHANGES)
     is_known = 1.0 - m.below(strip.owner, 0.5)
     film_loss = traffic_wear * (1.0 + _PATCHY * long_variation + _PATCHY * short_variation) * is_known
-    return Look(brightness=1.0 + is_known * _FILM_MEAN - film_loss * _FILM_DARKER, roughness=film_loss * _FILM_ROUGHER)
+    is_renewed = _share_of_lengths(m, place, strip.owner, _RENEWAL, wear.seed + 3.0, wear.renewed) * is_known
+    is_black = _share_of_lengths(m, place, strip.owner, _MARK, wear.seed + 4.0, wear.rubber * traffic_wear) * is_known
+    dirt_variation = _slow(m, place, strip.owner, wear.seed + 5.0)
+    dirt = m.smaller(wear.dirt * (1.0 + dirt_variation) * is_known, 1.0)
+    film = 1.0 + is_known * _FILM_MEAN - film_loss * _FILM_DARKER
+    old_brightness = film * (1.0 - dirt) * (1.0 - is_black * _RUBBER_DARKER)
+    return Look(
+        brightness=old_brightness * (1.0 - is_renewed) + is_renewed * (1.0 + _NEW_FILM),
+        roughness=film_loss * _FILM_ROUGHER * (1.0 - is_renewed),
+    )
+
+
+def _share_of_lengths(m: Calculus, place: PavementPlace, owner: Any, length: float, seed: Any, share: Any) -> Any:
+    """Return 1 on a share of an owner's pieces of a length (m), drawn at random, else 0."""
+    piece = m.floor(place.station * (1.0 / length))
+    return m.below(_signed_hash(m, owner, piece, seed) * 0.5 + 0.5, share)
 
 
 class ArrayCalculus:
@@ -367,7 +397,7 @@ class ArrayCalculus:
         """Return the larger of two."""
         return np.maximum(value, other)
 
-    def below(self, value: Float, limit: float) -> Float:
+    def below(self, value: Float, limit: Float | float) -> Float:
         """Return 1 where values are below a limit, else 0."""
         return np.asarray(value < limit, dtype=np.float64)
 
