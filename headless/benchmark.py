@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "folder of another version (checkout or installation), whose scans are measured alternately with this one's"
     parser.add_argument(_BESIDE, type=Path, metavar="FOLDER", help=text)
     text = "scene to measure on (%(default)s)"
-    parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help=text)
+    parser.add_argument("--scenario", default="rq31-600m-even", metavar="NAME_OR_FILE", help=text)
     add_changes_argument(parser)
     parser.add_argument("--quick", action="store_true", help="use a small scene, to check that everything works")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")

@@ -29,7 +29,7 @@ _ROW = "--row"
 _ROWS = "rows"
 """Folder, within the output's, of what is measured already."""
 _TABLE = "tradeoff {} {}"
-"""Name in the document of a table of a scene: "tradeoff rq31-600m colours"."""
+"""Name in the document of a table of a scene: "tradeoff rq31-600m-even colours"."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -34,6 +34,7 @@ TIMES = re.compile(r"seconds|_mb$|^(time|stages|memory|machine|duration|points_p
 
 RECIPE = """title: Tiny
 seed: 5
+scenario: rq31-600m-even
 set:
   fidelity: draft
   vegetation_detail: 0
@@ -111,16 +112,16 @@ def settings(*changes: str) -> tuple[str, ...]:
 
 CLOUD = "../constant-materials/out/cloud.laz"
 JOBS = {
-    "constant-materials": GoldenJob((generate("rq31-600m", *UAV, *PLAIN),)),
+    "constant-materials": GoldenJob((generate("rq31-600m-even", *UAV, *PLAIN),)),
     "images": GoldenJob(
-        (generate("rq31-600m", *UAV, "colour.source=images", "colour.ground_sampling_distance=0.3", "road.length=60"),)
+        (generate("rq31-600m-even", *UAV, "colour.source=images", "colour.ground_sampling_distance=0.3", "road.length=60"),)
     ),
     "pixel-per-return": GoldenJob(
-        (generate("rq31-600m", *UAV, "colour.source=returns", "road.length=60"),), lacking="needs Blender 5.0"
+        (generate("rq31-600m-even", *UAV, "colour.source=returns", "road.length=60"),), lacking="needs Blender 5.0"
     ),
     "airborne": GoldenJob((generate("airborne-1000m-even", *DRAFT, *PLAIN, "scan.pulse_rate_khz=150"),)),
-    "vehicle": GoldenJob((generate("mobile-mapping-300m", *DRAFT, *PLAIN, "scan.pulse_rate_khz=150"),)),
-    "tripod": GoldenJob((generate("tripod-200m", *DRAFT, *PLAIN, "scan.platform.turn_seconds=10"),)),
+    "vehicle": GoldenJob((generate("mobile-mapping-300m-even", *DRAFT, *PLAIN, "scan.pulse_rate_khz=150"),)),
+    "tripod": GoldenJob((generate("tripod-200m-even", *DRAFT, *PLAIN, "scan.platform.turn_seconds=10"),)),
     "foreign-scene": GoldenJob(
         (
             ("scan", "scene.obj", "--up", "z", "--output", "path", "--path", "path.csv", "--height", "30"),
@@ -129,7 +130,7 @@ JOBS = {
         (("scene.obj", FLOOR_AND_BOX), ("trajectory.csv", TRAJECTORY), ("path.csv", "x,y\n-40,0\n0,3\n40,0\n")),
     ),
     "sections": GoldenJob(
-        (generate("rq31-600m", *UAV, *PLAIN, "road.length=400", "scan.section_length=100", NO_SCENE),)
+        (generate("rq31-600m-even", *UAV, *PLAIN, "road.length=400", "scan.section_length=100", NO_SCENE),)
     ),
     "data-set": GoldenJob((("dataset", "recipe.yaml", "--output", "set"),), (("recipe.yaml", RECIPE),)),
     "twins": GoldenJob(

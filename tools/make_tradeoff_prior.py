@@ -39,9 +39,9 @@ from synthroads_addon.scanning.colour.views import View  # noqa: E402
 from synthroads_addon.scenario.scenario import load_scenario  # noqa: E402
 
 SCENES: dict[str, tuple[str, Sequence[str]]] = {
-    "uav": ("rq31-600m", ["road.length=300"]),
-    "vehicle": ("mobile-mapping-300m", []),
-    "tripod": ("tripod-200m", []),
+    "uav": ("rq31-600m-even", ["road.length=300"]),
+    "vehicle": ("mobile-mapping-300m-even", []),
+    "tripod": ("tripod-200m-even", []),
     "airborne": ("airborne-1000m-even", []),
 }
 """Platform -> scenario and changes."""

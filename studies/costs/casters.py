@@ -73,7 +73,7 @@ CASTERS: dict[str, Callable[[SceneMesh], Caster]] = {
 
 
 def demo_scene() -> tuple[SceneMesh, Flight]:
-    """Build the scenario `rq31-600m`; return its mesh, and the flight over it."""
+    """Build the scenario `rq31-600m-even`; return its mesh, and the flight over it."""
     from synthroads_addon.blender.files import empty_file
     from synthroads_addon.blender.model.build import build_road
     from synthroads_addon.blender.scene.evaluated import scene_mesh
@@ -83,7 +83,7 @@ def demo_scene() -> tuple[SceneMesh, Flight]:
     from synthroads_addon.scenario.scenario import load_scenario
 
     empty_file()
-    scenario = load_scenario("rq31-600m")
+    scenario = load_scenario("rq31-600m-even")
     parameters = sample_road(scenario.road, scenario.seed)
     geometry = RoadGeometry(parameters)
     build_road(BuildRequest(parameters, scenario.settings().tolerance, scenario.settings().vegetation_detail))

@@ -177,7 +177,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=("save", "scan"))
     parser.add_argument("file", type=Path)
-    parser.add_argument("--scenario", default="rq31-600m")
+    parser.add_argument("--scenario", default="rq31-600m-even")
     parser.add_argument("--set", dest="changes", action="append", default=[], metavar="FIELD=VALUE")
     parser.add_argument("--cores", nargs="+", type=int, default=[])
     parser.add_argument("--turns", type=int, default=1, metavar="N", help="times that each number is measured (1)")

@@ -1,6 +1,6 @@
 """Measure what all effects of the sensor cost: a scene scanned with them and without them, in turn.
 
-    python studies/costs/effects.py rq31-600m --like centerline-uav --repeats 3 --set road.length=200 \\
+    python studies/costs/effects.py rq31-600m-even --like centerline-uav --repeats 3 --set road.length=200 \\
         --set scan.platform.speed=4.4 --each
 
 The scene is built once. The effects are those that the first scene of a recipe (``--like``) has drawn, and what

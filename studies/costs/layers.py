@@ -1,6 +1,6 @@
 """Measure layers by the materials' nodes at the returns beside those of a pixel per return: Blender 5.0 or newer.
 
-    python studies/costs/layers.py --scenarios rq31-600m tripod-200m
+    python studies/costs/layers.py --scenarios rq31-600m-even tripod-200m-even
 
 The points are those of short stretches spread over the path, on the first metres of each road. It prints, by scenario,
 the RMSE of each layer over the 99.9 % of the points that differ least, the median and the 95th percentile of CIEDE2000
@@ -39,7 +39,7 @@ from synthroads_addon.scanning.record import record_as_measured
 from synthroads_addon.scanning.scan import join_results
 from synthroads_addon.scenario.scenario import load_scenario
 
-SCENARIOS = ("rq31-600m", "mobile-mapping-300m", "tripod-200m", "airborne-1000m-even")
+SCENARIOS = ("rq31-600m-even", "mobile-mapping-300m-even", "tripod-200m-even", "airborne-1000m-even")
 LAYERS = frozenset({"rgb", *MATERIAL_LAYERS})
 KEPT = 0.999
 """Share of the points, those that differ least, whose RMSE is said."""

@@ -1,7 +1,7 @@
 """Time what is done for the pulses of a scenario by compiled loops and by NumPy, in turn, on one thread.
 
-    python studies/costs/loops.py mobile-mapping-300m --set road.length=100 --set scan.rays_per_pulse=7
-    python studies/costs/loops.py rq31-600m --set road.length=60 --set scan.traffic_speed_factor=0 --faces
+    python studies/costs/loops.py mobile-mapping-300m-even --set road.length=100 --set scan.rays_per_pulse=7
+    python studies/costs/loops.py rq31-600m-even --set road.length=60 --set scan.traffic_speed_factor=0 --faces
 
 Casting is in both, in packets. Of each block the shortest of some runs counts, in processor time. With ``--faces`` it
 says how many pulses have all their rays on one face, and what could be saved of these rays, where nothing moves.

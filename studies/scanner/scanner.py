@@ -31,11 +31,11 @@ REACH, ASIDE, PIXEL = 105.0, 42.0, 0.15
 """Half the length and width that a picture shows, and its pixel, m."""
 SHORT = ["road.half_width=40"]
 PLATFORMS = {
-    "UAV, rotating mirror": ("rq31-600m", ["road.length=200"]),
-    "mobile mapping, two heads": ("mobile-mapping-300m", ["road.length=200"]),
-    "tripod, panoramic": ("tripod-200m", []),
+    "UAV, rotating mirror": ("rq31-600m-even", ["road.length=200"]),
+    "mobile mapping, two heads": ("mobile-mapping-300m-even", ["road.length=200"]),
+    "tripod, panoramic": ("tripod-200m-even", []),
     "aircraft": ("airborne-1000m-even", []),
-    "trajectory file": ("rq31-600m", ["road.length=200"]),
+    "trajectory file": ("rq31-600m-even", ["road.length=200"]),
 }
 
 
@@ -124,7 +124,7 @@ def draw_cloud_shadows(output: Path) -> None:
     changes = ["road.length=200", "road.half_width=40", "scan.lines_per_second=50"]
     changes += ['road.environment.cloud_cover={"minimum":0.45,"maximum":0.45}']
     with tempfile.TemporaryDirectory() as folder:
-        cloud = scan("rq31-600m", changes, Path(folder) / "scan")
+        cloud = scan("rq31-600m-even", changes, Path(folder) / "scan")
     figure = new_figure(9, 7.6)
     axes = figure.subplots(2, 1)
     time = np.asarray(cloud.gps_time)
@@ -145,7 +145,7 @@ def intensity_histograms(output: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for model in ("lambert", "oren_nayar"):
             changes = ["road.length=100", f"scan.reflection={model}"]
-            clouds[model] = scan("rq31-600m", changes, Path(folder) / model)
+            clouds[model] = scan("rq31-600m-even", changes, Path(folder) / model)
     names = {row.name: row.id for row in classes()}
     for axis, name in zip(axes, ("road", "road_marking", "vegetation"), strict=True):
         for model, cloud in clouds.items():

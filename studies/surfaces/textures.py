@@ -89,7 +89,7 @@ def save_image(path: Path, pixels: Float) -> None:
 
 def render(textures: str, path: Path, width: int, samples: int) -> None:
     """Build a road with the textures of a folder and render it from a driver's place."""
-    limits = load_scenario("rq31-600m", list(LIMITS)).road.model_copy(update={"textures": textures})
+    limits = load_scenario("rq31-600m-even", list(LIMITS)).road.model_copy(update={"textures": textures})
     light = Environment(sun_azimuth_deg=140.0, sun_elevation_deg=38.0)
     parameters = sample_road(limits, SEED, "").model_copy(update={"environment": light})
     model, geometry = build_road(BuildRequest(parameters, 0.01, 0.3)), RoadGeometry(parameters)

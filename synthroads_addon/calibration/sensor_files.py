@@ -524,7 +524,7 @@ def _standing(estimate: SensorEstimate, device: Device, setting: ScannerSetting)
         lines = float(np.clip(estimate.azimuth_step / turn, slowest, fastest))
     platform = {"kind": "tripod", "stations": [60.0], "turn_seconds": _short(1.0 / lines), "turn_deg": 0.0}
     settings = {"scan.lines_per_second": _short(lines), "scan.platform": platform | {"height": 1.73}}
-    return "tripod-200m", settings | {"scan.reflection": "oren_nayar"}
+    return "tripod-200m-even", settings | {"scan.reflection": "oren_nayar"}
 
 
 def save_device(sensor: FittedSensor, path: Path, overwrite: bool = False) -> None:

@@ -15,7 +15,7 @@ from ..base.machine import linear_algebra_on_one_thread
 from ..base.progress import Progress, exhaust, silent
 from ..cloud.selection.classes import RealClass
 from ..cloud.selection.patches import FEATURES, Patches, join_patches, make_patches
-from .classifier import Distinction, distinguish
+from .classifier import Distinction, classifier_auc, distinguish
 from .clouds import ROAD, ComparedCloud, find_clouds, read_compared
 
 RINGS = (4.0, 6.0, 10.0, 15.0, 20.0, 30.0, 50.0)
@@ -73,6 +73,31 @@ class CloudComparison:
             for group in self.distinctions[0].auc
         }
 
+    def realism_by_road(self, seed: int = 1) -> dict[str, dict[str, float]]:
+        """Return by real cloud and group 1 - AUC of synthetic clouds against it alone over that of the other real ones.
+
+        Against one road a cloud is easier to tell than against all: the other real ones are, as well.
+
+        Args:
+            seed: seed by which patches and folds are drawn.
+
+        Raises:
+            InputError: a cloud has too few patches of a road's density.
+        """
+        result = {}
+        for number, road in enumerate(self.real):
+            others = self.real[:number] + self.real[number + 1 :]
+            synthetic_rows, real_rows = (
+                [classifier_auc(cloud.patches, road.patches, seed, cloud.cloud.name) for cloud in clouds]
+                for clouds in (self.synthetic, others)
+            )
+            result[road.cloud.name] = {
+                group: _mean_of([row[group] for row in synthetic_rows])
+                / max(_mean_of([row[group] for row in real_rows]), 1e-9)
+                for group in synthetic_rows[0]
+            }
+        return result
+
     def giveaways(self) -> dict[str, tuple[float, float]]:
         """Return by statistic its mean AUC alone (synthetic, real), ordered from the largest synthetic one."""
         means = {
@@ -119,8 +144,13 @@ def _joined(clouds: tuple[DescribedCloud, ...], distinctions: tuple[Distinction,
 
 
 def _mean(rows: Sequence[Distinction], group: str) -> float:
-    """Return the mean of 1 - AUC in a group, with an AUC below 0.5, worse than chance, counted as 0.5."""
-    return float(np.mean([1.0 - max(distinction.auc[group], 0.5) for distinction in rows]))
+    """Return the mean of 1 - AUC in a group, see `_mean_of`."""
+    return _mean_of([distinction.auc[group] for distinction in rows])
+
+
+def _mean_of(aucs: Sequence[float]) -> float:
+    """Return the mean of 1 - AUC, with an AUC below 0.5, worse than chance, counted as 0.5."""
+    return float(np.mean([1.0 - max(auc, 0.5) for auc in aucs]))
 
 
 def compare(synthetic: Path, real: Path, seed: int = 1, progress: Progress = silent) -> CloudComparison:

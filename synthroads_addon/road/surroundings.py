@@ -225,6 +225,15 @@ class MaterialVariation(Model):
     wheel_track_polish: float = quantity(0.3, ge=0, le=1, unit="1", description="Polish of the wheel tracks.")
     concrete_brightness: float = quantity(1.0, ge=0.5, le=2, unit="1", description="Factor on the base colour.")
     paint_wear: float = quantity(0.2, ge=0, le=1, unit="1", description="Share of the markings' film worn off.")
+    paint_renewed: float = quantity(
+        0.0, ge=0, le=1, unit="1", description="Share of the lines' length that was painted anew."
+    )
+    paint_dirt: float = quantity(
+        0.0, ge=0, le=1, unit="1", description="Share of the old markings' brightness that dirt takes."
+    )
+    paint_rubber: float = quantity(
+        0.0, ge=0, le=1, unit="1", description="Share of the most crossed lines' length that rubber has blackened."
+    )
     grass_dryness: float = quantity(0.3, ge=0, le=1, unit="1", description="0 green, 1 dry.")
     textures: tuple[MaterialTexture, ...] = Field(
         (), description="Images in place of materials' layers, at most one set for each material."

@@ -229,7 +229,7 @@ HEAD = [
 def test_a_heads_compression_zeros_noise_and_spacing_are_found_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    points, plan = measured("tripod-200m", HEAD, "oren_nayar")
+    points, plan = measured("tripod-200m-even", HEAD, "oren_nayar")
     cloud = write_las(tmp_path / "sweep.las", points.xyz, points.intensity * 65_535.0, points.instance_id)
     place = ",".join(str(value) for value in ORIGIN + np.array([20.0, 0.0, 1.73]))
     words = ("--device", "velodyne-hdl-64e", "--device-response", f"--scanner={place}", "--reflection", "oren_nayar")

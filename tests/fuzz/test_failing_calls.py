@@ -114,7 +114,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def words(job: str, inputs: Path, output: Path) -> list[str]:
     """Return a command that writes to a folder."""
     arguments = {
-        "generate": ["--scenario", "rq31-600m", *(f"--set={k}={json.dumps(v)}" for k, v in SMALL.items())],
+        "generate": ["--scenario", "rq31-600m-even", *(f"--set={k}={json.dumps(v)}" for k, v in SMALL.items())],
         "dataset": [str(inputs / "recipe.yaml")],
         "train": [str(inputs / "training.yaml")],
     }[job]

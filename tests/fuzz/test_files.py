@@ -300,7 +300,7 @@ def test_entries_of_csv_that_are_too_long(tmp_path: Path) -> None:
 )
 def test_null_bytes_in_the_names_of_files(field: str) -> None:
     value = json.dumps(["a\0.json"] if field == "road.assets" else "a\0.json")
-    scenario = load_scenario("rq31-600m", [f"{field}={value}", "road.length=40", "road.surroundings=true"][:2])
+    scenario = load_scenario("rq31-600m-even", [f"{field}={value}", "road.length=40", "road.surroundings=true"][:2])
 
     def use() -> None:
         scenario.own_materials()

@@ -37,7 +37,7 @@ def test_tables_have_the_columns_that_are_measured() -> None:
         _row("colour_source", "material", shares={"material": 1.0}, colour_truth="a pixel per return"),
         {"knob": "colour_source", "value": "returns", "left_out": "needs a newer one"},
     ]
-    text = markdown(found, "rq31-600m")
+    text = markdown(found, "rq31-600m-even")
     assert "| caster | embree | 12.3 | 1.0 | - | 1,234,567 | 7 | 2.5 |" in text
     assert "image (%) | material (%) | colour, CIEDE2000 95 % |" in text
     assert "| 95.00 | 0.40 | 6 |" in text
@@ -75,16 +75,16 @@ def test_the_front_is_in_the_table_with_the_noise_of_time() -> None:
     ]
     assert time_noise(found[:1]) is None
     assert time_noise(found) == pytest.approx(0.2, abs=1e-3)
-    text = markdown(found, "rq31-600m")
+    text = markdown(found, "rq31-600m-even")
     assert "| draft | yes | - |" in text
     assert f"| standard | no | {between}: 75.0 s for 100.0 s |" in text
     assert "compared with 3 other rows of the same job. Errors that are larger by less than 5 % count as equal" in text
     assert "Two runs with the same settings differ in time by up to 20 %; only rows that are faster by more" in text
-    assert "| standard | yes | - |" in markdown([*found[:3], found[4]], "rq31-600m")
+    assert "| standard | yes | - |" in markdown([*found[:3], found[4]], "rq31-600m-even")
 
 
 def test_images_from_afar_are_coarser() -> None:
-    assert row_scenario("rq31-600m", "image_spacing", 30).colour.image_spacing == 30.0
+    assert row_scenario("rq31-600m-even", "image_spacing", 30).colour.image_spacing == 30.0
     far = row_scenario("airborne-1000m-even", "ground_sampling_distance", 0.12, ["seed=9"])
     assert (far.colour.ground_sampling_distance, far.seed) == (pytest.approx(1.4), 9)
     # What a knob doesn't change is that of the standard fidelity, whichever the scene's own is.
@@ -148,13 +148,13 @@ def test_a_damaged_row_is_one_line(
         return _row(knob, value, errors={"height_mm": 2.5})
 
     monkeypatch.setattr("headless.tradeoff._measured_once", measured)
-    words = ["--scenario", "rq31-600m", "--output", str(tmp_path), "--knobs", "caster", "--resume", "--quiet"]
+    words = ["--scenario", "rq31-600m-even", "--output", str(tmp_path), "--knobs", "caster", "--resume", "--quiet"]
     assert commands.command("tradeoff", words) == 0
-    file = tmp_path / "rows" / "rq31-600m" / "caster-embree.json"
+    file = tmp_path / "rows" / "rq31-600m-even" / "caster-embree.json"
     data = json.loads(file.read_text())
     file.write_text(json.dumps(data | {"row": _kept()}))
     assert commands.command("tradeoff", words) == 0, "a sound one is kept"
-    assert json.loads((tmp_path / "rq31-600m.json").read_text())["rows"][-1] == _kept()
+    assert json.loads((tmp_path / "rq31-600m-even.json").read_text())["rows"][-1] == _kept()
     capsys.readouterr()
     file.write_text(json.dumps(data | {"row": row}))
     assert commands.command("tradeoff", words) == 2

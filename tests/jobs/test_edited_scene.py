@@ -30,7 +30,7 @@ def scenario(folder: Path) -> Scenario:
         'outputs=["cloud"]',
         "fidelity=draft",
     ]
-    return load_scenario("rq31-600m", [*changes, 'colour.source="material"'])
+    return load_scenario("rq31-600m-even", [*changes, 'colour.source="material"'])
 
 
 def test_a_scan_by_command_is_of_the_edited_road_that_is_named(tmp_path: Path) -> None:

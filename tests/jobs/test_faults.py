@@ -51,7 +51,7 @@ def command(name: str, inputs: Path, output: Path) -> list[str]:
     """Return a command that writes to a folder."""
     scan = ["--height", "30", "--set", "scan.lines_per_second=50", "--rays", "1"]
     arguments = {
-        "generate": ["--scenario", "rq31-600m", *SETTINGS],
+        "generate": ["--scenario", "rq31-600m-even", *SETTINGS],
         "scan": [str(inputs / "yard.obj"), "--up", "z", *scan],
         "twin": [str(inputs / "road.json")],
     }[name]

@@ -38,7 +38,7 @@ SMALL += ["scan.lines_per_second=50", "scan.platform.speed=24", "colour.source=m
 
 
 def job(output: Path, *changes: str, **options) -> Job:
-    return Job(load_scenario("rq31-600m", [*SMALL, *changes]), output, **options)
+    return Job(load_scenario("rq31-600m-even", [*SMALL, *changes]), output, **options)
 
 
 def command(*arguments: str | Path) -> subprocess.CompletedProcess:
@@ -169,7 +169,7 @@ def demo():
     from synthroads_addon.blender.things.model_builder import BuildRequest
     from synthroads_addon.sampling.road import sample_road
 
-    scenario = load_scenario("rq31-600m", ["road.length=200", "scan.noise.range_sigma=0", "scan.rays_per_pulse=1"])
+    scenario = load_scenario("rq31-600m-even", ["road.length=200", "scan.noise.range_sigma=0", "scan.rays_per_pulse=1"])
     parameters = sample_road(scenario.road, scenario.seed)
     build_road(BuildRequest(parameters, scenario.settings().tolerance, 0.3))
     geometry = RoadGeometry(parameters)
@@ -181,7 +181,7 @@ def scan_of(scenario, geometry, scene):
 
 
 @pytest.mark.keep_scene
-@pytest.mark.parametrize(("name", "driven"), [("mobile-mapping-300m", True), ("rq31-600m", False)])
+@pytest.mark.parametrize(("name", "driven"), [("mobile-mapping-300m-even", True), ("rq31-600m-even", False)])
 def test_a_vehicle_carries_the_scanner_where_the_platform_is_one(demo, name: str, driven: bool) -> None:
     _, geometry, scene = demo
     assert scan_of(load_scenario(name), geometry, scene).emission.on_vehicle is driven

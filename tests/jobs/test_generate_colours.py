@@ -19,7 +19,7 @@ LAYERS = 'cloud.attributes=["roughness","metallic","specular","color_source"]'
 
 
 def made(folder: Path, *changes: str) -> tuple[dict[str, Any], laspy.LasData]:
-    counts = generate(Job(load_scenario("rq31-600m", [*SMALL, *changes]), folder))["counts"]
+    counts = generate(Job(load_scenario("rq31-600m-even", [*SMALL, *changes]), folder))["counts"]
     return counts, laspy.read(folder / "cloud.laz")
 
 

@@ -58,7 +58,7 @@ def _scenario() -> dict[str, Any]:
     from synthroads_addon.scenario.scenario import load_scenario
 
     changes = [f"{name}={value}" for name, value in SMALL.items()]
-    return load_scenario("rq31-600m", changes).to_dict()
+    return load_scenario("rq31-600m-even", changes).to_dict()
 
 
 @pytest.fixture(scope="module")

@@ -583,8 +583,8 @@ def _(folder: Path) -> None:
     """They may lie anywhere, as those of the command line; each is read as what is needed there or refused."""
     there = marker(folder / "x").rename(folder / "outside" / "marker.json")
     uses: list[Callable[[], object]] = [
-        lambda: load_device(load_scenario("rq31-600m", [f"scan.device={there}"]).scan.device),
-        load_scenario("rq31-600m", [f"cloud.classes={there}"]).cloud.scheme,
+        lambda: load_device(load_scenario("rq31-600m-even", [f"scan.device={there}"]).scan.device),
+        load_scenario("rq31-600m-even", [f"cloud.classes={there}"]).cloud.scheme,
         partial(read_parameters, there),
         partial(read_axis, there),
         partial(read_asset_library, there),
@@ -595,13 +595,13 @@ def _(folder: Path) -> None:
             use()
     device = json.loads((ROOT / "synthroads_addon/presets/devices/riegl-minivux-3uav.json").read_text())
     there.write_text(json.dumps(device))
-    load_device(load_scenario("rq31-600m", [f"scan.device={there}"]).scan.device)
+    load_device(load_scenario("rq31-600m-even", [f"scan.device={there}"]).scan.device)
 
 
 @row("recipes: scenarios")
 def _(folder: Path) -> None:
     (folder / "elsewhere").mkdir()
-    (folder / "elsewhere" / "own.json").write_text(load_scenario("rq31-600m").to_json())
+    (folder / "elsewhere" / "own.json").write_text(load_scenario("rq31-600m-even").to_json())
     there = marker(folder / "x")
     for name, good in ((folder / "elsewhere" / "own.json", True), (there, False), (folder / "no.json", False)):
         (folder / "recipe.json").write_text(json.dumps({**OLD, "scenario": str(name)}))

@@ -54,7 +54,7 @@ def scenario(section: str) -> Scenario:
     still = ("scan.traffic_speed_factor=0",) if design == "EKA3" else ()
     road = (f"road.design_class={design}", f"road.cross_section={section}", f"road.length={length}")
     small = ("road.half_width=35", "seed=2", "scan.platform.speed=40")
-    return load_scenario("mobile-mapping-300m", [*road, *small, *ALL, *further, *still, *FILES])
+    return load_scenario("mobile-mapping-300m-even", [*road, *small, *ALL, *further, *still, *FILES])
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> PanopticSet:
     small = ("road.length=40", "road.half_width=30", "scan.platform.speed=40", "scan.traffic_speed_factor=0")
     small += ("road.vehicles.per_km.minimum=50", "road.vehicles.per_km.maximum=60")
     folder = tmp_path_factory.mktemp("short")
-    return panoptic_set(load_scenario("mobile-mapping-300m", [*small, *FILES]), folder)
+    return panoptic_set(load_scenario("mobile-mapping-300m-even", [*small, *FILES]), folder)
 
 
 pytestmark = [pytest.mark.keep_scene, pytest.mark.any_blender]

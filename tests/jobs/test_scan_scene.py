@@ -383,7 +383,7 @@ def test_a_scan_without_a_point_is_told(tmp_path: Path, capsys: pytest.CaptureFi
 @pytest.fixture
 def road_scene(tmp_path: Path) -> tuple[Path, RoadGeometry]:
     """Return a .blend that holds a road of ours with the set that it was built from, and its geometry."""
-    scenario = load_scenario("rq31-600m", ["road.length=60", "road.half_width=25", "fidelity=draft"])
+    scenario = load_scenario("rq31-600m-even", ["road.length=60", "road.half_width=25", "fidelity=draft"])
     parameters = sample_road(scenario.road, scenario.seed)
     model = build_road(BuildRequest(parameters, 0.02, 0.0))
     remember(model.root, parameters, scenario, "")

@@ -35,7 +35,7 @@ SCAN += ["scan.reflection=lambert", 'cloud.attributes=["incidence","color_source
 def scanned(
     folder: Path, scene: Path | None, *changes: str, tripods: tuple[tuple[float, ...], ...] = (PLACE,)
 ) -> tuple[dict[str, Any], laspy.LasData]:
-    scenario = load_scenario("tripod-200m", [*SCAN, *changes])
+    scenario = load_scenario("tripod-200m-even", [*SCAN, *changes])
     job = SceneScan(scenario, folder, scene, tripods=tripods)
     report = scan_scene(job)
     return report, laspy.read(folder / "cloud.laz")
@@ -124,7 +124,7 @@ def test_casters_give_the_same_layers(tmp_path: Path, road: bool) -> None:
     """Lit boards with a shadow on them, and base colour and layers of a road."""
     if road:
         empty_file()
-        scenario = load_scenario("rq31-600m", ["road.length=40", "road.half_width=20", "vegetation_detail=0.2"])
+        scenario = load_scenario("rq31-600m-even", ["road.length=40", "road.half_width=20", "vegetation_detail=0.2"])
         build_road(BuildRequest(sample_road(scenario.road, scenario.seed), 0.02, 0.2))
         bpy.context.view_layer.update()
     else:

@@ -20,7 +20,7 @@ from tests.helpers.scenes.scan_scenes import Standing
 def blocks(seconds: float, rays: int = 7) -> Blocks:
     path = Standing()
     path.strips = (Strip(0, 0.0, seconds),)
-    return Blocks(scanner_setting(load_scenario("rq31-600m").scan), path, rays)
+    return Blocks(scanner_setting(load_scenario("rq31-600m-even").scan), path, rays)
 
 
 def test_a_scan_of_the_demo_s_size_is_told_within_a_factor_of_two() -> None:

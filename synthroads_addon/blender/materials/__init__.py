@@ -57,7 +57,9 @@ class RoadMaterials:
         user_table: Mapping[str, Material] | None = None,
     ) -> None:
         self._variation, self._environment, self._user_table = variation, environment, user_table
-        self._wear = Wear(variation.wheel_track_polish, offset)
+        self._wear = Wear(
+            variation.wheel_track_polish, offset, variation.paint_renewed, variation.paint_dirt, variation.paint_rubber
+        )
         self._looks: dict[str, tuple[Material, str]] = {}
         self._textures: dict[str, Texture] = {}
         self._made_numbers: set[int] = set()

@@ -24,6 +24,10 @@ ATTRIBUTE, SHAPE, AGE = "pavement", "pavement_shape", "pavement_age"
 SR Pavement Place."""
 
 
+WEAR_INPUTS = ("Polish", "Seed", "Renewed", "Dirt", "Rubber")
+"""Inputs of the looks' node groups, in the order of `Wear`; each group has those that its field depends on."""
+
+
 class NodeCalculus:
     """The arithmetic `road.pavement.field.Calculus`, done by nodes that are added to a node group.
 
@@ -58,7 +62,7 @@ class NodeCalculus:
         """Return the larger of two numbers."""
         return self._math("MAXIMUM", value, operand)
 
-    def below(self, value: Value, limit: float) -> Value:
+    def below(self, value: Value, limit: Operand) -> Value:
         """Return 1 where the number is below a limit, else 0."""
         return self._math("LESS_THAN", value, limit)
 
@@ -66,6 +70,14 @@ class NodeCalculus:
         """Return a hash, from 0 to 1, of a whole-numbered key and seed."""
         place = self._tree.node("ShaderNodeCombineXYZ", key, seed).value
         return self._tree.node("ShaderNodeTexWhiteNoise", place, noise_dimensions="2D")["Value"]
+
+
+_OF_PAINT = (
+    ("Renewed", 0.0, (0.0, 1.0), "Share of the lines' length that was painted anew"),
+    ("Dirt", 0.0, (0.0, 1.0), "Share of the brightness that dirt takes"),
+    ("Rubber", 0.0, (0.0, 1.0), "Share of the most crossed lines' length that rubber has blackened"),
+)
+"""Inputs of the look of paint alone: name, default, limits, description."""
 
 
 def look_group(kind: str) -> bpy.types.NodeTree:
@@ -84,6 +96,7 @@ def _build(tree: Tree, kind: str) -> None:
     wear = Wear(
         tree.number("Polish", 0.3, (0.0, 1.0), description="Polish of the wheel tracks") if kind != "paint" else 0.0,
         tree.number("Seed", 0.0, (0.0, 65535.0), description="Seed of all that is random"),
+        *(tree.number(*row[:3], description=row[3]) for row in (_OF_PAINT if kind == "paint" else ())),
     )
     calculus, height = NodeCalculus(tree), None
     # As a vector: a number taken from a colour is its luminance, whose weights don't add up to 1 exactly.
@@ -125,7 +138,7 @@ def pavement_look(shade: Shade, kind: str, wear: Wear) -> tuple[Look, Value | No
     tree = shade.tree
     group_node = tree.group.nodes.new("ShaderNodeGroup")
     group_node.node_tree = look_group(kind)
-    for name, value in zip(("Polish", "Seed"), wear, strict=True):
+    for name, value in zip(WEAR_INPUTS, wear, strict=True):
         if name in group_node.inputs:
             tree.feed(group_node.inputs[name], value)
     for name, input_name in ((ATTRIBUTE, "Place"), (SHAPE, "Shape"), (AGE, "Age")):

@@ -9,7 +9,7 @@ from ...base.schema import read_json
 from ...scenario.colour import USUAL_RANGE, image_scale
 from ...scenario.scenario import Scenario, load_scenario
 
-SCENES = ("rq31-600m", "mobile-mapping-300m", "airborne-1000m-even")
+SCENES = ("rq31-600m-even", "mobile-mapping-300m-even", "airborne-1000m-even")
 """Built-in scenarios that the trade-off is measured on: 60 m above the road, on it, and 700 m above it."""
 TRUE_SAMPLES = 256
 """Samples per pixel of the light that counts as true beside whole light paths."""

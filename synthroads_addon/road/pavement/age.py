@@ -8,12 +8,9 @@ import math
 
 from ..section import Pavement
 from ..section_geometry import CarriagewaySection
+from .field import ASPHALT_OF_AGE, FILM_LASTS
 from .places import strip_lanes
 
-ASPHALT_OF_AGE = (0.38, 0.96, 1.06)
-"""Factor on asphalt under its binder's black film, on the bare aggregate below it, and on old asphalt."""
-_FILM_LASTS = 0.05
-"""Age at which traffic has left 1/e of the binder's film: about a year of twenty."""
 _CONCRETE_OF_AGE = (1.08, 0.88)
 """Factor on new and on old concrete."""
 
@@ -21,7 +18,7 @@ _CONCRETE_OF_AGE = (1.08, 0.88)
 def asphalt_brightness(age: float) -> float:
     """Return a factor on asphalt's base colour and specular at an age, 0 new, 1 old."""
     film_factor, bare_factor, old_factor = ASPHALT_OF_AGE
-    return bare_factor + (film_factor - bare_factor) * math.exp(-age / _FILM_LASTS) + (old_factor - bare_factor) * age
+    return bare_factor + (film_factor - bare_factor) * math.exp(-age / FILM_LASTS) + (old_factor - bare_factor) * age
 
 
 def concrete_brightness(age: float) -> float:

@@ -13,8 +13,9 @@ What is in it, and where its figures come from:
   day's work, sealed by bitumen; what was paved at once is as bright as itself and differs from its neighbours.
 - **Slabs** of concrete: joints every slab length and between lanes, sealed (ZTV Beton-StB: 8 to 10 mm wide); each slab
   is of its own pour.
-- **Markings** lose their film where tyres cross them: lines between lanes, arrows in the wheel tracks.
-- **Patches** are new and black, or older; open cracks are dark; sealed ones are a smooth band of bitumen. Where a
+- **Markings** lose their film where tyres cross them: lines between lanes, arrows in the wheel tracks. There tyres
+  leave rubber as well; dirt dims a line in stretches, and stretches that were painted anew have neither.
+- **Patches** are black in their first year, then bleached, each of a mix of its own; open cracks are dark; sealed ones are a smooth band of bitumen. Where a
   marking was ground off the aggregate is bare: brighter and rougher.
 - **Ages**: what was paved earlier or later than the rest is brighter or darker than it, see `materials.variation`.
 - **Heights**: wheel tracks are as deep as they are worn, with the mean of a lane at 0; joints lie lower. Patches and
@@ -69,6 +70,21 @@ _FILM_DARKER, _FILM_ROUGHER = 0.22, -0.06
 _FILM_MEAN = 0.05
 """Share by which a marking without wear is brighter than the mean. Chosen: about `_FILM_DARKER` times `_BESIDE`, so
 that the mean over a road's film, mostly edge lines, is 1."""
+_NEW_FILM = 0.17
+"""Share by which a new film is brighter than the mean one. It is what `materials.variation` makes of a wear of 0 beside
+the usual 0.2: its reflectivity and beads together return 0.77 where the table's return 0.66."""
+_RENEWAL, _MARK = 120.0, 4.0
+"""Lengths of a line that is painted anew at once, and that a tyre blackens, m. Chosen: a day's closure of a lane or a
+part of it; a tyre of 0.2 m that crosses a line of 0.15 m at 1 : 12, as in a swerve."""
+_RUBBER_DARKER = 0.55
+"""Share of a marking's brightness that a tyre's mark takes. Chosen: black lies on the grains' tops, white between."""
+ASPHALT_OF_AGE = (0.38, 0.96, 1.06)
+"""Factor on asphalt under its binder's black film, on the bare aggregate below it, and on old asphalt, see `age`."""
+FILM_LASTS = 0.05
+"""Age at which traffic has left 1/e of the binder's film: about a year of twenty."""
+_MIXES, _MIX_DEVIATION = 250.0, 0.12
+"""Steps of a patch's age that have a mix of their own, and by how much mixes are brighter or darker at most, as a share.
+Chosen: more steps than a road has patches; a little more than lanes and shoulder differ by."""
 _GROUND = 1.22
 """Brightness of where a marking was ground off."""
 _KNOTS = 64.0
@@ -93,7 +109,7 @@ class Calculus(Protocol):
     def larger(self, value: Any, other: Any) -> Any:
         """Return the larger of two."""
 
-    def below(self, value: Any, limit: float) -> Any:
+    def below(self, value: Any, limit: Any) -> Any:
         """Return 1 where values are below a limit, else 0."""
 
     def hash(self, key: Any, seed: Any) -> Any:
@@ -106,10 +122,16 @@ class Wear(NamedTuple):
     Attributes:
         polish: of the wheel tracks, 0 to 1.
         seed: 0 to 65535.
+        renewed: share of the lines' length that was painted anew.
+        dirt: share of markings' brightness that dirt takes, in the mean over what wasn't painted anew.
+        rubber: share of the length of lines that tyres cross most that is blackened by rubber; of others less.
     """
 
     polish: Any
     seed: Any
+    renewed: Any = 0.0
+    dirt: Any = 0.0
+    rubber: Any = 0.0
 
 
 class PavementPlace(NamedTuple):
@@ -253,18 +275,30 @@ def concrete_height(m: Calculus, place: PavementPlace, shape: Shape, slab_length
     return _height(m, strip, _slab_joint(m, place, strip, slab_length), shape)
 
 
-def _repaired(m: Calculus, strip: _Strip, look: Look) -> Look:
+def _patch_brightness(m: Calculus, age: Any, seed: Any) -> Any:
+    """Return the brightness of patches of an age (0 to 1): they bleach as all asphalt does, each of a mix of its own.
+
+    A patch is black in its first year alone, as `age.asphalt_brightness` of roads in use says; relative to pavement that
+    has bleached it is 0.38 when new, 0.96 without its film and 1.06 when old.
+    """
+    new_factor, bare_factor, old_factor = ASPHALT_OF_AGE
+    film = m.exponential(age * (-1.0 / FILM_LASTS))
+    mix = m.hash(m.floor(age * _MIXES), seed) * 2.0 - 1.0
+    return bare_factor + film * (new_factor - bare_factor) + age * (old_factor - bare_factor) + mix * _MIX_DEVIATION
+
+
+def _repaired(m: Calculus, strip: _Strip, look: Look, seed: Any) -> Look:
     """Return the look where patches and cracks have theirs in place of the pavement's.
 
-    The figures are chosen: a patch from new (brightness 0.72) to old, an open crack darker, a sealed one smoother, a
-    removed marking brighter and rougher. Masks are 0 or 1 since nodes of materials know no branches.
+    The figures are chosen: an open crack darker than the pavement, a sealed one smoother, a removed marking brighter and
+    rougher; of patches see `_patch_brightness`. Masks are 0 or 1 since nodes of materials know no branches.
     """
     age = strip.half * (1.0 / HALF_UNIT)
     is_removed = 1.0 - m.below(strip.kind, REMOVED_MARKING - 0.5)
     is_sealed = 1.0 - m.below(strip.kind, SEALED_CRACK - 0.5) - is_removed
     is_cracked = 1.0 - m.below(strip.kind, OPEN_CRACK - 0.5) - is_removed
     is_patch = 1.0 - is_cracked - is_removed
-    brightness = (0.72 + 0.36 * age) * is_patch + is_cracked * 0.45 - is_sealed * 0.05 + is_removed * _GROUND
+    brightness = _patch_brightness(m, age, seed) * is_patch + is_cracked * 0.45 - is_sealed * 0.05 + is_removed * _GROUND
     roughness = (0.06 - 0.1 * age) * is_patch + is_cracked * 0.05 - is_sealed * 0.4 + is_removed * 0.08
     is_strip, is_known = strip.strip, 1.0 - m.below(strip.owner, 0.5)
     blended = look.brightness * is_strip + brightness * (1.0 - is_strip)
@@ -292,7 +326,7 @@ def asphalt_look(m: Calculus, place: PavementPlace, wear: Wear) -> Look:
         (1.0 + 0.09 * day_deviation + 0.04 * slow_variation) * traffic_factor * (1.0 - 0.35 * joint) * (1.0 + place.age)
     )
     roughness = 0.05 * day_deviation + 0.02 * slow_variation - 0.3 * polish - 0.1 * joint
-    return _repaired(m, strip, Look(brightness, roughness))
+    return _repaired(m, strip, Look(brightness, roughness), wear.seed)
 
 
 def concrete_look(m: Calculus, place: PavementPlace, wear: Wear, slab_length: Any) -> Look:
@@ -315,11 +349,11 @@ def concrete_look(m: Calculus, place: PavementPlace, wear: Wear, slab_length: An
         (1.0 + 0.06 * slab_deviation + 0.03 * slow_variation) * traffic_factor * (1.0 - 0.6 * joint) * (1.0 + place.age)
     )
     roughness = 0.05 * slab_deviation + 0.02 * slow_variation - 0.25 * polish - 0.25 * joint
-    return _repaired(m, strip, Look(brightness, roughness))
+    return _repaired(m, strip, Look(brightness, roughness), wear.seed)
 
 
 def paint_look(m: Calculus, place: PavementPlace, wear: Wear) -> Look:
-    """Return how a marking differs from its mean at places: its film goes where traffic crosses it.
+    """Return how a marking differs from its mean at places: film, dirt and rubber, and what was painted anew.
 
     Kinds of markings are told apart by masks of 0 or 1, since nodes of materials know no branches.
 
@@ -341,7 +375,22 @@ def paint_look(m: Calculus, place: PavementPlace, wear: Wear) -> Look:
     short_variation = _slow(m, place, strip.owner, wear.seed + 1.0, _CHANGES)
     is_known = 1.0 - m.below(strip.owner, 0.5)
     film_loss = traffic_wear * (1.0 + _PATCHY * long_variation + _PATCHY * short_variation) * is_known
-    return Look(brightness=1.0 + is_known * _FILM_MEAN - film_loss * _FILM_DARKER, roughness=film_loss * _FILM_ROUGHER)
+    is_renewed = _share_of_lengths(m, place, strip.owner, _RENEWAL, wear.seed + 3.0, wear.renewed) * is_known
+    is_black = _share_of_lengths(m, place, strip.owner, _MARK, wear.seed + 4.0, wear.rubber * traffic_wear) * is_known
+    dirt_variation = _slow(m, place, strip.owner, wear.seed + 5.0)
+    dirt = m.smaller(wear.dirt * (1.0 + dirt_variation) * is_known, 1.0)
+    film = 1.0 + is_known * _FILM_MEAN - film_loss * _FILM_DARKER
+    old_brightness = film * (1.0 - dirt) * (1.0 - is_black * _RUBBER_DARKER)
+    return Look(
+        brightness=old_brightness * (1.0 - is_renewed) + is_renewed * (1.0 + _NEW_FILM),
+        roughness=film_loss * _FILM_ROUGHER * (1.0 - is_renewed),
+    )
+
+
+def _share_of_lengths(m: Calculus, place: PavementPlace, owner: Any, length: float, seed: Any, share: Any) -> Any:
+    """Return 1 on a share of an owner's pieces of a length (m), drawn at random, else 0."""
+    piece = m.floor(place.station * (1.0 / length))
+    return m.below(_signed_hash(m, owner, piece, seed) * 0.5 + 0.5, share)
 
 
 class ArrayCalculus:
@@ -367,7 +416,7 @@ class ArrayCalculus:
         """Return the larger of two."""
         return np.maximum(value, other)
 
-    def below(self, value: Float, limit: float) -> Float:
+    def below(self, value: Float, limit: Float | float) -> Float:
         """Return 1 where values are below a limit, else 0."""
         return np.asarray(value < limit, dtype=np.float64)
 

@@ -35,7 +35,7 @@ LAYERS = ("base_color", "roughness", "metallic", "specular")
 
 @pytest.mark.slow
 @pytest.mark.skipif(not HAS_RETURN_CAMERA, reason="Blender < 5")
-@pytest.mark.parametrize("scenario", ["rq31-600m", "mobile-mapping-300m", "tripod-200m"])
+@pytest.mark.parametrize("scenario", ["rq31-600m-even", "mobile-mapping-300m-even", "tripod-200m-even"])
 def test_they_are_those_of_a_pixel_per_return(scenario: str) -> None:
     # For a pixel per return shadows of what drives stay where they were when the scan began: here nothing does.
     standing = "scan.traffic_speed_factor=0"
@@ -48,7 +48,7 @@ def test_they_are_those_of_a_pixel_per_return(scenario: str) -> None:
 def test_every_blender_gives_the_same() -> None:
     """The record is of one Blender, and all are compared with it."""
     empty_file()
-    scenario = load_scenario("rq31-600m", [*ROAD, 'outputs=["cloud"]'])
+    scenario = load_scenario("rq31-600m-even", [*ROAD, 'outputs=["cloud"]'])
     shown = RoadScene.of(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
     shown.build()
     plan = shown.plan()

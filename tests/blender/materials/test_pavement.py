@@ -11,7 +11,7 @@ import pytest
 from synthroads_addon.base.arrays import Float
 from synthroads_addon.blender.casters.embree import EmbreeCaster
 from synthroads_addon.blender.materials import RoadMaterials, material
-from synthroads_addon.blender.materials.pavement import AGE, ATTRIBUTE, SHAPE, look_group
+from synthroads_addon.blender.materials.pavement import AGE, ATTRIBUTE, SHAPE, WEAR_INPUTS, look_group
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things.model_builder import BuildRequest
@@ -51,7 +51,7 @@ PLACES = 100_000
 
 @pytest.mark.parametrize("kind", ["asphalt", "concrete", "paint"])
 def test_nodes_and_arrays_give_the_same_field(kind: str) -> None:
-    rng, wear, slab = np.random.default_rng(7), Wear(0.5, 4711.0), 4.5
+    rng, wear, slab = np.random.default_rng(7), Wear(0.5, 4711.0, 0.3, 0.2, 0.4), 4.5
     code = place_code(rng.integers(0, 28, PLACES), rng.integers(0, 2, PLACES), 1.75)
     across = rng.uniform(-2.5, 2.5, PLACES)
     values = np.zeros((PLACES, 4), np.float32)
@@ -92,7 +92,7 @@ def _probe(kind: str, wear: Wear, outputs: dict[str, str]) -> bpy.types.Material
     nodes.clear()
     group = nodes.new("ShaderNodeGroup")
     group.node_tree = look_group(kind)
-    for name, value in zip(("Polish", "Seed"), wear, strict=True):
+    for name, value in zip(WEAR_INPUTS, wear, strict=True):
         if name in group.inputs:
             group.inputs[name].default_value = value
     for name, entry in ((ATTRIBUTE, "Place"), (SHAPE, "Shape"), (AGE, "Age")):
@@ -162,6 +162,52 @@ def test_lines_that_lane_changes_cross_are_more_worn_than_those_beside_the_lanes
         assert not len(station) or (station.min() < 9.0 and station.max() > 49.0)
     assert brightness[PAINT_CROSSED].mean() < brightness[PAINT_BESIDE].mean() - 0.1
     assert brightness[PAINT_CROSSED].mean() < brightness[PAINT_IN_LANE].mean() < brightness[PAINT_BESIDE].mean()
+
+
+def _line_brightness(kind: int, **changes: float) -> np.ndarray:
+    """Return the factors on a marking's brightness, every 0.5 m of a line of 60 km."""
+    station = np.arange(0.25, 60_000.0, 0.5)
+    place = PavementPlace(station, np.zeros(len(station)), np.full(len(station), place_code(kind, 1)))
+    return np.asarray(paint_look(ArrayCalculus(), place, Wear(0.0, 7.0)._replace(**changes)).brightness)
+
+
+def test_lines_painted_anew_are_so_on_the_given_share_of_stretches_and_are_brighter() -> None:
+    usual, renewed = (_line_brightness(PAINT_CROSSED, renewed=share) for share in (0.0, 0.3))
+    is_new = np.abs(renewed - usual) > 1e-9
+    assert np.mean(is_new) == pytest.approx(0.3, abs=0.06)
+    assert renewed[is_new].min() > usual.max(), "a new film is brighter than any old one"
+    assert np.ptp(renewed[is_new]) < 1e-9, "neither worn nor dirty"
+    assert np.allclose((np.flatnonzero(np.diff(is_new)) + 1) * 0.5 % 120.0, 0.0), "in stretches, not in spots"
+
+
+def test_dirt_takes_its_share_of_the_brightness_in_stretches() -> None:
+    usual, dirty = (_line_brightness(PAINT_BESIDE, dirt=share) for share in (0.0, 0.2))
+    taken = 1.0 - dirty / usual
+    assert taken.mean() == pytest.approx(0.2, abs=0.01)
+    assert taken.min() < 0.08
+    assert taken.max() > 0.32
+    assert np.abs(np.diff(taken)).max() < 0.02, "smooth along the line"
+    spotless = _line_brightness(PAINT_BESIDE, dirt=0.2, renewed=1.0)
+    assert spotless == pytest.approx(np.full(len(spotless), spotless[0])), "new lines are clean"
+
+
+def test_rubber_blackens_lines_that_tyres_cross_more_than_those_beside_the_lanes() -> None:
+    black = {}
+    for kind in (PAINT_CROSSED, PAINT_BESIDE):
+        usual, marked = (_line_brightness(kind, rubber=share) for share in (0.0, 0.2))
+        is_black = marked < usual - 1e-9
+        assert np.allclose(marked[is_black] / usual[is_black], marked[is_black][0] / usual[is_black][0])
+        black[kind] = np.mean(is_black)
+    assert black[PAINT_CROSSED] == pytest.approx(0.2, abs=0.03)
+    assert black[PAINT_BESIDE] == pytest.approx(0.04, abs=0.01)
+
+
+def test_a_road_s_paint_is_as_new_dirty_and_black_as_its_parameters_say() -> None:
+    variation = MaterialVariation(paint_renewed=0.4, paint_dirt=0.1, paint_rubber=0.05)
+    item = RoadMaterials(variation, Environment(), 3.0).material("paint_white")
+    group = next(node for node in item.node_tree.nodes if node.type == "GROUP")
+    found = [group.inputs[name].default_value for name in ("Seed", "Renewed", "Dirt", "Rubber")]
+    assert found == pytest.approx([3.0, 0.4, 0.1, 0.05])
 
 
 def test_a_road_has_its_own_polish_and_seed() -> None:

@@ -71,7 +71,7 @@ class Built:
 
 
 def demo_parameters(**changes: Any) -> RoadParameters:
-    scenario = load_scenario("rq31-600m")
+    scenario = load_scenario("rq31-600m-even")
     return sample_road(scenario.road.model_copy(update=changes), scenario.seed)
 
 

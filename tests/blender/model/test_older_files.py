@@ -28,7 +28,7 @@ FIELDS = {"Dash Length": "Dash", "Gap Length": "Gap"}
 
 
 def short_road() -> RoadParameters:
-    scenario = load_scenario("rq31-600m")
+    scenario = load_scenario("rq31-600m-even")
     return sample_road(scenario.road.model_copy(update={"length": 40.0}), scenario.seed)
 
 

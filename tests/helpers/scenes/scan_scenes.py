@@ -99,7 +99,7 @@ def plane(size: float = 5000.0, slope: tuple[float, float] = (0.0, 0.0)) -> Scen
 
 
 def scan_of(mesh: SceneMesh, rays: int = 1, path: Standing | None = None, moving=(), **changes) -> ScanPlan:
-    setting = scanner_setting(load_scenario("rq31-600m").scan)
+    setting = scanner_setting(load_scenario("rq31-600m-even").scan)
     setting = replace(setting, **{"range_sigma": 0.0, "threshold": 0.0, "saturation": np.inf, **changes})
     surfaces = surfaces_of(materials()[name] for name in mesh.materials)
     target = Target(ScannedScene(mesh, tuple(moving)), BruteForce)

@@ -19,7 +19,7 @@ from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.roads.furnished_data import road_data
 
 PARTS = ("road", "terrain", "guardrails", "signs", "delineators", "vehicles")
-SCENARIO = load_scenario("rq31-600m", ["fidelity=draft"])
+SCENARIO = load_scenario("rq31-600m-even", ["fidelity=draft"])
 TOLERANCE = SCENARIO.settings().tolerance
 OBJECTS: dict[str, dict[str, Any]] = {
     "rail-left": {"type": "Guardrail", "start_station": 5.0, "end_station": 30.0, "offset": 14.9, "faces": "right"},

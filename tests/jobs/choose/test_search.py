@@ -47,7 +47,7 @@ SMALL = (
 
 
 def report_of(folder: Path, *changes: str) -> dict[str, Any]:
-    job = Job(load_scenario("rq31-600m", [*SMALL, *changes]), folder, overwrite=True, new_file=True)
+    job = Job(load_scenario("rq31-600m-even", [*SMALL, *changes]), folder, overwrite=True, new_file=True)
     return generate(job)
 
 
@@ -167,9 +167,9 @@ def scenes() -> dict[str, list[str]]:
     uav += ["scan.field_of_view_deg=360"]
     return {
         "every-class-1500m": uav,
-        "rq31-600m": [*uav, "scan.platform.height=100", "road.trees_per_hectare=80", "road.grass_density=0.5"],
-        "mobile-mapping-300m": ["road.length=150", "road.half_width=25"],
-        "tripod-200m": ["road.length=100", "road.half_width=30", "road.grass_density=0.2"],
+        "rq31-600m-even": [*uav, "scan.platform.height=100", "road.trees_per_hectare=80", "road.grass_density=0.5"],
+        "mobile-mapping-300m-even": ["road.length=150", "road.half_width=25"],
+        "tripod-200m-even": ["road.length=100", "road.half_width=30", "road.grass_density=0.2"],
         "airborne-1000m-even": ["road.length=300", "road.half_width=60"],
     }
 

@@ -33,7 +33,7 @@ pytestmark = pytest.mark.any_blender
 @pytest.fixture
 def kept(tmp_path: Path) -> Path:
     """Return the file of a kept scene: a level plane, above which 20 m of a road's path are flown."""
-    scenario = load_scenario("rq31-600m", ["road.length=20", "scan.platform.speed=40", *SETTINGS])
+    scenario = load_scenario("rq31-600m-even", ["road.length=20", "scan.platform.speed=40", *SETTINGS])
     scene = ScannedScene(plane(200.0))
     rows = {name: materials()[name] for name in scene.static.materials}
     path = tmp_path / "scene.pickle"

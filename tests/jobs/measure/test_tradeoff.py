@@ -33,7 +33,7 @@ def small_scenario(folder: Path, *more: str) -> Path:
     changes += [f"scan.device={sparse_scanner(folder, 40.0)}", "scan.pulse_rate_khz=40", "scan.field_of_view_deg=60"]
     changes += ["colour.ground_sampling_distance=0.3", *more]
     path = folder / "small.json"
-    path.write_text(canonical_json(load_scenario("rq31-600m", changes).to_dict()))
+    path.write_text(canonical_json(load_scenario("rq31-600m-even", changes).to_dict()))
     return path
 
 
@@ -91,9 +91,9 @@ def test_a_document_gets_the_tables_of_which_all_knobs_are_measured(
         "headless.tradeoff._measured_once", lambda scene, knob, value: costs | {"knob": knob, "value": value}
     )
     monkeypatch.setattr("headless.tradeoff_plot.plot", lambda rows, path: path.write_bytes(b""))
-    document, other = tmp_path / "page.md", "<!-- table: tradeoff rq31-600m points -->\nolder\n<!-- end of table -->\n"
-    document.write_text(other + "<!-- table: tradeoff rq31-600m light -->\n<!-- end of table -->\n")
-    words = ["--scenario", "rq31-600m", "--output", str(tmp_path / "out"), "--knobs", "samples"]
+    document, other = tmp_path / "page.md", "<!-- table: tradeoff rq31-600m-even points -->\nolder\n<!-- end of table -->\n"
+    document.write_text(other + "<!-- table: tradeoff rq31-600m-even light -->\n<!-- end of table -->\n")
+    words = ["--scenario", "rq31-600m-even", "--output", str(tmp_path / "out"), "--knobs", "samples"]
     assert commands.command("tradeoff", [*words, "--document", str(document)]) == 0
     assert document.read_text().startswith(other)
     assert "--knobs samples --output DIR`" in document.read_text()

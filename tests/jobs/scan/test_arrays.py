@@ -30,7 +30,7 @@ STEPS = {"xyz": 1e-3, "scan_angle_deg": 0.006} | {
 
 
 def scenario(*changes: str) -> Scenario:
-    return load_scenario("rq31-600m", [*SMALL, *changes])
+    return load_scenario("rq31-600m-even", [*SMALL, *changes])
 
 
 def read(path: Path) -> PointBlock:

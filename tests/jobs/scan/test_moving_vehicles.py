@@ -232,7 +232,7 @@ class TestWhatMoves:
         """It is one more vehicle of the road as edited: on the lane that it was put on."""
         parameters = RoadParameters.from_dict(road_data({"a": vehicle("car", "right", 0, 100.0, (0.5, 0.5, 0.5))}))
         root = build_road(BuildRequest(parameters, 0.01, 0.0, {"road", "vehicles"})).root
-        remember(root, parameters, load_scenario("rq31-600m"), "")
+        remember(root, parameters, load_scenario("rq31-600m-even"), "")
         copy = bpy.data.objects["a"].copy()
         bpy.context.scene.collection.objects.link(copy)
         here, ahead = RoadGeometry(parameters).alignment.position(np.array([100.0, 130.0]))
@@ -352,7 +352,7 @@ def on_mesh(mesh: SceneMesh, points: Float) -> Float:
 
 def scanned(scene: ScannedScene, geometry: RoadGeometry, *changes: str) -> PointBlock:
     options = ["scan.noise.range_sigma=0", "scan.rays_per_pulse=1", 'cloud.attributes=["noise_free"]', "scan.threads=1"]
-    scenario = load_scenario("rq31-600m", [*options, *changes])
+    scenario = load_scenario("rq31-600m-even", [*options, *changes])
     scan = plan_scan(Survey(scenario, ScenarioInputs.read(scenario), BlenderServices()), scene, _Drone(geometry))
     # What a pulse meets behind a window is a return of its own, and no return lies between two surfaces.
     scan = altered(scan, setting=replace(scan.setting, range_resolution=0.0))

@@ -24,13 +24,13 @@ pytestmark = [pytest.mark.any_blender, pytest.mark.slow]
 COMMON = ('outputs=["cloud"]', "scan.noise.range_sigma=0")
 SCENES: dict[str, tuple[str, tuple[str, ...], float]] = {
     "leaves": (
-        "rq31-600m",
+        "rq31-600m-even",
         ("road.length=60", "road.half_width=35", "road.trees_per_hectare=250", "scan.footprints=full"),
         0.25,
     ),
-    "spared": ("rq31-600m", ("road.length=60", "road.half_width=35", "scan.footprints=where_needed"), 0.3),
+    "spared": ("rq31-600m-even", ("road.length=60", "road.half_width=35", "scan.footprints=where_needed"), 0.3),
     "vehicles, mirrors, rain": (
-        "mobile-mapping-300m",
+        "mobile-mapping-300m-even",
         (
             "road.length=120",
             "road.vehicles.per_km.minimum=60",
@@ -42,7 +42,7 @@ SCENES: dict[str, tuple[str, tuple[str, ...], float]] = {
         ),
         0.04,
     ),
-    "cylindrical beam": ("tripod-200m", ("road.length=100", "scan.beam=cylindrical", "scan.rays_per_pulse=7"), 0.4),
+    "cylindrical beam": ("tripod-200m-even", ("road.length=100", "scan.beam=cylindrical", "scan.rays_per_pulse=7"), 0.4),
     "one ray": ("airborne-1000m-even", ("road.length=150", "road.half_width=60", "scan.rays_per_pulse=1"), 0.3),
 }
 """Scenarios, what changes in them, and the duration of each of the stretches that are scanned, s."""

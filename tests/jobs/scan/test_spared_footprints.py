@@ -35,12 +35,12 @@ COMMON = (
     "road.environment.bad_weather=0",
 )
 SCENES: dict[str, tuple[str, tuple[str, ...], float]] = {
-    "uav": ("rq31-600m", ("road.length=80", "road.half_width=40"), 0.05),
-    "mobile": ("mobile-mapping-300m", ("road.length=120",), 0.04),
+    "uav": ("rq31-600m-even", ("road.length=80", "road.half_width=40"), 0.05),
+    "mobile": ("mobile-mapping-300m-even", ("road.length=120",), 0.04),
     "airborne": ("airborne-1000m-even", ("road.length=150", "road.half_width=60"), 0.03),
-    "tripod": ("tripod-200m", ("road.length=100",), 0.2),
+    "tripod": ("tripod-200m-even", ("road.length=100",), 0.2),
     "dense plants": (
-        "rq31-600m",
+        "rq31-600m-even",
         (
             "road.length=60",
             "road.half_width=35",

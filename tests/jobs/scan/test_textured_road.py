@@ -18,7 +18,14 @@ from synthroads_addon.materials.variation import WET_BASE, WET_ROUGHNESS
 from synthroads_addon.road.damage import DAMAGES
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
-from synthroads_addon.road.pavement.field import ArrayCalculus, Look, Wear, asphalt_look
+from synthroads_addon.road.pavement.field import (
+    PATCH,
+    ArrayCalculus,
+    PavementPlace,
+    Wear,
+    asphalt_look,
+    damage_code,
+)
 from synthroads_addon.road.pavement.places import pavement_places
 from synthroads_addon.road.pavement.surface import PavementSurface
 from synthroads_addon.scanning.record import CollectedBlocks, record
@@ -91,7 +98,9 @@ def test_points_have_the_images_values_at_their_station_and_offset(tmp_path: Pat
     seed = float(stream(parameters.metadata.seed, "pavement look").integers(1 << 16))
     wear = Wear(parameters.materials.wheel_track_polish, seed)
     look = asphalt_look(ArrayCalculus(), pavement_places(geometry.sections["right"], station, offset), wear)
-    of_patch = Look(0.72 + 0.36 * 0.5, 0.06 - 0.1 * 0.5)
+    of_patch = asphalt_look(
+        ArrayCalculus(), PavementPlace(np.zeros(1), np.zeros(1), np.full(1, damage_code(PATCH, 0.5))), wear
+    )
     wet = parameters.environment.wetness
     assert wet > 0.1
     darker, smoother = 1.0 - WET_BASE * wet, 1.0 - WET_ROUGHNESS * wet

@@ -59,7 +59,7 @@ def parameters(
         horizontal=tuple(HorizontalElement.between(*row) for row in elements),
         vertical=tuple(VerticalPoint(station=s, elevation=z, radius=r) for s, z, r in vertical),
     )
-    scenario = load_scenario("rq31-600m").road.model_copy(update={"length": sum(row[0] for row in elements)})
+    scenario = load_scenario("rq31-600m-even").road.model_copy(update={"length": sum(row[0] for row in elements)})
     return sample_road(scenario, 1, "", axis)
 
 
@@ -69,7 +69,7 @@ def road(elements=WINDING, vertical=HILLY) -> RoadGuide:
 
 @cache
 def sampled_road(length: float) -> RoadGuide:
-    return RoadGuide(RoadGeometry(sample_road(load_scenario("rq31-600m", [f"road.length={length}"]).road, 1)))
+    return RoadGuide(RoadGeometry(sample_road(load_scenario("rq31-600m-even", [f"road.length={length}"]).road, 1)))
 
 
 def path_of(guide=None, **platform) -> MovingPath | TripodPath:

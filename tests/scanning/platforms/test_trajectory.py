@@ -61,7 +61,7 @@ def attitudes(rows: np.ndarray) -> Rotation:
 
 def test_no_pulse_leaves_after_the_trajectory_has_ended(tmp_path: Path) -> None:
     """Of a flight that is shorter than a line only the pulses within it; longer ones have whole lines as ever."""
-    setting = scanner_setting(load_scenario("rq31-600m").scan)
+    setting = scanner_setting(load_scenario("rq31-600m-even").scan)
     line = 1.0 / setting.lines_per_second
     for duration, count in ((1e-9, 1), (0.3 * line, None), (line, setting.pulses_per_line)):
         path = trajectory(tmp_path, rows_of(np.array([0.0, duration])))
@@ -74,7 +74,7 @@ def test_no_pulse_leaves_after_the_trajectory_has_ended(tmp_path: Path) -> None:
 
 
 def test_the_blocks_of_a_flight_of_thirty_years_are_counted_and_not_listed(tmp_path: Path) -> None:
-    setting = scanner_setting(load_scenario("rq31-600m").scan)
+    setting = scanner_setting(load_scenario("rq31-600m-even").scan)
     rows = rows_of(np.array([0.0, 1.0]))
     rows[1, 0] = 1e9
     path = trajectory(tmp_path, rows)

@@ -153,7 +153,7 @@ def test_what_is_refused_says_where_and_what_is_allowed(case: str) -> None:
 
 @pytest.mark.parametrize("changes", [["condition=rain", "rate_mm_h=5"], ["condition=fog"], ["visibility=300"]])
 def test_changes_reach_the_fields_of_a_weather(changes: list[str]) -> None:
-    weather = load_scenario("rq31-600m", [f"scan.weather.{change}" for change in changes]).scan.weather
+    weather = load_scenario("rq31-600m-even", [f"scan.weather.{change}" for change in changes]).scan.weather
     wanted = {"condition": "clear"} | dict(change.split("=") for change in changes)
     if wanted["condition"] != "clear":
         wanted["echoes"] = "False"
