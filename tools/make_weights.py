@@ -12,73 +12,110 @@ import shlex
 import subprocess
 import sys
 import time
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import laspy
+import numpy as np
 import torch
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from ml.cards import WEIGHTS, Domain, Figure, ModelCard  # noqa: E402
+from ml.data.points import GROUND_CLASSES, ROAD_CLASSES  # noqa: E402
 from ml.runs import METRICS, Run  # noqa: E402
 from ml.shipped import ship  # noqa: E402
 from synthroads_addon.base.files import write_file  # noqa: E402
 from synthroads_addon.base.schema import canonical_json, read_json  # noqa: E402
+from synthroads_addon.cloud.formats.registry import open_cloud  # noqa: E402
 from synthroads_addon.dataset.manifest import MANIFEST, read_manifest  # noqa: E402
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis  # noqa: E402
 
 REAL = "a real scan"
 """How the names of figures on clouds of others call them."""
+ROAD_AGAINST_VERGE = {
+    "title": "Road, markings included, against everything beside it, by the offset from the road's axis",
+    "classes": {"0": "verge", "1": "road"},
+    "groups": {"road": ["road", "road_marking"], "verge": ["ground", "vegetation", "road_furniture"]},
+}
+"""Mapping of the classes of a cloud without labels, beside which an axis lies."""
 RULES = ("views", "skeleton", "middle of", "between the", "centroid")
 """Beginnings of the names of what learns nothing in `synthroads evaluate`'s tables."""
 
 
 @dataclass(frozen=True)
-class Plan:
+class Training:
+    """One training: a configuration, its changes, and what it learns from.
+
+    Attributes:
+        configuration, changes: of the training.
+        splits: of the data set, that it learns from.
+    """
+
+    configuration: str
+    changes: tuple[str, ...]
+    splits: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Plan(Training):
     """Plan of one shipped model.
 
     Attributes:
         title, task: of its card.
-        configuration, changes: of the training.
-        splits: of the data set, that it learns from.
         domain: what it is good for.
         limits: where it fails.
         inside, outside: splits of the recipe's roads that it is measured on, by how the figures call them: roads of the
             kinds that it has learned, and others.
         mapping: real cloud's name in the folder of real ones -> mapping of its classes; of centrelines axes lie beside.
+        paved: real cloud's name -> smallest and largest offset of each pavement from the axis beside it, m.
+        strips: splits whose roads are measured once more as strips of `STRIP` m to both sides of the axis, ground only.
+        first: training that this one continues from, out of `FIRST`; None for random weights.
     """
 
     title: str
     task: Any
-    configuration: str
-    changes: tuple[str, ...]
-    splits: tuple[str, ...]
     domain: Domain
     limits: tuple[str, ...]
     inside: dict[str, str]
     outside: dict[str, str]
     mapping: dict[str, str | None] = field(default_factory=dict)
+    paved: dict[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
+    strips: tuple[str, ...] = ()
+    first: str | None = None
 
 
 RECIPE = "package-models"
 """Data set that all of them learn from."""
+FIRST = {
+    "segmentation-first": Training(
+        "segmentation-any-scanner",
+        ("schedule.epochs=36", "batch=8", "threads=1", "workers=3", "prepare_on=cpu"),
+        ("train", "train_sweeps"),
+    ),
+}
+"""Trainings that plans continue from, made once for all of them."""
+STRIP = 11.0
+"""How far strips reach to both sides of an axis, m: as published airborne clouds of roads do."""
 PLANS = {
     "centerline-airborne": Plan(
-        "Centreline of roads with one or two carriageways, seen from the air, ten slices at a time",
-        "centerline",
-        "centerline-transformer",
-        ("schedule.epochs=32", "slices.truth=either", "data.calibration_split=held_out", "threads=1", "workers=2"),
-        ("train",),
-        Domain(density=(8.0, 60.0), platforms=("airborne", "uav"), needs=("intensity",)),
-        (
+        configuration="centerline-transformer",
+        changes=("schedule.epochs=32", "slices.truth=either", "data.calibration_split=held_out", "threads=1", "workers=2"),
+        splits=("train",),
+        title="Centreline of roads with one or two carriageways, seen from the air, ten slices at a time",
+        task="centerline",
+        domain=Domain(density=(8.0, 60.0), platforms=("airborne", "uav"), needs=("intensity",)),
+        limits=(
             "Roads in towns, with islands, tracks or cycle paths beside, it hasn't seen.",
             "Strips cut off within the pavement, and roads without markings, it knows from augmentation alone.",
             "Only ground is looked at: plants and vehicles must be told from it before.",
         ),
-        {"test": "its own test roads"},
-        {"held_out": "synthetic roads of another world"},
-        {
+        inside={"test": "its own test roads"},
+        outside={"held_out": "synthetic roads of another world"},
+        mapping={
             "als_rural2lane_t211-278.laz": None,
             "als_rural2lane_t000-075.laz": None,
             "als_dual4lane_t338-369.laz": None,
@@ -86,40 +123,68 @@ PLANS = {
         },
     ),
     "segmentation-overhead": Plan(
-        "Five classes on and beside roads, from the air and from UAVs",
-        "segmentation",
-        "segmentation-any-scanner",
-        ("schedule.epochs=36", "batch=8", "threads=1", "workers=3", "prepare_on=cpu"),
-        ("train", "train_sweeps"),
-        Domain(density=(8.0, 1500.0), platforms=("airborne", "uav")),
-        (
+        configuration="segmentation-strips",
+        changes=("threads=1", "prepare_on=cpu"),
+        splits=("train", "train_medians"),
+        title="Five classes on and beside roads, from the air and from UAVs, whole scenes and strips along the road",
+        task="segmentation",
+        domain=Domain(density=(8.0, 1500.0), platforms=("airborne", "uav")),
+        limits=(
             "Buildings, rails, water and furniture of streets are none of its classes: they become one of the five.",
             "Plants beside synthetic roads are of few kinds; hedges along a pavement may be taken for road furniture.",
         ),
-        {"test": "its own test roads"},
-        {"held_out": "synthetic roads of another world"},
-        {"ign_lidarhd_street.laz": "ign"},
+        inside={"test": "its own test roads", "test_medians": "its own roads with wide and narrow medians"},
+        outside={"held_out": "synthetic roads of another world"},
+        mapping={"ign_lidarhd_street.laz": "ign"},
+        # Read off the profiles of intensity and height across each road.
+        paved={
+            "als_dual4lane_t338-369.laz": ((-10.9, -3.4), (3.3, 10.9)),
+            "als_dual6lane_t370-473.laz": ((-10.9, -3.6), (3.6, 10.9)),
+            "als_rural2lane_t000-075.laz": ((-2.3, 2.3),),
+            "als_rural2lane_t211-278.laz": ((-3.2, 3.4),),
+        },
+        strips=("test_medians",),
+        first="segmentation-first",
     ),
     "segmentation-sweeps": Plan(
-        "Five classes on and beside roads, in single sweeps of a car's head",
-        "segmentation",
-        "segmentation-any-scanner",
-        (
+        configuration="segmentation-any-scanner",
+        changes=(
             # Of three seeds the best on sweeps of its own.
             *("seed=1", "schedule.epochs=64", "batch=6", "crop_points=12000", "crops_per_tile=3"),
             # Balanced crops hold rare classes often already: with weights as well they are found where they aren't.
             *("class_weights=0", "fitted_offsets=true", "threads=1", "workers=2", "prepare_on=cpu"),
         ),
-        ("train_sweeps",),
-        Domain(density=(5.0, 15.0), platforms=("sweep",)),
-        (
+        splits=("train_sweeps",),
+        title="Five classes on and beside roads, in single sweeps of a car's head",
+        task="segmentation",
+        domain=Domain(density=(5.0, 15.0), platforms=("sweep",)),
+        limits=(
             "Three trainings that differ in their seed alone differ by up to nine points on one real sweep.",
             "Sidewalks and kerbs it has never seen: in towns road and ground are taken for one another.",
             "Markings are found where the intensity tells them, which in sweeps of cars' heads it hardly does.",
         ),
-        {"test_sweeps": "sweeps of its own"},
-        {},
-        {"semkitti_seq00_000000.laz": "semantickitti"},
+        inside={"test_sweeps": "sweeps of its own"},
+        outside={},
+        mapping={"semkitti_seq00_000000.laz": "semantickitti"},
+    ),
+    "segmentation-terrestrial": Plan(
+        configuration="segmentation-terrestrial",
+        changes=("threads=1", "prepare_on=cpu"),
+        splits=("train_mobile", "train_tripod"),
+        title="Five classes on and beside roads, in whole drives of mobile scanners and from tripods",
+        task="segmentation",
+        domain=Domain(density=(30.0, 5000.0), platforms=("mobile", "tripod")),
+        limits=(
+            "It was measured on synthetic clouds only: no labelled real cloud of a vehicle's drive or a tripod was there.",
+            "Buildings, rails, water and furniture of streets are none of its classes: they become one of the five.",
+            "Sidewalks and kerbs it has never seen: in towns road and ground are taken for one another.",
+        ),
+        inside={"test_mobile": "its own test drives", "test_tripod": "its own tripods"},
+        outside={
+            "held_out_mobile": "drives with heads that it hasn't met",
+            "held_out_tripod": "tripods with a scanner that it hasn't met",
+        },
+        first="segmentation-first",
     ),
 }
 
@@ -142,11 +207,22 @@ def main() -> None:
 def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
     """Make one model: its data set, training, figures, weights and card."""
     data_folder, folder = arguments.work / RECIPE, arguments.work / name
-    run_command(
-        "dataset", RECIPE, "--output", str(data_folder), "--jobs", str(arguments.jobs), *resumption(data_folder)
-    )
-    options = [word for change in (*plan.changes, *data_changes(plan, data_folder)) for word in ("--set", change)]
-    minutes, machine = train(plan, folder, options)
+    first = FIRST[plan.first] if plan.first else None
+    splits = needed_splits(plan)
+    make_scenes = (RECIPE, "--output", str(data_folder), "--splits", *splits)
+    run_command("dataset", *make_scenes, "--jobs", str(arguments.jobs), *resumption(data_folder))
+    commands = [f"synthroads dataset {shlex.join(make_scenes)}"]
+    minutes, epochs, machines = 0.0, 0, []
+    trainings = [(first, arguments.work / str(plan.first), ())] if first else []
+    trainings.append((plan, folder, (f"start={arguments.work / plan.first}",) if plan.first else ()))
+    for training, run_folder, start in trainings:
+        changes = (*training.changes, *start, *data_changes(training, data_folder))
+        options = [word for change in changes for word in ("--set", change)]
+        training_minutes, machine = train(training, run_folder, options)
+        minutes += training_minutes
+        epochs += Run.open(run_folder).configuration.schedule.epochs
+        machines += [] if machine in machines else [machine]
+        commands.append(f"synthroads train {training.configuration} --output {run_folder} {shlex.join(options)}")
     run: Run[Any] = Run.open(folder)
     figures = [
         *(
@@ -159,6 +235,7 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
             for split, place_text in plan.outside.items()
             for figure in measured(plan, name, split, place_text, arguments)
         ),
+        *(figure for split in plan.strips for figure in measured_strips(name, split, arguments)),
         *foreign(plan, name, folder, arguments),
     ]
     arguments.weights.mkdir(parents=True, exist_ok=True)
@@ -168,16 +245,13 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
         title=plan.title,
         task=plan.task,
         domain=plan.domain,
-        recipe=(
-            f"synthroads dataset {RECIPE} --output {data_folder}",
-            f"synthroads train {plan.configuration} --output {folder} {shlex.join(options)}",
-        ),
+        recipe=tuple(commands),
         commit=commit(),
         seed=run.configuration.seed,
-        scenes=training_roads(plan, data_folder),
-        epochs=run.configuration.schedule.epochs,
+        scenes=training_roads({*plan.splits, *(first.splits if first else ())}, data_folder),
+        epochs=epochs,
         minutes=round(minutes, 1),
-        machine=machine,
+        machine=" and ".join(machines),
         parameters=int(read_json(folder / "metrics.json")["parameters"]),
         figures=tuple(figures),
         limits=plan.limits,
@@ -186,12 +260,20 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
     write_file(arguments.weights / f"{name}.md", card_text(card).encode(), overwrite=True)
 
 
+def needed_splits(plan: Plan) -> list[str]:
+    """Return the splits of the data set that a model is trained and measured on, sorted."""
+    first_splits = FIRST[plan.first].splits if plan.first else ()
+    # Centrelines are validated after each epoch.
+    validation = ("validation",) if plan.task == "centerline" else ()
+    return sorted({*plan.splits, *first_splits, *plan.inside, *plan.outside, *validation})
+
+
 def resumption(data: Path) -> list[str]:
     """Return the option by which a data set that was begun is gone on with."""
     return ["--resume"] if (data / MANIFEST).is_file() else []
 
 
-def train(plan: Plan, folder: Path, options: list[str]) -> tuple[float, str]:
+def train(training: Training, folder: Path, options: list[str]) -> tuple[float, str]:
     """Train a model to its end unless it is; return the minutes that all of it took so far, and on what.
 
     On a GPU that is time by the clock, else processor time.
@@ -202,7 +284,7 @@ def train(plan: Plan, folder: Path, options: list[str]) -> tuple[float, str]:
     if not (folder / METRICS).is_file():
         graphics = torch.cuda.get_device_name() if torch.cuda.is_available() else None
         begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.perf_counter()
-        run_command("train", plan.configuration, "--output", str(folder), "--resume", *options)
+        run_command("train", training.configuration, "--output", str(folder), "--resume", *options)
         end = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.perf_counter()
         minutes += (end[1] - begin[1] if graphics else end[0] - begin[0]) / 60.0
         machine = graphics or "one core"
@@ -210,16 +292,16 @@ def train(plan: Plan, folder: Path, options: list[str]) -> tuple[float, str]:
     return minutes, machine
 
 
-def training_roads(plan: Plan, data: Path) -> int:
+def training_roads(splits: Collection[str], data: Path) -> int:
     """Return the number of a data set's roads that a model learns from."""
-    return sum(1 for scene in read_manifest(data).scenes if scene.status == "done" and scene.split in plan.splits)
+    return sum(1 for scene in read_manifest(data).scenes if scene.status == "done" and scene.split in splits)
 
 
-def data_changes(plan: Plan, data: Path) -> list[str]:
+def data_changes(training: Training, data: Path) -> list[str]:
     """Return the changes of a configuration that have it learn from a data set's folder."""
-    if plan.task == "centerline":
+    if training.configuration.startswith("centerline"):
         return [f"data.data_sets={json.dumps([str(data)])}"]
-    sources = [{"path": str(data), "split": split} for split in plan.splits]
+    sources = [{"path": str(data), "split": split} for split in training.splits]
     return [f"data.synthetic={json.dumps(sources)}"]
 
 
@@ -241,7 +323,55 @@ def foreign(plan: Plan, name: str, folder: Path, arguments: argparse.Namespace) 
         words = [str(arguments.real / cloud), *(["--mapping", mapping] if mapping else [])]
         scores = evaluate(folder, words, arguments.work / f"{name}-scores" / Path(cloud).stem)
         figures += figures_of(plan, scores, f"{REAL}, {Path(cloud).stem}", is_inside=False)
+    for cloud, paved in plan.paved.items():
+        stem = Path(cloud).stem
+        mapping_file = arguments.work / f"{name}-scores" / f"{stem}-paved.json"
+        mapping_data = {**ROAD_AGAINST_VERGE, "axis": f"{stem}_axis.csv", "paved": paved}
+        write_file(mapping_file, canonical_json(mapping_data).encode(), overwrite=True)
+        words = [str(arguments.real / cloud), "--mapping", str(mapping_file)]
+        scores = evaluate(folder, words, arguments.work / f"{name}-scores" / stem)
+        figures += road_figures(scores, f"{REAL}, {stem}")
     return figures
+
+
+def measured_strips(name: str, split: str, arguments: argparse.Namespace) -> list[Figure]:
+    """Return how well road is told from ground on a split's roads cut to strips along their axes, ground only."""
+    data_folder, strips_folder = arguments.work / RECIPE, arguments.work / f"{name}-scores" / f"{split}-strips"
+    strips_folder.mkdir(parents=True, exist_ok=True)
+    for scene in read_manifest(data_folder).scenes:
+        if scene.split == split and scene.status == "done":
+            folder = data_folder / "scenes" / scene.name
+            cut_strip(folder / "cloud.laz", folder / "centerline.geojson", strips_folder / f"{scene.name}.laz")
+    scores = evaluate(
+        arguments.work / name, [str(strips_folder)], arguments.work / f"{name}-scores" / f"{split}-measured"
+    )
+    return road_figures(scores, f"its own roads with medians cut to {STRIP:g} m, ground only")
+
+
+def cut_strip(cloud: Path, axis: Path, target: Path) -> None:
+    """Write the ground, road and markings of a cloud within `STRIP` m of an axis, as the cloud's own format has them."""
+    if target.is_file():
+        return
+    with open_cloud(cloud) as reader:
+        line, names = MeasuredAxis.read(axis, place=reader.header.place), reader.header.scheme.names()
+    points = laspy.read(cloud)
+    _, offset = line.project(points.xyz)
+    ground_ids = [number for number, class_name in names.items() if class_name in GROUND_CLASSES]
+    points.points = points.points[(np.abs(offset) <= STRIP) & np.isin(points["class_id"], ground_ids)]
+    points.write(str(target))
+
+
+def road_figures(scores: dict[str, Any], place_text: str) -> list[Figure]:
+    """Return the recall and precision of the road, markings included, against everything else."""
+    ((_, test),) = scores["tests"].items()
+    is_road = np.array([class_name in ROAD_CLASSES for class_name in test["classes"]])
+    counts = np.array(test["confusion"])
+    hits = counts[np.ix_(is_road, is_road)].sum()
+    shares = {"recall": hits / counts[is_road].sum(), "precision": hits / max(counts[:, is_road].sum(), 1)}
+    return [
+        Figure(name=f"{word} of road, {place_text}", value=round(100.0 * float(share), 1), unit="%", inside=False)
+        for word, share in shares.items()
+    ]
 
 
 def figures_of(plan: Plan, scores: dict[str, Any], place_text: str, *, is_inside: bool) -> list[Figure]:

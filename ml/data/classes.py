@@ -1,11 +1,11 @@
 """Classes of training data: whatever a source calls its classes, as numbers of the scheme that is learned."""
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from synthroads_addon.base.classes import UNLABELLED, ClassScheme, ClassSelector, class_scheme
 from synthroads_addon.base.errors import InputError, nearest_name
@@ -28,6 +28,14 @@ class LabelMapping(Model):
     field: str = Field(
         "classification", min_length=1, description="Attribute of the file that contains the class numbers."
     )
+    axis: str = Field(
+        "",
+        description="File of the road's axis (CSV or GeoJSON) beside the cloud, for clouds without classes: the class "
+        "number of a point then is 1 where the offset from the axis is in `paved`, else 0.",
+    )
+    paved: tuple[tuple[float, float], ...] = Field(
+        (), description="Smallest and largest offset from the axis of each pavement, left positive, m."
+    )
     classes: dict[str, str] = Field(min_length=1, description="Class, or group of classes, of each number in the file.")
     groups: dict[str, tuple[str, ...]] = Field(
         {}, description="Classes of each group, which count as one class in scores; for data with coarser classes."
@@ -35,6 +43,16 @@ class LabelMapping(Model):
     ignore_zero_intensity: bool = Field(
         False, description="Ignore points with intensity 0, whose intensity wasn't measured."
     )
+
+    @model_validator(mode="after")
+    def _check_pavements(self) -> Self:
+        """Refuse an axis without pavements, pavements without an axis, and offsets that don't ascend."""
+        if bool(self.axis) != bool(self.paved):
+            raise ValueError("axis and paved must be given together")
+        for smallest, largest in self.paved:
+            if not smallest < largest:
+                raise ValueError(f"paved has {smallest:g}, {largest:g}: each must be two ascending offsets")
+        return self
 
     def targets(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """Return the names that the mapped truth distinguishes, in order: its groups if it has any, else `names`.

@@ -7,7 +7,7 @@ ends in ``offset``.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -22,7 +22,7 @@ from synthroads_addon.base.random_streams import stream
 from ..registry import apply_effects
 from .effects import CropEffects
 from .samples import Crop
-from .tiles import CloudTile, Scaling
+from .tiles import CloudTile, Scaling, scalings
 
 Feature = Literal["x", "y", "z", "red", "green", "blue", "intensity"]
 FEATURES: tuple[Feature, ...] = get_args(Feature)
@@ -46,12 +46,16 @@ class CropSettings:
         voxel: edge of the cells of ``grid_coord``, m.
         features: columns of ``feat``, in this order.
         votes: views, turned and mirrored, whose mean probability is a point's when it is labelled.
+        intensity: scaling of intensities, ``share`` or ``robust``, anew where an effect changes a whole tile's points.
+        classes: names of the classes by their places, for effects that act on some of them.
     """
 
     points: int = 24_000
     voxel: float = 0.1
     features: tuple[Feature, ...] = FEATURES
     votes: int = 1
+    intensity: str = "share"
+    classes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -213,9 +217,31 @@ def _draw_crop(crops: CropDataset | CropStream, tile_index: int, random: np.rand
     """Return an augmented crop around a random point of the tile, or of the tile that the seeds choose."""
     number, point = crops.seeds.draw(tile_index, random)
     tile = crops.tiles[number]
-    crop = cut_crop(tile, tile.coord[point], crops.settings.points, crops.scalings[tile.scene])
+    middle, scaling = tile.coord[point], crops.scalings[tile.scene]
+    changed_tile = change_tile(tile, crops.settings, crops.effects, random)
+    if changed_tile is not tile:
+        tile = changed_tile
+        # Where a strip was cut, the crop lies around its point nearest to the place that was drawn.
+        middle = tile.coord[((tile.coord[:, :2] - middle[:2]) ** 2).sum(axis=1).argmin()]
+        scaling = scalings([tile], crops.settings.intensity)[tile.scene]
+    crop = cut_crop(tile, middle, crops.settings.points, scaling)
     apply_effects("segmentation", crop, crops.effects, random)
     return crop
+
+
+def change_tile(
+    tile: CloudTile, settings: CropSettings, effects: CropEffects, random: np.random.Generator
+) -> CloudTile:
+    """Return a tile after the effects that act on whole tiles; the tile itself where none of them changes anything.
+
+    They see the intensities before these are scaled: a cloud is scaled by the points that it has.
+    """
+    sample = Crop(tile.coord, tile.strength, tile.color, tile.segment, tile.offset, settings.classes)
+    apply_effects("segmentation", sample, effects, random, before_thinning=True)
+    if sample.coord is tile.coord and sample.strength is tile.strength:
+        return tile
+    arrays = {name: getattr(sample, name) for name in Crop.per_point}
+    return replace(tile, **arrays)
 
 
 def collate(items: Sequence[Item]) -> Item:

@@ -1,5 +1,6 @@
 """Points on their way into a network, as effects change them: `Crop` of a tile, `Stretch` of a road."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -45,10 +46,19 @@ class Crop(Sample):
 
     Attributes:
         segment: (N,) int16 places of classes, or -1.
+        offset: (N,) distances to the left of the road's axis, m, or None.
+        classes: names of the classes by their places.
     """
 
     segment: NDArray[np.int16]
-    per_point: ClassVar[tuple[str, ...]] = (*Sample.per_point, "segment")
+    offset: AnyArray | None = None
+    classes: tuple[str, ...] = ()
+    per_point: ClassVar[tuple[str, ...]] = (*Sample.per_point, "segment", "offset")
+
+    def points_of(self, names: Collection[str]) -> Bool:
+        """Return a mask (N,) of the points whose class has one of some names."""
+        places = [place for place, name in enumerate(self.classes) if name in names]
+        return np.isin(self.segment, places)
 
 
 @dataclass

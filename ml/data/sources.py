@@ -23,6 +23,7 @@ from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.cloud.tools.quantile_mapping import levels, steps_per_unit
 from synthroads_addon.dataset.tiles import TileSorter
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 
 from ..configuration import Part
 from .classes import IGNORED, LabelMapping, class_names, load_mapping, table_between
@@ -33,6 +34,8 @@ from .yardsticks import load_yardstick, numbered_blocks
 
 FULL = 65535.0
 """Largest 16-bit intensity."""
+_PAST = 1.0
+"""Distance past an end or a gap of an axis to which offsets count, m: axes are given about every metre."""
 
 
 class Source(Part):
@@ -326,7 +329,8 @@ def labelled_blocks(cloud: CloudReader, scheme: ClassScheme, source: Source) -> 
         for block in cloud.usable_blocks():
             yield _with_class_indices(block, table[block.class_id])
         return
-    for file_block, file_numbers in zip(cloud.blocks(), _numbers(cloud, mapping.field), strict=True):
+    all_numbers = _paved_numbers(cloud, mapping) if mapping.paved else _numbers(cloud, mapping.field)
+    for file_block, file_numbers in zip(cloud.blocks(), all_numbers, strict=True):
         is_usable = cloud.usable_points(file_block, noise=True)  # it is for the mapping to say what numbers mean
         block, numbers = without_flags(file_block.select(is_usable)), file_numbers[is_usable]
         class_indices = mapping.label(numbers, names)
@@ -338,6 +342,15 @@ def labelled_blocks(cloud: CloudReader, scheme: ClassScheme, source: Source) -> 
 def _with_class_indices(block: PointBlock, class_indices: NDArray[np.int16]) -> PointBlock:
     """Return a block with class indices (N,) as its class ids, 255 where they are `IGNORED`."""
     return replace(block, class_id=np.where(class_indices == IGNORED, UNLABELLED, class_indices).astype(np.uint8))
+
+
+def _paved_numbers(cloud: CloudReader, mapping: LabelMapping) -> Iterator[AnyArray]:
+    """Yield 1 for a cloud's points on a pavement beside the mapping's axis, else 0; -1 beside its gaps and ends."""
+    axis = MeasuredAxis.read(cloud.header.path.parent / mapping.axis, place=cloud.header.place)
+    for block in cloud.blocks():
+        _, offset = axis.beside(block.xyz, np.inf, past=_PAST)
+        is_paved = np.any([(offset >= low) & (offset <= high) for low, high in mapping.paved], axis=0)
+        yield np.where(np.isfinite(offset), is_paved, -1).astype(np.int64)
 
 
 def _numbers(cloud: CloudReader, field: str) -> Iterator[AnyArray]:

@@ -25,6 +25,8 @@ class CloudTile:
         color: (N, 3) uint8 sRGB, or None where the scene has none.
         strength: (N,) float32 intensity as a share of 16 bits, or None where the scene has none.
         segment: (N,) int16 place of the class in the scheme, or `IGNORED`.
+        offset: (N,) float32 distance to the left of the road's axis, m; None where
+            there is no axis, or nobody asks for it.
     """
 
     scene: str
@@ -33,6 +35,7 @@ class CloudTile:
     color: UInt8 | None
     strength: Float32 | None
     segment: NDArray[np.int16]
+    offset: Float32 | None = None
 
     def __len__(self) -> int:
         return len(self.coord)
@@ -45,6 +48,7 @@ class CloudTile:
             color=None if self.color is None else self.color[keep],
             strength=None if self.strength is None else self.strength[keep],
             segment=self.segment[keep],
+            offset=None if self.offset is None else self.offset[keep],
         )
 
     def class_counts(self, classes: int) -> Int:

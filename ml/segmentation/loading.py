@@ -17,6 +17,7 @@ from ..data.classes import class_names
 from ..data.crops import CropDataset, Draw, Item, Seeds, collate
 from ..data.exchange import ExchangedCrops
 from ..data.scene_stream import EpochScenes, SceneStream
+from ..data.road_offsets import with_offsets
 from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, scalings
 from ..data.workers import load_batches
@@ -39,8 +40,9 @@ def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[Clo
         InputError: there are none, or they don't fit the configuration.
     """
     domains: dict[str, list[CloudTile]] = {}
+    needs_offsets = bool(configuration.effects.strip.probability or configuration.effects.stripes)
     for domain, sources in configuration.needed_sources().items():
-        domains[domain] = list(thin_tiles(sources, configuration, domain))
+        domains[domain] = list(thin_tiles(sources, configuration, domain, offsets=needs_offsets))
     return domains if configuration.data.stream else prepare_domains(domains, configuration)
 
 
@@ -61,7 +63,12 @@ def drop_slivers(tiles: Sequence[CloudTile], configuration: SegmentationConfigur
 
 
 def thin_tiles(
-    sources: Sequence[Source], configuration: SegmentationConfiguration, title: str, *, labels: bool = True
+    sources: Sequence[Source],
+    configuration: SegmentationConfiguration,
+    title: str,
+    *,
+    labels: bool = True,
+    offsets: bool = False,
 ) -> Iterator[CloudTile]:
     """Yield the sources' tiles thinned to one point per training voxel, scenes renamed to ``TITLE/PLACE/SCENE``.
 
@@ -71,9 +78,11 @@ def thin_tiles(
         sources, configuration: sources of the tiles, and configuration of the training.
         title: title of the domain.
         labels: whether labels are read; else all are `IGNORED`.
+        offsets: whether points have their offsets from the axes of data sets' roads.
     """
     for source_number, source in enumerate(sources):
-        for tile in read_tiles(source, configuration.scheme(), configuration.voxel, labels=labels):
+        tiles = read_tiles(source, configuration.scheme(), configuration.voxel, labels=labels)
+        for tile in with_offsets(Path(source.path), tiles) if offsets else tiles:
             yield replace(tile, scene=f"{title}/{source_number}/{tile.scene}")
 
 

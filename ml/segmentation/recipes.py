@@ -17,6 +17,7 @@ from synthroads_addon.base.schema import quantity
 from synthroads_addon.cloud.tools.quantile_mapping import LEVELS, QuantileMap
 
 from ..configuration import Configuration, Part, Schedule
+from ..data.classes import class_names
 from ..data.crops import FEATURES, CropSettings, Draw, Feature
 from ..data.effects import CropEffects
 from ..data.scene_stream import StreamOptions
@@ -182,8 +183,9 @@ class SegmentationConfiguration(Configuration):
         return class_scheme(self.classes)
 
     def crop_settings(self) -> CropSettings:
-        """Return the size, voxel, features and votes of crops."""
-        return CropSettings(self.crop_points, self.voxel, self.features, self.votes)
+        """Return the size, voxel, features, votes, scaling and classes of crops."""
+        names = class_names(self.scheme())
+        return CropSettings(self.crop_points, self.voxel, self.features, self.votes, self.intensity, names)
 
     def needed_sources(self) -> dict[str, tuple[Source, ...]]:
         """Return the training sources of the set-up by domain; the synthetic ones may be none where there is a stream.

@@ -10,6 +10,7 @@ from synthroads_addon.base.schema import quantity
 from ...registry import effect
 from ..samples import Crop
 from .base import PointEffects, point_effect_field
+from .strips import StripCut
 
 Generator = np.random.Generator
 
@@ -34,6 +35,22 @@ class CropEffects(PointEffects):
         le=3,
         unit="1",
         description="Standard deviation of the logarithms of a random gain and exponent of the intensities.",
+    )
+    strip: StripCut = Field(StripCut(), description="Cuts of whole tiles along the road, as of strips.")
+    contrast: float = quantity(
+        0.0,
+        ge=0,
+        le=3,
+        unit="1",
+        description="Largest logarithm of the factor on the intensities of everything but pavement.",
+    )
+    stripes: float = quantity(
+        0.0,
+        ge=0,
+        le=2,
+        unit="1",
+        description="Largest standard deviation of the logarithm of a brightness pattern across the road, as of wheel "
+        "tracks, joints and lanes of different age; only where the road's axis is known.",
     )
 
     @field_validator("mirror", mode="before")

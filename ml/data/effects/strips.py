@@ -1,0 +1,113 @@
+"""Effects on whole tiles of a road before crops are cut from them: strips along the axis, and their brightness.
+
+Published airborne clouds of roads are often strips cut along the axis, ground only. A network that has only met whole
+scenes takes the pavement in them for ground. Both effects act before intensities are scaled, since `predict` scales a
+cloud by the points that it has.
+"""
+
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from synthroads_addon.base.arrays import Float
+from synthroads_addon.base.schema import quantity
+
+from ...configuration import Part
+from ...registry import effect
+from ..points import GROUND_CLASSES, ROAD_CLASSES
+from ..samples import Crop
+
+if TYPE_CHECKING:
+    from .crops import CropEffects
+
+Generator = np.random.Generator
+
+_WAVES = 5
+"""Waves of a pattern across the road. Chosen: five look irregular."""
+_WAVELENGTHS = (1.5, 8.0)
+"""Shortest and longest wavelength across the road, m: from wheel tracks to two lanes."""
+
+
+class StripCut(Part):
+    """Options for cutting tiles along the road's axis, as strips of published airborne clouds are cut.
+
+    With a probability, a tile is cut to a distance R to both sides of the axis, or of the middle of one carriageway. R
+    is drawn from ``reach``, uniformly in its logarithm. In a share of the cut tiles only ground, road and markings
+    are kept. Tiles of scenes without an axis are never cut.
+    """
+
+    probability: float = quantity(0.0, ge=0, le=1, unit="1", description="Probability that a tile is cut.")
+    reach: tuple[float, float] = Field((6.0, 60.0), description="Smallest and largest R, m.")
+    ground_only: float = quantity(
+        0.5, ge=0, le=1, unit="1", description="Share of the cut tiles in which only ground, road and markings are kept."
+    )
+    carriageway: float = quantity(
+        0.25,
+        ge=0,
+        le=1,
+        unit="1",
+        description="Share of the cut tiles that are cut along a carriageway's middle, down to half of R.",
+    )
+
+    @model_validator(mode="after")
+    def _check_reach(self) -> Self:
+        """Refuse limits of the strip that don't ascend or are out of bounds."""
+        smallest, largest = self.reach
+        if not 1.0 <= smallest <= largest <= 1000.0:
+            raise ValueError(f"reach is {smallest:g}, {largest:g}: must be two ascending numbers from 1 to 1000")
+        return self
+
+
+@effect("segmentation", order=-20)
+def cut_strip(crop: Crop, effects: "CropEffects", random: Generator) -> None:
+    """Drop what lies beyond a strip along the road, in half of the strips also what isn't ground, in place.
+
+    A tile stays as it is where its road has no axis, or nothing would be left.
+    """
+    strip = effects.strip
+    if crop.offset is None or random.random() >= strip.probability:
+        return
+    reach = float(np.exp(random.uniform(*np.log(strip.reach))))
+    middle = 0.0
+    if random.random() < strip.carriageway:
+        # Strips of roads with one carriageway are half as wide as those of two.
+        middle, reach = _carriageway_middle(crop, random), reach / 2.0
+    keep = np.abs(crop.offset - middle) <= reach
+    if random.random() < strip.ground_only:
+        keep &= crop.points_of(GROUND_CLASSES)
+    if keep.any():
+        crop.keep(keep)
+
+
+@effect("segmentation", order=-10)
+def change_contrast(crop: Crop, effects: "CropEffects", random: Generator) -> None:
+    """Multiply intensities of everything but pavement by a common factor, all by a pattern across the road, in place."""
+    if crop.strength is None:
+        return
+    strength = crop.strength
+    if effects.contrast:
+        factor = np.exp(random.uniform(-effects.contrast, effects.contrast))
+        strength = np.where(crop.points_of(ROAD_CLASSES), strength, factor * strength)
+    if effects.stripes and crop.offset is not None:
+        sigma = random.uniform(0.0, effects.stripes)
+        strength = strength * np.exp(sigma * _pattern(crop.offset, random))
+    crop.strength = strength if strength is crop.strength else strength.astype(np.float32)
+
+
+def _carriageway_middle(crop: Crop, random: Generator) -> float:
+    """Return the offset (m) of the middle of a random side's pavement; 0 where there is none."""
+    assert crop.offset is not None
+    side = random.choice([-1.0, 1.0])
+    offset = crop.offset[crop.points_of(ROAD_CLASSES)]
+    offset = offset[side * offset > 0.0]
+    # The middle of the range without its outermost hundredths, which may be a turnout's.
+    return float(np.percentile(offset, [1.0, 99.0]).mean()) if len(offset) else 0.0
+
+
+def _pattern(offset: Float, random: Generator) -> Float:
+    """Return random values (N,) of about unit deviation that vary with the offset (m) only: a sum of waves."""
+    rate = 2.0 * np.pi / np.exp(random.uniform(*np.log(_WAVELENGTHS), _WAVES))
+    angle = offset[:, None] * rate + random.uniform(0.0, 2.0 * np.pi, _WAVES)
+    result: Float = np.cos(angle).sum(axis=1) * np.sqrt(2.0 / _WAVES)
+    return result
