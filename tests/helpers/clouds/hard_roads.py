@@ -157,9 +157,7 @@ def _inside(ground: Ground, station: Float, offset: Float, length: float) -> Boo
     return (across > ground.low) & (across < ground.high) & (station >= ground.start)
 
 
-def carriageway(
-    inner: float, lanes: int, lane: float, shoulder: float, sign: int
-) -> tuple[Ground, list[Paint], float]:
+def carriageway(inner: float, lanes: int, lane: float, shoulder: float, sign: int) -> tuple[Ground, list[Paint], float]:
     """Return pavement and lines of a carriageway from its inner edge outwards, and its outer edge, m."""
     first = inner + sign * 0.5
     borders = [first + sign * lane * number for number in range(lanes + 1)]

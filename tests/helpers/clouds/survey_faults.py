@@ -63,9 +63,7 @@ class SurveyFaults:
                     rng.uniform(0.8, 2.2) * rng.choice([-1, 1]),
                 )
             )
-        waves = [
-            (rng.uniform(0.0, 0.4), rng.uniform(30.0, 200.0), rng.uniform(0.0, 2.0 * np.pi)) for _ in range(3)
-        ]
+        waves = [(rng.uniform(0.0, 0.4), rng.uniform(30.0, 200.0), rng.uniform(0.0, 2.0 * np.pi)) for _ in range(3)]
         return cls(
             gain_step=float(rng.uniform(0.6, 1.4) * rng.choice([-1, 0, 1])),
             strip_border=(float(rng.uniform(-0.6, 0.6) * reach), float(rng.uniform(-0.08, 0.08))),
