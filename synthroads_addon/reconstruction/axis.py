@@ -9,13 +9,14 @@ from ..base.arrays import Bool, Float
 from ..base.errors import InputError
 from ..base.progress import Progress, silent
 from .cloud import PointKind, RoadCloud
-from .layout import RoadKind, RoadLayout, axis_guides, find_layout, with_branch
+from .layout import RoadKind, RoadLayout, find_layout, with_branch
 from .lines import find_lines
 from .path import CloudPath, first_path, path_through
 from .profiles import ACROSS, STRETCH, Profiles, make_profiles, register_path
 from .views.fusion import FusedAxis, mean_axis
 from .views.look import find_fused_axis
 from .views.view import View
+from .views.vote import axis_guides
 
 Predictor = Callable[[RoadCloud, CloudPath], tuple[Float, Float]]
 """Function that returns the axis' offset and standard deviation (M,), m, at each point of a path; NaN where unknown."""

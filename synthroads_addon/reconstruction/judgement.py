@@ -15,12 +15,13 @@ import numpy as np
 from scipy import ndimage
 
 from ..base.arrays import Bool, Float
-from .layout import Band, RoadLayout, axis_from_lines, axis_guides
+from .layout import Band, RoadLayout
 from .lines import Line, is_dashed
 from .profiles import STRETCH, Profiles, remove_grade
 from .smoothing import difference_figures, robust_scale
 from .views.fusion import APART
 from .views.pavement import pavement_edges
+from .views.vote import axis_from_lines, axis_guides
 
 FARTHEST_MIDDLE = 0.75
 """The middle between the pavement's edges may lie so far beside the axis, m. Chosen: half of what a shoulder on one

@@ -1,4 +1,4 @@
-"""Which lines belong together: carriageways, their lanes, and the median, and the axis that all of them agree on."""
+"""Which lines belong together: carriageways, their lanes, and the median."""
 
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -9,16 +9,17 @@ from scipy import ndimage
 from scipy.signal import find_peaks
 from scipy.special import expit
 
-from ..base.arrays import Bool, Float, otsu_threshold
+from ..base.arrays import Bool, Float
 from ..base.errors import InputError
 from .branches import find_branch
 from .edges import FARTHEST, Pavement
 from .ground.band import DarkBand, find_band
 from .ground.medians import Median, cut_medians, find_medians, median_level
+from .ground.paved import paved_by_brightness, paved_spans
 from .lines import STANDARD_DASHES, USUAL, WAVELENGTH, Line, is_dashed
 from .path import SPACING
-from .profiles import ACROSS, STRETCH, Grid, Profiles
-from .smoothing import bisquare, fill_gaps, hidden_std, mean_with_std, robust_scale, smooth
+from .profiles import STRETCH, Profiles
+from .smoothing import smooth
 
 RoadKind = Literal["dual", "single"]
 
@@ -32,15 +33,11 @@ _OTHER_EDGE, _OTHER_STRETCHES = 0.75, 5
 fifth of a lane, for 25 m; what is less or shorter is a fault."""
 _FEWEST_USUAL = 0.25
 """Share of the road that the usual part has at least. Chosen: a part that is less isn't the usual one."""
-_TOGETHER = 0.2
-"""Share of the stretches with both edges in which two lines must be seen together. Chosen: lines that seldom are give
-way to the edges."""
 _COMMON = 0.35
 """Share of the most common place's count from which on another place may be the usual one. Chosen: turnouts on a short
 road may be longer than what lies between them."""
-_NARROWEST_BAND, _NARROWEST_MEDIAN, _WIDEST_MEDIAN = 3.0, 0.8, 30.0
-"""Widths of pavement and median, m. Chosen: a lane; a concrete barrier on its own; carriageways that are farther apart
-are two roads."""
+_NARROWEST_MEDIAN, _WIDEST_MEDIAN = 0.8, 30.0
+"""Widths of medians, m. Chosen: a concrete barrier on its own; carriageways that are farther apart are two roads."""
 _UNMARKED_CARRIAGEWAY = 7.0
 """Width of pavement that is a carriageway even if its lines aren't seen, m. Chosen: two lanes."""
 _IN_THE_MIDDLE = 0.15
@@ -56,23 +53,6 @@ _BAND_MARGIN = 0.5
 of it."""
 _NARROWEST_LANE, _WIDEST_LANE, _USUAL_LANE = 2.3, 5.2, 3.6
 """Widths of lanes, m. Chosen: below any lane of RAA and RAL; above it but less than two; the usual one."""
-_AROUND_DASHES = (0.4, 1.4)
-"""Distances beside a lane line that are pavement for sure, m. Chosen: off the paint, within a lane's half."""
-_LIKE = 4.0
-"""Times the pavement's own spread of brightness that other ground is off at least. Chosen: Otsu's method parts any
-histogram, a pavement's as well."""
-_BLUR = (6.0, 1.0)
-"""Standard deviations of the brightness' blur, bins along and across. Chosen: some metres along the road, where
-pavement changes little, and less than a line across it."""
-_PAINT = 9
-"""Widest strip of paint, bins. Chosen: double lines fit in 0.9 m."""
-_AXIS_WAVELENGTH = 60.0
-"""Wavelength of which half of the axis' swings is kept, m. Chosen: shorter ones are noise."""
-_ROUNDS = 4
-"""Votes, each about the axis of the one before. Chosen: it moves no more after them."""
-_COVERED = 0.3
-"""Share of the road on which a bin must have points to belong to a strip. Chosen: bins between rows of points are often
-empty."""
 _ON_AND_BESIDE = ((-0.1, 0.1), (-0.8, -0.3), (0.3, 0.8))
 """Distances from a line's middle, m: on it, to the right, to the left. Chosen: beyond its paint, within a verge."""
 _BRIGHTER = 0.8
@@ -80,14 +60,8 @@ _BRIGHTER = 0.8
 all."""
 _ON_BAND = 0.5
 """Distance beside the dark band that a line on it may lie at, m. Chosen: what the band's edge is off by."""
-_CRACK = 0.3
-"""Gaps in the pavement that are closed to either side, m. Chosen: seams and bins between rows of points; a median is
-wider."""
 _STEADY = 5
 """Stretches over which the number of carriageways is judged. Chosen: 25 m, as no median begins for less."""
-_LEVEL_BLUR = 10.0
-"""Standard deviation of the blur of the pavement's brightness along the road, m. Chosen: single cars and stains vanish
-in it."""
 
 
 @dataclass(frozen=True)
@@ -364,107 +338,6 @@ def usual_place(distance: Float) -> float | None:
     return float(np.median(peak_distances))
 
 
-def paved_spans(pavement: Pavement) -> list[tuple[float, float]]:
-    """Return the right and left edge, m, of each strip that is paved along most of the road and as wide as a lane."""
-    profiles, has_points = pavement.profiles, np.isfinite(pavement.share)
-    rows = has_points.sum(axis=0)
-    share = np.where(has_points, pavement.share, 0.0).sum(axis=0) / np.maximum(rows, 1)
-    strip = (share > 0.5) & (rows > _COVERED * profiles.covered_length)
-    strip = ndimage.binary_closing(strip, iterations=round(_CRACK / ACROSS))
-    columns = [part[0] for part in ndimage.find_objects(ndimage.label(strip)[0])]
-    spans = [(profiles.offsets[c.start] - ACROSS / 2, profiles.offsets[c.stop - 1] + ACROSS / 2) for c in columns]
-    return [
-        (float(right_edge), float(left_edge))
-        for right_edge, left_edge in spans
-        if left_edge - right_edge >= _NARROWEST_BAND
-    ]
-
-
-def paved_by_brightness(profiles: Profiles, lines: list[Line]) -> Grid:
-    """Return a mask of pavement (S, U), 1 or 0, by brightness alike that near the lane lines; NaN without points.
-
-    Pavement is what is about as bright as the strips on both sides of the lane lines, after a blur of some metres:
-    grass, soil and gravel are mostly brighter. Without a dashed line it is as bright as the smoother of two kinds of
-    ground. Otsu's threshold parts the differences from that brightness, if there are two kinds of them; if not, all is
-    pavement.
-    """
-    brightness = _blur(profiles.brightness)
-    has_points = np.isfinite(brightness)
-    everywhere = np.where(has_points, 1.0, np.nan).astype(np.float32)
-    if any(is_dashed(line) for line in lines):
-        reference = _bins_beside(profiles, _lane_lines(lines)) & has_points
-    else:
-        reference = _smoother_ground(profiles, brightness.astype(np.float64))
-    if not reference.any():
-        return everywhere
-    difference = np.abs(brightness - _level_along(brightness, reference)[:, None])
-    threshold = otsu_threshold(np.asarray(difference[has_points], dtype=np.float64))
-    pavement = float(np.median(difference[has_points & (difference <= threshold)]))
-    other_ground = float(np.median(difference[has_points & (difference > threshold)]))
-    # Otsu's method splits any histogram: the parts are two kinds of ground only if they lie clearly apart.
-    if other_ground - pavement < _LIKE * robust_scale(difference[reference]):
-        return everywhere
-    # Paint is brighter than the threshold, but lies on pavement: narrow gaps across are closed.
-    mask = ndimage.grey_closing(np.where(has_points, difference <= threshold, 0.0), size=(1, _PAINT))
-    return np.where(has_points, mask, np.nan).astype(np.float32)
-
-
-def _bins_beside(profiles: Profiles, lines: list[Line]) -> Bool:
-    """Return a mask (S, U) of the bins to both sides of lines, within the distances of `_AROUND_DASHES`."""
-    mask = np.zeros(profiles.brightness.shape, dtype=bool)
-    rows = np.arange(len(profiles.stations))
-    for line in lines:
-        offset = np.interp(profiles.stations, line.stations, line.offsets, left=np.nan, right=np.nan)
-        for start, end in ((-_AROUND_DASHES[1], -_AROUND_DASHES[0]), _AROUND_DASHES):
-            for shift in np.arange(start, end + 1e-9, ACROSS):
-                column = np.rint((offset + shift - profiles.offsets[0]) / ACROSS)
-                in_grid = np.isfinite(column) & (column >= 0) & (column < len(profiles.offsets))
-                mask[rows[in_grid], column[in_grid].astype(np.int64)] = True
-    return mask
-
-
-def _level_along(brightness: Grid, reference: Bool) -> Float:
-    """Return the mean brightness (S,) of a row's reference bins (mask (S, U)), smoothed and bridged along the road."""
-    count = np.maximum(reference.sum(axis=1), 1)
-    mean_brightness = np.where(reference, brightness, 0.0).sum(axis=1) / count
-    has_reference = reference.any(axis=1)
-    rows = np.arange(len(mean_brightness))
-    mean_brightness = np.interp(rows, rows[has_reference], mean_brightness[has_reference])
-    return np.asarray(ndimage.gaussian_filter1d(mean_brightness, _LEVEL_BLUR, mode="nearest"))
-
-
-def _smoother_ground(profiles: Profiles, brightness: Float) -> Bool:
-    """Return a mask (S, U) of the smoother one of dark and bright ground; of all bins with points if these are few."""
-    has_points = np.isfinite(brightness)
-    if has_points.sum() < 2:
-        return has_points
-    dark_ground = has_points & (brightness <= otsu_threshold(np.asarray(brightness[has_points], dtype=np.float64)))
-    bright_ground = has_points & ~dark_ground
-    step = np.abs(np.diff(profiles.height, axis=1, append=np.nan))
-    roughness = [
-        float(np.median(of_kind)) if len(of_kind := step[kind & np.isfinite(step)]) else np.inf
-        for kind in (dark_ground, bright_ground)
-    ]
-    return dark_ground if roughness[0] <= roughness[1] else bright_ground
-
-
-def _lane_lines(lines: list[Line]) -> list[Line]:
-    """Return the long dashed lines, or just the longest line if none is dashed."""
-    dashed = [line for line in lines if is_dashed(line)]
-    longest = max((line.length for line in dashed), default=0.0)
-    return [line for line in dashed if line.length > 0.5 * longest] or sorted(lines, key=lambda item: -item.length)[:1]
-
-
-def _blur(values: Grid) -> Grid:
-    """Return values (S, U) blurred by a Gaussian over bins with points; NaN where there are hardly any around."""
-    has_points = np.isfinite(values)
-    weight = ndimage.gaussian_filter(has_points.astype(np.float32), _BLUR)
-    mean = ndimage.gaussian_filter(np.where(has_points, values, 0.0).astype(np.float32), _BLUR)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        # Chosen: points in 5 % of the blur's reach tell its value.
-        return np.where(weight > 0.05, mean / weight, np.nan)
-
-
 def _place_in(line: Line, usual_mask: Bool | None) -> float:
     """Return a line's median offset, m, in the stretches of a mask (K,), or in all where it is seen in none of them."""
     usual_offsets = line.offsets[usual_mask] if usual_mask is not None else line.offsets
@@ -546,135 +419,3 @@ def _carriageway_pair(bands: list[Band]) -> tuple[Band, Band] | None:
 def _is_whole(band: Band) -> bool:
     """Return whether a band may be one direction's carriageway, by its lines or its width."""
     return len(band.lines) >= 2 or band.width >= _UNMARKED_CARRIAGEWAY
-
-
-@dataclass(frozen=True)
-class FoundAxis:
-    """Offsets of the road's axis from the path in each of K stretches, with standard deviations.
-
-    Attributes:
-        stations: (K,) m along the path.
-        offsets: (K,) of the axis, m; smoothed.
-        std: (K,) standard deviation, m.
-        raw: (K,) offsets before smoothing, m; NaN where no line was seen.
-    """
-
-    stations: Float
-    offsets: Float
-    std: Float
-    raw: Float
-
-
-def axis_from_lines(layout: RoadLayout) -> FoundAxis:
-    """Return the axis of a layout, from its middle or innermost lines, by a vote of all lines on its course.
-
-    Of a dual carriageway it is the middle between its two innermost lines, of a single one the line in its middle, or
-    what lies midway between both branches of that; for want of lines the pavement's edges take their place. All lines
-    vote for how it moves along the road: each tells the axis from its own mean distance to it, and counts by how steady
-    that is. Where the lines in the middle are missing the others carry on.
-
-    Raises:
-        InputError: no line and no edge was seen anywhere.
-    """
-    guides = axis_guides(layout)
-    guide_lines = (
-        [band.middle for band in layout.bands] if layout.kind == "single" and len(guides) == 1 else list(guides)
-    )
-    lines = list(guides) + [line for band in layout.bands for line in band.lines if line not in guide_lines]
-    stations = lines[0].stations
-    centre = np.mean([line.measured for line in guides], axis=0)  # the axis by its guides alone
-    voted_offsets, start = centre, centre
-    if not any(np.isfinite(line.measured).any() for line in lines):
-        raise InputError("road", None, "neither lines nor edges of a carriageway can be made out in the cloud")
-    if not np.isfinite(centre).any():
-        # Without guides begin with the mean of all lines.
-        line_offsets = np.array([line.measured for line in lines])
-        has_votes = np.isfinite(line_offsets).sum(axis=0)
-        start = np.where(has_votes > 0, np.nansum(line_offsets, axis=0) / np.maximum(has_votes, 1), np.nan)
-    # Repeated, as a line's mean distance is from the axis of the round before.
-    axis = fill_gaps(start)
-    for _ in range(_ROUNDS):
-        voted_offsets = _vote_axis(lines, axis)
-        # The votes give the axis up to a constant, which its guides fix.
-        voted_offsets = voted_offsets + _mean_difference(centre - voted_offsets)
-        axis = fill_gaps(voted_offsets)
-    smooth_axis = smooth(
-        voted_offsets,
-        np.where(np.isfinite(voted_offsets), 1.0, 0.0),
-        STRETCH * SPACING,
-        _AXIS_WAVELENGTH,
-        usual_std=USUAL,
-    )
-    # The deviation of the constant, which smoothing along the road doesn't lessen.
-    level_std = mean_with_std(centre - voted_offsets)[1]
-    level_std = float(
-        np.hypot(level_std if np.isfinite(level_std) else 0.0, _shared_error(guides, smooth_axis.scatter))
-    )
-    has_votes = np.isfinite(voted_offsets)
-    # No curve is guessed where nothing was seen.
-    axis_offsets = np.interp(stations, stations[has_votes], smooth_axis.values[has_votes])
-    return FoundAxis(stations, axis_offsets, np.hypot(smooth_axis.std, level_std), voted_offsets)
-
-
-def axis_guides(layout: RoadLayout) -> tuple[Line, ...]:
-    """Return the lines, or edges in their place, whose mean offset is the axis: one or two."""
-    if layout.kind == "dual":
-        right_band, left_band = layout.bands
-        return right_band.guide(1), left_band.guide(-1)
-    (band,) = layout.bands
-    if band.axis_line is not None:
-        return (band.axis_line,)
-    guides = band.guide(-1), band.guide(1)
-    # A line on one side and the pavement's edge on the other have nothing between them that is the middle of both.
-    same_kind = (guides[0].width > 0.0) == (guides[1].width > 0.0)
-    return guides if same_kind and _seen_together(guides) >= _TOGETHER * _seen_together(band.edges) else band.edges
-
-
-def _seen_together(pair: tuple[Line, Line]) -> int:
-    """Return the number of stretches in which both of two lines are seen."""
-    return int((np.isfinite(pair[0].measured) & np.isfinite(pair[1].measured)).sum())
-
-
-def _vote_axis(lines: list[Line], axis: Float) -> Float:
-    """Return the axis on which all lines agree best: its offset (K,), m, in each stretch; NaN where none has a vote.
-
-    Each line votes for the place at its mean distance beside it; the result is the weighted mean of the votes.
-
-    Args:
-        lines: L lines.
-        axis: (K,) offsets, m, of the axis from which the lines' mean distances are measured.
-    """
-    # All arrays below are (L, K) but `mean` and `scatter` (L,) and `total` (K,); NaN where a line isn't seen.
-    offsets = np.array([line.measured for line in lines])
-    std = np.array([line.std for line in lines])
-    distance = offsets - axis
-    mean = np.array([mean_with_std(row)[0] for row in distance])
-    scatter = np.array([_robust_spread(row - value) for row, value in zip(distance, mean, strict=True)])
-    is_measured = np.isfinite(offsets) & np.isfinite(std)
-    # Inverse variances: the scatter of a line's distance and the error of each offset add up; 1 mm^2 keeps them finite.
-    weight = np.where(is_measured, 1.0 / (scatter[:, None] ** 2 + np.where(is_measured, std, 1.0) ** 2 + 1e-6), 0.0)
-    # A line whose distance changes, where a lane begins or ends, has no vote there: Tukey's bisquare is 0 far from the
-    # mean, by the line's own scatter, or what is usual.
-    residual = np.where(is_measured, distance - mean[:, None], 0.0)
-    weight *= np.array([bisquare(row, max(sigma, USUAL)) for row, sigma in zip(residual, scatter, strict=True)])
-    votes = np.where(is_measured, offsets - mean[:, None], 0.0)
-    total = weight.sum(axis=0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(total > 0.0, (weight * votes).sum(axis=0) / total, np.nan)
-
-
-def _shared_error(guides: tuple[Line, ...], scatter: float) -> float:
-    """Return the standard deviation, m, of the error that all offsets of the axis share, see `hidden_std`."""
-    return float(np.sqrt(sum(hidden_std(line.spacing, scatter) ** 2 for line in guides))) / len(guides)
-
-
-def _robust_spread(values: Float) -> float:
-    """Return the robust deviation of values, m, at least 3 mm (chosen: paint isn't laid better); inf without any."""
-    finite_values = values[np.isfinite(values)]
-    return max(robust_scale(finite_values), 0.003) if len(finite_values) else np.inf
-
-
-def _mean_difference(difference: Float) -> float:
-    """Return the robust mean of differences, m; 0 without any."""
-    value = mean_with_std(difference)[0]
-    return value if np.isfinite(value) else 0.0

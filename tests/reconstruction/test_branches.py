@@ -13,10 +13,11 @@ from synthroads_addon.reconstruction.axis import Options, find_axis, straighten_
 from synthroads_addon.reconstruction.branches import find_branch
 from synthroads_addon.reconstruction.cloud import read_road_cloud
 from synthroads_addon.reconstruction.edges import Pavement
-from synthroads_addon.reconstruction.layout import Band, RoadLayout, axis_from_lines
+from synthroads_addon.reconstruction.layout import Band, RoadLayout
 from synthroads_addon.reconstruction.lines import Line
 from synthroads_addon.reconstruction.path import CloudPath
 from synthroads_addon.reconstruction.profiles import Profiles
+from synthroads_addon.reconstruction.views.vote import axis_from_lines
 from tests.helpers.clouds.foreign_clouds import EAST, NORTH, axis_north, throw
 from tests.helpers.clouds.parted_roads import LENGTH, PARTED, PartedRoad
 

@@ -7,10 +7,11 @@ import pytest
 
 from synthroads_addon.base.arrays import Bool, Float
 from synthroads_addon.reconstruction.edges import Pavement
-from synthroads_addon.reconstruction.layout import Band, RoadKind, RoadLayout, axis_from_lines, axis_guides, find_layout
+from synthroads_addon.reconstruction.layout import Band, RoadKind, RoadLayout, find_layout
 from synthroads_addon.reconstruction.lines import Line
 from synthroads_addon.reconstruction.path import CloudPath
 from synthroads_addon.reconstruction.profiles import Profiles
+from synthroads_addon.reconstruction.views.vote import axis_from_lines, axis_guides
 
 STATIONS: Float = 5.0 * np.arange(60) + 2.5
 ROWS: Float = np.arange(300) + 0.5

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...base.arrays import Float
 from ..ground.band import find_band
-from ..layout import FoundAxis, RoadLayout, axis_from_lines, axis_guides
+from ..layout import RoadLayout
 from ..smoothing import fill_gaps
 from .dark_band import view_band
 from .extent import view_extent
@@ -17,6 +17,7 @@ from .period import view_period
 from .skeleton import view_skeleton
 from .symmetry import view_symmetry
 from .view import View
+from .vote import FoundAxis, axis_from_lines, axis_guides
 
 
 def find_fused_axis(layout: RoadLayout, extra_views: Sequence[View] = ()) -> FusedAxis:

@@ -3,10 +3,11 @@
 import numpy as np
 from scipy import ndimage
 
-from ..layout import FoundAxis, RoadLayout, axis_guides
+from ..layout import RoadLayout
 from ..path import SPACING
 from ..profiles import STRETCH
 from .view import View
+from .vote import FoundAxis, axis_guides
 
 _PAINTED = 0.10
 """Deviation of lines found by brightness where nothing scatters, m. Chosen: as measured bins are off."""

@@ -29,7 +29,7 @@ m."""
 _BEYOND = 6
 """Bins beyond an edge, half of which must be known. Chosen: else the cloud ends there, not the pavement."""
 _LIKE = 4.0
-"""Times the pavement's own spread of brightness that other ground is off at least. Chosen: as in `layout`."""
+"""Times the pavement's own spread of brightness that other ground is off at least. Chosen: as in `ground.paved`."""
 _FLOOR = 0.25
 """Deviation of the pavement's middle from the axis where nothing scatters, m. Chosen: shoulders of two sides differ by
 as much."""

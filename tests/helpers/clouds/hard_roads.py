@@ -12,17 +12,20 @@ from synthroads_addon.base.arrays import Bool, Float
 from synthroads_addon.base.classes import class_id
 from tests.helpers.clouds.foreign_clouds import EAST, NORTH, UP, axis_north
 from tests.helpers.clouds.road_clouds import block_of, write
+from tests.helpers.clouds.survey_faults import SurveyFaults
 
 LENGTH, DENSITY = 150.0, 14.0
 ASPHALT, GRASS, PAINT = 0.12, 0.42, 0.7
 """Intensities of pavement, verge and paint; points scatter about them as speckle does."""
+_WIDTH = 0.16  # m, of lines
 
 
 @dataclass(frozen=True)
 class Ground:
     """A strip of ground from right to left, m, with its intensity, roughness (m) and height above the pavement, m.
 
-    It begins at the station ``start``, m; until the road's end a ramp is shifted by ``turn``, m.
+    It begins at the station ``start``, m; until the road's end a ramp is shifted by ``turn``, m. Pavement is that of a
+    carriageway, of a ramp, or of neither (``use``: "").
     """
 
     low: float
@@ -32,17 +35,19 @@ class Ground:
     height: float = 0.0
     turn: float = 0.0
     start: float = 0.0
+    use: str = ""
 
 
 @dataclass(frozen=True)
 class Paint:
-    """A line at an offset, m, with dash and gap (m; 0: solid), turned outwards as its ground is."""
+    """A line at an offset, m, with dash and gap (m; 0: solid), turned outwards as its ground is; its dashes begin at a phase, m."""
 
     offset: float
     dash: float = 0.0
     gap: float = 0.0
     turn: float = 0.0
     start: float = 0.0
+    phase: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -58,6 +63,7 @@ class HardRoad:
         carriageways: number of carriageways that the road has.
         seed: of the points, cuts and course.
         slant: distance, m, by which the axis bends.
+        faults: of the survey, and wear; None: even strips, fresh paint.
     """
 
     name: str
@@ -70,6 +76,7 @@ class HardRoad:
     slant: float = 3.0
     length: float = LENGTH
     marks: dict[str, float] = field(default_factory=dict)
+    faults: SurveyFaults | None = None
 
     def cut_by(self, share: float) -> Self:
         """Return the road cut to a strip by up to a share of its reach."""
@@ -77,7 +84,8 @@ class HardRoad:
 
     def write(self, folder: Path) -> Path:
         """Write its cloud of ground points without classes into a folder, if that wasn't done; return the file."""
-        path = folder / f"{self.name.replace(' ', '-')}-{self.seed}-{self.cut:g}.laz"
+        kind = "hard" if self.faults else "even"
+        path = folder / f"{self.name.replace(' ', '-')}-{self.seed}-{self.cut:g}-{kind}.laz"
         if path.exists():
             return path
         rng = np.random.default_rng([self.seed, 77])
@@ -88,13 +96,22 @@ class HardRoad:
             inside = _inside(ground, station, offset, self.length)
             height[inside] = ground.height + rng.normal(0.0, ground.rough, inside.sum())
             level[inside] = ground.level
-        for line in self.lines:
-            along = station + 3.0 * self.seed
+        faults = self.faults or SurveyFaults()
+        if self.faults:
+            on_pavement = level < 1.5 * ASPHALT
+            level[on_pavement] *= faults.pavement_gain(station, offset)[on_pavement]
+        for index, line in enumerate(self.lines):
+            along = station + 3.0 * self.seed + line.phase
             painted = np.ones(count, bool) if line.dash == 0.0 else along % (line.dash + line.gap) < line.dash
-            shift = _shift(line.turn, line.start, station, self.length)
-            level[painted & (np.abs(offset - line.offset - shift) < 0.08) & (station >= line.start)] = PAINT
-        level = level * np.exp(rng.normal(0.0, 0.15, count))
-        seen = self._seen(station, offset)
+            distance = np.abs(offset - line.offset - _shift(line.turn, line.start, station, self.length))
+            share = faults.paint_share(distance, _WIDTH) * (painted & (station >= line.start))
+            fresh = faults.paint_level(index, station, level, PAINT) if self.faults else PAINT
+            level = level + share * (fresh - level)
+        level = level * np.exp(rng.normal(0.0, faults.speckle, count))
+        in_second = faults.second_strip(station, offset, self.length)
+        level = np.where(in_second, level * 10.0 ** (faults.gain_step / 10.0), level)
+        height = height + faults.height_step * in_second
+        seen = self._seen(station, offset) & ~faults.cut_out(offset)
         xyz = np.column_stack(
             [EAST + station, NORTH + offset + axis_north(station, self.slant, self.length), UP + height]
         )
@@ -104,10 +121,31 @@ class HardRoad:
 
     def _seen(self, station: Float, offset: Float) -> Bool:
         """Return a mask of the points that the cuts leave: either side's is another one every 50 m."""
+        right_cut, left_cut = self.sides(station)
+        return (offset > -right_cut) & (offset < left_cut)
+
+    def sides(self, station: Float) -> tuple[Float, Float]:
+        """Return how far to the right and to the left of the axis the cloud reaches at stations (N,), (N,) m each."""
         rng = np.random.default_rng([self.seed, 78])
         right_cut, left_cut = self.reach * (1.0 - self.cut * rng.uniform(0.0, 1.0, (2, 20)))
-        block = (station / 50.0).astype(np.int64)
-        return (offset > -right_cut[block]) & (offset < left_cut[block])
+        block = np.clip(station / 50.0, 0, 19).astype(np.int64)
+        return right_cut[block], left_cut[block]
+
+    def strips(self, station: Float, use: str, least: float = 3.0) -> list[tuple[Bool, Float]]:
+        """Return the strips of pavement of one use, from right to left: where each is seen (N,), and its middle (N,), m.
+
+        Args:
+            station: (N,) m.
+            use: of the ground.
+            least: width of a strip, m, that the cloud must hold.
+        """
+        right_cut, left_cut = self.sides(station)
+        result = []
+        for ground in sorted((ground for ground in self.grounds if ground.use == use), key=lambda ground: ground.low):
+            shift = _shift(ground.turn, ground.start, station, self.length)
+            low, high = np.maximum(ground.low + shift, -right_cut), np.minimum(ground.high + shift, left_cut)
+            result.append(((high - low >= least) & (station >= ground.start), 0.5 * (ground.low + ground.high) + shift))
+        return result
 
 
 def _shift(turn: float, start: float, station: Float, length: float) -> Float:
@@ -119,15 +157,13 @@ def _inside(ground: Ground, station: Float, offset: Float, length: float) -> Boo
     return (across > ground.low) & (across < ground.high) & (station >= ground.start)
 
 
-def _carriageway(
-    inner: float, lanes: int, lane: float, shoulder: float, sign: int
-) -> tuple[Ground, list[Paint], float]:
+def carriageway(inner: float, lanes: int, lane: float, shoulder: float, sign: int) -> tuple[Ground, list[Paint], float]:
     """Return pavement and lines of a carriageway from its inner edge outwards, and its outer edge, m."""
     first = inner + sign * 0.5
     borders = [first + sign * lane * number for number in range(lanes + 1)]
     outer = borders[-1] + sign * shoulder
     lines = [Paint(borders[0]), *(Paint(border, 6.0, 12.0) for border in borders[1:-1]), Paint(borders[-1])]
-    return Ground(min(inner, outer), max(inner, outer)), lines, outer
+    return Ground(min(inner, outer), max(inner, outer), use="carriageway"), lines, outer
 
 
 def motorway(seed: int, decibel: float | None = None, exit_from: float | None = None, third: bool = False) -> HardRoad:
@@ -142,8 +178,8 @@ def motorway(seed: int, decibel: float | None = None, exit_from: float | None = 
     rng = np.random.default_rng([seed, 5])
     median, lane = rng.uniform(1.5, 4.0), float(rng.choice([3.5, 3.75]))
     decibel = float(rng.uniform(0.5, 3.7)) if decibel is None else decibel
-    right, right_lines, right_outer = _carriageway(-0.5 * median, 2, lane, 2.5, -1)
-    left, left_lines, _ = _carriageway(0.5 * median, 2, lane, 2.5, 1)
+    right, right_lines, right_outer = carriageway(-0.5 * median, 2, lane, 2.5, -1)
+    left, left_lines, _ = carriageway(0.5 * median, 2, lane, 2.5, 1)
     level = ASPHALT * 10.0 ** (decibel / 10.0)
     grey = Ground(-0.5 * median, 0.5 * median, level, 0.02, 0.03)
     grounds, lines, name = [right, left, grey], [*right_lines, *left_lines], "motorway"
@@ -153,7 +189,7 @@ def motorway(seed: int, decibel: float | None = None, exit_from: float | None = 
         lines.append(Paint(right_outer - 2.6, turn=-8.0, start=exit_from))
     if third:
         name = "three carriageways"
-        collector, more_lines, _ = _carriageway(right_outer - rng.uniform(2.0, 4.0), 1, 4.5, 1.5, -1)
+        collector, more_lines, _ = carriageway(right_outer - rng.uniform(2.0, 4.0), 1, 4.5, 1.5, -1)
         grounds.append(collector)
         lines += more_lines
     marks = {"median": median, "decibel": decibel}

@@ -7,7 +7,7 @@ import pytest
 
 from synthroads_addon.base.arrays import Float
 from synthroads_addon.reconstruction.edges import Pavement
-from synthroads_addon.reconstruction.layout import Band, RoadLayout, axis_from_lines
+from synthroads_addon.reconstruction.layout import Band, RoadLayout
 from synthroads_addon.reconstruction.lines import Line
 from synthroads_addon.reconstruction.path import CloudPath
 from synthroads_addon.reconstruction.profiles import Profiles
@@ -18,6 +18,7 @@ from synthroads_addon.reconstruction.views.period import view_period
 from synthroads_addon.reconstruction.views.skeleton import view_skeleton
 from synthroads_addon.reconstruction.views.symmetry import view_symmetry
 from synthroads_addon.reconstruction.views.view import View
+from synthroads_addon.reconstruction.views.vote import axis_from_lines
 
 ROWS, HALF = 150, 12.0
 
