@@ -170,7 +170,7 @@ def tangent_axis(points: ArrayLike, radii: Sequence[float | None], rule: CurveRu
     legs = np.diff(polygon, axis=0)
     lengths = np.hypot(*legs.T)
     if lengths.min() < _LEAST_TANGENT:
-        raise InputError("points", int(lengths.argmin()) + 2, "lies on the point before it: put it elsewhere")
+        raise InputError("point", int(lengths.argmin()) + 2, "lies on the point before it: put it elsewhere")
     headings = np.unwrap(np.arctan2(legs[:, 1], legs[:, 0]))
     turns = np.diff(headings)
     wanted = [_wanted_radius(radius, turn, rule) for radius, turn in zip(radii, turns.tolist(), strict=True)]
@@ -219,12 +219,10 @@ def _corners(turns: Float, wanted: list[float], rooms: Float, rule: CurveRule) -
         if held is None:
             allowed = f"turns by {abs(math.degrees(turn)):.0f} degrees and has {room:.1f} m of its tangents for that"
             text = f"{allowed}, too little for a radius of {LEAST_RADIUS:g} m: put it, or the next point, farther away"
-            raise InputError("points", number + 1, text)
+            raise InputError("point", number + 1, text)
         clothoid = rule.clothoid(held, turn)
-        shape = (held, turn, clothoid)
-        corners.append(
-            Corner(number, turn, radius, held, clothoid, _tangent_of(*shape), _distance_of(*shape))
-        )
+        shape = (_written(held), turn, clothoid)
+        corners.append(Corner(number, turn, radius, held, clothoid, _tangent_of(*shape), _distance_of(*shape)))
     return corners
 
 
@@ -304,6 +302,11 @@ def _distance_of(radius: float, turn: float, clothoid: float) -> float:
     return (radius + _shift_and_middle(radius, clothoid)[0]) / math.cos(0.5 * turn) - radius
 
 
+def _written(radius: float) -> float:
+    """Return a radius (m) as a parameter set has it, which keeps 12 decimals of its curvature."""
+    return 1.0 / round_value(1.0 / radius, 12)
+
+
 def _chain(start: Float, heading: float, lengths: Float, corners: list[Corner]) -> TangentAxis:
     """Return the axis that begins at a point (2,) with a heading (rad): straights of the tangents, and the curves."""
     elements: list[Element] = []
@@ -325,9 +328,10 @@ def _chain(start: Float, heading: float, lengths: Float, corners: list[Corner]) 
             add(straight, 0.0, 0.0)
         begin, taken = station, corner.tangent
         if corner.radius:
-            curvature = math.copysign(1.0 / corner.radius, corner.turn)
+            radius = _written(corner.radius)
+            curvature = math.copysign(1.0 / radius, corner.turn)
             add(corner.clothoid, 0.0, curvature)
-            add(abs(corner.turn) * corner.radius - corner.clothoid, curvature, curvature)
+            add(abs(corner.turn) * radius - corner.clothoid, curvature, curvature)
             add(corner.clothoid, curvature, 0.0)
         placed.append(replace(corner, start=begin, end=station))
     if lengths[-1] - taken > _SPACE:
