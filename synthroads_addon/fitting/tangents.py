@@ -143,7 +143,7 @@ def tangent_axis(points: ArrayLike, radii: Sequence[float | None], rule: CurveRu
     """Return the axis of a tangent polygon.
 
     A radius that isn't given is the rule's usual one. Where two curves need more than the tangent between them, each
-    gets half of it, or what the other one leaves.
+    gets half of it, what the other one leaves, or what its smallest radius needs.
 
     Args:
         points: (N, 2) of the polygon, m, N >= 2.
@@ -194,10 +194,18 @@ def _rooms(lengths: Float, turns: Float, wanted: list[float], rule: CurveRule) -
         wanted: N - 2 radii, m.
         rule: by which clothoids are chosen.
     """
-    needs = np.array([tangent_length(r, t, rule) if r else 0.0 for r, t in zip(wanted, turns.tolist(), strict=True)])
+    rows = list(zip(wanted, turns.tolist(), strict=True))
+    needs = np.array([tangent_length(radius, turn, rule) if radius else 0.0 for radius, turn in rows])
+    least = [tangent_length(LEAST_RADIUS, turn, rule) if radius else 0.0 for radius, turn in rows]
+    least_lengths = np.concatenate(([0.0], np.minimum(needs, least), [0.0]))
     around = np.concatenate(([0.0], needs, [0.0]))
-    after = np.maximum(0.5 * lengths, lengths - around[1:])  # of each tangent, for the curve at its begin
-    before = np.maximum(0.5 * lengths, lengths - around[:-1])
+
+    def shares(end: slice, other: slice) -> Float:
+        """Return what the curves at one end of the tangents may take of them (N - 1,), m."""
+        half = np.clip(0.5 * lengths, least_lengths[end], np.maximum(lengths - least_lengths[other], least_lengths[end]))
+        return np.maximum(half, lengths - around[other])
+
+    before, after = shares(slice(1, None), slice(-1)), shares(slice(-1), slice(1, None))
     rooms = np.concatenate(([0.0], np.minimum(needs, np.minimum(before[:-1], after[1:])), [0.0]))
     for i, need in enumerate(needs.tolist(), 1):
         rooms[i] = min(need, lengths[i - 1] - rooms[i - 1], lengths[i] - rooms[i + 1])

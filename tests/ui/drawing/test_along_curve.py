@@ -18,6 +18,13 @@ from synthroads_addon.road.geometry import alignment_of, profile_of
 from synthroads_addon.ui.drawing import along_curve, links
 from tests.helpers.scenes.panel_road import cheap, choose, settings, users_own  # noqa: F401
 
+
+@pytest.fixture(autouse=True)
+def draft(cheap: Any) -> None:  # noqa: F811
+    """Build without what takes long."""
+    choose(cheap, fidelity="draft")
+
+
 CORNERS = ((-150.0, 0.0, 2.0), (0.0, 0.0, 2.0), (140.0, 60.0, 8.0))
 
 
