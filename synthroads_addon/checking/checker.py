@@ -1,12 +1,14 @@
 """Which rules of the guidelines (RAA, RMS, RPS) a road breaks. It works on any parameter set, hand-made or sampled."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
-from ..road.parameters import RoadParameters
+from ..road.parameters import AlignmentObject, RoadParameters
 from .rules import alignment, barriers, crossfall, furniture, markings, section, signs, traffic, turnouts
 from .rules.rule import Road, Rule, Violation
 
-__all__ = ["RULES", "Rule", "Violation", "check"]
+__all__ = ["RULES", "Rule", "Violation", "check", "check_axis"]
 
 MODULES = (alignment, crossfall, section, turnouts, markings, barriers, signs, furniture, traffic)
 """Where the rules are, in the order of their findings."""
@@ -22,10 +24,35 @@ def check(parameters: RoadParameters) -> list[Violation]:
         >>> check(sample_road(load_scenario("rq31-600m").road, seed=7))
         []
     """
+    return _violations(parameters, RULES.values())
+
+
+def check_axis(axis: AlignmentObject, design_class: str) -> list[Violation]:
+    """Return the violations of the rules for centrelines, as `check` does, by an axis that has no road yet.
+
+    Args:
+        axis: its horizontal elements and profile.
+        design_class: of the RAA, e.g. EKA1A.
+
+    Example:
+        >>> from synthroads_addon.road.parameters import HorizontalElement, VerticalPoint
+        >>> arc = HorizontalElement.between(300.0, 1 / 500, 1 / 500)
+        >>> level = (VerticalPoint(station=0.0, elevation=0.0),)
+        >>> place = {"instance": 1, "start_x": 0.0, "start_y": 0.0, "start_heading_deg": 0.0}
+        >>> axis = AlignmentObject(horizontal=(arc,), vertical=level, **place)
+        >>> [violation.rule for violation in check_axis(axis, "EKA1A")]
+        ['radius-minimum']
+    """
+    parameters = RoadParameters.model_construct(design_class=design_class, objects={"alignment": axis})
+    return _violations(parameters, alignment.RULES)
+
+
+def _violations(parameters: RoadParameters, rules: Iterable[Rule]) -> list[Violation]:
+    """Return the violations of some rules, in their order, then along the road."""
     violations: list[Violation] = []
     with np.errstate(all="ignore"):
         road = Road(parameters)
-        for rule in RULES.values():
+        for rule in rules:
             findings = [
                 Violation(rule.id, name, _finite(station), _finite(value), _finite(limit), rule.unit, text)
                 for name, station, value, limit, text in rule.find(road)

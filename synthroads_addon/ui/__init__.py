@@ -12,6 +12,7 @@ from types import ModuleType
 
 import bpy
 
+from .drawing import along_curve, tool
 from .fields import preferences, properties
 from .panels import (
     calibration,
@@ -56,6 +57,7 @@ MODULES = (
         views,
         scene_scan,
     ),
+    *(along_curve, tool),
     *(export, file_menus, calibration_settings, calibration, menus),
 )
 

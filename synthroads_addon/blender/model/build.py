@@ -58,6 +58,7 @@ class BuildTarget:
     Attributes:
         road: id of the road to replace; the scene's current road (`roads.road_meant`) if empty.
         beside: whether to replace no road, but to add one more.
+        moves_aside: whether one more road is moved until it overlaps nothing; else it is where its parameters say.
         keep_moves: whether a user's move of the replaced road stays; else the road is put where its parameters say.
         keeps: names of old parts that stay beside the new ones.
         drops: names of copies of parts that are removed with the old parts.
@@ -65,6 +66,7 @@ class BuildTarget:
 
     road: str = ""
     beside: bool = False
+    moves_aside: bool = True
     keep_moves: bool = True
     keeps: frozenset[str] = frozenset()
     drops: frozenset[str] = frozenset()

@@ -165,7 +165,7 @@ class Road:
         for name, carriageway in self.of(Carriageway).items():
             widenings = {key: turnout for key, turnout in turnouts.items() if turnout.carriageway == name}
             self.sides[name] = Edges(name, carriageway, widenings, self.length)
-        self.marks = np.unique(np.concatenate([edges.marks for edges in self.sides.values()]))
+        self.marks = np.unique(np.concatenate([np.empty(0), *(edges.marks for edges in self.sides.values())]))
 
     def of(self, kind: builtins.type[ObjectT]) -> dict[str, ObjectT]:
         """Return the objects of one class by id, in the order of the file."""

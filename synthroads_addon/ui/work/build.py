@@ -154,6 +154,6 @@ def road_work(
     steps = build_steps(BuildRequest(parameters, fidelity.tolerance, fidelity.vegetation_detail), place)
     model = yield from part_of_work(build_unseen(steps), 0.02, 1.0)
     remember(model.root, parameters, scenario, built_from, reconstruction)
-    if place.beside:
+    if place.beside and place.moves_aside:
         move_beside(model.root, bpy.context.view_layer)
     return model

@@ -1,0 +1,131 @@
+"""What is drawn over the 3D view while a road is drawn: tangents, elements by kind, handles, radii, and a line of text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import blf
+import bpy
+import gpu
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
+
+from ..work.view import draw_lines
+from .sketch import Handle, ShownElement
+
+COLORS = {"line": (0.95, 0.95, 0.95, 1.0), "arc": (1.0, 0.55, 0.1, 1.0), "clothoid": (0.25, 0.75, 1.0, 1.0)}
+"""Colours of straights, arcs and clothoids: told apart in grey as well."""
+_TANGENT, _REFUSED = (0.6, 0.6, 0.6, 0.8), (1.0, 0.2, 0.2, 1.0)
+_POINT, _RADIUS, _HOVERED = (1.0, 1.0, 1.0, 1.0), (1.0, 0.55, 0.1, 1.0), (1.0, 1.0, 0.2, 1.0)
+_TEXT = (1.0, 1.0, 1.0, 1.0)
+_DOT = 10.0
+"""Size of a handle, pixels at a resolution scale of 1."""
+_LETTERS, _MARGIN = 13.0, 18.0
+"""Size of letters, and distance of a text from its place, pixels at a resolution scale of 1."""
+
+
+class SketchView:
+    """What is to be shown of a sketch, and the handlers that draw it.
+
+    Attributes:
+        tangents: (x, y, z) of the polygon's points, the one under the mouse included.
+        elements: of the axis.
+        height: of the axis, m.
+        handles: what the mouse can take hold of.
+        hovered: the one under the mouse.
+        labels: texts at places.
+        text: the line at the mouse.
+        mouse: where it is in the region, pixels.
+        is_refused: whether the point under the mouse can't be taken.
+    """
+
+    def __init__(self) -> None:
+        self.tangents: list[tuple[float, float, float]] = []
+        self.elements: list[ShownElement] = []
+        self.height = 0.0
+        self.handles: list[Handle] = []
+        self.hovered: Handle | None = None
+        self.labels: list[tuple[tuple[float, float], str]] = []
+        self.text = ""
+        self.mouse = (0.0, 0.0)
+        self.is_refused = False
+        self._handlers: list[object] = []
+
+    def show(self) -> None:
+        """Begin to draw in all 3D views."""
+        add = bpy.types.SpaceView3D.draw_handler_add
+        self._handlers = [add(self._draw_lines, (), "WINDOW", "POST_VIEW"), add(self._draw_texts, (), "WINDOW", "POST_PIXEL")]
+
+    def hide(self) -> None:
+        """End to draw."""
+        for handler in self._handlers:
+            bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
+        self._handlers = []
+
+    def _draw_lines(self) -> None:
+        gpu.state.blend_set("ALPHA")
+        gpu.state.depth_test_set("NONE")
+        color = _REFUSED if self.is_refused else _TANGENT
+        _draw_polyline(self.tangents, color, 1.5)
+        for element in self.elements:
+            points = [(float(x), float(y), self.height) for x, y in element.points]
+            _draw_polyline(points, COLORS[element.kind], 4.0)
+        gpu.state.blend_set("NONE")
+
+    def _draw_texts(self) -> None:
+        context = bpy.context
+        region, space = context.region, context.space_data
+        if region is None or not isinstance(space, bpy.types.SpaceView3D):
+            return
+        scale = context.preferences.system.ui_scale
+        for handle in self.handles:
+            at = location_3d_to_region_2d(region, space.region_3d, Vector((*handle.place, self.height)))
+            if at is not None:
+                color = _HOVERED if handle == self.hovered else _POINT if handle.kind == "point" else _RADIUS
+                draw_square((at.x, at.y), _DOT * scale, color)
+        for place, text in self.labels:
+            at = location_3d_to_region_2d(region, space.region_3d, Vector((*place, self.height)))
+            if at is not None:
+                draw_label((at.x + _MARGIN * scale, at.y), text, scale)
+        if self.text:
+            draw_label((self.mouse[0] + _MARGIN * scale, self.mouse[1] - 2.0 * _MARGIN * scale), self.text, scale)
+
+
+def _draw_polyline(points: Sequence[tuple[float, float, float]], color: Sequence[float], width: float) -> None:
+    if len(points) > 1:
+        draw_lines([corner for pair in pairwise(points) for corner in pair], color, width)
+
+
+def draw_square(middle: tuple[float, float], size: float, color: Sequence[float]) -> None:
+    """Draw a filled square, in a draw handler of pixels."""
+    x, y, half = *middle, size / 2.0
+    corners = [(x - half, y - half), (x + half, y - half), (x + half, y + half), (x - half, y + half)]
+    _draw_face(corners, color)
+
+
+def _draw_face(corners: Sequence[tuple[float, float]], color: Sequence[float]) -> None:
+    """Draw a quadrilateral."""
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    shader.uniform_float("color", color)
+    places = [corners[i] for i in (0, 1, 2, 0, 2, 3)]
+    points = gpu.types.GPUVertBuf(shader.format_calc(), len(places))
+    points.attr_fill("pos", [(*place, 0.0) for place in places])
+    gpu.state.blend_set("ALPHA")
+    gpu.types.GPUBatch(type="TRIS", buf=points).draw(shader)
+    gpu.state.blend_set("NONE")
+
+
+def draw_label(place: tuple[float, float], text: str, scale: float) -> None:
+    """Draw a text on a dark ground, moved into the region where it would leave it; in a draw handler of pixels."""
+    region = bpy.context.region
+    blf.size(0, _LETTERS * scale)
+    width, height = blf.dimensions(0, text)
+    pad = 4.0 * scale
+    x = min(place[0], max(region.width - width - 2.0 * pad, pad)) if region else place[0]
+    y = min(max(place[1], 2.0 * pad), region.height - height - 2.0 * pad) if region else place[1]
+    corners = [(x - pad, y - pad), (x + width + pad, y - pad), (x + width + pad, y + height + pad), (x - pad, y + height + pad)]
+    _draw_face(corners, (0.0, 0.0, 0.0, 0.65))
+    blf.position(0, x, y, 0.0)
+    blf.color(0, *_TEXT)
+    blf.draw(0, text)
