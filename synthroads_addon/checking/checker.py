@@ -1,5 +1,7 @@
 """Which rules of the guidelines (RAA, RMS, RPS) a road breaks. It works on any parameter set, hand-made or sampled."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..road.parameters import RoadParameters
@@ -14,8 +16,12 @@ RULES: dict[str, Rule] = {rule.id: rule for module in MODULES for rule in module
 """All rules by id, in the order of their findings."""
 
 
-def check(parameters: RoadParameters) -> list[Violation]:
-    """Return all violations in the order of `RULES`, then along the road; an empty list if it keeps all rules.
+def check(parameters: RoadParameters, rules: Mapping[str, Rule] = RULES) -> list[Violation]:
+    """Return all violations in the order of the rules, then along the road; an empty list if it keeps them all.
+
+    Args:
+        parameters: the road.
+        rules: those that are checked, by id.
 
     Example:
         >>> from synthroads_addon import load_scenario, sample_road
@@ -25,7 +31,7 @@ def check(parameters: RoadParameters) -> list[Violation]:
     violations: list[Violation] = []
     with np.errstate(all="ignore"):
         road = Road(parameters)
-        for rule in RULES.values():
+        for rule in rules.values():
             findings = [
                 Violation(rule.id, name, _finite(station), _finite(value), _finite(limit), rule.unit, text)
                 for name, station, value, limit, text in rule.find(road)

@@ -18,7 +18,7 @@ from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...road.section import Carriageway
 from ...road.tables.stated import StatedRoad
-from ..compat import modifier_input, set_modifier_input
+from ..compat import identified_input, set_modifier_input
 from ..nodes.builder import remove_unused_groups
 from ..things.model_builder import ROLE, BuildRequest, ModelBuilder, group_inputs
 from ..things.registry import model_parts
@@ -57,14 +57,20 @@ def stated_road(root: bpy.types.Object, scene: bpy.types.Scene) -> StatedRoad:
 
 def shown_base(root: bpy.types.Object) -> tuple[RoadParameters, StatedRoad]:
     """Return a road's parameter set as built, and what its tables state, without edits of the model's inputs."""
-    return _parsed(str(root.get(PARAMETERS, "")), str(root.get(STATED, "")))
+    parameters = _built(str(root.get(PARAMETERS, "")))
+    return parameters, _stated(str(root[STATED])) if STATED in root else StatedRoad.of(parameters)
 
 
-@lru_cache(maxsize=8)
-def _parsed(built: str, stated: str) -> tuple[RoadParameters, StatedRoad]:
-    """Return a parameter set and a stated road from their JSON texts, cached; `InputError` if they are damaged."""
-    parameters = recall_parameters({PARAMETERS: built})  # type: ignore[arg-type]  # it reads this key only
-    return parameters, StatedRoad.from_json(stated) if stated else StatedRoad.of(parameters)
+@lru_cache(maxsize=4)
+def _built(text: str) -> RoadParameters:
+    """Return the parameter set of a JSON text, cached; `InputError` if it is damaged."""
+    return recall_parameters({PARAMETERS: text})  # type: ignore[arg-type]  # it reads this key only
+
+
+@lru_cache(maxsize=4)
+def _stated(text: str) -> StatedRoad:
+    """Return the stated road of a JSON text, cached; `InputError` if it is damaged."""
+    return StatedRoad.from_json(text)
 
 
 def restate(root: bpy.types.Object, scene: bpy.types.Scene, change: Callable[[StatedRoad], StatedRoad]) -> StatedRoad:
@@ -180,8 +186,8 @@ def _copy_inputs(
     for socket in group_inputs(new.node_group):
         if socket.socket_type == "NodeSocketGeometry":
             continue
-        value = modifier_input(new, socket.name)
+        value = identified_input(new, socket.identifier)
         if isinstance(value, bpy.types.Object):
             value = kept.get(str(value.get(ROLE, "")), value)
-        if modifier_input(modifier, socket.name) != value:
+        if identified_input(modifier, socket.identifier) != value:
             set_modifier_input(modifier, socket.name, value)

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ...base.errors import InputError
-from ...base.schema import round_value
 from ..guidelines import LIMITS
 from ..parameters import LONGEST_ROAD, HorizontalElement
 from .stations import StationMap, same_stations, stretched, with_insertion, without_element
@@ -215,7 +214,7 @@ def with_inserted(elements: Elements, number: int, kind: Kind, design_class: str
         InputError: a clothoid would have the same radius at both ends.
     """
     limits = LIMITS[design_class]
-    length, start, end = round_value(limits.speed / 3.6 * 2.0, 3), 0.0, 0.0
+    length, start, end = math.ceil(1e3 * limits.speed / 3.6 * 2.0) / 1e3, 0.0, 0.0
     if kind == "arc":
         start = end = 1.0 / limits.radius
     elif kind == "clothoid":

@@ -7,13 +7,16 @@ Every edit returns new objects of the parameter set. What isn't allowed raises `
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, TypeVar
+
+import numpy as np
 
 from ...base.errors import InputError
 from ...base.schema import Model, round_value
 from ..objects import AnyWidth, WidthPoint, width_at
 from ..parameters import AlignmentObject, StationEquation, VerticalPoint
-from ..profile import IntersectionPoint, Profile
+from ..profile import TOUCH, IntersectionPoint, Profile
 from ..section import Carriageway, CrossfallPoint
 from .stations import StationMap
 
@@ -37,8 +40,10 @@ def with_vertical_point(alignment: AlignmentObject, number: int, **values: float
         InputError: the station isn't between its neighbours', the roundings overlap, or a value isn't allowed.
     """
     points = list(alignment.vertical)
-    points[number] = _changed(points, number, values, f"Vertical Point {number + 1}")
-    return _with_vertical(alignment, points, number)
+    words = f"Vertical Point {number + 1}"
+    points[number] = _changed(points, number, values, words)
+    field, value = next(iter(values.items()))
+    return _with_vertical(alignment, points, f"{_LABELS[field]} of {words}", value)
 
 
 def with_vertical_point_inserted(alignment: AlignmentObject, number: int) -> AlignmentObject:
@@ -50,7 +55,7 @@ def with_vertical_point_inserted(alignment: AlignmentObject, number: int) -> Ali
     station = _station_between([point.station for point in points], number)
     elevation = _tangent_elevation(points, station)
     points.insert(number, VerticalPoint(station=station, elevation=round_value(elevation), radius=0.0))
-    return _with_vertical(alignment, points, number)
+    return _with_vertical(alignment, points, "Insert Vertical Point")
 
 
 def without_vertical_point(alignment: AlignmentObject, number: int) -> AlignmentObject:
@@ -58,14 +63,13 @@ def without_vertical_point(alignment: AlignmentObject, number: int) -> Alignment
     if len(alignment.vertical) < 2:
         raise InputError("Delete Vertical Point", None, "a road needs one vertical point at least")
     points = [point for i, point in enumerate(alignment.vertical) if i != number]
-    return _with_vertical(alignment, points, min(number, len(points) - 1))
+    return _with_vertical(alignment, points, f"Delete Vertical Point {number + 1}")
 
 
 def grades_percent(alignment: AlignmentObject) -> list[float]:
     """Return the grade behind each vertical point, %, rising positive; behind the last one that before it."""
-    points = alignment.vertical
-    grades = [100.0 * (b.elevation - a.elevation) / (b.station - a.station) for a, b in zip(points, points[1:])]
-    return [*grades, grades[-1]] if grades else [0.0]
+    profile = Profile([IntersectionPoint(p.station, p.elevation) for p in alignment.vertical])
+    return [100.0 * float(grade) for grade in profile.grades[1:]]
 
 
 def with_crossfall_point(carriageway: Carriageway, number: int, **values: float) -> Carriageway:
@@ -207,12 +211,32 @@ def _carried(points: Sequence[PointT], stations: StationMap) -> tuple[PointT, ..
     return tuple(moved)
 
 
-def _with_vertical(alignment: AlignmentObject, points: list[VerticalPoint], number: int) -> AlignmentObject:
-    """Return an alignment with other vertical points; `InputError` names the point that was edited."""
-    try:
-        Profile([IntersectionPoint(p.station, p.elevation, p.radius) for p in points])
-    except InputError as error:
-        raise InputError(f"Radius of Vertical Point {number + 1}", points[number].radius, error.allowed) from None
+def _with_vertical(
+    alignment: AlignmentObject, points: list[VerticalPoint], words: str, value: float | None = None
+) -> AlignmentObject:
+    """Return an alignment with other vertical points.
+
+    Args:
+        alignment: before.
+        points: in the order of their stations.
+        words: what is edited, for the message.
+        value: that was given, for the message.
+
+    Raises:
+        InputError: the roundings of two neighbours overlap.
+    """
+    grades = Profile([IntersectionPoint(p.station, p.elevation) for p in points]).grades
+    # A rounding reaches T = H |g2 - g1| / 2 to either side of its point.
+    reaches = [0.5 * p.radius * abs(change) for p, change in zip(points, np.diff(grades), strict=True)]
+    for number, (here, there) in enumerate(pairwise(points)):
+        needed, distance = reaches[number] + reaches[number + 1], there.station - here.station
+        if needed > distance + TOUCH:
+            raise InputError(
+                words,
+                value,
+                f"the roundings of points {number + 1} and {number + 2} would overlap (they need {needed:,.1f} m, and "
+                f"their stations are {distance:,.1f} m apart): give them smaller radii or more distance first",
+            )
     return alignment.model_copy(update={"vertical": tuple(points)})
 
 
