@@ -12,6 +12,7 @@ from types import ModuleType
 
 import bpy
 
+from . import alignment
 from .fields import preferences, properties
 from .panels import (
     calibration,
@@ -56,6 +57,7 @@ MODULES = (
         views,
         scene_scan,
     ),
+    *alignment.MODULES,
     *(export, file_menus, calibration_settings, calibration, menus),
 )
 
