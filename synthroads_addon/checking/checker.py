@@ -1,6 +1,6 @@
 """Which rules of the guidelines (RAA, RMS, RPS) a road breaks. It works on any parameter set, hand-made or sampled."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -16,15 +16,19 @@ RULES: dict[str, Rule] = {rule.id: rule for module in MODULES for rule in module
 """All rules by id, in the order of their findings."""
 
 
-def check(parameters: RoadParameters) -> list[Violation]:
-    """Return all violations in the order of `RULES`, then along the road; an empty list if it keeps all rules.
+def check(parameters: RoadParameters, rules: Mapping[str, Rule] = RULES) -> list[Violation]:
+    """Return all violations in the order of the rules, then along the road; an empty list if it keeps them all.
+
+    Args:
+        parameters: the road.
+        rules: those that are checked, by id.
 
     Example:
         >>> from synthroads_addon import load_scenario, sample_road
         >>> check(sample_road(load_scenario("rq31-600m").road, seed=7))
         []
     """
-    return _violations(parameters, RULES.values())
+    return _violations(parameters, rules.values())
 
 
 def check_axis(axis: AlignmentObject, design_class: str) -> list[Violation]:

@@ -12,6 +12,7 @@ from types import ModuleType
 
 import bpy
 
+from . import alignment
 from .drawing import along_curve, tool
 from .fields import preferences, properties
 from .panels import (
@@ -57,6 +58,7 @@ MODULES = (
         views,
         scene_scan,
     ),
+    *alignment.MODULES,
     *(along_curve, tool),
     *(export, file_menus, calibration_settings, calibration, menus),
 )

@@ -127,10 +127,10 @@ def _edited_road_objects(
     """Yield (id, object) of carriageways and line markings, with the values of the part Road's inputs."""
     sections = sections_of(parameters)
     for name, carriageway in parameters.of_type(Carriageway).items():
-        edited_carriageway = _carriageway(carriageway, modifier)
+        shown_carriageway = edited_carriageway(carriageway, modifier)
         turnouts = [shape.turnout for shape in sections[carriageway.side].turnouts]
-        pavement = _fit_damage(sections[carriageway.side], CarriagewaySection(edited_carriageway, turnouts))
-        yield name, edited_carriageway.model_copy(update={"pavement": pavement})
+        pavement = _fit_damage(sections[carriageway.side], CarriagewaySection(shown_carriageway, turnouts))
+        yield name, shown_carriageway.model_copy(update={"pavement": pavement})
     words = names_in_words(parameters)
     for name, line in parameters.of_type(LineMarking).items():
         line_name = f"{side_of(parameters, line)} {words[name]}"
@@ -140,7 +140,7 @@ def _edited_road_objects(
         yield name, line.model_copy(update=fields)
 
 
-def _carriageway(carriageway: Carriageway, modifier: bpy.types.NodesModifier) -> Carriageway:
+def edited_carriageway(carriageway: Carriageway, modifier: bpy.types.NodesModifier) -> Carriageway:
     """Return a carriageway with the values of the part Road's inputs."""
     side = carriageway.side.title()
     widths = {

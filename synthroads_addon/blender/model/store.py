@@ -9,6 +9,7 @@ import bpy
 
 from ...base.errors import InputError
 from ...road.parameters import RoadParameters
+from ...road.tables.stated import StatedRoad
 from ...scenario.scenario import Scenario
 from .older_files import PARAMETERS, adopt_older_roads
 from .roads import has_parts, parts_and_copies, renew_ids, road_meant, roots
@@ -19,6 +20,8 @@ BUILT_FROM = "synthroads_built_from"
 """Custom property of a road's root: text of the settings that it was built from."""
 FOUND = "synthroads_found"
 """Custom property of a road's root: how it was reconstructed from a cloud, as JSON."""
+STATED = "synthroads_stated"
+"""Custom property of a road's root: axis and carriageways as stated in its tables since it was built, as JSON."""
 
 
 def roads(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -70,6 +73,8 @@ def remember(
     root[PARAMETERS] = parameters.to_json()
     root[SCENARIO] = scenario.to_json()
     root[BUILT_FROM] = built_from
+    if STATED in root:
+        del root[STATED]
     if reconstruction:
         root[FOUND] = reconstruction
     elif FOUND in root:
@@ -89,6 +94,11 @@ def recall(root: bpy.types.Object) -> tuple[RoadParameters, Scenario]:
 def recall_parameters(root: bpy.types.Object) -> RoadParameters:
     """Return the parameter set stored in a road's root; raise `InputError` if it is damaged."""
     return RoadParameters.from_dict(_stored(root, PARAMETERS), "Road")
+
+
+def recall_stated(root: bpy.types.Object) -> StatedRoad | None:
+    """Return what the road's tables state since it was built; None if nothing. InputError if that is damaged."""
+    return StatedRoad.from_json(str(root[STATED])) if STATED in root else None
 
 
 def _stored(root: bpy.types.Object, key: str) -> Any:

@@ -8,7 +8,7 @@ parameter set, and a scan sees its object as a foreign body with its class.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,6 +24,7 @@ from ...road.objects import LineObject, PointObject, RoadObject
 from ...road.parameters import RoadParameters
 from ...road.section import Arrow, Hatching
 from ...road.surroundings import Terrain, Vegetation, Vehicle
+from ...road.tables.stated import StatedRoad, carry_stations
 from ...road.things.asset import Asset
 from ..things.model_builder import ROLE
 from .added import with_kept_things
@@ -49,7 +50,7 @@ from .places import (
 )
 from .read_back import edited_object, edited_parameters, read_inputs
 from .roads import BUILT_PARTS, ROAD, displacement, origin_of, parts_and_copies, root_above, world_matrix
-from .store import recall_parameters, road_named
+from .store import recall_parameters, recall_stated, road_named
 
 Float = NDArray[np.float64]
 
@@ -113,6 +114,15 @@ def read_road(root: bpy.types.Object, scene: bpy.types.Scene | None = None) -> E
     return reading.result()
 
 
+def read_as_stated(root: bpy.types.Object, scene: bpy.types.Scene, stated: StatedRoad) -> RoadParameters:
+    """Return the parameter set that a road has once its axis and carriageways are as stated, in the root's own frame.
+
+    Raises:
+        InputError: as `read_road`, or what is stated doesn't fit the rest of the road.
+    """
+    return _Reading(root, scene, stating=stated).result().known()
+
+
 @dataclass(frozen=True)
 class OpenRoad:
     """Name, id and edited state of a road in the open scene.
@@ -143,17 +153,20 @@ class _Reading:
     """A reading of a road from its scene, with lists that grow as it is read.
 
     Attributes:
+        stating: axis and carriageways that the road is about to get; None to read those that the scene shows.
         by_hand: parts that turned out to be edited by hand.
         stale: reasons why the scene doesn't show the parameters exactly.
     """
 
     root: bpy.types.Object
     scene: bpy.types.Scene
+    stating: StatedRoad | None = None
     by_hand: list[HandEdit] = field(default_factory=list)
     stale: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._built = recall_parameters(self.root)
+        self._stated = recall_stated(self.root)
         self._parts, self._copies = parts_and_copies(self.root, self.scene)
         self._base = with_kept_things(self._built, self._parts)
         self._into = np.linalg.inv(world_matrix(self.root))
@@ -169,22 +182,40 @@ class _Reading:
         visible_parts = {role: item for role, item in self._parts.items() if role not in (*_SURFACE, "Ground")}
         described_parts = {role: item for role, item in visible_parts.items() if self._is_fine(role, item)}
         described_parts |= {role: self._parts[role] for role in _SURFACE if role in self._parts}
-        parameters = edited_parameters(self._base, described_parts)
+        shown_base = self._base
+        if self._stated is not None:
+            shown_base = shown_base.model_copy(update={"objects": shown_base.objects | self._stated.carriageways})
+        parameters = edited_parameters(shown_base, described_parts)
         built_geometry = RoadGeometry(self._base)
-        backbone = self._parts.get("Backbone")
-        axis = edited_axis(built_geometry, backbone, self._place(backbone)) if backbone else None
-        if axis is not None:
+        parameters, axis = self._on_present_axis(parameters, built_geometry)
+        is_moved = axis is not None or parameters.alignment != self._base.alignment
+        if is_moved:
             self.stale.append("its axis was changed")
-            parameters = _on_axis(parameters, axis)
-        axes = RoadAxes(built_geometry, RoadGeometry(parameters) if axis is not None else built_geometry)
+        axes = RoadAxes(built_geometry, RoadGeometry(parameters) if is_moved else built_geometry)
         moved_objects = dict(self._moved(parameters, axes, described_parts))
         objects = {name: moved_objects[name] for name in parameters.objects if name in moved_objects}
         objects |= self._read_copies(parameters, objects, axes)
         data = parameters.to_dict() | {"objects": {name: item.to_dict() for name, item in objects.items()}}
-        placed_parameters = self._placed(RoadParameters.from_dict(data))
+        placed_parameters = RoadParameters.from_dict(data)
+        if self.stating is None:
+            placed_parameters = self._placed(placed_parameters)
         if not self.stale and InstanceNumbers(placed_parameters).parts != _kept_numbers(self._built, placed_parameters):
             self.stale.append("numbers of dashes and plants depend on the objects that the road has")
         return EditedRoad(placed_parameters, tuple(self.by_hand), "", tuple(self.stale), axis.fit if axis else None)
+
+    def _on_present_axis(
+        self, parameters: RoadParameters, built_geometry: RoadGeometry
+    ) -> tuple[RoadParameters, EditedAxis | None]:
+        """Return the road on its stated axis, then on the one that its backbone was moved to, if it was."""
+        stated = self.stating or self._stated
+        if stated is not None:
+            parameters = stated.applied(parameters, keeps_carriageways=self.stating is None)
+        backbone = self._parts.get("Backbone")
+        if backbone is None or self.stating is not None:
+            return parameters, None
+        shown_geometry = RoadGeometry(parameters) if stated is not None else built_geometry
+        axis = edited_axis(shown_geometry, backbone, self._place(backbone))
+        return (parameters, None) if axis is None else (_on_axis(parameters, axis), axis)
 
     def _place(self, item: bpy.types.Object) -> Float:
         """Return an object's matrix (4, 4) in the road's frame; exactly the identity if it nearly is."""
@@ -319,6 +350,8 @@ class _Reading:
                 self.by_hand.append(HandEdit(name or role_of(part), part.name, "a vertex was added"))
                 continue
             seen.add(name)
+            if name not in parameters.objects:  # it stood on an element that was deleted from the table
+                continue
             item, before = parameters.objects[name], self._base.objects[name]
             assert isinstance(before, PointObject)
             try:
@@ -341,7 +374,7 @@ class _Reading:
             if reason := self._reason(role, copy):
                 self.by_hand.append(HandEdit(role, copy.name, reason))
                 continue
-            item = parameters.objects[role]
+            item = parameters.objects.get(role, built_thing)
             if (modifier := own_modifier(copy)) is not None:
                 item = edited_object(item, modifier)
             updated_thing = self._updated(item, built_thing, copy, axes)
@@ -391,23 +424,8 @@ def _on_axis(parameters: RoadParameters, axis: EditedAxis) -> RoadParameters:
         if item["type"] == "Alignment":
             data["objects"][name] = axis.alignment.to_dict()
         else:
-            _carry_stations(item, axis.station, axis.alignment.length)
+            carry_stations(item, axis.station, axis.alignment.length)
     return RoadParameters.from_dict(data)
-
-
-def _carry_stations(data: Any, map_station: Callable[[float], float], length: float) -> None:
-    """Map all stations in an object's JSON data to another axis, in place; positive ones never become negative."""
-    if isinstance(data, list):
-        for part in data:
-            _carry_stations(part, map_station, length)
-    if not isinstance(data, dict):
-        return
-    for key, value in data.items():
-        if key in ("station", "start_station", "end_station") and isinstance(value, int | float):
-            new_station = round(map_station(float(value)), 6)
-            data[key] = max(new_station, 0.0) if value >= 0 else new_station
-        else:
-            _carry_stations(value, map_station, length)
 
 
 def _released(root: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[HandEdit]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import bpy
 
 from ...blender.model.store import find_road
+from ..alignment.panel import SYNTHROADS_MT_alignment
 from ..work.build import SYNTHROADS_OT_build, SYNTHROADS_OT_build_edited
 from ..work.long_operator import SYNTHROADS_OT_cancel
 from ..work.scan import SYNTHROADS_OT_scan
@@ -132,6 +133,7 @@ class SYNTHROADS_MT_object(bpy.types.Menu):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the entries in blocks: the road, scans, files."""
+        self.layout.menu(SYNTHROADS_MT_alignment.bl_idname, icon="CURVE_PATH")
         _draw_blocks(self.layout, _WORK)
 
 

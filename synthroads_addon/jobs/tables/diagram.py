@@ -1,0 +1,341 @@
+"""Lines and texts of a road's profile and cross-section, in pixels from a view's lower left corner.
+
+From top to bottom: the profile (ground, tangents, gradient line, vertical points), the band of curvature, the band of
+both carriageways' crossfall, each over the stations, and the cross-section at one station.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from ...base.arrays import Float
+from ...base.errors import InputError
+from ...road.geometry import RoadGeometry
+from ...road.section import Carriageway
+from ...road.tables.elements import element_rows
+from ...road.tables.points import strip_names, strip_width
+from ...road.objects import width_at
+from ...road.terrain import ground_elevation, surface_elevation
+
+Role = Literal[
+    "frame", "grid", "ground", "tangent", "road", "point", "curvature", "left", "right", "station", "text", "faint"
+]
+"""What a line or text is, by which it gets its colour."""
+_SAMPLES = 400
+"""Stations at which ground and gradient line are drawn; more than a view has columns for is not seen. Chosen."""
+_MARGIN_LEFT, _MARGIN, _TEXT_ROW = 64.0, 16.0, 16.0
+"""Room for the scale's numbers, at other edges, and for a row of text, pixels at a scale of 1. Chosen."""
+_LETTER = 6.5
+"""Mean width of a letter, pixels at a scale of 1."""
+_SHARES = (0.42, 0.14, 0.14, 0.30)
+"""Shares of the height for profile, curvature, crossfall and cross-section. Chosen."""
+_BESIDE = 12.0
+"""Ground that is shown beside the verges in the cross-section, m. Chosen."""
+_LARGEST_EXAGGERATION = 10.0
+"""Heights of a cross-section are drawn at most so many times as large as its widths. Chosen: 2.5 % is then seen."""
+_LEAST_HEIGHT = 2.0
+"""Height that a profile's scale covers at least, m: a level road isn't a line on the frame."""
+_TICK_SPACING = 90.0
+"""Least distance of two numbers of a scale along the road, pixels at a scale of 1. Chosen."""
+
+
+class DiagramLine(NamedTuple):
+    """A polyline.
+
+    Attributes:
+        role: what it is.
+        points: (N, 2) pixels.
+        width: pixels at a scale of 1.
+    """
+
+    role: Role
+    points: Float
+    width: float = 1.0
+
+
+class DiagramText(NamedTuple):
+    """A text on one line.
+
+    Attributes:
+        role: what it is.
+        x, y: of its baseline at the place that `align` names, pixels.
+        text: what is written.
+        align: whether it begins, has its middle or ends at x.
+    """
+
+    role: Role
+    x: float
+    y: float
+    text: str
+    align: Literal["left", "center", "right"] = "left"
+
+
+@dataclass
+class Diagram:
+    """What is drawn into a view.
+
+    Attributes:
+        lines, texts: from the lowest to the uppermost.
+        left, right: of the bands, pixels.
+        length: of the road between them, m.
+    """
+
+    left: float
+    right: float
+    length: float
+    lines: list[DiagramLine] = field(default_factory=list)
+    texts: list[DiagramText] = field(default_factory=list)
+
+    def x(self, station: Float | float) -> Float:
+        """Return the pixels of stations, m."""
+        return np.asarray(self.left + (self.right - self.left) * np.asarray(station) / self.length)
+
+    def station(self, x: float) -> float:
+        """Return the station, m, of a place in a band; within the road."""
+        share = (x - self.left) / (self.right - self.left)
+        return float(np.clip(share, 0.0, 1.0) * self.length)
+
+
+@dataclass(frozen=True)
+class _Band:
+    """A part of the view with a scale of its own, from a lower to an upper value.
+
+    Attributes:
+        bottom, top: pixels.
+        low, high: values there.
+    """
+
+    bottom: float
+    top: float
+    low: float
+    high: float
+
+    def y(self, value: Float | float) -> Float:
+        """Return the pixels of values."""
+        return self.bottom + (self.top - self.bottom) * (np.asarray(value) - self.low) / (self.high - self.low)
+
+
+def road_diagram(geometry: RoadGeometry, station: float, width: float, height: float, scale: float = 1.0) -> Diagram:
+    """Return a road's profile, bands and cross-section for a view.
+
+    Args:
+        geometry: of the road.
+        station: of the cross-section, m; the nearest one on the road counts.
+        width, height: of the view, pixels.
+        scale: of texts and margins, as the screen's resolution has it.
+    """
+    station = float(np.clip(station, 0.0, geometry.length))
+    diagram = Diagram(_MARGIN_LEFT * scale, max(width - _MARGIN * scale, _MARGIN_LEFT * scale + 1.0), geometry.length)
+    usable = max(height - 2.0 * _MARGIN * scale, 1.0)
+    tops = height - _MARGIN * scale - usable * np.concatenate(([0.0], np.cumsum(_SHARES)))
+    rooms = [(float(low) + 2.2 * _TEXT_ROW * scale, float(high) - 1.2 * _TEXT_ROW * scale) for high, low in zip(tops, tops[1:])]
+    ticks = list(_ticks(0.0, geometry.length, _TICK_SPACING * scale * geometry.length / (diagram.right - diagram.left)))
+    _profile(diagram, geometry, rooms[0], ticks, scale)
+    _curvature(diagram, geometry, rooms[1], scale)
+    _crossfalls(diagram, geometry, rooms[2], scale)
+    at = float(diagram.x(station))
+    diagram.lines.append(DiagramLine("station", np.array([[at, rooms[2][0]], [at, rooms[0][1]]]), 1.5))
+    diagram.texts.append(
+        DiagramText("station", at, rooms[2][0] - _TEXT_ROW * scale, f"Station {station:,.2f} m", _inner_align(diagram, at))
+    )
+    _cross_section(diagram, geometry, station, rooms[3], scale)
+    return diagram
+
+
+def _inner_align(diagram: Diagram, x: float) -> Literal["left", "center", "right"]:
+    """Return the alignment of a text at a place which keeps it within the view."""
+    share = (x - diagram.left) / (diagram.right - diagram.left)
+    return "left" if share < 0.1 else "right" if share > 0.9 else "center"
+
+
+def _ticks(low: float, high: float, spacing: float) -> Iterator[float]:
+    """Yield the round numbers from `low` to `high` that are a 1, 2 or 5 times a power of ten apart, over `spacing`."""
+    power = 10.0 ** math.floor(math.log10(max(spacing, 1e-9)))
+    step = next(power * factor for factor in (1.0, 2.0, 5.0, 10.0) if power * factor >= spacing * (1.0 - 1e-9))
+    for number in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1):
+        yield number * step
+
+
+def _frame(diagram: Diagram, band: _Band, title: str, scale: float) -> None:
+    """Add a band's frame and title."""
+    corners = [(diagram.left, band.bottom), (diagram.right, band.bottom)]
+    corners += [(diagram.right, band.top), (diagram.left, band.top), (diagram.left, band.bottom)]
+    diagram.lines.append(DiagramLine("frame", np.array(corners)))
+    diagram.texts.append(DiagramText("text", diagram.left, band.top + 0.3 * _TEXT_ROW * scale, title))
+
+
+def _scale_numbers(diagram: Diagram, band: _Band, unit: str, scale: float) -> None:
+    """Add the numbers of a band's scale and their lines."""
+    spacing = 2.0 * _TEXT_ROW * scale * (band.high - band.low) / max(band.top - band.bottom, 1.0)
+    for value in _ticks(band.low, band.high, spacing):
+        y = float(band.y(value))
+        diagram.lines.append(DiagramLine("grid", np.array([[diagram.left, y], [diagram.right, y]])))
+        text = f"{value:g}{unit}".replace("-0" if value == 0.0 else "\0", "0")
+        diagram.texts.append(
+            DiagramText("faint", diagram.left - 6.0 * scale, y - 0.25 * _TEXT_ROW * scale, text, "right")
+        )
+
+
+def _profile(
+    diagram: Diagram, geometry: RoadGeometry, room: tuple[float, float], ticks: list[float], scale: float
+) -> None:
+    """Add the profile: ground along the axis, tangents, gradient line, vertical points with their radii."""
+    axis = geometry.parameters.alignment
+    on_road = [s for s in geometry.profile.breakpoints if 0.0 < s < geometry.length]
+    station = np.union1d(np.linspace(0.0, geometry.length, _SAMPLES), on_road)
+    elevation = geometry.profile.elevation(station)
+    ground = _ground(geometry, station)
+    points = [(p.station, p.elevation, p.radius) for p in axis.vertical if 0.0 <= p.station <= geometry.length]
+    values = np.concatenate([elevation, ground[np.isfinite(ground)], [point[1] for point in points]])
+    low, high = float(values.min()), float(values.max())
+    spare = 0.08 * max(high - low, _LEAST_HEIGHT) + 0.5 * max(0.0, _LEAST_HEIGHT - (high - low))
+    band = _Band(*room, low - spare, high + spare)
+    ratio = ((band.top - band.bottom) / (band.high - band.low)) / ((diagram.right - diagram.left) / diagram.length)
+    _frame(diagram, band, f"Profile, heights x {ratio:.3g}", scale)
+    _scale_numbers(diagram, band, " m", scale)
+    for tick in ticks:
+        x = float(diagram.x(tick))
+        diagram.lines.append(DiagramLine("grid", np.array([[x, band.bottom], [x, band.top]])))
+        text = DiagramText("faint", x, band.bottom - _TEXT_ROW * scale, f"{tick:,.0f} m", _inner_align(diagram, x))
+        diagram.texts.append(text)
+    is_known = np.isfinite(ground)
+    if is_known.any():
+        diagram.lines.append(
+            DiagramLine("ground", np.column_stack([diagram.x(station[is_known]), band.y(ground[is_known])]), 1.5)
+        )
+    tangents = geometry.profile.grades
+    kinks = np.array([0.0, *(point[0] for point in points if 0.0 < point[0] < geometry.length), geometry.length])
+    if len(tangents):
+        diagram.lines.append(
+            DiagramLine("tangent", np.column_stack([diagram.x(kinks), band.y(_tangents(geometry, kinks))]))
+        )
+    diagram.lines.append(DiagramLine("road", np.column_stack([diagram.x(station), band.y(elevation)]), 2.5))
+    size = 4.0 * scale
+    for number, point in enumerate(axis.vertical, 1):
+        if not 0.0 <= point.station <= geometry.length:
+            continue
+        x, y = float(diagram.x(point.station)), float(band.y(point.elevation))
+        diamond = np.array([(x - size, y), (x, y + size), (x + size, y), (x, y - size), (x - size, y)])
+        diagram.lines.append(DiagramLine("point", diamond, 1.5))
+        radius = f", H {point.radius:,.0f} m" if point.radius else ""
+        diagram.texts.append(
+            DiagramText("point", x, y + 1.8 * size, f"{number}{radius}", _inner_align(diagram, x))
+        )
+
+
+def _tangents(geometry: RoadGeometry, station: Float) -> Float:
+    """Return the heights, m, of the tangents through the vertical points at stations (N,)."""
+    points = geometry.parameters.alignment.vertical
+    known = np.array([point.station for point in points])
+    heights = np.array([point.elevation for point in points])
+    inner = np.interp(station, known, heights)
+    grades = geometry.profile.grades
+    before = heights[0] + grades[0] * (station - known[0])
+    after = heights[-1] + grades[-1] * (station - known[-1])
+    return np.where(station < known[0], before, np.where(station > known[-1], after, inner))
+
+
+def _ground(geometry: RoadGeometry, station: Float) -> Float:
+    """Return the ground's heights (N,), m, along the axis; NaN where they aren't known."""
+    if geometry.terrain is None:
+        return np.full(station.shape, np.nan)
+    try:
+        return ground_elevation(geometry, geometry.terrain, station, np.zeros(station.shape))
+    except InputError:
+        return np.full(station.shape, np.nan)
+
+
+def _curvature(diagram: Diagram, geometry: RoadGeometry, room: tuple[float, float], scale: float) -> None:
+    """Add the band of curvature, left curves upwards, with the radii and A that fit."""
+    elements = geometry.parameters.alignment.horizontal
+    largest = max(abs(k) for e in elements for k in (e.curvature_start, e.curvature_end))
+    band = _Band(*room, -1.15 * (largest or 1.0), 1.15 * (largest or 1.0))
+    _frame(diagram, band, "Curvature: left curves upwards", scale)
+    middle = float(band.y(0.0))
+    diagram.lines.append(DiagramLine("grid", np.array([[diagram.left, middle], [diagram.right, middle]])))
+    corners: list[tuple[float, float]] = []
+    for row, element in zip(element_rows(elements), elements, strict=True):
+        begin, end = float(diagram.x(row.station)), float(diagram.x(row.station + element.length))
+        corners += [(begin, float(band.y(element.curvature_start))), (end, float(band.y(element.curvature_end)))]
+        text = {"line": "straight", "arc": f"R {abs(row.radius):,.0f}", "clothoid": f"A {row.parameter:,.0f}"}[row.kind]
+        if end - begin > _LETTER * scale * (len(text) + 1):
+            is_below = element.curvature_start + element.curvature_end >= 0.0
+            y = middle + (-1.0 if is_below else 0.35) * _TEXT_ROW * scale
+            diagram.texts.append(DiagramText("text", 0.5 * (begin + end), y, text, "center"))
+    diagram.lines.append(DiagramLine("curvature", np.array(corners), 2.0))
+
+
+def _crossfalls(diagram: Diagram, geometry: RoadGeometry, room: tuple[float, float], scale: float) -> None:
+    """Add the band of both carriageways' crossfall, %, positive where the surface falls to the right."""
+    carriageways = geometry.parameters.of_type(Carriageway).values()
+    largest = max(abs(p.crossfall_percent) for item in carriageways for p in item.crossfall)
+    band = _Band(*room, -1.2 * max(largest, 2.5), 1.2 * max(largest, 2.5))
+    _frame(diagram, band, "Crossfall in %: falling to the right upwards", scale)
+    _scale_numbers(diagram, band, " %", scale)
+    for item in carriageways:
+        known = [p.station for p in item.crossfall]
+        station = np.array([0.0, *(s for s in known if 0.0 < s < geometry.length), geometry.length])
+        percent = np.interp(station, known, [p.crossfall_percent for p in item.crossfall])
+        diagram.lines.append(DiagramLine(item.side, np.column_stack([diagram.x(station), band.y(percent)]), 2.0))
+
+
+def _cross_section(
+    diagram: Diagram, geometry: RoadGeometry, station: float, room: tuple[float, float], scale: float
+) -> None:
+    """Add the cross-section at a station: the surface from left to right, widths of strips, crossfalls."""
+    at = np.array([station])
+    edges = geometry.offsets(at)[0]
+    reach = _BESIDE if geometry.terrain is not None else 0.0
+    left, right = float(edges[0]) + reach, float(edges[-1]) - reach
+    offset = np.unique(np.concatenate([edges, np.linspace(right, left, _SAMPLES // 2)]))[::-1]
+    try:
+        height = surface_elevation(geometry, np.full(offset.shape, station), offset)
+    except InputError:
+        height = np.full(offset.shape, np.nan)
+    is_known = np.isfinite(height)
+    offset, height = offset[is_known], height[is_known]
+    if len(offset) < 2:
+        return
+    width_px = diagram.right - diagram.left
+    pixels = width_px / (left - right)
+    low, high = float(height.min()), float(height.max())
+    room_px = max(room[1] - room[0] - 3.0 * _TEXT_ROW * scale, 1.0)
+    exaggeration = min(_LARGEST_EXAGGERATION, room_px / (pixels * max(high - low, 0.1)))
+    middle = 0.5 * (room[0] + room[1]) - 0.5 * _TEXT_ROW * scale
+
+    def place(offsets: Float, heights: Float) -> Float:
+        x = diagram.left + (left - offsets) * pixels
+        return np.column_stack([x, middle + (heights - 0.5 * (low + high)) * pixels * exaggeration])
+
+    band = _Band(*room, 0.0, 1.0)
+    _frame(diagram, band, f"Cross-section at {station:,.2f} m, heights x {exaggeration:.3g}", scale)
+    on_road = (offset <= edges[0]) & (offset >= edges[-1])
+    diagram.lines.append(DiagramLine("ground", place(offset, height), 1.5))
+    diagram.lines.append(DiagramLine("road", place(offset[on_road], height[on_road]), 2.5))
+    axis_x = float(place(np.zeros(1), np.zeros(1))[0, 0])
+    diagram.lines.append(DiagramLine("station", np.array([[axis_x, room[0]], [axis_x, room[1]]]), 1.0))
+    text_y = room[0] + 0.4 * _TEXT_ROW * scale
+    for item in geometry.parameters.of_type(Carriageway).values():
+        inner = float(width_at(item.inner_offset, station))
+        percent = float(
+            np.interp(station, [p.station for p in item.crossfall], [p.crossfall_percent for p in item.crossfall])
+        )
+        first = inner
+        for strip in strip_names(item)[1:]:
+            strip_m = float(width_at(strip_width(item, strip), station))
+            ends = diagram.left + (left - item.sign * np.array([inner, inner + strip_m])) * pixels
+            for x in ends:
+                mark = np.array([[x, text_y + _TEXT_ROW * scale], [x, text_y + 1.4 * _TEXT_ROW * scale]])
+                diagram.lines.append(DiagramLine("grid", mark))
+            text = f"{strip_m:.2f}"
+            if abs(ends[1] - ends[0]) > _LETTER * scale * len(text):
+                diagram.texts.append(DiagramText("faint", float(ends.mean()), text_y, text, "center"))
+            inner += strip_m
+        x = diagram.left + (left - item.sign * 0.5 * (first + inner)) * pixels
+        y = room[1] - 1.2 * _TEXT_ROW * scale
+        diagram.texts.append(DiagramText(item.side, float(x), y, f"{percent:+.2f} %", "center"))

@@ -1,0 +1,149 @@
+"""A road's axis and carriageways as stated in its tables, after edits of the road that was built."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ...base.errors import InputError
+from ..objects import RoadObject
+from ..parameters import AlignmentObject, RoadParameters
+from ..section import Carriageway, Hatching, LineMarking, Turnout
+from ..surroundings import LONGEST
+from .elements import ElementsEdit
+from .points import carried_carriageway, carried_equations
+from .stations import StationMap, same_stations
+
+_STATIONS = ("station", "start_station", "end_station")
+
+
+@dataclass(frozen=True)
+class StatedRoad:
+    """Alignment and carriageways of a road as its tables state them.
+
+    Attributes:
+        alignment: elements and vertical points.
+        carriageways: by their ids, with crossfall and widths.
+        stations: from the road as it was built to the stated one.
+    """
+
+    alignment: AlignmentObject
+    carriageways: dict[str, Carriageway]
+    stations: StationMap
+
+    @classmethod
+    def of(cls, parameters: RoadParameters) -> StatedRoad:
+        """Return what a parameter set states."""
+        alignment = parameters.alignment
+        return cls(alignment, parameters.of_type(Carriageway), same_stations(alignment.length))
+
+    @classmethod
+    def from_json(cls, text: str) -> StatedRoad:
+        """Return what `to_json` wrote; InputError if it is damaged."""
+        try:
+            data = json.loads(text)
+            carriageways = {name: Carriageway.from_dict(item) for name, item in data["carriageways"].items()}
+            stations = StationMap(*(tuple(map(float, column)) for column in data["stations"]))
+            return cls(AlignmentObject.from_dict(data["alignment"]), carriageways, stations)
+        except (AttributeError, KeyError, TypeError, ValueError):
+            raise InputError("Alignment", None, "its table in the file is damaged: build the road again") from None
+
+    def to_json(self) -> str:
+        """Return the stated road as a JSON text."""
+        data: dict[str, Any] = {
+            "alignment": self.alignment.to_dict(),
+            "carriageways": {name: item.to_dict() for name, item in self.carriageways.items()},
+            "stations": [list(self.stations.before), list(self.stations.after)],
+        }
+        return json.dumps(data)
+
+    def with_elements(self, edit: ElementsEdit) -> StatedRoad:
+        """Return the road with edited elements: crossfall and widths move along with their places.
+
+        Vertical points keep their stations, as the profile is designed by them: grades and roundings stay.
+        """
+        update = {"horizontal": edit.elements, "equations": carried_equations(self.alignment, edit.stations)}
+        return StatedRoad(
+            self.alignment.model_copy(update=update),
+            {name: carried_carriageway(item, edit.stations) for name, item in self.carriageways.items()},
+            self.stations.then(edit.stations),
+        )
+
+    def with_alignment(self, alignment: AlignmentObject) -> StatedRoad:
+        """Return the road with another profile."""
+        return replace(self, alignment=alignment)
+
+    def with_carriageway(self, name: str, carriageway: Carriageway) -> StatedRoad:
+        """Return the road with another carriageway of an id."""
+        return replace(self, carriageways=self.carriageways | {name: carriageway})
+
+    def applied(self, parameters: RoadParameters, keeps_carriageways: bool = False) -> RoadParameters:
+        """Return a parameter set of the road as built with what is stated; all else moves along with its place.
+
+        What stood only on deleted stretches is gone.
+
+        Args:
+            parameters: with the stations of the road as it was built, but in its carriageways if these are kept.
+            keeps_carriageways: whether its own carriageways count.
+
+        Raises:
+            InputError: what is stated doesn't fit the rest of the road.
+        """
+        deleted = {name for name, item in parameters.objects.items() if self._is_deleted(item)}
+        deleted |= {
+            name
+            for name, item in parameters.objects.items()
+            if isinstance(item, LineMarking | Hatching) and item.turnout in deleted
+        }
+        objects: dict[str, RoadObject] = {}
+        for name, item in parameters.objects.items():
+            if name in deleted:
+                continue
+            if isinstance(item, AlignmentObject):
+                objects[name] = self.alignment
+            elif isinstance(item, Carriageway):
+                objects[name] = item if keeps_carriageways else self.carriageways.get(name, item)
+            else:
+                objects[name] = self._carried(item)
+        changed = parameters.model_copy(update={"objects": objects})
+        return RoadParameters.from_dict(changed.to_dict())
+
+    def _is_deleted(self, item: RoadObject) -> bool:
+        """Return whether an object stands only on stretches that were deleted."""
+        station = getattr(item, "station", None)
+        if station is None and isinstance(item, Turnout):
+            station = item.start_station
+        if station is not None:
+            return self.stations.is_deleted(station)
+        start, end = getattr(item, "start_station", None), getattr(item, "end_station", None)
+        return start is not None and end is not None and start < end and self.stations(start) == self.stations(end)
+
+    def _carried(self, item: RoadObject) -> RoadObject:
+        """Return an object at its place along the stated road; unchanged objects are returned themselves."""
+        data = item.to_dict()
+        carry_stations(data, self.stations, self.alignment.length)
+        return type(item).from_dict(data) if data != item.to_dict() else item
+
+
+def carry_stations(data: Any, stations: Any, length: float) -> None:
+    """Map all stations in an object's JSON data to another axis, in place; positive ones never become negative.
+
+    Args:
+        data: the object's data.
+        stations: function from a station to the one on the other axis, m.
+        length: of the other axis, m.
+    """
+    if isinstance(data, list):
+        for part in data:
+            carry_stations(part, stations, length)
+    if not isinstance(data, dict):
+        return
+    for key, value in data.items():
+        if key in _STATIONS and isinstance(value, int | float):
+            if value >= LONGEST:  # all along, however long the road is
+                continue
+            new_station = round(stations(float(value)), 6)
+            data[key] = max(new_station, 0.0) if value >= 0 else new_station
+        else:
+            carry_stations(value, stations, length)

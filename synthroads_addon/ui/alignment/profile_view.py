@@ -1,0 +1,181 @@
+"""The profile and cross-section of the current road, drawn in every image editor that shows no image.
+
+Annotations are not postponed here: Blender reads the properties from them.
+"""
+
+from typing import Any
+
+import blf
+import bpy
+import gpu
+import numpy as np
+
+from ...base.errors import InputError
+from ...jobs.tables.diagram import Diagram, road_diagram
+from ...road.geometry import RoadGeometry
+from ...road.parameters import RoadParameters
+from ..fields.room import value_row
+from ..work.common import has_road
+from ..work.view import draw_lines
+from .tables import tables
+
+COLORS = {
+    "frame": (0.55, 0.55, 0.55, 1.0),
+    "grid": (0.27, 0.27, 0.27, 1.0),
+    "ground": (0.55, 0.42, 0.25, 1.0),
+    "tangent": (0.50, 0.50, 0.50, 1.0),
+    "road": (0.95, 0.95, 0.95, 1.0),
+    "point": (1.00, 0.75, 0.20, 1.0),
+    "curvature": (0.35, 0.75, 1.00, 1.0),
+    "left": (0.95, 0.45, 0.45, 1.0),
+    "right": (0.45, 0.85, 0.50, 1.0),
+    "station": (1.00, 0.35, 0.10, 1.0),
+    "text": (0.90, 0.90, 0.90, 1.0),
+    "faint": (0.68, 0.68, 0.68, 1.0),
+}
+"""Colours of lines and texts by their role, told apart also by those who don't see red and green: by place and name."""
+_BACKGROUND = (0.11, 0.11, 0.11, 1.0)
+_TEXT_SIZE = 11.0
+
+
+class ProfileView:
+    """The drawing of the profile, and the diagram that was drawn last."""
+
+    def __init__(self) -> None:
+        self._handler: object | None = None
+        self._key: tuple[Any, ...] = ()
+        self._geometry: RoadGeometry | None = None
+        self._parameters: RoadParameters | None = None
+        self._diagram: Diagram | None = None
+
+    @property
+    def is_shown(self) -> bool:
+        """Return whether the profile is drawn."""
+        return self._handler is not None
+
+    def show(self) -> None:
+        """Begin to draw."""
+        if self._handler is None:
+            self._handler = bpy.types.SpaceImageEditor.draw_handler_add(self._draw, (), "WINDOW", "POST_PIXEL")
+
+    def hide(self) -> None:
+        """End drawing."""
+        if self._handler is not None:
+            bpy.types.SpaceImageEditor.draw_handler_remove(self._handler, "WINDOW")
+            self._handler = None
+        self._key, self._geometry, self._parameters, self._diagram = (), None, None, None
+
+    def diagram(self, scene: bpy.types.Scene, width: float, height: float, scale: float) -> Diagram | None:
+        """Return the diagram of the current road for a view of a size (pixels); None without a road."""
+        if tables.read(scene) is None or tables.parameters is None:
+            return None
+        if tables.parameters is not self._parameters:
+            self._parameters, self._key = tables.parameters, ()
+            try:
+                self._geometry = RoadGeometry(tables.parameters)
+            except InputError:
+                self._geometry = None
+        if self._geometry is None:
+            return None
+        key = (scene.synthroads_alignment.station, width, height, scale)
+        if key != self._key:
+            self._key, self._diagram = key, road_diagram(self._geometry, *key)
+        return self._diagram
+
+    def _draw(self) -> None:
+        """Draw the diagram into the image editor that is being drawn."""
+        context = bpy.context
+        space: Any = context.space_data
+        region = context.region
+        if space is None or getattr(space, "image", None) is not None or region is None:
+            return
+        scale = context.preferences.system.ui_scale
+        diagram = self.diagram(context.scene, region.width, region.height, scale)
+        _fill(region.width, region.height)
+        if diagram is None:
+            _write("Build a road to see its profile", 20.0 * scale, 20.0 * scale, COLORS["text"], scale)
+            return
+        gpu.state.blend_set("ALPHA")
+        for line in diagram.lines:
+            points = np.column_stack([line.points, np.zeros(len(line.points))])
+            corners = np.repeat(points, 2, axis=0)[1:-1]
+            draw_lines([tuple(corner) for corner in corners.tolist()], COLORS[line.role], line.width * scale)
+        for text in diagram.texts:
+            _write(text.text, text.x, text.y, COLORS[text.role], scale, text.align)
+        gpu.state.blend_set("NONE")
+
+
+profile_view = ProfileView()
+
+
+def _fill(width: float, height: float) -> None:
+    """Fill the region with the background."""
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    shader.uniform_float("color", _BACKGROUND)
+    corners = [(0.0, 0.0, 0.0), (width, 0.0, 0.0), (0.0, height, 0.0), (width, height, 0.0)]
+    points = gpu.types.GPUVertBuf(shader.format_calc(), len(corners))
+    points.attr_fill("pos", corners)
+    gpu.types.GPUBatch(type="TRI_STRIP", buf=points).draw(shader)
+
+
+def _write(text: str, x: float, y: float, color: tuple[float, ...], scale: float, align: str = "left") -> None:
+    """Write a text at a place, pixels."""
+    blf.size(0, _TEXT_SIZE * scale)
+    width = blf.dimensions(0, text)[0]
+    blf.position(0, x - {"left": 0.0, "center": 0.5, "right": 1.0}[align] * width, y, 0.0)
+    blf.color(0, *color)
+    blf.draw(0, text)
+
+
+def redraw_profiles() -> None:
+    """Tag all image editors for redraw."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "IMAGE_EDITOR":
+                area.tag_redraw()
+
+
+class SYNTHROADS_OT_show_profile(bpy.types.Operator):
+    """Show the profile, curvature, crossfall and a cross-section of the road in an image editor without an image, in a new window if there is none; press again to hide them"""  # noqa: E501 (a tooltip is one line)
+
+    bl_idname = "synthroads.show_profile"
+    bl_label = "Show Profile"
+    bl_options = {"REGISTER"}  # noqa: RUF012 (Blender reads a plain set)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether the scene has a road and Blender a window."""
+        if bpy.app.background or context.window is None:
+            cls.poll_message_set("Blender has no window to show it in")
+            return False
+        return has_road(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Begin to draw the profile, or end it."""
+        if profile_view.is_shown and _free_area(context) is not None:
+            profile_view.hide()
+            redraw_profiles()
+            return {"FINISHED"}
+        profile_view.show()
+        if _free_area(context) is None:
+            bpy.ops.wm.window_new()
+            area = context.window_manager.windows[-1].screen.areas[0]
+            area.type = "IMAGE_EDITOR"
+            area.spaces.active.image = None
+        redraw_profiles()
+        return {"FINISHED"}
+
+
+def _free_area(context: bpy.types.Context) -> bpy.types.Area | None:
+    """Return an image editor that shows no image; None if there is none."""
+    areas = [area for window in context.window_manager.windows for area in window.screen.areas]
+    return next((a for a in areas if a.type == "IMAGE_EDITOR" and a.spaces.active.image is None), None)
+
+
+def draw_station(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Draw the station of the cross-section while the profile is shown."""
+    if profile_view.is_shown:
+        value_row(layout, "Cross-section at").prop(scene.synthroads_alignment, "station", text="")
+
+
+unregister = profile_view.hide
