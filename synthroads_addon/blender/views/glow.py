@@ -39,7 +39,7 @@ _BEAD_ANGLE, _BEAD_START = math.radians(3.0), math.radians(1.05)
 """Observation angle by which markings' beads send back 1/e, beyond that of EN 1436's geometry, rad; the first chosen."""
 _BEAD_LOBE = 90.0
 """Entrance angle (deg) from which on a material's lobe is that of beads."""
-_SAME_CAMERA = 0.1
+_SAME_CAMERA = 0.005
 """Distance (m) by which a place may lie elsewhere in the camera's frame and in that of the headlights; chosen."""
 
 
