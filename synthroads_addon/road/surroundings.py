@@ -189,7 +189,9 @@ class Environment(Model):
     sun_azimuth_deg: float = quantity(
         180.0, ge=0, le=360, unit="deg", description="Direction of the sun, clockwise from north."
     )
-    sun_elevation_deg: float = quantity(45.0, ge=0, le=90, unit="deg", description="Height of the sun.")
+    sun_elevation_deg: float = quantity(
+        45.0, ge=-90, le=90, unit="deg", description="Height of the sun above the horizon; negative at dusk and at night."
+    )
     sun_strength: float = quantity(1.0, ge=0, le=2, unit="1", description="Strength of the sunlight; 1 on a clear day.")
     cloud_cover: float = quantity(0.0, ge=0, le=1, unit="1", description="Share of the ground in clouds' shadow.")
     cloud_size: float = quantity(120.0, ge=10, le=2000, unit="m", description="Size of a cloud's shadow.")

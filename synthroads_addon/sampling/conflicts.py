@@ -79,6 +79,8 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
 _PLAIN = {
     "lane_changes.taper_length": (0.0, 1e4),
     "pavement.potholes_per_km": (0.0, 1e4),
+    "environment.time_of_day": (0.0, 24.0),
+    "environment.day_of_year": (1.0, 366.0),
     "materials.patch_density": (0.0, 20.0),
     "materials.crack_density": (0.0, 1.0),
     "landscape.forest_share": (0.0, 1.0),

@@ -26,6 +26,7 @@ from .forest import sample_forest_edges
 from .pavement_damage import draw_materials
 from .placing.draw import draw
 from .placing.site import PlacementSite
+from .sun_place import sun_angles
 
 Kind = Literal["grass", "shrub", "tree"]
 
@@ -88,6 +89,10 @@ def sample_environment(scenario: RoadScenario, seed: int) -> Environment:
     rng, limits = stream(seed, "environment"), scenario.environment
     names = ("sun_azimuth_deg", "sun_elevation_deg", "cloud_cover")
     light = {name: draw(rng, getattr(limits, name)) for name in names}
+    if limits.sun_place == "time":
+        time_stream = stream(seed, "environment", "time of day")
+        hour, day = draw(time_stream, limits.time_of_day), round(draw(time_stream, limits.day_of_year))
+        light["sun_azimuth_deg"], light["sun_elevation_deg"] = map(round_value, sun_angles(hour, day, limits.latitude_deg))
     is_wet, wetness = rng.random() < limits.wet, draw(rng, limits.wetness)
     if rng.random() < limits.bad_weather:
         weather = list(WEATHER)[rng.integers(len(WEATHER))]

@@ -183,8 +183,35 @@ class LandscapeLimits(ClosedModel):
 class EnvironmentLimits(ClosedModel):
     """Light and weather."""
 
-    sun_azimuth_deg: Interval = interval(0.0, 360.0, "deg", "Direction of the sun, clockwise from north.")
-    sun_elevation_deg: Interval = interval(20.0, 62.0, "deg", "Height of the sun.")
+    sun_place: Literal["angles", "time"] = Field(
+        "angles",
+        title="Sun Follows From",
+        description="Whether the sun's place is drawn as two angles, or follows from time of day, day and latitude.",
+        json_schema_extra=notes(labels={"angles": "Direction and Height", "time": "Time of Day"}),
+    )
+    sun_azimuth_deg: Interval = interval(
+        0.0, 360.0, "deg", "Direction of the sun, clockwise from north.", only_with={"sun_place": ("angles",)}
+    )
+    sun_elevation_deg: Interval = interval(
+        20.0,
+        62.0,
+        "deg",
+        "Height of the sun above the horizon; negative at dusk and at night.",
+        only_with={"sun_place": ("angles",)},
+    )
+    time_of_day: Interval = interval(
+        9.0,
+        17.0,
+        "h",
+        "Time of the day by the sun, which is in the south at 12; 22 is night in Central Europe.",
+        only_with={"sun_place": ("time",)},
+    )
+    day_of_year: Interval = interval(
+        1.0, 365.0, "d", "Day of the year; 1 is the first of January.", only_with={"sun_place": ("time",)}
+    )
+    latitude_deg: float = quantity(
+        51.0, "deg", "Latitude; negative in the south.", (-90, 90), only_with={"sun_place": ("time",)}
+    )
     cloud_cover: Interval = interval(0.0, 0.6, "1", "Share of the ground in clouds' shadow.")
     wet: float = share(0.15, "Probability of a wet road.", title="Wet Road")
     wetness: Interval = interval(0.3, 1.0, "1", "Wetness of a wet road.")

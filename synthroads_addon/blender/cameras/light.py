@@ -14,6 +14,7 @@ import numpy as np
 
 from ...road.surroundings import Environment
 from ...scanning.colour.light import SunAndSky, expose_light, sun_direction
+from ...scanning.colour.twilight import sun_share
 from ..sky import SUN_ANGLE, SUN_COLOR, SUN_STRENGTH, fill_sky, new_sun
 from .stage import SUN_GROUP, Passes, stage
 
@@ -66,12 +67,14 @@ def _exposed(environment: Environment) -> tuple[SunAndSky, float]:
     """Return sunlight and skylight on white surfaces, exposed, and the factor of exposure, see `expose_light`."""
     # Radiance of a white Lambertian surface that faces the sun: L = E / pi. Blender keeps the irradiance E as 32 bits.
     sun_radiance = np.array(SUN_COLOR) * float(np.float32(SUN_STRENGTH * environment.sun_strength)) / math.pi
+    sun_radiance = sun_radiance * sun_share(environment.sun_elevation_deg)
     return expose_light(sun_direction(environment), sun_radiance, np.array(sky_radiance(environment)))
 
 
 def sky_radiance(environment: Environment) -> tuple[float, float, float]:
     """Return the radiance (red, green, blue) of a white matt level surface under an environment's sky alone.
 
+    After sunset it is the radiance of a sky as bright as at a low sun, see `sky.fill_sky`.
     Each sky is rendered once per process, in Blender's main thread.
     """
     return _sky_radiance(_Sky.of(environment))
@@ -95,7 +98,7 @@ def _world(sky: _Sky) -> Iterator[bpy.types.World]:
     """Context of a new Blender world with this sky; removes it on exit."""
     world = bpy.data.worlds.new("SR Stage Sky")
     try:
-        fill_sky(world, *sky)
+        fill_sky(world, *sky, exposed=True)
         yield world
     finally:
         bpy.data.worlds.remove(world)

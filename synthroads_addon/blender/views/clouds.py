@@ -12,6 +12,7 @@ from statistics import NormalDist
 import bpy
 
 from ...road.surroundings import Environment
+from ...scanning.colour.twilight import sky_share
 from ..sky import SUN_COLOR, SUN_STRENGTH
 
 _HEIGHT = 1200.0
@@ -77,6 +78,7 @@ def _color(tree: bpy.types.NodeTree, environment: Environment, density: bpy.type
     sine = math.sin(math.radians(max(environment.sun_elevation_deg, 3.0)))
     # Radiance of a Lambertian surface, albedo E / pi, less at a low sun by chosen weights.
     radiance = _ALBEDO * SUN_STRENGTH * environment.sun_strength * (0.35 + 0.65 * sine) / math.pi
+    radiance *= sky_share(environment.sun_elevation_deg)
     mix = tree.nodes.new("ShaderNodeMix")
     mix.data_type = "RGBA"
     colors = [color_input for color_input in mix.inputs if color_input.type == "RGBA"]

@@ -1,4 +1,4 @@
-"""Sun, sky, haze, landscape, sward and cameras of a road in the file, for the user's pictures, not for scans."""
+"""Sun, sky, haze, landscape, sward, lamps and cameras of a road in the file, for the user's pictures, not for scans."""
 
 import math
 from collections.abc import Iterator
@@ -14,7 +14,9 @@ from ..sky import fill_sky, new_sun
 from ..things.model_builder import SUPPORT
 from .clouds import add_clouds
 from .exposure import level_irradiance, stops_for, sun_and_sky
+from .glow import add_glow, remove_glow
 from .haze import haze_body, haze_light, light_below
+from .lamps import LIT_BELOW, add_lamps, remove_lamps
 from .landscape import add_landscape, remove_landscape
 from .sward import Lawn, add_sward, remove_sward
 from .viewpoints import Viewpoint, aerial_view, driver_view
@@ -35,6 +37,7 @@ def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix
 
     Other lights and cameras stay. A dense sward is added around the driver's camera. The driver's camera becomes the
     scene's if it has none; a camera of an earlier call is replaced by the same one. The scene is exposed for the light.
+    From dusk on lamps shine, and signs, markings and delineators send the driver's headlights' light back.
 
     Args:
         scene: scene that shows the road.
@@ -58,12 +61,16 @@ def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix
         camera = _mark(name, _camera(_NAMES[name], view(parameters), matrix), scene)
         if name == camera_kind:
             scene.camera = camera
+        if name == DRIVER and environment.sun_elevation_deg < LIT_BELOW:
+            add_glow(add_lamps(scene, parameters, matrix, camera))
 
 
 def remove_views(scene: bpy.types.Scene) -> None:
     """Remove the objects that `add_views` added to a scene, with their data; the world stays."""
     remove_landscape(scene)
     remove_sward(scene)
+    remove_lamps(scene)
+    remove_glow()
     items = list(views_of(scene).values())
     data = [item.data for item in items if item.data is not None]
     bpy.data.batch_remove(items)

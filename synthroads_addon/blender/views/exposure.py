@@ -6,21 +6,25 @@ import numpy as np
 
 from ...base.arrays import Float
 from ...road.surroundings import Environment
+from ...scanning.colour.twilight import sky_share
 from ..cameras.light import sky_radiance
-from ..sky import SUN_COLOR, SUN_STRENGTH
+from ..sky import sun_irradiance
+from .lamps import LUX
 
 _REFERENCE = Environment(sun_elevation_deg=42.0)
 """Environment whose light needs no correction; chosen."""
 _CORRECTED_SHARE = 0.85
 """Share of a change of light, in stops, that is corrected: a dull day stays duller than a bright one; chosen."""
-_STOPS = (-1.0, 4.0)
-"""Limits of the correction, stops; chosen."""
+_LEAST_STOPS = -1.0
+"""Least correction, stops; chosen."""
+_LAMPLIGHT = 10.0 / LUX
+"""Least irradiance that is exposed for. Chosen: by night the ground some 40 m ahead has 10 lx of the headlights."""
 
 
 def sun_and_sky(environment: Environment) -> tuple[Float, Float]:
     """Return the sun's irradiance normal to its rays, and the sky's on level ground, (3,) each: red, green, blue."""
-    sun = np.array(SUN_COLOR) * SUN_STRENGTH * environment.sun_strength
-    return sun, math.pi * np.array(sky_radiance(environment))
+    sky = math.pi * np.array(sky_radiance(environment)) * sky_share(environment.sun_elevation_deg)
+    return sun_irradiance(environment), sky
 
 
 def level_irradiance(environment: Environment) -> Float:
@@ -32,5 +36,5 @@ def level_irradiance(environment: Environment) -> Float:
 def stops_for(irradiance: Float) -> float:
     """Return the exposure (stops) for level ground under an irradiance (3,), compared with the reference light."""
     reference = float(level_irradiance(_REFERENCE).mean())
-    stops = _CORRECTED_SHARE * math.log2(reference / max(float(np.mean(irradiance)), 1e-6))
-    return min(max(stops, _STOPS[0]), _STOPS[1])
+    stops = _CORRECTED_SHARE * math.log2(reference / max(float(np.mean(irradiance)), _LAMPLIGHT))
+    return max(stops, _LEAST_STOPS)

@@ -22,10 +22,12 @@ class Interval(ClosedModel):
         return self
 
 
-def interval(minimum: float, maximum: float, unit: str, description: str, title: str | None = None) -> Any:
-    """Return a pydantic field for an `Interval` with its default limits."""
+def interval(
+    minimum: float, maximum: float, unit: str, description: str, title: str | None = None, **further_notes: Any
+) -> Any:
+    """Return a pydantic field for an `Interval` with its default limits, and optionally more of `notes`."""
     limits = Interval(minimum=minimum, maximum=maximum)
-    return Field(limits, title=title, description=description, json_schema_extra=notes(unit=unit))
+    return Field(limits, title=title, description=description, json_schema_extra=notes(unit=unit, **further_notes))
 
 
 def share(default: float, description: str, title: str | None = None) -> Any:
