@@ -62,6 +62,10 @@ def certificate(recipe: str, result: CloudComparison, real: str) -> dict[str, An
         real: what the real clouds are, in words.
     """
     data = result.to_dict()
+    left_out = {
+        road: {group: round(value, 4) for group, value in groups.items()}
+        for road, groups in (result.realism_left_out() if len(data["real"]) > 1 else {}).items()
+    }
     auc = {group: _spread([row["auc"][group] for row in data["synthetic"]]) for group in data["realism"]}
     yardstick = {group: _spread([row["auc"][group] for row in data["real"]]) for group in data["realism"]}
     return {
@@ -74,6 +78,7 @@ def certificate(recipe: str, result: CloudComparison, real: str) -> dict[str, An
         "auc": auc,
         "yardstick": yardstick,
         "realism": data["realism"],
+        "realism_left_out": left_out,
         "giveaways": dict(list(data["giveaways"].items())[:_SHOWN]),
         "statistics": _statistics(data),
     }
@@ -207,7 +212,34 @@ def table(rows: list[dict[str, Any]], folder: str) -> str:
         name = f"[`{row['recipe']}`]({folder}/{row['recipe']}.json)"
         cells += [f"{count_within} of {total}", giveaways_text, row["real"]]
         lines.append(f"| {name} | {row['clouds']} | {' | '.join(cells)} |")
-    return "\n".join([*lines, ""])
+    return "\n".join([*lines, *_left_out_lines(rows), ""])
+
+
+def _left_out_lines(rows: list[dict[str, Any]]) -> list[str]:
+    """Return the table of realism against roads that were left out, as lines of Markdown; empty without any."""
+    rows_left_out = [row for row in rows if row.get("realism_left_out")]
+    if not rows_left_out:
+        return []
+    groups = list(rows[0]["realism"])
+    lines = [
+        "",
+        "## With each road left out",
+        "",
+        "The recipes' ranges were chosen by looking at all of these roads. This table shows how far a choice",
+        "made on some of them holds on another: each real road in turn is left out, the half of the recipe's",
+        "clouds is taken that is hardest to tell from each of the other roads, and these are compared with the",
+        "road that was left out, alone. The figures are realism: 1 - AUC of the synthetic clouds divided by the",
+        "1 - AUC of the other real roads against the same road.",
+        "",
+        f"| recipe | road left out | {' | '.join(groups)} |",
+        "|---|---|" + "--:|" * len(groups),
+    ]
+    for row in rows_left_out:
+        left_out = row["realism_left_out"]
+        means = {group: float(np.mean([values[group] for values in left_out.values()])) for group in groups}
+        for road, values in [*left_out.items(), ("mean", means)]:
+            lines.append(f"| `{row['recipe']}` | {road} | " + " | ".join(f"{values[group]:.2f}" for group in groups) + " |")
+    return lines
 
 
 def certify(folder: Path, real: Path, words: str, are_sweeps: bool = False) -> dict[str, Any]:

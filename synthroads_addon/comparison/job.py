@@ -73,28 +73,31 @@ class CloudComparison:
             for group in self.distinctions[0].auc
         }
 
-    def realism_by_road(self, seed: int = 1) -> dict[str, dict[str, float]]:
-        """Return by real cloud and group 1 - AUC of synthetic clouds against it alone over that of the other real ones.
+    def realism_left_out(self, seed: int = 1) -> dict[str, dict[str, float]]:
+        """Return realism by real cloud and group, against that cloud alone, by synthetic clouds chosen without it.
 
-        Against one road a cloud is easier to tell than against all: the other real ones are, as well.
+        Of the synthetic clouds the half is taken that is hardest to tell from each of the other real ones by all
+        statistics; its mean 1 - AUC against the cloud that was left out is divided by that of the other real ones.
 
         Args:
             seed: seed by which patches and folds are drawn.
 
         Raises:
-            InputError: a cloud has too few patches of a road's density.
+            InputError: a cloud has too few patches of another's density.
         """
-        result = {}
+        real_patches = [cloud.patches for cloud in self.real]
+        synthetic_rows, real_rows = (
+            [[classifier_auc(cloud.patches, patches, seed, cloud.cloud.name) for patches in real_patches] for cloud in side]
+            for side in (self.synthetic, self.real)
+        )
+        count_chosen, result = -(-len(synthetic_rows) // 2), {}
         for number, road in enumerate(self.real):
-            others = self.real[:number] + self.real[number + 1 :]
-            synthetic_rows, real_rows = (
-                [classifier_auc(cloud.patches, road.patches, seed, cloud.cloud.name) for cloud in clouds]
-                for clouds in (self.synthetic, others)
-            )
+            others = [other for other in range(len(self.real)) if other != number]
+            by_likeness = sorted(synthetic_rows, key=lambda row: -_mean_of([row[other]["all"] for other in others]))
             result[road.cloud.name] = {
-                group: _mean_of([row[group] for row in synthetic_rows])
-                / max(_mean_of([row[group] for row in real_rows]), 1e-9)
-                for group in synthetic_rows[0]
+                group: _mean_of([row[number][group] for row in by_likeness[:count_chosen]])
+                / max(_mean_of([real_rows[other][number][group] for other in others]), 1e-9)
+                for group in synthetic_rows[0][number]
             }
         return result
 

@@ -230,7 +230,7 @@ class MaterialLimits(ClosedModel):
     crack_density: Interval = interval(0.0, 0.6, "1", "0 no cracks, 1 cracked all over.")
     wheel_track_polish: Interval = interval(0.15, 0.6, "1", "Polish of the wheel tracks.")
     concrete_brightness: Interval = interval(0.85, 1.2, "1", "Factor on the base colour.")
-    paint_wear: Interval = interval(0.0, 0.5, "1", "Share of the markings' film worn off.")
+    paint_wear: Interval = interval(0.1, 0.35, "1", "Share of the markings' film worn off.")
     grass_dryness: Interval = interval(0.0, 0.8, "1", "0 green, 1 dry.")
     paint_renewed: Interval = interval(0.0, 0.4, "1", "Share of the lines' length that was painted anew.")
     paint_dirt: Interval = interval(0.0, 0.2, "1", "Share of the old markings' brightness that dirt takes.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -30,6 +31,9 @@ class Compared:
             "real": [{"auc": {"all": 0.8}, "medians": {"residual_mm": one}} for one in (20.0, 30.0)],
         }
 
+    def realism_left_out(self) -> dict[str, dict[str, float]]:
+        return {"a": {"all": 0.4}, "b": {"all": 0.7}}
+
 
 def made(*ours: float) -> dict[str, Any]:
     return certificate("sweeps", cast(CloudComparison, Compared(ours)), "two roads")
@@ -51,6 +55,34 @@ def test_the_table_has_a_row_for_each_recipe() -> None:
     text = table([made(25.0), made(99.0) | {"recipe": "standin"}], "certificates")
     assert "| [`sweeps`](certificates/sweeps.json) | 1 | 0.90 (0.50) | 1 of 1 | residual_mm 0.80, level_db 0.60" in text
     assert "| [`standin`](certificates/standin.json) | 1 | 0.90 (0.50) | 0 of 1 |" in text
+    assert "| `sweeps` | a | 0.40 |\n| `sweeps` | b | 0.70 |\n| `sweeps` | mean | 0.55 |\n" in text
+    old = {key: value for key, value in made(25.0).items() if key != "realism_left_out"}
+    assert "left out" not in table([old], "certificates")
+
+
+def test_a_road_left_out_is_compared_with_the_half_that_is_most_like_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The clouds stand for themselves; the table has the AUC of each against each real one."""
+    aucs = {
+        "one": {"a": 0.6, "b": 0.9, "c": 0.9},
+        "two": {"a": 0.9, "b": 0.7, "c": 0.8},
+        "a": {"b": 0.8, "c": 0.9},
+        "b": {"a": 0.8, "c": 0.75},
+        "c": {"a": 0.6, "b": 0.3},
+    }
+
+    def looked_up(patches: str, others: str, seed: int, name: str) -> dict[str, float]:
+        assert (patches, seed) == (name, 5)
+        return {"all": aucs[name].get(others, 0.5)}
+
+    def cloud(name: str) -> Any:
+        return SimpleNamespace(patches=name, cloud=SimpleNamespace(name=name))
+
+    monkeypatch.setattr("synthroads_addon.comparison.job.classifier_auc", looked_up)
+    result = CloudComparison((cloud("one"), cloud("two")), (cloud("a"), cloud("b"), cloud("c")), (), ())
+    found = {road: groups["all"] for road, groups in result.realism_left_out(5).items()}
+    # Without a "two" is more like the others (0.3 + 0.2 against 0.1 + 0.1), without b and c "one" and "two":
+    # 0.4 + 0.1 against 0.1 + 0.2, and 0.4 + 0.1 against 0.1 + 0.3. An AUC below 0.5 counts as 0.5.
+    assert found == pytest.approx({"a": 0.1 / 0.3, "b": 0.1 / 0.35, "c": 0.1 / 0.175})
 
 
 def test_sweeps_are_certified_by_the_figures_that_all_have() -> None:
