@@ -12,7 +12,7 @@ from types import ModuleType
 
 import bpy
 
-from .drawing import along_curve, tool
+from .drawing import along_curve, dots, tool
 from .fields import preferences, properties
 from .panels import (
     calibration,
@@ -57,7 +57,7 @@ MODULES = (
         views,
         scene_scan,
     ),
-    *(along_curve, tool),
+    *(along_curve, tool, dots),
     *(export, file_menus, calibration_settings, calibration, menus),
 )
 

@@ -95,6 +95,12 @@ class SYNTHROADS_PG_drawing(bpy.types.PropertyGroup):
         description="The road remembers its curve, and can be fitted again when the curve has changed",
         default=True,
     )
+    dots: bpy.props.BoolProperty(
+        name="Dots and Labels",
+        description="Show dots at the ends of elements (blue), vertical points (pink) and stations of things (yellow) "
+        "of the active object's road, to be dragged along it, and a label with station and offset of what is moved",
+        default=True,
+    )
     follows: bpy.props.BoolProperty(
         name="Follow the Curve",
         description="Build the shown road again as soon as its curve has changed, outside of Edit Mode",
@@ -409,7 +415,7 @@ def draw_settings(layout: bpy.types.UILayout, drawing: Any) -> None:
     """Draw the settings of roads along curves."""
     value_row(layout, "Heights").prop(drawing, "heights", text="")
     value_row(layout, "Tolerance").prop(drawing, "tolerance", text="")
-    for name, label in (("tangents", "Tangent Polygon"), ("linked", "Keep Linked")):
+    for name, label in (("tangents", "Tangent Polygon"), ("linked", "Keep Linked"), ("dots", "Dots and Labels")):
         draw_flag(layout, drawing, name, label)
 
 
