@@ -13,7 +13,7 @@ from types import ModuleType
 import bpy
 
 from . import alignment
-from .drawing import along_curve, tool
+from .drawing import along_curve, dots, tool
 from .fields import preferences, properties
 from .panels import (
     calibration,
@@ -59,7 +59,7 @@ MODULES = (
         scene_scan,
     ),
     *alignment.MODULES,
-    *(along_curve, tool),
+    *(along_curve, tool, dots),
     *(export, file_menus, calibration_settings, calibration, menus),
 )
 

@@ -21,12 +21,11 @@ from ...jobs.drawn_axis import road_along, rules_text
 from ...scenario.scenario import Scenario
 from ..fields.numbers import exact
 from ..fields.room import buttons_row, draw_flag, draw_text, value_row
-from ..panels.road_files import FIT_PICTURE
 from ..work.build import road_work, unused_seed
 from ..work.common import Sidebar, column, is_free, redraw_sidebars
 from ..work.job import Aside, PanelJob, Work, running_job
 from ..work.long_operator import LongOperator
-from ..work.pictures import keep_picture
+from ..work.pictures import FIT_PICTURE, keep_picture
 from .links import (
     FOLLOWS,
     TANGENTS,
@@ -44,6 +43,8 @@ from .links import (
 
 _DELAY = 0.5
 """Seconds after a change of a curve until its road is looked at; each further change begins anew."""
+DRAW_ROAD = "synthroads.draw_road"
+"""Name of the drawing tool and of its operator."""
 POLYGON_NAME = "SynthRoads Tangents"
 """Name of a curve that the drawing tool makes."""
 
@@ -93,6 +94,12 @@ class SYNTHROADS_PG_drawing(bpy.types.PropertyGroup):
     linked: bpy.props.BoolProperty(
         name="Keep Linked",
         description="The road remembers its curve, and can be fitted again when the curve has changed",
+        default=True,
+    )
+    dots: bpy.props.BoolProperty(
+        name="Dots and Labels",
+        description="Show dots at the ends of elements (blue), vertical points (pink) and stations of things (yellow) "
+        "of the active object's road, to be dragged along it, and a label with station and offset of what is moved",
         default=True,
     )
     follows: bpy.props.BoolProperty(
@@ -385,7 +392,7 @@ class SYNTHROADS_PT_drawing(Sidebar, bpy.types.Panel):
         """Draw the ways to a drawn road, their settings, and the shown road's link with its curve."""
         layout, drawing = column(self), context.scene.synthroads_drawing
         row = buttons_row(layout, ("Draw Road", "Road from Curve"), align=True)
-        row.operator("synthroads.draw_road", text="Draw Road", icon="GREASEPENCIL")
+        row.operator(DRAW_ROAD, text="Draw Road", icon="GREASEPENCIL")
         row.operator(SYNTHROADS_OT_road_from_curve.bl_idname, icon="CURVE_DATA")
         draw_settings(layout, drawing)
         root = find_road(context.scene)
@@ -409,7 +416,7 @@ def draw_settings(layout: bpy.types.UILayout, drawing: Any) -> None:
     """Draw the settings of roads along curves."""
     value_row(layout, "Heights").prop(drawing, "heights", text="")
     value_row(layout, "Tolerance").prop(drawing, "tolerance", text="")
-    for name, label in (("tangents", "Tangent Polygon"), ("linked", "Keep Linked")):
+    for name, label in (("tangents", "Tangent Polygon"), ("linked", "Keep Linked"), ("dots", "Dots and Labels")):
         draw_flag(layout, drawing, name, label)
 
 

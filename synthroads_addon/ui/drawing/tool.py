@@ -15,6 +15,7 @@ from ...base.arrays import Float
 from ...blender.model.store import find_road
 from ..work.common import is_free, redraw_sidebars
 from ..work.view import redraw_views
+from .along_curve import DRAW_ROAD
 from .overlay import SketchView
 from .sketch import Handle, Sketch, radius_text, shown_elements, state_text
 
@@ -144,7 +145,7 @@ def ground_point(context: bpy.types.Context, mouse: tuple[float, float], height:
 class SYNTHROADS_OT_draw_road(bpy.types.Operator):
     """Draw a road: click the points at which its straight tangents meet, on the ground (best in top view, Numpad 7). Lines, clothoids and arcs are shown as they will be built. Enter or the right mouse button builds the road"""  # noqa: E501 (a tooltip is one line)
 
-    bl_idname = "synthroads.draw_road"
+    bl_idname = DRAW_ROAD
     bl_label = "Draw Road"
 
     beside: bpy.props.BoolProperty(
@@ -279,7 +280,7 @@ class DrawRoadTool(bpy.types.WorkSpaceTool):
 
     bl_space_type = "VIEW_3D"
     bl_context_mode = "OBJECT"
-    bl_idname = "synthroads.draw_road"
+    bl_idname = DRAW_ROAD
     bl_label = "Draw Road"
     bl_description = (
         "Draw a road on the ground: click the points at which its straight tangents meet.\n"

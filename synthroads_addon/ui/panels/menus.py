@@ -9,6 +9,13 @@ import bpy
 
 from ...blender.model.store import find_road
 from ..alignment.panel import SYNTHROADS_MT_alignment
+from ..drawing.along_curve import (
+    SYNTHROADS_OT_fit_again,
+    SYNTHROADS_OT_road_from_curve,
+    SYNTHROADS_OT_unlink_curve,
+    active_curve,
+)
+from ..drawing.tool import SYNTHROADS_OT_draw_road
 from ..work.build import SYNTHROADS_OT_build, SYNTHROADS_OT_build_edited
 from ..work.long_operator import SYNTHROADS_OT_cancel
 from ..work.scan import SYNTHROADS_OT_scan
@@ -57,6 +64,8 @@ Block = tuple[tuple[type[bpy.types.Operator], str, str], ...]
 _ROADS: Block = (
     (SYNTHROADS_OT_build, "Build Road", "MOD_BUILD"),
     (SYNTHROADS_OT_random_road, "Random Road", "FILE_REFRESH"),
+    (SYNTHROADS_OT_draw_road, "Draw Road", "GREASEPENCIL"),
+    (SYNTHROADS_OT_road_from_curve, "Build Road from Curve", "CURVE_DATA"),
     (SYNTHROADS_OT_load_road, "Load Parameter Set...", "IMPORT"),
     (SYNTHROADS_OT_load_axis, "Build Along Centreline...", "CURVE_PATH"),
     (SYNTHROADS_OT_road_from_scan, "Build Road from a Scan...", "POINTCLOUD_DATA"),
@@ -64,6 +73,8 @@ _ROADS: Block = (
 _WORK: tuple[Block, ...] = (
     (
         (SYNTHROADS_OT_build_edited, "Build Road as Edited", "FILE_REFRESH"),
+        (SYNTHROADS_OT_fit_again, "Fit Road to Curve Again", "FILE_REFRESH"),
+        (SYNTHROADS_OT_unlink_curve, "Unlink Road from Curve", "UNLINKED"),
         (SYNTHROADS_OT_repeat_thing, "Repeat Along Road", "MOD_ARRAY"),
         (SYNTHROADS_OT_delete_thing, "Delete from Road", "TRASH"),
         (SYNTHROADS_OT_show_plants, "Hide or Show Plants", "HIDE_OFF"),
@@ -147,10 +158,14 @@ def _draw_object(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
 
 
 def _draw_context(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
-    """Draw what is done with a thing of the road that is clicked with the right mouse button."""
+    """Draw what is done with a curve, or a thing of the road, that is clicked with the right mouse button."""
+    layout = menu.layout
+    if active_curve(context) is not None:
+        layout.separator()
+        layout.operator_context = "INVOKE_REGION_WIN"
+        layout.operator(SYNTHROADS_OT_road_from_curve.bl_idname, icon="CURVE_DATA")
     if find_road(context.scene) is None:
         return
-    layout = menu.layout
     layout.separator()
     layout.operator_context = "INVOKE_REGION_WIN"
     if thing_of(context.view_layer.objects.active, context.scene) is not None:
@@ -160,7 +175,14 @@ def _draw_context(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
     layout.menu(SYNTHROADS_MT_add.bl_idname, text="Add to Road", icon="ADD")
 
 
+def _draw_convert(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
+    """Draw Road from Curve beside Blender's own conversions of the active curve."""
+    menu.layout.separator()
+    menu.layout.operator(SYNTHROADS_OT_road_from_curve.bl_idname, icon="CURVE_PATH")
+
+
 _MENUS = (
+    ("VIEW3D_MT_object_convert", _draw_convert),
     ("VIEW3D_MT_add", _draw_add),
     ("VIEW3D_MT_object", _draw_object),
     ("VIEW3D_MT_object_context_menu", _draw_context),

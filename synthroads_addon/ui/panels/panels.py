@@ -9,6 +9,7 @@ import bpy
 
 from ...blender.model.store import BUILT_FROM, find_road
 from ...blender.things.model_builder import ROLE
+from ..drawing.links import curve_name
 from ..fields.preferences import preferences
 from ..fields.room import buttons_row, draw_flag, draw_menu, draw_text, value_row
 from ..fields.sheets import SHEETS, PanelFields, fields_of
@@ -108,6 +109,8 @@ class RoadPanel(SheetPanel):
             draw_text(layout, f"Length of the road: {parameters.alignment.length:,.0f} m", "DRIVER_DISTANCE")
         if road and source_file_name(road):
             draw_text(layout, f"Built from {source_file_name(road)}", "FILE")
+        elif road and curve_name(road):
+            draw_text(layout, f"Built along {curve_name(road)}", "CURVE_DATA")
         elif road and not road.get(BUILT_FROM):
             draw_text(layout, "Built by a command, not from these settings", "FILE")
         elif road and road.get(BUILT_FROM) != settings.road_values():
@@ -185,7 +188,7 @@ def _draw_request_to_save(layout: bpy.types.UILayout, settings: Any) -> None:
 
 def _draw_other_objects(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw a note on the number of visible objects that aren't the road's but are scanned too."""
-    count = sum(item.type in _SOLID and ROLE not in item for item in context.visible_objects)
+    count = sum(item.type in _SOLID and ROLE not in item and not item.hide_render for item in context.visible_objects)
     if count:
         text = "1 other object is scanned too" if count == 1 else f"{count} other objects are scanned too"
         draw_text(layout, text, "INFO")

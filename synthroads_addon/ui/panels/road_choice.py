@@ -10,6 +10,8 @@ import bpy
 
 from ...blender.model.roads import choose_road
 from ...blender.model.store import find_road, roads
+from ..drawing.along_curve import SYNTHROADS_OT_road_from_curve
+from ..drawing.tool import SYNTHROADS_OT_draw_road
 from ..fields.room import draw_text, fits
 from ..work.build import SYNTHROADS_OT_build
 
@@ -53,8 +55,27 @@ class SYNTHROADS_PG_roads(bpy.types.PropertyGroup):
     )
 
 
+class SYNTHROADS_MT_one_more(bpy.types.Menu):
+    """Where one more road is built. It gets a seed that no road of the scene has"""
+
+    bl_idname = "SYNTHROADS_MT_one_more"
+    bl_label = "One More Road"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the places: beside what is there, at the cursor, along the active curve, or drawn by hand."""
+        layout = self.layout
+        layout.operator_context = "INVOKE_REGION_WIN"
+        layout.operator(SYNTHROADS_OT_build.bl_idname, text="Beside the Others", icon="ADD").beside = True
+        entry = layout.operator(SYNTHROADS_OT_build.bl_idname, text="At the 3D Cursor", icon="PIVOT_CURSOR")
+        entry.beside = entry.at_cursor = True
+        layout.operator(
+            SYNTHROADS_OT_road_from_curve.bl_idname, text="Along the Active Curve", icon="CURVE_DATA"
+        ).beside = True
+        layout.operator(SYNTHROADS_OT_draw_road.bl_idname, text="Draw It", icon="GREASEPENCIL").beside = True
+
+
 def draw_road_choice(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the choice of the road and a button to build another one; nothing without a road."""
+    """Draw the choice of the road and the menu that adds another one; nothing without a road."""
     shown = find_road(context.scene)
     if shown is None:
         return
@@ -63,7 +84,7 @@ def draw_road_choice(layout: bpy.types.UILayout, context: bpy.types.Context) -> 
     row = layout.row(align=True)
     row.use_property_split = False
     row.prop(context.window_manager.synthroads_roads, "shown", text="")
-    row.operator(SYNTHROADS_OT_build.bl_idname, text="", icon="ADD").beside = True
+    row.menu(SYNTHROADS_MT_one_more.bl_idname, text="", icon="ADD")
 
 
 def draw_road_name(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

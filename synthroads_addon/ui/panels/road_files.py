@@ -30,14 +30,12 @@ from ..work.build import road_work, shown_place
 from ..work.common import column, has_road, refusing
 from ..work.job import Aside, PanelJob, Work
 from ..work.long_operator import FileOperator
-from ..work.pictures import ShowPicture, keep_picture
+from ..work.pictures import FIT_PICTURE, ShowPicture, keep_picture
 from ..work.view import look_along, view_of
 from .presets import JsonFileChooser
 from .rules import edited_parameters
 
 _FROM_FILE, _NAME = "file", "parameters.json"
-FIT_PICTURE = "SynthRoads Axis Fit"
-"""Name of the image that shows how far an axis was missed."""
 
 
 def from_file(path: Path) -> str:

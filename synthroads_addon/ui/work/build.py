@@ -6,6 +6,7 @@ Annotations are not postponed here: Blender reads the properties from them.
 from contextlib import suppress
 
 import bpy
+from mathutils import Vector
 
 from ...base.errors import InputError
 from ...base.random_streams import stream
@@ -16,6 +17,7 @@ from ...blender.model.settle import settle_steps
 from ...blender.model.store import find_road, recall, remember, roads
 from ...blender.model.truth import EditedRoad, read_road
 from ...blender.things.model_builder import BuildRequest
+from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...sampling.road import sample_road
 from ...scenario.scenario import Scenario
@@ -41,6 +43,12 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
+    at_cursor: bpy.props.BoolProperty(
+        name="At the Cursor",
+        description="Put the middle of one more road at the 3D cursor; else the road is beside all visible objects",
+        options={"SKIP_SAVE"},
+    )
+
     _first = False
     _seed = 0
 
@@ -48,7 +56,9 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
         """Return the job that builds a road from the panel's settings."""
         settings = context.scene.synthroads
         self._first = find_road(context.scene) is None
-        place = BuildTarget(beside=True) if self.beside else shown_place(context.scene)
+        place = shown_place(context.scene)
+        if self.beside:
+            place = BuildTarget(beside=True, moves_aside=not self.at_cursor)
         before, self._seed = settings.seed, settings.exact_seed()
         if self.beside:
             self._seed = unused_seed(self._seed, context.scene)
@@ -65,6 +75,8 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
         parameters = recall(job.result.root)[0]
         choose_road(context.scene, job.result.root)
         if self.beside:
+            if self.at_cursor:
+                move_middle_to(job.result.root, parameters, context.scene.cursor.location)
             context.view_layer.objects.active = job.result.root
             if self._seed != context.scene.synthroads.exact_seed():
                 context.scene.synthroads.seed = self._seed
@@ -72,6 +84,14 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
         if self._first and not bpy.app.background and isinstance(space, bpy.types.SpaceView3D):
             look_along(space, parameters)
         return f"Built {parameters.alignment.length:,.0f} m of road"
+
+
+def move_middle_to(root: bpy.types.Object, parameters: RoadParameters, place: Vector) -> None:
+    """Move a road's root so that the middle of the road's axis is at a place of the scene."""
+    geometry = RoadGeometry(parameters)
+    middle = geometry.length / 2.0
+    local = Vector((*geometry.alignment.position(middle).tolist(), float(geometry.profile.elevation(middle))))
+    root.location = root.location + place - root.matrix_basis @ local
 
 
 class SYNTHROADS_OT_build_edited(LongOperator, bpy.types.Operator):

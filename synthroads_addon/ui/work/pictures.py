@@ -6,6 +6,9 @@ import bpy
 import numpy as np
 from PIL import Image
 
+FIT_PICTURE = "SynthRoads Axis Fit"
+"""Name of the image that shows how far an axis was missed."""
+
 
 def keep_picture(name: str, picture: Image.Image) -> bpy.types.Image:
     """Store a picture as the file's image of a name, replacing its pixels if it exists; return the image."""

@@ -20,6 +20,7 @@ from tests.helpers.scenes.small_road import build_small
 
 VERBS = (
     *("Build Road", "Random Road", "Scan", "Show Cloud", "Check Rules", "Export Twin", "Export Cloud"),
+    *("Draw Road", "Build Road from Curve", "Fit Road to Curve Again", "Unlink Road from Curve"),
     *("Repeat Along Road", "Delete from Road", "Set Class of Selected", "Add Sun, Sky, Cameras", "Save Scenario"),
 )
 
@@ -59,6 +60,7 @@ def test_every_operator_stands_in_a_menu_or_needs_a_choice_of_the_panel() -> Non
     text = "\n".join(line for draw in (*draws, file_menus._draw_export) for line in entries(draw))
     of_the_panel = {
         *("choose_scenario", "choose_device", "add_file", "remove_file", "add_calibration_class", "show_violation"),
+        *("move_thing", "move_axis_point"),
         *("remove_calibration_class", "show_doubt", "look_through", "add_asset_library"),
     }
     for name in dir(bpy.ops.synthroads):
@@ -75,6 +77,19 @@ def test_the_menu_of_the_right_mouse_button_is_for_roads() -> None:
     assert "synthroads.delete_thing" in text
     bpy.context.view_layer.objects.active = bpy.data.objects["Road"]
     assert "synthroads.repeat_thing" not in "\n".join(entries(menus._draw_context))
+
+
+def test_a_curves_menus_lead_to_its_road() -> None:
+    """The menu of the right mouse button, and Object > Convert."""
+    assert any("synthroads.road_from_curve" in line for line in entries(menus._draw_convert))
+    data = bpy.data.curves.new("Ride", "CURVE")
+    curve = bpy.data.objects.new("Ride", data)
+    bpy.context.scene.collection.objects.link(curve)
+    assert entries(menus._draw_context) == []
+    bpy.context.view_layer.objects.active = curve
+    assert any("synthroads.road_from_curve" in line for line in entries(menus._draw_context))
+    functions = bpy.types.VIEW3D_MT_object_convert._dyn_ui_initialize()
+    assert [function.__name__ for function in functions].count("_draw_convert") == 1
 
 
 def test_every_operator_has_a_tooltip_and_tells_its_values() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
+from types import SimpleNamespace
 from typing import Any
 
 import bpy
@@ -16,15 +17,19 @@ from synthroads_addon.blender.model.build import build_road, build_steps
 from synthroads_addon.blender.model.roads import root_above
 from synthroads_addon.blender.model.stage import DataBlockLog, remove_staged
 from synthroads_addon.blender.model.store import find_road, recall, roads
+from synthroads_addon.blender.model.truth import read_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things.model_builder import ROLE, BuildRequest
 from synthroads_addon.blender.things.registry import model_parts
+from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
+from synthroads_addon.ui.panels import road_choice
 from synthroads_addon.ui.work import build
 from synthroads_addon.ui.work.job import PanelJob, running_job
 from synthroads_addon.ui.work.unseen import build_unseen
+from tests.helpers.scenes.fake_layout import FakeLayout
 from tests.helpers.scenes.kept_groups import KeptGroups
 from tests.helpers.scenes.panel_road import (  # noqa: F401
     SAME,
@@ -364,6 +369,30 @@ def test_one_more_road_is_another_and_stands_beside_the_first(cheap: Any) -> Non
     place = tuple(second.location)
     bpy.ops.synthroads.build()
     assert tuple(second.location) == place, "built again it stays beside the first"
+
+
+def test_one_more_road_at_the_cursor(cheap: Any) -> None:  # noqa: F811
+    choose(cheap, **{"road.length": 60.0})
+    bpy.ops.synthroads.build()
+    (first,) = roads(bpy.context.scene)
+    bpy.context.scene.cursor.location = (300.0, -200.0, 5.0)
+    bpy.ops.synthroads.build(beside=True, at_cursor=True)
+    second = next(root for root in roads(bpy.context.scene) if root != first)
+    bpy.context.view_layer.update()
+    geometry = RoadGeometry(recall(second)[0])
+    middle = [*geometry.alignment.position(30.0).tolist(), float(geometry.profile.elevation(30.0))]
+    assert (second.matrix_world @ Vector(middle) - Vector((300.0, -200.0, 5.0))).length < 1e-4
+    assert recall(second)[1].seed != recall(first)[1].seed, "with a seed of its own"
+    read = read_road(second).known()
+    assert np.abs(np.subtract(read.transform.translate, recall(second)[0].transform.translate)[:2]).max() > 100.0
+
+
+def test_the_plus_asks_where_the_next_road_is_to_be() -> None:
+    layout = FakeLayout()
+    road_choice.SYNTHROADS_MT_one_more.draw(SimpleNamespace(layout=layout), bpy.context)
+    text = "\n".join(layout.lines)
+    for words in ("Beside the Others", "At the 3D Cursor", "Along the Active Curve", "Draw It"):
+        assert words in text
 
 
 def test_one_more_road_leaves_the_users_own_free(cheap: Any) -> None:  # noqa: F811
