@@ -13,10 +13,11 @@ from itertools import combinations
 import numpy as np
 from scipy import ndimage
 
-from ...base.arrays import Bool, Float
+from ...base.arrays import Float
 from ..lines import Line, is_dashed
-from ..profiles import ACROSS, STRETCH, Grid, Profiles
+from ..profiles import STRETCH, Grid, Profiles
 from ..smoothing import fill_gaps, robust_scale
+from .levels import median_level
 
 _NARROWEST, _WIDEST = 1.2, 30.0
 """Distances of the lines beside a median, m. Chosen: a double line is laid in 1 m at most; carriageways that are
@@ -35,8 +36,6 @@ _SEEN = 0.3
 """Share of the road on which a line must be seen to frame a median. Chosen: as `layout` takes lines of rural roads."""
 _NEAR = 4
 """Stretches to either side whose evidence counts. Chosen: 20 m; no median ends sooner."""
-_FEWEST = 4
-"""Bins of a stretch that its ground's level is told from. Chosen: less than a tenth of a strip's."""
 _BRIGHTNESS = (0.04, 0.6)
 """Deviation of the logarithm of brightness from lane to lane at least, and of another ground's. Chosen: wear; 2.5
 dB."""
@@ -200,17 +199,3 @@ def _odds_of(levels: dict[str, Float], same_std: float, other_std: float) -> Flo
     # ln of N(d; 0, other) / N(d; 0, same).
     odds = np.log(same_std / other_std) + 0.5 * mean**2 * (same_std**-2 - other_std**-2)
     return np.where(share > 0.2, np.clip(odds, _AGAINST, _FOR), 0.0)
-
-
-def median_level(profiles: Profiles, values: Grid | Float, low: Float, high: Float) -> Float:
-    """Return the median (K,) of values (S, U) between offsets (K,), m, in each stretch; NaN where hardly seen."""
-    result = np.full(profiles.stretches, np.nan)
-    for number in np.flatnonzero(np.isfinite(low) & np.isfinite(high)):
-        first, last = profiles.column(float(low[number])), profiles.column(float(high[number]))
-        if last - first + 1 < 2 or abs(profiles.offsets[last] - high[number]) > 2.0 * ACROSS:
-            continue
-        bins = values[number * STRETCH : (number + 1) * STRETCH, first : last + 1]
-        known: Bool = np.isfinite(bins)
-        if known.sum() >= _FEWEST:
-            result[number] = float(np.median(bins[known]))
-    return result
