@@ -24,8 +24,8 @@ _KERB, _KERB_REACH = 0.05, 3
 _CRACK = 9
 """Widest gap in the pavement that is a crack or a seam, bins. Chosen: a median is wider."""
 _RAIL = 20
-"""Widest strip without points, bins, that is rails or a wall cut out of the median. Chosen: two guardrails and what lies
-between them."""
+"""Widest strip without points, bins, that is rails or a wall cut out of the median. Chosen: two guardrails and the
+ground between."""
 _NO_LANE = 23
 """Strip between two parts of a median that is no carriageway, bins. Chosen: no lane of RAA or RAL is as narrow."""
 _PATCH = 5
