@@ -135,7 +135,7 @@ class HardRoad:
         return right_cut[block], left_cut[block]
 
     def strips(self, station: Float, use: str, least: float = 3.0) -> list[tuple[Bool, Float]]:
-        """Return the strips of pavement of one use, from right to left: where each is seen, and its middle, m, (N,) each.
+        """Return the strips of pavement of one use, from right to left: where each is seen (N,), and its middle (N,).
 
         Args:
             station: (N,) m.

@@ -79,7 +79,7 @@ class SurveyFaults:
         )
 
     def paint_share(self, distance: Float, width: float) -> Float:
-        """Return the share (N,) of a footprint that a line fills at distances (N,), m, from its middle; its width in m."""
+        """Return the share (N,) of a footprint that a line (m) fills at distances (N,), m, from its middle."""
         if self.footprint == 0.0:
             return (distance < 0.5 * width).astype(np.float64)
         # Two boxes of these widths that lie over each other.

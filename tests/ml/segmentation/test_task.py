@@ -511,7 +511,7 @@ def test_a_cloud_that_is_refused_names_the_tables_before_it(trained: Trained, tm
     labelled, empty = tmp_path / "labelled.laz", tmp_path / "empty.laz"
     write_cloud(labelled, road_block(500, 4, 20.0))
     write_cloud(empty, road_block(0, 4, 20.0))
-    with pytest.raises(InputError, match="measured before it is in .*out: labelled.txt, labelled.png"):
+    with pytest.raises(InputError, match=r"measured before it is in .*out: labelled\.txt, labelled\.png"):
         task.evaluate(run, Evaluation([labelled, empty], "test", tmp_path / "out"))
     assert (tmp_path / "out/labelled.txt").exists()
     with pytest.raises(InputError) as alone:
