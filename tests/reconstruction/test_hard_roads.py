@@ -19,7 +19,7 @@ from synthroads_addon.reconstruction.ground.medians import find_medians
 from synthroads_addon.reconstruction.ground.paved import lines_on_pavement
 from synthroads_addon.reconstruction.ground.strips import find_strips
 from synthroads_addon.reconstruction.layout import find_layout
-from synthroads_addon.reconstruction.lines import find_lines
+from synthroads_addon.reconstruction.lines import Line, find_lines, is_dashed
 from synthroads_addon.reconstruction.path import CloudPath
 from synthroads_addon.reconstruction.profiles import Profiles, make_profiles
 from synthroads_addon.reconstruction.reconstruct import reconstruct
@@ -165,6 +165,31 @@ def test_carriageways_and_ramps_are_counted_by_stretch(tmp_path: Path, kind: str
         assert ((2 + more == carriageways) & (other == ramps))[plain].mean() > 0.95
         for strip in strips:
             assert strip.probability[strip.present].mean() > 0.6
+
+
+def test_each_kind_of_evidence_moves_a_medians_odds(tmp_path: Path) -> None:
+    road = motorway(15, decibel=0.0)
+    profiles = profiles_of(road, tmp_path)
+    lines = find_lines(profiles)
+    (median,) = find_medians(profiles, lines)
+    left_dashes = next(line for line in lines if line.offset > 2.0 and is_dashed(line))
+    others = [line for line in lines if line is not left_dashes]
+
+    def odds(profiles: Profiles, lines: list[Line]) -> float:
+        return sum(one.total for one in find_medians(profiles, lines) if abs(one.low.mean() + one.high.mean()) < 1.0)
+
+    assert odds(profiles, lines) == pytest.approx(median.total)
+    shifted = replace(left_dashes, first_dash=left_dashes.first_dash + 5.0)
+    assert odds(profiles, [*others, shifted]) == pytest.approx(median.total + 1.0)
+    longer = replace(left_dashes, dash=4.0, gap=8.0)
+    assert odds(profiles, [*others, longer]) == pytest.approx(median.total + 1.5)
+    unlike = replace(left_dashes, offsets=left_dashes.offsets + 0.6)
+    assert odds(profiles, [*others, unlike]) < median.total - 0.2
+    inside = (profiles.offsets > -1.0) & (profiles.offsets < 1.0)
+    unpaved, paved = (np.where(inside, share, 1.0) * np.ones(profiles.count.shape) for share in (0.2, 1.0))
+    by_class, against = (replace(profiles, paved=share.astype(np.float32)) for share in (unpaved, paved))
+    assert odds(by_class, lines) > median.total + 2.0
+    assert odds(against, lines) < median.total - 2.0
 
 
 def test_a_median_whose_guardrail_was_cut_out_is_one(tmp_path: Path) -> None:
