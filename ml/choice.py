@@ -1,5 +1,6 @@
 """The choice of a shipped model for a cloud: by its density, evenness, rings and attributes."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf, log
@@ -22,6 +23,9 @@ _UNEVEN = 12.0  # of the 90th to the 20th percentile of cells' points: scanners 
 _LONG = 3.0  # of a ground-based cloud's extent along to that across: the scanner drove
 _DENSE = 60.0  # points/m2 from which an even cloud is a UAV's
 _SAMPLE = 2_000_000
+SQUARE = 24
+"""Edge, m, of the squares whose points are counted, so that a sample of them can be drawn. Chosen: that of the tiles
+which models label (`segmentation.scoring.EDGE`)."""
 CLEARLY = 0.05
 """Difference of two models' agreement with themselves (Cohen's kappa) from which it decides between them. Chosen: on a
 labelled street and a labelled sweep, the model with the better classes is 0.01 behind; on a road from the air the model
@@ -38,12 +42,14 @@ class CloudTraits:
         platform: likely platform of the scanner, judged by density, unevenness, extent, and whether the points
             form the rings of a sweep.
         attributes: names of the points' attributes that vary: ``intensity``, ``color``.
+        squares: numbers of usable points by column and row of squares of `SQUARE` m.
     """
 
     density: float
     unevenness: float
     platform: Platform
     attributes: frozenset[str]
+    squares: Mapping[tuple[int, int], int] = field(default_factory=dict, repr=False, compare=False)
 
     def to_text(self) -> str:
         """Return the traits as text."""
@@ -193,12 +199,16 @@ def cloud_traits(path: Path) -> CloudTraits:
     cell_corners, counts = np.array(list(cells)), np.array(list(cells.values()), dtype=np.float64)
     lower_count, median, upper_count = np.percentile(counts, [20, 50, 90])
     unevenness = float(upper_count / max(lower_count, 1.0))
+    squares: Counter[tuple[int, int]] = Counter()
+    for (column, row), count in cells.items():
+        squares[column // SQUARE, row // SQUARE] += count
     names = (("intensity", brightest > darkest), ("color", colorful))
     return CloudTraits(
         density=float(median),
         unevenness=unevenness,
         platform=_platform(float(median), unevenness, cell_corners.astype(np.float64), first_blocks),
         attributes=frozenset(name for name, is_present in names if is_present),
+        squares=squares,
     )
 
 

@@ -10,6 +10,7 @@ from synthroads_addon.base.files import path_beside
 from synthroads_addon.base.progress import Progress, silent
 
 from .choice import Choice, choose_model, usable_cards, with_agreements
+from .runs import Run
 from .shipped import open_run
 from .tasks import Prediction, task
 
@@ -60,30 +61,30 @@ def predict(
     Raises:
         InputError: there is no such cloud or model, or the cloud isn't what the model needs.
     """
-    choice = None
-    if run is None:
-        choice = choose_model(cloud, "segmentation")
-        if choice.doubtful:
-            choice = _try_models(choice, cloud)
-        run = choice.card.name
-    trained_run = open_run(Path(run))
+    choice, trained_run = (None, open_run(Path(run))) if run is not None else _choose_run(cloud)
     name = trained_run.configuration.task
     target = output or usual_output(cloud, name)
     prediction = Prediction(cloud, target, path, overwrite, classification, "--output" if output else "")
     return Predicted(name, target, task(name).predict(trained_run, prediction, progress), choice)
 
 
-def _try_models(choice: Choice, cloud: Path) -> Choice:
-    """Return the choice after the models that the cloud fits were tried on a part of it; as it is if only one does."""
-    cards = usable_cards("segmentation", choice.traits)
+def _choose_run(cloud: Path) -> tuple[Choice, Run[Any]]:
+    """Return the shipped segmentation for a cloud, by its traits and in doubt by a trial of those it fits, and its run.
+
+    Raises:
+        InputError: it is no cloud, or no model is of use for it.
+    """
+    choice = choose_model(cloud, "segmentation")
+    cards = usable_cards("segmentation", choice.traits) if choice.doubtful else []
     if len(cards) < 2:
-        return choice
+        return choice, open_run(Path(choice.card.name))
     # Imported here: networks take time to load, and most clouds are like what one of the models was trained on.
     from .segmentation.self_agreement import sample_cloud, self_agreement
 
-    sample = sample_cloud(cloud)
-    agreements = {card.name: self_agreement(open_run(Path(card.name)), sample) for card in cards}
-    return with_agreements(choice, cards, agreements)
+    sample = sample_cloud(cloud, choice.traits.squares)
+    runs = {card.name: open_run(Path(card.name)) for card in cards}
+    choice = with_agreements(choice, cards, {name: self_agreement(run, sample) for name, run in runs.items()})
+    return choice, runs[choice.card.name]
 
 
 def usual_output(cloud: Path, task_name: str) -> Path:

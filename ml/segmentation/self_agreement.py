@@ -1,6 +1,6 @@
 """Agreement of a model with itself: the same points labelled from two directions, compared without any true label."""
 
-from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from synthroads_addon.base.random_streams import stream
 from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.tools.quantile_mapping import LEVELS
 
+from ..choice import SQUARE
 from ..data.classes import IGNORED, class_names
 from ..data.points import voxel_sample
 from ..data.sources import FULL
@@ -17,7 +18,7 @@ from ..data.tiles import CloudTile, eight_bits, scalings
 from ..runs import Run
 from ..scores.confusion import Confusion
 from .recipes import SegmentationConfiguration
-from .scoring import EDGE, classifier, label_tile, trained_model, turn_tile
+from .scoring import classifier, label_tile, trained_model, turn_tile
 
 SQUARES = 6
 """Most squares of a cloud that are labelled. Chosen: some seconds of work."""
@@ -55,22 +56,18 @@ def _kappa(counts: Int) -> float:
     return (observed - expected) / (1.0 - expected) if expected < 1.0 else 0.0
 
 
-def sample_cloud(path: Path, seed: int = 0) -> CloudTile:
+def sample_cloud(path: Path, squares: Mapping[tuple[int, int], int], seed: int = 0) -> CloudTile:
     """Return the usable points of some squares of a cloud, drawn with their numbers of points as weights.
 
     Args:
-        path: cloud file of any size; it is read twice.
+        path: cloud file of any size; it is read once.
+        squares: numbers of its usable points by column and row of squares of `SQUARE` m (`CloudTraits.squares`).
         seed: of the draw.
 
     Raises:
-        InputError: it can't be read, or has no usable points.
+        InputError: it can't be read.
     """
-    counts: Counter[tuple[int, int]] = Counter()
-    with open_cloud(path) as cloud:
-        for block in cloud.usable_blocks(_BLOCK):
-            squares, numbers = np.unique(_square_of(block.xyz), axis=0, return_counts=True)
-            counts.update(dict(zip(map(tuple, squares.tolist()), numbers.tolist(), strict=True)))
-    drawn = np.array(_draw_squares(counts, stream(seed, "self-agreement")))
+    drawn = np.array(_draw_squares(squares, stream(seed, "self-agreement")))
     parts = []
     with open_cloud(path) as cloud:
         scale, has_color = cloud.header.intensity_scale or 1.0, cloud.header.has_color
@@ -90,7 +87,7 @@ def sample_cloud(path: Path, seed: int = 0) -> CloudTile:
     )
 
 
-def _draw_squares(counts: Counter[tuple[int, int]], generator: np.random.Generator) -> list[tuple[int, int]]:
+def _draw_squares(counts: Mapping[tuple[int, int], int], generator: np.random.Generator) -> list[tuple[int, int]]:
     """Return at most `SQUARES` squares in the order drawn, up to the one with which `ENOUGH_POINTS` are met."""
     squares = sorted(counts)
     weights = np.array([counts[square] for square in squares], dtype=np.float64)
@@ -104,5 +101,5 @@ def _draw_squares(counts: Counter[tuple[int, int]], generator: np.random.Generat
 
 
 def _square_of(xyz: Float) -> Int:
-    """Return the column and row (N, 2) of the square of `EDGE` m that each point lies in."""
-    return np.floor(xyz[:, :2] / EDGE).astype(np.int64)
+    """Return the column and row (N, 2) of the square of `SQUARE` m that each point lies in."""
+    return np.floor(xyz[:, :2] / SQUARE).astype(np.int64)

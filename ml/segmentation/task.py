@@ -91,6 +91,9 @@ def _train_alone(run: SegmentationRun, progress: Progress) -> dict[str, Any]:
 def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = silent) -> tuple[dict[str, Any], str]:
     """Score a trained run on each of the labelled data, write tables and pictures; return scores and text tables.
 
+    Each of the data has its files as soon as it is measured: one that is refused leaves those before it, and the error
+    names them.
+
     Raises:
         InputError: a cloud has no labels and there is no mapping, or its classes don't fit.
         OutputError: the folder can't be written.
@@ -102,7 +105,13 @@ def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = 
     files: list[str] = []
     for path, name in zip(evaluation.data, _names(evaluation), strict=True):
         source = _test_source(path, evaluation)
-        confusion, largest_result = score(model, configuration, [source], progress)
+        try:
+            confusion, largest_result = score(model, configuration, [source], progress)
+        except InputError as error:
+            if not files:
+                raise
+            kept = f"{error.allowed}; what was measured before it is in {evaluation.output}: {', '.join(files)}"
+            raise InputError(error.field, error.value, kept) from error
         results[name] = confusion.to_dict()
         tables[name] = score_table(results[name]) + "\n"
         files.append(f"{name}.txt")

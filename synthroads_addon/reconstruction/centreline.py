@@ -11,6 +11,7 @@ from ..base.machine import linear_algebra_on_one_thread
 from ..base.progress import Progress, part_of, silent
 from .axis import Options, find_axis, straighten_path
 from .cloud import RoadCloud
+from .ground.strips import Strip, find_strips
 from .judgement import Judgement, judge
 from .layout import RoadKind, find_layout
 from .lines import find_lines
@@ -46,6 +47,7 @@ class Centreline:
         notes: remarks on what was left out.
         parted: (K,) probability that the road has two carriageways, in each stretch of 5 m from the path's start; None
             if nothing was looked for.
+        strips: strips of pavement beside the road, in the same stretches: further carriageways and ramps.
     """
 
     kind: RoadKind
@@ -57,6 +59,7 @@ class Centreline:
     judgement: Judgement
     notes: tuple[str, ...]
     parted: Float | None = None
+    strips: tuple[Strip, ...] = ()
 
 
 @linear_algebra_on_one_thread(scipy=True)
@@ -89,7 +92,8 @@ def find_centreline(cloud: RoadCloud, options: Options | None = None, progress: 
     confirmed = road.confirmed_along(line, profiles.middles)
     judgement = judge(layout, cores, rivals, road.parted_line(line, profiles.middles), confirmed)
     heights, notes = _heights(profiles), layout.notes
-    return Centreline(layout.kind, line, heights, std, half_widths, road.axis, judgement, notes, layout.parted)
+    strips = tuple(find_strips(layout.pavement, layout.bands[0].low, layout.bands[-1].high))
+    return Centreline(layout.kind, line, heights, std, half_widths, road.axis, judgement, notes, layout.parted, strips)
 
 
 def _seen_part(path: CloudPath, axis: FusedAxis) -> CloudPath:
@@ -162,17 +166,25 @@ def centreline_report(centreline: Centreline, cloud: RoadCloud) -> dict[str, Any
 
 
 def _carriageways(centreline: Centreline) -> list[dict[str, Any]]:
-    """Return as JSON data the stretches with one and with two carriageways, with the number's probability, m."""
+    """Return as JSON data the stretches with the same numbers of carriageways and ramps, and their probability, m."""
     if centreline.parted is None:
         return []
-    is_two = centreline.parted > 0.5
-    borders = [0, *(np.flatnonzero(np.diff(is_two)) + 1).tolist(), len(is_two)]
+    number = 1 + (centreline.parted > 0.5).astype(np.int64)
+    ramps = np.zeros(len(number), dtype=np.int64)
+    probability = np.maximum(centreline.parted, 1.0 - centreline.parted)
+    for strip in centreline.strips:
+        is_ramp = strip.ramp > 0.5
+        number += ~is_ramp & strip.present
+        ramps += is_ramp & strip.present
+        probability = np.where(
+            strip.present, probability * strip.probability * max(strip.ramp, 1.0 - strip.ramp), probability
+        )
+    borders = [0, *(np.flatnonzero(np.diff(number) | np.diff(ramps)) + 1).tolist(), len(number)]
     result = []
     for first, end in pairwise(borders):
-        probability = float(np.mean(centreline.parted[first:end]))
-        number = 2 if is_two[first] else 1
         stretch = {"start": float(STRETCH * first), "end": min(float(STRETCH * end), round(centreline.path.length, 1))}
-        result.append(stretch | {"number": number, "probability": round(max(probability, 1.0 - probability), 4)})
+        counts = {"number": int(number[first]), "ramps": int(ramps[first])}
+        result.append({**stretch, **counts, "probability": round(float(np.mean(probability[first:end])), 4)})
     return result
 
 

@@ -17,7 +17,7 @@ from scipy import ndimage
 from ..base.arrays import Bool, Float
 from .layout import Band, RoadLayout
 from .lines import Line, is_dashed
-from .profiles import STRETCH, Profiles, remove_grade
+from .profiles import ACROSS, STRETCH, Profiles, remove_grade
 from .smoothing import difference_figures, robust_scale
 from .views.fusion import APART
 from .views.pavement import pavement_edges
@@ -48,6 +48,8 @@ _CUT, _VERGE = 2, 1.5
 Chosen: the reach of an edge's median profile; an edge strip and some verge."""
 _NEAR = 4
 """Stretches to either side of one whose evidence counts for it. Chosen: 20 m, as an axis changes little in them."""
+_SURE = 0.95
+"""Probability of two carriageways from which on a strip within the median isn't the median. Chosen: as of intervals."""
 _SHORTEST_TRUST = 5
 """Stretches between doubts that are trusted at least. Chosen: 25 m, less of a road is of no use."""
 _SHORTEST = 3
@@ -128,6 +130,8 @@ def judge(
     middles = np.mean(pavement_edges(profiles, cores, layout.kind == "dual"), axis=0)
     if profiles.paved is not None:  # classes tell the edges that neither brightness nor height shows
         middles = np.where(np.isfinite(middles), middles, _middles_by_class(layout))
+    if layout.kind == "dual":
+        middles = np.where(_is_part_of_median(layout, cores), np.nan, middles)
     middle_name, edges_reason = "the pavement's middle", "the pavement's edges aren't seen on both sides"
     unseen = np.isnan(middles)
     if layout.kind == "dual":
@@ -160,6 +164,20 @@ def judge(
         doubtful = ~ndimage.binary_opening(~doubtful, np.ones(_SHORTEST_TRUST))
     doubts = list(_doubts(profiles, doubtful, masks))
     return Judgement(doubts, float(1.0 - doubtful.mean()), lines, middles)
+
+
+def _is_part_of_median(layout: RoadLayout, cores: Sequence[float]) -> Bool:
+    """Return a mask (K,) of the stretches in which what looks like the median lies between the lines beside it.
+
+    Where solid lines and the ground between them show the median for sure, a kerb, a rail or a stripe of another ground
+    within it isn't its middle, and says nothing against it. Ground beyond these lines does.
+    """
+    right, left = axis_guides(layout)
+    if layout.parted is None or right.width == 0.0 or left.width == 0.0 or is_dashed(right) or is_dashed(left):
+        return np.zeros(layout.profiles.stretches, dtype=bool)
+    right_edge, left_edge = pavement_edges(layout.profiles, cores, True)
+    within = (right_edge > right.offset - ACROSS) & (left_edge < left.offset + ACROSS)  # False where unseen
+    return np.asarray(within & (layout.parted > _SURE))
 
 
 def _middles_by_class(layout: RoadLayout) -> Float:

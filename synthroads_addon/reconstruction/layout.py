@@ -14,8 +14,9 @@ from ..base.errors import InputError
 from .branches import find_branch
 from .edges import FARTHEST, Pavement
 from .ground.band import DarkBand, find_band
-from .ground.medians import Median, cut_medians, find_medians, median_level
-from .ground.paved import paved_by_brightness, paved_spans
+from .ground.levels import median_level
+from .ground.medians import Median, cut_medians, find_medians
+from .ground.paved import lines_on_pavement, paved_by_brightness, paved_spans
 from .lines import STANDARD_DASHES, USUAL, WAVELENGTH, Line, is_dashed
 from .path import SPACING
 from .profiles import STRETCH, Profiles
@@ -155,13 +156,14 @@ def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = N
     Raises:
         InputError: no carriageway can be made out.
     """
-    # Classes tell a median from pavement; without them lines and ground do.
-    medians: list[Median] = []
+    # Classes are one kind of evidence of a median, beside lines and ground: a model takes bright medians for road.
     share, band = profiles.paved, None
     if share is None:
+        lines = lines_on_pavement(profiles, lines)
         band = None if kind == "dual" else _unpainted_band(profiles, lines)
-        medians = find_medians(profiles, lines) if band is None and kind != "single" else []
-        share = band.share(profiles) if band else cut_medians(paved_by_brightness(profiles, lines), profiles, medians)
+        share = band.share(profiles) if band else paved_by_brightness(profiles, lines)
+    medians = find_medians(profiles, lines) if band is None and kind != "single" else []
+    share = cut_medians(share, profiles, medians)
     pavement, notes = Pavement(profiles, share), []
     spans = paved_spans(pavement)
     # Rural roads have gaps in their lines, and no turnouts.

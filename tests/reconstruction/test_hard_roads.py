@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from studies.reconstruction.carriageways import compare, measure, totals
 from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.reconstruction.axis import FoundRoad
-from synthroads_addon.reconstruction.centreline import Centreline, centreline_report, find_centreline
+from synthroads_addon.reconstruction.centreline import Centreline, find_centreline
 from synthroads_addon.reconstruction.cloud import RoadCloud, read_road_cloud
 from synthroads_addon.reconstruction.ground.band import find_band
 from synthroads_addon.reconstruction.ground.medians import find_medians
+from synthroads_addon.reconstruction.ground.paved import lines_on_pavement
+from synthroads_addon.reconstruction.ground.strips import find_strips
 from synthroads_addon.reconstruction.layout import find_layout
-from synthroads_addon.reconstruction.lines import find_lines
+from synthroads_addon.reconstruction.lines import Line, find_lines, is_dashed
 from synthroads_addon.reconstruction.path import CloudPath
 from synthroads_addon.reconstruction.profiles import Profiles, make_profiles
 from synthroads_addon.reconstruction.reconstruct import reconstruct
+from synthroads_addon.reconstruction.views.pavement import pavement_edges
 from tests.helpers.clouds.foreign_clouds import EAST, NORTH, axis_north
 from tests.helpers.clouds.hard_roads import HardRoad, motorway, rural, street
+from tests.helpers.clouds.survey_faults import SurveyFaults
+from tests.helpers.clouds.thrown_roads import KINDS, MOTORWAYS, thrown_road, true_counts
 
 WINDOW = 50.0
 """Length, m, over which the axis is compared with its views."""
@@ -64,9 +71,9 @@ def test_a_narrow_grey_median_parts_two_carriageways(tmp_path: Path, road: HardR
     assert found.kind == "dual"
     assert np.abs(errors(found, cloud, road)[1]).max() < 0.3
     assert found.judgement.trusted > 0.85
-    (stretch,) = centreline_report(found, cloud)["carriageways"]
-    assert stretch["number"] == 2
-    assert stretch["probability"] > 0.5
+    figures = compare(found, cloud, road)
+    assert figures.main == figures.plain
+    assert figures.counted > 0.9 * figures.plain
 
 
 @pytest.mark.parametrize("decibel", [0.5, 2.5, 3.7])
@@ -139,6 +146,73 @@ def test_the_axis_is_hardly_worse_than_its_best_view(tmp_path: Path, road: HardR
                 views.append(float(np.nanmean(np.abs(of_view))))
         # 5 cm, half a bin, are no loss: which of several views within a bin is nearest is chance.
         assert own <= 1.1 * min(views) + 0.05
+
+
+@pytest.mark.parametrize("kind", MOTORWAYS)
+def test_carriageways_and_ramps_are_counted_by_stretch(tmp_path: Path, kind: str) -> None:
+    for seed in (2, 6):
+        road = thrown_road(kind, seed)
+        profiles = profiles_of(road, tmp_path)
+        layout = find_layout(profiles, find_lines(profiles))
+        assert layout.kind == "dual"
+        strips = find_strips(layout.pavement, layout.bands[0].low, layout.bands[-1].high)
+        carriageways, ramps, plain = true_counts(road, profiles.middles)
+        zeros = np.zeros(profiles.stretches, dtype=np.int64)
+        more, other = (
+            sum((strip.present for strip in strips if (strip.ramp > 0.5) == is_ramp), zeros)
+            for is_ramp in (False, True)
+        )
+        assert ((2 + more == carriageways) & (other == ramps))[plain].mean() > 0.95
+        for strip in strips:
+            assert strip.probability[strip.present].mean() > 0.6
+
+
+def test_each_kind_of_evidence_moves_a_medians_odds(tmp_path: Path) -> None:
+    road = motorway(15, decibel=0.0)
+    profiles = profiles_of(road, tmp_path)
+    lines = find_lines(profiles)
+    (median,) = find_medians(profiles, lines)
+    left_dashes = next(line for line in lines if line.offset > 2.0 and is_dashed(line))
+    others = [line for line in lines if line is not left_dashes]
+
+    def odds(profiles: Profiles, lines: list[Line]) -> float:
+        return sum(one.total for one in find_medians(profiles, lines) if abs(one.low.mean() + one.high.mean()) < 1.0)
+
+    assert odds(profiles, lines) == pytest.approx(median.total)
+    shifted = replace(left_dashes, first_dash=left_dashes.first_dash + 5.0)
+    assert odds(profiles, [*others, shifted]) == pytest.approx(median.total + 1.0)
+    longer = replace(left_dashes, dash=4.0, gap=8.0)
+    assert odds(profiles, [*others, longer]) == pytest.approx(median.total + 1.5)
+    unlike = replace(left_dashes, offsets=left_dashes.offsets + 0.6)
+    assert odds(profiles, [*others, unlike]) < median.total - 0.2
+    inside = (profiles.offsets > -1.0) & (profiles.offsets < 1.0)
+    unpaved, paved = (np.where(inside, share, 1.0) * np.ones(profiles.count.shape) for share in (0.2, 1.0))
+    by_class, against = (replace(profiles, paved=share.astype(np.float32)) for share in (unpaved, paved))
+    assert odds(by_class, lines) > median.total + 2.0
+    assert odds(against, lines) < median.total - 2.0
+
+
+def test_a_median_whose_guardrail_was_cut_out_is_one(tmp_path: Path) -> None:
+    road = replace(motorway(18, decibel=2.5), faults=SurveyFaults(rails=((-0.3, 0.3),)))
+    right, left = pavement_edges(profiles_of(road, tmp_path), [-6.0, 6.0], True)
+    assert 0.5 * (right + left) == pytest.approx(np.zeros(len(right)), abs=0.3)
+
+
+def test_bright_strips_in_rough_ground_are_no_lines(tmp_path: Path) -> None:
+    profiles = profiles_of(thrown_road("street", 1), tmp_path)
+    lines = find_lines(profiles)
+    kept = lines_on_pavement(profiles, lines)
+    assert max(abs(line.offset) for line in lines) > 8.0
+    assert max(abs(line.offset) for line in kept) < 6.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_thrown_roads_are_told_or_doubted(tmp_path: Path, kind: str) -> None:
+    shares = totals([measure(thrown_road(kind, seed), tmp_path) for seed in (201, 202)])
+    assert shares["counted"] > 90.0
+    assert shares["near_or_doubted"] > 95.0
+    assert shares["silent"] <= 0.2
 
 
 def test_an_error_names_only_what_was_given(tmp_path: Path) -> None:

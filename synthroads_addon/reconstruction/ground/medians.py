@@ -13,10 +13,11 @@ from itertools import combinations
 import numpy as np
 from scipy import ndimage
 
-from ...base.arrays import Bool, Float
+from ...base.arrays import Float
 from ..lines import Line, is_dashed
-from ..profiles import ACROSS, STRETCH, Grid, Profiles
+from ..profiles import STRETCH, Grid, Profiles
 from ..smoothing import fill_gaps, robust_scale
+from .levels import median_level
 
 _NARROWEST, _WIDEST = 1.2, 30.0
 """Distances of the lines beside a median, m. Chosen: a double line is laid in 1 m at most; carriageways that are
@@ -35,8 +36,6 @@ _SEEN = 0.3
 """Share of the road on which a line must be seen to frame a median. Chosen: as `layout` takes lines of rural roads."""
 _NEAR = 4
 """Stretches to either side whose evidence counts. Chosen: 20 m; no median ends sooner."""
-_FEWEST = 4
-"""Bins of a stretch that its ground's level is told from. Chosen: less than a tenth of a strip's."""
 _BRIGHTNESS = (0.04, 0.6)
 """Deviation of the logarithm of brightness from lane to lane at least, and of another ground's. Chosen: wear; 2.5
 dB."""
@@ -44,8 +43,20 @@ _HEIGHT = (0.01, 0.1)
 """The same of heights, m. Chosen: rutting; a kerb."""
 _ROUGHNESS = (0.2, 0.8)
 """The same of the logarithm of roughness. Chosen: of some fifty heights; grass has twice to three times asphalt's."""
+_PAVED = (0.05, 0.5)
+"""The same of the share that classes call pavement. Chosen: a model's faults from lane to lane; half of the points."""
 _AGAINST, _FOR = -0.7, 5.0
 """Limits of one kind of evidence, log-odds. Chosen: ground may be paved alike, so that likeness says little."""
+_AGAINST_BY_CLASS = -2.5
+"""Limit of evidence by class, log-odds. Chosen: beyond what lines alone say for a median."""
+_OTHER_PERIOD, _OTHER_PHASE, _SAME_PHASE = 1.0, 0.5, -0.5
+"""Log-odds where the dashes nearest to both sides have other periods, the same one but begin elsewhere, or the same
+course. Chosen: each direction is painted on its own, lines of one carriageway mostly together."""
+_PERIOD, _PHASE = 1.5, 1.0
+"""Differences of periods and of dashes' beginnings, m, from which on they aren't the same. Chosen: bins of a metre."""
+_MIRRORED, _UNLIKE, _MIRROR = 0.5, -0.5, 0.35
+"""Log-odds where each line beyond one side has its mirror image beyond the other, or none has, and how exact that is,
+m. Chosen: most motorways are alike in both directions, and so are many roads about a lane."""
 _PRIOR = -1.0
 """Log-odds of a median between two solid lines with lanes beyond both. Chosen: other roads have such lines as well."""
 _FRAMED, _NO_LANE = 4.0, 1.0
@@ -133,8 +144,40 @@ def _median_between(profiles: Profiles, right: Line, left: Line, lines: Sequence
     prior = _PRIOR if all(has_lanes) and is_sure else -np.inf
     if all(any(is_dashed(other) for other in others) for others in lane_lines):
         prior += _FRAMED + (0.0 if _LIKE_A_LANE[0] <= gap <= _LIKE_A_LANE[1] else _NO_LANE)
+    dashes = [[other for other in others if is_dashed(other)] for others in lane_lines]
+    prior += _pattern_odds(*dashes) + _symmetry_odds(right, left, lines)
     strip = min(_EDGE_STRIP, 0.25 * gap)
     return Median(right, left, right_offsets + strip, left_offsets - strip, prior + odds)
+
+
+def _pattern_odds(right: Sequence[Line], left: Sequence[Line]) -> float:
+    """Return the log-odds that dashed lines to the right and to the left of a strip were painted apart; 0 if unseen."""
+    if not right or not left:
+        return 0.0
+    right_line, left_line = (max(lines, key=lambda line: line.length) for lines in (right, left))
+    period, other_period = (line.dash + line.gap for line in (right_line, left_line))
+    if abs(period - other_period) > _PERIOD:
+        return _OTHER_PERIOD
+    shift = (right_line.first_dash - left_line.first_dash + 0.5 * period) % period - 0.5 * period
+    return _OTHER_PHASE if abs(shift) > _PHASE else _SAME_PHASE
+
+
+def _symmetry_odds(right: Line, left: Line, lines: Sequence[Line]) -> float:
+    """Return the log-odds by how many lines beyond both sides are each other's mirror images; 0 if unseen."""
+    beyond = [
+        np.array([sign * (other.offset - line.offset) for other in lines if sign * (other.offset - line.offset) > 0.0])
+        for line, sign in ((right, -1), (left, 1))
+    ]
+    if not all(len(distances) for distances in beyond):
+        return 0.0
+    # Beyond the outermost line of the narrower side the cloud may be cut off.
+    reach = min(float(distances.max()) for distances in beyond) + _MIRROR
+    near = [distances[distances <= reach] for distances in beyond]
+    if not all(len(distances) for distances in near):
+        return 0.0
+    apart = np.abs(near[0][:, None] - near[1][None])
+    share = float(np.mean(np.concatenate([apart.min(axis=0), apart.min(axis=1)]) <= _MIRROR))
+    return _UNLIKE + share * (_MIRRORED - _UNLIKE)
 
 
 def _is_cut_off(profiles: Profiles, line: Line, sign: int) -> bool:
@@ -172,13 +215,15 @@ def _ground_odds(profiles: Profiles, right: Float, left: Float) -> Float:
         {name: np.log(np.maximum(values, least)) for name, values in table.items()}
         for table, least in ((level, floor), (rough, 1e-3))
     )
-    return np.asarray(
-        _odds_of(logarithm, *_BRIGHTNESS) + _odds_of(rise, *_HEIGHT) + _odds_of(rough_logarithm, *_ROUGHNESS)
-    )
+    odds = _odds_of(logarithm, *_BRIGHTNESS) + _odds_of(rise, *_HEIGHT) + _odds_of(rough_logarithm, *_ROUGHNESS)
+    if profiles.paved is not None:
+        paved = {name: median_level(profiles, profiles.paved, *place) for name, place in places.items()}
+        odds = odds + _odds_of(paved, *_PAVED, against=_AGAINST_BY_CLASS)
+    return np.asarray(odds)
 
 
-def _odds_of(levels: dict[str, Float], same_std: float, other_std: float) -> Float:
-    """Return the log-odds (K,) that a strip is other ground than both sides, by one quantity's levels.
+def _odds_of(levels: dict[str, Float], same_std: float, other_std: float, against: float = _AGAINST) -> Float:
+    """Return the log-odds (K,), at least ``against``, that a strip is other ground than both sides, by its levels.
 
     Both sides are lanes: how they differ along the road says by how much pavement does.
     """
@@ -199,18 +244,4 @@ def _odds_of(levels: dict[str, Float], same_std: float, other_std: float) -> Flo
     mean = np.where(share > 0.0, total / np.maximum(share, 1e-9), 0.0)
     # ln of N(d; 0, other) / N(d; 0, same).
     odds = np.log(same_std / other_std) + 0.5 * mean**2 * (same_std**-2 - other_std**-2)
-    return np.where(share > 0.2, np.clip(odds, _AGAINST, _FOR), 0.0)
-
-
-def median_level(profiles: Profiles, values: Grid | Float, low: Float, high: Float) -> Float:
-    """Return the median (K,) of values (S, U) between offsets (K,), m, in each stretch; NaN where hardly seen."""
-    result = np.full(profiles.stretches, np.nan)
-    for number in np.flatnonzero(np.isfinite(low) & np.isfinite(high)):
-        first, last = profiles.column(float(low[number])), profiles.column(float(high[number]))
-        if last - first + 1 < 2 or abs(profiles.offsets[last] - high[number]) > 2.0 * ACROSS:
-            continue
-        bins = values[number * STRETCH : (number + 1) * STRETCH, first : last + 1]
-        known: Bool = np.isfinite(bins)
-        if known.sum() >= _FEWEST:
-            result[number] = float(np.median(bins[known]))
-    return result
+    return np.where(share > 0.2, np.clip(odds, against, _FOR), 0.0)

@@ -8,11 +8,15 @@ from ..edges import Pavement
 from ..lines import Line, is_dashed
 from ..profiles import ACROSS, Grid, Profiles
 from ..smoothing import robust_scale
+from .levels import median_level
 
 _NARROWEST_BAND = 3.0
 """Width of a strip of pavement, m. Chosen: a lane."""
 _AROUND_DASHES = (0.4, 1.4)
 """Distances beside a lane line that are pavement for sure, m. Chosen: off the paint, within a lane's half."""
+_BESIDE_LINE = ((-1.4, -0.4), (0.4, 1.4))
+"""Distances from a line's middle, m, of the ground on its right and its left. Chosen: off the paint, within half of a
+lane."""
 _LIKE = 4.0
 """Times the pavement's own spread of brightness that other ground is off at least. Chosen: Otsu's method parts any
 histogram, a pavement's as well."""
@@ -30,6 +34,32 @@ wider."""
 _LEVEL_BLUR = 10.0
 """Standard deviation of the blur of the pavement's brightness along the road, m. Chosen: single cars and stains vanish
 in it."""
+_ROUGHER = 2.0
+"""Times as rough as the smoothest ground beside lines that no pavement is. Chosen: grass and soil are twice to five
+times as rough, patches and ruts less."""
+_SMOOTH = 0.004
+"""Step from bin to bin, m, that counts as smooth at least. Chosen: the best scanners' noise."""
+
+
+def lines_on_pavement(profiles: Profiles, lines: list[Line]) -> list[Line]:
+    """Return the lines that have smooth ground on one side at least: bright strips in grass and soil are no paint."""
+    if not lines:
+        return []
+    step = np.abs(np.diff(profiles.height, axis=1, append=np.nan))
+    places = [[(line.offsets + start, line.offsets + end) for start, end in _BESIDE_LINE] for line in lines]
+    roughness = np.full((len(lines), 2), np.inf)
+    for row, sides in enumerate(places):
+        for side, (low, high) in enumerate(sides):
+            levels = median_level(profiles, step, low, high)
+            if np.isfinite(levels).any():
+                roughness[row, side] = float(np.nanmedian(levels))
+    smoother = roughness.min(axis=1)
+    # Where no height is known around a line nothing speaks against it.
+    known = np.isfinite(smoother)
+    if not known.any():
+        return lines
+    largest = _ROUGHER * max(float(smoother[known].min()), _SMOOTH)
+    return [line for line, value in zip(lines, smoother, strict=True) if not np.isfinite(value) or value <= largest]
 
 
 def paved_spans(pavement: Pavement) -> list[tuple[float, float]]:

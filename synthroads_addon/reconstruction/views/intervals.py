@@ -58,10 +58,10 @@ def _quantile(density: Float, share: float) -> Float:
     share_before, share_after = (
         np.take_along_axis(cumulative_share, end_index - step, axis=1)[:, 0] for step in (1, 0)
     )
-    # Linear between the entry before, of end_index - 1.5 steps, and this one; too narrow within the middle cell, where
-    # the axis' own deviation is wider anyway (`half_width`).
+    # Linear within the cell: the middle one ends half a step from the middle, each further one a step farther out.
     share_of_step = (share - share_before) / (share_after - share_before)
-    return np.maximum(_STEP * (end_index[:, 0] - 1.5 + share_of_step), 0.0)
+    end = end_index[:, 0]
+    return np.where(end == 1, 0.5 * share_of_step, end - 1.5 + share_of_step) * _STEP
 
 
 def _density(axis: FusedAxis) -> Float:

@@ -22,7 +22,12 @@ _KERB, _KERB_REACH = 0.05, 3
 """Height that a kerb rises by, m, and bins to either side of it. Chosen: the lowest kerbs; over 0.6 m a crossfall of 8
 % rises by less."""
 _CRACK = 9
-"""Widest gap in the pavement, or in the median, that is a crack or a seam, bins. Chosen: a median is wider."""
+"""Widest gap in the pavement that is a crack or a seam, bins. Chosen: a median is wider."""
+_RAIL = 20
+"""Widest strip without points, bins, that is rails or a wall cut out of the median. Chosen: two guardrails and the
+ground between."""
+_NO_LANE = 23
+"""Strip between two parts of a median that is no carriageway, bins. Chosen: no lane of RAA or RAL is as narrow."""
 _PATCH = 5
 """Stretches in which what differs from the ground before and behind it is a patch, a stain, an entrance. Chosen: 25
 m."""
@@ -65,9 +70,10 @@ def pavement_edges(profiles: Profiles, cores: Sequence[float], dual: bool, offse
     )
     difference = np.abs(paintless_brightness - levels[:, None])
     is_pavement = has_points & ~(difference > _brightness_threshold(difference[has_points], difference[:, core]))
-    band_mask = _without_patches(_close_cracks(is_pavement) & ~steps)
+    band_mask = _without_patches(_close(is_pavement, _CRACK) & ~steps)
     if dual:
-        band_mask = _close_cracks(has_points & ~band_mask)
+        in_cloud = _close(has_points, _RAIL)
+        band_mask = _close(in_cloud & ~band_mask, _NO_LANE) & in_cloud
     return np.array(
         [
             _run_at(profiles, row, row_has_points, offset)
@@ -98,9 +104,9 @@ def _brightness_threshold(difference: Float, core: Float) -> float:
     return threshold if is_distinct else np.inf
 
 
-def _close_cracks(mask: Bool) -> Bool:
-    """Return a mask (K, U) with gaps that are narrow across the road closed."""
-    window = np.ones((1, _CRACK))
+def _close(mask: Bool, width: int) -> Bool:
+    """Return a mask (K, U) with gaps of at most a width, bins, across the road closed."""
+    window = np.ones((1, width))
     return ndimage.binary_erosion(ndimage.binary_dilation(mask, window), window, border_value=1)
 
 

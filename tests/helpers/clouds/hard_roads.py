@@ -40,7 +40,10 @@ class Ground:
 
 @dataclass(frozen=True)
 class Paint:
-    """A line at an offset, m, with dash and gap (m; 0: solid), turned outwards as its ground is; its dashes begin at a phase, m."""
+    """A line at an offset, m, with dash and gap (m; 0: solid), turned outwards as its ground is.
+
+    Its dashes are moved along by ``phase``, m.
+    """
 
     offset: float
     dash: float = 0.0
@@ -132,7 +135,7 @@ class HardRoad:
         return right_cut[block], left_cut[block]
 
     def strips(self, station: Float, use: str, least: float = 3.0) -> list[tuple[Bool, Float]]:
-        """Return the strips of pavement of one use, from right to left: where each is seen (N,), and its middle (N,), m.
+        """Return the strips of pavement of one use, from right to left: where each is seen (N,), and its middle (N,).
 
         Args:
             station: (N,) m.

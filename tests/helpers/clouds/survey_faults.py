@@ -1,4 +1,4 @@
-"""What wear and surveys do to a thrown road: gain steps between strips, patches, worn paint, rails that were cut off."""
+"""Faults of surveys and wear on thrown roads: gain steps between strips, patches, worn paint, rails cut out."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class SurveyFaults:
         )
 
     def paint_share(self, distance: Float, width: float) -> Float:
-        """Return the share (N,) of a footprint that a line of a width, m, fills at distances (N,), m, from its middle."""
+        """Return the share (N,) of a footprint that a line (m) fills at distances (N,), m, from its middle."""
         if self.footprint == 0.0:
             return (distance < 0.5 * width).astype(np.float64)
         # Two boxes of these widths that lie over each other.

@@ -1,4 +1,4 @@
-"""Roads thrown at random for the study of carriageways: motorways of three kinds, streets, rural roads; all with faults."""
+"""Roads thrown at random for the study of carriageways: motorways, streets, rural roads, with faults of surveys."""
 
 from __future__ import annotations
 
@@ -88,9 +88,8 @@ def true_counts(road: HardRoad, station: Float) -> tuple[Int, Int, Bool]:
     ramps, plain = np.zeros(len(station), dtype=np.int64), np.ones(len(station), dtype=bool)
     for ground in (ground for ground in road.grounds if ground.use == "ramp"):
         sign = np.sign(ground.turn)
-        outer = max(
-            sign * edge for other in road.grounds if other.use == "carriageway" for edge in (other.low, other.high)
-        )
+        carriageways = [other for other in road.grounds if other.use == "carriageway"]
+        outer = max(sign * edge for other in carriageways for edge in (other.low, other.high))
         ((_, middle),) = road.strips(station, "ramp")
         apart = sign * middle - 0.5 * (ground.high - ground.low) - outer
         right_cut, left_cut = road.sides(station)

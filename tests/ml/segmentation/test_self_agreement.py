@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from ml.choice import SQUARE, cloud_traits
 from ml.prediction import predict
+from ml.runs import Run
 from ml.segmentation.scoring import EDGE
 from ml.segmentation.self_agreement import ENOUGH_POINTS, SQUARES, _draw_squares, _kappa, sample_cloud, self_agreement
 from ml.shipped import open_run
 from synthroads_addon.base.random_streams import stream
+from synthroads_addon.cloud.formats.registry import open_cloud
 from tests.helpers.clouds.road_clouds import block_of, write
 
 
@@ -47,14 +51,35 @@ def unlike(tmp_path: Path) -> Path:
 
 
 def test_the_sample_holds_what_lies_in_its_squares(unlike: Path) -> None:
-    sample = sample_cloud(unlike)
+    sample = sample_cloud(unlike, cloud_traits(unlike).squares)
     squares = np.unique(np.floor((sample.coord[:, :2] + sample.origin[:2]) / EDGE), axis=0)
     assert 1 <= len(squares) <= SQUARES
     assert len(sample) > 80_000
     assert sample.strength is not None
     assert sample.color is None
-    again = sample_cloud(unlike)
+    again = sample_cloud(unlike, cloud_traits(unlike).squares)
     assert (again.coord == sample.coord).all()
+
+
+def test_the_traits_count_the_points_of_the_squares_that_are_drawn(unlike: Path) -> None:
+    assert SQUARE == EDGE
+    with open_cloud(unlike) as cloud:
+        xyz = np.concatenate([block.xyz for block in cloud.blocks(1_000_000)])
+    squares, numbers = np.unique(np.floor(xyz[:, :2] / EDGE).astype(int), axis=0, return_counts=True)
+    assert cloud_traits(unlike).squares == dict(zip(map(tuple, squares.tolist()), numbers.tolist(), strict=True))
+
+
+def test_each_model_that_is_tried_is_opened_once(unlike: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+
+    def open_and_count(run: Path) -> Run[Any]:
+        opened.append(str(run))
+        return open_run(run)
+
+    monkeypatch.setattr("ml.prediction.open_run", open_and_count)
+    predicted = predict(unlike, tmp_path / "once.laz")
+    assert predicted.choice is not None
+    assert sorted(opened) == sorted(predicted.choice.agreements)
 
 
 def test_a_model_sees_a_cloud_that_none_was_trained_on_twice(unlike: Path, tmp_path: Path) -> None:
@@ -63,6 +88,6 @@ def test_a_model_sees_a_cloud_that_none_was_trained_on_twice(unlike: Path, tmp_p
     assert predicted.choice.doubtful
     assert set(predicted.choice.agreements) == {"segmentation-overhead", "segmentation-sweeps"}
     name = predicted.choice.card.name
-    expected = self_agreement(open_run(Path(name)), sample_cloud(unlike))
+    expected = self_agreement(open_run(Path(name)), sample_cloud(unlike, cloud_traits(unlike).squares))
     assert predicted.choice.agreements[name] == pytest.approx(expected, abs=1e-6)
     assert "agree with themselves" in predicted.choice.why()

@@ -506,6 +506,19 @@ def test_clouds_of_one_name_have_results_of_their_own(trained: Trained, tmp_path
         task.evaluate(run, Evaluation([clouds[0], clouds[0]], "test", tmp_path / "out"))
 
 
+def test_a_cloud_that_is_refused_names_the_tables_before_it(trained: Trained, tmp_path: Path) -> None:
+    run = Run.open(trained())
+    labelled, empty = tmp_path / "labelled.laz", tmp_path / "empty.laz"
+    write_cloud(labelled, road_block(500, 4, 20.0))
+    write_cloud(empty, road_block(0, 4, 20.0))
+    with pytest.raises(InputError, match=r"measured before it is in .*out: labelled\.txt, labelled\.png"):
+        task.evaluate(run, Evaluation([labelled, empty], "test", tmp_path / "out"))
+    assert (tmp_path / "out/labelled.txt").exists()
+    with pytest.raises(InputError) as alone:
+        task.evaluate(run, Evaluation([empty], "test", tmp_path / "out"))
+    assert "before it" not in str(alone.value)
+
+
 def test_tests_are_looked_at_before_the_training(data: Path, tmp_path: Path) -> None:
     run = Run.start(tmp_path / "run", toy(data))
     wrong = {"late": [{"path": str(data / "real"), "split": "tset"}]}

@@ -7,7 +7,7 @@ import pytest
 
 from synthroads_addon.base.arrays import Float
 from synthroads_addon.reconstruction.views.fusion import fuse
-from synthroads_addon.reconstruction.views.intervals import SLIPS, half_width
+from synthroads_addon.reconstruction.views.intervals import SLIPS, _quantile, half_width
 from synthroads_addon.reconstruction.views.view import View
 
 STATIONS: Float = 5.0 * np.arange(40) + 2.5
@@ -64,3 +64,13 @@ def test_where_nothing_is_seen_the_deviation_alone_counts() -> None:
     assert half_width(axis, 0.95, 1.96)[gap] == pytest.approx(1.96 * axis.std[gap])
     nothing = fuse(STATIONS, [View("lines", np.full(40, np.nan), np.full(40, np.inf))])
     assert np.isinf(half_width(nothing, 0.95, 1.96)).all()
+
+
+def test_a_narrow_density_has_its_share_within_the_middle_cell() -> None:
+    step = 0.05
+    cells = np.zeros((2, 5))
+    cells[0] = [0.0, 0.0, 1.0, 0.0, 0.0]
+    cells[1] = [0.0, 0.2, 0.6, 0.2, 0.0]
+    # A density that is even within cells: the middle one reaches half a step to either side.
+    assert _quantile(cells, 0.68) == pytest.approx([0.68 * 0.5 * step, (0.5 + 0.08 / 0.4) * step])
+    assert _quantile(cells, 0.3) == pytest.approx([0.3 * 0.5 * step, 0.5 * 0.5 * step])
