@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ...blender.model.store import find_road
 from ...checking.checker import RULES
 from ...road.tables.elements import KIND_NAMES
 from ...road.tables.points import grades_percent
-from ..fields.room import buttons_row, draw_text, fits, value_row
+from ..fields.room import buttons_row, draw_text, fits, row_width, text_width, value_row
 from ..work.common import Sidebar, column
 from .operators import (
     SYNTHROADS_OT_crossfall_by_rule,
@@ -26,11 +27,13 @@ from .profile_view import SYNTHROADS_OT_show_profile, draw_station
 from .rows import KINDS
 from .tables import TABLES, Table, fix_of, marks_of, sync_later, tables
 
-_LIST_SHARE, _NAME_SHARE, _BOX_SHARE = 0.85, 0.42, 0.92
-"""Shares of a row's width that are within a list beside its scroll bar, of a list's row for its name, within a box."""
+_LIST_SHARE, _BOX_SHARE = 0.95, 0.92
+"""Shares of a row's width that are within a list, and within a box."""
+_ICON_ROOM, _VALUE_ROOM = 24.0, 8.0
+"""Pixels at a resolution scale of 1 that an icon before a name and the margins of a value take."""
 _ICONS = {"line": "IPO_LINEAR", "clothoid": "IPO_QUAD", "arc": "SPHERECURVE"}
-_VALUES = "1,188.60 m"
-"""A value as wide as most are."""
+_NAME, _VALUE = "12 Clothoid", "1188.6 m"
+"""A name and a value as wide as most are."""
 
 
 def _cells(layout: bpy.types.UILayout, name: str, is_broken: bool, item: Any, fields: Sequence[str]) -> None:
@@ -45,13 +48,13 @@ def _cells(layout: bpy.types.UILayout, name: str, is_broken: bool, item: Any, fi
     """
     row = layout.row(align=True)
     icon = "ERROR" if is_broken else "BLANK1"
-    count = len(fields)
-    while count > 1 and not fits(_VALUES, _LIST_SHARE * (1.0 - _NAME_SHARE) / count):
-        count -= 1
-    if not fits(name, _LIST_SHARE * _NAME_SHARE, 1):
+    room = _LIST_SHARE * row_width()
+    name_room = text_width(_NAME) + _ICON_ROOM
+    count = int(np.clip((room - name_room) / (text_width(_VALUE) + _VALUE_ROOM), 0, len(fields)))
+    if not count:
         row.label(text=name, icon=icon)
         return
-    split = row.split(factor=_NAME_SHARE)
+    split = row.split(factor=name_room / room)
     split.label(text=name, icon=icon)
     values = split.row(align=True)
     for field in fields[:count]:
