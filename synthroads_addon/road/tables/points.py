@@ -60,8 +60,9 @@ def with_vertical_point_inserted(alignment: AlignmentObject, number: int) -> Ali
     free = [ends[number - 1], begins[number]] if is_inner else [begins[0]] if number <= 0 else [ends[-1]]
     if is_inner and free[1] - free[0] <= TOUCH:
         raise InputError(
-            "Insert Vertical Point", None, f"the roundings of points {number} and {number + 1} leave no room: choose "
-            "smaller radii there first"
+            "Insert Vertical Point",
+            None,
+            f"the roundings of points {number} and {number + 1} leave no room: choose smaller radii there first",
         )
     station = _station_between(free, min(number, 1))
     elevation = _tangent_elevation(points, station)
@@ -185,8 +186,7 @@ def carried_carriageway(carriageway: Carriageway, stations: StationMap) -> Carri
             carriageway = _with_strip(carriageway, strip, points if len(points) > 1 else float(width[0].width))
     pavement = carriageway.pavement
     ruts = [
-        rut.model_copy(update={name: _moved(getattr(rut, name), stations) for name in _RANGE})
-        for rut in pavement.ruts
+        rut.model_copy(update={name: _moved(getattr(rut, name), stations) for name in _RANGE}) for rut in pavement.ruts
     ]
     holes = [
         hole.model_copy(update={"station": _moved(hole.station, stations)})
