@@ -23,11 +23,11 @@ from ..nodes.builder import remove_unused_groups
 from ..things.model_builder import ROLE, BuildRequest, ModelBuilder, group_inputs
 from ..things.registry import model_parts
 from .axis_edits import edited_axis
+from .build import road_collection
 from .edits import keep_built, own_modifier
 from .older_files import PARAMETERS
 from .read_back import edited_carriageway
 from .roads import NAME, OF_ROAD, ROAD, parts_and_copies, world_matrix
-from .build import road_collection
 from .store import STATED, recall, recall_parameters
 from .truth import read_as_stated
 
@@ -104,7 +104,8 @@ def _refuse_moved_backbone(root: bpy.types.Object, parts: dict[str, bpy.types.Ob
     if backbone is None or "Road" not in parts:
         raise InputError("Alignment", None, "the road's surface or backbone was deleted: undo that, or build it again")
     base = shown_base(root)[0]
-    data = base.model_copy(update={"objects": {name: _stated_object(item, stated) for name, item in base.objects.items()}})
+    objects = {name: _stated_object(item, stated) for name, item in base.objects.items()}
+    data = base.model_copy(update={"objects": objects})
     place = np.linalg.inv(world_matrix(root)) @ world_matrix(backbone)
     if edited_axis(RoadGeometry(data), backbone, place) is not None:
         raise InputError("Alignment", None, "the backbone was moved by hand: press Build as Edited first")
@@ -115,9 +116,7 @@ def _stated_object(item: object, stated: StatedRoad) -> object:
     return stated.alignment if type(item) is type(stated.alignment) else item
 
 
-def _surface(
-    root: bpy.types.Object, scene: bpy.types.Scene, parameters: RoadParameters
-) -> dict[str, bpy.types.Object]:
+def _surface(root: bpy.types.Object, scene: bpy.types.Scene, parameters: RoadParameters) -> dict[str, bpy.types.Object]:
     """Return new objects of the road's surface by role, unlinked from the scene's sight until they are taken over."""
     settings = recall(root)[1].settings()
     builder = ModelBuilder(
@@ -141,9 +140,7 @@ def _remove(objects: dict[str, bpy.types.Object]) -> None:
             bpy.data.meshes.remove(mesh)
 
 
-def _take_over(
-    root: bpy.types.Object, parts: dict[str, bpy.types.Object], made: dict[str, bpy.types.Object]
-) -> None:
+def _take_over(root: bpy.types.Object, parts: dict[str, bpy.types.Object], made: dict[str, bpy.types.Object]) -> None:
     """Give the road's own objects the meshes, node groups and inputs of new ones; the objects stay, for all that refer.
 
     Args:

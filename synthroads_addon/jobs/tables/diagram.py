@@ -7,7 +7,7 @@ both carriageways' crossfall, each over the stations, and the cross-section at o
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -16,10 +16,10 @@ import numpy as np
 from ...base.arrays import Float
 from ...base.errors import InputError
 from ...road.geometry import RoadGeometry
+from ...road.objects import width_at
 from ...road.section import Carriageway
 from ...road.tables.elements import element_rows
 from ...road.tables.points import strip_names, strip_width
-from ...road.objects import width_at
 from ...road.terrain import ground_elevation, surface_elevation
 
 Role = Literal[
@@ -34,6 +34,8 @@ _LETTER = 6.5
 """Mean width of a letter, pixels at a scale of 1."""
 _SHARES = (0.42, 0.14, 0.14, 0.30)
 """Shares of the height for profile, curvature, crossfall and cross-section. Chosen."""
+_ROWS_BELOW = (0, 2)
+"""Bands with a row of text below them: the stations, and that of the cross-section."""
 _BESIDE = 12.0
 """Ground that is shown beside the verges in the cross-section, m. Chosen."""
 _LARGEST_EXAGGERATION = 10.0
@@ -131,20 +133,38 @@ def road_diagram(geometry: RoadGeometry, station: float, width: float, height: f
     """
     station = float(np.clip(station, 0.0, geometry.length))
     diagram = Diagram(_MARGIN_LEFT * scale, max(width - _MARGIN * scale, _MARGIN_LEFT * scale + 1.0), geometry.length)
-    usable = max(height - 2.0 * _MARGIN * scale, 1.0)
-    tops = height - _MARGIN * scale - usable * np.concatenate(([0.0], np.cumsum(_SHARES)))
-    rooms = [(float(low) + 2.2 * _TEXT_ROW * scale, float(high) - 1.2 * _TEXT_ROW * scale) for high, low in zip(tops, tops[1:])]
-    ticks = list(_ticks(0.0, geometry.length, _TICK_SPACING * scale * geometry.length / (diagram.right - diagram.left)))
+    row = _TEXT_ROW * scale
+    rooms = _rooms(height, row, scale)
+    metres = geometry.length / (diagram.right - diagram.left)  # per pixel
+    ticks = list(_ticks(0.0, geometry.length, _TICK_SPACING * scale * metres))
     _profile(diagram, geometry, rooms[0], ticks, scale)
     _curvature(diagram, geometry, rooms[1], scale)
     _crossfalls(diagram, geometry, rooms[2], scale)
     at = float(diagram.x(station))
     diagram.lines.append(DiagramLine("station", np.array([[at, rooms[2][0]], [at, rooms[0][1]]]), 1.5))
-    diagram.texts.append(
-        DiagramText("station", at, rooms[2][0] - _TEXT_ROW * scale, f"Station {station:,.2f} m", _inner_align(diagram, at))
-    )
+    text = f"Station {station:,.2f} m"
+    diagram.texts.append(DiagramText("station", at, rooms[2][0] - row, text, _inner_align(diagram, at)))
     _cross_section(diagram, geometry, station, rooms[3], scale)
     return diagram
+
+
+def _rooms(height: float, row: float, scale: float) -> list[tuple[float, float]]:
+    """Return the lower and upper edges, pixels, of profile, curvature, crossfall and cross-section.
+
+    Above each is a row of text, and one below the profile and the crossfall; they share what is left.
+
+    Args:
+        height: of the view, pixels.
+        row: height of a row of text, pixels.
+        scale: of margins.
+    """
+    left = max(height - 2.0 * _MARGIN * scale - 1.3 * row * (len(_SHARES) + len(_ROWS_BELOW)), 1.0)
+    rooms, top = [], height - _MARGIN * scale
+    for number, share in enumerate(_SHARES):
+        top -= 1.3 * row
+        rooms.append((top - share * left, top))
+        top -= share * left + (1.3 * row if number in _ROWS_BELOW else 0.0)
+    return rooms
 
 
 def _inner_align(diagram: Diagram, x: float) -> Literal["left", "center", "right"]:
@@ -223,9 +243,9 @@ def _profile(
         diamond = np.array([(x - size, y), (x, y + size), (x + size, y), (x, y - size), (x - size, y)])
         diagram.lines.append(DiagramLine("point", diamond, 1.5))
         radius = f", H {point.radius:,.0f} m" if point.radius else ""
-        diagram.texts.append(
-            DiagramText("point", x, y + 1.8 * size, f"{number}{radius}", _inner_align(diagram, x))
-        )
+        align = _inner_align(diagram, x)
+        beside = {"left": 2.0, "center": 0.0, "right": -2.0}[align] * size
+        diagram.texts.append(DiagramText("point", x + beside, y + 1.8 * size, f"{number}{radius}", align))
 
 
 def _tangents(geometry: RoadGeometry, station: Float) -> Float:
@@ -304,7 +324,7 @@ def _cross_section(
     width_px = diagram.right - diagram.left
     pixels = width_px / (left - right)
     low, high = float(height.min()), float(height.max())
-    room_px = max(room[1] - room[0] - 3.0 * _TEXT_ROW * scale, 1.0)
+    room_px = max(room[1] - room[0] - 3.0 * _TEXT_ROW * scale, 0.3 * (room[1] - room[0]))
     exaggeration = min(_LARGEST_EXAGGERATION, room_px / (pixels * max(high - low, 0.1)))
     middle = 0.5 * (room[0] + room[1]) - 0.5 * _TEXT_ROW * scale
 
@@ -319,23 +339,41 @@ def _cross_section(
     diagram.lines.append(DiagramLine("road", place(offset[on_road], height[on_road]), 2.5))
     axis_x = float(place(np.zeros(1), np.zeros(1))[0, 0])
     diagram.lines.append(DiagramLine("station", np.array([[axis_x, room[0]], [axis_x, room[1]]]), 1.0))
-    text_y = room[0] + 0.4 * _TEXT_ROW * scale
     for item in geometry.parameters.of_type(Carriageway).values():
-        inner = float(width_at(item.inner_offset, station))
-        percent = float(
-            np.interp(station, [p.station for p in item.crossfall], [p.crossfall_percent for p in item.crossfall])
-        )
-        first = inner
-        for strip in strip_names(item)[1:]:
-            strip_m = float(width_at(strip_width(item, strip), station))
-            ends = diagram.left + (left - item.sign * np.array([inner, inner + strip_m])) * pixels
-            for x in ends:
-                mark = np.array([[x, text_y + _TEXT_ROW * scale], [x, text_y + 1.4 * _TEXT_ROW * scale]])
-                diagram.lines.append(DiagramLine("grid", mark))
-            text = f"{strip_m:.2f}"
-            if abs(ends[1] - ends[0]) > _LETTER * scale * len(text):
-                diagram.texts.append(DiagramText("faint", float(ends.mean()), text_y, text, "center"))
-            inner += strip_m
-        x = diagram.left + (left - item.sign * 0.5 * (first + inner)) * pixels
-        y = room[1] - 1.2 * _TEXT_ROW * scale
-        diagram.texts.append(DiagramText(item.side, float(x), y, f"{percent:+.2f} %", "center"))
+        _widths(diagram, item, station, room, lambda offset: diagram.left + (left - offset) * pixels, scale)
+
+
+def _widths(
+    diagram: Diagram,
+    carriageway: Carriageway,
+    station: float,
+    room: tuple[float, float],
+    to_x: Callable[[float], float],
+    scale: float,
+) -> None:
+    """Add the widths of a carriageway's strips below the cross-section, and its crossfall above it.
+
+    Args:
+        diagram: that gets them.
+        carriageway: of the road.
+        station: of the cross-section, m.
+        room: lower and upper edge of the cross-section, pixels.
+        to_x: function from an offset (m) to pixels.
+        scale: of texts.
+    """
+    row, sign = _TEXT_ROW * scale, carriageway.sign
+    text_y = room[0] + 0.4 * row
+    first = inner = float(width_at(carriageway.inner_offset, station))
+    for strip in strip_names(carriageway)[1:]:
+        strip_m = float(width_at(strip_width(carriageway, strip), station))
+        ends = to_x(sign * inner), to_x(sign * (inner + strip_m))
+        for x in ends:
+            diagram.lines.append(DiagramLine("grid", np.array([[x, text_y + row], [x, text_y + 1.4 * row]])))
+        text = f"{strip_m:.2f}"
+        if abs(ends[1] - ends[0]) > _LETTER * scale * len(text):
+            diagram.texts.append(DiagramText("faint", 0.5 * sum(ends), text_y, text, "center"))
+        inner += strip_m
+    known = [point.station for point in carriageway.crossfall]
+    percent = float(np.interp(station, known, [point.crossfall_percent for point in carriageway.crossfall]))
+    middle = to_x(sign * 0.5 * (first + inner))
+    diagram.texts.append(DiagramText(carriageway.side, middle, room[1] - 1.2 * row, f"{percent:+.2f} %", "center"))

@@ -52,7 +52,19 @@ def with_vertical_point_inserted(alignment: AlignmentObject, number: int) -> Ali
     The profile stays the same until the new point is moved. Beyond the ends it is `STEP` away.
     """
     points = list(alignment.vertical)
-    station = _station_between([point.station for point in points], number)
+    reaches = _reaches(points)
+    begins = [point.station - reach for point, reach in zip(points, reaches, strict=True)]
+    ends = [point.station + reach for point, reach in zip(points, reaches, strict=True)]
+    # Halfway between the roundings beside it, on the tangent that is left of them.
+    is_inner = 0 < number < len(points)
+    free = [ends[number - 1], begins[number]] if is_inner else [begins[0]] if number <= 0 else [ends[-1]]
+    if is_inner and free[1] - free[0] <= TOUCH:
+        raise InputError(
+            "Insert Vertical Point",
+            None,
+            f"the roundings of points {number} and {number + 1} leave no room: choose smaller radii there first",
+        )
+    station = _station_between(free, min(number, 1))
     elevation = _tangent_elevation(points, station)
     points.insert(number, VerticalPoint(station=station, elevation=round_value(elevation), radius=0.0))
     return _with_vertical(alignment, points, "Insert Vertical Point")
@@ -174,11 +186,10 @@ def carried_carriageway(carriageway: Carriageway, stations: StationMap) -> Carri
             carriageway = _with_strip(carriageway, strip, points if len(points) > 1 else float(width[0].width))
     pavement = carriageway.pavement
     ruts = [
-        rut.model_copy(update={name: round_value(stations(getattr(rut, name)), 6) for name in _RANGE})
-        for rut in pavement.ruts
+        rut.model_copy(update={name: _moved(getattr(rut, name), stations) for name in _RANGE}) for rut in pavement.ruts
     ]
     holes = [
-        hole.model_copy(update={"station": round_value(stations(hole.station), 6)})
+        hole.model_copy(update={"station": _moved(hole.station, stations)})
         for hole in pavement.potholes
         if not stations.is_deleted(hole.station)
     ]
@@ -187,6 +198,8 @@ def carried_carriageway(carriageway: Carriageway, stations: StationMap) -> Carri
     return carriageway.model_copy(update=update)
 
 
+SAME = 1e-9
+"""Stations nearer than this (m) are the same: what isn't moved keeps all of its digits."""
 _RANGE = ("start_station", "end_station")
 _LABELS = {
     "station": "Station",
@@ -205,10 +218,16 @@ def _carried(points: Sequence[PointT], stations: StationMap) -> tuple[PointT, ..
         station: float = point.station  # type: ignore[attr-defined]
         if stations.is_deleted(station):
             continue
-        there = round_value(stations(station), 6)
+        there = _moved(station, stations)
         if not moved or there > moved[-1].station:  # type: ignore[attr-defined]
             moved.append(point if there == station else point.model_copy(update={"station": there}))
     return tuple(moved)
+
+
+def _moved(station: float, stations: StationMap) -> float:
+    """Return a station, m, moved along by a map, to the micrometre."""
+    there = stations(station)
+    return station if abs(there - station) < SAME else round_value(there, 6)
 
 
 def _with_vertical(
@@ -225,9 +244,7 @@ def _with_vertical(
     Raises:
         InputError: the roundings of two neighbours overlap.
     """
-    grades = Profile([IntersectionPoint(p.station, p.elevation) for p in points]).grades
-    # A rounding reaches T = H |g2 - g1| / 2 to either side of its point.
-    reaches = [0.5 * p.radius * abs(change) for p, change in zip(points, np.diff(grades), strict=True)]
+    reaches = _reaches(points)
     for number, (here, there) in enumerate(pairwise(points)):
         needed, distance = reaches[number] + reaches[number + 1], there.station - here.station
         if needed > distance + TOUCH:
@@ -238,6 +255,12 @@ def _with_vertical(
                 f"their stations are {distance:,.1f} m apart): give them smaller radii or more distance first",
             )
     return alignment.model_copy(update={"vertical": tuple(points)})
+
+
+def _reaches(points: Sequence[VerticalPoint]) -> list[float]:
+    """Return how far the rounding of each vertical point reaches to either side, m: T = H |g2 - g1| / 2."""
+    changes = np.diff(Profile([IntersectionPoint(p.station, p.elevation) for p in points]).grades)
+    return [0.5 * point.radius * abs(float(change)) for point, change in zip(points, changes, strict=True)]
 
 
 def _changed(points: Sequence[PointT], number: int, values: dict[str, float], words: str) -> PointT:

@@ -12,7 +12,7 @@ from ..parameters import AlignmentObject, RoadParameters
 from ..section import Carriageway, Hatching, LineMarking, Turnout
 from ..surroundings import LONGEST
 from .elements import ElementsEdit
-from .points import carried_carriageway, carried_equations
+from .points import SAME, carried_carriageway, carried_equations
 from .stations import StationMap, same_stations
 
 _STATIONS = ("station", "start_station", "end_station")
@@ -143,7 +143,10 @@ def carry_stations(data: Any, stations: Any, length: float) -> None:
         if key in _STATIONS and isinstance(value, int | float):
             if value >= LONGEST:  # all along, however long the road is
                 continue
-            new_station = round(stations(float(value)), 6)
+            exact_station = stations(float(value))
+            if abs(exact_station - value) < SAME:
+                continue
+            new_station = round(exact_station, 6)
             data[key] = max(new_station, 0.0) if value >= 0 else new_station
         else:
             carry_stations(value, stations, length)

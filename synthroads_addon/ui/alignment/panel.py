@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ...blender.model.store import find_road
 from ...checking.checker import RULES
 from ...road.tables.elements import KIND_NAMES
 from ...road.tables.points import grades_percent
-from ..fields.room import buttons_row, draw_text, fits, value_row
+from ..fields.room import buttons_row, draw_text, fits, row_width, text_width, value_row
 from ..work.common import Sidebar, column
 from .operators import (
     SYNTHROADS_OT_crossfall_by_rule,
@@ -26,33 +27,42 @@ from .profile_view import SYNTHROADS_OT_show_profile, draw_station
 from .rows import KINDS
 from .tables import TABLES, Table, fix_of, marks_of, sync_later, tables
 
-_LIST_SHARE, _NAME_SHARE, _BOX_SHARE = 0.85, 0.42, 0.92
-"""Shares of a row's width that are within a list beside its scroll bar, of a list's row for its name, within a box."""
+_LIST_SHARE, _BOX_SHARE = 0.95, 0.92
+"""Shares of a row's width that are within a list, and within a box."""
+_ICON_ROOM, _VALUE_ROOM = 24.0, 8.0
+"""Pixels at a resolution scale of 1 that an icon before a name and the margins of a value take."""
 _ICONS = {"line": "IPO_LINEAR", "clothoid": "IPO_QUAD", "arc": "SPHERECURVE"}
-_VALUES = "1,188.60 m"
-"""A value as wide as most are."""
+_NAME, _VALUE = "12 Clothoid", "1188.6 m"
+"""A name and a value as wide as most are."""
 
 
-def _cells(layout: bpy.types.UILayout, name: str, is_broken: bool, item: Any, fields: Sequence[str]) -> None:
-    """Draw a row of a list: its name, marked where it breaks a rule, and as many of its values as fit.
+def _cells(
+    layout: bpy.types.UILayout, number: int, name: str, icon: str, is_broken: bool, item: Any, fields: Sequence[str]
+) -> None:
+    """Draw a row of a list: number and name, an icon, and as many of its values as fit.
 
     Args:
         layout: a row.
-        name: of the row.
-        is_broken: whether it breaks a rule.
+        number: of the row, from 0.
+        name: of the row; its icon alone stands for it where it has no room beside the values.
+        icon: of the row; a warning takes its place where the row breaks a rule.
+        is_broken: whether it does.
         item: with the values.
         fields: names of the values, the most important first; empty for a gap.
     """
     row = layout.row(align=True)
-    icon = "ERROR" if is_broken else "BLANK1"
-    count = len(fields)
-    while count > 1 and not fits(_VALUES, _LIST_SHARE * (1.0 - _NAME_SHARE) / count):
-        count -= 1
-    if not fits(name, _LIST_SHARE * _NAME_SHARE, 1):
-        row.label(text=name, icon=icon)
+    row.alert = is_broken
+    room, value_room = _LIST_SHARE * row_width(), text_width(_VALUE) + _VALUE_ROOM
+    long_room, short_room = (text_width(text) + _ICON_ROOM for text in ("12 Clothoid", "12"))
+    has_name = long_room + len(fields) * value_room <= room
+    name_room = long_room if has_name else short_room
+    count = int(np.clip((room - name_room) / value_room, 0, len(fields)))
+    text, icon = f"{number + 1} {name}".strip() if has_name else f"{number + 1}", "ERROR" if is_broken else icon
+    if not count:
+        row.label(text=text, icon=icon)
         return
-    split = row.split(factor=_NAME_SHARE)
-    split.label(text=name, icon=icon)
+    split = row.split(factor=name_room / room)
+    split.label(text=text, icon=icon)
     values = split.row(align=True)
     for field in fields[:count]:
         if field:
@@ -82,7 +92,7 @@ class SYNTHROADS_UL_elements(_RowList, bpy.types.UIList):
         kind = tables.elements[item.number].kind
         last = {"line": "", "clothoid": "parameter", "arc": "radius"}[kind]
         broken = bool(marks_of(context.scene, "elements", item.number))
-        _cells(layout, f"{item.number + 1} {KIND_NAMES[kind]}", broken, item, ("length", last))
+        _cells(layout, item.number, KIND_NAMES[kind], _ICONS[kind], broken, item, ("length", last))
 
 
 class SYNTHROADS_UL_vertical(_RowList, bpy.types.UIList):
@@ -91,7 +101,7 @@ class SYNTHROADS_UL_vertical(_RowList, bpy.types.UIList):
     def draw_item(self, context: Any, layout: Any, data: Any, item: Any, icon: int, owner: Any, active: str) -> None:
         """Draw one row."""
         broken = bool(marks_of(context.scene, "vertical", item.number))
-        _cells(layout, f"{item.number + 1}", broken, item, ("station", "elevation"))
+        _cells(layout, item.number, "", "BLANK1", broken, item, ("station", "elevation"))
 
 
 class SYNTHROADS_UL_crossfall(_RowList, bpy.types.UIList):
@@ -100,7 +110,7 @@ class SYNTHROADS_UL_crossfall(_RowList, bpy.types.UIList):
     def draw_item(self, context: Any, layout: Any, data: Any, item: Any, icon: int, owner: Any, active: str) -> None:
         """Draw one row."""
         broken = bool(marks_of(context.scene, "crossfall", item.number))
-        _cells(layout, f"{item.number + 1}", broken, item, ("station", "percent"))
+        _cells(layout, item.number, "", "BLANK1", broken, item, ("station", "percent"))
 
 
 class SYNTHROADS_UL_widths(_RowList, bpy.types.UIList):
@@ -109,7 +119,7 @@ class SYNTHROADS_UL_widths(_RowList, bpy.types.UIList):
     def draw_item(self, context: Any, layout: Any, data: Any, item: Any, icon: int, owner: Any, active: str) -> None:
         """Draw one row."""
         broken = bool(marks_of(context.scene, "widths", item.number))
-        _cells(layout, f"{item.number + 1}", broken, item, ("station", "width"))
+        _cells(layout, item.number, "", "BLANK1", broken, item, ("station", "width"))
 
 
 _TITLES: dict[Table, str] = {

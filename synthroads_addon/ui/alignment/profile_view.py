@@ -9,6 +9,7 @@ import blf
 import bpy
 import gpu
 import numpy as np
+from gpu_extras.batch import batch_for_shader
 
 from ...base.errors import InputError
 from ...jobs.tables.diagram import Diagram, road_diagram
@@ -111,11 +112,10 @@ profile_view = ProfileView()
 def _fill(width: float, height: float) -> None:
     """Fill the region with the background."""
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)]
+    batch = batch_for_shader(shader, "TRI_STRIP", {"pos": corners})
     shader.uniform_float("color", _BACKGROUND)
-    corners = [(0.0, 0.0, 0.0), (width, 0.0, 0.0), (0.0, height, 0.0), (width, height, 0.0)]
-    points = gpu.types.GPUVertBuf(shader.format_calc(), len(corners))
-    points.attr_fill("pos", corners)
-    gpu.types.GPUBatch(type="TRI_STRIP", buf=points).draw(shader)
+    batch.draw(shader)
 
 
 def _write(text: str, x: float, y: float, color: tuple[float, ...], scale: float, align: str = "left") -> None:

@@ -1,0 +1,103 @@
+"""Lines of the profile and the cross-section: in the view, and where the road's own numbers put them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from synthroads_addon.jobs.tables.diagram import Diagram, road_diagram
+from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.road import RoadScenario
+
+SIZE = (900.0, 640.0)
+
+
+@pytest.fixture(scope="module")
+def geometry() -> RoadGeometry:
+    return RoadGeometry(sample_road(RoadScenario(length=1500.0), 7))
+
+
+def lines(diagram: Diagram, role: str) -> list[np.ndarray]:
+    return [line.points for line in diagram.lines if line.role == role]
+
+
+@pytest.mark.parametrize("station", [0.0, 733.0, 1500.0, 9999.0])
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_all_is_within_the_view(geometry: RoadGeometry, station: float, scale: float) -> None:
+    size = (SIZE[0] * scale, SIZE[1] * scale)
+    diagram = road_diagram(geometry, station, *size, scale)
+    for line in diagram.lines:
+        assert np.isfinite(line.points).all()
+        assert (line.points >= -1.0).all()
+        assert (line.points <= np.array(size) + 1.0).all(), line.role
+    for text in diagram.texts:
+        assert 0.0 <= text.x <= size[0]
+        assert 0.0 <= text.y <= size[1] - 8.0 * scale, text.text
+
+
+def test_the_gradient_line_is_the_profile(geometry: RoadGeometry) -> None:
+    """Pixels and metres are linear: the heights at three stations give the scale, and all others follow it."""
+    diagram = road_diagram(geometry, 0.0, *SIZE)
+    road = lines(diagram, "road")[0]
+    station = (road[:, 0] - diagram.left) / (diagram.right - diagram.left) * geometry.length
+    elevation = geometry.profile.elevation(np.clip(station, 0.0, geometry.length))
+    slope, offset = np.polyfit(elevation, road[:, 1], 1)
+    assert slope > 0.0
+    assert np.allclose(slope * elevation + offset, road[:, 1], atol=1e-6)
+    # Vertical points lie on the same scale, each with its number.
+    points = lines(diagram, "point")
+    axis = geometry.parameters.alignment
+    assert len(points) == len(axis.vertical)
+    for diamond, point in zip(points, axis.vertical, strict=True):
+        x, y = diamond[1:4:2].mean(axis=0)
+        assert diagram.station(float(x)) == pytest.approx(point.station, abs=1e-6)
+        assert y == pytest.approx(slope * point.elevation + offset, abs=1e-6)
+
+
+def test_curvature_changes_at_the_elements_borders(geometry: RoadGeometry) -> None:
+    diagram = road_diagram(geometry, 0.0, *SIZE)
+    (curve,) = lines(diagram, "curvature")
+    station = np.array([diagram.station(float(x)) for x in curve[:, 0]])
+    borders = np.repeat(geometry.alignment.element_starts, 2)[1:-1]
+    assert np.allclose(station, borders, atol=1e-4)
+    curvature = [k for e in geometry.parameters.alignment.horizontal for k in (e.curvature_start, e.curvature_end)]
+    slope, offset = np.polyfit(curvature, curve[:, 1], 1)
+    assert slope > 0.0  # left curves upwards
+    assert np.allclose(slope * np.array(curvature) + offset, curve[:, 1], atol=1e-6)
+
+
+def test_the_cross_section_has_the_surfaces_heights_and_the_stated_widths(geometry: RoadGeometry) -> None:
+    station = 700.0
+    diagram = road_diagram(geometry, station, *SIZE)
+    section = lines(diagram, "road")[1]
+    edges = geometry.offsets(np.array([station]))[0]
+    offset = np.interp(section[:, 0], section[[0, -1], 0], edges[[0, -1]])
+    height = geometry.elevation(np.full(len(offset), station), np.clip(offset, edges[-1], edges[0]))
+    slope, base = np.polyfit(height, section[:, 1], 1)
+    assert slope > 0.0
+    assert np.allclose(slope * height + base, section[:, 1], atol=0.05)
+    texts = [text.text for text in diagram.texts]
+    assert texts.count("3.75") == 4
+    assert any(text.startswith("Cross-section at 700.00 m") for text in texts)
+    for side in ("left", "right"):
+        carriageway = geometry.parameters.carriageway(side)  # type: ignore[arg-type]
+        percent = 100.0 * float(geometry.crossfall(carriageway, station))  # type: ignore[arg-type]
+        assert f"{percent:+.2f} %" in texts
+
+
+def test_a_level_straight_road_without_ground_is_drawn() -> None:
+    parameters = sample_road(RoadScenario(length=300.0), 1)
+    axis = parameters.alignment
+    level = [point.model_copy(update={"elevation": 5.0}) for point in axis.vertical]
+    straight = axis.horizontal[0].between(300.0, 0.0, 0.0)
+    changed = axis.model_copy(update={"vertical": tuple(level), "horizontal": (straight,)})
+    kept = {
+        name: changed if item is axis else item
+        for name, item in parameters.objects.items()
+        if type(item).__name__ in ("AlignmentObject", "Carriageway", "Median")
+    }
+    diagram = road_diagram(RoadGeometry(parameters.model_copy(update={"objects": kept})), 100.0, *SIZE)
+    heights = lines(diagram, "road")[0][:, 1]
+    assert np.ptp(heights) < 1e-9
+    assert all(np.isfinite(line.points).all() for line in diagram.lines)

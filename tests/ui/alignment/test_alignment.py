@@ -1,0 +1,186 @@
+"""The panel Alignment: its tables are the road's, edits show at once, are undone, and are the road's truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+import synthroads_addon
+from synthroads_addon.blender.model.store import STATED, find_road, objects_of
+from synthroads_addon.blender.model.truth import EditedRoad, read_road
+from synthroads_addon.checking.marks import row_marks
+from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.tables.elements import element_rows
+from synthroads_addon.ui.alignment import panel, tables
+from synthroads_addon.ui.fields import room
+from tests.helpers.scenes.fake_layout import drawn
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file with a small road of an arc, a clothoid and an arc."""
+    path = tmp_path_factory.mktemp("road") / "road.blend"
+    synthroads_addon.register()
+    settings = bpy.context.scene.synthroads
+    settings.road.length, settings.road.half_width, settings.seed, settings.fidelity = 150.0, 20.0, 3, "draft"
+    bpy.ops.synthroads.build()
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    synthroads_addon.unregister()
+    return path
+
+
+@pytest.fixture
+def group(file: Path) -> Iterator[Any]:
+    """Register the add-on and open the small road for one test; return the tables' properties."""
+    synthroads_addon.register()
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    tables.sync(bpy.context.scene)
+    yield bpy.context.scene.synthroads_alignment
+    synthroads_addon.unregister()
+
+
+def read() -> EditedRoad:
+    root = find_road(bpy.context.scene)
+    assert root
+    bpy.context.view_layer.update()
+    return read_road(root)
+
+
+def rows() -> list[tuple[str, float, float]]:
+    return [(row.kind, row.length, row.radius) for row in element_rows(read().parameters.alignment.horizontal)]
+
+
+def test_the_rows_are_the_roads(group: Any) -> None:
+    axis = read().parameters.alignment
+    assert [len(group.elements), len(group.vertical)] == [len(axis.horizontal), len(axis.vertical)]
+    for row, there in zip(group.elements, element_rows(axis.horizontal), strict=True):
+        assert (row.kind, row.length, row.radius) == (
+            there.kind,
+            float(np.float32(there.length)),
+            float(np.float32(there.radius)),
+        )
+    for row, point in zip(group.vertical, axis.vertical, strict=True):
+        assert row.elevation == float(np.float32(point.elevation))
+    assert STATED not in find_road(bpy.context.scene)  # to look changes nothing
+
+
+def test_a_value_changes_the_road_at_once_and_is_read_back_exactly(group: Any) -> None:
+    before = rows()
+    group.elements[0].length = 44.125
+    group.elements[2].radius = 1000.5
+    group.vertical[0].elevation = 0.5
+    assert tables.tables.refused == ""
+    edited = read()
+    after = rows()
+    assert after[0] == (before[0][0], 44.125, before[0][2])
+    assert after[2][2] == 1000.5
+    assert edited.parameters.alignment.vertical[0].elevation == 0.5
+    assert edited.lost == ""
+    assert edited.by_hand == ()
+    assert edited.stale  # Build as Edited is offered
+    # The scene shows it: the backbone's vertices lie on the stated axis.
+    backbone = objects_of(find_road(bpy.context.scene))["Backbone"].data  # type: ignore[arg-type]
+    geometry = RoadGeometry(edited.parameters)
+    places = np.empty(3 * len(backbone.vertices), np.float32)
+    backbone.vertices.foreach_get("co", places)
+    station, offset = geometry.alignment.project(places.reshape(-1, 3)[:, :2].astype(np.float64))
+    assert np.abs(offset).max() < 1e-3
+    assert np.abs(places.reshape(-1, 3)[:, 2] - geometry.profile.elevation(station)).max() < 1e-3
+    assert station.max() == pytest.approx(geometry.length, abs=1e-3)
+
+
+def test_the_built_road_is_the_stated_one(group: Any) -> None:
+    group.elements[0].length = 60.0
+    group.crossfall[0].percent = -5.5
+    group.strip = "Lane 1"
+    group.widths[0].width = 3.5
+    stated = read().parameters
+    assert bpy.ops.synthroads.build_edited() == {"FINISHED"}
+    built = read()
+    assert built.parameters == stated
+    assert built.stale == ()
+    assert STATED not in find_road(bpy.context.scene)
+    carriageway = built.parameters.carriageway("right")
+    assert carriageway
+    assert carriageway.crossfall[0].crossfall_percent == -5.5
+    assert carriageway.lanes[0].width == 3.5
+
+
+def test_rows_are_inserted_split_and_deleted(group: Any) -> None:
+    before = rows()
+    assert bpy.ops.synthroads.split_element(number=1) == {"FINISHED"}
+    assert len(group.elements) == len(before) + 1
+    assert rows()[1][1] + rows()[2][1] == pytest.approx(before[1][1], abs=1e-5)
+    assert bpy.ops.synthroads.insert_element(kind="line", number=0) == {"FINISHED"}
+    assert (group.elements[1].kind, group.active_elements) == ("line", 1)
+    assert bpy.ops.synthroads.delete_element() == {"FINISHED"}  # the active one
+    assert [row[0] for row in rows()] == ["arc", "clothoid", "clothoid", "arc"]
+    for table in ("vertical", "crossfall", "widths"):
+        count = len(getattr(group, table))
+        assert bpy.ops.synthroads.insert_point(table=table, number=0) == {"FINISHED"}
+        assert len(getattr(group, table)) == count + 1
+        assert bpy.ops.synthroads.delete_point(table=table, number=1) == {"FINISHED"}
+        assert len(getattr(group, table)) == count
+
+
+def test_a_broken_rule_is_marked_in_its_row_with_its_words_and_mended(group: Any) -> None:
+    bpy.ops.synthroads.insert_element(kind="arc", number=0)
+    marks = row_marks(read().parameters)
+    assert {number: [v.rule for v in found] for number, found in tables.tables.marks.elements.items()} == {
+        number: [v.rule for v in found] for number, found in marks.elements.items()
+    }
+    group.active_elements = 1
+    text = "\n".join(drawn(panel.SYNTHROADS_PT_alignment, bpy.context).lines)
+    assert "Curvature doesn't jump" in text
+    assert "a transition" in text
+    assert "synthroads.mend_rule" in text
+    assert bpy.ops.synthroads.mend_rule(table="elements", number=1) == {"FINISHED"}
+    assert [row[0] for row in rows()][:3] == ["arc", "clothoid", "arc"]
+
+
+def test_what_is_not_allowed_stays_and_says_why(group: Any) -> None:
+    before = rows()
+    group.elements[0].length = 0.0
+    assert tables.tables.refused == "Length of Element 1 is 0.0: must be from 0.01 to 1,000,000 m"
+    assert rows() == before
+    text = " ".join(drawn(panel.SYNTHROADS_PT_alignment, bpy.context).lines)
+    assert "Length of Element 1" in text
+    with pytest.raises(RuntimeError, match="Row is 9: must be 0 to 2, or -1 for the active row"):
+        bpy.ops.synthroads.delete_element(number=9)
+    group.elements[0].length = before[0][1] + 1.0
+    assert tables.tables.refused == ""
+
+
+def test_a_moved_backbone_is_built_before_its_table_is_edited(group: Any) -> None:
+    backbone = objects_of(find_road(bpy.context.scene))["Backbone"]  # type: ignore[arg-type]
+    for vertex in backbone.data.vertices:
+        vertex.co.z += 0.5
+    backbone.data.update()
+    group.elements[0].length = 50.0
+    assert tables.tables.refused == "Alignment: the backbone was moved by hand: press Build as Edited first"
+
+
+def test_an_edit_is_undone_with_its_rows(group: Any) -> None:
+    bpy.ops.ed.undo_push(message="before")
+    before = rows()
+    bpy.ops.synthroads.split_element(number=0)
+    bpy.ops.ed.undo_push(message="split")
+    bpy.ops.ed.undo()
+    assert rows() == before
+    tables.sync(bpy.context.scene)
+    assert len(bpy.context.scene.synthroads_alignment.elements) == len(before)
+
+
+@pytest.mark.parametrize("width", [200.0, 300.0])
+def test_no_word_is_cut(group: Any, width: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(room, "sidebar_width", lambda: width)
+    bpy.ops.synthroads.insert_element(kind="arc", number=0)
+    group.active_elements = 1
+    layout = drawn(panel.SYNTHROADS_PT_alignment, bpy.context)
+    cut = [text for text, place, needed in layout.texts(width - 60.0) if needed > place]
+    assert cut == []
