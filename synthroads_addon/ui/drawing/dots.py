@@ -5,6 +5,7 @@ operator when the mouse is released: so it can be undone, and scripts can do the
 Annotations are not postponed here: Blender reads the properties from them.
 """
 
+import itertools
 from typing import Any, cast
 
 import bpy
@@ -52,7 +53,7 @@ def _disc() -> list[tuple[float, float, float]]:
     """Return triangles of a disc of radius 1 in the plane z = 0."""
     angles = 2.0 * np.pi * np.arange(_CORNERS + 1) / _CORNERS
     rim = [(float(np.cos(angle)), float(np.sin(angle)), 0.0) for angle in angles]
-    return [corner for a, b in zip(rim[:-1], rim[1:], strict=True) for corner in ((0.0, 0.0, 0.0), a, b)]
+    return [corner for a, b in itertools.pairwise(rim) for corner in ((0.0, 0.0, 0.0), a, b)]
 
 
 def present_dots(root: bpy.types.Object, scene: bpy.types.Scene) -> tuple[RoadGeometry, list[Dot]] | None:
@@ -105,7 +106,7 @@ class SYNTHROADS_OT_move_thing(bpy.types.Operator):
         assert root  # poll() has seen it
         item = parts_and_copies(root, context.scene)[0].get(self.thing)
         if item is None:
-            raise InputError("Thing", self.thing, "is no part of the shown road: names are in the panel Edit")
+            raise InputError("Thing", self.thing, "must be a part of the shown road, as the panel Edit lists them")
         change_thing(root, context.scene, item, {FIELDS[cast("Kind", self.kind)]: exact(self.station, None)})
         context.view_layer.objects.active = item
 
@@ -197,8 +198,10 @@ class SYNTHROADS_GT_dot(bpy.types.Gizmo):
 
     def _facing(self, context: bpy.types.Context) -> Matrix:
         place = self.matrix_world.copy()
-        return Matrix.Translation(place.translation) @ context.region_data.view_rotation.to_matrix().to_4x4() @ Matrix.Scale(
-            place.median_scale, 4
+        return (
+            Matrix.Translation(place.translation)
+            @ context.region_data.view_rotation.to_matrix().to_4x4()
+            @ Matrix.Scale(place.median_scale, 4)
         )
 
     def _key(self) -> tuple[str, str, int]:
@@ -216,7 +219,8 @@ class SYNTHROADS_GT_dot(bpy.types.Gizmo):
         """Move the dot along the road to where the mouse is."""
         axes = stored_axes(str(bpy.data.objects[self.root].get(PARAMETERS, "")))
         place = self._world(self.dot.place)
-        ground = ground_point(context, (event.mouse_region_x, event.mouse_region_y), place.z)
+        mouse = (float(event.mouse_region_x), float(event.mouse_region_y))
+        ground = ground_point(context.region, context.region_data, mouse, place.z)
         if axes is None or ground is None:
             return {"RUNNING_MODAL"}
         into = np.linalg.inv(world_matrix(bpy.data.objects[self.root]))
@@ -252,7 +256,7 @@ class SYNTHROADS_GGT_dots(bpy.types.GizmoGroup):
     bl_label = "Stations of the Road"
     bl_space_type = "VIEW_3D"
     bl_region_type = "WINDOW"
-    bl_options = {"3D", "PERSISTENT", "SHOW_MODAL_ALL", "SCALE"}  # noqa: RUF012 (Blender reads a plain set)
+    bl_options = {"3D", "PERSISTENT", "SHOW_MODAL_ALL"}  # noqa: RUF012 (Blender reads a plain set)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
