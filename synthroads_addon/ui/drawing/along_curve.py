@@ -218,6 +218,7 @@ class SYNTHROADS_OT_road_from_curve(AlongCurve, bpy.types.Operator):
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[Any]) -> str:
         """Link the road and its curve, make a drawn polygon an object, and return the message."""
+        assert job.result
         model, texts = job.result
         curve = context.scene.objects.get(self._curve) if self._curve else new_polygon(context, self._line)
         keep_link(model.root, curve if context.scene.synthroads_drawing.linked else None, self._line, texts)
@@ -274,6 +275,7 @@ class SYNTHROADS_OT_fit_again(AlongCurve, bpy.types.Operator):
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[Any]) -> str:
         """Keep the new state of the link and return the message."""
+        assert job.result
         model, texts = job.result
         keep_link(model.root, context.scene.objects.get(self._curve), self._line, texts)
         return f"Built {recall(model.root)[0].alignment.length:,.0f} m of road along {self._curve}: {'; '.join(texts)}"

@@ -44,9 +44,12 @@ _COLORS: dict[Kind, tuple[float, float, float]] = {
 }
 _SIZE = {"element": 0.11, "vertical": 0.11, "thing": 0.07, "start": 0.07, "end": 0.07}
 """Sizes of the dots as shares of Blender's usual gizmo. Chosen: those of the axis are larger."""
+_ALPHA, _HIGHLIGHT = 0.85, (1.0, 1.0, 0.3)
+"""Opacity of a dot, and its colour under the mouse."""
 _LABEL_ABOVE = 30.0
 """Height of the label above the object's origin, pixels at a resolution scale of 1."""
 _CORNERS = 16
+"""Corners of a dot's disc."""
 
 
 def _disc() -> list[tuple[float, float, float]]:
@@ -165,7 +168,7 @@ class SYNTHROADS_GT_dot(bpy.types.Gizmo):
 
     bl_idname = "SYNTHROADS_GT_dot"
 
-    __slots__ = ("disc", "dot", "root", "shown", "station")
+    __slots__ = ("disc", "dot", "root", "station")
 
     def setup(self) -> None:
         """Make the disc that is drawn."""
@@ -175,10 +178,16 @@ class SYNTHROADS_GT_dot(bpy.types.Gizmo):
     def hold(self, root: bpy.types.Object, dot: Dot) -> None:
         """Show a dot of a road."""
         self.root, self.dot, self.station = root.name, dot, dot.station
-        self.color = _COLORS[dot.kind]
-        self.alpha, self.color_highlight, self.alpha_highlight = 0.85, (1.0, 1.0, 0.3), 1.0
-        self.scale_basis = _SIZE[dot.kind]
-        self.matrix_basis = Matrix.Translation(self._world(dot.place))
+        shown: Any = self  # what Blender's own gizmos have isn't among the slots
+        shown.color, shown.alpha = _COLORS[dot.kind], _ALPHA
+        shown.color_highlight, shown.alpha_highlight = _HIGHLIGHT, 1.0
+        shown.scale_basis = _SIZE[dot.kind]
+        self._put(dot.place)
+
+    def _put(self, place: tuple[float, float, float]) -> None:
+        """Show the dot at a place of the road's own coordinates."""
+        shown: Any = self
+        shown.matrix_basis = Matrix.Translation(self._world(place))
 
     def _world(self, place: tuple[float, float, float]) -> Vector:
         root = bpy.data.objects[self.root]
@@ -227,7 +236,7 @@ class SYNTHROADS_GT_dot(bpy.types.Gizmo):
         local = into[:2, :2] @ ground + into[:2, 3]
         self.station = station_at(axes.before, self.dot, (float(local[0]), float(local[1])))
         x, y = axes.before.alignment.place(np.array([self.station]), np.array([self.dot.offset]))[0].tolist()
-        self.matrix_basis = Matrix.Translation(self._world((x, y, self.dot.place[2])))
+        self._put((x, y, self.dot.place[2]))
         context.area.header_text_set(f"{self.dot.title}: station {self.station:.2f} m")
         context.area.tag_redraw()
         return {"RUNNING_MODAL"}
@@ -239,7 +248,7 @@ class SYNTHROADS_GT_dot(bpy.types.Gizmo):
         dot, station = self.dot, self.station
         if cancel or station == dot.station:
             self.station = dot.station
-            self.matrix_basis = Matrix.Translation(self._world(dot.place))
+            self._put(dot.place)
             return
         if dot.kind in FIELDS:
             bpy.ops.synthroads.move_thing("EXEC_DEFAULT", True, thing=dot.name, kind=dot.kind, station=station)

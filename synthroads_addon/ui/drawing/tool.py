@@ -172,8 +172,11 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
         if bpy.app.background or not isinstance(context.space_data, bpy.types.SpaceView3D):
             self.report({"ERROR"}, "Draw Road needs a 3D view: move the mouse over one and press F3, Draw Road")
             return {"CANCELLED"}
+        if _in_progress:
+            return self._again(context, event)
         sketch = Sketch(context.scene.synthroads.scenario().road, height=float(context.scene.cursor.location.z))
         state = self._state = DrawingState(sketch)
+        _in_progress.append(state)
         state.view.show()
         context.window_manager.modal_handler_add(self)
         context.workspace.status_text_set(draw_keys)
@@ -181,6 +184,19 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
         if event.type == "LEFTMOUSE":
             self._handle(context, event)
         return {"RUNNING_MODAL"}
+
+    def _again(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Take a click that the drawing in progress passed on, and that Blender gave to the tool: it was on the view.
+
+        The sidebar lies over the view and is transparent where it has no panels, which Python can't see.
+        """
+        if event.type != "LEFTMOUSE":
+            self.report({"WARNING"}, "A road is being drawn: Enter builds it, Esc cancels")
+            return {"CANCELLED"}
+        region, mouse = mouse_in_view(context.area, event)
+        click(_in_progress[0], region, context.space_data.region_3d, mouse, event.ctrl)
+        redraw_views(context)
+        return {"CANCELLED"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Refuse: without a mouse there is nothing to draw with."""
@@ -209,8 +225,7 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
     def _handle(self, context: bpy.types.Context, event: bpy.types.Event) -> Answer:
         state = self._state
         assert state
-        region = next(part for part in context.area.regions if part.type == "WINDOW")
-        mouse = (float(event.mouse_x - region.x), float(event.mouse_y - region.y))
+        region, mouse = mouse_in_view(context.area, event)
         state.view.mouse = mouse
         if event.value == "PRESS" and event.type in ("RET", "NUMPAD_ENTER", "RIGHTMOUSE"):
             return "build"
@@ -227,12 +242,12 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
         if event.type in _WHEEL:
             return "on" if state.wheel(_WHEEL[event.type]) else "pass"
         view = context.space_data.region_3d
-        ground = ground_point(region, view, mouse, state.sketch.height)
         if is_click:
-            state.view.hovered = nearest_handle(region, view, state, mouse)
-            state.press(ground, event.ctrl)
-        elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            click(state, region, view, mouse, event.ctrl)
+            return "on"
+        if event.type == "LEFTMOUSE" and event.value == "RELEASE":
             state.release()
+        ground = ground_point(region, view, mouse, state.sketch.height)
         state.move(ground, event.ctrl, nearest_handle(region, view, state, mouse))
         return "on"
 
@@ -247,11 +262,36 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
         if self._state is None:
             return
         self._state.view.hide()
+        _in_progress.remove(self._state)
         self._state = None
         context.workspace.status_text_set(None)
         context.window.cursor_modal_restore()
         redraw_views(context)
         redraw_sidebars(context)
+
+
+_in_progress: list[DrawingState] = []
+"""The drawing in progress, if there is one."""
+
+
+def mouse_in_view(area: bpy.types.Area, event: bpy.types.Event) -> tuple[bpy.types.Region, tuple[float, float]]:
+    """Return the region of an area's view, and where the mouse is in it, pixels."""
+    region = next(part for part in area.regions if part.type == "WINDOW")
+    return region, (float(event.mouse_x - region.x), float(event.mouse_y - region.y))
+
+
+def click(
+    state: DrawingState,
+    region: bpy.types.Region,
+    view: bpy.types.RegionView3D,
+    mouse: tuple[float, float],
+    snaps: bool,
+) -> None:
+    """Have a drawing take a click: hold of the handle there, or one more point."""
+    state.view.hovered = nearest_handle(region, view, state, mouse)
+    ground = ground_point(region, view, mouse, state.sketch.height)
+    state.press(ground, snaps)
+    state.move(ground, snaps, nearest_handle(region, view, state, mouse))
 
 
 def is_over_view(area: bpy.types.Area, x: int, y: int) -> bool:
