@@ -1,6 +1,7 @@
 """Which rules of the guidelines (RAA, RMS, RPS) a road breaks. It works on any parameter set, hand-made or sampled."""
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -47,8 +48,8 @@ def check_axis(axis: AlignmentObject, design_class: str) -> list[Violation]:
         >>> [violation.rule for violation in check_axis(axis, "EKA1A")]
         ['radius-minimum']
     """
-    parameters = RoadParameters.model_construct(design_class=design_class, objects={"alignment": axis})
-    return _violations(parameters, alignment.RULES)
+    values: dict[str, Any] = {"design_class": design_class, "objects": {"alignment": axis}}
+    return _violations(RoadParameters.model_construct(**values), alignment.RULES)  # no valid road: it has no pavement
 
 
 def _violations(parameters: RoadParameters, rules: Iterable[Rule]) -> list[Violation]:

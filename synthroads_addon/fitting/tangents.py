@@ -202,7 +202,9 @@ def _rooms(lengths: Float, turns: Float, wanted: list[float], rule: CurveRule) -
 
     def shares(end: slice, other: slice) -> Float:
         """Return what the curves at one end of the tangents may take of them (N - 1,), m."""
-        half = np.clip(0.5 * lengths, least_lengths[end], np.maximum(lengths - least_lengths[other], least_lengths[end]))
+        half = np.clip(
+            0.5 * lengths, least_lengths[end], np.maximum(lengths - least_lengths[other], least_lengths[end])
+        )
         return np.maximum(half, lengths - around[other])
 
     before, after = shares(slice(1, None), slice(-1)), shares(slice(-1), slice(1, None))

@@ -153,7 +153,9 @@ def tangent_profile(stations: Float, heights: Float, design_class: str) -> tuple
         radii.append(min(limits.sag if change > 0.0 else limits.crest, largest))
     radii.append(0.0)
     rows = zip(stations.tolist(), heights.tolist(), radii, strict=True)
-    return tuple(VerticalPoint(station=round_value(s), elevation=round_value(z), radius=round_value(r)) for s, z, r in rows)
+    return tuple(
+        VerticalPoint(station=round_value(s), elevation=round_value(z), radius=round_value(r)) for s, z, r in rows
+    )
 
 
 def with_drawn_heights(drawn: DrawnAxis, scenario: RoadScenario, seed: int) -> DrawnAxis:

@@ -1,4 +1,4 @@
-"""Tangent polygons: their elements are exact, their radii as large as the tangents hold, their clothoids by the rule."""
+"""Tangent polygons: elements are exact, radii as large as the tangents hold, clothoids by the rule."""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -106,7 +108,7 @@ def test_a_curve_is_fitted_with_its_heights_and_the_deviation_is_true() -> None:
 
 def test_a_corner_is_refused_and_taken_as_tangents() -> None:
     corner = flat([[0, 0], [300, 0], [300, 300]])
-    dense = np.concatenate([np.linspace(a, b, 60, endpoint=False) for a, b in zip(corner, corner[1:], strict=False)])
+    dense = np.concatenate([np.linspace(a, b, 60, endpoint=False) for a, b in itertools.pairwise(corner)])
     with pytest.raises(AxisRefusedError, match="no road follows its points"):
         fitted_axis(dense, SCENARIO.road, 0.005, "BezierCurve")
     assert rounded_axis(corner, [None], SCENARIO.road).deviation > 10.0

@@ -6,6 +6,8 @@ evaluates them; polylines and hair curves are their points.
 
 from __future__ import annotations
 
+import itertools
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +95,7 @@ def _bezier_points(spline: bpy.types.Spline, scale: float) -> Float:
     controls = [(point.co, point.handle_left, point.handle_right) for point in spline.bezier_points]
     rows = np.array([[list(part) for part in control] for control in controls], dtype=np.float64)
     points = [rows[:1, 0]]
-    for before, after in zip(rows[:-1], rows[1:], strict=True):
+    for before, after in itertools.pairwise(rows):
         corners = np.array([before[0], before[2], after[1], after[0]])
         length = np.linalg.norm(np.diff(corners, axis=0), axis=1).sum() * scale
         count = int(np.clip(np.ceil(length / _SPACING), 2, _MOST))

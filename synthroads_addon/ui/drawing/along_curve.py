@@ -139,7 +139,9 @@ class AlongCurve(LongOperator):
         return super().refuse(said)
 
 
-def along_work(line: CurveLine, scenario: Scenario, place: BuildTarget, origin: tuple[float, float, float]) -> Work[Any]:
+def along_work(
+    line: CurveLine, scenario: Scenario, place: BuildTarget, origin: tuple[float, float, float]
+) -> Work[Any]:
     """Generator that builds a road along a line, as a job's work; it returns the model and two sentences on it.
 
     Args:
@@ -216,6 +218,7 @@ class SYNTHROADS_OT_road_from_curve(AlongCurve, bpy.types.Operator):
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[Any]) -> str:
         """Link the road and its curve, make a drawn polygon an object, and return the message."""
+        assert job.result
         model, texts = job.result
         curve = context.scene.objects.get(self._curve) if self._curve else new_polygon(context, self._line)
         keep_link(model.root, curve if context.scene.synthroads_drawing.linked else None, self._line, texts)
@@ -272,6 +275,7 @@ class SYNTHROADS_OT_fit_again(AlongCurve, bpy.types.Operator):
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[Any]) -> str:
         """Keep the new state of the link and return the message."""
+        assert job.result
         model, texts = job.result
         keep_link(model.root, context.scene.objects.get(self._curve), self._line, texts)
         return f"Built {recall(model.root)[0].alignment.length:,.0f} m of road along {self._curve}: {'; '.join(texts)}"
@@ -326,7 +330,9 @@ def followers(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 @persistent
 def _note_curves(scene: bpy.types.Scene, graph: bpy.types.Depsgraph) -> None:
     """Handler that schedules a look at linked curves after a change to one."""
-    changed = {update.id.original for update in graph.updates if isinstance(update.id, bpy.types.Object | bpy.types.Curve)}
+    changed = {
+        update.id.original for update in graph.updates if isinstance(update.id, bpy.types.Object | bpy.types.Curve)
+    }
     if not changed:
         return
     for root in roads(scene):
@@ -391,6 +397,7 @@ class SYNTHROADS_PT_drawing(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the ways to a drawn road, their settings, and the shown road's link with its curve."""
         layout, drawing = column(self), context.scene.synthroads_drawing
+        layout.operator_context = "INVOKE_REGION_WIN"
         row = buttons_row(layout, ("Draw Road", "Road from Curve"), align=True)
         row.operator(DRAW_ROAD, text="Draw Road", icon="GREASEPENCIL")
         row.operator(SYNTHROADS_OT_road_from_curve.bl_idname, icon="CURVE_DATA")

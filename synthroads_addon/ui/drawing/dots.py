@@ -5,6 +5,7 @@ operator when the mouse is released: so it can be undone, and scripts can do the
 Annotations are not postponed here: Blender reads the properties from them.
 """
 
+import itertools
 from typing import Any, cast
 
 import bpy
@@ -43,16 +44,19 @@ _COLORS: dict[Kind, tuple[float, float, float]] = {
 }
 _SIZE = {"element": 0.11, "vertical": 0.11, "thing": 0.07, "start": 0.07, "end": 0.07}
 """Sizes of the dots as shares of Blender's usual gizmo. Chosen: those of the axis are larger."""
+_ALPHA, _HIGHLIGHT = 0.85, (1.0, 1.0, 0.3)
+"""Opacity of a dot, and its colour under the mouse."""
 _LABEL_ABOVE = 30.0
 """Height of the label above the object's origin, pixels at a resolution scale of 1."""
 _CORNERS = 16
+"""Corners of a dot's disc."""
 
 
 def _disc() -> list[tuple[float, float, float]]:
     """Return triangles of a disc of radius 1 in the plane z = 0."""
     angles = 2.0 * np.pi * np.arange(_CORNERS + 1) / _CORNERS
     rim = [(float(np.cos(angle)), float(np.sin(angle)), 0.0) for angle in angles]
-    return [corner for a, b in zip(rim[:-1], rim[1:], strict=True) for corner in ((0.0, 0.0, 0.0), a, b)]
+    return [corner for a, b in itertools.pairwise(rim) for corner in ((0.0, 0.0, 0.0), a, b)]
 
 
 def present_dots(root: bpy.types.Object, scene: bpy.types.Scene) -> tuple[RoadGeometry, list[Dot]] | None:
@@ -105,7 +109,7 @@ class SYNTHROADS_OT_move_thing(bpy.types.Operator):
         assert root  # poll() has seen it
         item = parts_and_copies(root, context.scene)[0].get(self.thing)
         if item is None:
-            raise InputError("Thing", self.thing, "is no part of the shown road: names are in the panel Edit")
+            raise InputError("Thing", self.thing, "must be a part of the shown road, as the panel Edit lists them")
         change_thing(root, context.scene, item, {FIELDS[cast("Kind", self.kind)]: exact(self.station, None)})
         context.view_layer.objects.active = item
 
@@ -164,7 +168,7 @@ class SYNTHROADS_GT_dot(bpy.types.Gizmo):
 
     bl_idname = "SYNTHROADS_GT_dot"
 
-    __slots__ = ("disc", "dot", "root", "shown", "station")
+    __slots__ = ("disc", "dot", "root", "station")
 
     def setup(self) -> None:
         """Make the disc that is drawn."""
@@ -174,10 +178,16 @@ class SYNTHROADS_GT_dot(bpy.types.Gizmo):
     def hold(self, root: bpy.types.Object, dot: Dot) -> None:
         """Show a dot of a road."""
         self.root, self.dot, self.station = root.name, dot, dot.station
-        self.color = _COLORS[dot.kind]
-        self.alpha, self.color_highlight, self.alpha_highlight = 0.85, (1.0, 1.0, 0.3), 1.0
-        self.scale_basis = _SIZE[dot.kind]
-        self.matrix_basis = Matrix.Translation(self._world(dot.place))
+        shown: Any = self  # what Blender's own gizmos have isn't among the slots
+        shown.color, shown.alpha = _COLORS[dot.kind], _ALPHA
+        shown.color_highlight, shown.alpha_highlight = _HIGHLIGHT, 1.0
+        shown.scale_basis = _SIZE[dot.kind]
+        self._put(dot.place)
+
+    def _put(self, place: tuple[float, float, float]) -> None:
+        """Show the dot at a place of the road's own coordinates."""
+        shown: Any = self
+        shown.matrix_basis = Matrix.Translation(self._world(place))
 
     def _world(self, place: tuple[float, float, float]) -> Vector:
         root = bpy.data.objects[self.root]
@@ -197,8 +207,10 @@ class SYNTHROADS_GT_dot(bpy.types.Gizmo):
 
     def _facing(self, context: bpy.types.Context) -> Matrix:
         place = self.matrix_world.copy()
-        return Matrix.Translation(place.translation) @ context.region_data.view_rotation.to_matrix().to_4x4() @ Matrix.Scale(
-            place.median_scale, 4
+        return (
+            Matrix.Translation(place.translation)
+            @ context.region_data.view_rotation.to_matrix().to_4x4()
+            @ Matrix.Scale(place.median_scale, 4)
         )
 
     def _key(self) -> tuple[str, str, int]:
@@ -216,14 +228,15 @@ class SYNTHROADS_GT_dot(bpy.types.Gizmo):
         """Move the dot along the road to where the mouse is."""
         axes = stored_axes(str(bpy.data.objects[self.root].get(PARAMETERS, "")))
         place = self._world(self.dot.place)
-        ground = ground_point(context, (event.mouse_region_x, event.mouse_region_y), place.z)
+        mouse = (float(event.mouse_region_x), float(event.mouse_region_y))
+        ground = ground_point(context.region, context.region_data, mouse, place.z)
         if axes is None or ground is None:
             return {"RUNNING_MODAL"}
         into = np.linalg.inv(world_matrix(bpy.data.objects[self.root]))
         local = into[:2, :2] @ ground + into[:2, 3]
         self.station = station_at(axes.before, self.dot, (float(local[0]), float(local[1])))
         x, y = axes.before.alignment.place(np.array([self.station]), np.array([self.dot.offset]))[0].tolist()
-        self.matrix_basis = Matrix.Translation(self._world((x, y, self.dot.place[2])))
+        self._put((x, y, self.dot.place[2]))
         context.area.header_text_set(f"{self.dot.title}: station {self.station:.2f} m")
         context.area.tag_redraw()
         return {"RUNNING_MODAL"}
@@ -235,7 +248,7 @@ class SYNTHROADS_GT_dot(bpy.types.Gizmo):
         dot, station = self.dot, self.station
         if cancel or station == dot.station:
             self.station = dot.station
-            self.matrix_basis = Matrix.Translation(self._world(dot.place))
+            self._put(dot.place)
             return
         if dot.kind in FIELDS:
             bpy.ops.synthroads.move_thing("EXEC_DEFAULT", True, thing=dot.name, kind=dot.kind, station=station)
@@ -252,7 +265,7 @@ class SYNTHROADS_GGT_dots(bpy.types.GizmoGroup):
     bl_label = "Stations of the Road"
     bl_space_type = "VIEW_3D"
     bl_region_type = "WINDOW"
-    bl_options = {"3D", "PERSISTENT", "SHOW_MODAL_ALL", "SCALE"}  # noqa: RUF012 (Blender reads a plain set)
+    bl_options = {"3D", "PERSISTENT", "SHOW_MODAL_ALL"}  # noqa: RUF012 (Blender reads a plain set)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

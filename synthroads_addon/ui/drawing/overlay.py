@@ -1,4 +1,4 @@
-"""What is drawn over the 3D view while a road is drawn: tangents, elements by kind, handles, radii, and a line of text."""
+"""Drawn over the 3D view while a road is drawn: tangents, elements by kind, handles, radii, and a line of text."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import blf
 import bpy
 import gpu
 from bpy_extras.view3d_utils import location_3d_to_region_2d
+from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
 from ..work.view import draw_lines
@@ -55,7 +56,10 @@ class SketchView:
     def show(self) -> None:
         """Begin to draw in all 3D views."""
         add = bpy.types.SpaceView3D.draw_handler_add
-        self._handlers = [add(self._draw_lines, (), "WINDOW", "POST_VIEW"), add(self._draw_texts, (), "WINDOW", "POST_PIXEL")]
+        self._handlers = [
+            add(self._draw_lines, (), "WINDOW", "POST_VIEW"),
+            add(self._draw_texts, (), "WINDOW", "POST_PIXEL"),
+        ]
 
     def hide(self) -> None:
         """End to draw."""
@@ -108,11 +112,9 @@ def _draw_face(corners: Sequence[tuple[float, float]], color: Sequence[float]) -
     """Draw a quadrilateral."""
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     shader.uniform_float("color", color)
-    places = [corners[i] for i in (0, 1, 2, 0, 2, 3)]
-    points = gpu.types.GPUVertBuf(shader.format_calc(), len(places))
-    points.attr_fill("pos", [(*place, 0.0) for place in places])
+    places = [(*corners[i], 0.0) for i in (0, 1, 2, 0, 2, 3)]
     gpu.state.blend_set("ALPHA")
-    gpu.types.GPUBatch(type="TRIS", buf=points).draw(shader)
+    batch_for_shader(shader, "TRIS", {"pos": places}).draw(shader)
     gpu.state.blend_set("NONE")
 
 
@@ -124,7 +126,12 @@ def draw_label(place: tuple[float, float], text: str, scale: float) -> None:
     pad = 4.0 * scale
     x = min(place[0], max(region.width - width - 2.0 * pad, pad)) if region else place[0]
     y = min(max(place[1], 2.0 * pad), region.height - height - 2.0 * pad) if region else place[1]
-    corners = [(x - pad, y - pad), (x + width + pad, y - pad), (x + width + pad, y + height + pad), (x - pad, y + height + pad)]
+    corners = [
+        (x - pad, y - pad),
+        (x + width + pad, y - pad),
+        (x + width + pad, y + height + pad),
+        (x - pad, y + height + pad),
+    ]
     _draw_face(corners, (0.0, 0.0, 0.0, 0.65))
     blf.position(0, x, y, 0.0)
     blf.color(0, *_TEXT)

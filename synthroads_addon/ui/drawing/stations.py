@@ -68,7 +68,10 @@ def road_dots(geometry: RoadGeometry, things: Mapping[str, Thing]) -> list[Dot]:
         geometry: of the road.
         things: by their ids, as they are now.
     """
-    return [*_axis_dots(geometry), *(dot for name, thing in things.items() for dot in _thing_dots(geometry, name, thing))]
+    return [
+        *_axis_dots(geometry),
+        *(dot for name, thing in things.items() for dot in _thing_dots(geometry, name, thing)),
+    ]
 
 
 def _axis_dots(geometry: RoadGeometry) -> Iterator[Dot]:

@@ -21,6 +21,8 @@ from .sketch import Handle, Sketch, radius_text, shown_elements, state_text
 
 _NEAR = 12.0
 """Distance (pixels at a resolution scale of 1) from which on the mouse takes hold of a handle."""
+_LEVEL_VIEW = 1e-3
+"""Sine of the angle between view and ground below which nothing is clicked. Chosen: a pixel is metres then."""
 _KEYS = (
     ("MOUSE_LMB", "Add Point, Drag Handle"),
     ("EVENT_CTRL", "Snap to 15° and 10 m"),
@@ -30,6 +32,8 @@ _KEYS = (
     ("EVENT_ESC", "Cancel"),
 )
 """Keys and what they do, as the status bar shows them."""
+_WHEEL = {"WHEELUPMOUSE": 1, "WHEELDOWNMOUSE": -1}
+"""Events of the mouse wheel and the steps that they are."""
 Answer = Literal["on", "pass", "build", "cancel"]
 """What becomes of a drawing after an event: it goes on, passes the event on to Blender, builds the road, or ends."""
 
@@ -122,18 +126,20 @@ def refusal_of(sketch: Sketch, point: Float | None) -> str:
     return trial.refusal
 
 
-def ground_point(context: bpy.types.Context, mouse: tuple[float, float], height: float) -> Float | None:
+def ground_point(
+    region: bpy.types.Region, view: bpy.types.RegionView3D, mouse: tuple[float, float], height: float
+) -> Float | None:
     """Return the place (2,) of the scene at a height (m) that the mouse is over; None where the view looks past it.
 
     Args:
-        context: with a 3D view's region.
+        region: of a 3D view.
+        view: how it looks.
         mouse: in the region, pixels.
         height: of the plane that is clicked, m.
     """
-    region, view = context.region, context.region_data
     origin = region_2d_to_origin_3d(region, view, mouse)
     ahead = region_2d_to_vector_3d(region, view, mouse)
-    if abs(ahead.z) < 1e-6:
+    if abs(ahead.z) < _LEVEL_VIEW:
         return None
     distance = (height - origin.z) / ahead.z
     if distance <= 0.0 and view.is_perspective:
@@ -166,8 +172,11 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
         if bpy.app.background or not isinstance(context.space_data, bpy.types.SpaceView3D):
             self.report({"ERROR"}, "Draw Road needs a 3D view: move the mouse over one and press F3, Draw Road")
             return {"CANCELLED"}
+        if _in_progress:
+            return self._again(context, event)
         sketch = Sketch(context.scene.synthroads.scenario().road, height=float(context.scene.cursor.location.z))
         state = self._state = DrawingState(sketch)
+        _in_progress.append(state)
         state.view.show()
         context.window_manager.modal_handler_add(self)
         context.workspace.status_text_set(draw_keys)
@@ -175,6 +184,19 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
         if event.type == "LEFTMOUSE":
             self._handle(context, event)
         return {"RUNNING_MODAL"}
+
+    def _again(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Take a click that the drawing in progress passed on, and that Blender gave to the tool: it was on the view.
+
+        The sidebar lies over the view and is transparent where it has no panels, which Python can't see.
+        """
+        if event.type != "LEFTMOUSE":
+            self.report({"WARNING"}, "A road is being drawn: Enter builds it, Esc cancels")
+            return {"CANCELLED"}
+        region, mouse = mouse_in_view(context.area, event)
+        click(_in_progress[0], region, context.space_data.region_3d, mouse, event.ctrl)
+        redraw_views(context)
+        return {"CANCELLED"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Refuse: without a mouse there is nothing to draw with."""
@@ -203,7 +225,7 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
     def _handle(self, context: bpy.types.Context, event: bpy.types.Event) -> Answer:
         state = self._state
         assert state
-        mouse = (float(event.mouse_region_x), float(event.mouse_region_y))
+        region, mouse = mouse_in_view(context.area, event)
         state.view.mouse = mouse
         if event.value == "PRESS" and event.type in ("RET", "NUMPAD_ENTER", "RIGHTMOUSE"):
             return "build"
@@ -212,22 +234,21 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
         if event.value == "PRESS" and event.type == "BACK_SPACE":
             state.back()
             return "on"
-        if event.type in ("WHEELUPMOUSE", "WHEELDOWNMOUSE"):
-            return "on" if state.wheel(1 if event.type == "WHEELUPMOUSE" else -1) else "pass"
-        if event.type not in ("LEFTMOUSE", "MOUSEMOVE", "LEFT_CTRL", "RIGHT_CTRL"):
+        if event.type not in ("LEFTMOUSE", "MOUSEMOVE", "LEFT_CTRL", "RIGHT_CTRL", *_WHEEL):
             return "pass"
-        if context.region is None or context.region.type != "WINDOW":
+        is_click = event.type == "LEFTMOUSE" and event.value == "PRESS"
+        if (is_click or event.type in _WHEEL) and not is_over_view(context.area, event.mouse_x, event.mouse_y):
             return "pass"
-        ground = ground_point(context, mouse, state.sketch.height)
-        hovered = nearest_handle(context, state, mouse)
-        if event.type == "LEFTMOUSE" and event.value == "PRESS":
-            if not _in_region(context.region, mouse):
-                return "pass"
-            state.view.hovered = hovered
-            state.press(ground, event.ctrl)
-        elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
+        if event.type in _WHEEL:
+            return "on" if state.wheel(_WHEEL[event.type]) else "pass"
+        view = context.space_data.region_3d
+        if is_click:
+            click(state, region, view, mouse, event.ctrl)
+            return "on"
+        if event.type == "LEFTMOUSE" and event.value == "RELEASE":
             state.release()
-        state.move(ground, event.ctrl, nearest_handle(context, state, mouse))
+        ground = ground_point(region, view, mouse, state.sketch.height)
+        state.move(ground, event.ctrl, nearest_handle(region, view, state, mouse))
         return "on"
 
     def _build(self, context: bpy.types.Context, sketch: Sketch) -> set[str]:
@@ -241,6 +262,7 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
         if self._state is None:
             return
         self._state.view.hide()
+        _in_progress.remove(self._state)
         self._state = None
         context.workspace.status_text_set(None)
         context.window.cursor_modal_restore()
@@ -248,17 +270,48 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
         redraw_sidebars(context)
 
 
-def _in_region(region: bpy.types.Region, mouse: tuple[float, float]) -> bool:
-    return 0.0 <= mouse[0] < region.width and 0.0 <= mouse[1] < region.height
+_in_progress: list[DrawingState] = []
+"""The drawing in progress, if there is one."""
 
 
-def nearest_handle(context: bpy.types.Context, state: DrawingState, mouse: tuple[float, float]) -> Handle | None:
+def mouse_in_view(area: bpy.types.Area, event: bpy.types.Event) -> tuple[bpy.types.Region, tuple[float, float]]:
+    """Return the region of an area's view, and where the mouse is in it, pixels."""
+    region = next(part for part in area.regions if part.type == "WINDOW")
+    return region, (float(event.mouse_x - region.x), float(event.mouse_y - region.y))
+
+
+def click(
+    state: DrawingState,
+    region: bpy.types.Region,
+    view: bpy.types.RegionView3D,
+    mouse: tuple[float, float],
+    snaps: bool,
+) -> None:
+    """Have a drawing take a click: hold of the handle there, or one more point."""
+    state.view.hovered = nearest_handle(region, view, state, mouse)
+    ground = ground_point(region, view, mouse, state.sketch.height)
+    state.press(ground, snaps)
+    state.move(ground, snaps, nearest_handle(region, view, state, mouse))
+
+
+def is_over_view(area: bpy.types.Area, x: int, y: int) -> bool:
+    """Return whether a place of the window (pixels) is over an area's view, and over no header or sidebar on it."""
+    over = {
+        region.type
+        for region in area.regions
+        if region.x <= x < region.x + region.width and region.y <= y < region.y + region.height
+    }
+    return over == {"WINDOW"}
+
+
+def nearest_handle(
+    region: bpy.types.Region, view: bpy.types.RegionView3D, state: DrawingState, mouse: tuple[float, float]
+) -> Handle | None:
     """Return the handle of a drawing under the mouse (pixels of the region); None if there is none."""
-    reach = _NEAR * context.preferences.system.ui_scale
+    reach = _NEAR * bpy.context.preferences.system.ui_scale
     found: list[tuple[float, int, Handle]] = []
     for number, handle in enumerate(state.view.handles):
-        place = Vector((*handle.place, state.sketch.height))
-        at = location_3d_to_region_2d(context.region, context.region_data, place)
+        at = location_3d_to_region_2d(region, view, Vector((*handle.place, state.sketch.height)))
         if at is not None:
             found.append((float(np.hypot(at.x - mouse[0], at.y - mouse[1])), number, handle))
     nearest = min(found, default=None)

@@ -1,8 +1,9 @@
-"""Road from Curve: it lies on the curve, says how far off it is and what it breaks, and follows while that is wanted."""
+"""Road from Curve: on the curve, with its deviation and broken rules told, following it while that is wanted."""
 
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 import bpy
@@ -16,6 +17,8 @@ from synthroads_addon.blender.scene.curve_points import curve_points
 from synthroads_addon.checking.checker import check
 from synthroads_addon.road.geometry import alignment_of, profile_of
 from synthroads_addon.ui.drawing import along_curve, links
+from synthroads_addon.ui.fields import room
+from tests.helpers.scenes.fake_layout import drawn
 from tests.helpers.scenes.panel_road import cheap, choose, settings, users_own  # noqa: F401
 
 
@@ -85,8 +88,12 @@ def test_the_road_lies_on_the_curve_and_tells_how_far_off_it_is(cheap: Any) -> N
     assert rules.startswith(f"it breaks {len(broken)} rules: Smallest radius (")
     assert read_road(root).known() == recall(root)[0], "nothing counts as edited"
     surface = next(item for item in bpy.data.objects if item.get("synthroads_role") == "Road")
-    corners = np.array([surface.matrix_world @ vertex.co for vertex in surface.evaluated_get(
-        bpy.context.evaluated_depsgraph_get()).to_mesh().vertices])
+    corners = np.array(
+        [
+            surface.matrix_world @ vertex.co
+            for vertex in surface.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh().vertices
+        ]
+    )
     distances = [np.hypot(*(corners[:, :2] - point[:2]).T).min() for point in curve_points(curve)[::5]]
     assert max(distances) < 16.0, "the pavement is where the curve is"
 
@@ -243,3 +250,20 @@ def test_other_kinds_of_curves_are_read(kind: str) -> None:
         points = curve_points(added(data, "Hair"))
     assert points[0].tolist() == pytest.approx([0.0, 0.0, 3.0])
     assert points[-1].tolist() == pytest.approx([150.0, 0.0, 3.0], abs=1e-3)
+
+
+@pytest.mark.parametrize("width", [200.0, 300.0])
+def test_the_panel_shows_the_link_and_no_word_is_cut(width: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(room, "sidebar_width", lambda: width)
+    panel = along_curve.SYNTHROADS_PT_drawing
+    empty = "\n".join(drawn(panel, bpy.context).lines)
+    assert "synthroads.draw_road" in empty
+    assert "synthroads.fit_again" not in empty
+    bezier()
+    bpy.ops.synthroads.road_from_curve()
+    layout = drawn(panel, bpy.context)
+    text = " ".join(re.findall(r"label '([^']*)'", "\n".join(layout.lines)))
+    for words in ("from the curve", "It breaks", "Linked to Ride"):
+        assert words in text
+    assert "synthroads.fit_again" in "\n".join(layout.lines)
+    assert [item for item in layout.texts(room.row_width()) if item[2] > item[1] + 0.5] == []

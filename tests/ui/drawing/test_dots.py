@@ -128,7 +128,9 @@ def test_crossfall_by_the_rule_follows_the_curves_and_others_stay() -> None:
     assert right
     assert right.crossfall == crossfall_points("EKA1A", "right", 6.0, axis.horizontal)
     assert right.crossfall != parameters.carriageway("right").crossfall  # type: ignore[union-attr]
-    own = parameters.carriageway("left").model_copy(  # type: ignore[union-attr]
+    own = parameters.carriageway(
+        "left"
+    ).model_copy(  # type: ignore[union-attr]
         update={"crossfall": parameters.carriageway("left").crossfall[:1]}  # type: ignore[union-attr]
     )
     name = next(key for key, item in parameters.objects.items() if item == parameters.carriageway("left"))
@@ -159,7 +161,7 @@ def test_a_line_things_ends_move_one_by_one() -> None:
     bpy.ops.synthroads.move_thing(thing="rail-left", kind="start", station=12.5)
     rail = read_road(find_road(bpy.context.scene)).known().objects["rail-left"]  # type: ignore[arg-type]
     assert (rail.start_station, rail.end_station) == (12.5, 40.0)  # type: ignore[attr-defined]
-    with pytest.raises(RuntimeError, match="is no part of the shown road"):
+    with pytest.raises(RuntimeError, match="must be a part of the shown road"):
         bpy.ops.synthroads.move_thing(thing="nothing", kind="thing", station=1.0)
 
 

@@ -176,7 +176,11 @@ def test_the_status_bar_names_the_keys() -> None:
 def test_the_tool_stands_in_the_toolbar_and_begins_with_a_click() -> None:
     from bl_ui.space_toolsystem_toolbar import VIEW3D_PT_tools_active
 
-    tools = [item for item in VIEW3D_PT_tools_active._tools["OBJECT"] if getattr(item, "idname", "") == "synthroads.draw_road"]
+    tools = [
+        item
+        for item in VIEW3D_PT_tools_active._tools["OBJECT"]
+        if getattr(item, "idname", "") == "synthroads.draw_road"
+    ]
     groups = [part for item in VIEW3D_PT_tools_active._tools["OBJECT"] if isinstance(item, tuple) for part in item]
     assert len(tools) + len([item for item in groups if getattr(item, "idname", "") == "synthroads.draw_road"]) == 1
     assert tool.DrawRoadTool.bl_keymap[0][0] == tool.SYNTHROADS_OT_draw_road.bl_idname
