@@ -114,7 +114,11 @@ CLOUD = "../constant-materials/out/cloud.laz"
 JOBS = {
     "constant-materials": GoldenJob((generate("rq31-600m-even", *UAV, *PLAIN),)),
     "images": GoldenJob(
-        (generate("rq31-600m-even", *UAV, "colour.source=images", "colour.ground_sampling_distance=0.3", "road.length=60"),)
+        (
+            generate(
+                "rq31-600m-even", *UAV, "colour.source=images", "colour.ground_sampling_distance=0.3", "road.length=60"
+            ),
+        )
     ),
     "pixel-per-return": GoldenJob(
         (generate("rq31-600m-even", *UAV, "colour.source=returns", "road.length=60"),), lacking="needs Blender 5.0"

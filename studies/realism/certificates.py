@@ -238,7 +238,9 @@ def _left_out_lines(rows: list[dict[str, Any]]) -> list[str]:
         left_out = row["realism_left_out"]
         means = {group: float(np.mean([values[group] for values in left_out.values()])) for group in groups}
         for road, values in [*left_out.items(), ("mean", means)]:
-            lines.append(f"| `{row['recipe']}` | {road} | " + " | ".join(f"{values[group]:.2f}" for group in groups) + " |")
+            lines.append(
+                f"| `{row['recipe']}` | {road} | " + " | ".join(f"{values[group]:.2f}" for group in groups) + " |"
+            )
     return lines
 
 

@@ -93,7 +93,7 @@ def distinguish(patches: Patches, other_patches: Patches, seed: int, name: str) 
 
 
 def classifier_auc(patches: Patches, other_patches: Patches, seed: int, name: str) -> dict[str, float]:
-    """Return the AUC by group of statistics alone, in a part of the time of `distinguish`; arguments, errors as there."""
+    """Return the AUC by group of statistics alone, in less time than `distinguish`; arguments and errors as there."""
     return _auc_of_groups(*_samples(patches, other_patches, seed, name), seed)
 
 

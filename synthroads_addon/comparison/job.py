@@ -87,7 +87,10 @@ class CloudComparison:
         """
         real_patches = [cloud.patches for cloud in self.real]
         synthetic_rows, real_rows = (
-            [[classifier_auc(cloud.patches, patches, seed, cloud.cloud.name) for patches in real_patches] for cloud in side]
+            [
+                [classifier_auc(cloud.patches, patches, seed, cloud.cloud.name) for patches in real_patches]
+                for cloud in side
+            ]
             for side in (self.synthetic, self.real)
         )
         count_chosen, result = -(-len(synthetic_rows) // 2), {}

@@ -60,7 +60,9 @@ def test_the_table_has_a_row_for_each_recipe() -> None:
     assert "left out" not in table([old], "certificates")
 
 
-def test_a_road_left_out_is_compared_with_the_half_that_is_most_like_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_road_left_out_is_compared_with_the_half_that_is_most_like_the_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """The clouds stand for themselves; the table has the AUC of each against each real one."""
     aucs = {
         "one": {"a": 0.6, "b": 0.9, "c": 0.9},

@@ -15,8 +15,8 @@ What is in it, and where its figures come from:
   is of its own pour.
 - **Markings** lose their film where tyres cross them: lines between lanes, arrows in the wheel tracks. There tyres
   leave rubber as well; dirt dims a line in stretches, and stretches that were painted anew have neither.
-- **Patches** are black in their first year, then bleached, each of a mix of its own; open cracks are dark; sealed ones are a smooth band of bitumen. Where a
-  marking was ground off the aggregate is bare: brighter and rougher.
+- **Patches** are black in their first year, then bleached, each of a mix of its own; open cracks are dark; sealed ones
+  are a smooth band of bitumen. Where a marking was ground off the aggregate is bare: brighter and rougher.
 - **Ages**: what was paved earlier or later than the rest is brighter or darker than it, see `materials.variation`.
 - **Heights**: wheel tracks are as deep as they are worn, with the mean of a lane at 0; joints lie lower. Patches and
   cracks have heights of their own, and waves are `unevenness`.
@@ -83,8 +83,8 @@ ASPHALT_OF_AGE = (0.38, 0.96, 1.06)
 FILM_LASTS = 0.05
 """Age at which traffic has left 1/e of the binder's film: about a year of twenty."""
 _MIXES, _MIX_DEVIATION = 250.0, 0.12
-"""Steps of a patch's age that have a mix of their own, and by how much mixes are brighter or darker at most, as a share.
-Chosen: more steps than a road has patches; a little more than lanes and shoulder differ by."""
+"""Steps of a patch's age that have a mix of their own, and by how much mixes are brighter or darker at most, as a
+share. Chosen: more steps than a road has patches; a little more than lanes and shoulder differ by."""
 _GROUND = 1.22
 """Brightness of where a marking was ground off."""
 _KNOTS = 64.0
@@ -278,8 +278,8 @@ def concrete_height(m: Calculus, place: PavementPlace, shape: Shape, slab_length
 def _patch_brightness(m: Calculus, age: Any, seed: Any) -> Any:
     """Return the brightness of patches of an age (0 to 1): they bleach as all asphalt does, each of a mix of its own.
 
-    A patch is black in its first year alone, as `age.asphalt_brightness` of roads in use says; relative to pavement that
-    has bleached it is 0.38 when new, 0.96 without its film and 1.06 when old.
+    A patch is black in its first year alone, as `age.asphalt_brightness` of roads in use says; relative to pavement
+    that has bleached it is 0.38 when new, 0.96 without its film and 1.06 when old.
     """
     new_factor, bare_factor, old_factor = ASPHALT_OF_AGE
     film = m.exponential(age * (-1.0 / FILM_LASTS))
@@ -290,15 +290,17 @@ def _patch_brightness(m: Calculus, age: Any, seed: Any) -> Any:
 def _repaired(m: Calculus, strip: _Strip, look: Look, seed: Any) -> Look:
     """Return the look where patches and cracks have theirs in place of the pavement's.
 
-    The figures are chosen: an open crack darker than the pavement, a sealed one smoother, a removed marking brighter and
-    rougher; of patches see `_patch_brightness`. Masks are 0 or 1 since nodes of materials know no branches.
+    The figures are chosen: an open crack darker than the pavement, a sealed one smoother, a removed marking brighter
+    and rougher; of patches see `_patch_brightness`. Masks are 0 or 1 since nodes of materials know no branches.
     """
     age = strip.half * (1.0 / HALF_UNIT)
     is_removed = 1.0 - m.below(strip.kind, REMOVED_MARKING - 0.5)
     is_sealed = 1.0 - m.below(strip.kind, SEALED_CRACK - 0.5) - is_removed
     is_cracked = 1.0 - m.below(strip.kind, OPEN_CRACK - 0.5) - is_removed
     is_patch = 1.0 - is_cracked - is_removed
-    brightness = _patch_brightness(m, age, seed) * is_patch + is_cracked * 0.45 - is_sealed * 0.05 + is_removed * _GROUND
+    brightness = (
+        _patch_brightness(m, age, seed) * is_patch + is_cracked * 0.45 - is_sealed * 0.05 + is_removed * _GROUND
+    )
     roughness = (0.06 - 0.1 * age) * is_patch + is_cracked * 0.05 - is_sealed * 0.4 + is_removed * 0.08
     is_strip, is_known = strip.strip, 1.0 - m.below(strip.owner, 0.5)
     blended = look.brightness * is_strip + brightness * (1.0 - is_strip)

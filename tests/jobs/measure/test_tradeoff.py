@@ -91,7 +91,10 @@ def test_a_document_gets_the_tables_of_which_all_knobs_are_measured(
         "headless.tradeoff._measured_once", lambda scene, knob, value: costs | {"knob": knob, "value": value}
     )
     monkeypatch.setattr("headless.tradeoff_plot.plot", lambda rows, path: path.write_bytes(b""))
-    document, other = tmp_path / "page.md", "<!-- table: tradeoff rq31-600m-even points -->\nolder\n<!-- end of table -->\n"
+    document, other = (
+        tmp_path / "page.md",
+        "<!-- table: tradeoff rq31-600m-even points -->\nolder\n<!-- end of table -->\n",
+    )
     document.write_text(other + "<!-- table: tradeoff rq31-600m-even light -->\n<!-- end of table -->\n")
     words = ["--scenario", "rq31-600m-even", "--output", str(tmp_path / "out"), "--knobs", "samples"]
     assert commands.command("tradeoff", [*words, "--document", str(document)]) == 0

@@ -59,7 +59,7 @@ def test_an_even_scan_has_none_of_the_random_effects(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name in EFFECTS if name != REAL])
 def test_a_real_sensor_s_asphalt_varies_more_than_an_even_one_s(name: str) -> None:
     """Speckle of a fifth, with the surfaces' own variation, adds at least half a decibel between the quartiles."""
-    changes = (*SMALL, "fidelity=draft", "road.vehicles.per_km={\"minimum\": 0, \"maximum\": 0}", "scan.rays_per_pulse=1")
+    changes = (*SMALL, "fidelity=draft", 'road.vehicles.per_km={"minimum": 0, "maximum": 0}', "scan.rays_per_pulse=1")
     real, even = (noise_of_neighbours_db(load_scenario(each, changes)) for each in (name, f"{name}-even"))
     assert real > even + 0.5
 

@@ -42,7 +42,11 @@ SCENES: dict[str, tuple[str, tuple[str, ...], float]] = {
         ),
         0.04,
     ),
-    "cylindrical beam": ("tripod-200m-even", ("road.length=100", "scan.beam=cylindrical", "scan.rays_per_pulse=7"), 0.4),
+    "cylindrical beam": (
+        "tripod-200m-even",
+        ("road.length=100", "scan.beam=cylindrical", "scan.rays_per_pulse=7"),
+        0.4,
+    ),
     "one ray": ("airborne-1000m-even", ("road.length=150", "road.half_width=60", "scan.rays_per_pulse=1"), 0.3),
 }
 """Scenarios, what changes in them, and the duration of each of the stretches that are scanned, s."""
