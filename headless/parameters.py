@@ -11,8 +11,8 @@ if __name__ == "__main__":
 from headless.commands import Outcome, entry
 from headless.options import add_changes_argument, all_changes
 from synthroads_addon.base.changes import apply_change
-from synthroads_addon.road.guidelines import STANDARD_CROSS_SECTIONS, USUAL_SECTION
-from synthroads_addon.road.parameters import DESIGN_CLASSES, RoadParameters
+from synthroads_addon.road.guidelines import DESIGN_CLASSES, STANDARD_CROSS_SECTIONS, USUAL_SECTION
+from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scenario import Scenario
@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, metavar="N", help=f"seed of the first set ({Scenario().seed})")
     parser.add_argument("--count", type=int, metavar="K", help="write K sets of consecutive seeds, one per line")
     usual_class, sections = next(iter(USUAL_SECTION)), ", ".join(STANDARD_CROSS_SECTIONS)
-    text = f"design class of the RAA ({usual_class}, or the first that has the cross-section)"
+    text = f"design class of the RAA or RAL ({usual_class}, or the first that has the cross-section)"
     parser.add_argument("--design-class", choices=DESIGN_CLASSES, help=text)
     text = ", ".join(f"{section} for {name}" for name, section in USUAL_SECTION.items())
     parser.add_argument("--cross-section", metavar="RQ", help=f"one of {sections} (that of the design class: {text})")

@@ -9,8 +9,8 @@ from typing import Any
 from ..base.remarks import assume
 from ..road.crossfall import crossfall_points
 from ..road.guidelines import (
+    DUAL_CROSS_SECTIONS,
     SECTIONS_OF_CLASS,
-    STANDARD_CROSS_SECTIONS,
     StandardCrossSection,
     design_class_of,
 )
@@ -164,16 +164,16 @@ def _bases(
     if len(usual_section.lanes) == lanes:
         yield {}, usual_section
     section_names = SECTIONS_OF_CLASS[scenario.design_class]
-    standard_names = [name for name in STANDARD_CROSS_SECTIONS if len(STANDARD_CROSS_SECTIONS[name].lanes) == lanes]
+    standard_names = [name for name in DUAL_CROSS_SECTIONS if len(DUAL_CROSS_SECTIONS[name].lanes) == lanes]
     lane_width = 3.75 if width is None else width
     standard_names.sort(
         key=lambda name: (
             name not in section_names,
-            abs(math.fsum(STANDARD_CROSS_SECTIONS[name].lanes) / lanes - lane_width),
+            abs(math.fsum(DUAL_CROSS_SECTIONS[name].lanes) / lanes - lane_width),
         )
     )
     for name in standard_names:
-        section = STANDARD_CROSS_SECTIONS[name]
+        section = DUAL_CROSS_SECTIONS[name]
         yield {"cross_section": name, "design_class": design_class_of(name, scenario.design_class)}, section
     widths = (usual_section.lanes + usual_section.lanes[-1:] * lanes)[:lanes]
     section = StandardCrossSection(

@@ -12,7 +12,7 @@ from ..base.maps.crs import EPSG_URI
 from ..base.schema import round_value
 from ..base.version import generator
 from ..fitting.fit import AxisFit, alignment_object
-from ..road.guidelines import LIMITS, STANDARD_CROSS_SECTIONS, design_class_of
+from ..road.guidelines import DUAL_CLASSES, DUAL_CROSS_SECTIONS, LIMITS, design_class_of
 from ..road.objects import RoadObject
 from ..road.parameters import RoadParameters
 from ..road.section import Carriageway, CrossfallPoint, Lane, LineMarking, Median, Turnout
@@ -124,10 +124,10 @@ def _design_class(measurements: RoadMeasurements) -> str:
     largest_curvature = max(
         max(abs(e.curvature_start), abs(e.curvature_end)) for e in measurements.fit.alignment.elements
     )
-    possible_classes = [name for name, limits in LIMITS.items() if largest_curvature * limits.radius <= 1.02]
+    possible_classes = [name for name in DUAL_CLASSES if largest_curvature * LIMITS[name].radius <= 1.02]
     preferred = possible_classes[0] if possible_classes else "EKA3"
     standard_name = measurements.section.nearest
-    return design_class_of(standard_name, preferred) if standard_name in STANDARD_CROSS_SECTIONS else preferred
+    return design_class_of(standard_name, preferred) if standard_name in DUAL_CROSS_SECTIONS else preferred
 
 
 def _carriageway(measurements: RoadMeasurements, side: SideSection) -> Carriageway:

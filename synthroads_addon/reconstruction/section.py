@@ -9,7 +9,7 @@ from scipy import ndimage
 from scipy.signal import find_peaks
 
 from ..base.arrays import Bool, Float
-from ..road.guidelines import STANDARD_CROSS_SECTIONS, StandardCrossSection
+from ..road.guidelines import DUAL_CROSS_SECTIONS, StandardCrossSection
 from .edges import FARTHEST, Edge
 from .layout import Band, RoadKind, RoadLayout
 from .lines import Line
@@ -385,8 +385,8 @@ def _assumed_section(part: _SidePart) -> SideSection:
     inner_edge = part.edge(middle, False, np.abs(middle))
     width = mean_with_std(outer_edge.offsets - inner_edge.offsets)[0]
     width = width if np.isfinite(width) else part.band.width
-    name = min(STANDARD_CROSS_SECTIONS, key=lambda key: abs(STANDARD_CROSS_SECTIONS[key].paved_width - width))
-    row = STANDARD_CROSS_SECTIONS[name]
+    name = min(DUAL_CROSS_SECTIONS, key=lambda key: abs(DUAL_CROSS_SECTIONS[key].paved_width - width))
+    row = DUAL_CROSS_SECTIONS[name]
     innermost_line = inner_edge.offsets + row.inner_edge_strip
     lane_edges = [innermost_line + sum(row.lanes[::-1][:i]) for i in range(len(row.lanes) + 1)]
     columns = [_Boundary(lane_edge, lane_edge, inner_edge.spacing, False) for lane_edge in lane_edges]
@@ -532,7 +532,7 @@ def _share_pavement(outer_width: Estimate) -> tuple[Estimate, Estimate]:
     """
     if outer_width.value <= _WIDEST_STRIP:
         return outer_width, Estimate(0.0, 0.0)
-    rows = STANDARD_CROSS_SECTIONS.values()
+    rows = DUAL_CROSS_SECTIONS.values()
     best_section = min(rows, key=lambda row: abs(row.hard_shoulder + row.outer_edge_strip - outer_width.value))
     strip = best_section.outer_edge_strip
     return Estimate(strip, 0.0), Estimate(min(outer_width.value - strip, _WIDEST), outer_width.std)
@@ -540,9 +540,7 @@ def _share_pavement(outer_width: Estimate) -> tuple[Estimate, Estimate]:
 
 def nearest_standard(sides: dict[Side, SideSection]) -> tuple[str, float]:
     """Return the name of the standard cross-section nearest to both carriageways, and the largest difference (m)."""
-    distances = {
-        name: max(_misfit(side, row) for side in sides.values()) for name, row in STANDARD_CROSS_SECTIONS.items()
-    }
+    distances = {name: max(_misfit(side, row) for side in sides.values()) for name, row in DUAL_CROSS_SECTIONS.items()}
     nearest_name = min(distances, key=lambda name: distances[name])
     return nearest_name, distances[nearest_name]
 
@@ -566,7 +564,7 @@ def snap_to_standard(section: MeasuredSection) -> MeasuredSection:
     """Return the cross-section with the widths of the standard one within tolerance; unchanged if there is none."""
     if section.standard is None:
         return section
-    row = STANDARD_CROSS_SECTIONS[section.standard]
+    row = DUAL_CROSS_SECTIONS[section.standard]
     widths = {
         "inner_offset": row.median / 2.0,
         "inner_strip": row.inner_edge_strip,

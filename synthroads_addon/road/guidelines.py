@@ -1,53 +1,187 @@
-"""Limits of the RAA 2008 by design class, and the standard cross-sections: the one table of both.
+"""Limits of the guidelines by design class, and the standard cross-sections: the one table of both.
 
-The limits are those that secondary sources print of the RAA; the crossfall over the radius, which the RAA shows as a
-diagram, is derived from the shares of friction at its ends.
+They are read from the files of `presets/guidelines`: one for each guideline, with its classes, its quantities, each
+with its source and how sure it is, its cross-sections, and what a scenario of its classes has where nothing is given.
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Literal
+
+from pydantic import Field
+
+from ..base.files import PRESETS
+from ..base.schema import ClosedModel, read_json
+from .objects import Side
+
+CentreLine = Literal["none", "single", "double", "strip"]
+EdgeLine = Literal["none", "solid", "dashed"]
+
+
+class Quantity(ClosedModel):
+    """A quantity of a guideline: a number for all its classes, or one for each.
+
+    A limit is what the checker asks for; a default is what the sampler does where the scenario says nothing else.
+    """
+
+    unit: str = Field(description="Unit of the values.")
+    guideline: str = Field("", description="Guideline that it is from, where that is another one.")
+    values: float | dict[str, float] = Field(description="Value, or value by class; a class left out has none.")
+    use: Literal["limit", "default"] = Field(description="Whether roads are checked by it.")
+    sure: Literal["confirmed", "derived", "unconfirmed", "chosen"] = Field(description="How sure it is.")
+    source: str = Field(description="Where it is from; the guideline itself if empty.")
+
+
+class _Section(ClosedModel):
+    """A standard cross-section as a guideline's file has it: one direction, lanes from outside to inside; m."""
+
+    lanes: tuple[float, ...]
+    oncoming_lanes: tuple[float, ...] = ()
+    hard_shoulder: float
+    outer_edge_strip: float
+    inner_edge_strip: float
+    median: float
+    verge: float
+    centre_line: CentreLine = "none"
+    edge_line: EdgeLine = "solid"
+    sure: Literal["confirmed", "derived", "split", "chosen"]
+    source: str
+
+
+class _DesignClass(ClosedModel):
+    """A design class: its names for people and in messages, its cross-sections and the one that it usually has."""
+
+    label: str
+    citation: str
+    sections: tuple[str, ...] = Field(min_length=1)
+    usual_section: str
+
+
+class Guideline(ClosedModel):
+    """A guideline: design classes, limits, cross-sections, defaults of scenarios; a file of `presets/guidelines`."""
+
+    name: str = Field(description="Short name in messages.")
+    title: str = Field(description="Its name, and where the figures are from.")
+    carriageways: Literal[1, 2] = Field(description="Carriageways of its roads: one for both directions, or two.")
+    classes: dict[str, _DesignClass] = Field(min_length=1)
+    quantities: dict[str, Quantity]
+    sections: dict[str, _Section]
+    defaults: dict[str, Any] = Field(description="Fields of a road's scenario, where they aren't given.")
 
 
 @dataclass(frozen=True)
 class DesignLimits:
-    """Limits of the RAA for one design class of motorways.
+    """Limits and defaults of one design class. What a guideline doesn't have is 0, or infinite for an upper limit.
 
     Attributes:
-        speed: speed used for driving dynamics on a wet road, km/h.
+        speed: speed used for driving dynamics on a wet road, or planning speed, km/h.
         radius: smallest radius, m.
+        drawn_radius_least, drawn_radius_largest: radii that are drawn where the scenario says nothing, m.
         clothoid: smallest clothoid parameter A, m.
+        clothoid_ratio: largest ratio of the parameters of an S-curve's clothoids.
+        radius_ratio: largest ratio of neighbouring radii.
+        curvature_jump_radius: arcs of a larger radius (m) may follow a straight without a clothoid.
+        straight_longest: longest straight, m.
+        straight_same_hand, straight_same_hand_radii: shortest straight between two curves of one direction, m, and as
+            a multiple of the smaller radius.
+        arc_length, arc_seconds: shortest arc, m, and as a time of travel, s.
         grade_percent: steepest longitudinal grade.
         crest, sag: smallest vertical radii, m.
-        run_off_percent: largest slope of the pavement's edge against its rotation axis (4 m or more apart).
+        vertical_tangent: shortest tangent of a crest or sag, m.
+        least_crossfall_percent, largest_crossfall_percent: of the pavement.
         radius_least_crossfall: radius from which the least crossfall suffices, m.
         radius_outwards: radius from which the crossfall may fall to the outside, m.
+        run_off_percent: largest slope of the pavement's edge against its rotation axis.
+        run_off_percent_per_metre: the same, of edges near the axis, per m of their distance from it.
+        run_off_least_per_metre: least such slope while water could stand, % per m of the distance.
+        turnout_lane_length: shortest deceleration or acceleration lane, m.
+        interchange_spacing: least distance between two exits, or two entries, of one carriageway, m.
+        lane_taper_length: shortest stretch over which a lane begins or ends, m.
+        obstacle_distance: from the paved edge: nearer than this (m), an obstacle (pier, gantry post, pole, noise
+            barrier, tree, board on thick posts) needs a barrier in front of it.
+        tight_curve: arcs of a radius below this times the smallest have a barrier on their outer side.
+        overtaking_sight: where drivers see as far as this (m), the line between the directions is dashed.
+        stopping_deceleration: of a vehicle that stops for what it sees, m/s2.
+        unsigned_speed: speed limit where no sign says another, or the advised speed, km/h.
+        broad_line, narrow_line: widths of lines, m.
+        lane_dash, lane_gap: of lines between lanes, m.
+        centre_lines: least number of lines between the directions of one carriageway.
+        narrowest_centre_line_lane: lanes narrower than this (m) have no line between the directions.
     """
 
     speed: float
     radius: float
-    clothoid: float
+    drawn_radius_least: float
+    drawn_radius_largest: float
     grade_percent: float
     crest: float
     sag: float
-    run_off_percent: float
+    least_crossfall_percent: float
+    largest_crossfall_percent: float
     radius_least_crossfall: float
     radius_outwards: float
+    run_off_percent: float
+    run_off_least_per_metre: float
+    obstacle_distance: float
+    unsigned_speed: float
+    broad_line: float
+    narrow_line: float
+    lane_dash: float
+    lane_gap: float
+    straight_longest: float
+    overtaking_sight: float
+    clothoid: float = 0.0
+    clothoid_ratio: float = math.inf
+    radius_ratio: float = math.inf
+    curvature_jump_radius: float = math.inf
+    straight_same_hand: float = 0.0
+    straight_same_hand_radii: float = 0.0
+    arc_length: float = 0.0
+    arc_seconds: float = 0.0
+    vertical_tangent: float = 0.0
+    run_off_percent_per_metre: float = math.inf
+    turnout_lane_length: float = 0.0
+    interchange_spacing: float = 0.0
+    lane_taper_length: float = 0.0
+    tight_curve: float = 0.0
+    stopping_deceleration: float = 0.0
+    centre_lines: float = 0.0
+    narrowest_centre_line_lane: float = 0.0
+
+    @property
+    def shortest_arc(self) -> float:
+        """Return the length of the shortest arc, m."""
+        return max(self.arc_length, self.arc_seconds * self.speed / 3.6)
+
+    @property
+    def stopping_sight(self) -> float:
+        """Return the distance in which a vehicle stops, m: 2 s of travel and v^2 / (2 a); 0 where it isn't needed."""
+        if not self.stopping_deceleration:
+            return 0.0
+        speed = self.speed / 3.6
+        return REACTION_SECONDS * speed + speed**2 / (2.0 * self.stopping_deceleration)
+
+    def straight_between(self, smaller_radius: float) -> float:
+        """Return the length (m) of the shortest straight between two curves of one direction, by the smaller radius."""
+        return max(self.straight_same_hand, self.straight_same_hand_radii * smaller_radius)
 
 
-LIMITS = {
-    "EKA1A": DesignLimits(130, 900, 300, 4.0, 13000, 8800, 0.9, 3100, 4000),
-    "EKA1B": DesignLimits(120, 720, 240, 4.5, 10000, 5700, 0.9, 2550, 4000),
-    "EKA2": DesignLimits(100, 470, 160, 4.5, 5000, 4000, 0.9, 1700, 4000),
-    "EKA3": DesignLimits(80, 280, 90, 6.0, 3000, 2600, 0.9, 1030, 1050),
-}
-LEAST_CROSSFALL_PERCENT = 2.5
-LARGEST_CROSSFALL_PERCENT = 6.0
-LONGEST_STRAIGHT = 2000.0
+REACTION_SECONDS = 2.0
+"""Time that a driver travels on before the brakes grip, s (RAA and RAL)."""
 
 
 @dataclass(frozen=True)
 class StandardCrossSection:
-    """Widths of one carriageway of a standard cross-section (RQ), m; lanes from outside to inside."""
+    """Widths of one direction of a standard cross-section (RQ), m; lanes from outside to inside.
+
+    Attributes:
+        lanes: of the right direction, or of both.
+        hard_shoulder, outer_edge_strip, inner_edge_strip, median, verge: the other strips.
+        oncoming_lanes: lanes of the left direction where they are others.
+        single: whether both directions share one carriageway.
+        centre_line, edge_line: lines of a single carriageway.
+    """
 
     lanes: tuple[float, ...]
     hard_shoulder: float
@@ -55,33 +189,88 @@ class StandardCrossSection:
     inner_edge_strip: float
     median: float
     verge: float = 1.5
+    oncoming_lanes: tuple[float, ...] = field(default=(), compare=False)
+    single: bool = False
+    centre_line: CentreLine = "none"
+    edge_line: EdgeLine = "solid"
 
     @property
     def paved_width(self) -> float:
-        """Return the width of one carriageway from the inner edge strip to the hard shoulder, m."""
+        """Return the width of one direction's pavement from the inner edge strip to the hard shoulder, m."""
         return math.fsum(self.lanes) + self.hard_shoulder + self.outer_edge_strip + self.inner_edge_strip
 
+    @property
+    def total_width(self) -> float:
+        """Return the width of the whole road, from verge to verge, m."""
+        paved_width = math.fsum(self.of_side(side).paved_width for side in ("left", "right"))
+        return paved_width + 2.0 * self.verge + self.median
 
+    @property
+    def lever(self) -> float:
+        """Return the largest distance of a paved edge from the axis about which the crossfall turns, m."""
+        if not self.single:
+            return self.paved_width / 2.0
+        return max(self.of_side("left").paved_width, self.of_side("right").paved_width)
+
+    def of_side(self, side: Side) -> "StandardCrossSection":
+        """Return the cross-section with the lanes of one side."""
+        if side == "right" or not self.oncoming_lanes:
+            return self
+        return replace(self, lanes=self.oncoming_lanes, oncoming_lanes=())
+
+
+GUIDELINES: Mapping[str, Guideline] = {
+    guideline.name: guideline
+    for guideline in (
+        Guideline.from_dict(read_json(path), str(path)) for path in sorted((PRESETS / "guidelines").glob("*.json"))
+    )
+}
+"""Guidelines by name."""
+GUIDELINE_OF_CLASS: Mapping[str, Guideline] = {
+    name: guideline for guideline in GUIDELINES.values() for name in guideline.classes
+}
+"""Design class -> its guideline."""
+DESIGN_CLASSES: tuple[str, ...] = tuple(GUIDELINE_OF_CLASS)
+_QUANTITIES = frozenset(limit.name for limit in fields(DesignLimits))
+
+
+def _limits(guideline: Guideline, design_class: str) -> DesignLimits:
+    """Return the limits of a class; ValueError for a quantity that no code reads."""
+    if unknown := sorted(set(guideline.quantities) - _QUANTITIES):
+        raise ValueError(f"guideline {guideline.name}: unknown quantities {', '.join(unknown)}")
+    values = {
+        name: row.values if isinstance(row.values, float) else row.values.get(design_class)
+        for name, row in guideline.quantities.items()
+    }
+    return DesignLimits(**{name: value for name, value in values.items() if value is not None})
+
+
+def _section(row: _Section, guideline: Guideline) -> StandardCrossSection:
+    """Return a cross-section of a guideline."""
+    return StandardCrossSection(**row.model_dump(exclude={"sure", "source"}), single=guideline.carriageways == 1)
+
+
+LIMITS = {name: _limits(guideline, name) for name, guideline in GUIDELINE_OF_CLASS.items()}
+"""Design class -> its limits."""
 STANDARD_CROSS_SECTIONS = {
-    "RQ43.5": StandardCrossSection((3.75, 3.75, 3.5, 3.5), 2.5, 0.5, 0.75, 4.0),
-    "RQ38.5": StandardCrossSection((3.5, 3.5, 3.25, 3.25), 2.0, 0.5, 0.5, 2.5),
-    "RQ36": StandardCrossSection((3.75, 3.5, 3.5), 2.5, 0.5, 0.75, 4.0),
-    "RQ31.5": StandardCrossSection((3.5, 3.25, 3.25), 2.0, 0.5, 0.5, 2.5),
-    "RQ31": StandardCrossSection((3.75, 3.75), 3.0, 0.75, 0.75, 4.0),
-    "RQ28": StandardCrossSection((3.5, 3.5), 2.5, 0.5, 0.5, 4.0),
-    "RQ25": StandardCrossSection((3.5, 3.25), 2.0, 0.5, 0.5, 2.5),
+    name: _section(row, guideline) for guideline in GUIDELINES.values() for name, row in guideline.sections.items()
 }
-
-
-SECTIONS_OF_CLASS = {
-    "EKA1A": ("RQ43.5", "RQ36", "RQ31"),
-    "EKA1B": ("RQ43.5", "RQ36", "RQ31", "RQ28"),
-    "EKA2": ("RQ36", "RQ31", "RQ28"),
-    "EKA3": ("RQ38.5", "RQ31.5", "RQ25"),
-}
+"""Name -> standard cross-section."""
+DUAL_CROSS_SECTIONS = {name: section for name, section in STANDARD_CROSS_SECTIONS.items() if not section.single}
+"""Name -> standard cross-section of two carriageways."""
+SECTIONS_OF_CLASS = {name: guideline.classes[name].sections for name, guideline in GUIDELINE_OF_CLASS.items()}
 """Design class -> standard cross-sections that it may have."""
-USUAL_SECTION = {"EKA1A": "RQ31", "EKA1B": "RQ31", "EKA2": "RQ28", "EKA3": "RQ25"}
-"""Design class -> the cross-section that it has where none is given: of two lanes each way."""
+USUAL_SECTION = {name: guideline.classes[name].usual_section for name, guideline in GUIDELINE_OF_CLASS.items()}
+"""Design class -> the cross-section that it has where none is given."""
+CLASS_LABELS = {name: guideline.classes[name].label for name, guideline in GUIDELINE_OF_CLASS.items()}
+"""Design class -> its name for people."""
+DUAL_CLASSES = tuple(name for name in DESIGN_CLASSES if GUIDELINE_OF_CLASS[name].carriageways == 2)
+"""Design classes of roads with two carriageways."""
+
+
+def is_single(design_class: str) -> bool:
+    """Return whether roads of a design class have one carriageway for both directions."""
+    return GUIDELINE_OF_CLASS[design_class].carriageways == 1
 
 
 def design_class_of(cross_section: str, preferred: str) -> str:
@@ -97,7 +286,7 @@ def design_class_of(cross_section: str, preferred: str) -> str:
 
 
 def curve_crossfall_percent(design_class: str, curvature: float) -> float:
-    """Return the crossfall (%) towards the inside of a curve: 6 at the smallest radius, 2.5 from the largest.
+    """Return the crossfall (%) towards the inside of a curve: the largest at the smallest radius, the least far above.
 
     In between linear in log radius against log crossfall, rounded up to half a percent.
 
@@ -107,9 +296,10 @@ def curve_crossfall_percent(design_class: str, curvature: float) -> float:
     """
     limits = LIMITS[design_class]
     radius = 1.0 / max(abs(curvature), 1e-9)
-    share = math.log(radius / limits.radius) / math.log(limits.radius_least_crossfall / limits.radius)
-    change = math.log(LEAST_CROSSFALL_PERCENT / LARGEST_CROSSFALL_PERCENT)
-    exact = LARGEST_CROSSFALL_PERCENT * math.exp(change * min(1.0, max(0.0, share)))
+    smallest_radius = limits.drawn_radius_least
+    share = math.log(radius / smallest_radius) / math.log(limits.radius_least_crossfall / smallest_radius)
+    change = math.log(limits.least_crossfall_percent / limits.largest_crossfall_percent)
+    exact = limits.largest_crossfall_percent * math.exp(change * min(1.0, max(0.0, share)))
     return math.ceil(2.0 * exact - 1e-9) / 2.0
 
 
@@ -118,8 +308,6 @@ DELINEATOR_SPACING = ((20.0, 3.0), (50.0, 5.0), (100.0, 10.0), (300.0, 20.0), (6
 
 # --- turnouts (RAA; all unconfirmed but the interchange spacing) ---------------------------------------------------
 
-TURNOUT_LANE_LENGTH = {"EKA1A": 250.0, "EKA1B": 250.0, "EKA2": 200.0, "EKA3": 150.0}
-"""Shortest deceleration or acceleration lane, m."""
 TURNOUT_LANE_WIDTH = 3.5
 """Narrowest deceleration or acceleration lane, m."""
 TURNOUT_TAPER = 30.0
@@ -130,10 +318,6 @@ EMERGENCY_BAY_LENGTH = 40.0
 """Narrowest and shortest emergency bay at full width, m."""
 TURNOUT_GAP = 20.0
 """Least distance between two turnouts of one carriageway, m."""
-INTERCHANGE_SPACING = {"EKA1A": 8000.0, "EKA1B": 5000.0, "EKA2": 5000.0, "EKA3": 0.0}
-"""Least distance between two exits, or two entries, of one carriageway, m."""
-LANE_TAPER_LENGTH = {"EKA1A": 120.0, "EKA1B": 120.0, "EKA2": 100.0, "EKA3": 80.0}
-"""Shortest stretch over which a lane begins or ends, m."""
 
 # --- earthworks and drainage (RAA, RAS-Ew; unconfirmed) ---------------------------------------------------------------
 
@@ -144,11 +328,6 @@ SWALE_DEPTH_SHARE = 0.2
 
 EMBANKMENT_HEIGHT, EMBANKMENT_RUN = 3.0, 3.0
 """An embankment higher (m) and steeper (run per height) than this needs barriers."""
-TIGHT_CURVE = 1.25
-"""Arcs of a radius below this times the design class's smallest have a barrier on their outer side (unconfirmed)."""
-OBSTACLE_DISTANCE = {"EKA1A": 12.0, "EKA1B": 12.0, "EKA2": 12.0, "EKA3": 7.5}
-"""From the paved edge: nearer than this (m), an obstacle (pier, gantry post, pole, noise barrier, tree, board on thick
-posts) needs a barrier in front of it."""
 OBSTACLE_POST = 0.1
 """Posts of signs thicker than this (m) are obstacles; thinner ones give way."""
 OBSTACLE_LEAD, OBSTACLE_TAIL = 60.0, 10.0

@@ -20,6 +20,7 @@ from pydantic import Field, model_validator
 from ..base.errors import InputError
 from ..base.maps.crs import MapSystem, compound_code, system_urn
 from ..base.schema import Model, quantity, read_json, when
+from .guidelines import DESIGN_CLASSES
 from .objects import ObjectT, RoadObject, StrictFinite, width_at, width_kinks
 from .section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
 from .surroundings import Environment, Landscape, MaterialVariation, Terrain, Vegetation, Vehicle
@@ -31,7 +32,6 @@ LONGEST_ROAD = 1e6
 """Longest alignment, m: its tables grow with its length, so that a slip in a number would fill the memory."""
 _OVERLAP = 1e-4
 """Width, m, by which rounding may let the two carriageways' inner edges overlap."""
-DESIGN_CLASSES = ("EKA1A", "EKA1B", "EKA2", "EKA3")
 
 
 class Metadata(Model):
@@ -216,7 +216,9 @@ class RoadParameters(Model):
     version: Literal["1.0"] = SCHEMA_VERSION
     metadata: Metadata
     transform: Transform
-    design_class: Literal["EKA1A", "EKA1B", "EKA2", "EKA3"] = Field(description="Design class of the RAA.")
+    design_class: Literal[DESIGN_CLASSES] = Field(  # type: ignore[valid-type]
+        description="Design class: of motorways (RAA) or country roads (RAL)."
+    )
     environment: Environment = Field(Environment(), description="Light and weather.")
     materials: MaterialVariation = Field(MaterialVariation(), description="How the materials differ from the mean.")
     objects: dict[str, AnyObject] = Field(

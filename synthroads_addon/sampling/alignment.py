@@ -1,4 +1,4 @@
-"""Horizontal and vertical alignment from a seed, within the RAA by construction: nothing is drawn and rejected.
+"""Horizontal and vertical alignment from a seed, within the guideline by construction: nothing is drawn and rejected.
 
 Horizontally, arcs are joined by a straight with its two clothoids, by two clothoids of an S-curve, or by the one
 clothoid of an egg curve. Parts are appended while the road is long enough for all of them at their least lengths; what
@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.schema import round_value
 from ..road.crossfall import run_off_length
-from ..road.guidelines import LIMITS, LONGEST_STRAIGHT, DesignLimits
+from ..road.guidelines import LIMITS, DesignLimits
 from ..road.parameters import HorizontalElement, VerticalPoint
 from ..scenario.road import RoadScenario
 from .section import bounds, cross_section_of
@@ -22,13 +22,9 @@ _Pair = tuple[float, float]
 Lengths = tuple[list[float], list[float]]
 """Least and drawn lengths of the clothoids of a joint, m."""
 
-WIDEST_RADIUS = 5000.0
-"""Largest radius that is drawn where the scenario doesn't say otherwise, m."""
-BALANCED_BELOW, BALANCE = 1500.0, 1.5
-"""Consecutive radii differ by at most this ratio where the smaller is below this radius (m)."""
+BALANCED_BELOW = 1500.0
+"""Consecutive radii differ by at most the class's ratio where the smaller is below this radius (m)."""
 _BALANCED_FROM = BALANCED_BELOW * (1.0 + 1e-6)  # rounding the curvature must not take a radius below it
-STRAIGHT_SAME_DIRECTION = 400.0
-"""Least length of a straight between two curves of the same direction, m."""
 _SHORTEST_STRAIGHT = 60.0
 _SHORTEST_END = 20.0
 _EGG_RATIO = 1.2
@@ -36,6 +32,7 @@ _WIDEST_RATIO = 3.0
 _LONGEST_TURN = 0.9
 """Angle of an arc beyond which no length is given to it while others can take it, rad."""
 
+_MARGIN = 1.0 + 1e-6  # rounding the radius must not take a tangent below the shortest
 HIGHEST_CLIMB = 120.0
 """Height above or below the road's begin from which it no longer climbs or falls, m."""
 
@@ -65,9 +62,13 @@ class HorizontalSampler:
     def __init__(self, scenario: RoadScenario, rng: np.random.Generator) -> None:
         self.design_class, self.length, self.rng = scenario.design_class, scenario.length, rng
         self.limits: DesignLimits = LIMITS[scenario.design_class]
-        self.radii = bounds(scenario.radius) if scenario.radius else (self.limits.radius, WIDEST_RADIUS)
-        self.half_width = cross_section_of(scenario).paved_width / 2.0
-        self.shortest_arc = 2.0 * self.limits.speed / 3.6
+        self.radii = (
+            bounds(scenario.radius)
+            if scenario.radius
+            else (self.limits.drawn_radius_least, self.limits.drawn_radius_largest)
+        )
+        self.half_width = cross_section_of(scenario).lever
+        self.shortest_arc = self.limits.shortest_arc
         self.parts: list[_AlignmentPart] = []
         self.room = 0.0
         self.turned = 0.0
@@ -88,7 +89,10 @@ class HorizontalSampler:
 
     def _may_begin_straight(self) -> bool:
         """Return whether the road may begin straight: as it is all straight or a curve can follow."""
-        return self.length <= LONGEST_STRAIGHT or _widest_radius(self.length - 3.0 * _SHORTEST_END) > self.radii[0]
+        return (
+            self.length <= self.limits.straight_longest
+            or _widest_radius(self.length - 3.0 * _SHORTEST_END) > self.radii[0]
+        )
 
     def _next_parts(self) -> list[_AlignmentPart]:
         """Return the next parts, clothoids and a straight or arc of an end's least length; none without room.
@@ -118,11 +122,7 @@ class HorizontalSampler:
         """Return what makes a straight long enough, a clothoid, and the begin of an arc; none without room."""
         curvature_before = next((part.start for part in reversed(self.parts[:-1]) if part.start), 0.0)
         sign = self._turn()
-        least_straight = (
-            (STRAIGHT_SAME_DIRECTION if curvature_before * sign > 0.0 else _SHORTEST_STRAIGHT)
-            if curvature_before
-            else 0.0
-        )
+        least_straight = self._least_straight(curvature_before, sign)
         missing_length = max(0.0, least_straight - straight.length)
         room = self.room - missing_length - _SHORTEST_END
         if not (radius := self._radius(1.0 / abs(curvature_before) if curvature_before else None, room)):
@@ -143,6 +143,17 @@ class HorizontalSampler:
         end = math.copysign(1.0 / radius, start)
         is_alike = max(start / end, end / start) < _EGG_RATIO
         return [] if is_alike else self._clothoids([(start, end)], self._egg(start, end), room)
+
+    def _least_straight(self, curvature_before: float, sign: float) -> float:
+        """Return the least length (m) of a straight between a curvature (1/m) and a curve to a side, 1 left, -1 right.
+
+        The smaller radius isn't known yet: that before the straight is no smaller.
+        """
+        if not curvature_before:
+            return 0.0
+        if curvature_before * sign <= 0.0:
+            return _SHORTEST_STRAIGHT
+        return max(_SHORTEST_STRAIGHT, self.limits.straight_between(1.0 / abs(curvature_before)))
 
     def _clothoids(self, curvatures: list[_Pair], lengths: Lengths, room: float) -> list[_AlignmentPart]:
         """Return clothoids with lengths between the least and the drawn ones, as the room (m) allows; else none.
@@ -174,14 +185,16 @@ class HorizontalSampler:
                 max(smallest, radius_before / _WIDEST_RATIO),
                 min(largest, radius_before * _WIDEST_RATIO),
             )
-        if radius_before is not None and self.design_class != "EKA3":
+        if radius_before is not None and self.limits.radius_ratio < math.inf:
             smallest = max(
                 smallest,
-                radius_before / BALANCE
+                radius_before / self.limits.radius_ratio
                 if radius_before < BALANCED_BELOW
-                else min(_BALANCED_FROM, radius_before / BALANCE),
+                else min(_BALANCED_FROM, radius_before / self.limits.radius_ratio),
             )
-            largest = min(largest, radius_before * BALANCE) if radius_before < BALANCED_BELOW else largest
+            largest = (
+                min(largest, radius_before * self.limits.radius_ratio) if radius_before < BALANCED_BELOW else largest
+            )
         if room < math.inf:
             smallest, largest = (
                 max(smallest, self.limits.clothoid**2 / max(room, 1.0)),
@@ -271,7 +284,9 @@ class HorizontalSampler:
     def _room(self, part: _AlignmentPart) -> float:
         """Return by how much (m) a straight or arc may still be lengthened."""
         longest_length = (
-            LONGEST_STRAIGHT if part.start == 0.0 else max(_LONGEST_TURN / abs(part.start), self.shortest_arc)
+            self.limits.straight_longest
+            if part.start == 0.0
+            else max(_LONGEST_TURN / abs(part.start), self.shortest_arc)
         )
         return max(0.0, longest_length - part.length)
 
@@ -299,7 +314,7 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
     """Return drawn points of vertical intersection, 300 to 900 m apart; elevation 0 at the road's middle.
 
     Each rounding has half of the shorter of its two tangents; a grade changes by no more than the least radius allows
-    within it. Long roads turn back to the height they came from.
+    within it, and not at all where the tangents would be too short. Long roads turn back to the height they came from.
     """
     limits = LIMITS[scenario.design_class]
     steepest_grade = limits.grade_percent
@@ -317,6 +332,10 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
         span_before = (station_of_point - station_before) / (1 if station_before == stations[0] else 2)
         tangent = min(span_before, (station_after - station_of_point) / (1 if station_after == stations[-1] else 2))
         climb += grades[-1] / 100.0 * (station_of_point - station_before)
+        if tangent < limits.vertical_tangent:
+            grades.append(grades[-1])
+            radii.append(0.0)
+            continue
         least_grade = max(lowest_grade, grades[-1] - 200.0 * tangent / limits.crest)
         largest_grade = min(highest_grade, grades[-1] + 200.0 * tangent / limits.sag)
         if climb > HIGHEST_CLIMB:
@@ -326,6 +345,7 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
         grades.append(round_value(rng.uniform(least_grade, largest_grade)))
         grade_change = abs(grades[-1] - grades[-2]) / 100.0
         least_radius = limits.crest if grades[-1] < grades[-2] else limits.sag
+        least_radius = max(least_radius, 2.0 * limits.vertical_tangent * _MARGIN / max(grade_change, 1e-9))
         largest_radius = max(least_radius, min(2.0 * tangent / max(grade_change, 1e-9), 5.0 * least_radius))
         radii.append(round_value(rng.uniform(least_radius, largest_radius)) if grade_change > 0 else 0.0)
     elevations = np.concatenate([[0.0], np.cumsum(np.diff(stations) * np.array(grades) / 100.0)])

@@ -12,17 +12,17 @@ from operator import attrgetter
 from ..base.errors import InputError
 from ..base.schema import Model
 from ..road.guidelines import (
+    DUAL_CROSS_SECTIONS,
     EMERGENCY_BAY_LENGTH,
     EMERGENCY_BAY_TAPER,
     EMERGENCY_BAY_WIDTH,
-    LANE_TAPER_LENGTH,
     LIMITS,
     SECTIONS_OF_CLASS,
     STANDARD_CROSS_SECTIONS,
     TURNOUT_GAP,
-    TURNOUT_LANE_LENGTH,
     TURNOUT_LANE_WIDTH,
     TURNOUT_TAPER,
+    is_single,
 )
 from ..road.section import Marking, Pothole, Ramp, Rut, Turnout
 from ..road.surroundings import Environment, Landscape, MaterialVariation, Terrain, Vegetation, Vehicle
@@ -32,7 +32,7 @@ from ..scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
 from .section import RampLimits, cross_section_of, features_of, may_change_lanes
 
-LEAST_MEDIAN = min(section.median for section in STANDARD_CROSS_SECTIONS.values())
+LEAST_MEDIAN = min(section.median for section in DUAL_CROSS_SECTIONS.values())
 """Narrowest median of the standard cross-sections, m."""
 WIDEST_RADIUS = 100_000.0
 """A curve of a larger radius (m) is a straight."""
@@ -176,8 +176,7 @@ def _cross_section(scenario: RoadScenario) -> Iterator[str]:
     section, name = cross_section_of(scenario), scenario.cross_section
     if isinstance(name, str):
         standard = STANDARD_CROSS_SECTIONS[name]
-        width = 2.0 * (section.paved_width + section.verge) + section.median
-        allowed_width = 2.0 * (standard.paved_width + standard.verge) + standard.median
+        width, allowed_width = section.total_width, standard.total_width
         if len(section.lanes) > len(standard.lanes):
             yield f"lanes is {len(section.lanes)}, {name} has {len(standard.lanes)} per direction"
         if width > allowed_width + 1e-9:
@@ -188,10 +187,12 @@ def _cross_section(scenario: RoadScenario) -> Iterator[str]:
     least_width = min(
         min(STANDARD_CROSS_SECTIONS[section_name].lanes) for section_name in SECTIONS_OF_CLASS[scenario.design_class]
     )
-    if min(section.lanes) < least_width:
+    if min(section.lanes) < least_width and not section.single:
         field = "cross_section.lanes" if scenario.lane_width is None else "lane_width"
         yield f"{field} is {min(section.lanes):g} m, {scenario.design_class} needs {least_width:g} m"
-    if section.median < LEAST_MEDIAN:
+    if section.single and scenario.median_width is not None:
+        yield f"median_width is {section.median:g} m, the one carriageway of {scenario.design_class} has no median"
+    if not section.single and section.median < LEAST_MEDIAN:
         field = "cross_section.median" if scenario.median_width is None else "median_width"
         yield f"{field} is {section.median:g} m, {LEAST_MEDIAN:g} m are needed"
     edge = section.median / 2.0 + section.paved_width + section.verge
@@ -201,7 +202,12 @@ def _cross_section(scenario: RoadScenario) -> Iterator[str]:
 
 def _lane_changes(scenario: RoadScenario) -> Iterator[str]:
     """Yield a sentence if lanes may begin or end, but their tapers are all too short."""
-    limits, least_length = scenario.lane_changes, LANE_TAPER_LENGTH[scenario.design_class]
+    if is_single(scenario.design_class):
+        if scenario.lane_changes.share > 0.0:
+            share = scenario.lane_changes.share
+            yield f"lane_changes.share is {share:g}, {scenario.design_class} has none: 0 is allowed"
+        return
+    limits, least_length = scenario.lane_changes, LIMITS[scenario.design_class].lane_taper_length
     if limits.share > 0.0 and may_change_lanes(scenario, cross_section_of(scenario)):
         yield from _short("lane_changes.taper_length", limits.taper_length, least_length, scenario.design_class)
 
@@ -209,8 +215,13 @@ def _lane_changes(scenario: RoadScenario) -> Iterator[str]:
 def _turnouts(scenario: RoadScenario) -> Iterator[str]:
     """Yield a sentence for each limit that no turnout can keep to, where turnouts are wanted."""
     limits, name = scenario.turnouts, scenario.design_class
+    if is_single(name):
+        for kind in ("exits", "entries", "emergency_bays"):
+            if (share := getattr(limits, kind)) > 0.0:
+                yield f"turnouts.{kind} is {share:g}, {name} has none: 0 is allowed"
+        return
     if limits.exits > 0.0 or limits.entries > 0.0:
-        yield from _short("turnouts.lane_length", limits.lane_length, TURNOUT_LANE_LENGTH[name], name)
+        yield from _short("turnouts.lane_length", limits.lane_length, LIMITS[name].turnout_lane_length, name)
         yield from _short("turnouts.lane_width", limits.lane_width, TURNOUT_LANE_WIDTH, "a turnout")
         yield from _short("turnouts.taper_length", limits.taper_length, TURNOUT_TAPER, "a turnout")
         ramps = RampLimits(scenario, cross_section_of(scenario))

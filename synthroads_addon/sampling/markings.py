@@ -1,4 +1,8 @@
-"""Line markings, hatching and arrows as the cross-section and the turnouts ask for them (RMS)."""
+"""Line markings, hatching and arrows as the cross-section and the turnouts ask for them (RMS).
+
+Between the two directions of a single carriageway lies the line that its cross-section has: none, a single one that is
+dashed where drivers see far enough to overtake, or a line at the inner edge of either direction.
+"""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -6,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from ..base.schema import round_value
-from ..road.guidelines import LIMITS
+from ..road.guidelines import LIMITS, EdgeLine, StandardCrossSection, is_single
 from ..road.objects import AnyWidth, Side, WidthPoint, nominal_width, width_at, width_kinks
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
+from ..road.sight import overtaking_spans
 from ..road.turnout_geometry import TurnoutShape
 from .placing.ranges import Range, Reservations, free_ranges
 from .placing.site import PlacementSite
+from .section import cross_section_of
 
-NARROW, BROAD = 0.15, 0.30
-LANE_DASH, LANE_GAP = 6.0, 12.0
 BLOCK_DASH = BLOCK_GAP = 6.0
 SOLID_BEFORE_GORE = 30.0
 """The line beside a turnout's lane is solid for so long before (exit) or behind (entry) the gore's tip, m."""
@@ -31,12 +35,13 @@ def place_markings(site: PlacementSite) -> Iterator[tuple[str, LineMarking | Hat
     """Yield (id, marking) of everything painted on a road, all with instance 1 and films of one thickness."""
     limits = site.scenario.markings.film_thickness
     film = round_value(site.stream("film").uniform(limits.minimum, limits.maximum))
+    section = cross_section_of(site.scenario)
     is_meeting = _meet(site.carriageways)
     for side, carriageway in site.carriageways.items():
         sampler = _Painter(site, side, carriageway, film)
-        yield from sampler.lines(inner_edge=not is_meeting)
+        yield from sampler.lines(section.edge_line, inner_edge=not is_meeting)
         if is_meeting and side == "right":
-            yield sampler.centre_line()
+            yield from sampler.centre_lines(section)
         for name, turnout in site.turnouts_of(side).items():
             if turnout.ramp:
                 yield from sampler.turnout(name, turnout)
@@ -51,31 +56,56 @@ class _Painter:
         self.name = f"carriageway-{side}"
         self.section = site.sections[side]
         self.length = round_value(site.length)
-        self.arrow_length = 7.5 if LIMITS[site.design_class].speed > 80.0 else 5.0
+        self.limits = LIMITS[site.design_class]
+        self.arrow_length = 7.5 if self.limits.speed > 80.0 else 5.0
 
-    def centre_line(self) -> tuple[str, LineMarking]:
-        """Return (id, marking) of the dashed line at the inner edge, where both directions meet."""
+    def centre_lines(self, section: StandardCrossSection) -> Iterator[tuple[str, LineMarking]]:
+        """Yield (id, marking) of the line at the inner edge, where both directions meet.
+
+        It is dashed, but solid on a single carriageway where drivers don't see far enough to overtake.
+        """
         dash, gap = self._dashes()
-        fields = {"offset": self.carriageway.inner_offset, "dash_length": dash, "gap_length": gap}
-        return "centre-line", self._line("free", (0.0, self.length), **fields)
+        if section.single and (
+            section.centre_line == "none" or min(section.lanes) < self.limits.narrowest_centre_line_lane
+        ):
+            return
+        spans = [(0.0, self.length, True)]
+        if section.single:
+            spans = overtaking_spans(self.site.alignment, section.paved_width, self._overtaking_sight(), self.length)
+        for number, (start, end, may_overtake) in enumerate(spans):
+            dashes = {"dash_length": dash, "gap_length": gap} if may_overtake else {}
+            name = "centre-line" + (f"-{number + 1}" if number else "")
+            yield name, self._line("free", (start, end), offset=self.carriageway.inner_offset, **dashes)
+
+    def _overtaking_sight(self) -> float:
+        """Return how far (m) drivers must see where the line between the directions is dashed."""
+        sight = self.site.scenario.markings.overtaking_sight
+        return self.limits.overtaking_sight if sight is None else sight
+
+    @property
+    def edge_width(self) -> float:
+        """Return the width (m) of the outer edge line: broad on motorways, narrow on single carriageways."""
+        return self.limits.narrow_line if is_single(self.site.design_class) else self.limits.broad_line
 
     def _dashes(self) -> tuple[float, float]:
         """Return the lengths (m) of a lane line's dashes and gaps: the scenario's, else the usual ones."""
         limits = self.site.scenario.markings
-        return limits.lane_dash or LANE_DASH, limits.lane_gap or LANE_GAP
+        return limits.lane_dash or self.limits.lane_dash, limits.lane_gap or self.limits.lane_gap
 
-    def lines(self, inner_edge: bool = True) -> Iterator[tuple[str, LineMarking]]:
-        """Yield (id, marking) of the lines along lane boundaries: solid at the edges, dashed between lanes.
+    def lines(self, edge_line: EdgeLine, inner_edge: bool = True) -> Iterator[tuple[str, LineMarking]]:
+        """Yield (id, marking) of the lines along lane boundaries: at the edges, and dashed between lanes.
 
         Args:
-            inner_edge: whether there is one at the inner edge.
+            edge_line: how the outer edge line is: solid, dashed, or none.
+            inner_edge: whether there is a line at the inner edge.
         """
         lanes = self.carriageway.lanes
         dash, gap = self._dashes()
         blocks = Reservations(_block_span(shape) for shape in self.section.turnouts if shape.turnout.ramp)
-        for number, span in enumerate(free_ranges(0.0, self.length, blocks)):
+        edge_dashes = {"dash_length": dash, "gap_length": gap} if edge_line == "dashed" else {}
+        for number, span in enumerate(free_ranges(0.0, self.length, blocks) if edge_line != "none" else ()):
             name = f"{self.name}-line-0" + (f"-{number + 1}" if number else "")
-            yield name, self._line("outer_edge", span, boundary=0, width=BROAD)
+            yield name, self._line("outer_edge", span, boundary=0, width=self.edge_width, **edge_dashes)
         for boundary in range(1, len(lanes)):
             # Only an outermost or innermost lane ends: one of the two beside a boundary.
             (outer_start, outer_end), (inner_start, inner_end) = (
@@ -96,14 +126,14 @@ class _Painter:
         shape = self.site.shape(turnout)
         assert turnout.ramp is not None
         dashes = {"dash_length": BLOCK_DASH, "gap_length": BLOCK_GAP}
-        yield f"{name}-block", self._line("block", _block_span(shape), width=BROAD, **dashes)
+        yield f"{name}-block", self._line("block", _block_span(shape), width=self.limits.broad_line, **dashes)
         taper, lane = turnout.taper_in_length + turnout.taper_out_length, turnout.lane_length
         # The edge line begins where its strip has become as wide as the line.
-        begin = taper * min(1.0, BROAD / max(turnout.edge_strip_width, BROAD))
+        begin = taper * min(1.0, self.limits.broad_line / max(turnout.edge_strip_width, self.limits.broad_line))
         edge = _stations(shape, begin, turnout.length)
-        yield f"{name}-edge", self._line("turnout_edge", edge, turnout=name, width=BROAD)
+        yield f"{name}-edge", self._line("turnout_edge", edge, turnout=name, width=self.limits.broad_line)
         gore = _stations(shape, taper + lane, turnout.length)
-        yield f"{name}-gore-edge", self._line("gore_edge", gore, turnout=name, width=BROAD)
+        yield f"{name}-gore-edge", self._line("gore_edge", gore, turnout=name, width=self.limits.broad_line)
         yield f"{name}-hatching", Hatching(instance=1, turnout=name, film_thickness=self.film)
         if turnout.kind == "exit":
             count = max(_ARROWS_AT_LEAST, round(lane / ARROW_SPACING))
@@ -131,7 +161,12 @@ class _Painter:
 
     def _line(self, kind: Any, span: Range, **values: Any) -> LineMarking:
         """Return a line marking between two stations (m): solid and narrow unless `values` says otherwise."""
-        fields = {"width": NARROW, "dash_length": 0.0, "gap_length": 0.0, "film_thickness": self.film} | values
+        fields = {
+            "width": self.limits.narrow_line,
+            "dash_length": 0.0,
+            "gap_length": 0.0,
+            "film_thickness": self.film,
+        } | values
         start, end = span
         return LineMarking(instance=1, carriageway=self.name, kind=kind, start_station=start, end_station=end, **fields)
 

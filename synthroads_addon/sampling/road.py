@@ -9,6 +9,7 @@ from ..base.schema import round_value
 from ..base.version import generator
 from ..road.geometry import alignment_of
 from ..road.given_road import GivenRoad
+from ..road.guidelines import is_single
 from ..road.objects import RoadObject, Side
 from ..road.parameters import AlignmentObject, Metadata, RoadParameters, Transform
 from ..road.section import Carriageway, Median, Turnout
@@ -160,7 +161,7 @@ def _sample_site(
 
 def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
     """Yield (id, object) of the median, the carriageways and the turnouts."""
-    if len(site.carriageways) > 1:
+    if len(site.carriageways) > 1 and not is_single(site.design_class):
         yield "median", Median(instance=1)
     for side, carriageway in site.carriageways.items():
         yield f"carriageway-{side}", carriageway

@@ -19,11 +19,9 @@ from ..road.guidelines import (
     EMERGENCY_BAY_LENGTH,
     EMERGENCY_BAY_TAPER,
     EMERGENCY_BAY_WIDTH,
-    INTERCHANGE_SPACING,
-    LANE_TAPER_LENGTH,
+    LIMITS,
     STANDARD_CROSS_SECTIONS,
     TURNOUT_GAP,
-    TURNOUT_LANE_LENGTH,
     TURNOUT_LANE_WIDTH,
     TURNOUT_TAPER,
     StandardCrossSection,
@@ -148,10 +146,12 @@ def bounds(limits: Interval, least: float = -math.inf) -> tuple[float, float]:
 
 def features_of(scenario: RoadScenario, section: StandardCrossSection, ramps: RampLimits) -> tuple[Feature, ...]:
     """Return the turnouts and lane changes that a carriageway may have; those that can't fit are left out."""
-    limits, design_class = scenario.turnouts, scenario.design_class
+    if section.single:
+        return ()
+    limits, class_limits = scenario.turnouts, LIMITS[scenario.design_class]
     taper, lane = limits.taper_length, limits.lane_length
-    with_ramp = (bounds(taper, TURNOUT_TAPER), bounds(lane, TURNOUT_LANE_LENGTH[design_class]), ramps.lengths)
-    spacing = INTERCHANGE_SPACING[design_class]
+    with_ramp = (bounds(taper, TURNOUT_TAPER), bounds(lane, class_limits.turnout_lane_length), ramps.lengths)
+    spacing = class_limits.interchange_spacing
     length_of_another = spacing or _INTERCHANGE_EVERY
     features = [
         Feature("exit", limits.exits, with_ramp, BLEND + STEP, spacing, length_of_another),
@@ -163,7 +163,7 @@ def features_of(scenario: RoadScenario, section: StandardCrossSection, ramps: Ra
         features.append(Feature("emergency_bay", limits.emergency_bays, bay_lengths, length_of_another=_BAY_EVERY))
     if may_change_lanes(scenario, section):
         lane_changes = scenario.lane_changes
-        tapers = (bounds(lane_changes.taper_length, LANE_TAPER_LENGTH[design_class]),)
+        tapers = (bounds(lane_changes.taper_length, class_limits.lane_taper_length),)
         features.append(Feature("lane_change", lane_changes.share, tapers, 2.0 * BESIDE_LANE_CHANGE))
     return tuple(f for f in features if f.share > 0.0 and all(least <= largest for least, largest in f.lengths))
 
@@ -296,7 +296,8 @@ def cross_section_of(scenario: RoadScenario) -> StandardCrossSection:
     if scenario.lane_width is not None:
         lanes = (scenario.lane_width,) * len(lanes)
     median = section.median if scenario.median_width is None else scenario.median_width
-    return replace(section, lanes=lanes, median=median)
+    oncoming_lanes = section.oncoming_lanes if scenario.lanes is None and scenario.lane_width is None else ()
+    return replace(section, lanes=lanes, median=median, oncoming_lanes=oncoming_lanes)
 
 
 def _unchanged_cross_section(cross_section: str | FreeCrossSection) -> StandardCrossSection:
@@ -324,7 +325,8 @@ class CarriagewaySampler:
         """Return a drawn carriageway and its turnouts by id, all with instance 1; with its crossfall if it is given."""
         rng = stream(self.seed, "section", side)
         turnouts: dict[str, Turnout] = {}
-        lanes = tuple(Lane(width=width) for width in self.section.lanes)
+        section = self.section.of_side(side)
+        lanes = tuple(Lane(width=width) for width in section.lanes)
         for place in arrange_features(self.features, self.length, rng):
             if place.kind == "lane_change":
                 lanes = self._change_lane(lanes, place, side, rng)
@@ -356,7 +358,7 @@ class CarriagewaySampler:
         is_dropped = rng.random() < 0.5
         (taper,) = place.lengths
         start = lowest_station(side, self.length, place.begin + BESIDE_LANE_CHANGE, taper)
-        full_width = self.section.lanes[index]
+        full_width = self.section.of_side(side).lanes[index]
         first_width, last_width = (full_width, 0.0) if is_dropped == (side == "right") else (0.0, full_width)
         stations = (0.0, start, round_value(start + taper), round_value(self.length))
         points = zip(stations, (first_width, first_width, last_width, last_width), strict=True)
@@ -365,7 +367,7 @@ class CarriagewaySampler:
 
     def _carriageway(self, side: Side, lanes: tuple[Lane, ...], rng: np.random.Generator) -> Carriageway:
         """Return a carriageway of the road's cross-section with its crossfall, and its pavement with drawn damage."""
-        section, axis = self.section, self.axis.horizontal
+        section, axis = self.section.of_side(side), self.axis.horizontal
         damage = PavementDamage(self.scenario.materials, self.seed, side, self.length, self._lane_edges(lanes))
         return Carriageway(
             instance=1,
@@ -376,7 +378,8 @@ class CarriagewaySampler:
             lanes=lanes,
             inner_edge_strip_width=section.inner_edge_strip,
             verge_width=section.verge,
-            crossfall=crossfall_points(self.scenario.design_class, side, section.paved_width / 2.0, axis),
+            crossfall=crossfall_points(self.scenario.design_class, side, self.section.lever, axis),
+            rotation_axis="centreline" if section.single else "carriageway_axis",
             pavement=Pavement(
                 **self._courses.draw(side, len(lanes)),
                 **self._relief(side),
@@ -421,7 +424,7 @@ class CarriagewaySampler:
             end_station=round_value(min(start + length, self.length)),
             depth=draw_between(rng, bounds(limits.rut_depth)),
             width=width,
-            track=round_value(min(_WHEEL_TRACK, self.section.lanes[lane] - width)),
+            track=round_value(min(_WHEEL_TRACK, nominal_width(lanes[lane].width) - width)),
             ramp_length=round_value(min(_RUT_RAMP, length / 3.0)),
         )
         return (rut,)
@@ -437,7 +440,7 @@ class CarriagewaySampler:
             station = draw_between(rng, (length / 2.0, self.length - length / 2.0))
             # A lane only grows or only shrinks: one of the ends is the narrowest place.
             paved_width = min(
-                self._paved_width(lanes, station + half_length) for half_length in (-length / 2.0, length / 2.0)
+                self._paved_width(side, lanes, station + half_length) for half_length in (-length / 2.0, length / 2.0)
             )
             width = min(draw_between(rng, (smallest, largest)), paved_width)
             offset = sign * draw_between(rng, (inner_edge + width / 2.0, inner_edge + paved_width - width / 2.0))
@@ -445,9 +448,9 @@ class CarriagewaySampler:
             potholes.append(Pothole(station=station, offset=offset, length=length, width=width, depth=depth))
         return tuple(potholes)
 
-    def _paved_width(self, lanes: tuple[Lane, ...], station: float) -> float:
+    def _paved_width(self, side: Side, lanes: tuple[Lane, ...], station: float) -> float:
         """Return the width (m) of the main road's pavement of one carriageway at a station."""
-        total_width = self.section.paved_width
+        total_width = self.section.of_side(side).paved_width
         for lane in lanes:
             if isinstance(lane.width, tuple):
                 total_width += float(width_at(lane.width, station)) - nominal_width(lane.width)

@@ -4,6 +4,7 @@ from typing import Any
 
 from ..base.random_streams import stream
 from ..base.schema import round_value
+from ..road.guidelines import is_single
 from ..road.objects import Side
 from ..road.section import RemovedMarking, SurfaceCourse
 from ..scenario.road import RoadScenario
@@ -11,7 +12,7 @@ from .pavement_damage import draw_materials
 from .placing.draw import draw_between, pick
 
 _OTHER_KIND = 0.25
-"""Probability that one direction was renewed with another kind of asphalt or concrete than the other one."""
+"""Probability that one carriageway was renewed with another kind of asphalt or concrete than the other one."""
 _MOVED = (0.25, 1.2)
 """Distance of a former lane line from today's boundary, m: where traffic was led closer to one side."""
 _REMOVED_WIDTH, _REMOVED_DEPTH = 0.03, (0.0005, 0.003)
@@ -36,12 +37,13 @@ class SurfaceCourses:
         self._kinds: tuple[SurfaceCourse, ...] = limits.concretes if concrete else limits.asphalts
         self._first_kind = pick(stream(seed, "surface course"), self._kinds)
         self._age = draw_materials(scenario.materials, seed)["asphalt_age"]
+        self._other_kind = 0.0 if is_single(scenario.design_class) else _OTHER_KIND
         self._scenario, self._seed, self._length = scenario, seed, length
 
     def draw(self, side: Side, lanes: int) -> dict[str, Any]:
         """Return the kind and ages of a carriageway with a number of lanes, as fields of its pavement."""
         rng = stream(self._seed, "surface course", side)
-        kind = pick(rng, self._kinds) if side == "left" and rng.random() < _OTHER_KIND else self._first_kind
+        kind = pick(rng, self._kinds) if side == "left" and rng.random() < self._other_kind else self._first_kind
         fields: dict[str, Any] = {"kind": kind}
         if rng.random() >= self._scenario.pavement.renewed:
             return fields

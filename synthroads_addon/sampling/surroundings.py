@@ -11,7 +11,7 @@ from ..base.arrays import Bool, Float, Index
 from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..materials.textures import texture_sets
-from ..road.guidelines import OBSTACLE_DISTANCE, SWALE_DEPTH_SHARE
+from ..road.guidelines import LIMITS, SWALE_DEPTH_SHARE
 from ..road.objects import AnyWidth, RoadObject, Side, least_width, nominal_width, width_at, width_kinks
 from ..road.parameters import AlignmentObject
 from ..road.section_geometry import CarriagewaySection
@@ -154,7 +154,7 @@ def _room_beside(site: PlacementSite) -> float:
 def _first_tree(site: PlacementSite) -> float:
     """Return the distance (m) behind the verge from which trees may stand beside either carriageway."""
     narrowest_verge = min(least_width(road.verge_width) for road in site.carriageways.values())
-    return round_value(max(0.0, OBSTACLE_DISTANCE[site.design_class] - narrowest_verge))
+    return round_value(max(0.0, LIMITS[site.design_class].obstacle_distance - narrowest_verge))
 
 
 def _draw_species(rng: np.random.Generator, kind: Kind, names: tuple[str, ...]) -> list[str]:

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from ..base.schema import ClosedModel, Finite, notes, quantity
-from ..road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS, USUAL_SECTION, design_class_of
+from ..road.guidelines import (
+    CLASS_LABELS,
+    DESIGN_CLASSES,
+    GUIDELINE_OF_CLASS,
+    SECTIONS_OF_CLASS,
+    STANDARD_CROSS_SECTIONS,
+    USUAL_SECTION,
+    design_class_of,
+    is_single,
+)
 from ..road.section import ASPHALTS, CONCRETES, SHORTEST_DASH
 from ..road.surroundings import GRASSES, SHRUBS, TREES
 from ..road.things.limits import Interval, interval, share
@@ -39,6 +49,17 @@ CrossSection = Annotated[
     Discriminator(_form, "cross_section_type", "must be a standard cross-section's name or a JSON object with lanes"),
 ]
 """A standard cross-section's name, or one by hand."""
+
+
+def _merge_below(data: Any, defaults: Mapping[str, Any]) -> Any:
+    """Return data with the defaults of what it lacks, part by part; what isn't a dictionary is returned unchanged."""
+    if not isinstance(data, Mapping):
+        return data
+    merged = {
+        name: _merge_below(value, defaults[name]) if isinstance(defaults.get(name), Mapping) else value
+        for name, value in data.items()
+    }
+    return {**merged, **{name: value for name, value in defaults.items() if name not in data}}
 
 
 class LaneChangeLimits(ClosedModel):
@@ -105,10 +126,26 @@ class MarkingLimits(ClosedModel):
     """Line markings; what isn't given follows the RMS."""
 
     lane_dash: float | None = quantity(
-        None, "m", "Dash of lane lines; 6 m by the RMS.", (SHORTEST_DASH, 100), inherits="rms.lane_dash"
+        None,
+        "m",
+        "Dash of lane lines; 6 m on motorways, 4 m on country roads.",
+        (SHORTEST_DASH, 100),
+        inherits="design_class.lane_dash",
     )
     lane_gap: float | None = quantity(
-        None, "m", "Gap of lane lines; 12 m by the RMS.", (SHORTEST_DASH, 100), inherits="rms.lane_gap"
+        None,
+        "m",
+        "Gap of lane lines; 12 m on motorways, 8 m on country roads.",
+        (SHORTEST_DASH, 100),
+        inherits="design_class.lane_gap",
+    )
+    overtaking_sight: float | None = quantity(
+        None,
+        "m",
+        "Sight from which the line between the directions of one carriageway is dashed; the class's if not given.",
+        (50, 2000),
+        title="Overtaking Sight",
+        inherits="design_class.overtaking_sight",
     )
     film_thickness: Interval = interval(0.0015, 0.004, "m", "Thickness of the film.")
     removed: float = share(
@@ -242,15 +279,15 @@ class MaterialLimits(ClosedModel):
 class RoadScenario(ClosedModel):
     """Limits that the road is sampled within."""
 
-    design_class: Literal["EKA1A", "EKA1B", "EKA2", "EKA3"] = Field(
+    design_class: Literal[DESIGN_CLASSES] = Field(  # type: ignore[valid-type]
         "EKA1A",
-        description="Design class (RAA); if not given, the first that has the cross-section.",
-        json_schema_extra=notes(labels={"EKA1A": "EKA 1 A", "EKA1B": "EKA 1 B", "EKA2": "EKA 2", "EKA3": "EKA 3"}),
+        description="Design class (RAA: motorways; RAL: country roads); if not given, the first with the section.",
+        json_schema_extra=notes(labels=CLASS_LABELS),
     )
     cross_section: CrossSection = Field(
         "RQ31",
         title="Cross-Section",
-        description="Standard cross-section, or a custom one; if not given, EKA2 has RQ28 and EKA3 RQ25.",
+        description="Standard cross-section, or a custom one; if not given, the usual one of the class.",
     )
     lanes: int | None = quantity(
         None,
@@ -349,15 +386,23 @@ class RoadScenario(ClosedModel):
             return data
         design_class, section = str(data.get("design_class")), data.get("cross_section")
         if "cross_section" not in data and design_class in USUAL_SECTION:
-            return {**data, "cross_section": USUAL_SECTION[design_class]}
-        if "design_class" not in data and isinstance(section, str) and section in STANDARD_CROSS_SECTIONS:
-            return {**data, "design_class": design_class_of(section, next(iter(USUAL_SECTION)))}
-        return data
+            data = {**data, "cross_section": USUAL_SECTION[design_class]}
+        elif "design_class" not in data and isinstance(section, str) and section in STANDARD_CROSS_SECTIONS:
+            design_class = design_class_of(section, next(iter(USUAL_SECTION)))
+            data = {**data, "design_class": design_class}
+        guideline = GUIDELINE_OF_CLASS.get(design_class)
+        return _merge_below(data, guideline.defaults) if guideline else data
 
     @model_validator(mode="after")
     def _check_cross_section(self) -> RoadScenario:
         """Refuse a cross-section that isn't a standard one, or that the design class doesn't allow."""
         if not isinstance(self.cross_section, str):
+            if is_single(self.design_class):
+                names = ", ".join(SECTIONS_OF_CLASS[self.design_class])
+                raise ValueError(
+                    f"cross_section is by hand, of two carriageways: {self.design_class} allows {names}, which "
+                    "lane_width and lanes change"
+                )
             return self
         if self.cross_section not in STANDARD_CROSS_SECTIONS:
             names = ", ".join(STANDARD_CROSS_SECTIONS)

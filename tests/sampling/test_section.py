@@ -9,13 +9,10 @@ import pytest
 
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.guidelines import (
-    INTERCHANGE_SPACING,
-    LANE_TAPER_LENGTH,
     LIMITS,
     SECTIONS_OF_CLASS,
     STANDARD_CROSS_SECTIONS,
     TURNOUT_GAP,
-    TURNOUT_LANE_LENGTH,
 )
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import ASPHALTS, CONCRETES, Carriageway, LineMarking, Median, Turnout
@@ -100,7 +97,7 @@ def test_one_lane_at_the_edge_begins_or_ends_over_a_long_taper(roads, furnished)
             widths = [point.width for point in points]
             assert widths[:2] == widths[3:1:-1] or sorted(widths) == sorted([0.0, 0.0, max(widths), max(widths)])
             start, end = points[1].station, points[2].station
-            assert end - start >= LANE_TAPER_LENGTH[road.design_class] - 1e-6
+            assert end - start >= LIMITS[road.design_class].lane_taper_length - 1e-6
             for _, turnout in turnouts:
                 low, high = stretch(turnout)
                 assert high <= start - TURNOUT_GAP + 0.02 or low >= end + TURNOUT_GAP - 0.02
@@ -149,7 +146,7 @@ def test_turnouts_lie_in_the_road_and_apart(roads, furnished) -> None:
                 assert after[0] - before[1] >= TURNOUT_GAP - 0.05
             for kind in ("exit", "entry"):
                 alike = [turnout.start_station for _, turnout in turnouts if turnout.kind == kind]
-                assert all(b - a >= INTERCHANGE_SPACING[road.design_class] for a, b in pairwise(alike))
+                assert all(b - a >= LIMITS[road.design_class].interchange_spacing for a, b in pairwise(alike))
             assert all(turnout.carriageway == f"carriageway-{carriageway.side}" for _, turnout in turnouts)
 
 
@@ -161,7 +158,7 @@ def test_turnouts_keep_the_limits_of_their_class(roads, furnished) -> None:
                     assert turnout.lane_length >= 40.0
                     assert turnout.lane_width >= 3.0
                     continue
-                assert turnout.lane_length >= TURNOUT_LANE_LENGTH[road.design_class]
+                assert turnout.lane_length >= LIMITS[road.design_class].turnout_lane_length
                 assert turnout.lane_width >= 3.5
                 assert turnout.ramp.length >= nose(turnout, carriageway) + 10.0 - 1e-6
 
@@ -207,7 +204,7 @@ def test_long_roads_have_several_exits() -> None:
         road = sample_road(scenario(length=40_000.0, turnouts={"exits": 1.0}), seed)
         counts += [sum(turnout.kind == "exit" for _, turnout in turnouts) for _, _, turnouts in sides(road)]
     assert min(counts) >= 3
-    assert max(counts) <= 1 + 40_000 / INTERCHANGE_SPACING["EKA1A"]
+    assert max(counts) <= 1 + 40_000 / LIMITS["EKA1A"].interchange_spacing
 
 
 # --- pavement -----------------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.materials.variation import vary_material
-from synthroads_addon.road.guidelines import OBSTACLE_DISTANCE
+from synthroads_addon.road.guidelines import LIMITS
 from synthroads_addon.road.objects import width_at
 from synthroads_addon.road.parameters import (
     AlignmentObject,
@@ -224,7 +224,7 @@ def test_trees_are_no_obstacles(design_class: str, verge) -> None:
     trees = of_kind(dict(sample_vegetation(here)), "tree")
     assert trees
     for item in trees:
-        assert narrowest + item.band_start == pytest.approx(OBSTACLE_DISTANCE[design_class], abs=1e-9)
+        assert narrowest + item.band_start == pytest.approx(LIMITS[design_class].obstacle_distance, abs=1e-9)
 
 
 @pytest.mark.parametrize(

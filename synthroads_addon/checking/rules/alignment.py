@@ -1,4 +1,4 @@
-"""Rules for the centreline: radii, clothoids, straights, grades and roundings (RAA)."""
+"""Rules for the centreline: radii, clothoids, straights, grades and roundings (RAA, RAL)."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -7,16 +7,21 @@ from typing import Literal
 
 import numpy as np
 
-from ...road.guidelines import LONGEST_STRAIGHT
-from .rule import STRAIGHT, CurvatureRun, Finding, Road, Rule, at_least, at_most, out_of_order, same_curvature
+from .rule import (
+    STRAIGHT,
+    TOLERANCE,
+    CurvatureRun,
+    Finding,
+    Road,
+    Rule,
+    at_least,
+    at_most,
+    out_of_order,
+    same_curvature,
+)
 
-#: Shortest straight between two curves of the same direction, m (RAA, after a textbook).
-SHORTEST_STRAIGHT_SAME_DIRECTION = 400.0
-#: The larger of two neighbouring radii over the smaller, at most, where the smaller is below the radius beside (RAA).
-RADIUS_RATIO = 1.5
+#: Where the smaller of two neighbouring radii is below this (m), their ratio is limited (RAA).
 RADIUS_RATIO_BELOW = 1500.0
-#: The larger parameter of an S-curve's two clothoids over the smaller, at most (RAA).
-CLOTHOID_RATIO = 1.5
 #: Curvature (1/m) whose jumps are rounding in a file, and felt by nobody: 0.13 mm/s² at 130 km/h (chosen).
 _LEAST_JUMP = 1e-7
 #: Grades that differ by less than this (m/m) need no rounding: 0.1 mm on 100 m.
@@ -36,7 +41,7 @@ def _radius(road: Road) -> Iterator[Finding]:
     curves = [(run.start, run.radius) for run in road.runs if not run.straight]
     curves += [(station, 1.0 / curvature) for station, curvature in _sharp_clothoid_ends(road)]
     for station, radius in sorted(curves):
-        text = f"The radius of {radius:.1f} m is below {least_radius:.0f} m ({road.guideline})."
+        text = f"The radius of {radius:.1f} m is below {least_radius:.0f} m ({road.cite('radius', True)})."
         yield from at_least(road.axis, station, radius, least_radius, text)
 
 
@@ -78,6 +83,8 @@ def _clothoids(road: Road) -> Iterator[tuple[int, float, float, float]]:
 def _clothoid_minimum(road: Road) -> Iterator[Finding]:
     """Yield a finding for each clothoid whose parameter A is below the class's smallest."""
     least_parameter = road.limits.clothoid
+    if not road.binds("clothoid"):
+        return
     for i, parameter, _, _ in _clothoids(road):
         text = f"The clothoid's A = {parameter:.1f} m is below {least_parameter:.0f} m ({road.guideline})."
         yield from at_least(road.axis, road.starts[i], parameter, least_parameter, text)
@@ -86,19 +93,27 @@ def _clothoid_minimum(road: Road) -> Iterator[Finding]:
 def _clothoid_short(road: Road) -> Iterator[Finding]:
     """Yield a finding for each clothoid whose A is below a third of the largest radius that it must suit."""
     for i, parameter, _, radius in _clothoids(road):
-        text = f"The clothoid's A = {parameter:.1f} m is below R/3 = {radius / 3.0:.1f} m (RAA: R/3 <= A <= R)."
+        text = (
+            f"The clothoid's A = {parameter:.1f} m is below R/3 = {radius / 3.0:.1f} m "
+            f"({road.guideline_name}: R/3 <= A <= R)."
+        )
         yield from at_least(road.axis, road.starts[i], parameter, radius / 3.0, text)
 
 
 def _clothoid_long(road: Road) -> Iterator[Finding]:
     """Yield a finding for each clothoid whose A is above the smallest radius at its ends."""
     for i, parameter, radius, _ in _clothoids(road):
-        text = f"The clothoid's A = {parameter:.1f} m is above R = {radius:.1f} m (RAA: R/3 <= A <= R)."
+        text = (
+            f"The clothoid's A = {parameter:.1f} m is above R = {radius:.1f} m ({road.guideline_name}: R/3 <= A <= R)."
+        )
         yield from at_most(road.axis, road.starts[i], parameter, radius, text)
 
 
 def _clothoid_ratio(road: Road) -> Iterator[Finding]:
     """Yield a finding for each S-curve whose two clothoids' parameters differ by too much."""
+    if not road.binds("clothoid_ratio"):
+        return
+    largest_ratio = road.limits.clothoid_ratio
     parameters = {i: parameter for i, parameter, _, _ in _clothoids(road)}
     for i, parameter_before in parameters.items():
         parameter_after = parameters.get(i + 1)
@@ -111,9 +126,9 @@ def _clothoid_ratio(road: Road) -> Iterator[Finding]:
         ratio = _ratio(parameter_before, parameter_after)
         text = (
             f"The S-curve's clothoids, A = {parameter_before:.1f} m and {parameter_after:.1f} m, "
-            f"are as 1 : {ratio:.2f}; 1 : {CLOTHOID_RATIO} is allowed (RAA)."
+            f"are as 1 : {ratio:.2f}; 1 : {largest_ratio} is allowed (RAA)."
         )
-        yield from at_most(road.axis, road.starts[i + 1], ratio, CLOTHOID_RATIO, text)
+        yield from at_most(road.axis, road.starts[i + 1], ratio, largest_ratio, text)
 
 
 def _ratio(length: float, other_length: float) -> float:
@@ -126,34 +141,51 @@ def _curvature_jump(road: Road) -> Iterator[Finding]:
     """Yield a finding for each border of elements at which the curvature jumps."""
     for i in np.flatnonzero(~same_curvature(road.k1[:-1], road.k0[1:])):
         jump = abs(road.k0[i + 1] - road.k1[i])
-        if jump < _LEAST_JUMP:
+        if jump < _LEAST_JUMP or max(abs(road.k0[i + 1]), abs(road.k1[i])) * road.limits.curvature_jump_radius < 1.0:
             continue
-        text = f"The curvature jumps by {jump:.2e} 1/m: a transition curve is missing (RAA)."
+        source = road.cite("curvature_jump_radius") if road.binds("curvature_jump_radius") else road.guideline_name
+        text = f"The curvature jumps by {jump:.2e} 1/m: a transition curve is missing ({source})."
         yield Finding(road.axis, road.starts[i + 1], jump, 0.0, text)
 
 
 def _straight_longest(road: Road) -> Iterator[Finding]:
     """Yield a finding for each straight longer than the RAA allow."""
-    for run in road.runs:
+    longest_straight = road.limits.straight_longest
+    for run in road.runs if road.binds("straight_longest") else ():
         if run.straight:
-            text = f"The straight is {run.length:.0f} m long; {LONGEST_STRAIGHT:.0f} m are allowed (RAA)."
-            yield from at_most(road.axis, run.start, run.length, LONGEST_STRAIGHT, text)
+            text = f"The straight is {run.length:.0f} m long; {longest_straight:.0f} m are allowed (RAA)."
+            yield from at_most(road.axis, run.start, run.length, longest_straight, text)
 
 
 def _straight_between(road: Road) -> Iterator[Finding]:
     """Yield a finding for each short straight between two curves of the same direction."""
-    least_length = SHORTEST_STRAIGHT_SAME_DIRECTION
+    quantity = "straight_same_hand" if road.binds("straight_same_hand") else "straight_same_hand_radii"
     for run in road.runs:
         if not run.straight or road.is_cut(run):
             continue
         direction_before = _direction(road.k1[run.first - 1], road.k0[run.first - 1])
         direction_after = _direction(road.k0[run.last + 1], road.k1[run.last + 1])
         if direction_before * direction_after > 0.0:
+            least_length = road.limits.straight_between(
+                min(_radius_beside(road, run.first - 1, -1), _radius_beside(road, run.last + 1, 1))
+            )
             text = (
                 f"The straight between two curves of the same direction is {run.length:.1f} m long; it must be absent "
-                f"or {least_length:.0f} m and more (RAA)."
+                f"or {least_length:.0f} m and more ({road.cite(quantity)})."
             )
             yield from at_least(road.axis, run.start, run.length, least_length, text)
+
+
+def _radius_beside(road: Road, index: int, step: int) -> float:
+    """Return the smallest radius (m) of the curve beside a straight, from an element on, forwards (1) or back (-1)."""
+    largest_curvature = 0.0
+    while 0 <= index < len(road.lengths):
+        near, far = abs(road.k0[index]), abs(road.k1[index])
+        if max(near, far) < largest_curvature * (1.0 - TOLERANCE):
+            break
+        largest_curvature = max(largest_curvature, near, far)
+        index += step
+    return 1.0 / max(largest_curvature, STRAIGHT)
 
 
 def _direction(near_curvature: float, far_curvature: float) -> float:
@@ -179,8 +211,9 @@ def _arcs(road: Road) -> list[CurvatureRun]:
 
 
 def _radius_ratio(road: Road) -> Iterator[Finding]:
-    """Yield a finding for neighbouring arcs, hardly apart, whose radii differ by too much; not in EKA 3."""
-    if road.design_class == "EKA3":
+    """Yield a finding for neighbouring arcs, hardly apart, whose radii differ by too much; not in every class."""
+    largest_ratio = road.limits.radius_ratio
+    if not road.binds("radius_ratio") or np.isinf(largest_ratio):
         return
     straights = [run for run in road.runs if run.straight]
     starts = np.array([run.start for run in straights])
@@ -192,22 +225,27 @@ def _radius_ratio(road: Road) -> Iterator[Finding]:
         if straight_length < road.two_seconds and min(arc_before.radius, arc_after.radius) < RADIUS_RATIO_BELOW:
             text = (
                 f"The neighbouring radii {arc_before.radius:.0f} m and {arc_after.radius:.0f} m "
-                f"are as 1 : {ratio:.2f}; 1 : {RADIUS_RATIO} is allowed below {RADIUS_RATIO_BELOW:.0f} m (RAA)."
+                f"are as 1 : {ratio:.2f}; 1 : {largest_ratio} is allowed below {RADIUS_RATIO_BELOW:.0f} m (RAA)."
             )
-            yield from at_most(road.axis, arc_after.start, ratio, RADIUS_RATIO, text)
+            yield from at_most(road.axis, arc_after.start, ratio, largest_ratio, text)
 
 
 def _arc_length(road: Road) -> Iterator[Finding]:
-    """Yield a finding for each arc that is passed in less than two seconds.
+    """Yield a finding for each arc that is too short: on motorways one that is passed in less than two seconds.
 
     Arcs that an end of the road cuts aren't judged: they go on beyond it. One of length 0 lies between two clothoids,
     which an end of the road can't cut.
     """
+    needed_length = road.limits.shortest_arc
+    if road.binds("arc_seconds"):
+        needed_text = f"two seconds of travel are {needed_length:.1f} m (RAA)"
+    else:
+        needed_text = f"{needed_length:.0f} m are needed ({road.cite('arc_length', True)})"
     for arc in _arcs(road):
         is_between_clothoids = arc.length == 0.0
         if is_between_clothoids or not road.is_cut(arc):
-            text = f"The arc is {arc.length:.1f} m long; two seconds of travel are {road.two_seconds:.1f} m (RAA)."
-            yield from at_least(road.axis, arc.start, arc.length, road.two_seconds, text)
+            text = f"The arc is {arc.length:.1f} m long; {needed_text}."
+            yield from at_least(road.axis, arc.start, arc.length, needed_length, text)
 
 
 def _vertical_order(road: Road) -> Iterator[Finding]:
@@ -236,7 +274,8 @@ def _grade(road: Road) -> Iterator[Finding]:
             share = (road_end - grade_ends[i]) / (2.0 * profile.tangents[i])
             grades.append((road_end, float(profile.grades[i] + share * (profile.grades[i + 1] - profile.grades[i]))))
     for station, grade in dict.fromkeys(grades):
-        text = f"The grade of {100.0 * grade:.2f} % is steeper than {steepest_grade} % ({road.guideline})."
+        source = road.cite("grade_percent", True)
+        text = f"The grade of {100.0 * grade:.2f} % is steeper than {steepest_grade} % ({source})."
         yield from at_most(road.axis, station, 100.0 * abs(grade), steepest_grade, text)
 
 
@@ -249,8 +288,21 @@ def _rounding(road: Road, kind: Literal["crest", "sag"]) -> Iterator[Finding]:
     for i in np.flatnonzero((grade_change > SAME_GRADE) & on_road):
         radius = profile.radius[i]
         radius_text = f"radius of {radius:.0f} m" if radius else "missing rounding"
-        text = f"The {kind}'s {radius_text} is below {least_radius:.0f} m ({road.guideline})."
+        text = f"The {kind}'s {radius_text} is below {least_radius:.0f} m ({road.cite(kind, True)})."
         yield from at_least(road.axis, profile.station[i], radius, least_radius, text)
+
+
+def _vertical_tangent(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each crest or sag, wholly on the road, whose tangents are too short."""
+    profile, least_length = road.vertical, road.limits.vertical_tangent
+    on_road = (profile.station - profile.tangents > 0.0) & (profile.station + profile.tangents < road.length)
+    is_rounded = np.abs(np.diff(profile.grades)) > SAME_GRADE
+    for i in np.flatnonzero(is_rounded & on_road) if road.binds("vertical_tangent") else ():
+        text = (
+            f"The rounding's tangents are {profile.tangents[i]:.1f} m long; {least_length:.0f} m are needed "
+            f"({road.cite('vertical_tangent', True)})."
+        )
+        yield from at_least(road.axis, profile.station[i], profile.tangents[i], least_length, text)
 
 
 def _rounding_overlap(road: Road) -> Iterator[Finding]:
@@ -281,5 +333,6 @@ RULES = (
     Rule("grade-maximum", "Steepest grade", "%", "RAA", "confirmed", _grade),
     Rule("crest-radius", "Smallest crest radius", "m", "RAA", "confirmed", partial(_rounding, kind="crest")),
     Rule("sag-radius", "Smallest sag radius", "m", "RAA", "confirmed", partial(_rounding, kind="sag")),
+    Rule("vertical-tangent", "Shortest tangents of crests and sags", "m", "RAL", "confirmed", _vertical_tangent),
     Rule("rounding-overlap", "Roundings don't overlap", "m", "", "definition", _rounding_overlap),
 )

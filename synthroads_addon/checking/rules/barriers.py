@@ -12,13 +12,10 @@ from ...road.guidelines import (
     BARRIER_GAP,
     EMBANKMENT_HEIGHT,
     EMBANKMENT_RUN,
-    LIMITS,
-    OBSTACLE_DISTANCE,
     OBSTACLE_LEAD,
     OBSTACLE_POST,
     OBSTACLE_TAIL,
     SHORTEST_BARRIER,
-    TIGHT_CURVE,
 )
 from ...road.surroundings import Vegetation
 from ...road.things.noise_barrier import NoiseBarrier
@@ -38,7 +35,7 @@ def _gaps(road: Road, edges: Edges, protecting: Bool, start: float, end: float) 
 
 def _median_barrier(road: Road) -> Iterator[Finding]:
     """Yield a finding for each stretch of a carriageway without a barrier that faces it in the median."""
-    if len(road.sides) < 2:
+    if len(road.sides) < 2 or road.single:
         return
     barriers = road.barriers
     middle_stations = 0.5 * barriers.start + 0.5 * barriers.end
@@ -70,7 +67,7 @@ def _embankment_barrier(road: Road) -> Iterator[Finding]:
 
 def _curve_barrier(road: Road) -> Iterator[Finding]:
     """Yield a finding for each stretch outside of a tight curve without an outer barrier."""
-    below_radius = TIGHT_CURVE * LIMITS[road.design_class].radius
+    below_radius = road.limits.tight_curve * road.limits.radius
     curves = [run for run in road.runs if not run.straight and below(run.radius, below_radius)]
     for run, (name, edges) in product(curves, road.sides.items()):
         if edges.sign * run.curvature > 0.0:
@@ -89,6 +86,11 @@ def _obstacles(road: Road) -> Iterator[tuple[int, str]]:
         thing: Any = road.parameters.objects[name]
         if block.part == "foot" and thing.obstacle and above(getattr(thing, "post_diameter", np.inf), OBSTACLE_POST):
             yield i, thing.obstacle
+
+
+def _is_across(road: Road, side: str, index: int) -> bool:
+    """Return whether a body stands across the oncoming traffic of the one carriageway, so that it isn't in the way."""
+    return road.single and not road.positions.outer[side][index]
 
 
 def _missing_barrier(road: Road, edges: Edges, index: int, reach: tuple[float, float]) -> tuple[float, float] | None:
@@ -120,23 +122,23 @@ def _missing_barrier(road: Road, edges: Edges, index: int, reach: tuple[float, f
 
 def _obstacle_barrier(road: Road) -> Iterator[Finding]:
     """Yield a finding for each obstacle near a carriageway before which barrier is missing."""
-    limit = OBSTACLE_DISTANCE[road.design_class]
+    limit, source = road.limits.obstacle_distance, road.cite("obstacle_distance")
     for i, obstacle in _obstacles(road):
         for side, edges in road.sides.items():
             distance = road.positions.clearance[side][i]
-            if distance < 0.0 or not below(distance, limit):
+            if distance < 0.0 or not below(distance, limit) or _is_across(road, side, i):
                 continue
             if missing := _missing_barrier(road, edges, i, (OBSTACLE_LEAD, OBSTACLE_TAIL)):
                 text = (
                     f"The {obstacle} stands {distance:.2f} m from {side} and {missing[0]:.1f} m "
-                    f"of the barrier in front of it are missing; nearer than {limit} m it is needed (RPS)."
+                    f"of the barrier in front of it are missing; nearer than {limit} m it is needed ({source})."
                 )
                 yield Finding(road.bodies.names[i], missing[1], missing[0], 0.0, text)
 
 
 def _noise_barrier(road: Road) -> Iterator[Finding]:
     """Yield a finding for each noise barrier before which barrier is missing."""
-    limit = OBSTACLE_DISTANCE[road.design_class]
+    limit = road.limits.obstacle_distance
     for i in road.bodies.of(NoiseBarrier, part="barrier"):
         for side, edges in road.sides.items():
             distance = road.positions.clearance[side][i]
@@ -153,7 +155,7 @@ def _noise_barrier(road: Road) -> Iterator[Finding]:
 
 def _tree_distance(road: Road) -> Iterator[Finding]:
     """Yield a finding for each stand of trees so near that a barrier must stand before it, where none does."""
-    least_distance = OBSTACLE_DISTANCE[road.design_class]
+    least_distance = road.limits.obstacle_distance
     for name, plants in road.of(Vegetation).items():
         if plants.kind != "tree" or plants.density == 0.0:
             continue
@@ -170,7 +172,7 @@ def _tree_distance(road: Road) -> Iterator[Finding]:
             for start, _ in islice(_gaps(road, edges, is_before_trees, *stretch), 1):
                 text = (
                     f"Trees stand {distance:.2f} m from the {edges.carriageway.side} paved edge with no barrier in "
-                    f"front; {least_distance} m are needed (RPS)."
+                    f"front; {least_distance} m are needed ({road.cite('obstacle_distance')})."
                 )
                 yield Finding(name, start, distance, least_distance, text)
 

@@ -1,20 +1,16 @@
-"""Rules for the crossfall and its run-offs (RAA)."""
+"""Rules for the crossfall and its run-offs (RAA, RAL)."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from ...road.guidelines import LARGEST_CROSSFALL_PERCENT, LEAST_CROSSFALL_PERCENT, curve_crossfall_percent
+from ...road.guidelines import curve_crossfall_percent
 from .edges import Edges
 from .obstacles import Bool
 from .rule import TOLERANCE, Crossfall, Finding, Road, Rule, at_least, at_most, below, out_of_order, stretches
 
 #: A run-off may reach this far (m) beyond the elements whose curvature changes: crossfall points are often rounded.
 RUN_OFF_BEYOND = 1.0
-#: The least run-off slope (%) per metre between rotation axis and edge (RAA); the largest one where that is below 4 m.
-LEAST_RUN_OFF_PER_METRE = 0.1
-NARROW_RUN_OFF_PER_METRE = 0.225
-NARROW_RUN_OFF = 4.0
 
 
 def _crossfall_order(road: Road) -> Iterator[Finding]:
@@ -29,7 +25,9 @@ def _crossfall_order(road: Road) -> Iterator[Finding]:
 
 def _crossfall_least(road: Road) -> Iterator[Finding]:
     """Yield a finding for each stretch of less than the least crossfall outside of run-offs."""
-    least_percent = LEAST_CROSSFALL_PERCENT
+    least_percent = road.limits.least_crossfall_percent
+    if not road.binds("least_crossfall_percent"):
+        return
     for name, fall in road.crossfalls.items():
         value = np.abs(fall.percent[:-1])
         for first_piece, last_piece in stretches(~fall.runs_off & (value < least_percent * (1.0 - TOLERANCE))):
@@ -40,7 +38,9 @@ def _crossfall_least(road: Road) -> Iterator[Finding]:
 
 def _crossfall_largest(road: Road) -> Iterator[Finding]:
     """Yield a finding for each stretch of more than the largest crossfall."""
-    largest_percent = LARGEST_CROSSFALL_PERCENT
+    largest_percent = road.limits.largest_crossfall_percent
+    if not road.binds("largest_crossfall_percent"):
+        return
     for name, fall in road.crossfalls.items():
         value = np.abs(fall.percent)
         for first_row, last_row in stretches(value > largest_percent * (1.0 + TOLERANCE)):
@@ -51,6 +51,8 @@ def _crossfall_largest(road: Road) -> Iterator[Finding]:
 
 def _crossfall_inside(road: Road) -> Iterator[Finding]:
     """Yield a finding for each curve that doesn't fall to its inside as its radius needs."""
+    if not road.binds("radius_least_crossfall"):
+        return
     for name, fall in road.crossfalls.items():
         for run in road.runs:
             if run.straight or not below(run.radius, road.limits.radius_outwards):
@@ -80,11 +82,10 @@ def _edge_lever(edges: Edges) -> float:
     return width / (2.0 if edges.carriageway.rotation_axis == "carriageway_axis" else 1.0)
 
 
-def _flat_pieces(fall: Crossfall) -> tuple[Bool, Bool]:
-    """Return two masks (N - 1,): pieces wholly, and at least partly, of less than the least crossfall."""
+def _flat_pieces(fall: Crossfall, flat_limit: float) -> tuple[Bool, Bool]:
+    """Return two masks (N - 1,): pieces wholly, and at least partly, of less than the least crossfall (%)."""
     least_percent = np.minimum(fall.percent[:-1], fall.percent[1:])
     largest_percent = np.maximum(fall.percent[:-1], fall.percent[1:])
-    flat_limit = LEAST_CROSSFALL_PERCENT
     is_wholly_flat = (least_percent >= -flat_limit * (1.0 + TOLERANCE)) & (
         largest_percent <= flat_limit * (1.0 + TOLERANCE)
     )
@@ -95,18 +96,21 @@ def _flat_pieces(fall: Crossfall) -> tuple[Bool, Bool]:
 
 def _run_off_steepest(road: Road) -> Iterator[Finding]:
     """Yield a finding for each run-off in which the pavement's edge is too steep against the rotation axis."""
+    source = road.cite("run_off_percent")
     for name, fall in road.crossfalls.items():
         lever = _edge_lever(road.sides[name])
-        is_wide = lever >= NARROW_RUN_OFF
-        allowed_slope = road.limits.run_off_percent if is_wide else NARROW_RUN_OFF_PER_METRE * lever
-        is_wholly_flat, _ = _flat_pieces(fall)
-        limit = np.where(is_wholly_flat, max(allowed_slope, LEAST_RUN_OFF_PER_METRE * lever), allowed_slope)
+        allowed_slope = min(road.limits.run_off_percent, road.limits.run_off_percent_per_metre * lever)
+        is_wholly_flat, _ = _flat_pieces(fall, road.limits.least_crossfall_percent)
+        least_slope = road.limits.run_off_least_per_metre * lever
+        limit = np.where(is_wholly_flat, max(allowed_slope, least_slope), allowed_slope)
         slope = np.abs(fall.slope) * lever
         for first_piece, last_piece in stretches(fall.runs_off & (slope > limit * (1.0 + TOLERANCE))):
             worst_piece = first_piece + int(
                 np.argmax(slope[first_piece : last_piece + 1] / limit[first_piece : last_piece + 1])
             )
-            text = f"The edge runs off at {slope[worst_piece]:.3f} %; {limit[worst_piece]:.3f} % are allowed (RAA)."
+            text = (
+                f"The edge runs off at {slope[worst_piece]:.3f} %; {limit[worst_piece]:.3f} % are allowed ({source})."
+            )
             yield Finding(name, fall.station[worst_piece], slope[worst_piece], limit[worst_piece], text)
 
 
@@ -114,8 +118,8 @@ def _run_off_least(road: Road) -> Iterator[Finding]:
     """Yield a finding for each run-off whose edge is too level where the crossfall is too small to drain."""
     for name, fall in road.crossfalls.items():
         lever = _edge_lever(road.sides[name])
-        least_slope = LEAST_RUN_OFF_PER_METRE * lever
-        _, is_partly_flat = _flat_pieces(fall)
+        least_slope = road.limits.run_off_least_per_metre * lever
+        _, is_partly_flat = _flat_pieces(fall, road.limits.least_crossfall_percent)
         slope = np.abs(fall.slope) * lever
         for first_piece, last_piece in stretches(
             fall.runs_off & is_partly_flat & (slope < least_slope * (1.0 - TOLERANCE))
@@ -123,7 +127,8 @@ def _run_off_least(road: Road) -> Iterator[Finding]:
             worst_piece = first_piece + int(np.argmin(slope[first_piece : last_piece + 1]))
             text = (
                 f"The edge runs off at {slope[worst_piece]:.3f} % where the crossfall is below "
-                f"{LEAST_CROSSFALL_PERCENT} %; {least_slope:.3f} % are needed to drain it (RAA)."
+                f"{road.limits.least_crossfall_percent} %; {least_slope:.3f} % are needed to drain it "
+                f"({road.cite('run_off_least_per_metre')})."
             )
             yield Finding(name, fall.station[worst_piece], slope[worst_piece], least_slope, text)
 
@@ -137,7 +142,7 @@ def _run_off_place(road: Road) -> Iterator[Finding]:
         element = np.clip(np.searchsorted(road.starts, interval_middles) - 1, 0, len(road.lengths) - 1)
         for first_interval, last_interval in stretches(fall.runs_off[piece] & road.constant[element]):
             length = cuts[last_interval + 1] - cuts[first_interval]
-            text = f"The crossfall changes over {length:.1f} m where the curvature doesn't (RAA)."
+            text = f"The crossfall changes over {length:.1f} m where the curvature doesn't ({road.guideline_name})."
             yield from at_most(name, cuts[first_interval], length, RUN_OFF_BEYOND, text)
 
 

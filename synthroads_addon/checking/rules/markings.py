@@ -9,7 +9,7 @@ from ...road.objects import nominal_width, width_at, width_kinks
 from ...road.section import Arrow, Hatching, LineMarking
 from .edges import Edges, Float, TurnoutEdges
 from .obstacles import Bool
-from .rule import TOLERANCE, Finding, Road, Rule, above, at_most, below, gaps, stretches
+from .rule import TOLERANCE, Finding, Road, Rule, above, at_least, at_most, below, gaps, stretches
 from .section import NO_LANE, narrowest_lane
 
 #: Widths that each kind of line may have, m (RMS).
@@ -67,13 +67,15 @@ def _spans(marks: Float, mask: Bool) -> _Spans:
 def _required_lines(road: Road, edges: Edges) -> Iterator[tuple[str, int, _Spans, _Lines]]:
     """Yield (kind, boundary, stretches where it must run, its lines) for every line along a carriageway's lanes."""
     lines, whole_road, last_boundary = _lines_on(road, edges), [(0.0, road.length)], len(edges.lane_widths)
-    yield "outer_edge", 0, whole_road, _select_lines(lines, ("outer_edge", "block"), 0)
+    if not road.single:  # a single carriageway has rules of its own for its edges and its middle
+        yield "outer_edge", 0, whole_road, _select_lines(lines, ("outer_edge", "block"), 0)
     for boundary in range(1, last_boundary):
         spans = whole_road
         if not (edges.lane_widths[boundary - 1].constant and edges.lane_widths[boundary].constant):
             spans = _spans(edges.marks, _lanes_beside(road, edges, boundary)[0])
         yield "lane", boundary, spans, _select_lines(lines, ("lane",), boundary)
-    yield "inner_edge", last_boundary, whole_road, _select_lines(lines, ("inner_edge",), last_boundary)
+    if not road.single:
+        yield "inner_edge", last_boundary, whole_road, _select_lines(lines, ("inner_edge",), last_boundary)
 
 
 def _required_at(road: Road, turnout: TurnoutEdges) -> Iterator[tuple[str, tuple[float, float], _Lines]]:
@@ -140,7 +142,7 @@ def _marking_between(road: Road) -> Iterator[Finding]:
 
 def _regulated_lines(road: Road) -> Iterator[tuple[str, LineMarking]]:
     """Yield (id, line) for which the RMS give width and pattern: neither free nor temporary (yellow) ones."""
-    for name, line in road.of(LineMarking).items():
+    for name, line in road.of(LineMarking).items() if road.binds("narrow_line") else ():
         if line.color == "white" and line.kind != "free":
             yield name, line
 
@@ -197,7 +199,68 @@ def _arrow_direction(road: Road) -> Iterator[Finding]:
         yield from at_most(name, arrow.station, angle, TURNED, text)
 
 
+def _centre_lines(road: Road) -> Iterator[tuple[str, LineMarking]]:
+    """Yield (id, line) of the lines between the directions of a single carriageway."""
+    if not road.single:
+        return
+    for name, line in road.of(LineMarking).items():
+        edges = road.sides[line.carriageway]
+        strip = nominal_width(edges.carriageway.inner_edge_strip_width)
+        inner_edge = float(edges.inner(edges.marks).max())
+        if line.kind == "inner_edge" or (
+            line.kind == "free" and nominal_width(line.offset) <= inner_edge + strip + line.width
+        ):
+            yield name, line
+
+
+def _centre_line_missing(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each stretch of a single carriageway with fewer lines between its directions than needed."""
+    needed = int(road.limits.centre_lines)
+    if not road.single or not needed or len(road.sides) < 2 or _narrowest_through_lane(road) < _least_marked(road):
+        return
+    lines = [line for _, line in _centre_lines(road)]
+    if needed == 1:
+        spans_of_lines = [[(line.start_station, line.end_station) for line in lines]]
+    else:
+        spans_of_lines = [
+            [(line.start_station, line.end_station) for line in lines if line.carriageway == name]
+            for name in road.sides
+        ]
+    for spans in spans_of_lines:
+        for start, end in gaps(spans, 0.0, road.length):
+            text = (
+                f"There is no line between the directions for {end - start:.2f} m; "
+                f"{road.design_class} has {needed} ({road.cite('centre_lines')})."
+            )
+            yield Finding(next(iter(road.sides)), start, end - start, 0.0, text)
+
+
+def _centre_line_narrow(road: Road) -> Iterator[Finding]:
+    """Yield a finding for each line between the directions of a single carriageway whose lanes are too narrow."""
+    width, least_width = _narrowest_through_lane(road), _least_marked(road)
+    for name, line in _centre_lines(road):
+        text = (
+            f"A line lies between lanes of {width:.2f} m; lanes below {least_width:.2f} m have none "
+            f"({road.cite('narrowest_centre_line_lane')})."
+        )
+        yield from at_least(name, line.start_station, width, least_width, text)
+
+
+def _narrowest_through_lane(road: Road) -> float:
+    """Return the width (m) of the narrowest of the innermost lanes, at its widest."""
+    return min(nominal_width(edges.carriageway.lanes[-1].width) for edges in road.sides.values())
+
+
+def _least_marked(road: Road) -> float:
+    """Return the width (m) below which lanes have no line between the directions."""
+    return road.limits.narrowest_centre_line_lane * (1.0 - TOLERANCE)
+
+
 RULES = (
+    Rule(
+        "centre-line-missing", "Directions of one carriageway are parted", "m", "RMS", "confirmed", _centre_line_missing
+    ),
+    Rule("centre-line-narrow", "Narrow lanes have no line between them", "m", "RMS", "confirmed", _centre_line_narrow),
     Rule("marking-missing", "Every lane boundary and turnout has its lines", "1", "RMS", "confirmed", _marking_missing),
     Rule("marking-coverage", "Lines run all along what they bound", "m", "RMS", "definition", _marking_coverage),
     Rule("marking-between", "Lane lines run between two lanes", "m", "RMS", "definition", _marking_between),

@@ -16,7 +16,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...road.guidelines import LIMITS
+from ...road.guidelines import GUIDELINE_OF_CLASS, LIMITS, is_single
 from ...road.objects import ObjectT
 from ...road.parameters import AlignmentObject, RoadParameters
 from ...road.section import Carriageway, Turnout
@@ -131,7 +131,9 @@ class Road:
         axis: id of the alignment.
         terrain: the terrain, if there is one.
         limits: limits of the design class.
-        guideline: the RAA with the design class, for people.
+        guideline: the guideline with the design class, for people.
+        guideline_name: the same without the class.
+        single: whether both directions share one carriageway.
         two_seconds: m travelled in two seconds at the class's speed.
         lengths, k0, k1: (E,) lengths (m) and curvatures (1/m) at both ends of the horizontal elements.
         starts: (E + 1,) stations of their borders; `length` is the last.
@@ -146,7 +148,10 @@ class Road:
         self.parameters = parameters
         self.design_class = parameters.design_class
         self.limits = LIMITS[self.design_class]
-        self.guideline = f"RAA, {self.design_class.replace('EKA', 'EKA ')}"
+        self._guideline = GUIDELINE_OF_CLASS[self.design_class]
+        self.guideline = f"{self._guideline.name}, {self._guideline.classes[self.design_class].citation}"
+        self.guideline_name = self._guideline.name
+        self.single = is_single(self.design_class)
         self.two_seconds = self.limits.speed / 3.6 * 2.0
         self._by_type: dict[builtins.type, dict[str, Any]] = {}
         for name, item in parameters.objects.items():
@@ -166,6 +171,19 @@ class Road:
             widenings = {key: turnout for key, turnout in turnouts.items() if turnout.carriageway == name}
             self.sides[name] = Edges(name, carriageway, widenings, self.length)
         self.marks = np.unique(np.concatenate([np.empty(0), *(edges.marks for edges in self.sides.values())]))
+
+    def binds(self, quantity: str) -> bool:
+        """Return whether the road's guideline has a quantity as a limit, not as a default of the sampler's."""
+        row = self._guideline.quantities.get(quantity)
+        return row is not None and row.use == "limit"
+
+    def cite(self, quantity: str, of_class: bool = False) -> str:
+        """Return what a quantity is from, for people: guideline, design class if wanted, source, how sure."""
+        row = self._guideline.quantities[quantity]
+        name = row.guideline or self._guideline.name
+        if of_class:
+            name += f", {self._guideline.classes[self.design_class].citation}"
+        return f"{name}: {row.source}; {row.sure}" if row.source else name
 
     def of(self, kind: builtins.type[ObjectT]) -> dict[str, ObjectT]:
         """Return the objects of one class by id, in the order of the file."""

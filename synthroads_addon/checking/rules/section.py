@@ -1,11 +1,11 @@
-"""Rules for the cross-section (RAA): lanes and their tapers, median, shoulders, strips; and the pavement's damage."""
+"""Rules for the cross-section (RAA, RAL): lanes and their tapers, median, shoulders, strips; pavement's damage."""
 
 from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 
-from ...road.guidelines import LANE_TAPER_LENGTH, SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS, StandardCrossSection
+from ...road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS, StandardCrossSection
 from ...road.objects import AnyWidth, nominal_width, width_kinks
 from ...road.section import Carriageway, Median
 from .edges import Edges, WidthByStation
@@ -44,7 +44,7 @@ def _width_order(road: Road) -> Iterator[Finding]:
 
 def narrowest_lane(road: Road) -> float:
     """Return the narrowest lane (m) of the standard cross-sections that the road's class may have."""
-    return min(width for section in _standard_sections(road) for width in section.lanes)
+    return min(width for section in _standard_sections(road) for width in (*section.lanes, *section.oncoming_lanes))
 
 
 def _standard_sections(road: Road) -> list[StandardCrossSection]:
@@ -72,7 +72,8 @@ def _lane_ramps(lane: WidthByStation) -> list[tuple[int, int]]:
 
 def _lane_width(road: Road) -> Iterator[Finding]:
     """Yield a finding for each stretch of a lane that is too narrow, tapers to or from nothing left out."""
-    least_width, names = narrowest_lane(road), ", ".join(SECTIONS_OF_CLASS[road.design_class])
+    least_width = narrowest_lane(road)
+    source = f"{road.guideline_name}, {', '.join(SECTIONS_OF_CLASS[road.design_class])}"
     for name, edges in road.sides.items():
         for i, lane in enumerate(edges.lane_widths):
             is_narrow = (lane.width < least_width * (1.0 - TOLERANCE)) & (lane.width >= NO_LANE)
@@ -81,7 +82,7 @@ def _lane_width(road: Road) -> Iterator[Finding]:
             for first_point, last_point in stretches(is_narrow):
                 worst_point = first_point + int(np.argmin(lane.width[first_point : last_point + 1]))
                 width = lane.width[worst_point]
-                text = f"Lane {i + 1} is {width:.2f} m wide; {least_width:.2f} m are needed (RAA, {names})."
+                text = f"Lane {i + 1} is {width:.2f} m wide; {least_width:.2f} m are needed ({source})."
                 yield Finding(
                     name,
                     np.clip(lane.station[worst_point], 0.0, road.length),
@@ -102,7 +103,9 @@ def lane_tapers(road: Road, edges: Edges) -> Iterator[tuple[int, float, float]]:
 
 def _lane_taper(road: Road) -> Iterator[Finding]:
     """Yield a finding for each taper over which a lane begins or ends that is too short."""
-    least_length = LANE_TAPER_LENGTH[road.design_class]
+    if not road.binds("lane_taper_length"):
+        return
+    least_length = road.limits.lane_taper_length
     for name, edges in road.sides.items():
         for lane, begin, end in lane_tapers(road, edges):
             text = f"Lane {lane + 1} begins or ends over {end - begin:.1f} m; {least_length:.0f} m are needed (RAA)."
@@ -111,7 +114,7 @@ def _lane_taper(road: Road) -> Iterator[Finding]:
 
 def _median_width(road: Road) -> Iterator[Finding]:
     """Yield a finding for each stretch along which the median is narrower than any standard one."""
-    if len(road.sides) < 2:
+    if len(road.sides) < 2 or road.single:
         return
     width = np.sum([edges.inner(road.marks) for edges in road.sides.values()], axis=0)
     name = next(iter([*road.of(Median), *road.sides]))
@@ -121,10 +124,11 @@ def _median_width(road: Road) -> Iterator[Finding]:
         yield Finding(name, road.marks[worst_mark], width[worst_mark], LEAST_MEDIAN, text)
 
 
-def _is_standard(edges: Edges) -> bool:
-    """Return whether a carriageway's lanes are those of a standard cross-section."""
+def _is_standard(road: Road, edges: Edges) -> bool:
+    """Return whether a carriageway's lanes are those of a standard cross-section with as many carriageways."""
     lanes = tuple(nominal_width(lane.width) for lane in edges.carriageway.lanes)
-    return any(section.lanes == lanes for section in STANDARD_CROSS_SECTIONS.values())
+    sections = (section for section in STANDARD_CROSS_SECTIONS.values() if section.single == road.single)
+    return any(lanes in (section.lanes, section.oncoming_lanes) for section in sections)
 
 
 def _strip_widths(road: Road, fields: tuple[str, ...]) -> Iterator[Finding]:
@@ -135,13 +139,13 @@ def _strip_widths(road: Road, fields: tuple[str, ...]) -> Iterator[Finding]:
             min(getattr(section, field) for section in _standard_sections(road)),
         )
         for name, edges in road.sides.items():
-            if _is_standard(edges):
+            if _is_standard(road, edges):
                 strip = WidthByStation(getattr(edges.carriageway, f"{field}_width"))
                 worst_point = int(np.argmin(strip.width))
                 station, value = np.clip(strip.station[worst_point], 0.0, road.length), strip.width[worst_point]
                 text = (
                     f"The {strip_name} is {value:.2f} m wide; "
-                    f"the class's standard cross-sections have {least_width} m (RAA)."
+                    f"the class's standard cross-sections have {least_width} m ({road.guideline_name})."
                 )
                 yield from at_least(name, station, value, least_width, text)
 

@@ -7,9 +7,7 @@ from ...road.guidelines import (
     EMERGENCY_BAY_LENGTH,
     EMERGENCY_BAY_TAPER,
     EMERGENCY_BAY_WIDTH,
-    INTERCHANGE_SPACING,
     TURNOUT_GAP,
-    TURNOUT_LANE_LENGTH,
     TURNOUT_LANE_WIDTH,
     TURNOUT_TAPER,
 )
@@ -38,7 +36,7 @@ def _find_small(road: Road, of_bays: bool, field: str, least_value: float, text:
 def _lane_length(road: Road) -> Iterator[Finding]:
     """Return an iterator over findings for exits and entries with too short a lane."""
     text = "The {kind}'s lane is {value:.1f} m long; {least:.0f} m are needed (RAA)."
-    return _find_small(road, False, "lane_length", TURNOUT_LANE_LENGTH[road.design_class], text)
+    return _find_small(road, False, "lane_length", road.limits.turnout_lane_length, text)
 
 
 def _lane_width(road: Road) -> Iterator[Finding]:
@@ -98,7 +96,7 @@ def _gap(road: Road) -> Iterator[Finding]:
 
 def _interchange(road: Road) -> Iterator[Finding]:
     """Yield a finding for each exit, or entry, too near behind another one of its carriageway."""
-    least_spacing = INTERCHANGE_SPACING[road.design_class]
+    least_spacing = road.limits.interchange_spacing
     for side, kind in product(road.sides.values(), ("exit", "entry")):
         for earlier, later in _consecutive(item for item in side.turnouts if item.turnout.kind == kind):
             begin = later.turnout.start_station

@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 from ...base.schema import round_value
-from ...road.guidelines import OBSTACLE_LEAD, OBSTACLE_TAIL, TIGHT_CURVE
+from ...road.guidelines import OBSTACLE_LEAD, OBSTACLE_TAIL
 from ...road.objects import PointObject, Side, least_width
 from ...road.things.sign import TrafficSign
 from .edge import EdgeProfile
@@ -249,7 +249,11 @@ class Layout:
     @cached_property
     def tight_arcs(self) -> list[tuple[float, float, float]]:
         """Return start and end (m) and curvature (1/m) of the arcs that are tight for the design class."""
-        arcs, start, tight_curvature = [], 0.0, 1.0 / (TIGHT_CURVE * self.site.limits.radius)
+        arcs: list[tuple[float, float, float]] = []
+        tight_radius, start = self.site.limits.tight_curve * self.site.limits.radius, 0.0
+        if tight_radius == 0.0:
+            return arcs
+        tight_curvature = 1.0 / tight_radius
         for element in self.site.alignment.horizontal:
             if element.kind == "arc" and abs(element.curvature_start) > tight_curvature:
                 arcs.append((start, start + element.length, element.curvature_start))

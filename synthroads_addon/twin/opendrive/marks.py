@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from ...road.geometry import RoadGeometry
+from ...road.guidelines import is_single
 from ...road.objects import Side
 from ...road.section import LineMarking
 from .pieces import CLOSE
@@ -103,10 +104,14 @@ class RoadMarks:
 
 
 def _border_strip(geometry: RoadGeometry, side: Side, line: LineMarking) -> int | None:
-    """Return the index of the strip whose outer border a line follows: -1 for the inner edge, None for no border."""
+    """Return the index of the strip whose outer border a line follows: -1 for the inner edge, None for no border.
+
+    On a single carriageway, a free line between the directions, at their inner edges, is a mark of the centre lane.
+    """
     section = geometry.sections[side]
     if line.kind == "free":
-        return None
+        is_between = is_single(geometry.parameters.design_class) and line.offset == section.carriageway.inner_offset
+        return -1 if is_between else None
     if line.kind == "turnout_edge":
         return section.kinds.index("turnout_lane")
     if line.kind == "gore_edge":

@@ -3,14 +3,13 @@
 import re
 
 from ...road.geometry import RoadGeometry
+from ...road.guidelines import LIMITS
 from ...road.objects import Side
 from ...road.things.sign import TrafficSign
 from .pieces import CLOSE
 
 ADVISORY = 130.0
 """Speed on motorways without a limit, km/h: the one that German law advises."""
-_URBAN, _URBAN_CLASS = 100.0, "EKA3"
-"""Limit of urban motorways where no sign says another, km/h."""
 _LIMIT = re.compile(r"274-(\d+)")
 _ENDS = re.compile(r"278|282")
 """Signs at which a limit ends."""
@@ -25,8 +24,7 @@ class SpeedLimits:
     """
 
     def __init__(self, geometry: RoadGeometry, side: Side) -> None:
-        is_urban = geometry.parameters.design_class == _URBAN_CLASS
-        self.without = _URBAN if is_urban else ADVISORY
+        self.without = LIMITS[geometry.parameters.design_class].unsigned_speed
         is_with_stations = geometry.sections[side].carriageway.traffic > 0
         changes = _changes(geometry, is_with_stations, self.without)
         if not is_with_stations:

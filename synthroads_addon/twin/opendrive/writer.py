@@ -13,6 +13,7 @@ import numpy as np
 
 from ...base.maps.crs import wkt
 from ...road.geometry import RoadGeometry
+from ...road.guidelines import is_single
 from ...road.instances import InstanceNumbers
 from ...road.parameters import AlignmentObject, RoadParameters
 from ...road.section import Carriageway, LineMarking, Median, Turnout
@@ -95,7 +96,8 @@ def _road(road: Element, objects: Objects, faces: list[Face], plants: list[Place
     """Fill in the `road` element of one carriageway: type, plan, profiles, lanes, objects, signals."""
     frame = objects.frame
     geometry, limits = frame.geometry, SpeedLimits(frame.geometry, frame.side)
-    kind = element(road, "type", {"s": 0.0, "type": "motorway", "country": "DE"})
+    road_type = "rural" if is_single(geometry.parameters.design_class) else "motorway"
+    kind = element(road, "type", {"s": 0.0, "type": road_type, "country": "DE"})
     if limits.without == ADVISORY:
         element(kind, "speed", {"max": "no limit", "unit": "km/h"})
     else:

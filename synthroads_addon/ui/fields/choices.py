@@ -30,9 +30,14 @@ def _fidelities() -> Iterator[tuple[str, str, str]]:
 
 def _cross_sections() -> Iterator[tuple[str, str, str]]:
     for name, section in STANDARD_CROSS_SECTIONS.items():
-        lanes = len(section.lanes)
+        lanes, title = len(section.lanes), name.replace("RQ", "RQ ")
+        if section.single:
+            oncoming_lanes = len(section.of_side("left").lanes)
+            widths = f"one carriageway of {section.total_width - 2.0 * section.verge:g} m"
+            yield name, f"{title}, {lanes} + {oncoming_lanes} lanes", f"{widths}, {lanes} and {oncoming_lanes} lanes"
+            continue
         shoulder = f"hard shoulders of {section.hard_shoulder:g} m, median of {section.median:g} m"
-        yield name, f"{name.replace('RQ', 'RQ ')}, 2 × {lanes} lanes", f"{lanes} lanes each way, {shoulder}"
+        yield name, f"{title}, 2 × {lanes} lanes", f"{lanes} lanes each way, {shoulder}"
 
 
 def _design_classes() -> Iterator[tuple[str, str, str]]:

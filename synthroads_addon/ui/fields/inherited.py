@@ -10,8 +10,6 @@ from typing import Any, cast
 from ...base.errors import InputError
 from ...base.schema import note_of
 from ...road.guidelines import LIMITS, STANDARD_CROSS_SECTIONS, StandardCrossSection
-from ...sampling.alignment import WIDEST_RADIUS
-from ...sampling.markings import LANE_DASH, LANE_GAP
 from ...scanning.devices.device import DeviceChoice, ScannerSetting, setting_of
 from ...scanning.platforms.registry import PLATFORMS
 from ...scanning.receiver import Receiver
@@ -73,8 +71,11 @@ def _of_section(settings: Any, name: str) -> Value:
 
 def _of_design_class(settings: Any, name: str) -> Value:
     limits = LIMITS[settings.road.design_class]
-    grade = limits.grade_percent
-    return {"radius": (limits.radius, WIDEST_RADIUS), "grade_percent": (-grade, grade)}[name]
+    intervals = {
+        "radius": (limits.drawn_radius_least, limits.drawn_radius_largest),
+        "grade_percent": (-limits.grade_percent, limits.grade_percent),
+    }
+    return intervals[name] if name in intervals else float(getattr(limits, name))
 
 
 def _of_images(settings: Any, name: str) -> Value:
@@ -109,6 +110,5 @@ SOURCES: Mapping[str, Callable[[Any, str], Value]] = {
     "section": _of_section,
     "design_class": _of_design_class,
     "images": _of_images,
-    "rms": lambda settings, name: {"lane_dash": LANE_DASH, "lane_gap": LANE_GAP}[name],
 }
 """Sources of inherited values, by the name that the schema's note ``inherits`` begins with."""

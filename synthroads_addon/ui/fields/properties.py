@@ -5,6 +5,7 @@ here: Blender reads the properties from them.
 """
 
 import json
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,11 @@ from typing import Any
 import bpy
 
 from ...base.errors import InputError
+from ...road.guidelines import GUIDELINES, STANDARD_CROSS_SECTIONS, is_single
+from ...scenario.road import RoadScenario
 from ...scenario.scenario import Scenario, load_scenario
-from .fields import SYNTHROADS_PG_file
-from .groups import NOT_HERE, leaves, make_fields, read_fields, shown_state, write_fields
+from .fields import Field, SYNTHROADS_PG_file
+from .groups import NOT_HERE, GroupField, leaves, make_fields, read_fields, shown_state, write_fields
 from .hooks import HOOKS
 from .preferences import preferences
 
@@ -28,12 +31,48 @@ _OF_ROAD = ("title", "seed", "fidelity", "geometric_tolerance", "vegetation_deta
 """Fields that a road is built from."""
 
 FIRST_DATA = load_scenario(FIRST).to_dict() | _PANELS_OWN
-FIELDS = make_fields(Scenario, FIRST_DATA, "", HOOKS)
+
+
+def _change_class(road: Any, context: Any) -> None:
+    """Set what follows from a new design class: the cross-section, and another guideline's defaults of the road."""
+    former_section = STANDARD_CROSS_SECTIONS.get(road.cross_section)
+    HOOKS["road.design_class"](road, context)
+    if former_section is not None and former_section.single != is_single(road.design_class):
+        _take_over_defaults(road)
+
+
+def _change_section(road: Any, context: Any) -> None:
+    """Set what follows from a new cross-section: the design class, and another guideline's defaults of the road."""
+    former_class = road.design_class
+    HOOKS["road.cross_section"](road, context)
+    if is_single(former_class) != is_single(road.design_class):
+        _take_over_defaults(road)
+
+
+def _take_over_defaults(road: Any) -> None:
+    """Set what guidelines have defaults for to those of the road's design class, or of a scenario without any."""
+    usual = RoadScenario.from_dict({"design_class": road.design_class}).to_dict()
+    for guideline in GUIDELINES.values():
+        _write_parts(FIELDS["road"].fields, road, guideline.defaults, usual)
+
+
+def _write_parts(fields: Mapping[str, Field], owner: Any, names: Mapping[str, Any], values: Mapping[str, Any]) -> None:
+    """Set those properties of a group, and of groups in it, that are named to values; of unnamed ones none."""
+    for name, part in names.items():
+        field = fields[name]
+        if isinstance(field, GroupField):
+            _write_parts(field.fields, getattr(owner, name), part, values[name])
+        else:
+            field.write(owner, values[name])
+
+
+_HOOKS = HOOKS | {"road.design_class": _change_class, "road.cross_section": _change_section}
+FIELDS = make_fields(Scenario, FIRST_DATA, "", _HOOKS)
 """The scenario's fields by name."""
 _Generated: Any = type(
     "_Generated",
     (),
-    {"__annotations__": {name: p for field in FIELDS.values() for name, p in field.properties(HOOKS).items()}},
+    {"__annotations__": {name: p for field in FIELDS.values() for name, p in field.properties(_HOOKS).items()}},
 )
 
 

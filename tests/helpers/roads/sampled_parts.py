@@ -10,13 +10,13 @@ from synthroads_addon.checking.rules import crossfall as checker_crossfall
 from synthroads_addon.checking.rules import markings as checker_markings
 from synthroads_addon.checking.rules import section as checker_section
 from synthroads_addon.checking.rules import turnouts as checker_turnout
-from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS
+from synthroads_addon.road.guidelines import DUAL_CLASSES, SECTIONS_OF_CLASS
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import Carriageway, Turnout
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 
-PAIRS = [(name, section) for name, sections in SECTIONS_OF_CLASS.items() for section in sections]
+PAIRS = [(name, section) for name in DUAL_CLASSES for section in SECTIONS_OF_CLASS[name]]
 SEEDS = {1.0: 1, 5.0: 1, 50.0: 1, 600.0: 3, 3000.0: 1}
 BLEND = 30.0
 """Behind a ramp's end the verge needs this length (m) to come back."""

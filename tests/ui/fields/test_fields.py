@@ -396,6 +396,15 @@ def test_section_and_class_go_together(panel: Any) -> None:
     for name, allowed in SECTIONS_OF_CLASS.items():
         panel.road.design_class = name
         assert panel.scenario().road.cross_section in allowed
+    for changed, value, phones in (
+        ("design_class", "EKA1A", True),
+        ("design_class", "EKL3", False),
+        ("cross_section", "RQ31", True),
+        ("cross_section", "RQ9", False),
+    ):
+        setattr(panel.road, changed, value)
+        assert panel.road.furniture.emergency_phones is phones
+        assert panel.scenario().road.turnouts.exits == pytest.approx(0.3 if phones else 0.0)
     panel.road.cross_section = BY_HAND
     panel.road.design_class = "EKA3"
     assert panel.scenario().road.cross_section.lanes == (3.75, 3.75)

@@ -1,0 +1,118 @@
+"""How far drivers see along a road: past crests and around curves, with what stands beside it taken as a wall.
+
+The road is taken at stations a step apart. A driver sees a target if the straight line between them passes above the
+road's surface and between the walls at all stations between.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+
+from ..base.arrays import Bool, Float
+from .geometry import alignment_of, profile_of
+from .guidelines import DesignLimits
+from .parameters import AlignmentObject
+
+EYE_HEIGHT, TARGET_HEIGHT = 1.0, 0.5
+"""Heights of a driver's eye and of what is seen first of an obstacle, above the road, m. Chosen: a car's."""
+STEP = 10.0
+"""Distance of the stations, m. Chosen: a crest of 3000 m rises 4 mm above the chord of a step."""
+SHORTEST_DASHED = 100.0
+"""Stretches on which drivers see far enough, but which are shorter than this (m), have a solid line. Chosen: nobody
+overtakes on less."""
+BESIDE_ROAD = 6.0
+"""From the middle of the road to where the view ends at either side, beyond half of what is paved, m. Chosen: about
+where trees and batters are."""
+_BLOCK = 256
+"""Eyes at a time: what is computed for a block takes some 20 MB at 1 km of sight."""
+
+
+def sight_distances(axis: AlignmentObject, eye: Float, clear_width: float, longest: float, direction: int = 1) -> Float:
+    """Return how far (N,), m, drivers at stations (N,) see along the axis; infinite where they see past its end.
+
+    Args:
+        axis: the alignment.
+        eye: stations of the drivers, m.
+        clear_width: from the axis to the walls beside the road, m.
+        longest: sight (m) beyond which it doesn't matter.
+        direction: 1 along the stations, -1 against them.
+
+    Example:
+        >>> from synthroads_addon.road.parameters import HorizontalElement, VerticalPoint
+        >>> arc = HorizontalElement.between(600.0, 1 / 300, 1 / 300)
+        >>> level = (VerticalPoint(station=0.0, elevation=0.0),)
+        >>> axis = AlignmentObject(
+        ...     instance=1, start_x=0.0, start_y=0.0, start_heading_deg=0.0, horizontal=(arc,), vertical=level
+        ... )
+        >>> float(sight_distances(axis, np.array([0.0]), clear_width=6.0, longest=400.0)[0])
+        120.0
+    """
+    eye = np.atleast_1d(np.asarray(eye, dtype=np.float64))
+    blocks = [
+        _block_sight(axis, eye[first : first + _BLOCK], clear_width, longest, direction)
+        for first in range(0, len(eye), _BLOCK)
+    ]
+    return np.concatenate(blocks) if blocks else np.zeros(0)
+
+
+def _block_sight(axis: AlignmentObject, eye: Float, clear_width: float, longest: float, direction: int) -> Float:
+    """Return `sight_distances` of a few drivers at stations (N,), m."""
+    steps = np.arange(1, int(np.ceil(longest / STEP)) + 1)  # (S,)
+    stations = eye[:, None] + direction * STEP * np.arange(
+        len(steps) + 1
+    )  # (N, S + 1): the driver, then the road ahead
+    flat_stations = stations.ravel()
+    alignment, profile = alignment_of(axis), profile_of(axis)
+    positions = alignment.position(flat_stations).reshape(*stations.shape, 2)
+    heading = alignment.heading(flat_stations).reshape(stations.shape)
+    height = profile.elevation(flat_stations).reshape(stations.shape)
+    eye_position, eye_height = positions[:, :1], height[:, :1] + EYE_HEIGHT
+    sees = np.ones((len(eye), len(steps)), dtype=bool)
+    for target in steps[1:].tolist():
+        share = np.arange(1, target) / target  # of the way to the target
+        line = eye_position + share[None, :, None] * (positions[:, target : target + 1] - eye_position)
+        between = line - positions[:, 1:target]
+        to_left = np.cos(heading[:, 1:target]) * between[..., 1] - np.sin(heading[:, 1:target]) * between[..., 0]
+        line_height = eye_height + share * (height[:, target : target + 1] + TARGET_HEIGHT - eye_height)
+        is_free = (np.abs(to_left) <= clear_width) & (line_height >= height[:, 1:target])
+        sees[:, target - 1] = is_free.all(axis=1)
+    seen_steps = np.where(sees.all(axis=1), len(steps), np.argmin(sees, axis=1))
+    distance = STEP * seen_steps
+    room = axis.length - eye if direction > 0 else eye
+    return np.where((distance >= room) | sees.all(axis=1), np.inf, distance)
+
+
+def overtaking_spans(
+    axis: AlignmentObject, paved_half: float, sight: float, length: float
+) -> list[tuple[float, float, bool]]:
+    """Return (start m, end m, whether drivers both ways see as far as they need to overtake) along a road, in order.
+
+    Args:
+        axis: the alignment.
+        paved_half: half of the paved width, m.
+        sight: how far they must see, m.
+        length: of the road, m.
+    """
+    stations = np.append(np.arange(0.0, length, STEP), length)
+    middles = (stations[:-1] + stations[1:]) / 2.0
+    clear_width = paved_half + BESIDE_ROAD
+    far_enough: Bool = np.ones(len(middles), dtype=bool)
+    for direction in (1, -1):
+        far_enough &= sight_distances(axis, middles, clear_width, sight, direction) >= sight
+    borders = [0, *(np.flatnonzero(np.diff(far_enough.astype(np.int8))) + 1).tolist(), len(middles)]
+    spans: list[tuple[float, float, bool]] = []
+    for first, last in pairwise(borders):
+        start, end = float(stations[first]), float(stations[last])
+        may_overtake = bool(far_enough[first]) and (end - start >= SHORTEST_DASHED or end - start >= length)
+        if spans and spans[-1][2] == may_overtake:
+            start = spans.pop()[0]
+        spans.append((start, end, may_overtake))
+    return spans
+
+
+def stopping_sight_margin(axis: AlignmentObject, limits: DesignLimits, paved_half: float, stations: Float) -> Float:
+    """Return by how much (N,), m, drivers at stations (N,), in the worse direction, see farther than they stop in."""
+    clear_width = paved_half + limits.obstacle_distance
+    needed = limits.stopping_sight
+    sights = [sight_distances(axis, stations, clear_width, needed + STEP, direction) for direction in (1, -1)]
+    return np.minimum(*sights) - needed
