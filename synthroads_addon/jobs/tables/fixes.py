@@ -10,7 +10,7 @@ from ...base.errors import InputError
 from ...base.schema import round_value
 from ...checking.rules.rule import Violation
 from ...road.crossfall import crossfall_points
-from ...road.guidelines import LIMITS, LONGEST_STRAIGHT
+from ...road.guidelines import LIMITS
 from ...road.objects import nominal_width
 from ...road.parameters import VerticalPoint
 from ...road.section import Carriageway
@@ -55,7 +55,7 @@ def element_fix(road: StatedRoad, design_class: str, number: int, violation: Vio
         text = "Fit Clothoid to Its Neighbour" if "clothoid" in beside else "Insert Clothoid Before It"
         return _of_elements(text, lambda now: with_clothoid_between(now, number, design_class))
     if rule == "straight-longest":
-        return _length_fix(number, LONGEST_STRAIGHT)
+        return _length_fix(number, limits.straight_longest)
     if rule in ("straight-between", "arc-length") and element.kind != "clothoid":
         return _length_fix(number, math.ceil(1e3 * violation.limit) / 1e3)
     if rule == "radius-minimum":
