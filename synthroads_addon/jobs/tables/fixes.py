@@ -27,8 +27,6 @@ from ...road.tables.elements import (
 from ...road.tables.points import strip_names, strip_width, with_vertical_point, with_width
 from ...road.tables.stated import StatedRoad
 
-_RATIO = 1.5
-"""Largest ratio of neighbouring radii, and of an S-curve's parameters (RAA)."""
 _SPARE = 1e-3
 """What a fix stays clear of a limit by, m: the tables' numbers are rounded."""
 
@@ -63,7 +61,7 @@ def element_fix(road: StatedRoad, design_class: str, number: int, violation: Vio
             return _radius_fix(elements, number, limits.radius)
         return _end_fix(elements, number, limits.radius)
     if rule == "radius-ratio":
-        return _ratio_fix(elements, number)
+        return _ratio_fix(elements, number, limits.radius_ratio)
     if rule == "clothoid-minimum":
         return _parameter_fix(number, limits.clothoid)
     if rule in ("clothoid-short", "clothoid-long"):
@@ -71,7 +69,7 @@ def element_fix(road: StatedRoad, design_class: str, number: int, violation: Vio
     if rule == "clothoid-ratio" and number:
         parameters = [clothoid_parameter(elements[i]) for i in (number - 1, number)]
         smaller = number - 1 + parameters.index(min(parameters))
-        return _parameter_fix(smaller, max(parameters) / _RATIO)
+        return _parameter_fix(smaller, max(parameters) / limits.clothoid_ratio)
     return None
 
 
@@ -180,14 +178,14 @@ def _end_fix(elements: Elements, number: int, radius: float) -> Fix | None:
     return _of_elements(text, lambda now: with_end_radius(now, number, signed, at_end))
 
 
-def _ratio_fix(elements: Elements, number: int) -> Fix | None:
+def _ratio_fix(elements: Elements, number: int, largest_ratio: float) -> Fix | None:
     """Return the fix that widens the sharper one of an arc and the arc before it; None where there are none."""
     arcs = [i for i in range(number + 1) if elements[i].kind == "arc"][-2:]
     if len(arcs) < 2:
         return None
     radii = [1.0 / abs(elements[i].curvature_start) for i in arcs]
     # Rounded up, so that the ratio stays within its limit.
-    return _radius_fix(elements, arcs[radii.index(min(radii))], max(radii) / _RATIO + _SPARE)
+    return _radius_fix(elements, arcs[radii.index(min(radii))], max(radii) / largest_ratio + _SPARE)
 
 
 def _vertical_fix(text: str, number: int, **values: float) -> Fix:
