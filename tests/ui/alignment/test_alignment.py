@@ -131,8 +131,8 @@ def test_rows_are_inserted_split_and_deleted(group: Any) -> None:
 def test_a_broken_rule_is_marked_in_its_row_with_its_words_and_mended(group: Any) -> None:
     bpy.ops.synthroads.insert_element(kind="arc", number=0)
     marks = row_marks(read().parameters)
-    assert {number: [v.rule for v in found] for number, found in tables.tables.marks.elements.items()} == {
-        number: [v.rule for v in found] for number, found in marks.elements.items()
+    assert {number: [v.rule for v in broken] for number, broken in tables.tables.marks.elements.items()} == {
+        number: [v.rule for v in broken] for number, broken in marks.elements.items()
     }
     group.active_elements = 1
     text = "\n".join(drawn(panel.SYNTHROADS_PT_alignment, bpy.context).lines)
