@@ -64,7 +64,7 @@ def shown_base(root: bpy.types.Object) -> tuple[RoadParameters, StatedRoad]:
 @lru_cache(maxsize=4)
 def _built(text: str) -> RoadParameters:
     """Return the parameter set of a JSON text, cached; `InputError` if it is damaged."""
-    return recall_parameters({PARAMETERS: text})  # type: ignore[arg-type]  # it reads this key only
+    return recall_parameters({PARAMETERS: text})  # it reads this key only
 
 
 @lru_cache(maxsize=4)
