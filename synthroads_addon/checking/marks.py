@@ -39,11 +39,6 @@ class RowMarks:
     crossfall: dict[tuple[str, int], list[Violation]] = field(default_factory=dict)
     widths: dict[tuple[str, str, int], list[Violation]] = field(default_factory=dict)
 
-    def count(self) -> int:
-        """Return the number of broken rules that have a row."""
-        tables = (self.elements, self.vertical, self.crossfall, self.widths)
-        return sum(len(rows) for table in tables for rows in table.values())
-
 
 def row_marks(parameters: RoadParameters) -> RowMarks:
     """Return the rules of alignment, profile, crossfall and widths that a road breaks, each at its row.

@@ -13,7 +13,7 @@ from synthroads_addon.road.tables import elements as table
 from synthroads_addon.road.tables import points
 from synthroads_addon.road.tables.stated import StatedRoad
 from synthroads_addon.sampling.road import sample_road
-from synthroads_addon.scenario.road import RoadScenario
+from synthroads_addon.scenario.scenario import load_scenario
 
 Change = Callable[[StatedRoad], StatedRoad]
 RIGHT = "carriageway-right"
@@ -22,7 +22,7 @@ RIGHT = "carriageway-right"
 @pytest.fixture(scope="module")
 def road() -> RoadParameters:
     """A road of arcs, clothoids, S-curves, an egg and a straight."""
-    return sample_road(RoadScenario(length=2000.0), 7)
+    return sample_road(load_scenario("rq31-600m", ["road.length=2000"]).road, 7)
 
 
 def elements(edit: Callable[[table.Elements], table.ElementsEdit]) -> Change:
@@ -48,7 +48,7 @@ def marks_of(road: RoadParameters, stated: StatedRoad) -> RowMarks:
 
 
 def test_a_drawn_road_has_no_marks(road: RoadParameters) -> None:
-    assert row_marks(road).count() == 0
+    assert row_marks(road) == RowMarks()
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_a_crossfall_is_marked_and_stated_by_rule(road: RoadParameters) -> None:
     stated = crossfall(1.0)(StatedRoad.of(road))
     marks = marks_of(road, stated)
     assert set(marks.crossfall) == {(RIGHT, 0)}
-    assert marks_of(road, crossfall_fix(stated, road.design_class, RIGHT).change(stated)).count() == 0
+    assert marks_of(road, crossfall_fix(stated, road.design_class, RIGHT).change(stated)) == RowMarks()
 
 
 @pytest.mark.parametrize(

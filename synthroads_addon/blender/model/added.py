@@ -34,7 +34,7 @@ from .older_files import PARAMETERS
 from .places import IN_A_FRAME, PLACED, Lost, RoadAxes, part_update
 from .read_back import edited_object
 from .roads import NAME, OF_ROAD, ROAD, parts_and_copies, world_matrix
-from .store import recall, recall_parameters
+from .store import recall, recall_parameters, refuse_stated_axis
 
 _PLACE = frozenset({"station", "offset", "rotation_deg"})
 """Fields that say where a thing stands and how it is turned."""
@@ -125,7 +125,8 @@ def add_thing(root: bpy.types.Object, scene: bpy.types.Scene, thing: Thing, name
         name: id of the thing, which no part has.
 
     Raises:
-        InputError: the road's parameters are damaged, or an asset can't be read.
+        InputError: the road's parameters are damaged, its axis was stated anew since it was built, or an asset can't be
+            read.
     """
     made = _build(root, scene, thing, name)
     for role, item in made.items():
@@ -144,6 +145,7 @@ def _build(root: bpy.types.Object, scene: bpy.types.Scene, thing: Thing, name: s
     axes = stored_axes(str(root.get(PARAMETERS, "")))
     if axes is None:
         raise InputError("Road", root.name, "its parameter set in the file is damaged; build it again")
+    refuse_stated_axis(root)
     settings = recall(root)[1].settings()
     base = axes.before.parameters
     ground = {key: item for key, item in base.objects.items() if not isinstance(item, Thing)}
@@ -273,6 +275,7 @@ def change_thing(
     Raises:
         InputError: a value isn't allowed, or no parameters describe the part; the scene is as it was.
     """
+    refuse_stated_axis(root)
     before = present_thing(root, item)
     if not isinstance(before, Thing):
         raise InputError(item.name, None, "it was edited by hand, so that it has no fields: undo that edit first")

@@ -46,13 +46,13 @@ def stated_road(root: bpy.types.Object, scene: bpy.types.Scene) -> StatedRoad:
     modifier = own_modifier(road) if road is not None else None
     if modifier is None:
         return stated
-    edited: dict[str, Carriageway] = {}
+    edited_carriageways: dict[str, Carriageway] = {}
     for name, carriageway in stated.carriageways.items():
         try:
-            edited[name] = edited_carriageway(carriageway, modifier)
+            edited_carriageways[name] = edited_carriageway(carriageway, modifier)
         except KeyError:  # the model, of an older version, lacks an input
-            edited[name] = carriageway
-    return StatedRoad(stated.alignment, edited, stated.stations)
+            edited_carriageways[name] = carriageway
+    return StatedRoad(stated.alignment, edited_carriageways, stated.stations)
 
 
 def shown_base(root: bpy.types.Object) -> tuple[RoadParameters, StatedRoad]:
@@ -64,7 +64,7 @@ def shown_base(root: bpy.types.Object) -> tuple[RoadParameters, StatedRoad]:
 @lru_cache(maxsize=4)
 def _built(text: str) -> RoadParameters:
     """Return the parameter set of a JSON text, cached; `InputError` if it is damaged."""
-    return recall_parameters({PARAMETERS: text})  # type: ignore[arg-type]  # it reads this key only
+    return recall_parameters({PARAMETERS: text})  # it reads this key only
 
 
 @lru_cache(maxsize=4)
@@ -92,8 +92,8 @@ def restate(root: bpy.types.Object, scene: bpy.types.Scene, change: Callable[[St
     if new == now:
         return now
     parameters = read_as_stated(root, scene, new)
-    made = _surface(root, scene, parameters)
-    _take_over(root, parts, made)
+    new_objects = _surface(root, scene, parameters)
+    _take_over(root, parts, new_objects)
     root[STATED] = new.to_json()
     return new
 
@@ -140,17 +140,19 @@ def _remove(objects: dict[str, bpy.types.Object]) -> None:
             bpy.data.meshes.remove(mesh)
 
 
-def _take_over(root: bpy.types.Object, parts: dict[str, bpy.types.Object], made: dict[str, bpy.types.Object]) -> None:
+def _take_over(
+    root: bpy.types.Object, parts: dict[str, bpy.types.Object], new_objects: dict[str, bpy.types.Object]
+) -> None:
     """Give the road's own objects the meshes, node groups and inputs of new ones; the objects stay, for all that refer.
 
     Args:
         root: of the road.
         parts: its objects by role.
-        made: the new ones by role.
+        new_objects: the new ones by role.
     """
-    kept = {role: parts[role] for role in made if role in parts}
-    for role, new in made.items():
-        item = kept.get(role)
+    kept_objects = {role: parts[role] for role in new_objects if role in parts}
+    for role, new in new_objects.items():
+        item = kept_objects.get(role)
         if item is None:  # a detail that the road hadn't
             new.name = role
             new[OF_ROAD], new[NAME] = str(root[ROAD]), new.name
@@ -160,7 +162,7 @@ def _take_over(root: bpy.types.Object, parts: dict[str, bpy.types.Object], made:
         item.data = new.data
         old, modifier = own_modifier(item), own_modifier(new)
         if old is not None and modifier is not None:
-            _copy_inputs(old, modifier, kept)
+            _copy_inputs(old, modifier, kept_objects)
         bpy.data.objects.remove(new)
         if old_mesh is not None and not old_mesh.users:
             bpy.data.meshes.remove(old_mesh)
@@ -169,14 +171,14 @@ def _take_over(root: bpy.types.Object, parts: dict[str, bpy.types.Object], made:
 
 
 def _copy_inputs(
-    modifier: bpy.types.NodesModifier, new: bpy.types.NodesModifier, kept: dict[str, bpy.types.Object]
+    modifier: bpy.types.NodesModifier, new: bpy.types.NodesModifier, kept_objects: dict[str, bpy.types.Object]
 ) -> None:
     """Give a modifier the node group and inputs of a new one; only what differs is set.
 
     Args:
         modifier: of the road's own object.
         new: the new one.
-        kept: objects by role that stay in place of new ones.
+        kept_objects: objects by role that stay in place of new ones.
     """
     if modifier.node_group != new.node_group:
         modifier.node_group = new.node_group
@@ -185,6 +187,6 @@ def _copy_inputs(
             continue
         value = identified_input(new, socket.identifier)
         if isinstance(value, bpy.types.Object):
-            value = kept.get(str(value.get(ROLE, "")), value)
+            value = kept_objects.get(str(value.get(ROLE, "")), value)
         if identified_input(modifier, socket.identifier) != value:
             set_modifier_input(modifier, socket.name, value)

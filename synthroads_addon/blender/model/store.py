@@ -101,6 +101,13 @@ def recall_stated(root: bpy.types.Object) -> StatedRoad | None:
     return StatedRoad.from_json(str(root[STATED])) if STATED in root else None
 
 
+def refuse_stated_axis(root: bpy.types.Object) -> None:
+    """Raise `InputError` if the road's axis was stated anew since it was built: its things stand on the old one."""
+    stated = recall_stated(root)
+    if stated is not None and stated.alignment != recall_parameters(root).alignment:
+        raise InputError("Road", root.name, "its axis was changed in Alignment: press Build as Edited first")
+
+
 def _stored(root: bpy.types.Object, key: str) -> Any:
     """Return the JSON data in a custom property of a road's root."""
     try:

@@ -97,11 +97,6 @@ class Diagram:
         """Return the pixels of stations, m."""
         return np.asarray(self.left + (self.right - self.left) * np.asarray(station) / self.length)
 
-    def station(self, x: float) -> float:
-        """Return the station, m, of a place in a band; within the road."""
-        share = (x - self.left) / (self.right - self.left)
-        return float(np.clip(share, 0.0, 1.0) * self.length)
-
 
 @dataclass(frozen=True)
 class _Band:

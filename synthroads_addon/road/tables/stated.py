@@ -90,15 +90,15 @@ class StatedRoad:
         Raises:
             InputError: what is stated doesn't fit the rest of the road.
         """
-        deleted = {name for name, item in parameters.objects.items() if self._is_deleted(item)}
-        deleted |= {
+        deleted_ids = {name for name, item in parameters.objects.items() if self._is_deleted(item)}
+        deleted_ids |= {
             name
             for name, item in parameters.objects.items()
-            if isinstance(item, LineMarking | Hatching) and item.turnout in deleted
+            if isinstance(item, LineMarking | Hatching) and item.turnout in deleted_ids
         }
         objects: dict[str, RoadObject] = {}
         for name, item in parameters.objects.items():
-            if name in deleted:
+            if name in deleted_ids:
                 continue
             if isinstance(item, AlignmentObject):
                 objects[name] = self.alignment
@@ -106,8 +106,8 @@ class StatedRoad:
                 objects[name] = item if keeps_carriageways else self.carriageways.get(name, item)
             else:
                 objects[name] = self._carried(item)
-        changed = parameters.model_copy(update={"objects": objects})
-        return RoadParameters.from_dict(changed.to_dict())
+        new_parameters = parameters.model_copy(update={"objects": objects})
+        return RoadParameters.from_dict(new_parameters.to_dict())
 
     def _is_deleted(self, item: RoadObject) -> bool:
         """Return whether an object stands only on stretches that were deleted."""

@@ -59,7 +59,10 @@ def _field(read: Callable[[Any], float], write: Callable[[StatedRoad, int, float
             return 0.0
 
     def put(group: Any, value: float) -> None:
-        changed = _value(value, get(group))
+        try:
+            changed = _value(value, read(group))
+        except LookupError:  # the row is gone, and the list not drawn since
+            return
         if changed is not None:
             try_edit(group.id_data, lambda road: write(road, group.number, changed))
 
@@ -404,15 +407,13 @@ ATTACHED = (bpy.types.Scene, "synthroads_alignment", SYNTHROADS_PG_alignment)
 @persistent
 def _note_changes(scene: bpy.types.Scene, graph: bpy.types.Depsgraph | None = None) -> None:
     """Handler: the road may have changed, by an edit, a build or undo."""
-    note_changes(scene, graph)
+    note_changes(graph)
 
 
 @persistent
 def _other_file(*_: Any) -> None:
     """Handler: another file was opened."""
     tables.forget()
-    for scene in bpy.data.scenes:
-        sync(scene)
 
 
 HANDLERS = dict.fromkeys(("depsgraph_update_post", "undo_post", "redo_post"), _note_changes)

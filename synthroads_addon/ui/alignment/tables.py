@@ -206,15 +206,9 @@ def unregister() -> None:
         bpy.app.timers.unregister(_sync_now)
 
 
-def note_changes(scene: bpy.types.Scene, graph: bpy.types.Depsgraph | None = None) -> None:
-    """Mark the tables as stale after a change of a road's objects, and give the lists their rows."""
+def note_changes(graph: bpy.types.Depsgraph | None = None) -> None:
+    """Mark the tables as stale after a change of a road's objects: they are read again when they are next drawn."""
     changes = [update.id for update in graph.updates] if graph else []
-    group: Any = getattr(scene, "synthroads_alignment", None)
-    is_touched = graph is None or any(
+    tables.stale |= graph is None or any(
         isinstance(item, bpy.types.Object) and (ROLE in item or ROAD in item) for item in changes
     )
-    if group is None or not (is_touched or (group.elements and find_road(scene) is None)):
-        return
-    tables.stale = True
-    if any(len(getattr(group, table)) != row_count(scene, table) for table in TABLES):
-        sync(scene)

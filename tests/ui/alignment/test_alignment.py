@@ -18,7 +18,7 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.tables.elements import element_rows
 from synthroads_addon.ui.alignment import panel, tables
 from synthroads_addon.ui.fields import room
-from tests.helpers.scenes.fake_layout import drawn
+from tests.helpers.scenes.fake_layout import FakeLayout, drawn
 
 
 @pytest.fixture(scope="module")
@@ -131,8 +131,8 @@ def test_rows_are_inserted_split_and_deleted(group: Any) -> None:
 def test_a_broken_rule_is_marked_in_its_row_with_its_words_and_mended(group: Any) -> None:
     bpy.ops.synthroads.insert_element(kind="arc", number=0)
     marks = row_marks(read().parameters)
-    assert {number: [v.rule for v in found] for number, found in tables.tables.marks.elements.items()} == {
-        number: [v.rule for v in found] for number, found in marks.elements.items()
+    assert {number: [v.rule for v in broken] for number, broken in tables.tables.marks.elements.items()} == {
+        number: [v.rule for v in broken] for number, broken in marks.elements.items()
     }
     group.active_elements = 1
     text = "\n".join(drawn(panel.SYNTHROADS_PT_alignment, bpy.context).lines)
@@ -165,6 +165,14 @@ def test_a_moved_backbone_is_built_before_its_table_is_edited(group: Any) -> Non
     assert tables.tables.refused == "Alignment: the backbone was moved by hand: press Build as Edited first"
 
 
+def test_things_are_placed_once_the_stated_axis_is_built(group: Any) -> None:
+    group.elements[0].length = 60.0
+    with pytest.raises(RuntimeError, match="its axis was changed in Alignment: press Build as Edited first"):
+        bpy.ops.synthroads.add_thing(kind="TrafficSign", station=50.0, side="right")
+    bpy.ops.synthroads.build_edited()
+    assert bpy.ops.synthroads.add_thing(kind="TrafficSign", station=50.0, side="right") == {"FINISHED"}
+
+
 def test_an_edit_is_undone_with_its_rows(group: Any) -> None:
     bpy.ops.ed.undo_push(message="before")
     before = rows()
@@ -184,3 +192,41 @@ def test_no_word_is_cut(group: Any, width: float, monkeypatch: pytest.MonkeyPatc
     layout = drawn(panel.SYNTHROADS_PT_alignment, bpy.context)
     cut = [text for text, place, needed in layout.texts(width - 60.0) if needed > place]
     assert cut == []
+
+
+@pytest.mark.parametrize("width", [200.0, 300.0])
+def test_a_lists_row_shows_its_values_whole(group: Any, width: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blender cuts a number that is wider than its field: as many are shown as have room."""
+    monkeypatch.setattr(room, "sidebar_width", lambda: width)
+    bpy.ops.synthroads.insert_element(kind="arc", number=0)
+    for table in tables.TABLES:
+        kind = getattr(panel, f"SYNTHROADS_UL_{table}")
+        for item in getattr(group, table):
+            layout = FakeLayout()
+            kind.draw_item(None, bpy.context, layout, group, item, 0, group, "")
+            shown = layout.texts(room.row_width())
+            assert [text for text, place, needed in shown if needed > place] == []
+            assert layout.used  # a value at least
+            assert 1 <= len(layout.used) <= (1 if width == 200.0 else 2)
+    assert any("<ERROR>" in line for line in _lines(group, 1))
+    assert not any("<ERROR>" in line for line in _lines(group, 0))
+
+
+def _lines(group: Any, number: int) -> list[str]:
+    layout = FakeLayout()
+    kind: Any = panel.SYNTHROADS_UL_elements
+    kind.draw_item(None, bpy.context, layout, group, group.elements[number], 0, group, "")
+    return layout.lines
+
+
+def test_every_edit_stands_in_the_menu() -> None:
+    """Blender's search finds what stands in a menu."""
+    synthroads_addon.register()
+    try:
+        text = "\n".join(drawn(panel.SYNTHROADS_MT_alignment, bpy.context).lines)
+        for words in ("Insert Straight", "Insert Clothoid", "Insert Arc", "Delete Element", "Split Element"):
+            assert f"'{words}'" in text
+        for words in ("Insert Vertical Point", "Delete Crossfall Point", "Insert Width", "Show Profile"):
+            assert f"'{words}'" in text
+    finally:
+        synthroads_addon.unregister()

@@ -56,8 +56,9 @@ def test_every_action_is_found_by_its_verb() -> None:
 
 def test_every_operator_stands_in_a_menu_or_needs_a_choice_of_the_panel() -> None:
     """Blender's search finds what stands in a menu."""
-    draws = (menus.SYNTHROADS_MT_add.draw, menus.SYNTHROADS_MT_object.draw, file_menus._draw_import)
-    text = "\n".join(line for draw in (*draws, file_menus._draw_export) for line in entries(draw))
+    draws = (menus.SYNTHROADS_MT_add.draw, menus.SYNTHROADS_MT_object.draw, menus.SYNTHROADS_MT_alignment.draw)
+    files = (file_menus._draw_import, file_menus._draw_export)
+    text = "\n".join(line for draw in (*draws, *files) for line in entries(draw))
     of_the_panel = {
         *("choose_scenario", "choose_device", "add_file", "remove_file", "add_calibration_class", "show_violation"),
         *("move_thing", "move_axis_point"),
