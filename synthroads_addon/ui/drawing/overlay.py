@@ -22,8 +22,8 @@ _POINT, _RADIUS, _HOVERED = (1.0, 1.0, 1.0, 1.0), (1.0, 0.55, 0.1, 1.0), (1.0, 1
 _TEXT = (1.0, 1.0, 1.0, 1.0)
 _DOT = 10.0
 """Size of a handle, pixels at a resolution scale of 1."""
-_LETTERS, _MARGIN = 13.0, 18.0
-"""Size of letters, and distance of a text from its place, pixels at a resolution scale of 1."""
+_LETTERS, _LINE, _MARGIN = 13.0, 18.0, 18.0
+"""Size of letters, distance of lines, and of a text from its place, pixels at a resolution scale of 1."""
 
 
 class SketchView:
@@ -119,20 +119,23 @@ def _draw_face(corners: Sequence[tuple[float, float]], color: Sequence[float]) -
 
 
 def draw_label(place: tuple[float, float], text: str, scale: float) -> None:
-    """Draw a text on a dark ground, moved into the region where it would leave it; in a draw handler of pixels."""
+    """Draw a text on a dark ground, in a draw handler of pixels; it is moved into the region where it would leave it.
+
+    Args:
+        place: lower left corner, pixels; that of the first line.
+        text: one line or several.
+        scale: resolution scale of the interface.
+    """
     region = bpy.context.region
     blf.size(0, _LETTERS * scale)
-    width, height = blf.dimensions(0, text)
-    pad = 4.0 * scale
-    x = min(place[0], max(region.width - width - 2.0 * pad, pad)) if region else place[0]
-    y = min(max(place[1], 2.0 * pad), region.height - height - 2.0 * pad) if region else place[1]
-    corners = [
-        (x - pad, y - pad),
-        (x + width + pad, y - pad),
-        (x + width + pad, y + height + pad),
-        (x - pad, y + height + pad),
-    ]
-    _draw_face(corners, (0.0, 0.0, 0.0, 0.65))
-    blf.position(0, x, y, 0.0)
+    lines = text.splitlines()
+    width, pad, step = max(blf.dimensions(0, line)[0] for line in lines), 4.0 * scale, _LINE * scale
+    below = step * (len(lines) - 1)
+    x = min(place[0], max(region.width - width - 2.0 * pad, pad))
+    y = min(max(place[1], below + 2.0 * pad), region.height - step - pad)
+    left, right, low, high = x - pad, x + width + pad, y - below - pad, y + step - pad
+    _draw_face([(left, low), (right, low), (right, high), (left, high)], (0.0, 0.0, 0.0, 0.65))
     blf.color(0, *_TEXT)
-    blf.draw(0, text)
+    for number, line in enumerate(lines):
+        blf.position(0, x, y - number * step, 0.0)
+        blf.draw(0, line)
