@@ -181,7 +181,7 @@ class SYNTHROADS_GT_dot(bpy.types.Gizmo):
         shown: Any = self  # what Blender's own gizmos have isn't among the slots
         shown.color, shown.alpha = _COLORS[dot.kind], _ALPHA
         shown.color_highlight, shown.alpha_highlight = _HIGHLIGHT, 1.0
-        shown.scale_basis = _SIZE[dot.kind]
+        shown.scale_basis, shown.use_draw_modal = _SIZE[dot.kind], True
         self._put(dot.place)
 
     def _put(self, place: tuple[float, float, float]) -> None:

@@ -20,6 +20,8 @@ COLORS = {"line": (0.95, 0.95, 0.95, 1.0), "arc": (1.0, 0.55, 0.1, 1.0), "clotho
 _TANGENT, _REFUSED = (0.6, 0.6, 0.6, 0.8), (1.0, 0.2, 0.2, 1.0)
 _POINT, _RADIUS, _HOVERED = (1.0, 1.0, 1.0, 1.0), (1.0, 0.55, 0.1, 1.0), (1.0, 1.0, 0.2, 1.0)
 _TEXT = (1.0, 1.0, 1.0, 1.0)
+_TEXT_LEFT = 70.0
+"""Distance of the lines of text from the view's left edge, pixels at a resolution scale of 1: beside the toolbar."""
 _DOT = 10.0
 """Size of a handle, pixels at a resolution scale of 1."""
 _LETTERS, _LINE, _MARGIN = 13.0, 18.0, 18.0
@@ -36,8 +38,7 @@ class SketchView:
         handles: what the mouse can take hold of.
         hovered: the one under the mouse.
         labels: texts at places.
-        text: the line at the mouse.
-        mouse: where it is in the region, pixels.
+        text: lines at the bottom of the view.
         is_refused: whether the point under the mouse can't be taken.
     """
 
@@ -49,7 +50,6 @@ class SketchView:
         self.hovered: Handle | None = None
         self.labels: list[tuple[tuple[float, float], str]] = []
         self.text = ""
-        self.mouse = (0.0, 0.0)
         self.is_refused = False
         self._handlers: list[object] = []
 
@@ -93,7 +93,7 @@ class SketchView:
             if at is not None:
                 draw_label((at.x + _MARGIN * scale, at.y), text, scale)
         if self.text:
-            draw_label((self.mouse[0] + _MARGIN * scale, self.mouse[1] - 2.0 * _MARGIN * scale), self.text, scale)
+            draw_label((_TEXT_LEFT * scale, 0.0), self.text, scale)
 
 
 def _draw_polyline(points: Sequence[tuple[float, float, float]], color: Sequence[float], width: float) -> None:

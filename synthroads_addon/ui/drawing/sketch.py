@@ -22,7 +22,7 @@ _STEP = 1.1
 _SPACING = 5.0
 """Distance of the points by which an element is shown, m."""
 _LINE = 70
-"""Letters of a line of a text at the mouse."""
+"""Letters of a line of the text in the view."""
 _MILLIMETRE = 3
 """Decimals of a point's coordinates in m: what the view's own numbers keep within some kilometres."""
 
