@@ -193,10 +193,17 @@ def _rooms(lengths: Float, turns: Float, wanted: list[float], rule: CurveRule) -
         turns: (N - 2,) at the inner points, rad.
         wanted: N - 2 radii, m.
         rule: by which clothoids are chosen.
+
+    Raises:
+        InputError: a tangent is too short for the smallest radius, even by itself.
     """
     rows = list(zip(wanted, turns.tolist(), strict=True))
     needs = np.array([tangent_length(radius, turn, rule) if radius else 0.0 for radius, turn in rows])
     least = [tangent_length(LEAST_RADIUS, turn, rule) if radius else 0.0 for radius, turn in rows]
+    for number, (turn, length) in enumerate(zip(turns.tolist(), least, strict=True), 1):
+        room = float(lengths[number - 1 : number + 1].min())
+        if length > room:
+            raise _too_sharp(number, turn, room)
     least_lengths = np.concatenate(([0.0], np.minimum(needs, least), [0.0]))
     around = np.concatenate(([0.0], needs, [0.0]))
 
@@ -210,7 +217,7 @@ def _rooms(lengths: Float, turns: Float, wanted: list[float], rule: CurveRule) -
     before, after = shares(slice(1, None), slice(-1)), shares(slice(-1), slice(1, None))
     rooms = np.concatenate(([0.0], np.minimum(needs, np.minimum(before[:-1], after[1:])), [0.0]))
     for i, need in enumerate(needs.tolist(), 1):
-        rooms[i] = min(need, lengths[i - 1] - rooms[i - 1], lengths[i] - rooms[i + 1])
+        rooms[i] = max(min(need, lengths[i - 1] - rooms[i - 1], lengths[i] - rooms[i + 1]), 0.0)
     return rooms[1:-1]
 
 
@@ -227,13 +234,18 @@ def _corners(turns: Float, wanted: list[float], rooms: Float, rule: CurveRule) -
             continue
         held = largest_radius(radius, turn, room, rule)
         if held is None:
-            allowed = f"turns by {abs(math.degrees(turn)):.0f} degrees and has {room:.1f} m of its tangents for that"
-            text = f"{allowed}, too little for a radius of {LEAST_RADIUS:g} m: put it, or the next point, farther away"
-            raise InputError("point", number + 1, text)
+            raise _too_sharp(number, turn, room)
         clothoid = rule.clothoid(held, turn)
         shape = (_written(held), turn, clothoid)
         corners.append(Corner(number, turn, radius, held, clothoid, _tangent_of(*shape), _distance_of(*shape)))
     return corners
+
+
+def _too_sharp(number: int, turn: float, room: float) -> InputError:
+    """Return the error of a point (counted from 0) whose turn (rad) has too little room (m) on its tangents."""
+    allowed = f"turns by {abs(math.degrees(turn)):.0f} degrees and has {room:.1f} m of its tangents for that"
+    text = f"{allowed}, too little for a radius of {LEAST_RADIUS:g} m: put it, or the next point, farther away"
+    return InputError("point", number + 1, text)
 
 
 def largest_radius(wanted: float, turn: float, room: float, rule: CurveRule) -> float | None:

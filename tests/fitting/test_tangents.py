@@ -88,6 +88,13 @@ def test_a_flat_angle_gets_a_larger_radius() -> None:
     assert abs(flat.turn) * flat.radius - flat.clothoid >= RULE.shortest_arc - 1e-9
 
 
+def test_clothoids_leave_the_shortest_arc_or_half_of_the_turn() -> None:
+    arc = RULE.shortest_arc
+    assert RULE.clothoid(900.0, 0.5) == RULE.usual_clothoid(900.0) == pytest.approx(100.0)
+    assert RULE.clothoid(900.0, -0.18) == pytest.approx(162.0 - arc)
+    assert RULE.clothoid(900.0, 0.1) == pytest.approx(45.0)
+
+
 def test_a_radius_is_what_the_tangents_hold() -> None:
     (corner,) = tangent_axis([[0, 0], [200, 0], [400, 200]], [None], RULE).corners
     assert corner.is_reduced

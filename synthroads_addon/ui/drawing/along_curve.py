@@ -203,7 +203,7 @@ class SYNTHROADS_OT_road_from_curve(AlongCurve, bpy.types.Operator):
         if self.polygon:
             rows = _rows(self.polygon)
             points = np.array(rows, dtype=np.float64)[:, :3]
-            self._line = CurveLine("points", points, tuple(row[3] for row in rows), drawing.settings(None))
+            self._line = CurveLine(POLYGON_NAME, points, tuple(row[3] for row in rows), drawing.settings(None))
         elif curve is None:
             raise InputError("Curve", None, "select a curve first, or draw one (Add > Curve, or the tool Draw Road)")
         else:

@@ -181,7 +181,7 @@ class SYNTHROADS_GT_dot(bpy.types.Gizmo):
         shown: Any = self  # what Blender's own gizmos have isn't among the slots
         shown.color, shown.alpha = _COLORS[dot.kind], _ALPHA
         shown.color_highlight, shown.alpha_highlight = _HIGHLIGHT, 1.0
-        shown.scale_basis = _SIZE[dot.kind]
+        shown.scale_basis, shown.use_draw_modal = _SIZE[dot.kind], True
         self._put(dot.place)
 
     def _put(self, place: tuple[float, float, float]) -> None:
@@ -319,7 +319,7 @@ def _draw_label() -> None:
     labels: list[tuple[Vector, str]] = []
     if item is not None and item.select_get() and (text := label_of(item, context.scene)):
         labels.append((item.matrix_world.translation, text))
-    if _Hovered.dot is not None:
+    if _Hovered.dot is not None and not (labels and item is not None and item[ROLE] == _Hovered.dot.name):
         labels.append((_Hovered.place, f"{_Hovered.dot.title}: station {_Hovered.dot.station:.2f} m"))
     for place, text in labels:
         at = location_3d_to_region_2d(region, space.region_3d, place)

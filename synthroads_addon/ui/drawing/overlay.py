@@ -20,10 +20,12 @@ COLORS = {"line": (0.95, 0.95, 0.95, 1.0), "arc": (1.0, 0.55, 0.1, 1.0), "clotho
 _TANGENT, _REFUSED = (0.6, 0.6, 0.6, 0.8), (1.0, 0.2, 0.2, 1.0)
 _POINT, _RADIUS, _HOVERED = (1.0, 1.0, 1.0, 1.0), (1.0, 0.55, 0.1, 1.0), (1.0, 1.0, 0.2, 1.0)
 _TEXT = (1.0, 1.0, 1.0, 1.0)
+_TEXT_LEFT = 70.0
+"""Distance of the lines of text from the view's left edge, pixels at a resolution scale of 1: beside the toolbar."""
 _DOT = 10.0
 """Size of a handle, pixels at a resolution scale of 1."""
-_LETTERS, _MARGIN = 13.0, 18.0
-"""Size of letters, and distance of a text from its place, pixels at a resolution scale of 1."""
+_LETTERS, _LINE, _MARGIN = 13.0, 18.0, 18.0
+"""Size of letters, distance of lines, and of a text from its place, pixels at a resolution scale of 1."""
 
 
 class SketchView:
@@ -36,8 +38,7 @@ class SketchView:
         handles: what the mouse can take hold of.
         hovered: the one under the mouse.
         labels: texts at places.
-        text: the line at the mouse.
-        mouse: where it is in the region, pixels.
+        text: lines at the bottom of the view.
         is_refused: whether the point under the mouse can't be taken.
     """
 
@@ -49,7 +50,6 @@ class SketchView:
         self.hovered: Handle | None = None
         self.labels: list[tuple[tuple[float, float], str]] = []
         self.text = ""
-        self.mouse = (0.0, 0.0)
         self.is_refused = False
         self._handlers: list[object] = []
 
@@ -93,7 +93,7 @@ class SketchView:
             if at is not None:
                 draw_label((at.x + _MARGIN * scale, at.y), text, scale)
         if self.text:
-            draw_label((self.mouse[0] + _MARGIN * scale, self.mouse[1] - 2.0 * _MARGIN * scale), self.text, scale)
+            draw_label((_TEXT_LEFT * scale, 0.0), self.text, scale)
 
 
 def _draw_polyline(points: Sequence[tuple[float, float, float]], color: Sequence[float], width: float) -> None:
@@ -119,20 +119,23 @@ def _draw_face(corners: Sequence[tuple[float, float]], color: Sequence[float]) -
 
 
 def draw_label(place: tuple[float, float], text: str, scale: float) -> None:
-    """Draw a text on a dark ground, moved into the region where it would leave it; in a draw handler of pixels."""
+    """Draw a text on a dark ground, in a draw handler of pixels; it is moved into the region where it would leave it.
+
+    Args:
+        place: lower left corner, pixels; that of the first line.
+        text: one line or several.
+        scale: resolution scale of the interface.
+    """
     region = bpy.context.region
     blf.size(0, _LETTERS * scale)
-    width, height = blf.dimensions(0, text)
-    pad = 4.0 * scale
-    x = min(place[0], max(region.width - width - 2.0 * pad, pad)) if region else place[0]
-    y = min(max(place[1], 2.0 * pad), region.height - height - 2.0 * pad) if region else place[1]
-    corners = [
-        (x - pad, y - pad),
-        (x + width + pad, y - pad),
-        (x + width + pad, y + height + pad),
-        (x - pad, y + height + pad),
-    ]
-    _draw_face(corners, (0.0, 0.0, 0.0, 0.65))
-    blf.position(0, x, y, 0.0)
+    lines = text.splitlines()
+    width, pad, step = max(blf.dimensions(0, line)[0] for line in lines), 4.0 * scale, _LINE * scale
+    below = step * (len(lines) - 1)
+    x = min(place[0], max(region.width - width - 2.0 * pad, pad))
+    y = min(max(place[1], below + 2.0 * pad), region.height - step - pad)
+    left, right, low, high = x - pad, x + width + pad, y - below - pad, y + step - pad
+    _draw_face([(left, low), (right, low), (right, high), (left, high)], (0.0, 0.0, 0.0, 0.65))
     blf.color(0, *_TEXT)
-    blf.draw(0, text)
+    for number, line in enumerate(lines):
+        blf.position(0, x, y - number * step, 0.0)
+        blf.draw(0, line)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
+from textwrap import wrap
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -20,6 +21,8 @@ _STEP = 1.1
 """Factor by which one turn of the wheel changes a radius. Chosen: seven turns double it."""
 _SPACING = 5.0
 """Distance of the points by which an element is shown, m."""
+_LINE = 70
+"""Letters of a line of the text in the view."""
 _MILLIMETRE = 3
 """Decimals of a point's coordinates in m: what the view's own numbers keep within some kilometres."""
 
@@ -163,7 +166,8 @@ class Sketch:
         try:
             self._axis_of(points, radii)
         except InputError as error:
-            self.refusal = str(error)
+            text = f"Point {error.value} {error.allowed}" if error.field == "point" else str(error)
+            self.refusal = "\n".join(wrap(text, _LINE))
             return False
         self.points, self.radii, self.refusal = points, radii, ""
         return True
@@ -198,9 +202,9 @@ def radius_text(corner: Corner) -> str:
 
 
 def state_text(drawn: DrawnAxis | None) -> str:
-    """Return the line on a sketch in words: its length and elements, its deviation, and what rules it breaks."""
+    """Return lines on a sketch in words: its length and elements, its deviation, and each rule that it breaks."""
     if drawn is None:
         return "Click the next point"
     names = list(dict.fromkeys(RULES[violation.rule].title for violation in drawn.violations))
-    rules = f"breaks: {', '.join(names)}" if names else "keeps the rules of the centreline"
-    return f"{drawn.axis.length:,.1f} m, {drawn.text}; {rules}"
+    rules = [f"Breaks: {name}" for name in names] or ["Keeps the rules of the centreline"]
+    return "\n".join([f"{drawn.axis.length:,.1f} m, {drawn.text}", *rules])

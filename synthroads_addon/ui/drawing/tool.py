@@ -226,7 +226,6 @@ class SYNTHROADS_OT_draw_road(bpy.types.Operator):
         state = self._state
         assert state
         region, mouse = mouse_in_view(context.area, event)
-        state.view.mouse = mouse
         if event.value == "PRESS" and event.type in ("RET", "NUMPAD_ENTER", "RIGHTMOUSE"):
             return "build"
         if event.value == "PRESS" and event.type == "ESC":

@@ -46,7 +46,7 @@ def test_clicks_make_lines_clothoids_and_an_arc() -> None:
     assert state.sketch.points == LINE
     assert [element.kind for element in state.view.elements] == ["line", "clothoid", "arc", "clothoid", "line"]
     assert [text for _, text in state.view.labels] == ["R 900 m, A 300 m"]
-    assert "keeps the rules of the centreline" in state.view.text
+    assert "Keeps the rules of the centreline" in state.view.text
     assert "from the tangents' points" in state.view.text
 
 
@@ -125,7 +125,8 @@ def test_a_point_that_cannot_be_rounded_is_refused_in_words() -> None:
     back = np.array([0.0, 1.0]) + LINE[1]
     state.move(np.array(LINE[1]) + [5.0, 0.0], False, None)
     assert state.view.is_refused
-    assert "put it, or the next point, farther away" in state.view.text
+    assert "put it, or the next point, farther away" in state.view.text.replace("\n", " ")
+    assert state.view.text.startswith("Point 3 turns by")
     state.press(np.array(LINE[1]) + [5.0, 0.0], False)
     assert state.sketch.points == LINE
     state.move(back + [900.0, 900.0], False, None)
