@@ -18,6 +18,7 @@ from synthroads_addon.reconstruction.ground.band import find_band
 from synthroads_addon.reconstruction.ground.medians import find_medians
 from synthroads_addon.reconstruction.ground.paved import lines_on_pavement
 from synthroads_addon.reconstruction.ground.strips import find_strips
+from synthroads_addon.reconstruction.judgement import judge
 from synthroads_addon.reconstruction.layout import find_layout
 from synthroads_addon.reconstruction.lines import Line, find_lines, is_dashed
 from synthroads_addon.reconstruction.path import CloudPath
@@ -165,6 +166,15 @@ def test_carriageways_and_ramps_are_counted_by_stretch(tmp_path: Path, kind: str
         assert ((2 + more == carriageways) & (other == ramps))[plain].mean() > 0.95
         for strip in strips:
             assert strip.probability[strip.present].mean() > 0.6
+
+
+def test_of_three_carriageways_with_as_many_lines_neither_pair_is_trusted(tmp_path: Path) -> None:
+    profiles = profiles_of(thrown_road("three carriageways", 44), tmp_path)
+    layout = find_layout(profiles, find_lines(profiles))
+    assert layout.has_rival
+    assert judge(layout, [0.5 * (band.low + band.high) for band in layout.bands]).trusted == 0.0
+    profiles = profiles_of(thrown_road("narrow median", 2), tmp_path)
+    assert not find_layout(profiles, find_lines(profiles)).has_rival
 
 
 def test_each_kind_of_evidence_moves_a_medians_odds(tmp_path: Path) -> None:
