@@ -156,6 +156,8 @@ def judge(
     if layout.parted is not None:
         is_other = layout.parted < 0.5 if layout.kind == "dual" else layout.parted > 0.5
         reasons["whether the road has one carriageway or two isn't clear"] = is_other
+    if layout.has_rival:
+        reasons["two pairs of carriageways have as many lines, and either may be the road"] = np.ones_like(unseen)
     if rivals is not None:
         reasons[f"views of it disagree by more than {APART:g} m"] = rivals
     masks = {reason: _without_short_runs(mask) for reason, mask in reasons.items()}

@@ -130,6 +130,7 @@ class RoadLayout:
         pavement: cross profiles with their share of pavement.
         notes: what was left out, in words.
         parted: (K,) probability that the road has two carriageways there, not one; None if nothing was looked for.
+        has_rival: whether two other neighbouring carriageways have as many lines, and may be the road as well.
     """
 
     kind: RoadKind
@@ -137,6 +138,7 @@ class RoadLayout:
     pavement: Pavement
     notes: tuple[str, ...]
     parted: Float | None = None
+    has_rival: bool = False
 
     @property
     def profiles(self) -> Profiles:
@@ -184,7 +186,8 @@ def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = N
     if len(bands) > len(carriageways):
         notes.append(f"{len(bands) - len(carriageways)} other strips of pavement were left out")
     parted = _parted(pavement, pair, medians)
-    return RoadLayout("dual" if pair else "single", carriageways, pavement, tuple(notes), parted)
+    kind_seen: RoadKind = "dual" if pair else "single"
+    return RoadLayout(kind_seen, carriageways, pavement, tuple(notes), parted, _has_rival(bands, pair))
 
 
 def _unpainted_band(profiles: Profiles, lines: list[Line]) -> DarkBand | None:
@@ -408,14 +411,29 @@ def _line_without_paint(stations: Float, measured: Float, spacing: Float, usual:
 
 def _carriageway_pair(bands: list[Band]) -> tuple[Band, Band] | None:
     """Return the two neighbouring bands between which a median may lie, those with most lines; None without any."""
-    pairs = [
+    pairs = _carriageway_pairs(bands)
+    return max(pairs, key=_line_count) if pairs else None
+
+
+def _has_rival(bands: list[Band], pair: tuple[Band, Band] | None) -> bool:
+    """Return whether another pair of neighbouring bands has as many lines as the chosen one."""
+    return pair is not None and sum(_line_count(other) >= _line_count(pair) for other in _carriageway_pairs(bands)) > 1
+
+
+def _line_count(pair: tuple[Band, Band]) -> int:
+    """Return the number of lines of two bands."""
+    return len(pair[0].lines) + len(pair[1].lines)
+
+
+def _carriageway_pairs(bands: list[Band]) -> list[tuple[Band, Band]]:
+    """Return the neighbouring bands between which a median may lie, from right to left."""
+    return [
         (right_band, left_band)
         for right_band, left_band in pairwise(bands)
         if _NARROWEST_MEDIAN <= left_band.low - right_band.high <= _WIDEST_MEDIAN
         and _is_whole(right_band)
         and _is_whole(left_band)
     ]
-    return max(pairs, key=lambda pair: len(pair[0].lines) + len(pair[1].lines)) if pairs else None
 
 
 def _is_whole(band: Band) -> bool:

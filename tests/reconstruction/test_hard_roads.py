@@ -18,6 +18,7 @@ from synthroads_addon.reconstruction.ground.band import find_band
 from synthroads_addon.reconstruction.ground.medians import find_medians
 from synthroads_addon.reconstruction.ground.paved import lines_on_pavement
 from synthroads_addon.reconstruction.ground.strips import find_strips
+from synthroads_addon.reconstruction.judgement import judge
 from synthroads_addon.reconstruction.layout import find_layout
 from synthroads_addon.reconstruction.lines import Line, find_lines, is_dashed
 from synthroads_addon.reconstruction.path import CloudPath
@@ -167,6 +168,15 @@ def test_carriageways_and_ramps_are_counted_by_stretch(tmp_path: Path, kind: str
             assert strip.probability[strip.present].mean() > 0.6
 
 
+def test_of_three_carriageways_with_as_many_lines_neither_pair_is_trusted(tmp_path: Path) -> None:
+    profiles = profiles_of(thrown_road("three carriageways", 44), tmp_path)
+    layout = find_layout(profiles, find_lines(profiles))
+    assert layout.has_rival
+    assert judge(layout, [0.5 * (band.low + band.high) for band in layout.bands]).trusted == 0.0
+    profiles = profiles_of(thrown_road("narrow median", 2), tmp_path)
+    assert not find_layout(profiles, find_lines(profiles)).has_rival
+
+
 def test_each_kind_of_evidence_moves_a_medians_odds(tmp_path: Path) -> None:
     road = motorway(15, decibel=0.0)
     profiles = profiles_of(road, tmp_path)
@@ -193,7 +203,8 @@ def test_each_kind_of_evidence_moves_a_medians_odds(tmp_path: Path) -> None:
 
 
 def test_a_median_whose_guardrail_was_cut_out_is_one(tmp_path: Path) -> None:
-    road = replace(motorway(18, decibel=2.5), faults=SurveyFaults(rails=((-0.3, 0.3),)))
+    # Without verges, whose brightness would hide the median's.
+    road = replace(motorway(18, decibel=2.5), faults=SurveyFaults(rails=((-0.3, 0.3),)), reach=11.0)
     right, left = pavement_edges(profiles_of(road, tmp_path), [-6.0, 6.0], True)
     assert 0.5 * (right + left) == pytest.approx(np.zeros(len(right)), abs=0.3)
 

@@ -508,14 +508,14 @@ def test_clouds_of_one_name_have_results_of_their_own(trained: Trained, tmp_path
 
 def test_a_cloud_that_is_refused_names_the_tables_before_it(trained: Trained, tmp_path: Path) -> None:
     run = Run.open(trained())
-    labelled, empty = tmp_path / "labelled.laz", tmp_path / "empty.laz"
+    labelled, broken = tmp_path / "labelled.laz", tmp_path / "broken.laz"
     write_cloud(labelled, road_block(500, 4, 20.0))
-    write_cloud(empty, road_block(0, 4, 20.0))
+    broken.write_bytes(b"no cloud")
     with pytest.raises(InputError, match=r"measured before it is in .*out: labelled\.txt, labelled\.png"):
-        task.evaluate(run, Evaluation([labelled, empty], "test", tmp_path / "out"))
+        task.evaluate(run, Evaluation([labelled, broken], "test", tmp_path / "out"))
     assert (tmp_path / "out/labelled.txt").exists()
     with pytest.raises(InputError) as alone:
-        task.evaluate(run, Evaluation([empty], "test", tmp_path / "out"))
+        task.evaluate(run, Evaluation([broken], "test", tmp_path / "out"))
     assert "before it" not in str(alone.value)
 
 
