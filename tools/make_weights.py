@@ -103,7 +103,13 @@ STRIP = 11.0
 PLANS = {
     "centerline-airborne": Plan(
         configuration="centerline-transformer",
-        changes=("schedule.epochs=32", "slices.truth=either", "data.calibration_split=held_out", "threads=1", "workers=2"),
+        changes=(
+            "schedule.epochs=32",
+            "slices.truth=either",
+            "data.calibration_split=held_out",
+            "threads=1",
+            "workers=2",
+        ),
         splits=("train",),
         title="Centreline of roads with one or two carriageways, seen from the air, ten slices at a time",
         task="centerline",
@@ -175,7 +181,7 @@ PLANS = {
         task="segmentation",
         domain=Domain(density=(30.0, 5000.0), platforms=("mobile", "tripod")),
         limits=(
-            "It was measured on synthetic clouds only: no labelled real cloud of a vehicle's drive or a tripod was there.",
+            "It was measured on synthetic clouds only: no labelled real cloud of a drive or of a tripod was there.",
             "Buildings, rails, water and furniture of streets are none of its classes: they become one of the five.",
             "Sidewalks and kerbs it has never seen: in towns road and ground are taken for one another.",
         ),
@@ -213,10 +219,12 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
     run_command("dataset", *make_scenes, "--jobs", str(arguments.jobs), *resumption(data_folder))
     commands = [f"synthroads dataset {shlex.join(make_scenes)}"]
     minutes, epochs, machines = 0.0, 0, []
-    trainings = [(first, arguments.work / str(plan.first), ())] if first else []
-    trainings.append((plan, folder, (f"start={arguments.work / plan.first}",) if plan.first else ()))
-    for training, run_folder, start in trainings:
-        changes = (*training.changes, *start, *data_changes(training, data_folder))
+    start = (f"start={arguments.work / plan.first}",) if plan.first else ()
+    trainings: list[tuple[Training, Path, tuple[str, ...]]] = [(plan, folder, start)]
+    if first:
+        trainings.insert(0, (first, arguments.work / str(plan.first), ()))
+    for training, run_folder, start_change in trainings:
+        changes = (*training.changes, *start_change, *data_changes(training, data_folder))
         options = [word for change in changes for word in ("--set", change)]
         training_minutes, machine = train(training, run_folder, options)
         minutes += training_minutes
@@ -349,7 +357,7 @@ def measured_strips(name: str, split: str, arguments: argparse.Namespace) -> lis
 
 
 def cut_strip(cloud: Path, axis: Path, target: Path) -> None:
-    """Write the ground, road and markings of a cloud within `STRIP` m of an axis, as the cloud's own format has them."""
+    """Write the ground, road and markings of a cloud within `STRIP` m of an axis; a file that is there stays."""
     if target.is_file():
         return
     with open_cloud(cloud) as reader:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ml.cards import Domain, Figure, ModelCard
+from ml.cards import Domain, Figure, ModelCard, model_names, read_card
 from ml.choice import CLEARLY, CloudTraits, cloud_traits, domain_distance, nearest_model, with_agreements
 from synthroads_addon.base.errors import InputError
 from tests.helpers.clouds.road_clouds import block_of, write
@@ -54,6 +54,25 @@ def test_the_nearest_model_is_chosen(density: float, platform: Any, chosen: str,
     assert choice.doubtful == doubtful
     assert chosen in choice.why()
     assert ("unlike" in choice.why()) == doubtful
+
+
+@pytest.mark.parametrize(
+    ("density", "platform", "name"),
+    [
+        (18.0, "airborne", "segmentation-overhead"),
+        (300.0, "uav", "segmentation-overhead"),
+        (8.0, "sweep", "segmentation-sweeps"),
+        (50.0, "mobile", "segmentation-terrestrial"),
+        (275.0, "mobile", "segmentation-terrestrial"),
+        (3000.0, "tripod", "segmentation-terrestrial"),
+    ],
+)
+def test_each_kind_of_survey_has_a_shipped_model(density: float, platform: Any, name: str) -> None:
+    cards = [read_card(model) for model in model_names("segmentation")]
+    choice = nearest_model(cards, CloudTraits(density, 20.0, platform, INTENSE))
+    assert choice.card.name == name
+    assert not choice.doubtful
+    assert choice.distance == 0.0
 
 
 def test_a_cloud_without_what_a_model_needs_is_not_for_it() -> None:
