@@ -218,7 +218,7 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
     make_scenes = (RECIPE, "--output", str(data_folder), "--splits", *splits)
     run_command("dataset", *make_scenes, "--jobs", str(arguments.jobs), *resumption(data_folder))
     commands = [f"synthroads dataset {shlex.join(make_scenes)}"]
-    minutes, epochs, machines = 0.0, 0, []
+    minutes, epochs, machines = 0.0, 0, list[str]()
     start = (f"start={arguments.work / plan.first}",) if plan.first else ()
     trainings: list[tuple[Training, Path, tuple[str, ...]]] = [(plan, folder, start)]
     if first:
@@ -229,7 +229,7 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
         training_minutes, machine = train(training, run_folder, options)
         minutes += training_minutes
         epochs += Run.open(run_folder).configuration.schedule.epochs
-        machines += [] if machine in machines else [machine]
+        machines.append(f"{machine} ({training_minutes:.1f})" if first else machine)
         commands.append(f"synthroads train {training.configuration} --output {run_folder} {shlex.join(options)}")
     run: Run[Any] = Run.open(folder)
     figures = [
@@ -259,7 +259,7 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
         scenes=training_roads({*plan.splits, *(first.splits if first else ())}, data_folder),
         epochs=epochs,
         minutes=round(minutes, 1),
-        machine=" and ".join(machines),
+        machine=", then ".join(machines),
         parameters=int(read_json(folder / "metrics.json")["parameters"]),
         figures=tuple(figures),
         limits=plan.limits,
