@@ -97,6 +97,23 @@ def test_traits_are_measured_on_the_cloud(tmp_path: Path) -> None:
     assert traits.attributes == frozenset()
 
 
+@pytest.mark.parametrize(("hidden", "platform"), [(0.0, "uav"), (0.02, "uav"), (0.12, "mobile")])
+def test_gaps_tell_a_dense_even_cloud_of_the_road_from_one_from_the_air(
+    tmp_path: Path, hidden: float, platform: str
+) -> None:
+    """Drives that were thinned to a grid are as even as clouds from the air."""
+    rng = np.random.default_rng(1)
+    squares = np.stack(np.meshgrid(np.arange(160), np.arange(40)), axis=-1).reshape(-1, 2)
+    squares = squares[rng.random(len(squares)) >= hidden]
+    places = np.repeat(squares, 80, axis=0) + rng.uniform(0.0, 1.0, (80 * len(squares), 2))
+    xyz = np.column_stack([places, np.zeros(len(places))])
+    traits = cloud_traits(
+        write(tmp_path / "even.laz", block_of(xyz, rng.uniform(0.1, 0.9, len(xyz)), np.zeros(len(xyz))))
+    )
+    assert traits.unevenness < 2.0
+    assert traits.platform == platform
+
+
 def test_a_model_that_clearly_agrees_more_with_itself_is_taken_and_said() -> None:
     choice = nearest_model([AIR, CAR], CloudTraits(300.0, 3.0, "uav", INTENSE))
     assert choice.card.name == "car"

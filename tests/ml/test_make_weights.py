@@ -17,7 +17,6 @@ from synthroads_addon.dataset.recipe import load_recipe, scene_jobs
 from tests.helpers.clouds.road_clouds import block_of
 from tests.helpers.clouds.segmentation_data import write_cloud
 from tools.make_weights import (
-    FIRST,
     PLANS,
     RECIPE,
     ROAD_AGAINST_VERGE,
@@ -53,7 +52,7 @@ def test_a_plan_fits_its_configuration_and_the_recipe(name: str) -> None:
 def test_a_second_training_can_continue_the_first_one(name: str) -> None:
     """Their networks, classes and features must be the same: `train` refuses others."""
     plan = PLANS[name]
-    first = FIRST[str(plan.first)]
+    first = PLANS[str(plan.first)]
     second_configuration = load_configuration(plan.configuration, [*plan.changes, *data_changes(plan, DATA)])
     first_configuration = load_configuration(first.configuration, [*first.changes, *data_changes(first, DATA)])
     for field in ("task", "classes", "features", "intensity", "network"):
