@@ -22,6 +22,11 @@ _OTHER_PLATFORM = log(3.0) + 1e-9  # added for another platform: always beyond `
 _UNEVEN = 12.0  # of the 90th to the 20th percentile of cells' points: scanners that stand or drive on the road
 _LONG = 3.0  # of a ground-based cloud's extent along to that across: the scanner drove
 _DENSE = 60.0  # points/m2 from which an even cloud is a UAV's
+_BLOCK = 8
+"""Edge of the blocks in which empty square metres are counted, m. Chosen: several times as wide as what hides ground."""
+_HIDDEN = 0.05
+"""Share of empty square metres from which a dense even cloud was scanned from the road: what stands beside it hides the
+ground behind it. Chosen: even synthetic drives have 0.11 to 0.13, clouds from the air at most 0.03."""
 _SAMPLE = 2_000_000
 SQUARE = 24
 """Edge, m, of the squares whose points are counted, so that a sample of them can be drawn. Chosen: that of the tiles
@@ -215,6 +220,8 @@ def cloud_traits(path: Path) -> CloudTraits:
 def _platform(density: float, unevenness: float, cell_corners: Float, first_blocks: Sequence[Float]) -> Platform:
     """Return the likely platform: even clouds are seen from above, uneven ones from the road.
 
+    A dense cloud that was thinned is even wherever it was scanned from: its gaps tell.
+
     Args:
         density: points/m2.
         unevenness: see `CloudTraits`.
@@ -222,11 +229,28 @@ def _platform(density: float, unevenness: float, cell_corners: Float, first_bloc
         first_blocks: the cloud's points (N, 3) in blocks, up to the one with which they exceed `MOST_POINTS`; a cloud
             of more points is no sweep.
     """
-    if unevenness < _UNEVEN:
-        return "uav" if density >= _DENSE else "airborne"
+    if unevenness < _UNEVEN and density < _DENSE:
+        return "airborne"
+    if unevenness < _UNEVEN and _empty_share(cell_corners) < _HIDDEN:
+        return "uav"
     if sum(map(len, first_blocks)) <= MOST_POINTS and find_sweep(np.concatenate(first_blocks)) is not None:
         return "sweep"
     spread = (
         np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(cell_corners.T)), 1.0)) if len(cell_corners) > 2 else np.ones(2)
     )
     return "mobile" if spread[1] > _LONG * spread[0] else "tripod"
+
+
+def _empty_share(cell_corners: Float) -> float:
+    """Return the share of empty square metres in blocks of `_BLOCK` m with neighbours on all sides; 0 without any.
+
+    Args:
+        cell_corners: (N, 2) corners of the occupied square metres, each once.
+    """
+    block_places = np.floor(cell_corners / _BLOCK).astype(np.int64)
+    block_places -= block_places.min(axis=0) - 1
+    columns = int(block_places[:, 1].max()) + 2
+    blocks, counts = np.unique(block_places[:, 0] * columns + block_places[:, 1], return_counts=True)
+    steps = [row * columns + column for row in (-1, 0, 1) for column in (-1, 0, 1)]
+    is_inner = np.all([np.isin(blocks + step, blocks) for step in steps], axis=0)
+    return float(1.0 - counts[is_inner].mean() / _BLOCK**2) if is_inner.any() else 0.0

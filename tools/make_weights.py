@@ -73,7 +73,7 @@ class Plan(Training):
         mapping: real cloud's name in the folder of real ones -> mapping of its classes; of centrelines axes lie beside.
         paved: real cloud's name -> smallest and largest offset of each pavement from the axis beside it, m.
         strips: splits whose roads are measured once more as strips of `STRIP` m to both sides of the axis, ground only.
-        first: training that this one continues from, out of `FIRST`; None for random weights.
+        first: plan whose training this one continues from; None for random weights.
     """
 
     title: str
@@ -90,20 +90,18 @@ class Plan(Training):
 
 RECIPE = "package-models"
 """Data set that all of them learn from."""
-FIRST = {
-    "segmentation-first": Training(
-        "segmentation-any-scanner",
-        ("schedule.epochs=36", "batch=8", "threads=1", "workers=3", "prepare_on=cpu"),
-        ("train", "train_sweeps"),
-    ),
-}
-"""Trainings that plans continue from, made once for all of them."""
 STRIP = 11.0
 """How far strips reach to both sides of an axis, m: as published airborne clouds of roads do."""
 PLANS = {
     "centerline-airborne": Plan(
         configuration="centerline-transformer",
-        changes=("schedule.epochs=32", "slices.truth=either", "data.calibration_split=held_out", "threads=1", "workers=2"),
+        changes=(
+            "schedule.epochs=32",
+            "slices.truth=either",
+            "data.calibration_split=held_out",
+            "threads=1",
+            "workers=2",
+        ),
         splits=("train",),
         title="Centreline of roads with one or two carriageways, seen from the air, ten slices at a time",
         task="centerline",
@@ -123,17 +121,18 @@ PLANS = {
         },
     ),
     "segmentation-overhead": Plan(
-        configuration="segmentation-strips",
-        changes=("threads=1", "prepare_on=cpu"),
-        splits=("train", "train_medians"),
-        title="Five classes on and beside roads, from the air and from UAVs, whole scenes and strips along the road",
+        configuration="segmentation-any-scanner",
+        changes=("schedule.epochs=36", "batch=8", "threads=1", "workers=3", "prepare_on=cpu"),
+        splits=("train", "train_sweeps"),
+        title="Five classes on and beside roads, from the air and from UAVs",
         task="segmentation",
         domain=Domain(density=(8.0, 1500.0), platforms=("airborne", "uav")),
         limits=(
             "Buildings, rails, water and furniture of streets are none of its classes: they become one of the five.",
             "Plants beside synthetic roads are of few kinds; hedges along a pavement may be taken for road furniture.",
+            "In strips along dual carriageways, without vegetation, a third of the road is taken for ground.",
         ),
-        inside={"test": "its own test roads", "test_medians": "its own roads with wide and narrow medians"},
+        inside={"test": "its own test roads"},
         outside={"held_out": "synthetic roads of another world"},
         mapping={"ign_lidarhd_street.laz": "ign"},
         # Read off the profiles of intensity and height across each road.
@@ -144,7 +143,6 @@ PLANS = {
             "als_rural2lane_t211-278.laz": ((-3.2, 3.4),),
         },
         strips=("test_medians",),
-        first="segmentation-first",
     ),
     "segmentation-sweeps": Plan(
         configuration="segmentation-any-scanner",
@@ -173,9 +171,9 @@ PLANS = {
         splits=("train_mobile", "train_tripod"),
         title="Five classes on and beside roads, in whole drives of mobile scanners and from tripods",
         task="segmentation",
-        domain=Domain(density=(30.0, 5000.0), platforms=("mobile", "tripod")),
+        domain=Domain(density=(6.0, 3000.0), platforms=("mobile", "tripod")),
         limits=(
-            "It was measured on synthetic clouds only: no labelled real cloud of a vehicle's drive or a tripod was there.",
+            "It was measured on synthetic clouds only: no labelled real cloud of a drive or of a tripod was there.",
             "Buildings, rails, water and furniture of streets are none of its classes: they become one of the five.",
             "Sidewalks and kerbs it has never seen: in towns road and ground are taken for one another.",
         ),
@@ -184,7 +182,7 @@ PLANS = {
             "held_out_mobile": "drives with heads that it hasn't met",
             "held_out_tripod": "tripods with a scanner that it hasn't met",
         },
-        first="segmentation-first",
+        first="segmentation-overhead",
     ),
 }
 
@@ -207,21 +205,23 @@ def main() -> None:
 def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
     """Make one model: its data set, training, figures, weights and card."""
     data_folder, folder = arguments.work / RECIPE, arguments.work / name
-    first = FIRST[plan.first] if plan.first else None
+    first = PLANS[plan.first] if plan.first else None
     splits = needed_splits(plan)
     make_scenes = (RECIPE, "--output", str(data_folder), "--splits", *splits)
     run_command("dataset", *make_scenes, "--jobs", str(arguments.jobs), *resumption(data_folder))
     commands = [f"synthroads dataset {shlex.join(make_scenes)}"]
-    minutes, epochs, machines = 0.0, 0, []
-    trainings = [(first, arguments.work / str(plan.first), ())] if first else []
-    trainings.append((plan, folder, (f"start={arguments.work / plan.first}",) if plan.first else ()))
-    for training, run_folder, start in trainings:
-        changes = (*training.changes, *start, *data_changes(training, data_folder))
+    minutes, epochs, machines = 0.0, 0, list[str]()
+    start = (f"start={arguments.work / plan.first}",) if plan.first else ()
+    trainings: list[tuple[Training, Path, tuple[str, ...]]] = [(plan, folder, start)]
+    if first:
+        trainings.insert(0, (first, arguments.work / str(plan.first), ()))
+    for training, run_folder, start_change in trainings:
+        changes = (*training.changes, *start_change, *data_changes(training, data_folder))
         options = [word for change in changes for word in ("--set", change)]
         training_minutes, machine = train(training, run_folder, options)
         minutes += training_minutes
         epochs += Run.open(run_folder).configuration.schedule.epochs
-        machines += [] if machine in machines else [machine]
+        machines.append(f"{machine} ({training_minutes:.1f})" if first else machine)
         commands.append(f"synthroads train {training.configuration} --output {run_folder} {shlex.join(options)}")
     run: Run[Any] = Run.open(folder)
     figures = [
@@ -251,7 +251,7 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
         scenes=training_roads({*plan.splits, *(first.splits if first else ())}, data_folder),
         epochs=epochs,
         minutes=round(minutes, 1),
-        machine=" and ".join(machines),
+        machine=", then ".join(machines),
         parameters=int(read_json(folder / "metrics.json")["parameters"]),
         figures=tuple(figures),
         limits=plan.limits,
@@ -262,7 +262,7 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
 
 def needed_splits(plan: Plan) -> list[str]:
     """Return the splits of the data set that a model is trained and measured on, sorted."""
-    first_splits = FIRST[plan.first].splits if plan.first else ()
+    first_splits = PLANS[plan.first].splits if plan.first else ()
     # Centrelines are validated after each epoch.
     validation = ("validation",) if plan.task == "centerline" else ()
     return sorted({*plan.splits, *first_splits, *plan.inside, *plan.outside, *validation})
@@ -336,20 +336,19 @@ def foreign(plan: Plan, name: str, folder: Path, arguments: argparse.Namespace) 
 
 def measured_strips(name: str, split: str, arguments: argparse.Namespace) -> list[Figure]:
     """Return how well road is told from ground on a split's roads cut to strips along their axes, ground only."""
-    data_folder, strips_folder = arguments.work / RECIPE, arguments.work / f"{name}-scores" / f"{split}-strips"
-    strips_folder.mkdir(parents=True, exist_ok=True)
+    data_folder, strips_folder = arguments.work / RECIPE, arguments.work / f"{name}-scores" / "strips"
+    (strips_folder / split).mkdir(parents=True, exist_ok=True)
     for scene in read_manifest(data_folder).scenes:
         if scene.split == split and scene.status == "done":
             folder = data_folder / "scenes" / scene.name
-            cut_strip(folder / "cloud.laz", folder / "centerline.geojson", strips_folder / f"{scene.name}.laz")
-    scores = evaluate(
-        arguments.work / name, [str(strips_folder)], arguments.work / f"{name}-scores" / f"{split}-measured"
-    )
-    return road_figures(scores, f"its own roads with medians cut to {STRIP:g} m, ground only")
+            cut_strip(folder / "cloud.laz", folder / "centerline.geojson", strips_folder / split / f"{scene.name}.laz")
+    words = [str(strips_folder), "--split", split]
+    scores = evaluate(arguments.work / name, words, arguments.work / f"{name}-scores" / f"{split}-strips")
+    return road_figures(scores, f"motorways with other medians cut to {STRIP:g} m, ground only")
 
 
 def cut_strip(cloud: Path, axis: Path, target: Path) -> None:
-    """Write the ground, road and markings of a cloud within `STRIP` m of an axis, as the cloud's own format has them."""
+    """Write the ground, road and markings of a cloud within `STRIP` m of an axis; a file that is there stays."""
     if target.is_file():
         return
     with open_cloud(cloud) as reader:

@@ -16,8 +16,8 @@ from synthroads_addon.base.random_streams import stream
 from ..data.classes import class_names
 from ..data.crops import CropDataset, Draw, Item, Seeds, collate
 from ..data.exchange import ExchangedCrops
-from ..data.scene_stream import EpochScenes, SceneStream
 from ..data.road_offsets import with_offsets
+from ..data.scene_stream import EpochScenes, SceneStream
 from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, scalings
 from ..data.workers import load_batches
@@ -40,9 +40,8 @@ def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[Clo
         InputError: there are none, or they don't fit the configuration.
     """
     domains: dict[str, list[CloudTile]] = {}
-    needs_offsets = bool(configuration.effects.strip.probability or configuration.effects.stripes)
     for domain, sources in configuration.needed_sources().items():
-        domains[domain] = list(thin_tiles(sources, configuration, domain, offsets=needs_offsets))
+        domains[domain] = list(thin_tiles(sources, configuration, domain, offsets=_needs_offsets(configuration)))
     return domains if configuration.data.stream else prepare_domains(domains, configuration)
 
 
@@ -239,7 +238,13 @@ def streamed_tiles(configuration: SegmentationConfiguration, number: int, folder
     """Return the thinned tiles of a stream's scene; an empty list if it has none."""
     if not any(folder.glob("pointcept/*/*/*/coord.npy")):
         return []
-    return list(thin_tiles([Source(path=str(folder))], configuration, f"stream/{number}"))
+    sources, needs_offsets = [Source(path=str(folder))], _needs_offsets(configuration)
+    return list(thin_tiles(sources, configuration, f"stream/{number}", offsets=needs_offsets))
+
+
+def _needs_offsets(configuration: SegmentationConfiguration) -> bool:
+    """Return whether an effect needs the points' offsets from their roads' axes."""
+    return bool(configuration.effects.strip.probability or configuration.effects.stripes)
 
 
 def _load_crops(

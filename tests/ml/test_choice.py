@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ml.cards import Domain, Figure, ModelCard
+from ml.cards import Domain, Figure, ModelCard, model_names, read_card
 from ml.choice import CLEARLY, CloudTraits, cloud_traits, domain_distance, nearest_model, with_agreements
 from synthroads_addon.base.errors import InputError
 from tests.helpers.clouds.road_clouds import block_of, write
@@ -56,6 +56,25 @@ def test_the_nearest_model_is_chosen(density: float, platform: Any, chosen: str,
     assert ("unlike" in choice.why()) == doubtful
 
 
+@pytest.mark.parametrize(
+    ("density", "platform", "name"),
+    [
+        (18.0, "airborne", "segmentation-overhead"),
+        (300.0, "uav", "segmentation-overhead"),
+        (8.0, "sweep", "segmentation-sweeps"),
+        (50.0, "mobile", "segmentation-terrestrial"),
+        (275.0, "mobile", "segmentation-terrestrial"),
+        (3000.0, "tripod", "segmentation-terrestrial"),
+    ],
+)
+def test_each_kind_of_survey_has_a_shipped_model(density: float, platform: Any, name: str) -> None:
+    cards = [read_card(model) for model in model_names("segmentation")]
+    choice = nearest_model(cards, CloudTraits(density, 20.0, platform, INTENSE))
+    assert choice.card.name == name
+    assert not choice.doubtful
+    assert choice.distance == 0.0
+
+
 def test_a_cloud_without_what_a_model_needs_is_not_for_it() -> None:
     plain = CloudTraits(300.0, 30.0, "mobile", frozenset())
     assert domain_distance(CAR, plain) == inf
@@ -76,6 +95,23 @@ def test_traits_are_measured_on_the_cloud(tmp_path: Path) -> None:
     traits = cloud_traits(write(tmp_path / "sweep.laz", block_of(swept, np.full(16_000, 0.5), np.zeros(16_000))))
     assert traits.platform == "tripod"
     assert traits.attributes == frozenset()
+
+
+@pytest.mark.parametrize(("hidden", "platform"), [(0.0, "uav"), (0.02, "uav"), (0.12, "mobile")])
+def test_gaps_tell_a_dense_even_cloud_of_the_road_from_one_from_the_air(
+    tmp_path: Path, hidden: float, platform: str
+) -> None:
+    """Drives that were thinned to a grid are as even as clouds from the air."""
+    rng = np.random.default_rng(1)
+    squares = np.stack(np.meshgrid(np.arange(160), np.arange(40)), axis=-1).reshape(-1, 2)
+    squares = squares[rng.random(len(squares)) >= hidden]
+    places = np.repeat(squares, 80, axis=0) + rng.uniform(0.0, 1.0, (80 * len(squares), 2))
+    xyz = np.column_stack([places, np.zeros(len(places))])
+    traits = cloud_traits(
+        write(tmp_path / "even.laz", block_of(xyz, rng.uniform(0.1, 0.9, len(xyz)), np.zeros(len(xyz))))
+    )
+    assert traits.unevenness < 2.0
+    assert traits.platform == platform
 
 
 def test_a_model_that_clearly_agrees_more_with_itself_is_taken_and_said() -> None:

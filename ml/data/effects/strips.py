@@ -40,7 +40,11 @@ class StripCut(Part):
     probability: float = quantity(0.0, ge=0, le=1, unit="1", description="Probability that a tile is cut.")
     reach: tuple[float, float] = Field((6.0, 60.0), description="Smallest and largest R, m.")
     ground_only: float = quantity(
-        0.5, ge=0, le=1, unit="1", description="Share of the cut tiles in which only ground, road and markings are kept."
+        0.5,
+        ge=0,
+        le=1,
+        unit="1",
+        description="Share of the cut tiles in which only ground, road and markings are kept.",
     )
     carriageway: float = quantity(
         0.25,
@@ -82,7 +86,7 @@ def cut_strip(crop: Crop, effects: "CropEffects", random: Generator) -> None:
 
 @effect("segmentation", order=-10)
 def change_contrast(crop: Crop, effects: "CropEffects", random: Generator) -> None:
-    """Multiply intensities of everything but pavement by a common factor, all by a pattern across the road, in place."""
+    """Multiply the intensities beside the pavement by a factor, and all by a pattern across the road, in place."""
     if crop.strength is None:
         return
     strength = crop.strength
@@ -107,7 +111,8 @@ def _carriageway_middle(crop: Crop, random: Generator) -> float:
 
 def _pattern(offset: Float, random: Generator) -> Float:
     """Return random values (N,) of about unit deviation that vary with the offset (m) only: a sum of waves."""
-    rate = 2.0 * np.pi / np.exp(random.uniform(*np.log(_WAVELENGTHS), _WAVES))
+    shortest, longest = np.log(_WAVELENGTHS)
+    rate = 2.0 * np.pi / np.exp(random.uniform(shortest, longest, _WAVES))
     angle = offset[:, None] * rate + random.uniform(0.0, 2.0 * np.pi, _WAVES)
     result: Float = np.cos(angle).sum(axis=1) * np.sqrt(2.0 / _WAVES)
     return result
