@@ -17,6 +17,7 @@ from .panels import (
     calibration,
     calibration_settings,
     cloud_view,
+    dataset,
     edit,
     export,
     file_menus,
@@ -56,7 +57,7 @@ MODULES = (
         views,
         scene_scan,
     ),
-    *(export, file_menus, calibration_settings, calibration, menus),
+    *(export, file_menus, calibration_settings, calibration, dataset, menus),
 )
 
 

@@ -1,0 +1,94 @@
+"""Blender is told the translations of all that is registered, and texts are translated before they are measured."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+
+import bpy
+
+from .catalogue import catalogue_of, languages
+
+_LOCALES = {"de": ("de_DE", "de")}
+"""Language -> its locales in Blender."""
+_CONTEXTS = ("*", "Operator")
+"""Contexts in which Blender looks up labels and tooltips, and operators' names."""
+_PREFIX = "SYNTHROADS_"
+_KINDS = ("Operator", "Panel", "Menu", "PropertyGroup", "UIList", "AddonPreferences", "Gizmo", "GizmoGroup")
+
+
+def registered_messages() -> set[str]:
+    """Return all labels, tooltips and choices of the classes that are registered now."""
+    return {text.strip() for cls in _classes() for text in _messages(cls) if any(map(str.isalpha, text))}
+
+
+def _classes() -> Iterator[type]:
+    """Yield our registered classes."""
+    for kind in _KINDS:
+        waiting = list(getattr(bpy.types, kind).__subclasses__())
+        while waiting:
+            cls = waiting.pop()
+            waiting += cls.__subclasses__()
+            if _is_ours(cls) and getattr(cls, "is_registered", False):
+                yield cls
+
+
+def _is_ours(cls: type) -> bool:
+    """Return whether a class is one of this add-on's."""
+    package = __package__.rpartition(".ui.")[0]
+    return cls.__module__.startswith(package) or cls.__name__.startswith(_PREFIX)
+
+
+def _messages(cls: type) -> Iterator[str]:
+    """Yield the texts of one class and its properties."""
+    yield str(getattr(cls, "bl_label", ""))
+    if issubclass(cls, bpy.types.Operator):
+        yield cls.bl_rna.description
+    for name, item in cls.bl_rna.properties.items():
+        if name in ("rna_type", "name") or name.startswith("bl_"):
+            continue
+        if name not in getattr(cls, "__annotations__", {}) and not _annotated(cls, name):
+            continue
+        yield item.name
+        yield item.description
+        if item.type == "ENUM":
+            for choice in item.enum_items:
+                yield choice.name
+                yield choice.description
+
+
+def _annotated(cls: type, name: str) -> bool:
+    """Return whether a class or one of its bases declares a property."""
+    return any(name in getattr(base, "__annotations__", {}) for base in cls.__mro__)
+
+
+def register() -> None:
+    """Tell Blender the translations of all messages of the registered classes, and of the panel's fixed texts."""
+    dictionary: dict[str, dict[tuple[str, str], str]] = {}
+    for language in languages():
+        catalogue = catalogue_of(language)
+        assert catalogue is not None
+        texts = registered_messages() | set(catalogue.messages)
+        pairs = {text: translation for text in texts if (translation := catalogue.translate(text))}
+        entries = {(context, text): translation for text, translation in pairs.items() for context in _CONTEXTS}
+        dictionary |= dict.fromkeys(_LOCALES.get(language, (language,)), entries)
+    bpy.app.translations.register(__package__, dictionary)
+
+
+def unregister() -> None:
+    """Take the translations back."""
+    bpy.app.translations.unregister(__package__)
+
+
+def said(text: str) -> str:
+    """Return a text of the panel in the language of Blender's window, or as it is."""
+    if not bpy.context.preferences.view.use_translate_interface:
+        return text
+    return _said(bpy.app.translations.locale, text)
+
+
+@lru_cache(maxsize=4096)
+def _said(locale: str, text: str) -> str:
+    """Return a text in the language of a locale, or as it is; cached, as panels are drawn often."""
+    catalogue = catalogue_of(locale)
+    return text if catalogue is None else catalogue.translate(text) or text
