@@ -33,6 +33,7 @@ from .panels import (
     things,
     views,
 )
+from .translations import blender as translations
 from .work import build, edited, follow, long_operator, scan
 
 MODULES = (
@@ -57,7 +58,7 @@ MODULES = (
         views,
         scene_scan,
     ),
-    *(export, file_menus, calibration_settings, calibration, dataset, menus),
+    *(export, file_menus, calibration_settings, calibration, dataset, menus, translations),
 )
 
 

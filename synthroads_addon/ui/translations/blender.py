@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 
 import bpy
@@ -18,8 +18,23 @@ _KINDS = ("Operator", "Panel", "Menu", "PropertyGroup", "UIList", "AddonPreferen
 
 
 def registered_messages() -> set[str]:
-    """Return all labels, tooltips and choices of the classes that are registered now."""
-    return {text.strip() for cls in _classes() for text in _messages(cls) if any(map(str.isalpha, text))}
+    """Return all labels, choices and tooltips of the classes that are registered now."""
+    return registered_labels() | registered_tooltips()
+
+
+def registered_labels() -> set[str]:
+    """Return the labels and choices of the classes that are registered now."""
+    return _with_words(label for cls in _classes() for label, _ in _messages(cls))
+
+
+def registered_tooltips() -> set[str]:
+    """Return the tooltips of the classes that are registered now, and those of their properties and choices."""
+    return _with_words(tooltip for cls in _classes() for _, tooltip in _messages(cls))
+
+
+def _with_words(texts: Iterable[str]) -> set[str]:
+    """Return the texts that have letters."""
+    return {text.strip() for text in texts if any(map(str.isalpha, text))}
 
 
 def _classes() -> Iterator[type]:
@@ -39,22 +54,16 @@ def _is_ours(cls: type) -> bool:
     return cls.__module__.startswith(package) or cls.__name__.startswith(_PREFIX)
 
 
-def _messages(cls: type) -> Iterator[str]:
-    """Yield the texts of one class and its properties."""
-    yield str(getattr(cls, "bl_label", ""))
-    if issubclass(cls, bpy.types.Operator):
-        yield cls.bl_rna.description
+def _messages(cls: type) -> Iterator[tuple[str, str]]:
+    """Yield label and tooltip of one class, of its properties, and of their choices."""
+    is_operator = issubclass(cls, bpy.types.Operator)
+    yield str(getattr(cls, "bl_label", "")), cls.bl_rna.description if is_operator else ""
     for name, item in cls.bl_rna.properties.items():
-        if name in ("rna_type", "name") or name.startswith("bl_"):
+        if not _annotated(cls, name) or item.is_hidden:
             continue
-        if name not in getattr(cls, "__annotations__", {}) and not _annotated(cls, name):
-            continue
-        yield item.name
-        yield item.description
-        if item.type == "ENUM":
-            for choice in item.enum_items:
-                yield choice.name
-                yield choice.description
+        yield item.name, item.description
+        for choice in item.enum_items if item.type == "ENUM" else ():
+            yield choice.name, choice.description
 
 
 def _annotated(cls: type, name: str) -> bool:
