@@ -57,8 +57,9 @@ def _is_ours(cls: type) -> bool:
 def _messages(cls: type) -> Iterator[tuple[str, str]]:
     """Yield label and tooltip of one class, of its properties, and of their choices."""
     is_operator = issubclass(cls, bpy.types.Operator)
-    yield str(getattr(cls, "bl_label", "")), cls.bl_rna.description if is_operator else ""
-    for name, item in cls.bl_rna.properties.items():
+    rna = getattr(bpy.ops.synthroads, cls.__name__.partition("_OT_")[2]).get_rna_type() if is_operator else cls.bl_rna
+    yield str(getattr(cls, "bl_label", "")), rna.description if is_operator else ""
+    for name, item in rna.properties.items():
         if not _annotated(cls, name) or item.is_hidden:
             continue
         yield item.name, item.description
