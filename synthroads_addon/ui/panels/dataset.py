@@ -140,10 +140,11 @@ class SYNTHROADS_PT_dataset(Sidebar, bpy.types.Panel):
 
 def _draw_result(layout: bpy.types.UILayout, work: DatasetWork) -> None:
     """Draw how many scenes are done, and the strip of their pictures."""
-    text = f"{work.done} of {work.total} scenes done" + (f", {work.failed} failed" if work.failed else "")
     row = layout.row(align=True)
-    draw_text(row.column(), text, "ERROR" if work.failed else "CHECKMARK", beside=1)
+    draw_text(row.column(), f"{work.done} of {work.total} scenes done", "CHECKMARK", beside=1)
     row.operator("wm.path_open", text="", icon="FILE_FOLDER").filepath = str(work.folder)
+    if work.failed:
+        draw_text(layout, f"{work.failed} failed: the folder logs says why", "ERROR")
     pictures = list(work.pictures.items())[-MOST_PICTURES:]
     if not pictures:
         return

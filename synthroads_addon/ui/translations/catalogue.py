@@ -9,6 +9,8 @@ from pathlib import Path
 
 FOLDER = Path(__file__).parent
 _HOLE = re.compile(r"\{(\d)\}")
+_GROUPS = {"9": r"(°|%|m|1 : n|per (?:km|m|m²|ha|s|100 m)|cm³|m?m/dB|dB|kHz|Hz|m?rad|ns|nm|mm/h|h|d|K|hPa)"}
+"""Hole -> what it may hold, if not any text: ``{9}`` holds a unit, as in ``Length (km)``."""
 _DEEPEST = 6
 """Most patterns within each other; chosen: a tooltip has four."""
 
@@ -38,7 +40,8 @@ class Catalogue:
         for pattern, message in self._pattern_messages:
             if match := pattern.fullmatch(text):
                 parts = [self.translate(part, depth + 1) or part for part in match.groups()]
-                return _HOLE.sub(lambda hole: parts[int(hole[1])], self.messages[message])
+                held = dict(zip(_HOLE.findall(message), parts, strict=True))
+                return _HOLE.sub(lambda hole: held[hole[1]], self.messages[message])
         return None
 
     def missing(self, text: str, used: set[str]) -> set[str]:
@@ -63,13 +66,14 @@ class Catalogue:
 
 def _says_something(part: str) -> bool:
     """Return whether a part has words to translate: no number with its unit, and no hole."""
-    return re.fullmatch(r"(?:[-+\d.,e%°: ]|\{\d\}|\b(?:m|mm|km|s|h|d|deg|rad|mrad|nm|kHz|MHz|Hz|px|dB|ns|K|hPa|B|cm³|m/s|mm/h|per|m²|ha|n)\b)*", part) is None
+    return re.fullmatch(r"(?:[-+\d.,e%°×: ]|\{\d\}|\b(?:m|mm|km|s|h|d|deg|rad|mrad|nm|kHz|MHz|Hz|px|dB|m/dB|1 : n|ns|K|hPa|B|cm³|m/s|mm/h|per|m²|ha|n)\b)*", part) is None
 
 
 def pattern_of(message: str) -> re.Pattern[str]:
     """Return the regular expression of a message with holes, which are its groups in order."""
-    pieces = _HOLE.split(message)[::2]
-    return re.compile("(.+?)".join(re.escape(piece) for piece in pieces), re.DOTALL)
+    *pieces, last = _HOLE.split(message)
+    texts = [re.escape(text) + _GROUPS.get(number, "(.+?)") for text, number in zip(pieces[::2], pieces[1::2], strict=True)]
+    return re.compile("".join(texts) + re.escape(last), re.DOTALL)
 
 
 @lru_cache(maxsize=8)
