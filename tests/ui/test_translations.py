@@ -4,7 +4,6 @@ import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 
 import bpy
 import pytest
@@ -23,10 +22,9 @@ CAPITAL_NOUNS = ("Straße", "Punktwolke", "Fahrstreifen", "Querschnitt", "Schutz
 
 @pytest.fixture(autouse=True)
 def add_on() -> Iterator[None]:
-    """Register the add-on for one test, and go back to English."""
+    """Register the add-on for one test."""
     synthroads_addon.register()
     yield
-    bpy.context.preferences.view.language = "en_US"
     synthroads_addon.unregister()
 
 
@@ -75,31 +73,45 @@ def test_patterns_translate_what_they_hold() -> None:
     assert pattern_of("a {0} (b)").fullmatch("a x (b)")
 
 
-def test_blender_answers_in_german() -> None:
-    bpy.context.preferences.view.language = "de_DE"
-    assert bpy.app.translations.pgettext_iface("Build Road", "Operator") == "Straße bauen"
-    assert bpy.app.translations.pgettext_iface("Guardrail Height") == "Höhe der Schutzplanke"
+@pytest.fixture
+def german(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have texts said in German: the package bpy has no languages of its own to choose from."""
+    monkeypatch.setattr(translations, "locale", lambda: "de_DE")
+
+
+def test_blender_is_told_all_labels_and_tooltips(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: dict[str, dict[tuple[str, str], str]] = {}
+    monkeypatch.setattr(translations, "_tell", lambda entries: told.update(entries))
+    translations.register()
+    assert sorted(told) == ["de", "de_DE"]
+    assert told["de_DE"]["Operator", "Build Road"] == "Straße bauen"
+    assert told["de_DE"]["*", "Guardrail Height Minimum"] == "Höhe der Schutzplanke: Minimum"
+    for text in translations.registered_messages():
+        assert ("*", text) in told["de_DE"], text
+
+
+@pytest.mark.usefixtures("german")
+def test_drawn_texts_are_german() -> None:
     assert translations.said("12,345 points written") == "12,345 Punkte geschrieben"
-    own = bpy.app.translations.pgettext_tip(
-        synthroads_addon.ui.panels.dataset.SYNTHROADS_OT_make_dataset.bl_rna.description
-    )
-    assert "Szenen" in own
-    bpy.context.preferences.view.language = "en_US"
+    assert translations.said("Own Length") == "Länge angeben"
+    cls = next(c for c in panels.CLASSES if issubclass(c, panels.MainPanel))
+    assert "Unten ein Szenario wählen" in " ".join(drawn(cls, bpy.context).lines)
+
+
+def test_english_stays_english() -> None:
     assert translations.said("12 points written") == "12 points written"
 
 
+@pytest.mark.usefixtures("german")
 @pytest.mark.parametrize("width", [200.0, 300.0])
 def test_no_german_text_is_cut(width: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Names of values, buttons, flags and texts are wrapped by their German width."""
-    bpy.context.preferences.view.language = "de_DE"
     monkeypatch.setattr(room, "sidebar_width", lambda: width)
     for name in ("MainPanel", "RoadPanel", "ScannerPanel", "OutputPanel"):
         cls = next(c for c in panels.CLASSES if issubclass(c, getattr(panels, name)))
-        lines = drawn(cls, bpy.context).lines
-        assert lines, name
-    for text in messages("de").values():
-        for line in room.text_lines(text):
-            assert room.fits(line) or len(line) <= 3, line
+        assert drawn(cls, bpy.context).lines, name
+    for text in translations.registered_labels():
+        assert all(room.fits(line) for line in room.text_lines(translations.said(text))), text
 
 
 def test_other_languages_are_added_by_a_file_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,4 +127,3 @@ def test_other_languages_are_added_by_a_file_alone(tmp_path: Path, monkeypatch: 
         assert catalogue.catalogue_of("es") is None
     finally:
         catalogue.catalogue_of.cache_clear()
-    assert SimpleNamespace(languages=languages()).languages

@@ -82,6 +82,11 @@ def register() -> None:
         pairs = {text: translation for text in texts if (translation := catalogue.translate(text))}
         entries = {(context, text): translation for text, translation in pairs.items() for context in _CONTEXTS}
         dictionary |= dict.fromkeys(_LOCALES.get(language, (language,)), entries)
+    _tell(dictionary)
+
+
+def _tell(dictionary: dict[str, dict[tuple[str, str], str]]) -> None:
+    """Tell Blender translations by locale, context and message."""
     bpy.app.translations.register(__package__, dictionary)
 
 
@@ -92,13 +97,17 @@ def unregister() -> None:
 
 def said(text: str) -> str:
     """Return a text of the panel in the language of Blender's window, or as it is."""
-    if not bpy.context.preferences.view.use_translate_interface:
-        return text
-    return _said(bpy.app.translations.locale, text)
+    return _said(locale(), text)
+
+
+def locale() -> str:
+    """Return the locale of Blender's labels, such as ``de_DE``; empty where they aren't translated."""
+    view = bpy.context.preferences.view
+    return str(bpy.app.translations.locale or "") if view.use_translate_interface else ""
 
 
 @lru_cache(maxsize=4096)
-def _said(locale: str, text: str) -> str:
+def _said(language: str, text: str) -> str:
     """Return a text in the language of a locale, or as it is; cached, as panels are drawn often."""
-    catalogue = catalogue_of(locale)
+    catalogue = catalogue_of(language)
     return text if catalogue is None else catalogue.translate(text) or text
