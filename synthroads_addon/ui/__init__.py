@@ -19,6 +19,7 @@ from .panels import (
     calibration,
     calibration_settings,
     cloud_view,
+    dataset,
     edit,
     export,
     file_menus,
@@ -34,6 +35,7 @@ from .panels import (
     things,
     views,
 )
+from .translations import blender as translations
 from .work import build, edited, follow, long_operator, scan
 
 MODULES = (
@@ -60,7 +62,7 @@ MODULES = (
     ),
     *alignment.MODULES,
     *(along_curve, tool, dots),
-    *(export, file_menus, calibration_settings, calibration, menus),
+    *(export, file_menus, calibration_settings, calibration, dataset, menus, translations),
 )
 
 

@@ -25,7 +25,7 @@ _GROUP = "SR Headlight Return"
 _NODE = "SR Glow"
 LUMINANCES = {
     "lamp_glass": 20_000.0,
-    "lamp_red": 1500.0,
+    "lamp_red": 400.0,
     "lamp_yellow": 3000.0,
     "led_white": 400.0,
     "led_red": 400.0,

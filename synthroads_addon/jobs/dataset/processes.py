@@ -8,7 +8,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
@@ -115,8 +115,17 @@ Submit = Callable[[list[str]], Iterator[Outcome]]
 """Has the tasks in these folders done, and yields how each ended, in any order."""
 
 
-def local_processes(jobs: int) -> Submit:
-    """Return a function that runs tasks in so many processes at once on this machine."""
+def no_beat() -> None:
+    """Do nothing: the beat of work that nobody watches."""
+
+
+def local_processes(jobs: int, beat: Callable[[], None] = no_beat) -> Submit:
+    """Return a function that runs tasks in so many processes at once on this machine.
+
+    Args:
+        jobs: processes at once.
+        beat: called several times a second meanwhile; what it raises ends the work.
+    """
 
     threads = max(1, available_cores() // jobs)
 
@@ -136,8 +145,12 @@ def local_processes(jobs: int) -> Submit:
                 folders_ended.append(folder)
 
         try:
-            for future in as_completed([pool.submit(task, folder) for folder in folders]):
-                yield future.result()
+            waiting = {pool.submit(task, folder) for folder in folders}
+            while waiting:
+                ended, waiting = wait(waiting, timeout=_TICK, return_when=FIRST_COMPLETED)
+                for future in ended:
+                    yield future.result()
+                beat()
         finally:
             stopping.set()
             pool.shutdown(wait=True, cancel_futures=True)

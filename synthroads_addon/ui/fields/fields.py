@@ -27,6 +27,7 @@ from .choices import ITEMS, is_offered
 from .inherited import SOURCES, Value
 from .numbers import clamp_32_bit, exact, is_share, list_as_text, number_property, numbers_in, push_along
 from .room import draw_flag, draw_text, fits, value_row, value_share
+from ..translations.blender import said
 from .wording import label, tooltip, value_name, written_unit
 
 AUTOMATIC = "AUTOMATIC"
@@ -265,7 +266,7 @@ class NumberField(OptionalField):
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
         """Draw the number in a row, or a share as a slider with the label inside if that fits."""
-        if not self.is_share or self.optional or not fits(f"{self.label} 0.000"):
+        if not self.is_share or self.optional or not fits(f"{said(self.label)} 0.000"):
             super().draw_row(layout, settings, owner)
             return
         row = layout.row()

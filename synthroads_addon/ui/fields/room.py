@@ -10,6 +10,8 @@ from collections.abc import Sequence
 import blf
 import bpy
 
+from ..translations.blender import said
+
 NAMES_SHARE = 0.45
 """Share of a row's width that its name takes."""
 _EDGES = 60.0
@@ -84,7 +86,7 @@ def draw_text(layout: bpy.types.UILayout, text: str, icon: str = "NONE", share: 
         beside: icons and icon buttons in the same row.
     """
     has_icon = icon != "NONE"
-    lines = text_lines(text, share, has_icon + beside)
+    lines = text_lines(said(text), share, has_icon + beside)
     column = layout if len(lines) == 1 else layout.column(align=True)
     for number, line in enumerate(lines):
         column.label(text=line, icon="BLANK1" if has_icon and number else icon)
@@ -92,7 +94,7 @@ def draw_text(layout: bpy.types.UILayout, text: str, icon: str = "NONE", share: 
 
 def buttons_row(layout: bpy.types.UILayout, texts: Sequence[str], align: bool = False) -> bpy.types.UILayout:
     """Return a row layout for buttons, or a column if their texts don't fit side by side."""
-    side_by_side = all(fits(text, 1.0 / len(texts), 1) for text in texts)
+    side_by_side = all(fits(said(text), 1.0 / len(texts), 1) for text in texts)
     return layout.row(align=align) if side_by_side else layout.column(align=align)
 
 
@@ -105,14 +107,16 @@ def draw_menu(layout: bpy.types.UILayout, menu: str, title: str, label: str) -> 
         title: of what is chosen.
         label: what the menu offers.
     """
-    if not fits(title, icons=2):
+    if not fits(said(title), icons=2):
         draw_text(layout, title)
         title = label
+    title = said(title)
     layout.menu(menu, text=title, icon="PRESET")
 
 
 def value_row(layout: bpy.types.UILayout, label: str) -> bpy.types.UILayout:
     """Draw a label and return the layout for its value: beside it if both fit, else below."""
+    label = said(label)
     if not is_narrow() and fits(label, NAMES_SHARE):
         split = layout.split(factor=NAMES_SHARE)
         name = split.row()
@@ -130,7 +134,7 @@ def value_row(layout: bpy.types.UILayout, label: str) -> bpy.types.UILayout:
 
 def value_share(label: str) -> float:
     """Return the share of a row's width that `value_row` leaves for the value of a label."""
-    return 1.0 - NAMES_SHARE if not is_narrow() and fits(label, NAMES_SHARE) else 1.0
+    return 1.0 - NAMES_SHARE if not is_narrow() and fits(said(label), NAMES_SHARE) else 1.0
 
 
 def draw_flag(layout: bpy.types.UILayout, owner: object, name: str, label: str) -> None:
@@ -141,6 +145,7 @@ def draw_flag(layout: bpy.types.UILayout, owner: object, name: str, label: str) 
         owner, name: the property.
         label: the text.
     """
+    label = said(label)
     if not is_narrow() and fits(label, 1.0 - NAMES_SHARE, 1):
         value_row(layout, "").prop(owner, name, text=label)
         return

@@ -31,6 +31,7 @@ from .cloud_view import (
     SYNTHROADS_OT_hide_cloud,
     SYNTHROADS_OT_show_cloud,
 )
+from .dataset import SYNTHROADS_OT_make_dataset
 from .edit import SYNTHROADS_OT_show_plants
 from .export import SYNTHROADS_OT_export_cloud, SYNTHROADS_OT_export_twin, SYNTHROADS_OT_install_ifc
 from .placing import (
@@ -94,6 +95,7 @@ _WORK: tuple[Block, ...] = (
         (SYNTHROADS_OT_fit_materials, "Fit Materials", "MOD_DATA_TRANSFER"),
         (SYNTHROADS_OT_show_calibration, "Show Calibration's Diagrams", "IMAGE_DATA"),
         (SYNTHROADS_OT_save_materials, "Save Fitted Materials to Table", "FILE_TICK"),
+        (SYNTHROADS_OT_make_dataset, "Make Data Set", "FILE_FOLDER"),
         (SYNTHROADS_OT_cancel, "Cancel Running Work", "X"),
     ),
     (

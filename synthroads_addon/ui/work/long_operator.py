@@ -16,6 +16,7 @@ import bpy
 from ...base.errors import Cancelled, InputError
 from ...blender.model.stage import remove_staged
 from ..fields.room import draw_text
+from ..translations.blender import said
 from .common import is_free, redraw_sidebars, refuse
 from .job import TICK, PanelJob, WorkPace, running_job, stop_job
 
@@ -118,7 +119,7 @@ class LongOperator:
         if job.error is None:
             return self._say(self.succeed(context, job), job.remarks)
         if isinstance(job.error, Cancelled):
-            self.report({"WARNING"}, f"{job.title} cancelled; {self.nothing_done}")
+            self.report({"WARNING"}, said(f"{job.title} cancelled; {self.nothing_done}"))
             return {"CANCELLED"}
         if isinstance(job.error, InputError):
             return self.refuse(job.error)
@@ -129,7 +130,7 @@ class LongOperator:
     def _say(self, message: str, remarks: Sequence[str]) -> set[str]:
         for remark in remarks:
             self.report({"WARNING"}, remark)
-        self.report({"INFO"}, message)
+        self.report({"INFO"}, said(message))
         return {"FINISHED"}
 
     def _leave(self, context: bpy.types.Context) -> None:
@@ -208,7 +209,7 @@ def draw_job(layout: bpy.types.UILayout) -> bool:
         return False
     row = layout.row(align=True)
     row.scale_y = 1.4
-    row.progress(factor=job.share, text=job.state)
+    row.progress(factor=job.share, text=said(job.state))
     row.operator(SYNTHROADS_OT_cancel.bl_idname, text="", icon="X")
     for note in job.notes:
         draw_text(layout, note, "INFO")
@@ -222,9 +223,9 @@ def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
         return
     layout.label(text="", icon="EVENT_ESC")
     layout.separator(factor=2.0)
-    layout.label(text=f"Cancel {job.title}")
+    layout.label(text=said(f"Cancel {job.title}"))
     layout.separator_spacer()
-    layout.label(text=f"SynthRoads: {job.state}")  # Blender cuts texts off that stand on this bar
+    layout.label(text=f"SynthRoads: {said(job.state)}")  # Blender cuts texts off that stand on this bar
     layout.progress(factor=job.share)
     layout.separator_spacer()
 

@@ -1,0 +1,129 @@
+"""The window in other languages: complete, nothing left over, with the same holes, and told to Blender."""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+import pytest
+
+import synthroads_addon
+from synthroads_addon.ui.fields import room
+from synthroads_addon.ui.panels import panels
+from synthroads_addon.ui.translations import blender as translations
+from synthroads_addon.ui.translations.catalogue import FOLDER, Catalogue, languages, pattern_of
+from tests.helpers.scenes.fake_layout import drawn
+from tools import translations as tool
+
+HOLE = re.compile(r"\{\d\}")
+CAPITAL_NOUNS = ("Straße", "Punktwolke", "Fahrstreifen", "Querschnitt", "Schutzplanke", "Leitpfosten")
+
+
+@pytest.fixture(autouse=True)
+def add_on() -> Iterator[None]:
+    """Register the add-on for one test."""
+    synthroads_addon.register()
+    yield
+    synthroads_addon.unregister()
+
+
+def messages(language: str) -> dict[str, str]:
+    return dict(json.loads((FOLDER / f"{language}.json").read_text(encoding="utf-8")))
+
+
+def test_german_is_there() -> None:
+    assert "de" in languages()
+
+
+@pytest.mark.parametrize("language", languages())
+def test_every_message_is_translated_and_none_is_left_over(language: str) -> None:
+    """`python tools/translations.py --write` adds what is missing with empty translations, to be filled in."""
+    needed = translations.registered_messages() | tool.source_messages()
+    missing, left_over = tool.compare(messages(language), needed)
+    assert missing == []
+    assert left_over == []
+
+
+def test_what_lacks_and_what_is_left_over_is_named() -> None:
+    lacking, left_over = tool.compare({"Length": "Länge", "Own {0}": "{0} angeben", "Old": "Alt"}, {"Own Width"})
+    assert (lacking, left_over) == (["Width"], ["Length", "Old"])
+
+
+@pytest.mark.parametrize("language", languages())
+def test_translations_have_the_holes_of_their_messages(language: str) -> None:
+    for text, translation in messages(language).items():
+        assert set(HOLE.findall(text)) == set(HOLE.findall(translation)), text
+        assert translation.strip() == translation != "", text
+    assert list(messages(language)) == sorted(messages(language))
+
+
+def test_german_uses_the_terms_of_road_building() -> None:
+    text = "\n".join(messages("de").values())
+    for term in (*CAPITAL_NOUNS, "Station", "Achse", "Klothoide", "Querneigung", "Standstreifen", "Verkehrszeichenbrücke"):
+        assert term in text, term
+
+
+def test_patterns_translate_what_they_hold() -> None:
+    catalogue = Catalogue({"{0} of {1} points": "{0} von {1} Punkten", "Own {0}": "{0} angeben", "Length": "Länge"})
+    assert catalogue.translate("3 of 12 points") == "3 von 12 Punkten"
+    assert catalogue.translate("Own Length") == "Länge angeben"
+    assert catalogue.translate("Own Width") == "Width angeben"
+    assert catalogue.translate("nothing") is None
+    assert pattern_of("a {0} (b)").fullmatch("a x (b)")
+
+
+@pytest.fixture
+def german(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have texts said in German: the package bpy has no languages of its own to choose from."""
+    monkeypatch.setattr(translations, "locale", lambda: "de_DE")
+
+
+def test_blender_is_told_all_labels_and_tooltips(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: dict[str, dict[tuple[str, str], str]] = {}
+    monkeypatch.setattr(translations, "_tell", lambda entries: told.update(entries))
+    translations.register()
+    assert sorted(told) == ["de", "de_DE"]
+    assert told["de_DE"]["Operator", "Build Road"] == "Straße bauen"
+    assert told["de_DE"]["*", "Guardrail Height Minimum"] == "Höhe der Schutzplanke: Minimum"
+    for text in translations.registered_messages():
+        assert ("*", text) in told["de_DE"], text
+
+
+@pytest.mark.usefixtures("german")
+def test_drawn_texts_are_german() -> None:
+    assert translations.said("12,345 points written") == "12,345 Punkte geschrieben"
+    assert translations.said("Own Length") == "Länge angeben"
+    cls = next(c for c in panels.CLASSES if issubclass(c, panels.MainPanel))
+    assert "Unten ein Szenario wählen" in " ".join(drawn(cls, bpy.context).lines)
+
+
+def test_english_stays_english() -> None:
+    assert translations.said("12 points written") == "12 points written"
+
+
+@pytest.mark.usefixtures("german")
+@pytest.mark.parametrize("width", [200.0, 300.0])
+def test_no_german_text_is_cut(width: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Names of values, buttons, flags and texts are wrapped by their German width."""
+    monkeypatch.setattr(room, "sidebar_width", lambda: width)
+    for name in ("MainPanel", "RoadPanel", "ScannerPanel", "OutputPanel"):
+        cls = next(c for c in panels.CLASSES if issubclass(c, getattr(panels, name)))
+        assert drawn(cls, bpy.context).lines, name
+    for text in translations.registered_labels():
+        assert all(room.fits(line) for line in room.text_lines(translations.said(text))), text
+
+
+def test_other_languages_are_added_by_a_file_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from synthroads_addon.ui.translations import catalogue
+
+    (tmp_path / "fr.json").write_text(json.dumps({"Road": "Route"}), encoding="utf-8")
+    monkeypatch.setattr(catalogue, "FOLDER", tmp_path)
+    catalogue.catalogue_of.cache_clear()
+    try:
+        found = catalogue.catalogue_of("fr_FR")
+        assert found is not None
+        assert found.translate("Road") == "Route"
+        assert catalogue.catalogue_of("es") is None
+    finally:
+        catalogue.catalogue_of.cache_clear()
