@@ -12,6 +12,8 @@ from synthroads_addon.base.files import PRESETS
 from synthroads_addon.base.schema import read_json
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.guidelines import (
+    DUAL_CLASSES,
+    DUAL_CROSS_SECTIONS,
     LIMITS,
     SECTIONS_OF_CLASS,
     STANDARD_CROSS_SECTIONS,
@@ -133,12 +135,12 @@ def test_unreadable_files_are_named(tmp_path) -> None:
 
 
 def test_standard_cross_sections_add_up() -> None:
-    for name, section in STANDARD_CROSS_SECTIONS.items():
+    for name, section in DUAL_CROSS_SECTIONS.items():
         paved = sum(section.lanes) + section.hard_shoulder + section.outer_edge_strip + section.inner_edge_strip
         assert 2 * (paved + section.verge) + section.median == pytest.approx(float(name[2:]))
 
 
-@pytest.mark.parametrize("section", list(STANDARD_CROSS_SECTIONS))
+@pytest.mark.parametrize("section", list(DUAL_CROSS_SECTIONS))
 @pytest.mark.parametrize("length", [600, 5000])
 @cases(2, 20)
 def test_roads_keep_the_limits_of_their_class(section: str, length: int, count: int) -> None:
@@ -220,7 +222,8 @@ def test_short_and_long_roads(length: int) -> None:
 
 def test_curve_crossfall() -> None:
     for name, limits in LIMITS.items():
-        assert curve_crossfall_percent(name, 1 / limits.radius) == 6.0
+        largest = 6.0 if name in DUAL_CLASSES else 7.0
+        assert curve_crossfall_percent(name, 1 / limits.drawn_radius_least) == largest
         assert curve_crossfall_percent(name, 1 / limits.radius_least_crossfall) == 2.5
         assert curve_crossfall_percent(name, 0.0) == 2.5
 

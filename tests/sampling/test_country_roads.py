@@ -243,6 +243,12 @@ BREACHES = {
     ),
 }
 """Rule -> a road of EKL 3 that breaks it."""
+OF_COUNTRY_ROADS = {"vertical-tangent", "stopping-sight", "centre-line-missing", "centre-line-narrow"}
+"""Rules that motorways don't have."""
+
+
+def test_every_rule_of_country_roads_has_a_planted_breach() -> None:
+    assert set(BREACHES) >= OF_COUNTRY_ROADS
 
 
 @pytest.mark.parametrize("rule", BREACHES)
