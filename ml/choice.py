@@ -23,9 +23,9 @@ _UNEVEN = 12.0  # of the 90th to the 20th percentile of cells' points: scanners 
 _LONG = 3.0  # of a ground-based cloud's extent along to that across: the scanner drove
 _DENSE = 60.0  # points/m2 from which an even cloud is a UAV's
 _BLOCK = 8
-"""Edge of the blocks in which empty square metres are counted, m. Chosen: several times as wide as what hides ground."""
+"""Edge of the blocks in which empty square metres are counted, m. Chosen: wider than what hides ground."""
 _HIDDEN = 0.05
-"""Share of empty square metres from which a dense even cloud was scanned from the road: what stands beside it hides the
+"""Share of empty square metres from which a dense even cloud was scanned from the road: what stands there hides the
 ground behind it. Chosen: even synthetic drives have 0.11 to 0.13, clouds from the air at most 0.03."""
 _SAMPLE = 2_000_000
 SQUARE = 24
