@@ -1,7 +1,7 @@
 """List what the catalogues of translations lack, and what is left over in them: ``python tools/translations.py``.
 
-It needs Blender (bpy), as it reads the labels and tooltips of the registered panel. ``--write`` adds the missing messages
-to the catalogues with empty translations, and sorts them; fill them in, and run it again.
+It needs Blender (bpy), as it reads the labels and tooltips of the registered panel. ``--write`` adds what is missing to
+the catalogues with empty translations, and sorts them; fill them in, and run it again.
 """
 
 from __future__ import annotations

@@ -190,7 +190,11 @@ class Environment(Model):
         180.0, ge=0, le=360, unit="deg", description="Direction of the sun, clockwise from north."
     )
     sun_elevation_deg: float = quantity(
-        45.0, ge=-90, le=90, unit="deg", description="Height of the sun above the horizon; negative at dusk and at night."
+        45.0,
+        ge=-90,
+        le=90,
+        unit="deg",
+        description="Height of the sun above the horizon; negative at dusk and at night.",
     )
     sun_strength: float = quantity(1.0, ge=0, le=2, unit="1", description="Strength of the sunlight; 1 on a clear day.")
     cloud_cover: float = quantity(0.0, ge=0, le=1, unit="1", description="Share of the ground in clouds' shadow.")

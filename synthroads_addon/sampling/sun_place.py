@@ -30,7 +30,9 @@ def sun_angles(hour: float, day: int, latitude_deg: float) -> tuple[float, float
     hour_angle, latitude = math.radians(15.0 * (hour - 12.0)), math.radians(latitude_deg)
     # The unit vector towards the sun: east, north and up.
     east = -math.cos(declination) * math.sin(hour_angle)
-    north = math.cos(latitude) * math.sin(declination) - math.sin(latitude) * math.cos(declination) * math.cos(hour_angle)
+    north = math.cos(latitude) * math.sin(declination) - math.sin(latitude) * math.cos(declination) * math.cos(
+        hour_angle
+    )
     up = math.sin(latitude) * math.sin(declination) + math.cos(latitude) * math.cos(declination) * math.cos(hour_angle)
     azimuth = math.degrees(math.atan2(east, north)) % 360.0
     return azimuth, math.degrees(math.asin(min(max(up, -1.0), 1.0)))

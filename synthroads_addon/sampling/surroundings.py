@@ -92,7 +92,9 @@ def sample_environment(scenario: RoadScenario, seed: int) -> Environment:
     if limits.sun_place == "time":
         time_stream = stream(seed, "environment", "time of day")
         hour, day = draw(time_stream, limits.time_of_day), round(draw(time_stream, limits.day_of_year))
-        light["sun_azimuth_deg"], light["sun_elevation_deg"] = map(round_value, sun_angles(hour, day, limits.latitude_deg))
+        light["sun_azimuth_deg"], light["sun_elevation_deg"] = map(
+            round_value, sun_angles(hour, day, limits.latitude_deg)
+        )
     is_wet, wetness = rng.random() < limits.wet, draw(rng, limits.wetness)
     if rng.random() < limits.bad_weather:
         weather = list(WEATHER)[rng.integers(len(WEATHER))]

@@ -4,11 +4,11 @@ import math
 
 import pytest
 
+from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.sampling.conflicts import conflicts
 from synthroads_addon.sampling.sun_place import sun_angles
 from synthroads_addon.sampling.surroundings import sample_environment
 from synthroads_addon.scenario.road import EnvironmentLimits, RoadScenario
-from synthroads_addon.road.things.limits import Interval
 
 
 @pytest.mark.parametrize(

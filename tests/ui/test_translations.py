@@ -17,7 +17,15 @@ from tests.helpers.scenes.fake_layout import drawn
 from tools import translations as tool
 
 HOLE = re.compile(r"\{\d\}")
-CAPITAL_NOUNS = ("Straße", "Punktwolke", "Fahrstreifen", "Querschnitt", "Schutzplanke", "Leitpfosten")
+TERMS = (
+    "Straße",
+    "Fahrstreifen",
+    "Querschnitt",
+    "Schutzplanke",
+    "Leitpfosten",
+    "Standstreifen",
+    "Verkehrszeichenbrücke",
+)
 
 
 @pytest.fixture(autouse=True)
@@ -60,7 +68,7 @@ def test_translations_have_the_holes_of_their_messages(language: str) -> None:
 
 def test_german_uses_the_terms_of_road_building() -> None:
     text = "\n".join(messages("de").values())
-    for term in (*CAPITAL_NOUNS, "Station", "Achse", "Klothoide", "Querneigung", "Standstreifen", "Verkehrszeichenbrücke"):
+    for term in (*TERMS, "Station", "Achse", "Klothoide", "Querneigung"):
         assert term in text, term
 
 
@@ -81,7 +89,7 @@ def german(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_blender_is_told_all_labels_and_tooltips(monkeypatch: pytest.MonkeyPatch) -> None:
     told: dict[str, dict[tuple[str, str], str]] = {}
-    monkeypatch.setattr(translations, "_tell", lambda entries: told.update(entries))
+    monkeypatch.setattr(translations, "_tell", told.update)
     translations.register()
     assert sorted(told) == ["de", "de_DE"]
     assert told["de_DE"]["Operator", "Build Road"] == "Straße bauen"

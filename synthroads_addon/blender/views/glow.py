@@ -1,10 +1,10 @@
 """Materials in pictures by night: what sends headlights' light back to the driver, and what shines itself.
 
-Cycles has no retro-reflecting shader. Seen from the driver's camera, which carries the headlights, retro-reflection is a
-light that the surface gives off: its luminance is L = R E, with the coefficient of retro-reflection R (cd/lx/m2) of the
-road's material table, and the illuminance E (lx) normal to the headlights' light, which the pattern of their beam and the
-distance give. From other cameras, which have no headlights, nothing is sent back. Shadows of the beam are left out: what
-the driver sees, headlights 0.55 m below reach too.
+Cycles has no retro-reflecting shader. Seen from the driver's camera, which carries the headlights, retro-reflection is
+a light that the surface gives off: its luminance is L = R E, with the coefficient of retro-reflection R (cd/lx/m2) of
+the road's material table, and the illuminance E (lx) normal to the headlights' light, which the pattern of their beam
+and the distance give. From other cameras, which have no headlights, nothing is sent back. Shadows of the beam are left
+out: what the driver sees, headlights 0.55 m below reach too.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import bpy
 from ...materials.table import Material
 from ..materials import MEAN
 from ..materials.surface_layers import PROPERTY
-from .lamps import BEAM, DRIVER_LAMP, LUX, beam_group, number
+from .lamps import BEAM, LUX, beam_group, number
 
 GLOW = "synthroads_glow"
 """Custom property of materials that were made to glow here."""
@@ -30,13 +30,13 @@ LUMINANCES = {
     "led_white": 400.0,
     "led_red": 400.0,
 }
-"""Material -> its luminance where it is brightest, cd/m2. Chosen: dipped headlights and street lights as seen from beside
+"""Material -> its luminance where it is brightest, cd/m2. Chosen: headlights and street lights as seen from beside
 their beams; signal lights; displays by night within class L3 of EN 12966."""
 _PRISM_ANGLE = math.radians(0.7)
 """Observation angle by which prisms and sheetings send back 1/e, rad: 95 cd/lx/m2 give 71, 59, 5.4 at 0.2, 0.33 and 2
 degrees; class RA1 of EN 12899-1 has 70, 50, 5."""
 _BEAD_ANGLE, _BEAD_START = math.radians(3.0), math.radians(1.05)
-"""Observation angle by which markings' beads send back 1/e, beyond that of EN 1436's geometry, rad; the first chosen."""
+"""Observation angle by which beads send back 1/e, beyond that of EN 1436's geometry, rad; the first chosen."""
 _BEAD_LOBE = 90.0
 """Entrance angle (deg) from which on a material's lobe is that of beads."""
 _SAME_CAMERA = 0.005
@@ -124,7 +124,10 @@ def _return_group(headlights: bpy.types.Object) -> bpy.types.NodeTree:
     links.new(lamp_place, beam.inputs[0])
     # Illuminance of a lamp of intensity I at a distance d, normal to its light: E = I / d^2.
     illuminance = number(
-        group, "DIVIDE", number(group, "MULTIPLY", beam.outputs[0], BEAM / LUX), number(group, "MULTIPLY", distance, distance)
+        group,
+        "DIVIDE",
+        number(group, "MULTIPLY", beam.outputs[0], BEAM / LUX),
+        number(group, "MULTIPLY", distance, distance),
     )
     # Observation angle, between the ways to the lamp and to the eye: atan2(|a x b|, a . b).
     eye = _eye_in_lamp_frame(headlights)
@@ -132,7 +135,9 @@ def _return_group(headlights: bpy.types.Object) -> bpy.types.NodeTree:
     sine = _vector(group, "LENGTH", _vector(group, "CROSS_PRODUCT", to_eye, to_lamp))
     observation = number(group, "ARCTAN2", sine, _vector(group, "DOT_PRODUCT", to_eye, to_lamp))
     beyond = number(group, "MAXIMUM", number(group, "SUBTRACT", observation, start.outputs["Start"]), 0.0)
-    observed = number(group, "EXPONENT", number(group, "DIVIDE", number(group, "MULTIPLY", beyond, -1.0), start.outputs["Angle"]))
+    observed = number(
+        group, "EXPONENT", number(group, "DIVIDE", number(group, "MULTIPLY", beyond, -1.0), start.outputs["Angle"])
+    )
     # Entrance angle, between the surface's normal and the lamp: as for lasers, exp(-t^2 / l^2).
     geometry = nodes.new("ShaderNodeNewGeometry")
     cosine = number(

@@ -1,7 +1,7 @@
 """Lamps of pictures at dusk and by night: the driver's and other vehicles' headlights, and street lights.
 
-They are added around what the model has: where a vehicle or a mast shows the glass of a lamp, light comes from. Intensities
-are real ones (cd), over `LUX`. Scans ignore all of it.
+They are added around what the model has: light comes from where a vehicle or a mast shows the glass of a lamp.
+Intensities are real ones (cd), over `LUX`. Scans ignore all of it.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from ...materials.table import entry_of
 from ...road.parameters import RoadParameters
 from ...road.surroundings import Vehicle
 from ...road.things.pole import Pole
+from ...scanning.scene.mesh import SceneMesh
 from ..scene.evaluated import scene_mesh
 from ..things.model_builder import ROLE, SUPPORT
 
@@ -205,11 +206,11 @@ def _objects(scene: bpy.types.Scene, parameters: RoadParameters, kind: type) -> 
     return [item for item in scene.objects if item.get(ROLE) in names]
 
 
-def _middle(mesh: object, entry: str) -> Float | None:
+def _middle(mesh: SceneMesh, entry: str) -> Float | None:
     """Return the middle (3,) of a mesh's faces of a material by its entry in the table, m; None if it has none."""
-    is_entry = np.array([entry_of(name) == entry for name in mesh.materials], dtype=bool)  # type: ignore[attr-defined]
-    faces = mesh.triangles[is_entry[mesh.material]]  # type: ignore[attr-defined]
+    numbers = [number for number, name in enumerate(mesh.materials) if entry_of(name) == entry]
+    faces = mesh.triangles[np.isin(mesh.material, numbers)]
     if not len(faces):
         return None
-    corners = mesh.vertices[faces].reshape(-1, 3).astype(np.float64)  # type: ignore[attr-defined]
+    corners = mesh.vertices[faces].reshape(-1, 3).astype(np.float64)
     return np.asarray((corners.min(axis=0) + corners.max(axis=0)) / 2.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from ...base.errors import InputError
@@ -11,7 +11,7 @@ from ...dataset.changes import change_recipe
 from ...dataset.manifest import Manifest
 from ...dataset.recipe import Recipe, load_recipe
 from .cluster import Cluster, dask_workers
-from .processes import local_processes, no_beat
+from .processes import local_processes
 from .run import DatasetRun
 
 _MOST_JOBS = 1024
@@ -27,7 +27,6 @@ def make_dataset(
     splits: Collection[str] | None = None,
     changes: Sequence[str] = (),
     progress: Progress = silent,
-    beat: Callable[[], None] = no_beat,
 ) -> Manifest:
     """Make a data set's scenes, each in a process of its own, and return its manifest.
 
@@ -43,7 +42,6 @@ def make_dataset(
         splits: make scenes of these splits only; all if None.
         changes: ``path=value`` for every scenario after the recipe's own, as in "fidelity=draft".
         progress: told how many scenes are done.
-        beat: called several times a second while scenes are made on this machine; what it raises ends the work.
 
     Raises:
         InputError: a value is wrong, what is there was made from another recipe, or the cluster is lost.
@@ -56,4 +54,4 @@ def make_dataset(
     base_recipe = recipe if isinstance(recipe, Recipe) else load_recipe(str(recipe))
     split_names = frozenset(splits) if splits else None
     work = DatasetRun(change_recipe(base_recipe, changes), output.absolute(), resume, progress, split_names, overwrite)
-    return work.run(dask_workers(jobs) if isinstance(jobs, Cluster) else local_processes(jobs, beat))
+    return work.run(dask_workers(jobs) if isinstance(jobs, Cluster) else local_processes(jobs))

@@ -24,10 +24,10 @@ _LEVELS = (
     (-12.0, (2.70, 12.17, -431.69, -1899.83)),
     (-18.0, (13.84, 262.72, 1447.42, 2797.93)),
 )
-"""Least elevation (deg), and coefficients of log10 of the illuminance (lx) by powers of elevation / 90 degrees (Janiczek
-and DeYoung 1987, Computer programs for sun and moon illuminance, U.S. Naval Observatory Circular 171)."""
+"""Least elevation (deg), and coefficients of log10 of the illuminance (lx) by powers of elevation / 90 degrees
+(Janiczek and DeYoung 1987, Computer programs for sun and moon illuminance, U.S. Naval Observatory Circular 171)."""
 _BLUE_HOUR = np.array([0.55, 0.85, 1.9])
-"""Colour of the sky's light from civil twilight on, as a factor on a low sun's sky, of mean 1.1. Chosen: the blue hour."""
+"""Colour of the sky's light from civil twilight on, as a factor on a low sun's sky, of mean 1.1. Chosen."""
 _BLUE_FROM, _BLUE_AT = 1.0, -6.0
 """Elevations (deg) at which that colour begins, and is reached: the end of civil twilight."""
 

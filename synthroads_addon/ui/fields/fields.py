@@ -23,11 +23,11 @@ from ...base.errors import InputError
 from ...base.schema import note_of, unit_of
 from ...road.things.limits import Interval
 from ...scenario.scenario import Scenario
+from ..translations.blender import said
 from .choices import ITEMS, is_offered
 from .inherited import SOURCES, Value
 from .numbers import clamp_32_bit, exact, is_share, list_as_text, number_property, numbers_in, push_along
 from .room import draw_flag, draw_text, fits, value_row, value_share
-from ..translations.blender import said
 from .wording import label, tooltip, value_name, written_unit
 
 AUTOMATIC = "AUTOMATIC"

@@ -53,7 +53,8 @@ class SYNTHROADS_PG_dataset(bpy.types.PropertyGroup):
     )
     scenes: bpy.props.IntProperty(
         name="Scenes",
-        description="Number of scenes in all, divided among the recipe's groups and splits; 0: as many as the recipe says",
+        description="Number of scenes in all, divided among the recipe's groups and splits; "
+        "0: as many as the recipe says",
         default=0,
         min=0,
         max=MOST_SCENES,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
+from typing import Any
 
 import bpy
 
@@ -54,7 +55,7 @@ def _is_ours(cls: type) -> bool:
     return cls.__module__.startswith(package) or cls.__name__.startswith(_PREFIX)
 
 
-def _messages(cls: type) -> Iterator[tuple[str, str]]:
+def _messages(cls: Any) -> Iterator[tuple[str, str]]:
     """Yield label and tooltip of one class, of its properties, and of their choices."""
     is_operator = issubclass(cls, bpy.types.Operator)
     rna = getattr(bpy.ops.synthroads, cls.__name__.partition("_OT_")[2]).get_rna_type() if is_operator else cls.bl_rna

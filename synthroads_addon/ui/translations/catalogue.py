@@ -1,9 +1,10 @@
-"""A catalogue of translated messages, with patterns for texts that hold names and numbers. It knows nothing of Blender."""
+"""A catalogue of translated messages, with patterns for texts that hold names and numbers."""
 
 from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from functools import cached_property, lru_cache
 from pathlib import Path
 
@@ -11,6 +12,9 @@ FOLDER = Path(__file__).parent
 _HOLE = re.compile(r"\{(\d)\}")
 _GROUPS = {"9": r"(°|%|m|1 : n|per (?:km|m|m²|ha|s|100 m)|cm³|m?m/dB|dB|kHz|Hz|m?rad|ns|nm|mm/h|h|d|K|hPa)"}
 """Hole -> what it may hold, if not any text: ``{9}`` holds a unit, as in ``Length (km)``."""
+_UNITS = "m|mm|km|s|h|d|deg|rad|mrad|nm|kHz|MHz|Hz|px|dB|m/dB|1 : n|ns|K|hPa|B|cm³|m/s|mm/h|per|m²|ha|n"
+_NOTHING_SAID = re.compile(r"(?:[-+\d.,e%°×: ]|\{\d\}|\b(?:" + _UNITS + r")\b)*")
+"""Numbers and units, which are the same in every language."""
 _DEEPEST = 6
 """Most patterns within each other; chosen: a tooltip has four."""
 
@@ -41,7 +45,7 @@ class Catalogue:
             if match := pattern.fullmatch(text):
                 parts = [self.translate(part, depth + 1) or part for part in match.groups()]
                 held = dict(zip(_HOLE.findall(message), parts, strict=True))
-                return _HOLE.sub(lambda hole: held[hole[1]], self.messages[message])
+                return "".join(held[piece] if place % 2 else piece for place, piece in _pieces(self.messages[message]))
         return None
 
     def missing(self, text: str, used: set[str]) -> set[str]:
@@ -64,15 +68,22 @@ class Catalogue:
         return [(pattern_of(message), message) for message in holed]
 
 
+def _pieces(message: str) -> Iterator[tuple[int, str]]:
+    """Yield (place, piece) of a message: texts at even places, the numbers of its holes at odd ones."""
+    return enumerate(_HOLE.split(message))
+
+
 def _says_something(part: str) -> bool:
     """Return whether a part has words to translate: no number with its unit, and no hole."""
-    return re.fullmatch(r"(?:[-+\d.,e%°×: ]|\{\d\}|\b(?:m|mm|km|s|h|d|deg|rad|mrad|nm|kHz|MHz|Hz|px|dB|m/dB|1 : n|ns|K|hPa|B|cm³|m/s|mm/h|per|m²|ha|n)\b)*", part) is None
+    return _NOTHING_SAID.fullmatch(part) is None
 
 
 def pattern_of(message: str) -> re.Pattern[str]:
     """Return the regular expression of a message with holes, which are its groups in order."""
     *pieces, last = _HOLE.split(message)
-    texts = [re.escape(text) + _GROUPS.get(number, "(.+?)") for text, number in zip(pieces[::2], pieces[1::2], strict=True)]
+    texts = [
+        re.escape(text) + _GROUPS.get(number, "(.+?)") for text, number in zip(pieces[::2], pieces[1::2], strict=True)
+    ]
     return re.compile("".join(texts) + re.escape(last), re.DOTALL)
 
 

@@ -1,4 +1,4 @@
-"""Data sets made from the window: the command's own work in a thread, and small pictures of the scenes that are done."""
+"""Data sets made from the window: the command's own work in a thread, and small pictures of the scenes done."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from ...base.process.modules import launch_modules_by
 from ...cloud.tools.convert import draw_previews
 from ...dataset.manifest import Manifest, SceneEntry, read_manifest
 from ...dataset.recipe import Recipe, scene_jobs
-from ...jobs.dataset.make import make_dataset
+from ...jobs.dataset.processes import local_processes
+from ...jobs.dataset.run import DatasetRun
 from .job import Report
 
 _SIDE = 256
@@ -62,24 +63,17 @@ class DatasetWork:
         """Make the data set in this thread, and return its manifest.
 
         Raises:
-            InputError, OutputError: see `make_dataset`.
+            InputError, OutputError: see `DatasetRun.run`.
             Cancelled: by `report`; scenes that are done stay.
         """
 
-        def progress(_: str, share: float) -> None:
+        def progress(stage: str, share: float) -> None:
             self._share = share
             self._look()
             report(share)
 
-        manifest = make_dataset(
-            self.recipe,
-            self.folder,
-            jobs=self.jobs,
-            resume=self.resume,
-            overwrite=self.overwrite,
-            progress=progress,
-            beat=lambda: report(self._share),
-        )
+        run = DatasetRun(self.recipe, self.folder.absolute(), self.resume, progress, overwrite=self.overwrite)
+        manifest = run.run(local_processes(self.jobs, beat=lambda: report(self._share)))
         self._count(manifest)
         return manifest
 
@@ -128,5 +122,3 @@ def _command(module: str) -> list[str]:
     lines += f"sys.argv = [{module!r}, *sys.argv[sys.argv.index('--') + 1:]]; "
     lines += f"import runpy; runpy.run_module({module!r}, run_name='__main__')"
     return [bpy.app.binary_path, "--background", "--python-exit-code", "1", "--python-expr", lines, "--"]
-
-

@@ -1,4 +1,4 @@
-"""Night in pictures: lamps of real intensities, light sent back to the driver by the laws' numbers, nothing for scans."""
+"""Night in pictures: lamps of real intensities, light sent back to the driver by the laws' numbers."""
 
 import math
 from collections.abc import Iterator

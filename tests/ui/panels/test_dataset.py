@@ -93,7 +93,7 @@ def test_what_is_missing_is_said_in_the_panels_words(panel: Any, tmp_path: Path)
         bpy.ops.synthroads.make_dataset()
     (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
     panel.recipe = "small-roads"
-    with pytest.raises(RuntimeError, match="Folder.*holds other files"):
+    with pytest.raises(RuntimeError, match=r"Folder.*holds other files"):
         bpy.ops.synthroads.make_dataset()
 
 
