@@ -52,10 +52,10 @@ def _change_section(road: Any, context: Any) -> None:
 def _take_over_defaults(road: Any) -> None:
     """Set what guidelines have defaults for to those of the road's design class, or of a scenario without any."""
     usual = RoadScenario.from_dict({"design_class": road.design_class}).to_dict()
-    fields = FIELDS["road"]
-    assert isinstance(fields, GroupField)
+    field = FIELDS["road"]
+    assert isinstance(field, GroupField)
     for guideline in GUIDELINES.values():
-        _write_parts(fields.fields, road, guideline.defaults, usual)
+        _write_parts(field.fields, road, guideline.defaults, usual)
 
 
 def _write_parts(fields: Mapping[str, Field], owner: Any, names: Mapping[str, Any], values: Mapping[str, Any]) -> None:
