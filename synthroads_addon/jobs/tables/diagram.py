@@ -25,7 +25,7 @@ from ...road.terrain import ground_elevation, surface_elevation
 Role = Literal[
     "frame", "grid", "ground", "tangent", "road", "point", "curvature", "left", "right", "station", "text", "faint"
 ]
-"""What a line or text is, by which it gets its colour."""
+"""Kinds of lines and texts, which have a colour each."""
 _SAMPLES = 400
 """Stations at which ground and gradient line are drawn; more than a view has columns for is not seen. Chosen."""
 _MARGIN_LEFT, _MARGIN, _TEXT_ROW = 64.0, 16.0, 16.0
@@ -79,7 +79,7 @@ class DiagramText(NamedTuple):
 
 @dataclass
 class Diagram:
-    """What is drawn into a view.
+    """Lines and texts that are drawn into a view.
 
     Attributes:
         lines, texts: from the lowest to the uppermost.

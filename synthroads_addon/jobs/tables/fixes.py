@@ -1,4 +1,4 @@
-"""What mends a rule that a row of a road's tables breaks: the smallest change of that row which keeps the rule."""
+"""Fixes of rules that rows of a road's tables break: the smallest change of a row which keeps the rule."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from ...road.tables.points import strip_names, strip_width, with_vertical_point,
 from ...road.tables.stated import StatedRoad
 
 _SPARE = 1e-3
-"""What a fix stays clear of a limit by, m: the tables' numbers are rounded."""
+"""Distance of a fixed value from its limit, m: the tables' numbers are rounded."""
 
 
 @dataclass(frozen=True)

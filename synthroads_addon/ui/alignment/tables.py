@@ -1,4 +1,4 @@
-"""What the tables show: the current road's elements, points and widths, the rules that rows break, and edits of them.
+"""Contents of the tables: the current road's elements, points and widths, the rules that rows break, and edits of them.
 
 It is read anew when something of the road has changed, at the next look.
 """

@@ -1,4 +1,4 @@
-"""What a road's root keeps of the curve that it was built along, and whether the curve has changed since.
+"""Record, on a road's root, of the curve that it was built along, and whether the curve has changed since.
 
 The link holds as long as the road is the one that was built along the curve: building it from settings or from a file
 ends it.

@@ -29,7 +29,7 @@ _LETTERS, _LINE, _MARGIN = 13.0, 18.0, 18.0
 
 
 class SketchView:
-    """What is to be shown of a sketch, and the handlers that draw it.
+    """Contents of a sketch's overlay, and the handlers that draw it.
 
     Attributes:
         tangents: (x, y, z) of the polygon's points, the one under the mouse included.

@@ -28,7 +28,7 @@ _MILLIMETRE = 3
 
 
 class Handle(NamedTuple):
-    """What of a sketch the mouse can take hold of: a point, or the middle of the curve at it."""
+    """Handle of a sketch that the mouse can take hold of: a point, or the middle of the curve at it."""
 
     kind: Literal["point", "radius"]
     number: int

@@ -35,7 +35,7 @@ _KEYS = (
 _WHEEL = {"WHEELUPMOUSE": 1, "WHEELDOWNMOUSE": -1}
 """Events of the mouse wheel and the steps that they are."""
 Answer = Literal["on", "pass", "build", "cancel"]
-"""What becomes of a drawing after an event: it goes on, passes the event on to Blender, builds the road, or ends."""
+"""State of a drawing after an event: it goes on, passes the event on to Blender, builds the road, or ends."""
 
 
 class DrawingState:
