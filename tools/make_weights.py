@@ -265,7 +265,7 @@ def needed_splits(plan: Plan) -> list[str]:
     first_splits = PLANS[plan.first].splits if plan.first else ()
     # Centrelines are validated after each epoch.
     validation = ("validation",) if plan.task == "centerline" else ()
-    return sorted({*plan.splits, *first_splits, *plan.inside, *plan.outside, *validation})
+    return sorted({*plan.splits, *first_splits, *plan.inside, *plan.outside, *plan.strips, *validation})
 
 
 def resumption(data: Path) -> list[str]:
