@@ -5,6 +5,7 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from ...base.rotations import wrap_angle
 from .base import FULL_TURN, Numbers, Pattern, PulseRays, PulseTiming
 
 _Elevation = Annotated[float, Field(strict=True, gt=-90, lt=90)]
@@ -91,7 +92,8 @@ class RotatingHead(Pattern):
         azimuth = step * timing.angle_step + beam_delays[beam] * (FULL_TURN * timing.lines_per_second)
         if self.azimuths_deg is not None:
             azimuth = azimuth + np.deg2rad(self.azimuths_deg)[beam]
-            azimuth -= FULL_TURN * np.round(azimuth / FULL_TURN)
+        if self.azimuths_deg is not None or turn_delay is not None:
+            azimuth = wrap_angle(azimuth)
         elevation = np.deg2rad(self.elevations_deg)
         vertical, horizontal = np.sin(elevation)[beam], np.cos(elevation)[beam]
         sine, cosine = np.sin(azimuth), np.cos(azimuth)

@@ -406,3 +406,10 @@ def test_a_free_mirror_gives_any_slice_the_same() -> None:
     for name in ("time", "scan_angle", "direction", "in_plane", "across"):
         np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[..., 12_345:12_445])
     assert len(np.unique(whole.scan_angle)) > 5 * len(np.unique(shots(preset("riegl-vq-780i"), 0, 30_000).scan_angle))
+
+
+@pytest.mark.parametrize("device", ["velodyne-vlp-16", "riegl-vq-450"])
+def test_a_whole_turn_by_a_clock_of_its_own_keeps_its_scan_angles_within_half_a_turn(device: str) -> None:
+    angles = shots(preset(device, mirror_clock="free"), 0, 300_000).scan_angle
+    assert np.abs(angles).max() <= np.pi
+    assert np.abs(angles).max() > np.deg2rad(179.5)
