@@ -7,7 +7,6 @@ import numpy as np
 from pydantic import Field
 
 from ...base.arrays import Float
-from ...base.rotations import wrap_angle
 from ...base.schema import quantity
 from .base import Numbers, Pattern, PulseRays, PulseTiming
 
@@ -43,8 +42,6 @@ class LinePattern(Pattern):
         time = line / timing.lines_per_second + pulse_in_line / timing.pulse_rate
         angle = self.angles(timing, line, place)
         angle += math.radians(self.centre_from_nadir_deg)
-        if delays is not None:  # a whole turn's first and last pulse may be up to half a step beyond it
-            angle = wrap_angle(angle)
         return make_rays(time, angle, self.tilts(line), with_frame)
 
     def angles(self, timing: PulseTiming, line: Numbers, place: Float) -> Float:
