@@ -94,6 +94,20 @@ def test_a_value_changes_the_road_at_once_and_is_read_back_exactly(group: Any) -
     assert station.max() == pytest.approx(geometry.length, abs=1e-3)
 
 
+def test_the_surface_is_seen_along_the_stated_axis(group: Any) -> None:
+    group.elements[2].radius = 400.0
+    root = find_road(bpy.context.scene)
+    assert root
+    geometry = RoadGeometry(read().parameters)
+    pavement = objects_of(root)["Road"].evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    places = np.empty(3 * len(pavement.vertices), np.float32)
+    pavement.vertices.foreach_get("co", places)
+    station, offset = geometry.alignment.project(places.reshape(-1, 3)[:, :2].astype(np.float64))
+    assert [station.min(), station.max()] == pytest.approx([0.0, geometry.length], abs=1e-2)
+    assert offset.min() < -5.0  # both carriageways are there
+    assert offset.max() > 5.0
+
+
 def test_the_built_road_is_the_stated_one(group: Any) -> None:
     group.elements[0].length = 60.0
     group.crossfall[0].percent = -5.5
