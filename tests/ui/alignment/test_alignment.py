@@ -222,15 +222,38 @@ def test_a_lists_row_shows_its_values_whole(group: Any, width: float, monkeypatc
             assert [text for text, place, needed in shown if needed > place] == []
             assert layout.used  # a value at least
             assert 1 <= len(layout.used) <= (1 if width == 200.0 else 2)
-    assert any("<ERROR>" in line for line in _lines(group, 1))
-    assert not any("<ERROR>" in line for line in _lines(group, 0))
+    assert [_element_row(group, number).alert for number in (0, 1)] == [False, True]
+    named = [any("Arc" in line for line in _element_row(group, 1).lines)]
+    assert named == [width == 300.0]  # the kind's name is there at a usual width
 
 
-def _lines(group: Any, number: int) -> list[str]:
+@pytest.mark.parametrize("width", [200.0, 400.0])
+def test_a_row_with_room_for_an_icon_has_a_warning_where_it_breaks_a_rule(
+    group: Any, width: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(room, "sidebar_width", lambda: width)
+    bpy.ops.synthroads.insert_element(kind="arc", number=0)
+    has_warning = [any("<ERROR>" in line for line in _element_row(group, number).lines) for number in (0, 1)]
+    assert has_warning == [False, True]
+
+
+def test_a_length_is_shown_with_its_millimetres(group: Any) -> None:
+    """Blender counts the digits before the point as well: with 2 of them, 21.31 m would be shown as 21 m."""
+    shown = bpy.utils.units.to_string("METRIC", "LENGTH", 21.311, precision=_digits(group.elements[0], "length"))
+    assert shown == "21.311 m"
+    shown = bpy.utils.units.to_string("METRIC", "LENGTH", 21.311, precision=2)
+    assert shown == "21 m"
+
+
+def _digits(item: Any, name: str) -> int:
+    return int(item.bl_rna.properties[name].precision)
+
+
+def _element_row(group: Any, number: int) -> FakeLayout:
     layout = FakeLayout()
     kind: Any = panel.SYNTHROADS_UL_elements
     kind.draw_item(None, bpy.context, layout, group, group.elements[number], 0, group, "")
-    return layout.lines
+    return layout.parts()[0]
 
 
 def test_every_edit_stands_in_the_menu() -> None:
