@@ -30,9 +30,9 @@ from .tables import TABLES, Table, fix_of, marks_of, sync_later, tables
 
 _BOX_SHARE = 0.92
 """Share of a row's width that is within a box."""
-_LIST_EDGES = 26.0
+_LIST_EDGES = 25.0
 """Margins and scroll bar of a list, pixels at a resolution scale of 1."""
-_ICON_ROOM, _NAME_ROOM, _VALUE_ROOM = 20.0, 20.0, 8.0
+_ICON_ROOM, _NAME_ROOM, _VALUE_ROOM = 20.0, 16.0, 7.0
 """Pixels at a resolution scale of 1 that an icon before a name, the margins of a name and those of a value take."""
 _ICONS = {"line": "IPO_LINEAR", "clothoid": "IPO_QUAD", "arc": "SPHERECURVE"}
 _LONGEST_NAME, _VALUE = "Clothoid", "1188.6 m"
