@@ -32,7 +32,7 @@ _BOX_SHARE = 0.92
 """Share of a row's width that is within a box."""
 _LIST_EDGES = 25.0
 """Margins and scroll bar of a list, pixels at a resolution scale of 1."""
-_ICON_ROOM, _NAME_ROOM, _VALUE_ROOM = 20.0, 16.0, 7.0
+_ICON_ROOM, _NAME_ROOM, _VALUE_ROOM = 20.0, 16.0, 16.0
 """Pixels at a resolution scale of 1 that an icon before a name, the margins of a name and those of a value take."""
 _ICONS = {"line": "IPO_LINEAR", "clothoid": "IPO_QUAD", "arc": "SPHERECURVE"}
 _LONGEST_NAME, _VALUE = "Clothoid", "1188.6 m"
@@ -48,7 +48,7 @@ def _cells(
         layout: a row.
         number: of the row, from 0.
         name: of the row; where it has no room beside the values, its icon goes, or else stands for it alone.
-        icon: of the row; a warning takes its place where the row breaks a rule, which is red in any case.
+        icon: of the row; a warning takes its place beside a name where the row breaks a rule, which is red in any case.
         is_broken: whether it does.
         item: with the values.
         fields: names of the values, the most important first; empty for a gap.
@@ -61,12 +61,9 @@ def _cells(
     has_name = long_room + values_room <= room
     has_icon = not has_name or long_room + _ICON_ROOM + values_room <= room
     name_room = (long_room if has_name else short_room) + _ICON_ROOM * has_icon
-    count = int(np.clip((room - name_room) / value_room, 0, len(fields)))
+    count = int(np.clip((room - name_room) / value_room, 1, len(fields)))
     text = f"{number + 1} {said(name)}".strip() if has_name else f"{number + 1}"
-    icon = ("ERROR" if is_broken else icon) if has_icon else "NONE"
-    if not count:
-        row.label(text=text, icon=icon)
-        return
+    icon = ("ERROR" if is_broken and has_name else icon) if has_icon else "NONE"
     split = row.split(factor=name_room / room)
     split.label(text=text, icon=icon)
     values = split.row(align=True)

@@ -227,14 +227,14 @@ def test_a_lists_row_shows_its_values_whole(group: Any, width: float, monkeypatc
     assert named == [width == 300.0]  # the kind's name is there at a usual width
 
 
-@pytest.mark.parametrize("width", [200.0, 400.0])
-def test_a_row_with_room_for_an_icon_has_a_warning_where_it_breaks_a_rule(
-    group: Any, width: float, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("width", "icon"), [(200.0, "SPHERECURVE"), (400.0, "ERROR")])
+def test_a_rows_icon_is_its_kind_where_there_is_no_name_and_else_a_warning(
+    group: Any, width: float, icon: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(room, "sidebar_width", lambda: width)
     bpy.ops.synthroads.insert_element(kind="arc", number=0)
-    has_warning = [any("<ERROR>" in line for line in _element_row(group, number).lines) for number in (0, 1)]
-    assert has_warning == [False, True]
+    assert f"<{icon}>" in "".join(_element_row(group, 1).lines)
+    assert "<ERROR>" not in "".join(_element_row(group, 0).lines)
 
 
 def test_a_length_is_shown_with_its_millimetres(group: Any) -> None:
