@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 
 import synthroads_addon
+from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.model.store import STATED, find_road, objects_of
 from synthroads_addon.blender.model.truth import EditedRoad, read_road
+from synthroads_addon.blender.things.model_builder import group_inputs
 from synthroads_addon.checking.marks import row_marks
 from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.section import LineMarking
 from synthroads_addon.road.tables.elements import element_rows
 from synthroads_addon.ui.alignment import panel, tables
 from synthroads_addon.ui.fields import room
@@ -106,6 +109,35 @@ def test_the_surface_is_seen_along_the_stated_axis(group: Any) -> None:
     assert [station.min(), station.max()] == pytest.approx([0.0, geometry.length], abs=1e-2)
     assert offset.min() < -5.0  # both carriageways are there
     assert offset.max() > 5.0
+
+
+def test_lines_reach_as_far_as_the_road_after_several_edits(group: Any) -> None:
+    """Their stations are inputs of the surface, which is shown along the stated axis: they are carried once only."""
+    for length in (40.0, 30.0, 25.0):
+        group.elements[0].length = length
+    bpy.ops.synthroads.delete_element(number=0)
+    parameters = read().parameters
+    ends = [(line.start_station, line.end_station) for line in parameters.of_type(LineMarking).values()]
+    assert ends
+    assert ends == [pytest.approx((0.0, parameters.alignment.length), abs=1e-5)] * len(ends)
+
+
+def test_a_line_edited_along_the_stated_axis_ends_there(group: Any) -> None:
+    group.elements[0].length += 20.0
+    root = find_road(bpy.context.scene)
+    assert root
+    pavement = objects_of(root)["Road"]
+    name = next(name for name in _input_names(pavement) if name.endswith("End Station"))
+    set_modifier_input(pavement.modifiers[0], name, 100.0)
+    assert bpy.ops.synthroads.build_edited() == {"FINISHED"}
+    length = read().parameters.alignment.length
+    ends = sorted({line.end_station for line in read().parameters.of_type(LineMarking).values()})
+    assert ends == pytest.approx([100.0, length], abs=1e-4)
+
+
+def _input_names(item: bpy.types.Object) -> list[str]:
+    tree = item.modifiers[0].node_group
+    return [socket.name for socket in group_inputs(tree)]
 
 
 def test_the_built_road_is_the_stated_one(group: Any) -> None:
