@@ -163,10 +163,11 @@ def _take_over(
         old, modifier = own_modifier(item), own_modifier(new)
         if old is not None and modifier is not None:
             _copy_inputs(old, modifier, kept_objects)
-        bpy.data.objects.remove(new)
         if old_mesh is not None and not old_mesh.users:
             bpy.data.meshes.remove(old_mesh)
         keep_built(item)
+    for role in kept_objects:  # all inputs are copied: to remove an object empties the inputs that name it
+        bpy.data.objects.remove(new_objects[role])
     remove_unused_groups()
 
 

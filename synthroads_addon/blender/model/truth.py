@@ -184,8 +184,10 @@ class _Reading:
         described_parts |= {role: self._parts[role] for role in _SURFACE if role in self._parts}
         shown_base = self._base
         if self._stated is not None:
-            shown_base = shown_base.model_copy(update={"objects": shown_base.objects | self._stated.carriageways})
+            shown_base = self._stated.with_stated_surface(shown_base)
         parameters = edited_parameters(shown_base, described_parts)
+        if self._stated is not None:
+            parameters = self._stated.with_built_lines(parameters, self._base)
         built_geometry = RoadGeometry(self._base)
         parameters, axis = self._on_present_axis(parameters, built_geometry)
         is_moved = axis is not None or parameters.alignment != self._base.alignment

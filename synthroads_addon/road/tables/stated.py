@@ -78,6 +78,46 @@ class StatedRoad:
         """Return the road with another carriageway of an id."""
         return replace(self, carriageways=self.carriageways | {name: carriageway})
 
+    def with_stated_surface(self, parameters: RoadParameters) -> RoadParameters:
+        """Return a parameter set of the road as built with the stated carriageways, and their line markings.
+
+        The stations of these lines are those along the stated road; lines of deleted stretches are gone.
+        """
+        objects: dict[str, RoadObject] = {}
+        for name, item in parameters.objects.items():
+            if isinstance(item, LineMarking):
+                if not self._is_deleted(item):
+                    objects[name] = self._carried(item)
+            else:
+                objects[name] = self.carriageways.get(name, item)
+        return parameters.model_copy(update={"objects": objects})
+
+    def with_built_lines(self, parameters: RoadParameters, built: RoadParameters) -> RoadParameters:
+        """Return a parameter set that `with_stated_surface` gave, and that was edited, with the road's lines as built.
+
+        Edits of the lines stay; the stations are those of the road as built.
+
+        Args:
+            parameters: with the stated surface.
+            built: the road as built.
+        """
+        objects: dict[str, RoadObject] = {}
+        for name, item in built.objects.items():
+            shown_item = parameters.objects.get(name, item)  # a deleted line isn't there
+            is_shown_line = isinstance(shown_item, LineMarking) and name in parameters.objects
+            objects[name] = self._line_as_built(shown_item, item) if is_shown_line else shown_item
+        return parameters.model_copy(update={"objects": objects})
+
+    def _line_as_built(self, line: RoadObject, built_line: RoadObject) -> RoadObject:
+        """Return a line with the stations of the road as built: its own ones where they weren't edited."""
+        carried_line = self._carried(built_line)
+        stations = {}
+        for name in ("start_station", "end_station"):
+            station = getattr(line, name)
+            is_edited = station != getattr(carried_line, name)
+            stations[name] = round(self.stations.place_before(station), 6) if is_edited else getattr(built_line, name)
+        return line.model_copy(update=stations)
+
     def applied(self, parameters: RoadParameters, keeps_carriageways: bool = False) -> RoadParameters:
         """Return a parameter set of the road as built with what is stated; all else moves along with its place.
 

@@ -52,11 +52,11 @@ class StationMap:
     def then(self, edit: StationMap) -> StationMap:
         """Return the map of these edits followed by one more."""
         # A knot of the further edit lies where this map, which doesn't decrease, reaches its station.
-        pulled_back = [self._place_before(station) for station in edit.before]
+        pulled_back = [self.place_before(station) for station in edit.before]
         knots = sorted({*self.before, *pulled_back})
         return StationMap(tuple(knots), tuple(edit(self(knot)) for knot in knots))
 
-    def _place_before(self, station: float) -> float:
+    def place_before(self, station: float) -> float:
         """Return a station before these edits whose place has the given station afterwards, m."""
         if station <= self.after[0]:
             return self.before[0] + (station - self.after[0])

@@ -19,7 +19,7 @@ from ...road.tables.points import (
     without_width,
 )
 from ...road.tables.stated import StatedRoad
-from ..fields.numbers import exact
+from ..fields.numbers import LENGTH_DIGITS, exact
 from ..work.common import has_road, is_free, redraw_sidebars, refusing
 from .rows import KIND_ITEMS
 from .tables import carriageway_of, edit, fix_of, marks_of, row_count, strip_of, sync, tables
@@ -127,7 +127,7 @@ class SYNTHROADS_OT_split_element(TableOperator, bpy.types.Operator):
         "0 divides it in the middle",
         min=0.0,
         step=100,
-        precision=2,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
         options={"SKIP_SAVE"},
     )

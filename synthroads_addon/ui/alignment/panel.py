@@ -13,6 +13,7 @@ from ...checking.checker import RULES
 from ...road.tables.elements import KIND_NAMES
 from ...road.tables.points import grades_percent
 from ..fields.room import buttons_row, draw_text, fits, row_width, text_width, value_row
+from ..translations.blender import said
 from ..work.common import Sidebar, column
 from .operators import (
     SYNTHROADS_OT_crossfall_by_rule,
@@ -27,13 +28,15 @@ from .profile_view import SYNTHROADS_OT_show_profile, draw_station
 from .rows import KINDS
 from .tables import TABLES, Table, fix_of, marks_of, sync_later, tables
 
-_LIST_SHARE, _BOX_SHARE = 0.95, 0.92
-"""Shares of a row's width that are within a list, and within a box."""
-_ICON_ROOM, _VALUE_ROOM = 24.0, 8.0
-"""Pixels at a resolution scale of 1 that an icon before a name and the margins of a value take."""
+_BOX_SHARE = 0.92
+"""Share of a row's width that is within a box."""
+_LIST_EDGES = 25.0
+"""Margins and scroll bar of a list, pixels at a resolution scale of 1."""
+_ICON_ROOM, _NAME_ROOM, _VALUE_ROOM = 20.0, 16.0, 16.0
+"""Pixels at a resolution scale of 1 that an icon before a name, the margins of a name and those of a value take."""
 _ICONS = {"line": "IPO_LINEAR", "clothoid": "IPO_QUAD", "arc": "SPHERECURVE"}
-_NAME, _VALUE = "12 Clothoid", "1188.6 m"
-"""A name and a value as wide as most are."""
+_LONGEST_NAME, _VALUE = "Clothoid", "1188.6 m"
+"""The longest name of a row, and a value as wide as most are."""
 
 
 def _cells(
@@ -44,23 +47,23 @@ def _cells(
     Args:
         layout: a row.
         number: of the row, from 0.
-        name: of the row; its icon alone stands for it where it has no room beside the values.
-        icon: of the row; a warning takes its place where the row breaks a rule.
+        name: of the row; where it has no room beside the values, its icon goes, or else stands for it alone.
+        icon: of the row; a warning takes its place beside a name where the row breaks a rule, which is red in any case.
         is_broken: whether it does.
         item: with the values.
         fields: names of the values, the most important first; empty for a gap.
     """
     row = layout.row(align=True)
     row.alert = is_broken
-    room, value_room = _LIST_SHARE * row_width(), text_width(_VALUE) + _VALUE_ROOM
-    long_room, short_room = (text_width(text) + _ICON_ROOM for text in ("12 Clothoid", "12"))
-    has_name = long_room + len(fields) * value_room <= room
-    name_room = long_room if has_name else short_room
-    count = int(np.clip((room - name_room) / value_room, 0, len(fields)))
-    text, icon = f"{number + 1} {name}".strip() if has_name else f"{number + 1}", "ERROR" if is_broken else icon
-    if not count:
-        row.label(text=text, icon=icon)
-        return
+    room, value_room = row_width() - _LIST_EDGES, text_width(_VALUE) + _VALUE_ROOM
+    long_room, short_room = (text_width(text) + _NAME_ROOM for text in (f"12 {said(_LONGEST_NAME)}", "12"))
+    values_room = len(fields) * value_room
+    has_name = long_room + values_room <= room
+    has_icon = not has_name or long_room + _ICON_ROOM + values_room <= room
+    name_room = (long_room if has_name else short_room) + _ICON_ROOM * has_icon
+    count = int(np.clip((room - name_room) / value_room, 1, len(fields)))
+    text = f"{number + 1} {said(name)}".strip() if has_name else f"{number + 1}"
+    icon = ("ERROR" if is_broken and has_name else icon) if has_icon else "NONE"
     split = row.split(factor=name_room / room)
     split.label(text=text, icon=icon)
     values = split.row(align=True)

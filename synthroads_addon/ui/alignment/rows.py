@@ -22,7 +22,7 @@ from ...road.tables.elements import (
 )
 from ...road.tables.points import strip_names, width_rows, with_crossfall_point, with_vertical_point, with_width
 from ...road.tables.stated import StatedRoad
-from ..fields.numbers import exact
+from ..fields.numbers import LENGTH_DIGITS, exact
 from .profile_view import redraw_profiles
 from .tables import carriageway_of, note_changes, strip_of, sync, tables, try_edit, unregister
 
@@ -165,7 +165,7 @@ class SYNTHROADS_PG_element(bpy.types.PropertyGroup):
         min=0.0,
         max=LONGEST_ROAD,
         step=100,
-        precision=2,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
     radius: _field(
@@ -177,7 +177,7 @@ class SYNTHROADS_PG_element(bpy.types.PropertyGroup):
         min=-LARGEST_RADIUS,
         max=LARGEST_RADIUS,
         step=1000,
-        precision=2,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
     parameter: _field(
@@ -189,7 +189,7 @@ class SYNTHROADS_PG_element(bpy.types.PropertyGroup):
         min=0.0,
         max=LARGEST_RADIUS,
         step=1000,
-        precision=2,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
     start_radius: _field(
@@ -203,7 +203,7 @@ class SYNTHROADS_PG_element(bpy.types.PropertyGroup):
         min=-LARGEST_RADIUS,
         max=LARGEST_RADIUS,
         step=1000,
-        precision=2,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
     end_radius: _field(
@@ -217,7 +217,7 @@ class SYNTHROADS_PG_element(bpy.types.PropertyGroup):
         min=-LARGEST_RADIUS,
         max=LARGEST_RADIUS,
         step=1000,
-        precision=2,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
 
@@ -232,7 +232,7 @@ class SYNTHROADS_PG_vertical_point(bpy.types.PropertyGroup):
         name="Station",
         description="Distance along the road in m at which the two grades meet, e.g. 350; between its neighbours'",
         step=1000,
-        precision=2,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
     elevation: _field(
@@ -244,7 +244,7 @@ class SYNTHROADS_PG_vertical_point(bpy.types.PropertyGroup):
         min=-500.0,
         max=9000.0,
         step=10,
-        precision=2,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
     radius: _field(
@@ -256,7 +256,7 @@ class SYNTHROADS_PG_vertical_point(bpy.types.PropertyGroup):
         min=0.0,
         max=LARGEST_RADIUS,
         step=10000,
-        precision=1,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
 
@@ -272,7 +272,7 @@ class SYNTHROADS_PG_crossfall_point(bpy.types.PropertyGroup):
         description="Distance along the road in m, e.g. 350; between its neighbours'. In between the crossfall is "
         "linear. It changes along clothoids only (RAA)",
         step=1000,
-        precision=2,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
     percent: _field(
@@ -298,7 +298,7 @@ class SYNTHROADS_PG_width_row(bpy.types.PropertyGroup):
         name="Station",
         description="Distance along the road in m, e.g. 350; between its neighbours'. In between the width is linear",
         step=1000,
-        precision=2,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
     width: _field(
@@ -310,7 +310,7 @@ class SYNTHROADS_PG_width_row(bpy.types.PropertyGroup):
         min=-50.0,
         max=50.0,
         step=10,
-        precision=2,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
 
@@ -380,7 +380,7 @@ class SYNTHROADS_PG_alignment(bpy.types.PropertyGroup):
         "row after a click on one",
         min=0.0,
         step=500,
-        precision=2,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
         update=_redraw,
     )

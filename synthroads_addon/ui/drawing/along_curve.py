@@ -19,7 +19,7 @@ from ...fitting.fit import AxisRefusedError
 from ...fitting.plot import axis_picture
 from ...jobs.drawn_axis import road_along, rules_text
 from ...scenario.scenario import Scenario
-from ..fields.numbers import exact
+from ..fields.numbers import LENGTH_DIGITS, exact
 from ..fields.room import buttons_row, draw_flag, draw_text, value_row
 from ..work.build import road_work, unused_seed
 from ..work.common import Sidebar, column, is_free, redraw_sidebars
@@ -79,7 +79,7 @@ class SYNTHROADS_PG_drawing(bpy.types.PropertyGroup):
         default=0.05,
         min=0.001,
         max=10.0,
-        precision=3,
+        precision=LENGTH_DIGITS,
         step=1,
         unit="LENGTH",
     )

@@ -24,7 +24,7 @@ from ...blender.things.model_builder import ROLE
 from ...jobs.drawn_axis import place_text
 from ...road.geometry import RoadGeometry
 from ...road.things.thing import Thing
-from ..fields.numbers import exact
+from ..fields.numbers import LENGTH_DIGITS, exact
 from ..work.build import road_work
 from ..work.common import has_road, is_free, refusing
 from ..work.job import PanelJob
@@ -93,7 +93,7 @@ class SYNTHROADS_OT_move_thing(bpy.types.Operator):
         name="Station",
         description="Distance along the road in m, e.g. 120",
         min=0.0,
-        precision=2,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
 
@@ -133,7 +133,11 @@ class SYNTHROADS_OT_move_axis_point(LongOperator, bpy.types.Operator):
         min=1,
     )
     station: bpy.props.FloatProperty(
-        name="Station", description="Distance along the road in m, e.g. 120", min=0.0, precision=2, unit="LENGTH"
+        name="Station",
+        description="Distance along the road in m, e.g. 120",
+        min=0.0,
+        precision=LENGTH_DIGITS,
+        unit="LENGTH",
     )
 
     @classmethod

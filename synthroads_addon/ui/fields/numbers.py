@@ -16,6 +16,9 @@ from ...base.schema import unit_of
 from .wording import BLENDERS
 
 LARGEST_INTEGER = 2**31 - 1
+LENGTH_DIGITS = 5
+"""Digits that a number with a unit of Blender's is shown with, those before the point included, as Blender's own
+lengths are: with 2, 21.31 m would be shown as 21 m."""
 _SMALL = 20.0
 """A number that is 0 at first and can't be larger than this is set in small steps."""
 
@@ -51,7 +54,7 @@ def number_property(
         min=low,
         max=high,
         step=1 if fine or share else 10 if abs(first) < 2 else 100,
-        precision=0 if large else 4 if fine else 2,
+        precision=LENGTH_DIGITS if unit in BLENDERS else 0 if large else 4 if fine else 2,
         subtype="FACTOR" if share else "NONE",
         unit=BLENDERS.get(unit, "NONE"),
         **arguments,

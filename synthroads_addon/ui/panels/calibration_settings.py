@@ -20,6 +20,7 @@ from ...cloud.selection.pavement import RoadClasses
 from ...materials.surfaces import Reflection
 from ...materials.table import Material, materials
 from ...scanning.devices.device import device_names, load_device
+from ..fields.numbers import LENGTH_DIGITS
 
 _RAY = "RAY"
 
@@ -52,6 +53,7 @@ class SYNTHROADS_PG_calibration_class(bpy.types.PropertyGroup):
         description="Width of the surface that the image shows",
         default=1.0,
         min=1e-3,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
 
@@ -96,7 +98,9 @@ class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
         name="Paved", default="-7 -1; 1 7", description="Ranges of offsets from the axis that are pavement, m"
     )
     lines: bpy.props.StringProperty(name="Lines", default="-4 4", description="Offsets of markings from the axis, m")
-    line_width: bpy.props.FloatProperty(name="Line Width", default=0.15, min=0.02, max=2.0, unit="LENGTH")
+    line_width: bpy.props.FloatProperty(
+        name="Line Width", default=0.15, min=0.02, max=2.0, precision=LENGTH_DIGITS, unit="LENGTH"
+    )
     device: bpy.props.EnumProperty(
         name="Beam", items=list(_devices()), description="Device whose beam footprint is used"
     )

@@ -29,7 +29,7 @@ from ...twin.formats import (
     twin_file_names,
     write_twin,
 )
-from ..fields.numbers import exact
+from ..fields.numbers import LENGTH_DIGITS, exact
 from ..fields.room import draw_text
 from ..work import common
 from ..work.common import Sidebar, column, has_road, is_free, refusing
@@ -110,7 +110,7 @@ class SYNTHROADS_OT_export_cloud(FileOperator, bpy.types.Operator):
         min=0.0,
         max=10.0,
         step=1,
-        precision=3,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
 
@@ -173,7 +173,7 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         default=TOLERANCE,
         min=0.0001,
         max=1.0,
-        precision=4,
+        precision=LENGTH_DIGITS,
         step=0.1,
         unit="LENGTH",
     )

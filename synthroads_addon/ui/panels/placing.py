@@ -25,7 +25,7 @@ from ...road.things.registry import THINGS
 from ...road.things.thing import LengthwiseThing, StandingThing, Thing
 from ...sampling.placing.single import USUAL_SIGN, thing_by_rule
 from ...scenario.assets import library_names, read_asset_library
-from ..fields.numbers import exact
+from ..fields.numbers import LENGTH_DIGITS, exact
 from ..work.common import column, has_road, is_free, refusing
 from ..work.view import view_of
 from .things import thing_of
@@ -146,7 +146,7 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
         default=_AT_CURSOR,
         min=_AT_CURSOR,
         soft_min=0.0,
-        precision=2,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
         options={"SKIP_SAVE"},
     )
@@ -166,7 +166,7 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
         description="Distance from the axis in m, positive to the left, e.g. -16.5; -100 to 100 m are allowed",
         min=-100.0,
         max=100.0,
-        precision=3,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
     turned: bpy.props.FloatProperty(
@@ -182,7 +182,7 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
         default=SHORTEST_BARRIER,
         min=1.0,
         soft_max=1000.0,
-        precision=1,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
     code: bpy.props.StringProperty(
@@ -274,7 +274,7 @@ class SYNTHROADS_OT_repeat_thing(_OnRoad, bpy.types.Operator):
         default=50.0,
         soft_min=-1000.0,
         soft_max=1000.0,
-        precision=2,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
     )
 

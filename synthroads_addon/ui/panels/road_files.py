@@ -24,7 +24,7 @@ from ...road.parameters import RoadParameters
 from ...road_files.kinks import FARTHEST_ROUNDING
 from ...scenario.road import RoadScenario
 from ...scenario.scenario import Scenario
-from ..fields.numbers import exact
+from ..fields.numbers import LENGTH_DIGITS, exact
 from ..fields.room import buttons_row
 from ..work.build import road_work, shown_place
 from ..work.common import column, has_road, refusing
@@ -139,6 +139,7 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
         description="Distance from the points to the axis, positive to the left in the direction of the points",
         min=-FARTHEST_ASIDE,
         max=FARTHEST_ASIDE,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
         options={"SKIP_SAVE"},
     )
@@ -154,6 +155,7 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
         description="Height of the points above the road; 0 keeps the heights of the points",
         min=-FARTHEST_ABOVE,
         max=FARTHEST_ABOVE,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
         options={"SKIP_SAVE"},
     )
@@ -163,7 +165,7 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
         min=0.0,
         max=FARTHEST_ROUNDING,
         step=1,
-        precision=3,
+        precision=LENGTH_DIGITS,
         unit="LENGTH",
         options={"SKIP_SAVE"},
     )

@@ -26,7 +26,7 @@ from ...reconstruction.report import (
 )
 from ...road.geometry import RoadGeometry
 from ...scenario.scenario import Scenario
-from ..fields.numbers import exact
+from ..fields.numbers import LENGTH_DIGITS, exact
 from ..fields.room import draw_text
 from ..work.build import road_work, shown_place
 from ..work.common import Sidebar, column, refusing
@@ -67,7 +67,7 @@ class SYNTHROADS_OT_road_from_scan(RoadLoader, bpy.types.Operator):
         default=FIT_TOLERANCE,
         min=TOLERANCES[0],
         max=TOLERANCES[1],
-        precision=3,
+        precision=LENGTH_DIGITS,
         step=1,
         unit="LENGTH",
     )

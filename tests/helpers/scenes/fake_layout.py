@@ -19,6 +19,7 @@ class FakeLayout:
 
     def __init__(self, open_panels: bool = True, what: str = "", factor: float = 0.0) -> None:
         self.used: list[tuple[Any, str]] = []
+        self.alert = False
         self._factor = factor
         self._shown: list[tuple[str, int]] = []
         self._items: list[str | FakeLayout] = []
@@ -34,6 +35,10 @@ class FakeLayout:
             whole = " | ".join([first, *(line for line in more if not line.startswith(" "))]).removeprefix(" | ")
             return [whole, *(line for line in more if line.startswith(" "))]
         return [f"{'  ' if self._what else ''}{line}" for line in inner]
+
+    def parts(self) -> list[FakeLayout]:
+        """Return the layouts within this one, in their order."""
+        return [item for item in self._items if isinstance(item, FakeLayout)]
 
     def place_of(self, name: str) -> str | None:
         """Return the kind of the layout that a property was drawn in, such as row; None if it wasn't."""

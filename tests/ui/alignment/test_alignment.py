@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 
 import synthroads_addon
+from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.model.store import STATED, find_road, objects_of
 from synthroads_addon.blender.model.truth import EditedRoad, read_road
+from synthroads_addon.blender.things.model_builder import group_inputs
 from synthroads_addon.checking.marks import row_marks
 from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.section import LineMarking
 from synthroads_addon.road.tables.elements import element_rows
 from synthroads_addon.ui.alignment import panel, tables
 from synthroads_addon.ui.fields import room
@@ -92,6 +95,49 @@ def test_a_value_changes_the_road_at_once_and_is_read_back_exactly(group: Any) -
     assert np.abs(offset).max() < 1e-3
     assert np.abs(places.reshape(-1, 3)[:, 2] - geometry.profile.elevation(station)).max() < 1e-3
     assert station.max() == pytest.approx(geometry.length, abs=1e-3)
+
+
+def test_the_surface_is_seen_along_the_stated_axis(group: Any) -> None:
+    group.elements[2].radius = 400.0
+    root = find_road(bpy.context.scene)
+    assert root
+    geometry = RoadGeometry(read().parameters)
+    pavement = objects_of(root)["Road"].evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    places = np.empty(3 * len(pavement.vertices), np.float32)
+    pavement.vertices.foreach_get("co", places)
+    station, offset = geometry.alignment.project(places.reshape(-1, 3)[:, :2].astype(np.float64))
+    assert [station.min(), station.max()] == pytest.approx([0.0, geometry.length], abs=1e-2)
+    assert offset.min() < -5.0  # both carriageways are there
+    assert offset.max() > 5.0
+
+
+def test_lines_reach_as_far_as_the_road_after_several_edits(group: Any) -> None:
+    """Their stations are inputs of the surface, which is shown along the stated axis: they are carried once only."""
+    for length in (40.0, 30.0, 25.0):
+        group.elements[0].length = length
+    bpy.ops.synthroads.delete_element(number=0)
+    parameters = read().parameters
+    ends = [(line.start_station, line.end_station) for line in parameters.of_type(LineMarking).values()]
+    assert ends
+    assert ends == [pytest.approx((0.0, parameters.alignment.length), abs=1e-5)] * len(ends)
+
+
+def test_a_line_edited_along_the_stated_axis_ends_there(group: Any) -> None:
+    group.elements[0].length += 20.0
+    root = find_road(bpy.context.scene)
+    assert root
+    pavement = objects_of(root)["Road"]
+    name = next(name for name in _input_names(pavement) if name.endswith("End Station"))
+    set_modifier_input(pavement.modifiers[0], name, 100.0)
+    assert bpy.ops.synthroads.build_edited() == {"FINISHED"}
+    length = read().parameters.alignment.length
+    ends = sorted({line.end_station for line in read().parameters.of_type(LineMarking).values()})
+    assert ends == pytest.approx([100.0, length], abs=1e-4)
+
+
+def _input_names(item: bpy.types.Object) -> list[str]:
+    tree = item.modifiers[0].node_group
+    return [socket.name for socket in group_inputs(tree)]
 
 
 def test_the_built_road_is_the_stated_one(group: Any) -> None:
@@ -208,15 +254,38 @@ def test_a_lists_row_shows_its_values_whole(group: Any, width: float, monkeypatc
             assert [text for text, place, needed in shown if needed > place] == []
             assert layout.used  # a value at least
             assert 1 <= len(layout.used) <= (1 if width == 200.0 else 2)
-    assert any("<ERROR>" in line for line in _lines(group, 1))
-    assert not any("<ERROR>" in line for line in _lines(group, 0))
+    assert [_element_row(group, number).alert for number in (0, 1)] == [False, True]
+    named = [any("Arc" in line for line in _element_row(group, 1).lines)]
+    assert named == [width == 300.0]  # the kind's name is there at a usual width
 
 
-def _lines(group: Any, number: int) -> list[str]:
+@pytest.mark.parametrize(("width", "icon"), [(200.0, "SPHERECURVE"), (400.0, "ERROR")])
+def test_a_rows_icon_is_its_kind_where_there_is_no_name_and_else_a_warning(
+    group: Any, width: float, icon: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(room, "sidebar_width", lambda: width)
+    bpy.ops.synthroads.insert_element(kind="arc", number=0)
+    assert f"<{icon}>" in "".join(_element_row(group, 1).lines)
+    assert "<ERROR>" not in "".join(_element_row(group, 0).lines)
+
+
+def test_a_length_is_shown_with_its_millimetres(group: Any) -> None:
+    """Blender counts the digits before the point as well: with 2 of them, 21.31 m would be shown as 21 m."""
+    shown = bpy.utils.units.to_string("METRIC", "LENGTH", 21.311, precision=_digits(group.elements[0], "length"))
+    assert shown == "21.311 m"
+    shown = bpy.utils.units.to_string("METRIC", "LENGTH", 21.311, precision=2)
+    assert shown == "21 m"
+
+
+def _digits(item: Any, name: str) -> int:
+    return int(item.bl_rna.properties[name].precision)
+
+
+def _element_row(group: Any, number: int) -> FakeLayout:
     layout = FakeLayout()
     kind: Any = panel.SYNTHROADS_UL_elements
     kind.draw_item(None, bpy.context, layout, group, group.elements[number], 0, group, "")
-    return layout.lines
+    return layout.parts()[0]
 
 
 def test_every_edit_stands_in_the_menu() -> None:
