@@ -177,7 +177,9 @@ def _json_of(command: Sequence[str], name: str, cores: int, path: Path | None = 
     """Run a command on so many cores, with a folder on Python's path; return the JSON that it prints last."""
     environment = os.environ | ({"PYTHONPATH": str(path)} if path else {})
     with cores_of_children(cores):
-        process = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+        process = subprocess.run(
+            command, capture_output=True, text=True, encoding="utf-8", errors="replace", check=False, env=environment
+        )
     if process.returncode:
         raise RuntimeError(f"{name} failed: {process.stderr.strip()}")
     result: dict[str, Any] = json.loads(process.stdout[process.stdout.index("{") :])

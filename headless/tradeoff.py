@@ -194,7 +194,7 @@ def _measured_once(scene: str, knob: str, value: Any) -> dict[str, Any]:
     """Measure a row in a process of its own, and return it."""
     request = json.dumps({"scenario": scene, "knob": knob, "value": value})
     line = [sys.executable, str(Path(__file__).resolve()), "--output", ".", _ROW, request, "--json"]
-    process = subprocess.run(line, capture_output=True, text=True, check=False)
+    process = subprocess.run(line, capture_output=True, text=True, encoding="utf-8", errors="replace", check=False)
     if process.returncode:
         raise RuntimeError(f"{scene}: {knob} = {value} failed: {process.stderr.strip()}")
     result: dict[str, Any] = json.loads(process.stdout)

@@ -17,9 +17,17 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 UI = ROOT / "synthroads_addon" / "ui"
-_DRAWING = {"draw_text": 1, "draw_flag": 3, "value_row": 1, "draw_menu": 3, "right_label": 1, "poll_message_set": 0}
+_DRAWING = {
+    "draw_text": 1,
+    "draw_flag": 3,
+    "value_row": 1,
+    "draw_menu": 3,
+    "right_label": 1,
+    "poll_message_set": 0,
+    "said": 0,
+}
 """Function -> place of its argument that is shown."""
-_RETURNING = {"succeed", "_sentence", "_count", "result_lines", "verdict"}
+_RETURNING = {"succeed", "_sentence", "_compare", "_count", "result_lines", "verdict"}
 """Functions of the panel whose returned texts are shown."""
 
 

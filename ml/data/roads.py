@@ -340,7 +340,7 @@ def _write_cache(road: LearningRoad, folder: Path, cache: Path) -> None:
             (new_folder / "notes.json").write_text(json.dumps(notes), encoding="utf-8")
             shutil.rmtree(cache_folder, ignore_errors=True)
             with suppress(OSError):  # another training has just kept the same
-                new_folder.rename(cache_folder)
+                new_folder.replace(cache_folder)
     except OSError as error:
         raise OutputError("data.cache", str(cache), f"cannot be written ({error.strerror})") from None
 

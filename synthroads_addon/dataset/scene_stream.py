@@ -93,14 +93,14 @@ def publish(folder: Path, number: int, files: Path, entry: SceneEntry, plan: Str
         if (files / name).parent.is_dir():
             write_atomically(files / name, text)
     write_atomically(files / ENTRY, canonical_json(entry.to_dict()))
-    files.rename(scene_folder(folder, number))
+    files.replace(scene_folder(folder, number))
 
 
 def remove_scene(folder: Path, number: int) -> None:
     """Remove a scene from a stream, in one step as far as others see."""
     folder_to_delete = folder / f"{_REMOVED}{number:06d}"
     shutil.rmtree(folder_to_delete, ignore_errors=True)
-    scene_folder(folder, number).rename(folder_to_delete)
+    scene_folder(folder, number).replace(folder_to_delete)
     shutil.rmtree(folder_to_delete, ignore_errors=True)
 
 

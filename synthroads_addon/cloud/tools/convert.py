@@ -171,7 +171,7 @@ def draw_previews(
         with output_folder(folder, names.values(), overwrite) as work:
             counts, fields_by_kind = _draw(cloud, work, kinds, line, station, centerline, depth)
             for kind, name in names.items():
-                (work / preview_file(kind)).rename(work / name)
+                (work / preview_file(kind)).replace(work / name)
     fields = {name: fields_by_kind[kind] for kind, name in names.items()}
     return {"file": source.name, "pictures": list(names.values()), "fields": fields} | counts
 

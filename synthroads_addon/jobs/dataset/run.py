@@ -224,7 +224,7 @@ class DatasetRun:
             for name in result["folders"]:
                 target = self._place(published_name(name))
                 target.parent.mkdir(parents=True, exist_ok=True)
-                (outcome.folder / FILES / name).rename(target)
+                (outcome.folder / FILES / name).replace(target)
             self._describe_layouts()  # before it is recorded: a set that is stopped now can be learned from
             entry = SceneEntry.from_dict({**scene_fields, "status": "done", **result}, "scene")
             (outcome.folder / "report.json").replace(self._place(f"logs/{job.name}.json"))

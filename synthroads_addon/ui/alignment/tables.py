@@ -5,7 +5,8 @@ It is read anew when something of the road has changed, at the next look.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, Literal
 
 import bpy
@@ -26,6 +27,8 @@ from ...road.tables.stated import StatedRoad
 from ..work.common import panel_message, redraw_sidebars
 
 Table = Literal["elements", "vertical", "crossfall", "widths"]
+_NEAR = 0.1
+"""Difference of stations, m, below which a rule is broken at the same place; chosen: Blender holds them in 32 bits."""
 TABLES: tuple[Table, ...] = ("elements", "vertical", "crossfall", "widths")
 
 
@@ -144,6 +147,37 @@ def fix_of(scene: bpy.types.Scene, table: Table, number: int, violation: Violati
     if table == "crossfall":
         return crossfall_fix(road, parameters.design_class, pair[0])
     return width_fix(pair[0], strip_of(scene, pair[1]), number, violation)
+
+
+def fix_of_rule(scene: bpy.types.Scene, rule: str, name: str, station: float) -> Fix | None:
+    """Return what mends a broken rule of the current road's tables; None if there is nothing so simple.
+
+    Args:
+        scene: with the road.
+        rule: its id.
+        name: id of the object that breaks it.
+        station: where, m, within `_NEAR`.
+    """
+    road, parameters = tables.read(scene), tables.parameters
+    if road is None or parameters is None:
+        return None
+    design_class, marks = parameters.design_class, tables.marks
+
+    def fixes() -> Iterator[tuple[Violation, Callable[[], Fix | None]]]:
+        for number, row in marks.elements.items():
+            yield from ((one, partial(element_fix, road, design_class, number, one)) for one in row)
+        for number, row in marks.vertical.items():
+            yield from ((one, partial(vertical_fix, road, design_class, number, one)) for one in row)
+        for (owner, _), row in marks.crossfall.items():
+            yield from ((one, partial(crossfall_fix, road, design_class, owner)) for one in row)
+        for (owner, strip, number), row in marks.widths.items():
+            yield from ((one, partial(width_fix, owner, strip, number, one)) for one in row)
+
+    for violation, fix in fixes():
+        is_same = (violation.rule, violation.object) == (rule, name)
+        if is_same and abs(violation.station - station) < _NEAR:
+            return fix()
+    return None
 
 
 def edit(scene: bpy.types.Scene, change: Callable[[StatedRoad], StatedRoad]) -> None:

@@ -5,9 +5,10 @@ The work is `calibration.job`'s, in a thread.
 Annotations are not postponed here: Blender reads the properties from them.
 """
 
-from typing import ClassVar, cast
+from typing import ClassVar, NamedTuple, cast
 
 import bpy
+import numpy as np
 
 from ...base.errors import InputError
 from ...base.progress import exhaust
@@ -16,12 +17,17 @@ from ...calibration.job import Calibration, CalibrationJob, ClassComparison, cal
 from ...calibration.plot import calibration_picture
 from ..fields.room import NAMES_SHARE, buttons_row, draw_text, fits
 from ..fields.wording import title_case
+from ..translations.blender import said
 from ..work.common import Sidebar, column, large_button, refusing
 from ..work.job import PanelJob
 from ..work.long_operator import LongOperator
 from ..work.pictures import ShowPicture, keep_picture
 from .calibration_settings import path_of, textured_materials, usual_classes
 
+_BOX_SHARE = 0.9
+"""Share of a row that is within a box."""
+_BELOW = 0.25
+"""Share of the medians' span that the shortest of bars below 0 has; chosen: it is still seen."""
 PICTURE = "SynthRoads Calibration"
 """Name of the image that shows the result."""
 
@@ -220,14 +226,62 @@ def _draw_result(layout: bpy.types.UILayout, result: Calibration) -> None:
     """Draw a calibration's gain and figures by material, and the buttons to show diagrams and save the table."""
     if result.job.real is not None:
         draw_text(layout, f"Gain: {result.gain:.5g} units of the cloud per unit of the device, for all materials")
+    _draw_chart(layout, result)
     for entry in result.compared:
         box = layout.box()
         for number, line in enumerate(result_lines(entry)):
-            draw_text(box, line, "MATERIAL" if number == 0 else "NONE", share=0.9)
+            draw_text(box, line, "MATERIAL" if number == 0 else "NONE", share=_BOX_SHARE)
     row = buttons_row(layout, ("Show Diagrams", "Save to Table"), align=True)
     row.operator(SYNTHROADS_OT_show_calibration.bl_idname, icon="IMAGE_DATA")
     if result.job.real is not None and result.job.fit:
         row.operator(SYNTHROADS_OT_save_materials.bl_idname, icon="FILE_TICK")
+
+
+class Bar(NamedTuple):
+    """A bar of the chart of median intensities.
+
+    Attributes:
+        material: whose.
+        source: Real, of the cloud, or Expected.
+        median: of the intensities, in the cloud's units, or the device's without one.
+        share: of the longest bar's length.
+    """
+
+    material: str
+    source: str
+    median: float
+    share: float
+
+
+def chart_bars(result: Calibration) -> list[Bar]:
+    """Return the bars of the materials' median intensities, real ones before expected ones, all to one scale.
+
+    They begin at 0; where one is negative, as levels in decibels may be, `_BELOW` of their span below the least.
+    """
+    medians = []
+    for entry in result.compared:
+        name = material_name(entry.target.material)
+        if entry.real is not None:
+            medians.append((name, "Real", float(np.median(entry.real.intensity))))
+        medians.append((name, "Expected", float(np.median(entry.expected))))
+    least, largest = min(row[2] for row in medians), max(row[2] for row in medians)
+    begin = 0.0 if least >= 0.0 else least - _BELOW * (largest - least)
+    length = largest - begin
+    return [Bar(*row, (row[2] - begin) / length if length > 0.0 else 0.0) for row in medians]
+
+
+def _draw_chart(layout: bpy.types.UILayout, result: Calibration) -> None:
+    """Draw the median intensities of all materials as bars with their numbers, under a heading with their unit."""
+    box = layout.box().column(align=True)
+    is_real = result.job.real is not None
+    heading = said("Median intensity, units of the cloud") if is_real else said("Median intensity, units of the device")
+    draw_text(box, heading, "SEQ_HISTOGRAM", share=_BOX_SHARE)
+    sources, material = {"Real": said("Real"), "Expected": said("Expected")}, ""
+    for bar in chart_bars(result):
+        if bar.material != material:
+            material = bar.material
+            draw_text(box, material, share=_BOX_SHARE)
+        box.progress(factor=bar.share, text=f"{sources[bar.source]} {bar.median:.3g}")
 
 
 def result_lines(entry: ClassComparison) -> list[str]:

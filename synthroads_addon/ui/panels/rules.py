@@ -3,8 +3,6 @@
 Annotations are not postponed here: Blender reads the properties from them.
 """
 
-from collections.abc import Sequence
-
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
@@ -15,17 +13,18 @@ from ...blender.model.store import find_road
 from ...blender.model.truth import read_road
 from ...blender.things.model_builder import ROLE
 from ...checking.checker import RULES, Violation, check
+from ...jobs.tables.fixes import Fix
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...road.section import Carriageway, LineMarking
-from ..fields.room import draw_text, fits, is_narrow, text_lines, text_width
-from ..work.common import Sidebar, has_road, redraw_sidebars, refusing, right_label
+from ..alignment.tables import edit, fix_of_rule
+from ..fields.room import draw_text, fits, is_narrow, text_lines
+from ..fields.wording import title_case
+from ..translations.blender import said
+from ..work.common import Sidebar, has_road, redraw_sidebars, refusing
 from ..work.view import Marker, look_at_place, redraw_views, view_of
 from .road_choice import draw_road_name
 
-_STATION_SHARE, _NAME_SHARE = 0.25, 0.45
-"""Shares of the list's width that station and rule have where all three columns fit."""
-_STATION, _FOUND = "Station", "Found, limit"
 _LIST_SHARE = 0.85
 """Share of a row that is within the list, beside its scroll bar."""
 _BOX_SHARE, _TITLE_SHARE = 0.92, 0.36
@@ -147,6 +146,22 @@ class SYNTHROADS_PG_rules(bpy.types.PropertyGroup):
     index: bpy.props.IntProperty(update=_look_at_entry, description="Click to look at the place")
 
 
+def check_shown_road(context: bpy.types.Context) -> int:
+    """Fill the list with the rules that the shown road, with its edits, breaks; return their number.
+
+    Raises:
+        InputError: see `edited_parameters`.
+    """
+    parameters = edited_parameters(context.scene)
+    assert parameters  # the operators' poll() has seen the road
+    violations = check(parameters)
+    _clear(context.window_manager)
+    checked.keep(parameters, shown_id(context.scene))
+    _fill(context.window_manager.synthroads_rules, parameters, violations)
+    redraw_views(context)
+    return len(violations)
+
+
 class SYNTHROADS_OT_check_rules(bpy.types.Operator):
     """List every rule of the guidelines that the road, as it is edited now, breaks"""
 
@@ -162,14 +177,7 @@ class SYNTHROADS_OT_check_rules(bpy.types.Operator):
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
         """Check the road with its edits and fill the list of broken rules."""
-        parameters = edited_parameters(context.scene)
-        assert parameters  # poll() has seen the road
-        violations = check(parameters)
-        _clear(context.window_manager)
-        checked.keep(parameters, shown_id(context.scene))
-        _fill(context.window_manager.synthroads_rules, parameters, violations)
-        self.report({"INFO"}, _count(len(violations)))
-        redraw_views(context)
+        self.report({"INFO"}, _count(check_shown_road(context)))
 
 
 class SYNTHROADS_OT_show_violation(bpy.types.Operator):
@@ -198,6 +206,34 @@ class SYNTHROADS_OT_show_violation(bpy.types.Operator):
         rules.index = self.index
 
 
+class SYNTHROADS_OT_mend_violation(bpy.types.Operator):
+    """Change the road's axis, profile, crossfall or width as little as keeps this rule, and check the rules again"""
+
+    bl_idname = "synthroads.mend_violation"
+    bl_label = "Mend"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    index: bpy.props.IntProperty(name="Line", min=0, description="Row of the list, from 0", options={"SKIP_SAVE"})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return whether the list of broken rules has entries."""
+        return SYNTHROADS_OT_show_violation.poll.__func__(cls, context)
+
+    @refusing
+    def execute(self, context: bpy.types.Context) -> None:
+        """Apply the fix of the list entry `index`, and fill the list anew."""
+        count = len(context.window_manager.synthroads_rules.violations)
+        if self.index >= count:
+            raise InputError("index", self.index, f"must be 0 to {count - 1}")
+        fix = _fix_of_entry(context.scene, self.index)
+        if fix is None:
+            raise InputError("Line", self.index, "no single change keeps this rule: edit what stands in the sentence")
+        edit(context.scene, fix.change)
+        check_shown_road(context)
+        self.report({"INFO"}, fix.text)
+
+
 class SYNTHROADS_OT_clear_rules(bpy.types.Operator):
     """Empty the list, and remove the marker from the 3D view"""
 
@@ -213,7 +249,7 @@ class SYNTHROADS_OT_clear_rules(bpy.types.Operator):
 
 
 class SYNTHROADS_UL_violations(bpy.types.UIList):
-    """List of broken rules, a row each: station, rule, value and limit."""
+    """List of broken rules: rule, object with its station, value with its limit, below each other."""
 
     def draw_item(
         self,
@@ -226,8 +262,9 @@ class SYNTHROADS_UL_violations(bpy.types.UIList):
         active_property: str,
     ) -> None:
         """Draw one row of the list."""
-        names = [row.name for row in data.violations]
-        _draw_columns(layout, (f"{item.station:,.0f} m", item.name, item.comparison), names)
+        lines = layout.column(align=True)
+        for line in row_lines(item):
+            lines.label(text=line)
 
     def filter_items(
         self, context: bpy.types.Context, data: SYNTHROADS_PG_rules, field: str
@@ -264,39 +301,24 @@ class SYNTHROADS_PT_rules(Sidebar, bpy.types.Panel):
         draw_text(layout, _count(count), "ERROR" if count else "CHECKMARK")
         if not count:
             return
-        _draw_columns(layout.row(), (_STATION, "Rule", _FOUND), [row.name for row in rules.violations])
         layout.template_list("SYNTHROADS_UL_violations", "", rules, "violations", rules, "index", rows=4)
         if 0 <= rules.index < count:
-            _draw_details(layout, rules)
+            _draw_details(layout, context.scene, rules)
 
 
-def _draw_columns(layout: bpy.types.UILayout, texts: tuple[str, str, str], names: Sequence[str]) -> None:
-    """Draw one row of the list, or its head: station, rule and value, as many columns as fit.
+def row_lines(item: SYNTHROADS_PG_violation) -> list[str]:
+    """Return the lines of a row of the list: rule; object and station; value and limit, wrapped to its width.
 
-    Args:
-        layout: a row.
-        texts: of the three columns.
-        names: of all lines' rules: as one of them doesn't fit, all are left to the box below.
+    Object and value are in one line where all of it fits.
     """
-    widest = max(names, key=text_width, default="")
-    all_three = fits(widest, _NAME_SHARE) and fits(_FOUND, 1.0 - _STATION_SHARE - _NAME_SHARE)
-    two = fits(_STATION, _STATION_SHARE) and fits(widest, 1.0 - _STATION_SHARE)
-    if not all_three and not two:
-        lines = layout.column(align=True)
-        for line in text_lines(", ".join(texts[:2]), _LIST_SHARE):
-            lines.label(text=line)
-        return
-    split = layout.split(factor=_STATION_SHARE)
-    split.label(text=texts[0])
-    if not all_three:
-        split.label(text=texts[1])
-        return
-    rest = split.split(factor=_NAME_SHARE / (1.0 - _STATION_SHARE))
-    rest.label(text=texts[1])
-    right_label(rest, texts[2])
+    place, comparison = said(f"{title_case(item.object)}, station {item.station:,.0f} m"), said(item.comparison)
+    together = f"{place}: {comparison}"
+    texts = [said(item.name), *([together] if fits(together, _LIST_SHARE) else [place, comparison])]
+    return [line for text in texts for line in text_lines(text, _LIST_SHARE)]
 
 
-def _draw_details(layout: bpy.types.UILayout, rules: SYNTHROADS_PG_rules) -> None:
+def _draw_details(layout: bpy.types.UILayout, scene: bpy.types.Scene, rules: SYNTHROADS_PG_rules) -> None:
+    """Draw the selected broken rule in full: its sentence, its numbers by name, its source, and what mends it."""
     item = rules.violations[rules.index]
     rule = RULES[item.rule]
     box = layout.box().column(align=True)
@@ -306,8 +328,8 @@ def _draw_details(layout: bpy.types.UILayout, rules: SYNTHROADS_PG_rules) -> Non
         ("Found", item.value),
         ("Limit", item.limit),
         ("Station", f"{item.station:,.2f} m"),
-        ("Object", item.object),
-        ("Rule", item.rule),
+        ("Object", title_case(item.object)),
+        ("Rule", RULES[item.rule].title),
     ):
         if is_narrow():
             draw_text(box, f"{title}: {value}", share=_BOX_SHARE)
@@ -318,6 +340,28 @@ def _draw_details(layout: bpy.types.UILayout, rules: SYNTHROADS_PG_rules) -> Non
     source = f"{rule.source}: " if rule.source else ""
     draw_text(box, source + _SURENESS[rule.sure], share=_BOX_SHARE)
     box.operator(SYNTHROADS_OT_show_violation.bl_idname, icon="VIEWZOOM").index = rules.index
+    _draw_fix(box, scene, rules.index)
+
+
+def _draw_fix(box: bpy.types.UILayout, scene: bpy.types.Scene, index: int) -> None:
+    """Draw what mends a broken rule, as a button; nothing if nothing simple does, or another road is shown."""
+    fix = _fix_of_entry(scene, index)
+    if fix is None:
+        return
+    button = fix.text
+    if not fits(said(button), _BOX_SHARE, 1):
+        box.separator()
+        draw_text(box, button, share=_BOX_SHARE)
+        button = "Mend"
+    box.operator(SYNTHROADS_OT_mend_violation.bl_idname, text=button, icon="MODIFIER").index = index
+
+
+def _fix_of_entry(scene: bpy.types.Scene, index: int) -> Fix | None:
+    """Return what mends the broken rule of a list entry; None if nothing simple does, or the road isn't as checked."""
+    if checked.road != shown_id(scene) or checked.is_outdated(scene):
+        return None
+    item = bpy.context.window_manager.synthroads_rules.violations[index]
+    return fix_of_rule(scene, item.rule, item.object, item.station)
 
 
 def _fill(rules: SYNTHROADS_PG_rules, parameters: RoadParameters, violations: list[Violation]) -> None:
@@ -346,9 +390,9 @@ def _write_number(value: float, unit: str) -> str:
 
 
 def _compare(violation: Violation) -> str:
-    """Return the value that was found and its limit, short, with the unit: ``2.6 m, limit 3.5 m``."""
+    """Return the value that was found and its limit, short, with the unit: ``2.6 m (limit 3.5 m)``."""
     unit = "" if violation.unit == "1" else f" {violation.unit}"
-    return f"{_digits(violation.value)}{unit}, limit {_digits(violation.limit)}{unit}"
+    return f"{_digits(violation.value)}{unit} (limit {_digits(violation.limit)}{unit})"
 
 
 def _digits(value: float) -> str:

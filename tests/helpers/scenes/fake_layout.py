@@ -156,7 +156,7 @@ class FakeLayout:
         self._say(f"menu {shown!r} {idname}{_icon(icon)}", shown, 1 + _has(icon))
 
     def progress(self, factor: float = 0.0, text: str = "") -> None:
-        self._say(f"progress {text!r}")
+        self._say(f"progress {text!r}", text)
 
 
 def drawn(panel: type, context: Any, **options: Any) -> FakeLayout:

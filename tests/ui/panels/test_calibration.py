@@ -118,6 +118,38 @@ def test_results_name_their_percentiles(settings: Any, tmp_path: Path) -> None:
     assert all(word in lines[3] for word in ("real ", "expected ", "error ", "of the interquartile range"))
 
 
+@pytest.mark.parametrize("width", [200.0, 300.0])
+@pytest.mark.parametrize(("has_cloud", "decibels"), [(True, 30.0), (False, 30.0), (False, 0.0)])
+def test_a_chart_compares_the_materials_medians(
+    settings: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, width: float, has_cloud: bool, decibels: float
+) -> None:
+    labels(settings, labelled(tmp_path / "real.laz", 30.0, 40.0))
+    settings.real, settings.decibels = settings.real if has_cloud else "", decibels
+    assert bpy.ops.synthroads.compare_intensities() == {"FINISHED"}
+    bars = calibration.chart_bars(calibration.latest)
+    names = [("Asphalt", "Real"), ("Asphalt", "Expected"), ("Paint White", "Real"), ("Paint White", "Expected")]
+    assert [bar[:2] for bar in bars] == [name for name in names if has_cloud or name[1] == "Expected"]
+    longest = max(bars, key=lambda bar: bar.median)
+    assert longest.share == 1.0
+    ordered = sorted(bars, key=lambda bar: bar.median)
+    assert [bar.share for bar in ordered] == sorted(bar.share for bar in bars)
+    assert ordered[0].share > 0.0
+    if ordered[0].median > 0.0:
+        assert [bar.share for bar in bars] == pytest.approx([bar.median / longest.median for bar in bars])
+    percentiles = calibration.latest.compared[0].to_dict()["expected"]
+    assert bars[int(has_cloud)].median == pytest.approx(percentiles["50"], rel=1e-3)
+    if has_cloud:
+        assert bars[0].median == pytest.approx(calibration.latest.compared[0].to_dict()["real"]["50"], rel=1e-3)
+    monkeypatch.setattr(room, "sidebar_width", lambda: width)
+    layout = drawn(calibration.SYNTHROADS_PT_calibration, bpy.context)
+    texts = layout.texts(room.row_width())
+    assert [text for text, place, needed in texts if needed > place] == []
+    shown = [text for text, _, _ in texts]
+    assert all(f"{bar.source} {bar.median:.3g}" in shown for bar in bars)
+    whose = "of the cloud" if has_cloud else "of the device"
+    assert f"Median intensity, units {whose}" in " ".join(shown)
+
+
 @pytest.mark.parametrize(("width", "kind"), [(300.0, "column"), (600.0, "row")], ids=["as at first", "wide"])
 def test_what_is_fitted_is_not_cut_off(settings: Any, monkeypatch: pytest.MonkeyPatch, width: float, kind: str) -> None:
     """The names stand side by side only where there is room: in the sidebar as it is at first there isn't."""

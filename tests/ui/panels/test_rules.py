@@ -18,8 +18,11 @@ from synthroads_addon.blender.things.model_builder import ROLE
 from synthroads_addon.checking.checker import RULES, check
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.section import Carriageway
+from synthroads_addon.ui.fields import room
+from synthroads_addon.ui.fields.wording import title_case
 from synthroads_addon.ui.panels import rules
-from tests.helpers.scenes.fake_layout import drawn
+from synthroads_addon.ui.translations.catalogue import catalogue_of
+from tests.helpers.scenes.fake_layout import FakeLayout, drawn
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +80,7 @@ def test_the_list_is_the_librarys_for_the_edited_road(found: Any) -> None:
     assert rows == [(v.rule, v.object, v.text, RULES[v.rule].title) for v in expected]
     assert [row.station for row in found.violations] == [np.float32(v.station) for v in expected]
     row = next(row for row in found.violations if row.rule == "lane-width")
-    assert (row.value, row.limit, row.comparison) == ("2.6 m", "3.5 m", "2.6 m, limit 3.5 m")
+    assert (row.value, row.limit, row.comparison) == ("2.6 m", "3.5 m", "2.6 m (limit 3.5 m)")
     assert found.index == -1
 
 
@@ -215,3 +218,57 @@ def test_the_panel_shows_the_list_and_the_chosen_line_in_full(found: Any) -> Non
     assert "label 'Found' | label '2.6 m'" in lines()
     assert "label 'Limit' | label '3.5 m'" in lines()
     assert "changed since" not in lines()
+
+
+@pytest.mark.parametrize("width", [200.0, 300.0])
+@pytest.mark.parametrize("locale", ["", "de_DE"])
+def test_a_row_says_rule_object_value_and_limit(
+    found: Any, width: float, locale: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if locale:
+        catalogue = catalogue_of(locale)
+        assert catalogue
+        monkeypatch.setattr(rules, "said", lambda text: catalogue.translate(text) or text)
+    monkeypatch.setattr(room, "sidebar_width", lambda: width)
+    narrow_lane()
+    bpy.ops.synthroads.check_rules()
+    for row in found.violations:
+        lines = rules.row_lines(row)
+        assert all(room.fits(line, rules._LIST_SHARE) for line in lines)
+        text = " ".join(lines)
+        for part in (title_case(row.object), f" {row.station:,.0f} m", row.value, row.limit):
+            assert part in text
+        assert (row.name in text) or locale
+
+
+def test_a_row_draws_its_lines_below_each_other(found: Any) -> None:
+    narrow_lane()
+    bpy.ops.synthroads.check_rules()
+    layout = FakeLayout()
+    rules.SYNTHROADS_UL_violations.draw_item(None, None, layout, found, found.violations[0], 0, found, "index")
+    assert layout.lines == [f"  label {line!r}" for line in rules.row_lines(found.violations[0])]
+
+
+def test_a_broken_rule_is_mended_from_the_list(found: Any) -> None:
+    narrow_lane()
+    bpy.ops.synthroads.check_rules()
+    index = next(i for i, row in enumerate(found.violations) if row.rule == "lane-width")
+    found.index = index
+    assert "button 'Set Width to 3.50 m' synthroads.mend_violation" in "\n".join(
+        drawn(rules.SYNTHROADS_PT_rules, bpy.context).lines
+    )
+    assert bpy.ops.synthroads.mend_violation(index=index) == {"FINISHED"}
+    assert "lane-width" not in {row.rule for row in found.violations}
+    assert check(road()) == [] == list(found.violations)
+
+
+def test_what_no_single_change_mends_has_no_button(found: Any) -> None:
+    narrow_lane()
+    bpy.ops.synthroads.check_rules()
+    found.violations[0].rule = "object-range"
+    found.index = 0
+    assert "mend_violation" not in "\n".join(drawn(rules.SYNTHROADS_PT_rules, bpy.context).lines)
+    with pytest.raises(RuntimeError, match="no single change keeps this rule"):
+        bpy.ops.synthroads.mend_violation(index=0)
+    with pytest.raises(RuntimeError, match="index is 9999: must be 0 to"):
+        bpy.ops.synthroads.mend_violation(index=9999)
