@@ -27,7 +27,7 @@ _HALF_WIDTHS = (12.0, 45.0)
 way."""
 _MARGIN = 8.0
 """Reach outside of the surface that the first path was made from, m. Chosen: that path may be off by as much."""
-_REGISTRATIONS, _PARALLEL = 6, 0.3
+_REGISTRATIONS, _PARALLEL = 16, 0.3
 """Times that a path is laid beside lines at most, and distance that it may still move by, m. Chosen: bounds the work;
 lines that bend by less are followed."""
 _GRIDS = (-0.5, -0.25, 0.25)
