@@ -7,7 +7,7 @@ lane. A narrow median that is paved like the lanes is told by the lines alone, a
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -67,6 +67,12 @@ _PERIOD, _PHASE = 1.5, 1.0
 _MIRRORED, _UNLIKE, _MIRROR = 0.5, -0.5, 0.35
 """Log-odds where each line beyond one side has its mirror image beyond the other, or none has, and how exact that is,
 m. Chosen: most motorways are alike in both directions, and so are many roads about a lane."""
+_AXIS_ERROR, _AXIS_RANGE = 0.5, 16.0
+"""Deviation of a network's axis from the middle of a median, m, and width of the road on which it lies anywhere if the
+axis isn't there, m. Chosen: half of a narrow median; two carriageways."""
+_BY_NETWORK = (-0.7, 1.5)
+"""Limits of the evidence by a network's axis, log-odds. Chosen: one view of several; a road with three carriageways has
+two medians, of which it sees one."""
 _PRIOR = -1.0
 """Log-odds of a median between two solid lines with lanes beyond both. Chosen: other roads have such lines as well."""
 _FRAMED, _NO_LANE = 4.0, 1.0
@@ -102,11 +108,16 @@ class Median:
         return np.asarray(seen)
 
 
-def find_medians(profiles: Profiles, lines: Sequence[Line]) -> list[Median]:
+def find_medians(profiles: Profiles, lines: Sequence[Line], learned: Float | None = None) -> list[Median]:
     """Return the strips that are medians rather than lanes on most of their length, from right to left.
 
     Of strips that overlap the likelier one is returned. A strip counts by the stretches in which the cloud holds it: a
     carriageway beside the road may begin, end, or be cut off.
+
+    Args:
+        profiles: along a path parallel to the road.
+        lines: all line markings on pavement.
+        learned: (K,) offsets of the axis by a network, m, NaN where it sees none; None without a network.
     """
     usual_lines = [line for line in lines if line.length >= max(_SHORTEST, _SEEN * _held_length(profiles, line))]
     strips = []
@@ -115,7 +126,8 @@ def find_medians(profiles: Profiles, lines: Sequence[Line]) -> list[Median]:
         between = [line for line in usual_lines if right.offset < line.offset < left.offset]
         if not _NARROWEST <= gap <= _WIDEST or any(_parts_lanes(line, right, left) for line in between):
             continue
-        strips.append(_median_between(profiles, right, left, usual_lines))
+        strip = _median_between(profiles, right, left, usual_lines)
+        strips.append(replace(strip, odds=strip.odds + _network_odds(strip, learned)))
     chosen: list[Median] = []
     for strip in sorted((strip for strip in strips if strip.total > 0.0), key=lambda strip: -strip.total):
         if all(strip.left.offset <= one.right.offset or strip.right.offset >= one.left.offset for one in chosen):
@@ -165,6 +177,16 @@ def _median_between(profiles: Profiles, right: Line, left: Line, lines: Sequence
     prior += _pattern_odds(*dashes) + _symmetry_odds(right, left, lines)
     strip = min(_EDGE_STRIP, 0.25 * gap)
     return Median(right, left, right_offsets + strip, left_offsets - strip, prior + odds)
+
+
+def _network_odds(strip: Median, learned: Float | None) -> Float:
+    """Return the log-odds (K,) by where a network sees the road's axis (K,), m; 0 where it sees none."""
+    if learned is None:
+        return np.zeros(len(strip.odds))
+    distance = learned - 0.5 * (strip.low + strip.high)
+    # ln of N(d; 0, error) times the range, over which it is as likely anywhere.
+    odds = np.log(_AXIS_RANGE / (_AXIS_ERROR * np.sqrt(2.0 * np.pi))) - 0.5 * (distance / _AXIS_ERROR) ** 2
+    return np.where(np.isfinite(distance), np.clip(odds, *_BY_NETWORK), 0.0)
 
 
 def is_lane_line(line: Line) -> bool:
