@@ -15,7 +15,7 @@ from .branches import find_branch
 from .edges import FARTHEST, Pavement
 from .ground.band import DarkBand, find_band
 from .ground.levels import median_level
-from .ground.medians import Median, cut_medians, find_medians
+from .ground.medians import Median, cut_medians, find_medians, is_lane_line
 from .ground.paved import lines_on_pavement, paved_by_brightness, paved_spans
 from .lines import STANDARD_DASHES, USUAL, WAVELENGTH, Line, is_dashed
 from .path import SPACING
@@ -67,6 +67,8 @@ for a line where it is bright."""
 _SAME_LANES, _OTHER_LANES = 0.12, 0.2
 """Differences of lanes' widths, m, up to which carriageways are alike, and from which on they aren't. Chosen: widths of
 lanes come in steps of 0.25 m, and are measured to some centimetres."""
+_OTHER_PERIOD = 2.0
+"""Difference of the periods of two lane lines that have other patterns, m. Chosen: standard ones differ by 3 m."""
 _STEADY = 5
 """Stretches over which the number of carriageways is judged. Chosen: 25 m, as no median begins for less."""
 
@@ -444,8 +446,15 @@ def _unlikeness(pair: tuple[Band, Band]) -> float:
     """Return by how much the lanes of two bands differ at most, m, from the median outwards as far as both have lines.
 
     The outermost lane has no say if it isn't the only one: a pavement's edge may pass for its line. Infinity where
-    fewer than two lines on either side are seen.
+    fewer than two lines on either side are seen, and where the lane lines have other periods: both directions of a road
+    are painted by the same rules.
     """
+    periods = [
+        [line.dash + line.gap for line in sorted(band.lines, key=lambda line: -line.length) if is_lane_line(line)][:1]
+        for band in pair
+    ]
+    if all(periods) and abs(periods[0][0] - periods[1][0]) > _OTHER_PERIOD:
+        return np.inf
     places = [sorted(sign * band.place(line) for line in band.lines) for band, sign in zip(pair, (-1, 1), strict=True)]
     count = min(len(side) for side in places)
     if count < 2:

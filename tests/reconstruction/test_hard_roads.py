@@ -24,7 +24,9 @@ from synthroads_addon.reconstruction.lines import Line, find_lines, is_dashed
 from synthroads_addon.reconstruction.path import CloudPath
 from synthroads_addon.reconstruction.profiles import Profiles, make_profiles
 from synthroads_addon.reconstruction.reconstruct import reconstruct
+from synthroads_addon.reconstruction.views.look import rule_views
 from synthroads_addon.reconstruction.views.pavement import pavement_edges
+from synthroads_addon.reconstruction.views.vote import axis_from_lines
 from tests.helpers.clouds.foreign_clouds import EAST, NORTH, axis_north
 from tests.helpers.clouds.hard_roads import HardRoad, carriageway, motorway, rural, street
 from tests.helpers.clouds.survey_faults import SurveyFaults
@@ -183,12 +185,21 @@ def test_of_three_carriageways_alike_neither_pair_is_trusted(tmp_path: Path) -> 
     assert not find_layout(profiles, find_lines(profiles)).has_rival
 
 
-@pytest.mark.parametrize("seed", [41, 44])
+@pytest.mark.parametrize("seed", [41, 44, 50])
 def test_of_three_carriageways_those_with_lanes_alike_are_the_road(tmp_path: Path, seed: int) -> None:
     profiles = profiles_of(thrown_road("three carriageways", seed), tmp_path)
     layout = find_layout(profiles, find_lines(profiles))
     assert 0.5 * (layout.bands[0].high + layout.bands[1].low) == pytest.approx(0.0, abs=0.2)
     assert not layout.has_rival
+
+
+def test_symmetry_of_three_carriageways_is_unsure(tmp_path: Path) -> None:
+    profiles = profiles_of(thrown_road("three carriageways", 41), tmp_path)
+    layout = find_layout(profiles, find_lines(profiles))
+    (view,) = [view for view in rule_views(layout, axis_from_lines(layout)) if view.name == "cross-profile"]
+    seen = np.isfinite(view.offsets)
+    assert seen.any()
+    assert view.std[seen].min() > 4.0
 
 
 def test_a_carriageway_that_begins_beside_the_road_is_counted(tmp_path: Path) -> None:
