@@ -28,7 +28,7 @@ from synthroads_addon.reconstruction.views.look import rule_views
 from synthroads_addon.reconstruction.views.pavement import pavement_edges
 from synthroads_addon.reconstruction.views.vote import axis_from_lines
 from tests.helpers.clouds.foreign_clouds import EAST, NORTH, axis_north
-from tests.helpers.clouds.hard_roads import HardRoad, carriageway, motorway, rural, street
+from tests.helpers.clouds.hard_roads import ASPHALT, HardRoad, carriageway, motorway, rural, street
 from tests.helpers.clouds.survey_faults import SurveyFaults
 from tests.helpers.clouds.thrown_roads import KINDS, MOTORWAYS, thrown_road, true_counts
 
@@ -311,6 +311,15 @@ def test_a_median_whose_guardrail_was_cut_out_is_one(tmp_path: Path) -> None:
     road = replace(motorway(18, decibel=2.5), faults=SurveyFaults(rails=((-0.3, 0.3),)), reach=11.0)
     right, left = pavement_edges(profiles_of(road, tmp_path), [-6.0, 6.0], True)
     assert 0.5 * (right + left) == pytest.approx(np.zeros(len(right)), abs=0.3)
+
+
+def test_a_kerb_alone_is_no_median(tmp_path: Path) -> None:
+    # A raised median as bright as the pavement: kerbs on both sides of it, the left one nearer to the profiles' middle.
+    road = motorway(18, decibel=0.0)
+    raised = replace(road.grounds[2], low=-2.5, high=1.2, level=ASPHALT, rough=0.004, height=0.1)
+    profiles = profiles_of(replace(road, name="raised", grounds=(*road.grounds[:2], raised), reach=11.0), tmp_path)
+    right, left = pavement_edges(profiles, [-6.0, 6.0], True)
+    assert not np.any(np.abs(0.5 * (right + left) - 1.2) < 0.3)
 
 
 def test_bright_strips_in_rough_ground_are_no_lines(tmp_path: Path) -> None:
