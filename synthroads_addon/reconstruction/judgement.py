@@ -35,16 +35,17 @@ Chosen: half of a kerb, more than paint and range noise."""
 ROUGHEST = 0.04
 """Pavements are seen smoother than this by any scanner that shows their edges, m. Chosen: grass and soil have more."""
 ASKEW = 0.08
-"""Lines run along an axis: where they lie at such an angle to it, m per m, it has left them. Chosen: more than a taper's
-and the slope at which lines are followed."""
+"""Lines run along an axis: where they lie at such an angle to it, m per m, it has left them. Chosen: more than a
+taper's, and than the slope at which lines are followed."""
 _SLOPES, _WINDOW = np.linspace(-0.5, 0.5, 51), 20
 """Slopes of paint that are tried, m per m, and rows over which it is looked for. Chosen: what a path may be off by at
 its ends; as paths are laid beside lines."""
 _CLEAR, _ALONG = 0.3, 0.5
-"""Share of the energy at any slope that paint stands out by, and share of that which it has along the axis at most where
-it runs at an angle to it. Chosen: noise varies by a tenth with slope; lines by more than their own energy."""
+"""Share of the energy at any slope that paint stands out by, and share of that which it has along the axis at most
+where it runs at an angle to it. Chosen: noise varies by a tenth with slope; lines by more than their own energy."""
 _BESIDE_ROAD = 1.0
-"""Distance beside the carriageways within which paint counts, m. Chosen: an edge line may lie outside of the pavement."""
+"""Distance beside the carriageways within which paint counts, m. Chosen: an edge line may lie outside of what passes
+for pavement."""
 _CORE = 1.5
 """Distance to either side of a carriageway's middle that is pavement if anything is, m. Chosen: a lane."""
 _ON_AND_BESIDE = ((-0.05, 0.05), (-0.6, -0.3), (0.3, 0.6))

@@ -298,9 +298,7 @@ def test_a_networks_axis_is_one_view_of_a_median(tmp_path: Path) -> None:
         offsets = path.project(profiles.path.points)
         return np.interp(path.stations, *offsets), np.full(len(path.points), 0.1)
 
-    parted, by_network = (
-        find_centreline(cloud, Options(predictor=predictor)).parted for predictor in (None, predict)
-    )
+    parted, by_network = (find_centreline(cloud, Options(predictor=predictor)).parted for predictor in (None, predict))
     assert parted is not None
     assert by_network is not None
     assert by_network.min() > parted.min()

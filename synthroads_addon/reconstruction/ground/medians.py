@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 from scipy import ndimage
 
-from ...base.arrays import Bool, Float
+from ...base.arrays import Float
 from ..lines import STANDARD_DASHES, Line, is_dashed
 from ..path import SPACING
 from ..profiles import STRETCH, Grid, Profiles
@@ -99,13 +99,8 @@ class Median:
     @property
     def total(self) -> float:
         """Return the mean log-odds over the part of the road on which both lines are seen, or over all of it."""
-        return float(np.mean(self.odds[self.framed])) if self.framed.any() else float(np.mean(self.odds))
-
-    @property
-    def framed(self) -> Bool:
-        """Return a mask (K,) of the stretches between the first and the last in which both lines are seen."""
-        seen = np.isfinite(self.right.offsets) & np.isfinite(self.left.offsets)
-        return np.asarray(seen)
+        both_seen = np.isfinite(self.right.offsets) & np.isfinite(self.left.offsets)
+        return float(np.mean(self.odds[both_seen] if both_seen.any() else self.odds))
 
 
 def find_medians(profiles: Profiles, lines: Sequence[Line], learned: Float | None = None) -> list[Median]:
