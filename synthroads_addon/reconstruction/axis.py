@@ -27,7 +27,7 @@ _HALF_WIDTHS = (12.0, 45.0)
 way."""
 _MARGIN = 8.0
 """Reach outside of the surface that the first path was made from, m. Chosen: that path may be off by as much."""
-_REGISTRATIONS, _PARALLEL = 6, 0.3
+_REGISTRATIONS, _PARALLEL = 16, 0.3
 """Times that a path is laid beside lines at most, and distance that it may still move by, m. Chosen: bounds the work;
 lines that bend by less are followed."""
 _GRIDS = (-0.5, -0.25, 0.25)
@@ -70,6 +70,7 @@ class FoundRoad:
         layout: carriageways and lines that profiles along a path parallel to the road show.
         axis: offsets of the axis from that path, on which all views agree.
         asked: kind of road that the user gave; None if the cloud had to tell.
+        learned: points (N, 2) of the axis that a network sees, m; None without one.
     """
 
     cloud: RoadCloud
@@ -77,6 +78,7 @@ class FoundRoad:
     layout: RoadLayout
     axis: FusedAxis
     asked: RoadKind | None = None
+    learned: Float | None = None
 
     @property
     def path(self) -> CloudPath:
@@ -86,7 +88,8 @@ class FoundRoad:
     def layout_along(self, path: CloudPath, kind: RoadKind | None) -> RoadLayout:
         """Return the layout that profiles along another path show; InputError if they show no road of that kind."""
         profiles = make_profiles(self.cloud, path, self.half_width, keep_points=True)
-        return find_layout(profiles, find_lines(profiles), kind, asked=self.asked is not None)
+        learned = learned_along(self.learned, profiles)
+        return find_layout(profiles, find_lines(profiles), kind, asked=self.asked is not None, learned=learned)
 
     def open_along(self, path: CloudPath, stations: Float) -> Bool:
         """Return at which of the stations (K,), m, along a path the views of the axis disagree, as a mask (K,)."""
@@ -157,7 +160,8 @@ def find_axis(
     called with the share of the passes that are done.
     """
     progress("lines", 0.0)
-    road = _look_along(cloud, path, half_width, options)
+    learned = _learned_points(cloud, path, options)
+    road = _look_along(cloud, path, half_width, options, learned)
     for number in range(1, _PASSES):
         progress("lines", number / _PASSES)
         # The first path may be anywhere: only the second look, along an axis, can show that the axis stands still.
@@ -165,7 +169,7 @@ def find_axis(
             break
         # The next path is the axis itself: lines beside it are then straight, and smoothing bends none of them.
         offsets = np.interp(road.path.stations, road.axis.stations, road.axis.offsets)
-        road = _look_along(cloud, road.path.shift_by(offsets), half_width, options)
+        road = _look_along(cloud, road.path.shift_by(offsets), half_width, options, learned)
     layout = with_branch(road.layout)
     learned_views = _learned_view(cloud, layout.profiles, options)
     path_axis = find_fused_axis(layout, learned_views)
@@ -189,11 +193,34 @@ def _axis_in_grid(road: FoundRoad, learned_views: list[View], shift: float) -> F
     return replace(axis, offsets=axis.offsets + shift, raw=axis.raw + shift)
 
 
-def _look_along(cloud: RoadCloud, path: CloudPath, half_width: float, options: Options) -> FoundRoad:
+def _look_along(
+    cloud: RoadCloud, path: CloudPath, half_width: float, options: Options, learned: Float | None
+) -> FoundRoad:
     """Return the road that profiles along a path show: its layout, and its axis by the rule-based views."""
     profiles = make_profiles(cloud, path, half_width, keep_points=True)
-    layout = find_layout(profiles, find_lines(profiles), options.road)
-    return FoundRoad(cloud, half_width, layout, find_fused_axis(layout), options.road)
+    layout = find_layout(profiles, find_lines(profiles), options.road, learned=learned_along(learned, profiles))
+    return FoundRoad(cloud, half_width, layout, find_fused_axis(layout), options.road, learned)
+
+
+def _learned_points(cloud: RoadCloud, path: CloudPath, options: Options) -> Float | None:
+    """Return the points (N, 2), m, of the axis that the predictor sees along a path; None if it sees none."""
+    if options.predictor is None:
+        return None
+    offset, _ = options.predictor(cloud, path)
+    is_predicted = np.isfinite(offset)
+    return path.place(path.stations[is_predicted], offset[is_predicted]) if is_predicted.sum() > 1 else None
+
+
+def learned_along(points: Float | None, profiles: Profiles) -> Float | None:
+    """Return the offsets (K,), m, of a network's axis (N, 2) in profiles' stretches; NaN where it has no point near."""
+    if points is None:
+        return None
+    station, offset = profiles.path.project(points)
+    order = np.argsort(station, kind="stable")
+    station, offset = station[order], offset[order]
+    after = np.clip(np.searchsorted(station, profiles.middles), 1, len(station) - 1)
+    nearest = np.minimum(np.abs(profiles.middles - station[after - 1]), np.abs(station[after] - profiles.middles))
+    return np.where(nearest <= STRETCH, np.interp(profiles.middles, station, offset), np.nan)
 
 
 def _learned_view(cloud: RoadCloud, profiles: Profiles, options: Options) -> list[View]:

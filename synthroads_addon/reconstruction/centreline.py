@@ -9,7 +9,7 @@ import numpy as np
 from ..base.arrays import Float
 from ..base.machine import linear_algebra_on_one_thread
 from ..base.progress import Progress, part_of, silent
-from .axis import Options, find_axis, straighten_path
+from .axis import Options, find_axis, learned_along, straighten_path
 from .cloud import RoadCloud
 from .ground.strips import Strip, find_strips
 from .judgement import Judgement, judge
@@ -79,7 +79,8 @@ def find_centreline(cloud: RoadCloud, options: Options | None = None, progress: 
     line = seen_path.shift_by(offsets)
     progress("judging", 0.8)
     profiles = make_profiles(cloud, line, profile_half_width, keep_points=True)
-    layout = find_layout(profiles, find_lines(profiles), options.road)
+    learned = learned_along(road.learned, profiles)
+    layout = find_layout(profiles, find_lines(profiles), options.road, learned=learned)
     cores = [0.5 * (band.low + band.high) for band in layout.bands] if layout.kind == "dual" else [0.0]
     axis_stations, _ = line.project(road.path.place(road.axis.stations, road.axis.offsets))
     rivals = road.open_along(line, profiles.middles)

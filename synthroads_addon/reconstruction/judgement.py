@@ -17,7 +17,8 @@ from scipy import ndimage
 from ..base.arrays import Bool, Float
 from .layout import Band, RoadLayout
 from .lines import Line, is_dashed
-from .profiles import ACROSS, STRETCH, Profiles, remove_grade
+from .path import SPACING
+from .profiles import ACROSS, STRETCH, Profiles, registration_signal, remove_grade
 from .smoothing import difference_figures, robust_scale
 from .views.fusion import APART
 from .views.pavement import pavement_edges
@@ -33,6 +34,18 @@ RAISED = 0.05
 Chosen: half of a kerb, more than paint and range noise."""
 ROUGHEST = 0.04
 """Pavements are seen smoother than this by any scanner that shows their edges, m. Chosen: grass and soil have more."""
+ASKEW = 0.08
+"""Lines run along an axis: where they lie at such an angle to it, m per m, it has left them. Chosen: more than a
+taper's, and than the slope at which lines are followed."""
+_SLOPES, _WINDOW = np.linspace(-0.5, 0.5, 51), 20
+"""Slopes of paint that are tried, m per m, and rows over which it is looked for. Chosen: what a path may be off by at
+its ends; as paths are laid beside lines."""
+_CLEAR, _ALONG = 0.3, 0.5
+"""Share of the energy at any slope that paint stands out by, and share of that which it has along the axis at most
+where it runs at an angle to it. Chosen: noise varies by a tenth with slope; lines by more than their own energy."""
+_BESIDE_ROAD = 1.0
+"""Distance beside the carriageways within which paint counts, m. Chosen: an edge line may lie outside of what passes
+for pavement."""
 _CORE = 1.5
 """Distance to either side of a carriageway's middle that is pavement if anything is, m. Chosen: a lane."""
 _ON_AND_BESIDE = ((-0.05, 0.05), (-0.6, -0.3), (0.3, 0.6))
@@ -153,11 +166,12 @@ def judge(
         "the ground on its lanes is too rough for a pavement": lane_roughness(profiles, cores) > ROUGHEST,
     }
     reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(layout) > RAISED
+    reasons[f"paint runs at more than {ASKEW:g} m per m to it"] = np.abs(paint_slope(layout)) > ASKEW
     if layout.parted is not None:
         is_other = layout.parted < 0.5 if layout.kind == "dual" else layout.parted > 0.5
         reasons["whether the road has one carriageway or two isn't clear"] = is_other
     if layout.has_rival:
-        reasons["two pairs of carriageways have as many lines, and either may be the road"] = np.ones_like(unseen)
+        reasons["two pairs of carriageways have about as many lines, and either may be the road"] = np.ones_like(unseen)
     if rivals is not None:
         reasons[f"views of it disagree by more than {APART:g} m"] = rivals
     masks = {reason: _without_short_runs(mask) for reason, mask in reasons.items()}
@@ -262,6 +276,33 @@ def lane_roughness(profiles: Profiles, cores: Sequence[float]) -> Float:
             # A difference of two heights has sqrt(2) of their deviation.
             result[number] = robust_scale(steps) / np.sqrt(2.0)
     return result
+
+
+def paint_slope(layout: RoadLayout) -> Float:
+    """Return the slope (K,), m per m, of the paint on a road against its axis; 0 where no slope is clearly the best.
+
+    The rows about a stretch are sheared by each slope; lines that run along it then lie over each other, and the
+    energy (mean square) of the mean profile is the largest.
+    """
+    profiles = layout.profiles
+    near = (profiles.offsets > layout.bands[0].low - _BESIDE_ROAD) & (
+        profiles.offsets < layout.bands[-1].high + _BESIDE_ROAD
+    )
+    signal = np.pad(registration_signal(profiles)[:, near], ((_WINDOW, _WINDOW), (0, 0)))
+    first_rows = np.arange(profiles.stretches) * STRETCH + STRETCH // 2 + _WINDOW - _WINDOW // 2
+    first_rows = np.clip(first_rows, _WINDOW, max(_WINDOW, len(profiles.stations)))
+    along = np.arange(_WINDOW) - 0.5 * (_WINDOW - 1)
+    energy = np.zeros((len(_SLOPES), profiles.stretches))
+    for number, slope in enumerate(_SLOPES):
+        mean = np.zeros((profiles.stretches, signal.shape[1]))
+        for row, distance in enumerate(along):
+            mean += np.roll(signal[first_rows + row], -round(slope * distance * SPACING / ACROSS), axis=1) / _WINDOW
+        energy[number] = (mean**2).sum(axis=1)
+    noise = np.median(energy, axis=0)
+    clear = energy.max(axis=0) - noise
+    along_axis = energy[np.abs(_SLOPES) <= ASKEW].max(axis=0) - noise
+    is_askew = (clear > _CLEAR * noise) & (along_axis < _ALONG * clear)
+    return np.where(is_askew, _SLOPES[energy.argmax(axis=0)], 0.0)
 
 
 def raised_lines(layout: RoadLayout) -> Float:

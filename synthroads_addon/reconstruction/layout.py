@@ -15,7 +15,7 @@ from .branches import find_branch
 from .edges import FARTHEST, Pavement
 from .ground.band import DarkBand, find_band
 from .ground.levels import median_level
-from .ground.medians import Median, cut_medians, find_medians
+from .ground.medians import Median, cut_medians, find_medians, is_lane_line
 from .ground.paved import lines_on_pavement, paved_by_brightness, paved_spans
 from .lines import STANDARD_DASHES, USUAL, WAVELENGTH, Line, is_dashed
 from .path import SPACING
@@ -61,6 +61,14 @@ _BRIGHTER = 0.8
 all."""
 _ON_BAND = 0.5
 """Distance beside the dark band that a line on it may lie at, m. Chosen: what the band's edge is off by."""
+_FALSE_LINES = 1
+"""Lines by which a pair of carriageways must exceed another one to be the road. Chosen: an edge of the pavement passes
+for a line where it is bright."""
+_SAME_LANES, _OTHER_LANES = 0.12, 0.2
+"""Differences of lanes' widths, m, up to which carriageways are alike, and from which on they aren't. Chosen: widths of
+lanes come in steps of 0.25 m, and are measured to some centimetres."""
+_OTHER_PERIOD = 2.0
+"""Difference of the periods of two lane lines that have other patterns, m. Chosen: standard ones differ by 3 m."""
 _STEADY = 5
 """Stretches over which the number of carriageways is judged. Chosen: 25 m, as no median begins for less."""
 
@@ -130,7 +138,7 @@ class RoadLayout:
         pavement: cross profiles with their share of pavement.
         notes: what was left out, in words.
         parted: (K,) probability that the road has two carriageways there, not one; None if nothing was looked for.
-        has_rival: whether two other neighbouring carriageways have as many lines, and may be the road as well.
+        has_rival: whether two other neighbouring carriageways have about as many lines, and may be the road as well.
     """
 
     kind: RoadKind
@@ -146,7 +154,13 @@ class RoadLayout:
         return self.pavement.profiles
 
 
-def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = None, asked: bool = True) -> RoadLayout:
+def find_layout(
+    profiles: Profiles,
+    lines: list[Line],
+    kind: RoadKind | None = None,
+    asked: bool = True,
+    learned: Float | None = None,
+) -> RoadLayout:
     """Return the layout of carriageways and lanes that lines and pavement of the profiles show.
 
     Args:
@@ -154,6 +168,7 @@ def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = N
         lines: all line markings found in the profiles.
         kind: dual or single carriageway; None if the profiles must tell.
         asked: whether the user gave the kind; else it was found along another path.
+        learned: (K,) offsets of the axis by a network, m, which are one more evidence of a median; None without one.
 
     Raises:
         InputError: no carriageway can be made out.
@@ -164,7 +179,7 @@ def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = N
         lines = lines_on_pavement(profiles, lines)
         band = None if kind == "dual" else _unpainted_band(profiles, lines)
         share = band.share(profiles) if band else paved_by_brightness(profiles, lines)
-    medians = find_medians(profiles, lines) if band is None and kind != "single" else []
+    medians = find_medians(profiles, lines, learned) if band is None and kind != "single" else []
     share = cut_medians(share, profiles, medians)
     pavement, notes = Pavement(profiles, share), []
     spans = paved_spans(pavement)
@@ -179,7 +194,7 @@ def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = N
         notes.append(f"{left_out} lines were seen on a small part of the road and left out")
     if not bands:
         raise InputError("road", None, "no carriageway can be made out in the cloud")
-    pair = None if kind == "single" else _carriageway_pair(bands)
+    pair, has_rival = (None, False) if kind == "single" else _carriageway_pair(bands)
     if pair is None and kind == "dual":
         raise _one_carriageway(asked)
     carriageways = pair or (max(bands, key=lambda band: (len(band.lines), band.width)),)
@@ -187,7 +202,7 @@ def find_layout(profiles: Profiles, lines: list[Line], kind: RoadKind | None = N
         notes.append(f"{len(bands) - len(carriageways)} other strips of pavement were left out")
     parted = _parted(pavement, pair, medians)
     kind_seen: RoadKind = "dual" if pair else "single"
-    return RoadLayout(kind_seen, carriageways, pavement, tuple(notes), parted, _has_rival(bands, pair))
+    return RoadLayout(kind_seen, carriageways, pavement, tuple(notes), parted, has_rival)
 
 
 def _unpainted_band(profiles: Profiles, lines: list[Line]) -> DarkBand | None:
@@ -409,15 +424,43 @@ def _line_without_paint(stations: Float, measured: Float, spacing: Float, usual:
     )
 
 
-def _carriageway_pair(bands: list[Band]) -> tuple[Band, Band] | None:
-    """Return the two neighbouring bands between which a median may lie, those with most lines; None without any."""
-    pairs = _carriageway_pairs(bands)
-    return max(pairs, key=_line_count) if pairs else None
+def _carriageway_pair(bands: list[Band]) -> tuple[tuple[Band, Band] | None, bool]:
+    """Return the two neighbouring bands between which a median may lie, and whether another pair may be the road.
+
+    Those with most lines are the road. Where two pairs have about as many, as both directions' carriageways and those
+    of one direction may have, the road is the pair whose lanes are alike on both sides of its median; if both are, or
+    neither, it isn't told. None without any pair.
+    """
+    pairs = sorted(_carriageway_pairs(bands), key=_line_count, reverse=True)
+    if not pairs:
+        return None, False
+    rivals = [pair for pair in pairs if _line_count(pair) >= _line_count(pairs[0]) - _FALSE_LINES]
+    unlikeness = [_unlikeness(pair) for pair in rivals]
+    alike = [pair for pair, value in zip(rivals, unlikeness, strict=True) if value < _SAME_LANES]
+    if len(alike) == 1 and all(value > _OTHER_LANES for value in unlikeness if value >= _SAME_LANES):
+        return alike[0], False
+    return pairs[0], len(rivals) > 1
 
 
-def _has_rival(bands: list[Band], pair: tuple[Band, Band] | None) -> bool:
-    """Return whether another pair of neighbouring bands has as many lines as the chosen one."""
-    return pair is not None and sum(_line_count(other) >= _line_count(pair) for other in _carriageway_pairs(bands)) > 1
+def _unlikeness(pair: tuple[Band, Band]) -> float:
+    """Return by how much the lanes of two bands differ at most, m, from the median outwards as far as both have lines.
+
+    The outermost lane has no say if it isn't the only one: a pavement's edge may pass for its line. Infinity where
+    fewer than two lines on either side are seen, and where the lane lines have other periods: both directions of a road
+    are painted by the same rules.
+    """
+    periods = [
+        [line.dash + line.gap for line in sorted(band.lines, key=lambda line: -line.length) if is_lane_line(line)][:1]
+        for band in pair
+    ]
+    if all(periods) and abs(periods[0][0] - periods[1][0]) > _OTHER_PERIOD:
+        return np.inf
+    places = [sorted(sign * band.place(line) for line in band.lines) for band, sign in zip(pair, (-1, 1), strict=True)]
+    count = min(len(side) for side in places)
+    if count < 2:
+        return np.inf
+    right, left = (np.diff(side[:count])[: max(1, count - 2)] for side in places)
+    return float(np.abs(right - left).max())
 
 
 def _line_count(pair: tuple[Band, Band]) -> int:

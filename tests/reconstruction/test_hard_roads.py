@@ -11,27 +11,31 @@ import pytest
 from studies.reconstruction.carriageways import compare, measure, totals
 from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.reconstruction.axis import FoundRoad
+from synthroads_addon.reconstruction.axis import FoundRoad, Options, learned_along, straighten_path
 from synthroads_addon.reconstruction.centreline import Centreline, find_centreline
 from synthroads_addon.reconstruction.cloud import RoadCloud, read_road_cloud
 from synthroads_addon.reconstruction.ground.band import find_band
 from synthroads_addon.reconstruction.ground.medians import find_medians
 from synthroads_addon.reconstruction.ground.paved import lines_on_pavement
 from synthroads_addon.reconstruction.ground.strips import find_strips
-from synthroads_addon.reconstruction.judgement import judge
+from synthroads_addon.reconstruction.judgement import judge, paint_slope
 from synthroads_addon.reconstruction.layout import find_layout
 from synthroads_addon.reconstruction.lines import Line, find_lines, is_dashed
 from synthroads_addon.reconstruction.path import CloudPath
 from synthroads_addon.reconstruction.profiles import Profiles, make_profiles
 from synthroads_addon.reconstruction.reconstruct import reconstruct
+from synthroads_addon.reconstruction.views.look import rule_views
 from synthroads_addon.reconstruction.views.pavement import pavement_edges
+from synthroads_addon.reconstruction.views.vote import axis_from_lines
 from tests.helpers.clouds.foreign_clouds import EAST, NORTH, axis_north
-from tests.helpers.clouds.hard_roads import HardRoad, motorway, rural, street
+from tests.helpers.clouds.hard_roads import ASPHALT, HardRoad, carriageway, motorway, rural, street
 from tests.helpers.clouds.survey_faults import SurveyFaults
 from tests.helpers.clouds.thrown_roads import KINDS, MOTORWAYS, thrown_road, true_counts
 
 WINDOW = 50.0
 """Length, m, over which the axis is compared with its views."""
+_LEFT_AT = 120.0
+"""Station, m, at which a path leaves the axis."""
 
 
 def found_on(road: HardRoad, folder: Path) -> tuple[Centreline, RoadCloud]:
@@ -48,11 +52,12 @@ def errors(found: Centreline, cloud: RoadCloud, road: HardRoad) -> tuple[Float, 
     return station[keep], (points[:, 1] - NORTH - axis_north(station, road.slant, road.length))[keep]
 
 
-def profiles_of(road: HardRoad, folder: Path) -> Profiles:
-    """Return profiles along a road's true axis."""
+def profiles_of(road: HardRoad, folder: Path, slope: float = 0.0) -> Profiles:
+    """Return profiles along a road's true axis, or along a path that leaves it at `_LEFT_AT` with a slope (m per m)."""
     cloud = read_road_cloud(road.write(folder))
     station = np.arange(0.0, road.length, 1.0)
-    points = np.column_stack([EAST + station, NORTH + axis_north(station, road.slant, road.length)]) - cloud.origin[:2]
+    north = axis_north(station, road.slant, road.length) + slope * np.clip(station - _LEFT_AT, 0.0, None)
+    points = np.column_stack([EAST + station, NORTH + north]) - cloud.origin[:2]
     heading = np.arctan2(*np.gradient(points, axis=0).T[::-1])
     return make_profiles(cloud, CloudPath(points, heading), road.reach, keep_points=True)
 
@@ -168,13 +173,81 @@ def test_carriageways_and_ramps_are_counted_by_stretch(tmp_path: Path, kind: str
             assert strip.probability[strip.present].mean() > 0.6
 
 
-def test_of_three_carriageways_with_as_many_lines_neither_pair_is_trusted(tmp_path: Path) -> None:
-    profiles = profiles_of(thrown_road("three carriageways", 44), tmp_path)
+def test_of_three_carriageways_alike_neither_pair_is_trusted(tmp_path: Path) -> None:
+    sides = [carriageway(-1.5, 2, 3.5, 1.5, -1), carriageway(1.5, 2, 3.5, 1.5, 1), carriageway(12.5, 2, 3.5, 1.5, 1)]
+    grounds, lines = tuple(side[0] for side in sides), tuple(line for side in sides for line in side[1])
+    alike = HardRoad("three alike", grounds, lines, 25.0, carriageways=3, seed=4)
+    profiles = profiles_of(alike, tmp_path)
     layout = find_layout(profiles, find_lines(profiles))
     assert layout.has_rival
     assert judge(layout, [0.5 * (band.low + band.high) for band in layout.bands]).trusted == 0.0
     profiles = profiles_of(thrown_road("narrow median", 2), tmp_path)
     assert not find_layout(profiles, find_lines(profiles)).has_rival
+
+
+@pytest.mark.parametrize("seed", [41, 44, 50])
+def test_of_three_carriageways_those_with_lanes_alike_are_the_road(tmp_path: Path, seed: int) -> None:
+    profiles = profiles_of(thrown_road("three carriageways", seed), tmp_path)
+    layout = find_layout(profiles, find_lines(profiles))
+    assert 0.5 * (layout.bands[0].high + layout.bands[1].low) == pytest.approx(0.0, abs=0.2)
+    assert not layout.has_rival
+
+
+def test_symmetry_of_three_carriageways_is_unsure(tmp_path: Path) -> None:
+    profiles = profiles_of(thrown_road("three carriageways", 41), tmp_path)
+    layout = find_layout(profiles, find_lines(profiles))
+    (view,) = [view for view in rule_views(layout, axis_from_lines(layout)) if view.name == "cross-profile"]
+    seen = np.isfinite(view.offsets)
+    assert seen.any()
+    assert view.std[seen].min() > 4.0
+
+
+def test_a_carriageway_that_begins_beside_the_road_is_counted(tmp_path: Path) -> None:
+    road = thrown_road("three carriageways", 43)
+    found, cloud = found_on(road, tmp_path)
+    figures = compare(found, cloud, road)
+    assert figures.counted > 0.9 * figures.plain
+
+
+def test_a_path_is_laid_beside_lines_to_its_ends(tmp_path: Path) -> None:
+    # The cloud is cut anew at 100 m: the first path follows its middle and leaves the road at an angle of 0.4.
+    road = thrown_road("exit", 41)
+    cloud = read_road_cloud(road.write(tmp_path))
+    path, _ = straighten_path(cloud, Options())
+    points = path.points + cloud.origin[:2]
+    station = points[:, 0] - EAST
+    beside = points[:, 1] - NORTH - axis_north(station, road.slant, road.length)
+    assert np.ptp(beside[(station > 5.0) & (station < 145.0)]) < 1.0
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.2, 0.4])
+def test_an_axis_that_leaves_the_lines_is_doubted(tmp_path: Path, slope: float) -> None:
+    road = thrown_road("exit", 41)
+    profiles = profiles_of(road, tmp_path, slope)
+    layout = find_layout(profiles, find_lines(profiles))
+    beyond = profiles.middles > _LEFT_AT + 15.0
+    assert paint_slope(layout)[~beyond & (profiles.middles < _LEFT_AT - 10.0)] == pytest.approx(0.0)
+    assert paint_slope(layout)[beyond] == pytest.approx(-slope, abs=0.03)
+    doubts = judge(layout, [0.5 * (band.low + band.high) for band in layout.bands]).doubts
+    assert any("paint runs" in reason for doubt in doubts for reason in doubt.reasons) == (slope > 0.0)
+
+
+def test_only_dashes_with_a_lane_on_either_side_speak_against_a_median(tmp_path: Path) -> None:
+    profiles = profiles_of(motorway(15, decibel=1.5), tmp_path)
+    lines = find_lines(profiles)
+    (median,) = find_medians(profiles, lines)
+    dashed = next(line for line in lines if is_dashed(line))
+    fault = replace(dashed, offsets=median.left.offsets - 0.9, measured=median.left.measured - 0.9)
+    assert len(find_medians(profiles, [*lines, fault])) == 1
+    framed = next(line for line in lines if line.offset > 2.0 and is_dashed(line))
+    others = [line for line in lines if line is not framed]
+    (unframed,) = find_medians(profiles, [*others, replace(framed, dash=8.2, gap=8.7)])
+    assert unframed.total < median.total - 3.0
+    wide = replace(median.left, offsets=median.right.offsets + 7.2, measured=median.right.measured + 7.2)
+    between = replace(dashed, offsets=median.right.offsets + 3.6, measured=median.right.measured + 3.6)
+    beyond = replace(dashed, offsets=wide.offsets + 3.6, measured=wide.measured + 3.6)
+    right_lines = [line for line in lines if line.offset <= median.right.offset]
+    assert find_medians(profiles, [*right_lines, between, wide, beyond]) == []
 
 
 def test_each_kind_of_evidence_moves_a_medians_odds(tmp_path: Path) -> None:
@@ -202,11 +275,49 @@ def test_each_kind_of_evidence_moves_a_medians_odds(tmp_path: Path) -> None:
     assert odds(against, lines) < median.total - 2.0
 
 
+def test_a_networks_axis_is_one_view_of_a_median(tmp_path: Path) -> None:
+    road = motorway(15, decibel=0.0)
+    profiles = profiles_of(road, tmp_path)
+    lines = find_lines(profiles)
+    (median,) = find_medians(profiles, lines)
+    along = profiles.path.place(profiles.path.stations, np.zeros(len(profiles.path.points)))
+    beside = profiles.path.place(profiles.path.stations, np.full(len(profiles.path.points), 6.0))
+    for points, change in ((along, 1.5), (beside, -0.7)):
+        (seen,) = find_medians(profiles, lines, learned_along(points, profiles))
+        assert seen.total == pytest.approx(median.total + change, abs=0.01)
+    half = learned_along(along[: len(along) // 2], profiles)
+    assert half is not None
+    assert half[0] == pytest.approx(0.0, abs=0.01)
+    assert np.isnan(half[-1])
+    (seen,) = find_medians(profiles, lines, half)
+    assert seen.odds[-1] == pytest.approx(median.odds[-1])
+    # What it sees along the first path counts in every look.
+    cloud = read_road_cloud(road.write(tmp_path))
+
+    def predict(_: RoadCloud, path: CloudPath) -> tuple[Float, Float]:
+        offsets = path.project(profiles.path.points)
+        return np.interp(path.stations, *offsets), np.full(len(path.points), 0.1)
+
+    parted, by_network = (find_centreline(cloud, Options(predictor=predictor)).parted for predictor in (None, predict))
+    assert parted is not None
+    assert by_network is not None
+    assert by_network.min() > parted.min()
+
+
 def test_a_median_whose_guardrail_was_cut_out_is_one(tmp_path: Path) -> None:
     # Without verges, whose brightness would hide the median's.
     road = replace(motorway(18, decibel=2.5), faults=SurveyFaults(rails=((-0.3, 0.3),)), reach=11.0)
     right, left = pavement_edges(profiles_of(road, tmp_path), [-6.0, 6.0], True)
     assert 0.5 * (right + left) == pytest.approx(np.zeros(len(right)), abs=0.3)
+
+
+def test_a_kerb_alone_is_no_median(tmp_path: Path) -> None:
+    # A raised median as bright as the pavement: kerbs on both sides of it, the left one nearer to the profiles' middle.
+    road = motorway(18, decibel=0.0)
+    raised = replace(road.grounds[2], low=-2.5, high=1.2, level=ASPHALT, rough=0.004, height=0.1)
+    profiles = profiles_of(replace(road, name="raised", grounds=(*road.grounds[:2], raised), reach=11.0), tmp_path)
+    right, left = pavement_edges(profiles, [-6.0, 6.0], True)
+    assert not np.any(np.abs(0.5 * (right + left) - 1.2) < 0.3)
 
 
 def test_bright_strips_in_rough_ground_are_no_lines(tmp_path: Path) -> None:

@@ -7,14 +7,15 @@ lane. A narrow median that is paved like the lanes is told by the lines alone, a
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 from scipy import ndimage
 
 from ...base.arrays import Float
-from ..lines import Line, is_dashed
+from ..lines import STANDARD_DASHES, Line, is_dashed
+from ..path import SPACING
 from ..profiles import STRETCH, Grid, Profiles
 from ..smoothing import fill_gaps, robust_scale
 from .levels import median_level
@@ -33,7 +34,16 @@ _EDGE_STRIP = 0.5
 _STRIP = 1.3
 """Width of the ground beside lines that a median is compared with, m. Chosen: less than half of a lane."""
 _SEEN = 0.3
-"""Share of the road on which a line must be seen to frame a median. Chosen: as `layout` takes lines of rural roads."""
+"""Share of the length on which the cloud holds a line that it must be seen on to frame a median. Chosen: as `layout`
+takes lines of rural roads."""
+_SHORTEST = 40.0
+"""Length of such a line, m, at least. Chosen: the window in which lines are looked for; shorter ones are faults."""
+_HELD = 0.3
+"""Distance to either side of a line within which the cloud holds points where it holds the line, m. Chosen: as far as
+rows of points lie apart."""
+_DASHES = (1.0, 2.0)
+"""Differences of a lane line's period, and of its dashes, from a standard pattern's, m. Chosen: a bin of the road, and
+what wear leaves of both ends of a dash."""
 _NEAR = 4
 """Stretches to either side whose evidence counts. Chosen: 20 m; no median ends sooner."""
 _BRIGHTNESS = (0.04, 0.6)
@@ -57,6 +67,12 @@ _PERIOD, _PHASE = 1.5, 1.0
 _MIRRORED, _UNLIKE, _MIRROR = 0.5, -0.5, 0.35
 """Log-odds where each line beyond one side has its mirror image beyond the other, or none has, and how exact that is,
 m. Chosen: most motorways are alike in both directions, and so are many roads about a lane."""
+_AXIS_ERROR, _AXIS_RANGE = 0.5, 16.0
+"""Deviation of a network's axis from the middle of a median, m, and width of the road on which it lies anywhere if the
+axis isn't there, m. Chosen: half of a narrow median; two carriageways."""
+_BY_NETWORK = (-0.7, 1.5)
+"""Limits of the evidence by a network's axis, log-odds. Chosen: one view of several; a road with three carriageways has
+two medians, of which it sees one."""
 _PRIOR = -1.0
 """Log-odds of a median between two solid lines with lanes beyond both. Chosen: other roads have such lines as well."""
 _FRAMED, _NO_LANE = 4.0, 1.0
@@ -82,23 +98,31 @@ class Median:
 
     @property
     def total(self) -> float:
-        """Return the mean log-odds over the road."""
-        return float(np.mean(self.odds))
+        """Return the mean log-odds over the part of the road on which both lines are seen, or over all of it."""
+        both_seen = np.isfinite(self.right.offsets) & np.isfinite(self.left.offsets)
+        return float(np.mean(self.odds[both_seen] if both_seen.any() else self.odds))
 
 
-def find_medians(profiles: Profiles, lines: Sequence[Line]) -> list[Median]:
-    """Return the strips that are medians rather than lanes on most of the road, from right to left.
+def find_medians(profiles: Profiles, lines: Sequence[Line], learned: Float | None = None) -> list[Median]:
+    """Return the strips that are medians rather than lanes on most of their length, from right to left.
 
-    Of strips that overlap the likelier one is returned.
+    Of strips that overlap the likelier one is returned. A strip counts by the stretches in which the cloud holds it: a
+    carriageway beside the road may begin, end, or be cut off.
+
+    Args:
+        profiles: along a path parallel to the road.
+        lines: all line markings on pavement.
+        learned: (K,) offsets of the axis by a network, m, NaN where it sees none; None without a network.
     """
-    usual_lines = [line for line in lines if line.length >= _SEEN * profiles.covered_length]
+    usual_lines = [line for line in lines if line.length >= max(_SHORTEST, _SEEN * _held_length(profiles, line))]
     strips = []
     for right, left in combinations([line for line in usual_lines if not is_dashed(line)], 2):
         gap = left.offset - right.offset
         between = [line for line in usual_lines if right.offset < line.offset < left.offset]
-        if not _NARROWEST <= gap <= _WIDEST or any(is_dashed(line) for line in between):
+        if not _NARROWEST <= gap <= _WIDEST or any(_parts_lanes(line, right, left) for line in between):
             continue
-        strips.append(_median_between(profiles, right, left, usual_lines))
+        strip = _median_between(profiles, right, left, usual_lines)
+        strips.append(replace(strip, odds=strip.odds + _network_odds(strip, learned)))
     chosen: list[Median] = []
     for strip in sorted((strip for strip in strips if strip.total > 0.0), key=lambda strip: -strip.total):
         if all(strip.left.offset <= one.right.offset or strip.right.offset >= one.left.offset for one in chosen):
@@ -140,14 +164,44 @@ def _median_between(profiles: Profiles, right: Line, left: Line, lines: Sequence
     odds = _ground_odds(profiles, right_offsets, left_offsets)
     gap = left.offset - right.offset
     # Kerbs and edges pass for solid lines: where the cloud hides one lane's other line the other lane must be sure.
-    is_sure = all(lane_lines) or any(is_dashed(other) for others in lane_lines for other in others)
+    is_sure = all(lane_lines) or any(is_lane_line(other) for others in lane_lines for other in others)
     prior = _PRIOR if all(has_lanes) and is_sure else -np.inf
-    if all(any(is_dashed(other) for other in others) for others in lane_lines):
+    dashes = [[other for other in others if is_lane_line(other)] for others in lane_lines]
+    if all(dashes):
         prior += _FRAMED + (0.0 if _LIKE_A_LANE[0] <= gap <= _LIKE_A_LANE[1] else _NO_LANE)
-    dashes = [[other for other in others if is_dashed(other)] for others in lane_lines]
     prior += _pattern_odds(*dashes) + _symmetry_odds(right, left, lines)
     strip = min(_EDGE_STRIP, 0.25 * gap)
     return Median(right, left, right_offsets + strip, left_offsets - strip, prior + odds)
+
+
+def _network_odds(strip: Median, learned: Float | None) -> Float:
+    """Return the log-odds (K,) by where a network sees the road's axis (K,), m; 0 where it sees none."""
+    if learned is None:
+        return np.zeros(len(strip.odds))
+    distance = learned - 0.5 * (strip.low + strip.high)
+    # ln of N(d; 0, error) times the range, over which it is as likely anywhere.
+    odds = np.log(_AXIS_RANGE / (_AXIS_ERROR * np.sqrt(2.0 * np.pi))) - 0.5 * (distance / _AXIS_ERROR) ** 2
+    return np.where(np.isfinite(distance), np.clip(odds, *_BY_NETWORK), 0.0)
+
+
+def is_lane_line(line: Line) -> bool:
+    """Return whether a line's dashes are about a standard pattern's: those of faults, grass and rails mostly aren't."""
+    period, dash = _DASHES
+    return is_dashed(line) and any(
+        abs(line.dash + line.gap - standard - gap) <= period and abs(line.dash - standard) <= dash
+        for standard, gap in STANDARD_DASHES
+    )
+
+
+def _parts_lanes(line: Line, right: Line, left: Line) -> bool:
+    """Return whether a dashed line parts two lanes between two others: where a lane has no room beside it none is."""
+    return is_dashed(line) and min(line.offset - right.offset, left.offset - line.offset) >= _LANE[0]
+
+
+def _held_length(profiles: Profiles, line: Line) -> float:
+    """Return the length of the road, m, on which the cloud holds the ground that a line lies on."""
+    near = np.abs(profiles.offsets - line.offset) <= _HELD
+    return SPACING * float((profiles.count[:, near] > 0).any(axis=1).sum())
 
 
 def _pattern_odds(right: Sequence[Line], left: Sequence[Line]) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...base.arrays import Float
 from ..ground.band import find_band
+from ..ground.paved import paved_spans
 from ..layout import RoadLayout
 from ..smoothing import fill_gaps
 from .dark_band import view_band
@@ -40,7 +41,7 @@ def rule_views(layout: RoadLayout, lines: FoundAxis) -> list[View]:
     ground_views = [
         view_brightness(profiles, cores, dual),
         view_skeleton(profiles, cores).less_sure(0.5 * unevenness),
-        view_symmetry(profiles).less_sure(unevenness),
+        view_symmetry(profiles).less_sure(unevenness + _pavement_beside(layout)),
     ]
     band_views: list[View] = []
     if not dual:  # two carriageways have two bands, and shoulders that differ from lanes
@@ -65,6 +66,19 @@ def _beside_band(view: View, band: View) -> Float:
     """
     distance = np.abs(view.offsets - band.offsets)
     return np.where(np.isfinite(distance) & (distance <= APART), distance, 0.0)
+
+
+def _pavement_beside(layout: RoadLayout) -> float:
+    """Return the distance, m, of the middle of all strips of pavement from the middle of a road's two carriageways.
+
+    With a third carriageway beside them all is symmetric about another axis than the road's.
+    """
+    spans = paved_spans(layout.pavement)
+    if layout.kind == "single" or not spans:
+        return 0.0
+    beyond_right = max(0.0, layout.bands[0].low - min(right for right, _ in spans))
+    beyond_left = max(0.0, max(left for _, left in spans) - layout.bands[-1].high)
+    return 0.5 * abs(beyond_left - beyond_right)
 
 
 def _unevenness(layout: RoadLayout) -> Float:

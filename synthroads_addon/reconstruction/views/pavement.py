@@ -28,6 +28,9 @@ _RAIL = 20
 ground between."""
 _NO_LANE = 23
 """Strip between two parts of a median that is no carriageway, bins. Chosen: no lane of RAA or RAL is as narrow."""
+_NARROWEST = 0.8
+"""Width of a median, m, at least. Chosen: a concrete barrier on its own, as in `layout`; a kerb's step is seen over 0.6
+m, with the same ground on both sides it is none."""
 _PATCH = 5
 """Stretches in which what differs from the ground before and behind it is a patch, a stain, an entrance. Chosen: 25
 m."""
@@ -74,12 +77,15 @@ def pavement_edges(profiles: Profiles, cores: Sequence[float], dual: bool, offse
     if dual:
         in_cloud = _close(has_points, _RAIL)
         band_mask = _close(in_cloud & ~band_mask, _NO_LANE) & in_cloud
-    return np.array(
+    edges = np.array(
         [
             _run_at(profiles, row, row_has_points, offset)
             for row, row_has_points in zip(band_mask, has_points, strict=True)
         ]
     ).T
+    if dual:
+        edges[:, edges[1] - edges[0] < _NARROWEST] = np.nan
+    return edges
 
 
 def _is_kerb(height: Float) -> Bool:
