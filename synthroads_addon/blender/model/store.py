@@ -105,7 +105,9 @@ def refuse_stated_axis(root: bpy.types.Object) -> None:
     """Raise `InputError` if the road's axis was stated anew since it was built: its things stand on the old one."""
     stated = recall_stated(root)
     if stated is not None and stated.alignment != recall_parameters(root).alignment:
-        raise InputError("Road", root.name, "its axis was changed in Alignment: press Build as Edited first")
+        raise InputError(
+            "Road", None, "its axis was changed in Alignment: press Build as Edited first (at the top of Road)"
+        )
 
 
 def _stored(root: bpy.types.Object, key: str) -> Any:

@@ -8,12 +8,13 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...blender.model.store import find_road
+from ...blender.model.store import STATED, find_road
 from ...checking.checker import RULES
 from ...road.tables.elements import KIND_NAMES
 from ...road.tables.points import grades_percent
 from ..fields.room import buttons_row, draw_text, fits, row_width, text_width, value_row
 from ..translations.blender import said
+from ..work.build import SYNTHROADS_OT_build_edited
 from ..work.common import Sidebar, column
 from .operators import (
     SYNTHROADS_OT_crossfall_by_rule,
@@ -163,6 +164,9 @@ class SYNTHROADS_PT_alignment(Sidebar, bpy.types.Panel):
         sync_later(scene)
         layout.operator(SYNTHROADS_OT_show_profile.bl_idname, icon="IPO_EASE_IN_OUT")
         draw_station(layout, scene)
+        root = find_road(scene)
+        if root is not None and STATED in root:
+            layout.operator(SYNTHROADS_OT_build_edited.bl_idname, icon="FILE_REFRESH")
         if tables.refused:
             draw_text(layout, tables.refused, "ERROR")
         for table in TABLES:

@@ -23,7 +23,7 @@ KIND_NAMES: dict[Kind, str] = {
     "element": "End of an Element",
     "vertical": "Vertical Point",
     "thing": "Thing",
-    "start": "Begin of a Thing",
+    "start": "Start of a Thing",
     "end": "End of a Thing",
 }
 FIELDS: dict[Kind, str] = {"thing": "station", "start": "start_station", "end": "end_station"}
@@ -58,7 +58,7 @@ class Dot:
             return f"End of element {self.number}"
         if self.kind == "vertical":
             return f"Vertical point {self.number + 1}"
-        return {"thing": self.name, "start": f"Begin of {self.name}", "end": f"End of {self.name}"}[self.kind]
+        return {"thing": self.name, "start": f"Start of {self.name}", "end": f"End of {self.name}"}[self.kind]
 
 
 def road_dots(geometry: RoadGeometry, things: Mapping[str, Thing]) -> list[Dot]:

@@ -158,7 +158,7 @@ class SYNTHROADS_PG_settings(_Generated, bpy.types.PropertyGroup):
         if not chosen.strip():
             raise InputError("Output", None, "choose a folder for the files")
         if self.needs_saved_file():
-            raise InputError("Output", chosen, "save the file first, or choose a folder")
+            raise InputError("Output", chosen, "save the file first, or choose a folder in the panel Output")
         return Path(bpy.path.abspath(chosen)).expanduser().absolute()
 
 

@@ -28,7 +28,7 @@ from ...scenario.assets import library_names, read_asset_library
 from ..fields.numbers import LENGTH_DIGITS, exact
 from ..work.common import column, has_road, is_free, refusing
 from ..work.view import view_of
-from .things import thing_of
+from .things import sign_numbers, thing_of
 
 FARTHEST = 100.0
 """So far beside the axis, m, the cursor still means a place on the road."""
@@ -186,7 +186,10 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
         unit="LENGTH",
     )
     code: bpy.props.StringProperty(
-        name="Sign Number", description="Number in the catalogue of signs (VzKat), e.g. 274-120", default=USUAL_SIGN
+        name="Sign Number",
+        description="Number in the catalogue of signs (VzKat), e.g. 274-120; those that are known are listed as you type",
+        default=USUAL_SIGN,
+        search=sign_numbers,
     )
     text: bpy.props.StringProperty(name="Text", description="What is written on it; lines are divided by /")
     asset: bpy.props.EnumProperty(name="Asset", description="Asset of a built-in library", items=_asset_items())

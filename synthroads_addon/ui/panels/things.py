@@ -7,7 +7,7 @@ stands for now, and changes it at once: its place, its modifier's input, or its 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Literal, get_args, get_origin
 
 import bpy
@@ -20,6 +20,7 @@ from ...blender.things.model_builder import ROLE, SUPPORT
 from ...road.objects import Color
 from ...road.things.gantry import Gantry
 from ...road.things.registry import THINGS
+from ...road.things.sign_catalogue import sign_catalogue
 from ...road.things.thing import Thing
 from ..fields.numbers import exact, number_property
 from ..fields.room import draw_text, value_row
@@ -93,6 +94,13 @@ def _with_labels(message: str, thing: Thing | None) -> str:
     return message
 
 
+def sign_numbers(self: Any, context: bpy.types.Context, typed: str) -> Iterator[tuple[str, str]]:
+    """Yield (number, what the sign tells) of the catalogue's signs that contain the typed text, for a search field."""
+    for number, sign in sign_catalogue().signs.items():
+        if typed.lower() in f"{number} {sign.description}".lower():
+            yield number, sign.description
+
+
 def _getter(name: str, read: Callable[[Any], Any], empty: Any) -> Callable[[Any], Any]:
     def get(group: Any) -> Any:
         thing = _active_thing()
@@ -140,6 +148,8 @@ def _property(model: type[Thing], name: str, info: FieldInfo) -> Any:
         get, put = _getter(name, values.index, 0), _setter(name, values.__getitem__)
         return bpy.props.EnumProperty(items=items, get=get, set=put, **about)
     if kind is str:
+        if name == "code":
+            about["search"] = sign_numbers
         return bpy.props.StringProperty(get=_getter(name, str, ""), set=_setter(name, str), **about)
     if kind == tuple[str, ...]:
         about["description"] += f". Lines are divided by{_SEPARATOR.rstrip()}"

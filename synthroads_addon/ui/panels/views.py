@@ -6,16 +6,47 @@ Annotations are not postponed here: Blender reads the properties from them.
 import bpy
 from mathutils import Matrix
 
-from ...blender.model.store import find_road
+from ...blender.model.store import PARAMETERS, SCENARIO, find_road, recall
 from ...blender.views.daylight import VIEW, add_views, cameras_of
+from ...sampling.surroundings import sample_environment
+from ...scenario.scenario import Scenario
 from ..fields.room import buttons_row, draw_text
 from ..work.common import Sidebar, column, has_road, refusing
 from ..work.view import view_of
 from .rules import edited_parameters
 
 
+_SUN_LIMITS = ("sun_place", "sun_azimuth_deg", "sun_elevation_deg", "time_of_day", "day_of_year", "latitude_deg")
+"""Fields of a scenario's environment that the sun's direction follows from."""
+
+
+def move_sun(root: bpy.types.Object, chosen: Scenario) -> None:
+    """Give a road the sun of other limits, drawn with the road's seed, where they differ from those that it was built with.
+
+    Neither the model nor its edits depend on the sun: the road needn't be built again.
+
+    Args:
+        root: of the road.
+        chosen: the limits.
+
+    Raises:
+        InputError: what is kept of the road is damaged.
+    """
+    parameters, scenario = recall(root)
+    limits = {name: getattr(chosen.road.environment, name) for name in _SUN_LIMITS}
+    if limits == {name: getattr(scenario.road.environment, name) for name in _SUN_LIMITS}:
+        return
+    environment_limits = scenario.road.environment.model_copy(update=limits)
+    road = scenario.road.model_copy(update={"environment": environment_limits})
+    drawn = sample_environment(road, scenario.seed)
+    sun = {"sun_azimuth_deg": drawn.sun_azimuth_deg, "sun_elevation_deg": drawn.sun_elevation_deg}
+    environment = parameters.environment.model_copy(update=sun)
+    root[PARAMETERS] = parameters.model_copy(update={"environment": environment}).to_json()
+    root[SCENARIO] = scenario.model_copy(update={"road": road}).to_json()
+
+
 class SYNTHROADS_OT_add_views(bpy.types.Operator):
-    """Add sun, sky and haze for the road, a driver's and an aerial camera, replacing earlier ones. Scans ignore them"""
+    """Add sun, sky and haze for the road, a driver's and an aerial camera, replacing earlier ones. The sun is that of Sun and Weather. Scans ignore lights and cameras"""  # noqa: E501 (a tooltip is one line)
 
     bl_idname = "synthroads.add_views"
     bl_label = "Add Sun, Sky, Cameras"
@@ -29,9 +60,11 @@ class SYNTHROADS_OT_add_views(bpy.types.Operator):
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
         """Add sun, sky, haze and cameras for the road with its edits, replacing earlier ones."""
-        parameters, root = edited_parameters(context.scene), find_road(context.scene)
-        assert parameters  # poll() has seen the road
-        assert root
+        root = find_road(context.scene)
+        assert root  # poll() has seen the road
+        move_sun(root, context.scene.synthroads.scenario())
+        parameters = edited_parameters(context.scene)
+        assert parameters
         add_views(context.scene, parameters, Matrix(root.matrix_world))
 
 

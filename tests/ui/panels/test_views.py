@@ -91,3 +91,27 @@ def test_clear_air_has_no_haze_and_the_users_world_stays() -> None:
     assert sorted(views_of(bpy.context.scene)) == ["aerial", "driver", "sun"]
     assert mine.use_fake_user
     assert bpy.context.scene.world != mine
+
+
+def test_night_falls_over_a_road_with_its_edits(panel: Any) -> None:
+    """The sun of the panel is the road's by the button alone: nothing is built again, and what was placed stays."""
+    bpy.ops.synthroads.build()
+    bpy.ops.synthroads.add_thing(kind="Gantry", station=30.0)
+    before = rules.edited_parameters(bpy.context.scene)
+    low, high = "road.environment.sun_elevation_deg_minimum", "road.environment.sun_elevation_deg_maximum"
+    choose(panel, **{low: -20.0, high: -20.0})
+    assert bpy.ops.synthroads.add_views() == {"FINISHED"}
+    after = rules.edited_parameters(bpy.context.scene)
+    assert before
+    assert after
+    assert after.environment.sun_elevation_deg == -20.0
+    assert after.environment.sun_azimuth_deg == before.environment.sun_azimuth_deg
+    assert after.objects == before.objects
+    assert "gantry-1" in after.objects
+
+
+def test_a_loaded_roads_sun_stays_until_the_panels_is_changed(panel: Any) -> None:
+    bpy.ops.synthroads.build()
+    before = rules.edited_parameters(bpy.context.scene)
+    assert bpy.ops.synthroads.add_views() == {"FINISHED"}
+    assert rules.edited_parameters(bpy.context.scene) == before
