@@ -15,6 +15,7 @@ import bpy
 from . import alignment
 from .drawing import along_curve, dots, tool
 from .fields import preferences, properties
+from .fields.wording import title_case
 from .panels import (
     calibration,
     calibration_settings,
@@ -73,7 +74,8 @@ def register() -> None:
             bpy.utils.register_class(cls)
         if attached := getattr(module, "ATTACHED", None):
             owner, name, group = attached
-            setattr(owner, name, bpy.props.PointerProperty(type=group))
+            label = title_case(name).replace("Synthroads", "SynthRoads")
+            setattr(owner, name, bpy.props.PointerProperty(type=group, name=label))
         for event, function in getattr(module, "HANDLERS", {}).items():
             getattr(bpy.app.handlers, event).append(function)
         if hasattr(module, "register"):

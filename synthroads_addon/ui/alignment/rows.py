@@ -23,6 +23,7 @@ from ...road.tables.elements import (
 from ...road.tables.points import strip_names, width_rows, with_crossfall_point, with_vertical_point, with_width
 from ...road.tables.stated import StatedRoad
 from ..fields.numbers import LENGTH_DIGITS, exact
+from ..fields.wording import title_case
 from .profile_view import redraw_profiles
 from .tables import carriageway_of, note_changes, strip_of, sync, tables, try_edit, unregister
 
@@ -152,7 +153,7 @@ def _set_kind(group: Any, index: int) -> None:
 class SYNTHROADS_PG_element(bpy.types.PropertyGroup):
     """Row of an element: straight, clothoid or arc."""
 
-    number: bpy.props.IntProperty(options={"HIDDEN"})
+    number: bpy.props.IntProperty(name="Row", options={"HIDDEN"})
     kind: bpy.props.EnumProperty(
         name="Kind", description="What the element is", items=KIND_ITEMS, get=_kind, set=_set_kind
     )
@@ -225,7 +226,7 @@ class SYNTHROADS_PG_element(bpy.types.PropertyGroup):
 class SYNTHROADS_PG_vertical_point(bpy.types.PropertyGroup):
     """Row of a point of vertical intersection."""
 
-    number: bpy.props.IntProperty(options={"HIDDEN"})
+    number: bpy.props.IntProperty(name="Row", options={"HIDDEN"})
     station: _field(
         _vertical("station"),
         _write_vertical("station"),
@@ -264,7 +265,7 @@ class SYNTHROADS_PG_vertical_point(bpy.types.PropertyGroup):
 class SYNTHROADS_PG_crossfall_point(bpy.types.PropertyGroup):
     """Row of a carriageway's crossfall."""
 
-    number: bpy.props.IntProperty(options={"HIDDEN"})
+    number: bpy.props.IntProperty(name="Row", options={"HIDDEN"})
     station: _field(
         _crossfall("station"),
         _write_crossfall("station"),
@@ -291,7 +292,7 @@ class SYNTHROADS_PG_crossfall_point(bpy.types.PropertyGroup):
 class SYNTHROADS_PG_width_row(bpy.types.PropertyGroup):
     """Row of a strip's width."""
 
-    number: bpy.props.IntProperty(options={"HIDDEN"})
+    number: bpy.props.IntProperty(name="Row", options={"HIDDEN"})
     station: _field(
         _width(0),
         _write_width("station"),
@@ -360,16 +361,20 @@ def _look_at(table: str) -> Callable[[Any, Any], None]:
 
 def _active(table: str, words: str) -> Any:
     """Return the property of a table's active row."""
-    return bpy.props.IntProperty(description=f"{words} that is edited below the list", update=_look_at(table))
+    return bpy.props.IntProperty(
+        name=f"Active {title_case(words)}",
+        description=f"{words} that is edited below the list",
+        update=_look_at(table),
+    )
 
 
 class SYNTHROADS_PG_alignment(bpy.types.PropertyGroup):
     """The tables: their rows and active rows, and which carriageway and strip are shown."""
 
-    elements: bpy.props.CollectionProperty(type=SYNTHROADS_PG_element)
-    vertical: bpy.props.CollectionProperty(type=SYNTHROADS_PG_vertical_point)
-    crossfall: bpy.props.CollectionProperty(type=SYNTHROADS_PG_crossfall_point)
-    widths: bpy.props.CollectionProperty(type=SYNTHROADS_PG_width_row)
+    elements: bpy.props.CollectionProperty(type=SYNTHROADS_PG_element, name="Elements")
+    vertical: bpy.props.CollectionProperty(type=SYNTHROADS_PG_vertical_point, name="Vertical Points")
+    crossfall: bpy.props.CollectionProperty(type=SYNTHROADS_PG_crossfall_point, name="Crossfall")
+    widths: bpy.props.CollectionProperty(type=SYNTHROADS_PG_width_row, name="Widths")
     active_elements: _active("elements", "Element")
     active_vertical: _active("vertical", "Vertical point")
     active_crossfall: _active("crossfall", "Crossfall point")
@@ -390,7 +395,7 @@ class SYNTHROADS_PG_alignment(bpy.types.PropertyGroup):
         items=[("right", "Right", "Its traffic runs with the stations"), ("left", "Left", "Against the stations")],
         update=_sync,
     )
-    strip_number: bpy.props.IntProperty(default=3, min=0, update=_sync, options={"HIDDEN"})
+    strip_number: bpy.props.IntProperty(name="Number of the Strip", default=3, min=0, update=_sync, options={"HIDDEN"})
     strip: bpy.props.EnumProperty(
         name="Strip",
         description="Strip of the carriageway whose widths are shown; lanes are counted from outside",

@@ -85,7 +85,9 @@ class SYNTHROADS_PG_settings(_Generated, bpy.types.PropertyGroup):
         name="Scenario", default=FIRST, description="Scenario that these settings come from, built-in or a file"
     )
     loaded: bpy.props.StringProperty(
-        options={"HIDDEN"}, description="That scenario as JSON: its numbers have more digits than Blender's"
+        name="Loaded Scenario",
+        options={"HIDDEN"},
+        description="That scenario as JSON: its numbers have more digits than Blender's",
     )
     output: bpy.props.StringProperty(
         name="Folder",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from pydantic.fields import FieldInfo
 
 from ...base.schema import LARGEST, note_of, unit_of
@@ -72,3 +74,8 @@ def title_case(name: str) -> str:
     """Return a schema name in title case, as Blender writes labels: underscores become blanks."""
     words = name.replace("_", " ").split()
     return " ".join(w if i and w in _SMALL_WORDS else w[:1].upper() + w[1:] for i, w in enumerate(words))
+
+
+def thing_name(kind: str) -> str:
+    """Return a type of thing as people say it: ``TrafficSign`` becomes Traffic Sign."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind)

@@ -78,8 +78,8 @@ def _follow_axis(settings: Any, context: bpy.types.Context) -> None:
 class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
     """Settings of the calibration panel."""
 
-    classes: bpy.props.CollectionProperty(type=SYNTHROADS_PG_calibration_class)
-    active: bpy.props.IntProperty()
+    classes: bpy.props.CollectionProperty(type=SYNTHROADS_PG_calibration_class, name="Materials")
+    active: bpy.props.IntProperty(name="Active Material")
     real: bpy.props.StringProperty(
         name="Real Cloud",
         subtype="FILE_PATH",

@@ -16,6 +16,7 @@ from ..drawing.along_curve import (
     active_curve,
 )
 from ..drawing.tool import SYNTHROADS_OT_draw_road
+from ..fields.wording import thing_name
 from ..work.build import SYNTHROADS_OT_build, SYNTHROADS_OT_build_edited
 from ..work.long_operator import SYNTHROADS_OT_cancel
 from ..work.scan import SYNTHROADS_OT_scan
@@ -40,7 +41,6 @@ from .placing import (
     SYNTHROADS_OT_delete_thing,
     SYNTHROADS_OT_repeat_thing,
     menu_groups,
-    thing_name,
 )
 from .presets import (
     SYNTHROADS_OT_load_device,

@@ -3,7 +3,6 @@
 Annotations are not postponed here: Blender reads the properties from them.
 """
 
-import re
 from collections.abc import Iterator
 from typing import Any, Literal, NamedTuple
 
@@ -23,9 +22,11 @@ from ...road.objects import LineObject
 from ...road.parameters import RoadParameters
 from ...road.things.registry import THINGS
 from ...road.things.thing import LengthwiseThing, StandingThing, Thing
-from ...sampling.placing.single import USUAL_SIGN, thing_by_rule
+from ...sampling.placing.free_place import FARTHEST_MOVE, thing_at_free_place
+from ...sampling.placing.single import USUAL_SIGN
 from ...scenario.assets import library_names, read_asset_library
 from ..fields.numbers import LENGTH_DIGITS, exact
+from ..fields.wording import thing_name
 from ..work.common import column, has_road, is_free, refusing
 from ..work.view import view_of
 from .things import sign_numbers, thing_of
@@ -50,11 +51,6 @@ ICONS = {
     "ParkedVehicle": "AUTO",
     "Hedge": "OUTLINER_OB_CURVES",
 }
-
-
-def thing_name(kind: str) -> str:
-    """Return a type of thing as people say it: ``TrafficSign`` becomes Traffic Sign."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind)
 
 
 def menu_groups() -> Iterator[tuple[str, ...]]:
@@ -161,6 +157,12 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
         description="Behind barriers and clear of the pavement, as roads are furnished (RPS, HLB); else as given below",
         default=True,
     )
+    free_place: bpy.props.BoolProperty(
+        name="Next Free Place",
+        description="Move it along the road, with the stations, to where nothing stands, if something does at its "
+        f"station: at most {FARTHEST_MOVE:.0f} m. What runs along the road stays",
+        default=True,
+    )
     offset: bpy.props.FloatProperty(
         name="Offset",
         description="Distance from the axis in m, positive to the left, e.g. -16.5; -100 to 100 m are allowed",
@@ -211,8 +213,16 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
         if self.side == "cursor":
             self.side = cursor.side
         station = min(exact(self.station, None), geometry.length)
-        thing = thing_by_rule(geometry, self.kind, self.side, station, self._fields(station, geometry.length))
+        fields = self._fields(station, geometry.length)
+        place = thing_at_free_place(
+            *(geometry, self.kind, self.side, station, fields), farthest_move=FARTHEST_MOVE if self.free_place else 0.0
+        )
+        thing = place.thing
         assert isinstance(thing, StandingThing | LengthwiseThing)
+        if isinstance(thing, StandingThing) and thing.station != station:
+            self.station = thing.station
+            if self.kind == "KilometreBoard" and not self.text:
+                thing = thing.model_copy(update={"text": _kilometre(thing.station)})
         if self.by_rule:
             self.offset = thing.offset
         update: dict[str, Any] = {"instance": _next_number(parameters)}
@@ -222,8 +232,15 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
             )
         thing = thing.model_copy(update=update)
         taken = {*parameters.objects, *parts_and_copies(root, context.scene)[0]}
-        item = add_thing(root, context.scene, thing, _free_name(self.kind, taken))
+        name = _free_name(self.kind, taken)
+        item = add_thing(root, context.scene, thing, name)
         _select(context, [item])
+        if not place.is_free:
+            self.report(
+                {"WARNING"}, f"{name} and {place.obstacle} stand at one place: choose another station, side or offset"
+            )
+        elif place.obstacle:
+            self.report({"INFO"}, f"{name} is at station {self.station:,.2f} m, behind {place.obstacle}")
 
     def _fields(self, station: float, length: float) -> dict[str, Any]:
         """Return the fields that the redo panel gives, by the kind of thing."""
@@ -249,6 +266,8 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
         model = THINGS[self.kind]
         for name in ("kind", "station", "side", "by_rule"):
             layout.prop(self, name)
+        if issubclass(model, StandingThing):
+            layout.prop(self, "free_place")
         if not self.by_rule:
             layout.prop(self, "offset")
         layout.prop(self, "length" if issubclass(model, LineObject) else "turned")

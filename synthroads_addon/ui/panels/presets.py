@@ -167,7 +167,7 @@ class SYNTHROADS_OT_add_file(JsonFileChooser, _Undoable, bpy.types.Operator):
     bl_idname = ADD_FILE
     bl_label = "Add File..."
 
-    path: bpy.props.StringProperty(options={"HIDDEN"})
+    path: bpy.props.StringProperty(name="Field", options={"HIDDEN"})
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
@@ -183,8 +183,8 @@ class SYNTHROADS_OT_remove_file(_Undoable, bpy.types.Operator):
     bl_idname = REMOVE_FILE
     bl_label = "Remove File"
 
-    path: bpy.props.StringProperty(options={"HIDDEN"})
-    number: bpy.props.IntProperty(options={"HIDDEN"})
+    path: bpy.props.StringProperty(name="Field", options={"HIDDEN"})
+    number: bpy.props.IntProperty(name="Place in the List", options={"HIDDEN"})
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:

@@ -129,21 +129,23 @@ def _look_at_entry(rules: "SYNTHROADS_PG_rules", context: bpy.types.Context) -> 
 class SYNTHROADS_PG_violation(bpy.types.PropertyGroup):
     """A list entry for a broken rule: its `Violation` with an offset; `name` is the rule's title."""
 
-    rule: bpy.props.StringProperty()
-    object: bpy.props.StringProperty()
-    station: bpy.props.FloatProperty()
-    offset: bpy.props.FloatProperty()
-    value: bpy.props.StringProperty()
-    limit: bpy.props.StringProperty()
-    comparison: bpy.props.StringProperty(description="Both, short")
-    text: bpy.props.StringProperty()
+    rule: bpy.props.StringProperty(name="Rule")
+    object: bpy.props.StringProperty(name="Object")
+    station: bpy.props.FloatProperty(name="Station")
+    offset: bpy.props.FloatProperty(name="Offset")
+    value: bpy.props.StringProperty(name="Value")
+    limit: bpy.props.StringProperty(name="Limit")
+    comparison: bpy.props.StringProperty(name="Value and Limit")
+    text: bpy.props.StringProperty(name="Sentence")
 
 
 class SYNTHROADS_PG_rules(bpy.types.PropertyGroup):
     """List of the rules that the last checked road breaks."""
 
-    violations: bpy.props.CollectionProperty(type=SYNTHROADS_PG_violation)
-    index: bpy.props.IntProperty(update=_look_at_entry, description="Click to look at the place")
+    violations: bpy.props.CollectionProperty(type=SYNTHROADS_PG_violation, name="Broken Rules")
+    index: bpy.props.IntProperty(
+        name="Active Broken Rule", update=_look_at_entry, description="Click to look at the place"
+    )
 
 
 def check_shown_road(context: bpy.types.Context) -> int:

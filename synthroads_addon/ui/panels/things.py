@@ -24,7 +24,7 @@ from ...road.things.sign_catalogue import sign_catalogue
 from ...road.things.thing import Thing
 from ..fields.numbers import exact, number_property
 from ..fields.room import draw_text, value_row
-from ..fields.wording import label, title_case, tooltip, value_name
+from ..fields.wording import label, thing_name, title_case, tooltip, value_name
 from ..work.common import panel_message
 
 _SEPARATOR = " / "
@@ -196,7 +196,7 @@ def _group(kind: str, model: type[Thing]) -> type[bpy.types.PropertyGroup]:
 
 
 _GROUPS = {kind: _group(kind, model) for kind, model in THINGS.items()}
-_POINTERS = {kind: bpy.props.PointerProperty(type=group) for kind, group in _GROUPS.items()}
+_POINTERS = {kind: bpy.props.PointerProperty(type=group, name=thing_name(kind)) for kind, group in _GROUPS.items()}
 SYNTHROADS_PG_things = type("SYNTHROADS_PG_things", (bpy.types.PropertyGroup,), {"__annotations__": _POINTERS})
 CLASSES = (*_GROUPS.values(), SYNTHROADS_PG_things)
 ATTACHED = (bpy.types.Scene, "synthroads_things", SYNTHROADS_PG_things)

@@ -155,6 +155,11 @@ class FakeLayout:
         shown = getattr(bpy.types, idname).bl_label if text is None else text
         self._say(f"menu {shown!r} {idname}{_icon(icon)}", shown, 1 + _has(icon))
 
+    def template_icon(self, icon_value: int, scale: float = 1.0) -> None:
+        assert icon_value >= 0  # Blender gives pictures no number but 0 where it has no window
+        assert scale > 0.0
+        self._say("picture")
+
     def progress(self, factor: float = 0.0, text: str = "") -> None:
         self._say(f"progress {text!r}", text)
 

@@ -219,10 +219,10 @@ def schema_paths(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
 
 def states(settings: Any) -> Iterator[None]:
     """Set the panel to one state after the other that together give every field a meaning."""
-    chosen = [("uav", "smoothed", "snow"), ("uav", "zigzag", "snow")]
-    chosen += [(kind, "direct", "snow") for kind in PLATFORMS]
-    chosen += [("uav", "direct", condition) for condition in WEATHERS]
-    for kind, path, condition in chosen:
+    chosen = [("uav", "smoothed", "snow", "angles"), ("uav", "zigzag", "snow", "time")]
+    chosen += [(kind, "direct", "snow", "angles") for kind in PLATFORMS]
+    chosen += [("uav", "direct", condition, "angles") for condition in WEATHERS]
+    for kind, path, condition, sun_place in chosen:
         settings.show_scenario(Scenario())
         settings.scan.platform.kind, settings.scan.platform.path = kind, path
         settings.road.cross_section = BY_HAND
@@ -233,7 +233,7 @@ def states(settings: Any) -> Iterator[None]:
                     owner = getattr(owner, part)
                 if hasattr(owner, field.checkbox_name):
                     setattr(owner, field.checkbox_name, True)
-        settings.scan.weather.condition = condition
+        settings.scan.weather.condition, settings.road.environment.sun_place = condition, sun_place
         settings.colour.source, settings.colour.lighting = "images", "path"
         yield
 

@@ -15,6 +15,7 @@ from synthroads_addon.blender.model.settle import settle
 from synthroads_addon.blender.model.store import find_road, recall_parameters
 from synthroads_addon.blender.model.truth import EditedRoad, read_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.checking.checker import check
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.objects import LineObject
 from synthroads_addon.road.things.registry import THINGS
@@ -186,7 +187,8 @@ def test_every_thing_of_the_registry_can_be_added_at_the_cursor() -> None:
         station = 4.0 + 2.0 * number
         place = alignment.place(np.array([station]), np.array([8.0]))[0]
         bpy.context.scene.cursor.location = (*place, 0.0)
-        assert bpy.ops.synthroads.add_thing(kind=kind) == {"FINISHED"}, kind
+        # They stand at one place here and there, as they are so near to each other.
+        assert bpy.ops.synthroads.add_thing(kind=kind, free_place=False) == {"FINISHED"}, kind
         active = bpy.context.view_layer.objects.active
         added[active["synthroads_role"]] = (kind, station)
         assert len(scene_mesh(objects=[active])) > 0, kind
@@ -233,6 +235,37 @@ def test_a_small_thing_by_rule_stands_behind_the_barrier_and_faces_its_traffic()
     assert sign.rotation_deg == 0.0
     assert bpy.ops.synthroads.add_thing(kind="TrafficSign", station=30.0, side="left") == {"FINISHED"}
     assert abs(truth().parameters.objects["traffic-sign-2"].rotation_deg) == 180.0
+
+
+@pytest.mark.parametrize("by_rule", [True, False])
+def test_a_thing_is_put_behind_what_stands_at_its_station(by_rule: bool, capfd: pytest.CaptureFixture[str]) -> None:
+    options: dict[str, Any] = {"kind": "Pole", "station": 30.0, "side": "right", "by_rule": by_rule, "offset": -30.0}
+    for _ in range(2):
+        assert bpy.ops.synthroads.add_thing(**options) == {"FINISHED"}
+    poles = [truth().parameters.objects[f"pole-{number}"] for number in (1, 2)]
+    assert poles[0].station == 30.0
+    assert 30.0 < poles[1].station < 31.0
+    assert f"Info: pole-2 is at station {poles[1].station:.2f} m, behind pole-1" in capfd.readouterr().out
+    assert [v.text for v in check(truth().parameters) if v.rule == "object-overlap" and "pole" in v.text] == []
+
+
+def test_what_stands_at_one_place_with_another_is_named(capfd: pytest.CaptureFixture[str]) -> None:
+    for _ in range(2):
+        bpy.ops.synthroads.add_thing(kind="Pole", station=30.0, side="right", free_place=False)
+    poles = [truth().parameters.objects[f"pole-{number}"] for number in (1, 2)]
+    assert [pole.station for pole in poles] == [30.0, 30.0]
+    said = "Warning: pole-2 and pole-1 stand at one place: choose another station, side or offset"
+    assert said in capfd.readouterr().out
+    assert "object-overlap" in {violation.rule for violation in check(truth().parameters)}
+
+
+def test_a_board_that_is_moved_tells_where_it_stands() -> None:
+    place: dict[str, Any] = {"station": 47.0, "side": "right", "by_rule": False, "offset": -40.0}
+    bpy.ops.synthroads.add_thing(kind="Building", free_place=False, **place)
+    bpy.ops.synthroads.add_thing(kind="KilometreBoard", **place)
+    board = truth().parameters.objects["kilometre-board-1"]
+    assert 50.0 < board.station < 97.0
+    assert board.text == "0,1"
 
 
 def test_things_are_repeated_along_the_road() -> None:
