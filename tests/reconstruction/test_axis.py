@@ -79,11 +79,15 @@ def test_a_grid_that_shows_no_road_has_no_say(tmp_path: Path, monkeypatch: pytes
     whole, find_layout = line_found(cloud), axis_module.find_layout
 
     def find_no_other(
-        profiles: Profiles, lines: list[Line], wanted: RoadKind | None = None, asked: bool = True
+        profiles: Profiles,
+        lines: list[Line],
+        wanted: RoadKind | None = None,
+        asked: bool = True,
+        learned: Float | None = None,
     ) -> RoadLayout:
         if wanted is not None:  # the kind that the first grid showed
             raise InputError("road", None, "no carriageway can be made out in the cloud")
-        return find_layout(profiles, lines, wanted, asked)
+        return find_layout(profiles, lines, wanted, asked, learned)
 
     monkeypatch.setattr(axis_module, "find_layout", find_no_other)
     assert 0.0 < np.abs(line_found(cloud) - whole).max() < 0.03

@@ -272,6 +272,11 @@ def _ground_odds(profiles: Profiles, right: Float, left: Float) -> Float:
     odds = _odds_of(logarithm, *_BRIGHTNESS) + _odds_of(rise, *_HEIGHT) + _odds_of(rough_logarithm, *_ROUGHNESS)
     if profiles.paved is not None:
         paved = {name: median_level(profiles, profiles.paved, *place) for name, place in places.items()}
+        # A median is less paved than both sides: what is more so is a lane beside a verge.
+        right_share, left_share = paved["right"], paved["left"]
+        one_sided = np.fmin(right_share, left_share)
+        both_sides = np.where(np.isfinite(right_share + left_share), 0.5 * (right_share + left_share), one_sided)
+        paved["inside"] = np.where(paved["inside"] >= one_sided, both_sides, paved["inside"])
         odds = odds + _odds_of(paved, *_PAVED, against=_AGAINST_BY_CLASS)
     return np.asarray(odds)
 
