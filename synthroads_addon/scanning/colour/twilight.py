@@ -40,7 +40,7 @@ def level_illuminance(elevation_deg: float) -> float:
 
     Example:
         >>> [round(level_illuminance(elevation), 3) for elevation in (42.0, 0.0, -6.0, -40.0)]
-        [71801.466, 758.578, 3.304, 0.002]
+        [71730.964, 758.578, 3.412, 0.002]
     """
     for least_elevation, (constant, linear, square, cubic) in _LEVELS:
         if elevation_deg >= least_elevation:

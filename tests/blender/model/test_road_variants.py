@@ -20,7 +20,7 @@ from synthroads_addon.blender.things.model_builder import BuildRequest
 from synthroads_addon.blender.things.road.layout import names_in_words, side_of
 from synthroads_addon.road.damage import deepest_damage
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS
+from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS, is_single
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import Carriageway, LineMarking, Turnout
 from synthroads_addon.road.stretches import FRAME, stretches
@@ -79,8 +79,9 @@ def random_points(mesh: SceneMesh, triangles: NDArray[np.int32], count: int = 15
 def everything(design_class: str = "EKA1A", cross_section: str = "RQ31", length: float = 900.0) -> RoadScenario:
     """Return a scenario whose carriageways have exits, entries, bays, lane changes and damage wherever they fit."""
     data: dict[str, Any] = {"design_class": design_class, "cross_section": cross_section, "length": length}
-    data["turnouts"] = {"exits": 0.9, "entries": 0.9, "emergency_bays": 0.9}
-    data["lane_changes"] = {"share": 0.9}
+    if not is_single(design_class):  # one carriageway has none of these
+        data["turnouts"] = {"exits": 0.9, "entries": 0.9, "emergency_bays": 0.9}
+        data["lane_changes"] = {"share": 0.9}
     data["pavement"] = {"rutted": 0.9, "potholes_per_km": {"minimum": 3.0, "maximum": 6.0}}
     return RoadScenario.from_dict(data)
 

@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..base.arrays import Bool, Float
-from .geometry import alignment_of, profile_of
-from .guidelines import DesignLimits
-from .parameters import AlignmentObject
+from ...base.arrays import Bool, Float
+from ..geometry import alignment_of, profile_of
+from ..guidelines import DesignLimits
+from ..parameters import AlignmentObject
 
 EYE_HEIGHT, TARGET_HEIGHT = 1.0, 0.5
 """Heights of a driver's eye and of what is seen first of an obstacle, above the road, m. Chosen: a car's."""
