@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from ..base.schema import round_value
+from ..road.axes.sight import overtaking_spans
 from ..road.guidelines import LIMITS, EdgeLine, StandardCrossSection, is_single
 from ..road.objects import AnyWidth, Side, WidthPoint, nominal_width, width_at, width_kinks
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
-from ..road.axes.sight import overtaking_spans
 from ..road.turnout_geometry import TurnoutShape
 from .placing.ranges import Range, Reservations, free_ranges
 from .placing.site import PlacementSite

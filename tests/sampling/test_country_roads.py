@@ -8,6 +8,7 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.checking.checker import check
+from synthroads_addon.road.axes.sight import overtaking_spans, sight_distances
 from synthroads_addon.road.geometry import RoadGeometry, alignment_of
 from synthroads_addon.road.guidelines import (
     DUAL_CLASSES,
@@ -20,7 +21,6 @@ from synthroads_addon.road.guidelines import (
 )
 from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, RoadParameters, VerticalPoint
 from synthroads_addon.road.section import Carriageway, LineMarking, Median
-from synthroads_addon.road.axes.sight import overtaking_spans, sight_distances
 from synthroads_addon.road.surroundings import Vehicle
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario

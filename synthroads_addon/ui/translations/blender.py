@@ -20,7 +20,7 @@ _KINDS = ("Operator", "Panel", "Menu", "PropertyGroup", "UIList", "AddonPreferen
 
 def registered_messages() -> set[str]:
     """Return all labels, choices and tooltips of the classes that are registered now."""
-    return registered_labels() | registered_tooltips()
+    return _with_words(text for cls in _classes() for pair in _messages(cls) for text in pair)
 
 
 def registered_labels() -> set[str]:

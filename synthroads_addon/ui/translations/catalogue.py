@@ -28,22 +28,29 @@ class Catalogue:
 
     def __init__(self, messages: dict[str, str]) -> None:
         self.messages = messages
+        self._translations: dict[str, str | None] = {}
 
-    def translate(self, text: str, depth: int = 0) -> str | None:
-        """Return a text's translation; None if the catalogue has none.
+    def translate(self, text: str) -> str | None:
+        """Return a text's translation, kept for the next time; None if the catalogue has none.
 
         Example:
             >>> catalogue = Catalogue({"Length": "Länge", "Own {0}": "{0} angeben", "{0} points": "{0} Punkte"})
             >>> catalogue.translate("Own Length"), catalogue.translate("12 points"), catalogue.translate("Width")
             ('Länge angeben', '12 Punkte', None)
         """
+        if text not in self._translations:
+            self._translations[text] = self._translate(text, 0)
+        return self._translations[text]
+
+    def _translate(self, text: str, depth: int) -> str | None:
+        """Return the translation of a text, or of a part of one at a depth of patterns within each other."""
         if text in self.messages:
             return self.messages[text]
         if depth == _DEEPEST:
             return None
         for pattern, message in self._pattern_messages:
             if match := pattern.fullmatch(text):
-                parts = [self.translate(part, depth + 1) or part for part in match.groups()]
+                parts = [self._translate(part, depth + 1) or part for part in match.groups()]
                 held = dict(zip(_HOLE.findall(message), parts, strict=True))
                 return "".join(held[piece] if place % 2 else piece for place, piece in _pieces(self.messages[message]))
         return None

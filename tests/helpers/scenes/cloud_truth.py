@@ -20,6 +20,7 @@ from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters, read_parameters
 from synthroads_addon.scanning.scene.mesh import SceneMesh
+from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.scenes.panel_road import choose
 from tests.helpers.scenes.small_road import PARTS, TOLERANCE
 
@@ -35,6 +36,7 @@ _SAMPLE = 300
 def scan(folder: Path, name: str, scanner: str, kind: str = "npz") -> Path:
     """Scan the shown road from the panel, without noise; return the folder of the files."""
     panel = bpy.context.scene.synthroads
+    panel.show_scenario(load_scenario("rq31-600m-even"))
     choose(panel, **{"scan.device": scanner, "scan.relief": 0.0, "scan.traffic_speed_factor": 0.0})
     choose(panel, **{"scan.own_rays_per_pulse": True, "scan.rays_per_pulse": "1", "colour.source": "material"})
     choose(panel, **{"scan.platform.lateral_offsets": "0", "scan.platform.speed": 20.0, "overwrite": True})

@@ -81,7 +81,7 @@ def test_points_on_cracks_joints_and_patches_are_as_deep_and_as_dark_as_said() -
         < raised[paved & (np.abs(offset - lane) < 0.2) & (damage == "none")].mean()
         - 0.5 * parameters.carriageway("right").pavement.wheel_track_depth
     )
-    # Factors of the field, by what the laser sees of them.
-    assert medians["patch"] / medians["none"] == pytest.approx(0.72, abs=0.1)
+    # Factors of the field, by what the laser sees of them; a new patch is under its film, of a mix brighter or darker.
+    assert medians["patch"] / medians["none"] == pytest.approx(0.38, abs=0.14)
     assert medians["longitudinal crack"] / medians["none"] == pytest.approx(0.45, abs=0.1)
     assert medians["sealed longitudinal crack"] / medians["none"] == pytest.approx(0.40, abs=0.1)

@@ -11,6 +11,7 @@ import pytest
 from synthroads_addon.base.classes import classes
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.cloud.formats.registry import open_cloud
+from synthroads_addon.scenario.scenario import load_scenario
 from synthroads_addon.ui.panels.scene_scan import unclassified
 from synthroads_addon.ui.work import scan as scan_module
 from tests.helpers.scenes.panel_road import choose, settings, small_pictures
@@ -41,6 +42,7 @@ def yard(settings: Any, tmp_path: Path) -> Any:
     collection.objects.link(ground)
     bpy.ops.mesh.primitive_cube_add(size=4.0, location=(6.0, 3.0, 2.0))
     bpy.context.object.name = "Box"
+    settings.show_scenario(load_scenario("rq31-600m-even"))
     choose(settings, **CHEAP)
     settings.output = str(tmp_path / "out")
     return settings
@@ -141,6 +143,7 @@ def test_through_the_frames_of_a_moving_camera(yard: Any) -> None:
 
 
 def test_an_empty_scene_is_a_message(settings: Any, tmp_path: Path) -> None:
+    settings.show_scenario(load_scenario("rq31-600m-even"))
     choose(settings, **CHEAP)
     settings.output = str(tmp_path / "out")
     with pytest.raises(RuntimeError, match="nothing visible has faces"):
