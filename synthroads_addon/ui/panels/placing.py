@@ -187,7 +187,8 @@ class SYNTHROADS_OT_add_thing(_OnRoad, bpy.types.Operator):
     )
     code: bpy.props.StringProperty(
         name="Sign Number",
-        description="Number in the catalogue of signs (VzKat), e.g. 274-120; those that are known are listed as you type",
+        description="Number in the catalogue of signs (VzKat), e.g. 274-120; those that are known are listed as you "
+        "type",
         default=USUAL_SIGN,
         search=sign_numbers,
     )

@@ -15,13 +15,12 @@ from ..work.common import Sidebar, column, has_road, refusing
 from ..work.view import view_of
 from .rules import edited_parameters
 
-
 _SUN_LIMITS = ("sun_place", "sun_azimuth_deg", "sun_elevation_deg", "time_of_day", "day_of_year", "latitude_deg")
 """Fields of a scenario's environment that the sun's direction follows from."""
 
 
 def move_sun(root: bpy.types.Object, chosen: Scenario) -> None:
-    """Give a road the sun of other limits, drawn with the road's seed, where they differ from those that it was built with.
+    """Give a road the sun of other limits, drawn with its seed, where they differ from those that it was built with.
 
     Neither the model nor its edits depend on the sun: the road needn't be built again.
 
