@@ -220,7 +220,7 @@ class SYNTHROADS_OT_mend_violation(bpy.types.Operator):
 
     bl_idname = "synthroads.mend_violation"
     bl_label = "Mend"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}  # noqa: RUF012
 
     index: bpy.props.IntProperty(name="Line", min=0, description="Row of the list, from 0", options={"SKIP_SAVE"})
 
