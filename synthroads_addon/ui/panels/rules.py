@@ -3,6 +3,8 @@
 Annotations are not postponed here: Blender reads the properties from them.
 """
 
+from typing import Any
+
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
@@ -182,6 +184,14 @@ class SYNTHROADS_OT_check_rules(bpy.types.Operator):
         self.report({"INFO"}, _count(check_shown_road(context)))
 
 
+def _has_entries(cls: Any, context: bpy.types.Context) -> bool:
+    """Return whether the list of broken rules has entries; else tell an operator's button so."""
+    broken = len(context.window_manager.synthroads_rules.violations)
+    if not broken:
+        cls.poll_message_set("Check the rules first; the list of broken rules is empty")
+    return broken > 0
+
+
 class SYNTHROADS_OT_show_violation(bpy.types.Operator):
     """Look along the road at the place where this rule is broken"""
 
@@ -194,10 +204,7 @@ class SYNTHROADS_OT_show_violation(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the list of broken rules has entries."""
-        broken = len(context.window_manager.synthroads_rules.violations)
-        if not broken:
-            cls.poll_message_set("Check the rules first; the list of broken rules is empty")
-        return broken > 0
+        return _has_entries(cls, context)
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
@@ -213,14 +220,14 @@ class SYNTHROADS_OT_mend_violation(bpy.types.Operator):
 
     bl_idname = "synthroads.mend_violation"
     bl_label = "Mend"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}  # noqa: RUF012
 
     index: bpy.props.IntProperty(name="Line", min=0, description="Row of the list, from 0", options={"SKIP_SAVE"})
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the list of broken rules has entries."""
-        return SYNTHROADS_OT_show_violation.poll.__func__(cls, context)
+        return _has_entries(cls, context)
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:

@@ -60,7 +60,15 @@ def test_every_operator_stands_in_a_menu_or_needs_a_choice_of_the_panel() -> Non
     files = (file_menus._draw_import, file_menus._draw_export)
     text = "\n".join(line for draw in (*draws, *files) for line in entries(draw))
     of_the_panel = {
-        *("choose_scenario", "choose_device", "add_file", "remove_file", "add_calibration_class", "show_violation"),
+        *(
+            "choose_scenario",
+            "choose_device",
+            "add_file",
+            "remove_file",
+            "add_calibration_class",
+            "show_violation",
+            "mend_violation",
+        ),
         *("move_thing", "move_axis_point"),
         *("remove_calibration_class", "show_doubt", "look_through", "add_asset_library"),
     }
