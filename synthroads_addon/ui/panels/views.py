@@ -6,7 +6,8 @@ Annotations are not postponed here: Blender reads the properties from them.
 import bpy
 from mathutils import Matrix
 
-from ...blender.model.store import PARAMETERS, SCENARIO, find_road, recall
+from ...blender.model.older_files import PARAMETERS
+from ...blender.model.store import SCENARIO, find_road, recall
 from ...blender.views.daylight import VIEW, add_views, cameras_of
 from ...sampling.surroundings import sample_environment
 from ...scenario.scenario import Scenario
