@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import bpy
 
 from ...blender.model.store import BUILT_FROM, find_road
-from ...blender.things.model_builder import ROLE
+from ...blender.things.model_builder import ROLE, SUPPORT
 from ..drawing.links import curve_name
 from ..fields.preferences import preferences
 from ..fields.room import buttons_row, draw_flag, draw_menu, draw_text, value_row
@@ -188,7 +188,10 @@ def _draw_request_to_save(layout: bpy.types.UILayout, settings: Any) -> None:
 
 def _draw_other_objects(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw a note on the number of visible objects that aren't the road's but are scanned too."""
-    count = sum(item.type in _SOLID and ROLE not in item and not item.hide_render for item in context.visible_objects)
+    count = sum(
+        item.type in _SOLID and not (item.hide_render or ROLE in item or SUPPORT in item)
+        for item in context.visible_objects
+    )
     if count:
         text = "1 other object is scanned too" if count == 1 else f"{count} other objects are scanned too"
         draw_text(layout, text, "INFO")

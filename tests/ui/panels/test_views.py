@@ -14,8 +14,8 @@ from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things.model_builder import ROLE
 from synthroads_addon.blender.views.daylight import views_of
 from synthroads_addon.scanning.colour.light import sun_direction
-from synthroads_addon.ui.panels import rules, views
-from tests.helpers.scenes.fake_layout import drawn
+from synthroads_addon.ui.panels import panels, rules, views
+from tests.helpers.scenes.fake_layout import FakeLayout, drawn
 from tests.helpers.scenes.panel_road import choose
 
 
@@ -66,6 +66,9 @@ def test_the_button_lights_the_road_and_looks_along_it(panel: Any, tmp_path: Pat
         assert inside.mean() > 0.2, name
     after = scene_mesh()
     assert (before.vertices == after.vertices).all()
+    layout = FakeLayout()
+    panels.draw_scan(layout, bpy.context)
+    assert "scanned too" not in "\n".join(layout.lines), "what scans leave out isn't counted"
     panel.seed = 5
     bpy.ops.synthroads.look_through(camera="aerial")
     bpy.ops.synthroads.add_views()
