@@ -10,7 +10,6 @@ import numpy as np
 
 from ...base.arrays import Bool, Float
 from ..geometry import alignment_of, profile_of
-from ..guidelines import DesignLimits
 from ..parameters import AlignmentObject
 
 EYE_HEIGHT, TARGET_HEIGHT = 1.0, 0.5
@@ -108,11 +107,3 @@ def overtaking_spans(
             start = spans.pop()[0]
         spans.append((start, end, may_overtake))
     return spans
-
-
-def stopping_sight_margin(axis: AlignmentObject, limits: DesignLimits, paved_half: float, stations: Float) -> Float:
-    """Return by how much (N,), m, drivers at stations (N,), in the worse direction, see farther than they stop in."""
-    clear_width = paved_half + limits.obstacle_distance
-    needed = limits.stopping_sight
-    sights = [sight_distances(axis, stations, clear_width, needed + STEP, direction) for direction in (1, -1)]
-    return np.minimum(*sights) - needed

@@ -28,11 +28,6 @@ def registered_labels() -> set[str]:
     return _with_words(label for cls in _classes() for label, _ in _messages(cls))
 
 
-def registered_tooltips() -> set[str]:
-    """Return the tooltips of the classes that are registered now, and those of their properties and choices."""
-    return _with_words(tooltip for cls in _classes() for _, tooltip in _messages(cls))
-
-
 def _with_words(texts: Iterable[str]) -> set[str]:
     """Return the texts that have letters."""
     return {text.strip() for text in texts if any(map(str.isalpha, text))}
